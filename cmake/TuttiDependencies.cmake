@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# All third-party libraries, Debian 12 packages (scripts/install_dependencies.sh lists them).
+include_guard()
+
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(tl-expected REQUIRED)
+find_package(fmt REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(TBB REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(Protobuf REQUIRED)
+find_package(Threads REQUIRED)
+find_package(spectra REQUIRED)
+
+# SuiteSparse 5.12, LAPACKE and zstd ship no CMake configuration that works everywhere: plain imported targets.
+function(tutti_import_library target header)
+  cmake_parse_arguments(ARG "" "" "LIBS;SUFFIXES" ${ARGN})
+  string(TOUPPER ${target} upper)
+  string(REPLACE "::" "_" upper ${upper})
+  find_path(${upper}_INCLUDE_DIR ${header} PATH_SUFFIXES ${ARG_SUFFIXES} REQUIRED)
+  add_library(${target} INTERFACE IMPORTED GLOBAL)
+  target_include_directories(${target} SYSTEM INTERFACE "${${upper}_INCLUDE_DIR}")
+  foreach(lib IN LISTS ARG_LIBS)
+    find_library(${upper}_${lib}_LIBRARY ${lib} REQUIRED)
+    target_link_libraries(${target} INTERFACE "${${upper}_${lib}_LIBRARY}")
+    mark_as_advanced(${upper}_${lib}_LIBRARY)
+  endforeach()
+  mark_as_advanced(${upper}_INCLUDE_DIR)
+endfunction()
+tutti_import_library(tutti::cholmod cholmod.h LIBS cholmod SUFFIXES suitesparse)
+tutti_import_library(tutti::lapacke lapacke.h LIBS lapacke openblas)
+tutti_import_library(tutti::zstd zstd.h LIBS zstd)
+tutti_import_library(tutti::nanoflann nanoflann.hpp)
+
+if(TUTTI_BUILD_TESTS)
+  find_package(GTest REQUIRED)
+  find_package(rapidcheck REQUIRED)
+  find_package(Ceres 2.1 REQUIRED) # the reference solver of the tests
+endif()
+if(TUTTI_BUILD_BENCH)
+  find_package(benchmark REQUIRED)
+endif()

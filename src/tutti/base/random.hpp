@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <string_view>
+
+namespace tutti {
+
+/// Seeded randomness that is handed in, never global. `fork("alpha/odometry")` gives an independent stream that depends
+/// only on the seed and the name, so adding a consumer never changes what the others draw.
+class Rng {
+ public:
+  explicit Rng(std::uint64_t seed) : seed_(mix(seed)), engine_(seed_) {}
+
+  [[nodiscard]] Rng fork(std::string_view name) const {
+    std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
+    for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+    return Rng(seed_ ^ hash);
+  }
+  [[nodiscard]] Rng fork(std::uint64_t number) const { return Rng(seed_ ^ mix(number + 0x9e3779b97f4a7c15ULL)); }
+
+  /// Uniform in [low, high).
+  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
+  /// Uniform in {0, ..., n - 1}; n > 0.
+  std::uint64_t index(std::uint64_t n) { return std::uniform_int_distribution<std::uint64_t>(0, n - 1)(engine_); }
+  double normal(double sigma = 1.0) { return sigma * std::normal_distribution<double>(0.0, 1.0)(engine_); }
+  bool bernoulli(double probability) { return uniform(0.0, 1.0) < probability; }
+
+ private:
+  static std::uint64_t mix(std::uint64_t x) {  // splitmix64 finaliser
+    x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
+    x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
+    return x ^ (x >> 31U);
+  }
+  std::uint64_t seed_;
+  std::mt19937_64 engine_;
+};
+
+}  // namespace tutti

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+
+/// Rotations, as unit quaternions, with tangent theta in R^3 (radians, right perturbation).
+/// Equations: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018).
+namespace tutti {
+
+Eigen::Matrix3d skew(const Eigen::Vector3d& v);
+
+/// Exp(theta), eqs. (101), (132); accurate for any |theta| (series below 1e-4).
+Eigen::Quaterniond so3_exp(const Eigen::Vector3d& theta);
+/// Log(q) in (-pi, pi], eq. (103), (133); q and -q give the same. |q| must be 1 within 1e-6.
+Eigen::Vector3d so3_log(const Eigen::Quaterniond& q);
+/// Right Jacobian: Exp(theta + d) ~ Exp(theta) Exp(Jr(theta) d), eq. (143), and its inverse, eq. (144).
+Eigen::Matrix3d so3_right_jacobian(const Eigen::Vector3d& theta);
+Eigen::Matrix3d so3_right_jacobian_inverse(const Eigen::Vector3d& theta);
+/// Closest rotation to a 3x3 matrix in the Frobenius norm (SVD, det +1).
+Eigen::Matrix3d project_to_so3(const Eigen::Matrix3d& m);
+
+}  // namespace tutti

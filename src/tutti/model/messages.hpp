@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/model/proxy_graph.hpp"
+#include "tutti/model/submap.hpp"
+
+namespace tutti {
+
+inline constexpr std::uint32_t kProtocolVersion = 1;
+
+/// In front of every message. (robot, session, sequence) identifies it, so duplicates are recognised.
+struct MessageHeader {
+  RobotId robot;              ///< Sender; of a server's message: unused, 0.
+  std::uint64_t session = 0;  ///< Changes when the sender restarts.
+  std::uint64_t sequence = 0;
+  friend bool operator==(const MessageHeader&, const MessageHeader&) = default;
+};
+
+struct SubmapMessage {  ///< robot -> server
+  MessageHeader header;
+  Submap submap;
+};
+
+struct ProxyGraphMessage {  ///< server -> every robot
+  MessageHeader header;
+  ProxyGraph graph;
+};
+
+}  // namespace tutti
