@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/base/timestamp.hpp"
+#include "tutti/model/point_cloud.hpp"
+#include "tutti/model/pose_graph.hpp"
+#include "tutti/model/proxy_graph.hpp"
+#include "tutti/model/trajectory.hpp"
+
+/// Everything a finished mission knows, as plain values: filled by the mission, read by the report writers. What could
+/// not be measured is std::nullopt (or an empty vector). docs/report.md defines every figure.
+namespace tutti::mission {
+
+/// One estimate of one robot against the reference, after one rigid alignment (SE(3), no scale).
+struct Accuracy {
+  std::optional<double> rmse_m;       ///< ATE, root mean square.
+  std::optional<double> max_error_m;  ///< ATE, largest.
+  std::optional<double> rpe_m;        ///< RPE, root mean square of the translation.
+};
+
+enum class ConstraintKind { small, mid, large, other };  ///< The group of scales that asked for it; other = a baseline.
+
+/// A constraint that a robot holds at the end of the mission, between two of its own keyframes.
+struct ConstraintRecord {
+  Timestamp from;
+  Timestamp to;
+  ConstraintKind kind = ConstraintKind::other;
+};
+
+/// One policy on one robot.
+struct PolicyRecord {
+  std::string name;
+  Accuracy accuracy;
+  std::optional<double> agreement_rmse_m;  ///< ATE of the corrected estimate with the server's as the reference.
+  std::size_t constraints_added = 0;       ///< Held at the end of the mission.
+  Trajectory corrected;                    ///< T_map_body at keyframes.
+  std::vector<ConstraintRecord> constraints;
+};
+
+/// One answer of a robot to one broadcast (default policy).
+struct UpdateRecord {
+  double time_s = 0.0;  ///< Mission time.
+  std::uint64_t revision = 0;
+  std::size_t synchronised_nodes = 0;
+  std::size_t constraints_total = 0;       ///< Held after this update.
+  Eigen::VectorXd mean_disagreement_m;     ///< Per scale (0 = largest), over the synchronised nodes; before correcting.
+  Eigen::VectorXd max_disagreement_m;      ///< Same shape.
+  std::optional<double> agreement_rmse_m;  ///< Corrected against the broadcast, after correcting.
+};
+
+/// Where a robot believes another one to be at the end of the mission.
+struct WhereaboutsRecord {
+  RobotId other;
+  Timestamp stamp;   ///< Of the other's last known pose.
+  Pose3 T_map_body;  ///< Map frame of the robot that believes it.
+};
+
+struct RobotRecord {
+  RobotId id;
+  std::string name;
+  double distance_m = 0.0;  ///< Along the raw odometry, every pose.
+  double duration_s = 0.0;  ///< First to last odometry pose.
+  std::size_t odometry_factors = 0;
+  Accuracy onboard;                    ///< Raw odometry.
+  Accuracy server;                     ///< This robot's part of the server's estimate, aligned alone.
+  std::vector<PolicyRecord> policies;  ///< In the order they are to be shown.
+  std::uint64_t bytes_up = 0;          ///< Encoded messages robot -> server.
+  std::uint64_t bytes_down = 0;        ///< Encoded messages server -> robot.
+  std::size_t messages_up = 0;
+  std::size_t messages_down = 0;
+  std::size_t keyframes = 0;
+  std::size_t submaps = 0;
+  std::size_t proxy_nodes = 0;  ///< Of this robot in the last broadcast.
+  std::uint32_t component = 0;  ///< Robots of one component share the server's world frame.
+  Trajectory odometry;          ///< T_odom_body at keyframes.
+  Trajectory server_estimate;   ///< T_world_body at keyframes.
+  Trajectory reference;         ///< T_reference_body, one frame for all robots; empty when there is none.
+  std::vector<UpdateRecord> updates;
+  std::vector<WhereaboutsRecord> whereabouts;
+};
+
+/// A loop closure of the final map.
+struct ClosureRecord {
+  KeyframeId from;
+  KeyframeId to;
+};
+
+/// How many candidate closures were refused for one reason.
+struct RejectionRecord {
+  std::string reason;
+  std::size_t intra = 0;  ///< Both ends on one robot.
+  std::size_t inter = 0;
+};
+
+/// A node of ServerRecord::graph.
+struct NodeRecord {
+  KeyframeId id;
+  Timestamp stamp;
+};
+
+/// What one robot saw, in the server's world frame.
+struct CloudRecord {
+  RobotId robot;
+  PointCloud cloud;
+};
+
+struct ServerRecord {
+  std::size_t components = 0;           ///< Groups of robots that share a frame.
+  std::vector<ClosureRecord> closures;  ///< Accepted.
+  std::vector<RejectionRecord> rejections;
+  Accuracy joint;                   ///< All robots of the largest component together, one alignment.
+  std::vector<NodeRecord> nodes;    ///< One per pose of `graph`, sorted by (robot, index).
+  PoseGraph graph;                  ///< T_world_body.
+  ProxyGraph proxy;                 ///< The last broadcast.
+  std::vector<CloudRecord> clouds;  ///< Empty when no robot has a range sensor.
+};
+
+/// Where the odometry frame of `to` lies in that of `from`.
+struct TransformRecord {
+  std::string from;
+  std::string to;
+  Pose3 T_from_to;
+  std::optional<double> error_m;  ///< Against the reference, at the centroid of the `to` trajectory.
+  std::optional<double> error_deg;
+};
+
+/// Wall-clock samples of one policy on one robot, one per update; milliseconds. update = comparison + choosing +
+/// optimisation, from the broadcast's arrival to the corrected trajectory.
+struct PolicyTiming {
+  std::string robot;
+  std::string policy;
+  std::vector<double> update_ms;
+  std::vector<double> comparison_ms;
+  std::vector<double> optimisation_ms;
+};
+
+/// What one participant used of one core, and how late it was at worst. Only measured with --rate.
+struct LoadRecord {
+  std::string name;
+  double cpu_share = 0.0;  ///< CPU time / wall time; 1 = one core busy.
+  double worst_latency_ms = 0.0;
+};
+
+/// Everything that depends on the clock of this machine: never mixed with the rest.
+struct TimingRecord {
+  std::string machine;  ///< CPU, threads, BLAS, in words.
+  double wall_s = 0.0;
+  std::optional<double> rate;  ///< As asked for with --rate; none = as fast as possible.
+  std::vector<PolicyTiming> policies;
+  std::vector<double> server_verification_ms;  ///< One per candidate pair.
+  std::vector<double> server_optimisation_ms;
+  std::vector<double> proxy_graph_ms;
+  std::vector<LoadRecord> load;
+};
+
+struct MissionRecord {
+  std::string mission;
+  std::string description;
+  std::string input;  ///< E.g. "real recordings", "real odometry, closures from the reference", "simulated".
+  std::vector<std::string> notes;  ///< Plain words about input and limits, one sentence or two each.
+  std::uint64_t seed = 0;
+  std::string default_policy;
+  double duration_s = 0.0;             ///< Mission time.
+  double association_tolerance_s = 0;  ///< Stamps of estimate and reference this close belong together.
+  std::string version;                 ///< Program version and commit.
+  std::string effective_config_yaml;
+  std::vector<RobotRecord> robots;
+  ServerRecord server;
+  std::vector<TransformRecord> transforms;
+  TimingRecord timing;
+};
+
+}  // namespace tutti::mission
