@@ -2,3 +2,291 @@
 #include "tutti/base/config.hpp"
 
 #include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <numeric>
+#include <set>
+#include <sstream>
+
+namespace tutti {
+namespace {
+
+// Aliases can make a small file unfold without end ("&a [*a]", "billion laughs"); no honest settings come near these.
+constexpr int kMaxDepth = 32;
+constexpr int kMaxNodes = 200'000;
+
+/// What is wrong with a document's content, with the line that says it.
+struct ContentError {
+  int line;
+  std::string text;
+};
+
+class YamlReader {
+ public:
+  ConfigNode read(const YAML::Node& yaml, int line, int depth = 0) {
+    if (depth > kMaxDepth) throw ContentError{line, fmt::format("nested more than {} deep", kMaxDepth)};
+    if (++nodes_ > kMaxNodes) throw ContentError{line, fmt::format("more than {} values", kMaxNodes)};
+    ConfigNode out{.line = line};
+    if (yaml.IsScalar()) {
+      out.kind = ConfigNode::Kind::scalar;
+      out.scalar = yaml.Scalar();
+    } else if (yaml.IsSequence()) {
+      out.kind = ConfigNode::Kind::list;
+      for (const auto& element : yaml) out.list.push_back(read(element, line_of(element, line), depth + 1));
+    } else if (yaml.IsMap()) {
+      read_map(yaml, depth, out);
+    }
+    return out;
+  }
+  static int line_of(const YAML::Node& yaml, int fallback) {
+    return yaml.Mark().is_null() ? fallback : yaml.Mark().line + 1;
+  }
+
+ private:
+  void read_map(const YAML::Node& yaml, int depth, ConfigNode& out) {
+    out.kind = ConfigNode::Kind::map;
+    std::set<std::string> seen;
+    for (const auto& entry : yaml) {
+      const int line = line_of(entry.first, out.line);
+      if (!entry.first.IsScalar()) throw ContentError{line, "a key must be plain text"};
+      const std::string& key = entry.first.Scalar();
+      if (!seen.insert(key).second) throw ContentError{line, fmt::format("key '{}' appears twice", key)};
+      out.map.emplace_back(key, read(entry.second, line, depth + 1));
+    }
+  }
+  int nodes_ = 0;
+};
+
+void emit(YAML::Emitter& out, const ConfigNode& node) {
+  switch (node.kind) {
+    case ConfigNode::Kind::null:
+      out << YAML::Null;
+      break;
+    case ConfigNode::Kind::scalar:
+      out << node.scalar;
+      break;
+    case ConfigNode::Kind::list: {
+      const bool flat =
+          std::ranges::all_of(node.list, [](const auto& e) { return e.kind == ConfigNode::Kind::scalar; });
+      out << (flat ? YAML::Flow : YAML::Block) << YAML::BeginSeq;
+      for (const auto& element : node.list) emit(out, element);
+      out << YAML::EndSeq;
+      break;
+    }
+    case ConfigNode::Kind::map:
+      out << (node.map.empty() ? YAML::Flow : YAML::Block) << YAML::BeginMap;
+      for (const auto& [key, value] : node.map) {
+        out << YAML::Key << key << YAML::Value;
+        emit(out, value);
+      }
+      out << YAML::EndMap;
+      break;
+  }
+}
+
+void forget_lines(ConfigNode& node) {
+  node.line = 0;
+  for (auto& element : node.list) forget_lines(element);
+  for (auto& [key, value] : node.map) forget_lines(value);
+}
+
+/// The child of a map (created when missing) or list that one step of a path names.
+Result<ConfigNode*> step_into(ConfigNode& node, const std::string& step, const std::string& assignment) {
+  if (node.kind == ConfigNode::Kind::list) {
+    std::size_t index = 0;
+    const auto [end, error] = std::from_chars(step.data(), step.data() + step.size(), index);
+    if (error != std::errc{} || end != step.data() + step.size() || index >= node.list.size())
+      return fail(ErrorCode::configuration, "--set {}: '{}' is no element of the list, which has {}", assignment, step,
+                  node.list.size());
+    return &node.list[index];
+  }
+  if (node.kind == ConfigNode::Kind::scalar)
+    return fail(ErrorCode::configuration, "--set {}: nothing can be below '{}'", assignment, node.scalar);
+  node.kind = ConfigNode::Kind::map;
+  for (auto& [key, value] : node.map)
+    if (key == step) return &value;
+  return &node.map.emplace_back(step, ConfigNode{}).second;
+}
+
+/// Levenshtein's distance: how many letters to insert, delete or replace.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row.back();
+}
+
+template <class Number>
+bool parse_number(std::string_view text, Number& out) {
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  Number value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return false;
+  out = value;
+  return true;
+}
+
+template <class Number>
+std::string print_number(Number value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof(text), value).ptr};
+}
+
+}  // namespace
+
+const ConfigNode* ConfigNode::find(std::string_view key) const {
+  const auto found = std::ranges::find(map, key, &std::pair<std::string, ConfigNode>::first);
+  return found == map.end() ? nullptr : &found->second;
+}
+
+Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name) {
+  try {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1)
+      return fail(ErrorCode::parse, "{}: {} YAML documents, expected one", name, documents.size());
+    if (documents.empty()) return ConfigNode{};
+    return YamlReader{}.read(documents[0], YamlReader::line_of(documents[0], 1));
+  } catch (const ContentError& error) {
+    return fail(ErrorCode::parse, "{}:{}: {}", name, error.line, error.text);
+  } catch (const YAML::Exception& error) {
+    return fail(ErrorCode::parse, "{}:{}: {}", name, error.mark.line + 1, error.msg);
+  }
+}
+
+Result<ConfigNode> load_yaml(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  if (file.is_open() && file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
+  if (!file.is_open() || file.bad() || text.fail()) return fail(ErrorCode::io, "{}: cannot be read", path);
+  return parse_yaml(text.str(), path);
+}
+
+std::string to_yaml(const ConfigNode& node) {
+  YAML::Emitter out;
+  emit(out, node);
+  return std::string(out.c_str()) + "\n";
+}
+
+Status apply_override(ConfigNode& root, const std::string& assignment) {
+  const auto equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0)
+    return fail(ErrorCode::configuration, "--set {}: expected key=value, for example robots.0.voxel_m=0.4", assignment);
+  auto value = parse_yaml(assignment.substr(equals + 1), "--set " + assignment);
+  if (!value) return tl::unexpected(value.error());
+  forget_lines(*value);
+
+  const std::string key = assignment.substr(0, equals);
+  ConfigNode changed = root;  // so that a bad path leaves the root alone
+  ConfigNode* node = &changed;
+  for (std::size_t begin = 0; begin <= key.size();) {
+    const std::size_t end = std::min(key.find('.', begin), key.size());
+    const std::string step = key.substr(begin, end - begin);
+    begin = end + 1;
+    if (step.empty()) return fail(ErrorCode::configuration, "--set {}: empty step in the key", assignment);
+    auto child = step_into(*node, step, assignment);
+    if (!child) return tl::unexpected(child.error());
+    node = *child;
+  }
+  *node = std::move(*value);
+  root = std::move(changed);
+  return {};
+}
+
+namespace config_internal {
+
+bool parse_scalar(const std::string& text, bool& out) {
+  if (text != "true" && text != "false") return false;
+  out = text == "true";
+  return true;
+}
+bool parse_scalar(const std::string& text, int& out) { return parse_number(text, out); }
+bool parse_scalar(const std::string& text, std::uint64_t& out) { return parse_number(text, out); }
+bool parse_scalar(const std::string& text, double& out) {
+  double value = 0.0;
+  if (text == ".inf" || text == "+.inf" || text == "-.inf")  // YAML's own spelling
+    value = text[0] == '-' ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::infinity();
+  else if (!parse_number(text, value) || std::isnan(value))
+    return false;
+  out = value;
+  return true;
+}
+bool parse_scalar(const std::string& text, std::string& out) {
+  out = text;
+  return true;
+}
+
+std::string print_scalar(bool value) { return value ? "true" : "false"; }
+std::string print_scalar(int value) { return print_number(value); }
+std::string print_scalar(std::uint64_t value) { return print_number(value); }
+std::string print_scalar(double value) { return print_number(value); }
+std::string print_scalar(const std::string& value) { return value; }
+
+std::string type_name(const bool&) { return "true or false"; }
+std::string type_name(const int&) { return "an integer"; }
+std::string type_name(const std::uint64_t&) { return "a non-negative integer"; }
+std::string type_name(const double&) { return "a number"; }
+std::string type_name(const std::string&) { return "text"; }
+
+std::string violation(const Bound& bound, double value) {
+  const bool inside = (bound.low_open ? value > bound.low : value >= bound.low) && value <= bound.high;  // NaN: outside
+  return inside ? "" : "must be " + describe_bound(bound);
+}
+
+std::string violation(const Bound& bound, const std::string& value) {
+  const bool inside = bound.choices.empty() || std::ranges::find(bound.choices, value) != bound.choices.end();
+  return inside ? "" : "must be " + describe_bound(bound);
+}
+
+std::string describe_bound(const Bound& bound) {
+  if (!bound.choices.empty()) return fmt::format("one of {}", fmt::join(bound.choices, ", "));
+  const bool below = std::isfinite(bound.low);
+  const bool above = std::isfinite(bound.high);
+  const std::string low = print_scalar(bound.low);
+  const std::string high = print_scalar(bound.high);
+  if (below && above) return fmt::format("in {}{}, {}]", bound.low_open ? "(" : "[", low, high);
+  if (below) return fmt::format("{} {}", bound.low_open ? ">" : ">=", low);
+  if (above) return fmt::format("<= {}", high);
+  return "";
+}
+
+void Loader::finish() {
+  if (node_.kind != ConfigNode::Kind::map && node_.kind != ConfigNode::Kind::null)
+    complain(node_, path_, "expected a map of settings");
+  for (const auto& [key, value] : node_.map) {
+    if (std::ranges::find(known_, key) != known_.end()) continue;
+    const auto nearest = std::ranges::min_element(known_, {}, [&key](const auto& k) { return edit_distance(key, k); });
+    const bool close =
+        nearest != known_.end() && edit_distance(key, *nearest) <= std::max<std::size_t>(2, key.size() / 2);
+    complain(value, path_.empty() ? key : path_ + "." + key,
+             close ? fmt::format("unknown key, did you mean '{}'?", *nearest)
+                   : fmt::format("unknown key, known here: {}", fmt::join(known_, ", ")));
+  }
+}
+
+/// Kept as ":12: path: text"; to_status() puts the document's name in front.
+void Loader::complain(const ConfigNode& node, const std::string& path, const std::string& text) {
+  const std::string where = path.empty() ? "" : path + ": ";
+  problems_.push_back(node.line > 0 ? fmt::format(":{}: {}{}", node.line, where, text)
+                                    : fmt::format(": {}{}", where, text));
+}
+
+Status to_status(const std::string& name, const std::vector<std::string>& problems) {
+  if (problems.empty()) return {};
+  std::string message;
+  for (const auto& problem : problems) message += (message.empty() ? "" : "\n") + name + problem;
+  return fail(ErrorCode::configuration, "{}", message);
+}
+
+}  // namespace config_internal
+}  // namespace tutti
