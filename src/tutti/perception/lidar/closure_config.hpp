@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "tutti/base/config.hpp"
+
+namespace tutti::lidar {
+
+struct NormalConfig {
+  int neighbours = 12;             ///< Points of the plane fit, the point itself included.
+  double max_radius_m = 1.0;       ///< Neighbours farther than this are not used.
+  double max_surface_ratio = 0.2;  ///< Smallest over middle eigenvalue of the scatter; above it: no normal.
+  template <class V>
+  void describe(V& v) {
+    v.field("neighbours", neighbours, between(4, 64), "Points of the plane fit.");
+    v.field("max_radius_m", max_radius_m, greater_than(0.0), "Neighbours farther than this are not used.");
+    v.field("max_surface_ratio", max_surface_ratio, between(0.0, 1.0),
+            "Smallest over middle eigenvalue of the neighbours' scatter above which a point has no normal.");
+  }
+};
+
+/// One stage of the registration.
+struct RegistrationLevel {
+  double max_distance_m = 0.3;  ///< Correspondences farther apart are not used.
+  int max_points = 4000;        ///< Source points used, evenly spread.
+  int max_iterations = 15;
+  template <class V>
+  void describe(V& v) {
+    v.field("max_distance_m", max_distance_m, greater_than(0.0), "Correspondences farther apart are not used.");
+    v.field("max_points", max_points, at_least(10), "Source points used, evenly spread.");
+    v.field("max_iterations", max_iterations, at_least(1), "Gauss-Newton steps at most.");
+  }
+};
+
+struct RegistrationConfig {
+  std::vector<RegistrationLevel> levels{{1.5, 700, 10}, {0.6, 1500, 8}, {0.3, 4000, 10}};  ///< Coarse to fine.
+  double max_normal_angle_deg = 45.0;  ///< Between the normals of two corresponding points.
+  double overlap_distance_m = 0.3;     ///< A point overlaps when a target point with a like normal is this close.
+  double residual_scale_m = 0.05;      ///< Of the robust loss at the finest level; grows with the level's distance.
+  double covariance_scale = 30.0;      ///< Neighbouring residuals are not independent: divides the information.
+  double min_translation_sigma_m = 0.004;
+  double min_rotation_sigma_rad = 0.001;
+  template <class V>
+  void describe(V& v) {
+    v.field("levels", levels, any(), "Stages of the registration, coarse to fine.");
+    v.field("max_normal_angle_deg", max_normal_angle_deg, between(1.0, 180.0), "Between corresponding normals.");
+    v.field("overlap_distance_m", overlap_distance_m, greater_than(0.0),
+            "A point overlaps when a target point with a like normal is this close.");
+    v.field("residual_scale_m", residual_scale_m, greater_than(0.0), "Scale of the robust loss at the finest level.");
+    v.field("covariance_scale", covariance_scale, at_least(1.0),
+            "How many neighbouring residuals count as one independent one.");
+    v.field("min_translation_sigma_m", min_translation_sigma_m, greater_than(0.0), "Floor of the standard deviation.");
+    v.field("min_rotation_sigma_rad", min_rotation_sigma_rad, greater_than(0.0), "Floor of the standard deviation.");
+  }
+};
+
+/// Search for the rough relative pose by correlating views from above.
+struct CandidateConfig {
+  double cell_m = 0.4;     ///< Cell of the 128 x 128 view from above.
+  int yaw_steps = 120;     ///< Of the full turn; a multiple of 4.
+  int max_guesses = 3;     ///< Best alignments handed to the registration.
+  double min_score = 0.1;  ///< Correlation (0..1) below which a guess is not worth a registration.
+  template <class V>
+  void describe(V& v) {
+    v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 128 x 128 view from above.");
+    v.field("yaw_steps", yaw_steps, between(4, 720), "Steps of the full turn; a multiple of 4.");
+    v.field("max_guesses", max_guesses, between(1, 16), "Best alignments handed to the registration.");
+    v.field("min_score", min_score, between(0.0, 1.0), "Correlation below which a guess is dropped.");
+  }
+};
+
+/// From two submap clouds to a loop closure or a refusal. Every gate is a physical quantity.
+struct LidarClosureConfig {
+  double min_duration_s = 5.0;  ///< Shorter submaps saw too little: they gave wrong closures.
+  int min_keyframes = 3;
+  int min_points = 500;
+  NormalConfig normals;
+  CandidateConfig candidates;
+  RegistrationConfig registration;
+  double min_overlap = 0.3;              ///< Mean of both directions.
+  double max_plane_rmse_m = 0.085;       ///< Point to plane, over the overlap.
+  double min_eigenvalue = 0.05;          ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
+  double max_forward_backward_m = 0.05;  ///< Between a-to-b and b-to-a, at the centre of the overlap.
+  double max_forward_backward_deg = 0.5;
+  template <class V>
+  void describe(V& v) {
+    v.field("min_duration_s", min_duration_s, at_least(0.0), "Shorter submaps are not used.");
+    v.field("min_keyframes", min_keyframes, at_least(1), "Submaps with fewer keyframes are not used.");
+    v.field("min_points", min_points, at_least(10), "Submaps with fewer points are not used.");
+    v.field("normals", normals, any(), "Surface normals.");
+    v.field("candidates", candidates, any(), "Rough alignment.");
+    v.field("registration", registration, any(), "Point-to-plane registration.");
+    v.field("min_overlap", min_overlap, between(0.0, 1.0), "Mean overlap of both directions.");
+    v.field("max_plane_rmse_m", max_plane_rmse_m, greater_than(0.0), "Point-to-plane residual over the overlap.");
+    v.field("min_eigenvalue", min_eigenvalue, between(0.0, 0.34),
+            "Smallest eigenvalue of the normalised translation Hessian; below it the clouds can slide.");
+    v.field("max_forward_backward_m", max_forward_backward_m, greater_than(0.0),
+            "Between the registrations of a to b and b to a.");
+    v.field("max_forward_backward_deg", max_forward_backward_deg, greater_than(0.0),
+            "Between the registrations of a to b and b to a.");
+  }
+};
+
+}  // namespace tutti::lidar

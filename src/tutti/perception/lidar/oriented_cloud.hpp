@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "tutti/perception/lidar/closure_config.hpp"
+
+namespace tutti::lidar {
+
+/// Finds nearest points. Immutable after construction, safe to share between threads; equally near points: the one with
+/// the lower index.
+class NeighbourIndex {
+ public:
+  static constexpr std::int32_t kNone = -1;
+
+  explicit NeighbourIndex(std::vector<Eigen::Vector3f> points);
+  ~NeighbourIndex();
+  NeighbourIndex(const NeighbourIndex&) = delete;
+  NeighbourIndex& operator=(const NeighbourIndex&) = delete;
+
+  [[nodiscard]] const std::vector<Eigen::Vector3f>& points() const;
+  /// Index of the point nearest to `query` and closer than `max_distance`, or kNone.
+  [[nodiscard]] std::int32_t nearest(const Eigen::Vector3f& query, float max_distance) const;
+  /// The (at most) out.size() nearest points, nearest first; returns how many there are.
+  std::size_t nearest_k(const Eigen::Vector3f& query, std::span<std::int32_t> out) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+/// A surface: points, each with a unit normal that faces the place it was seen from (zero where there is none because
+/// the neighbourhood is not flat). Copies share the data.
+struct OrientedCloud {
+  std::shared_ptr<const NeighbourIndex> index;
+  std::shared_ptr<const std::vector<Eigen::Vector3f>> normals;
+
+  [[nodiscard]] std::size_t size() const { return normals ? normals->size() : 0; }
+  [[nodiscard]] const Eigen::Vector3f& point(std::size_t i) const { return index->points()[i]; }
+  [[nodiscard]] const Eigen::Vector3f& normal(std::size_t i) const { return (*normals)[i]; }
+};
+
+/// Normals by principal components of the nearest neighbours, turned towards the nearest viewpoint. Points and
+/// viewpoints in one frame; no viewpoint: towards the origin. Deterministic.
+OrientedCloud orient(std::vector<Eigen::Vector3f> points, std::span<const Eigen::Vector3f> viewpoints,
+                     const NormalConfig& config);
+
+}  // namespace tutti::lidar

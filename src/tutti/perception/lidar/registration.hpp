@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/perception/lidar/closure_config.hpp"
+#include "tutti/perception/lidar/oriented_cloud.hpp"
+
+namespace tutti::lidar {
+
+struct RegistrationResult {
+  Pose3 T_target_source;
+  Matrix6d covariance = Matrix6d::Identity();  ///< Right perturbation of T_target_source (geometry/pose3.hpp).
+  double overlap = 0.0;                     ///< Share of the source points with a target point near and a like normal.
+  double plane_rmse_m = 0.0;                ///< Point to plane, over the overlapping points.
+  double min_translation_eigenvalue = 0.0;  ///< Of sum n n^T over the overlap, trace 1: 0 = free to slide.
+  Eigen::Vector3d overlap_centre_source = Eigen::Vector3d::Zero();  ///< Mean of the overlapping points, source frame.
+  int iterations = 0;
+  bool converged = false;
+};
+
+/// Robust multi-scale point-to-plane registration [Chen & Medioni 1992] of `source` on `target`, from T_init.
+/// Too few correspondences: converged = false, overlap what was left.
+RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCloud& source, const Pose3& T_init,
+                                   const RegistrationConfig& config);
+
+}  // namespace tutti::lidar

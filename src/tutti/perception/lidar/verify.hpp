@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/model/loop_closure.hpp"
+#include "tutti/perception/lidar/closure_config.hpp"
+#include "tutti/perception/lidar/submap_features.hpp"
+
+namespace tutti::lidar {
+
+/// What comparing two submaps found. The measured quantities are those of the best alignment, also when refused.
+struct PairVerification {
+  bool accepted = false;
+  std::string reason;                          ///< Why refused: which quantity, its value, its bound.
+  Pose3 T_a_b;                                 ///< Between the submap frames.
+  Matrix6d covariance = Matrix6d::Identity();  ///< Right perturbation of T_a_b.
+  double overlap = 0.0;                        ///< Mean of both directions.
+  double plane_rmse_m = 0.0;                   ///< The larger of both directions.
+  double min_eigenvalue = 0.0;                 ///< The smaller of both directions.
+  double forward_backward_m = 0.0;             ///< At the centre of the overlap.
+  double correlation_score = 0.0;
+};
+
+/// Decides from the two submaps alone whether they show the same place. verify_pair(b, a) is the inverse, to the
+/// rounding of floating point.
+PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config);
+
+/// The closure is expressed between the middle keyframes, where bent submaps agree best; its covariance is enlarged by
+/// the odometry between the middle and the rest of each submap. pair.first < pair.second whatever the order of a and b.
+ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerification& verification);
+
+}  // namespace tutti::lidar
