@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/estimation/termination.hpp"
+#include "tutti/model/relative_pose.hpp"
+
+namespace tutti::estimation {
+
+struct OnboardSmootherConfig {
+  int max_iterations = 20;
+  double relative_cost_tolerance = 1e-6;
+  std::string loss = "none";
+  double loss_scale = 3.0;
+  int polishing_steps = 1;
+
+  template <class V>
+  void describe(V& v) {
+    v.field("max_iterations", max_iterations, at_least(1), "Gauss-Newton steps on the reduced graph at most.");
+    v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
+            "Converged when a step can lower the cost by less than this share of it.");
+    v.field("loss", loss, one_of({"none", "huber", "cauchy"}), "Robust loss on the constraints.");
+    v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
+    v.field("polishing_steps", polishing_steps, between(0, 10),
+            "Gauss-Newton steps on the full graph after the reduced one.");
+  }
+};
+
+/// A relative pose between two nodes of the chain, positions as returned by append().
+struct ChainConstraint {
+  std::size_t from = 0;
+  std::size_t to = 0;
+  RelativePose measurement;
+  friend bool operator==(const ChainConstraint&, const ChainConstraint&) = default;
+};
+
+struct SmootherSummary {
+  Termination termination = Termination::not_run;
+  int iterations = 0;          ///< On the reduced graph.
+  double initial_cost = -1.0;  ///< Of the reduced graph: compounded odometry and constraints (with the loss).
+  double final_cost = -1.0;
+  std::size_t reduced_nodes = 0;
+  std::size_t reduced_edges = 0;
+};
+
+/// All that determines the estimate; enough to restore the smoother.
+struct SmootherState {
+  Pose3 first;
+  std::vector<RelativePose> odometry;
+  std::vector<ChainConstraint> constraints;
+  friend bool operator==(const SmootherState&, const SmootherState&) = default;
+};
+
+/// A robot's own optimiser: one odometry chain and relative constraints between some of its nodes. Each run of odometry
+/// between two constrained nodes is compounded, with covariance, into one factor; Gauss-Newton solves the small graph
+/// of constrained nodes; each run's inner poses follow exactly in closed form (the smoother of a linear-Gaussian chain
+/// with fixed ends); what comes after the last constrained node is composed. A polishing step does the same about the
+/// current poses instead of the raw odometry, which makes it a Gauss-Newton step on the full graph. docs/math.md
+/// derives it. The estimate is a function of state() alone, not of the history of calls.
+class OnboardSmoother {
+ public:
+  explicit OnboardSmoother(const OnboardSmootherConfig& config = {}, const Pose3& first = {});
+  OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state);
+
+  /// Adds a node by odometry from the last one and returns its position; its pose is composed until solve().
+  /// Its covariance must be positive definite.
+  std::size_t append(const RelativePose& odometry);
+  /// Nodes: one more than odometry steps.
+  [[nodiscard]] std::size_t size() const { return poses_.size(); }
+  /// The full current set, replacing the previous one; nodes must exist. from == to is ignored.
+  void set_constraints(std::vector<ChainConstraint> constraints);
+  /// Moves the fixed first pose; every pose follows rigidly.
+  void set_first_pose(const Pose3& T_map_first);
+  /// On failure (singular, invalid_input) the poses stay as they were.
+  SmootherSummary solve();
+
+  [[nodiscard]] const Pose3& pose(std::size_t node) const { return poses_[node]; }
+  [[nodiscard]] const std::vector<Pose3>& poses() const { return poses_; }  ///< T_map_body per node.
+  /// Per constraint as set: robust weight at the last solve; 1 without a loss.
+  [[nodiscard]] const std::vector<double>& constraint_weights() const { return constraint_weights_; }
+  [[nodiscard]] const SmootherState& state() const { return state_; }
+
+ private:
+  OnboardSmootherConfig config_;
+  SmootherState state_;
+  std::vector<Pose3> poses_;
+  std::vector<double> constraint_weights_;
+  /// Compounded raw odometry of a run [begin, end]; odometry never changes, so runs are computed once.
+  std::map<std::pair<std::size_t, std::size_t>, RelativePose> compounds_;
+};
+
+}  // namespace tutti::estimation

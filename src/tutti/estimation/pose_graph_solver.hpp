@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/estimation/termination.hpp"
+#include "tutti/model/pose_graph.hpp"
+
+namespace tutti::estimation {
+
+struct SolverConfig {
+  int max_iterations = 50;
+  double relative_cost_tolerance = 1e-9;
+  std::string initialisation = "chordal";
+  std::string loss = "none";
+  double loss_scale = 1.0;
+  int max_step_halvings = 8;
+
+  template <class V>
+  void describe(V& v) {
+    v.field("max_iterations", max_iterations, at_least(0), "Gauss-Newton steps at most; 0 only initialises.");
+    v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
+            "Converged when a step can lower the cost by less than this share of it.");
+    v.field("initialisation", initialisation, one_of({"chordal", "given"}),
+            "Where to start: from the measurements alone, or from the given poses.");
+    v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the robust edges.");
+    v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
+    v.field("max_step_halvings", max_step_halvings, at_least(0), "How often a step that raises the cost is halved.");
+  }
+};
+
+/// Whether an edge may be wrong. `trusted` edges (odometry) never get a robust loss.
+enum class EdgeRole : unsigned char { trusted, robust };
+
+/// Odometry guessed from numbering: edges between consecutive nodes are trusted, all others robust.
+std::vector<EdgeRole> roles_from_numbering(const PoseGraph& graph);
+
+struct SolveSummary {
+  Termination termination = Termination::not_run;
+  int iterations = 0;
+  double initial_cost = -1.0;   ///< Sum of rho(r^T Omega r) (chi2 without a loss) at the initial poses.
+  double final_cost = -1.0;     ///< The same at the returned poses.
+  double gradient_norm = -1.0;  ///< Largest entry of J^T Omega r at the last linearisation.
+  double step_norm = -1.0;      ///< Largest entry of the last step (m, rad).
+  int components = 0;           ///< Connected components of the graph; each has its own gauge.
+};
+
+struct PoseGraphSolution {
+  std::vector<Pose3> poses;
+  SolveSummary summary;
+  std::vector<double> weights;  ///< Per edge: rho' at the solution, 1 where the loss does not apply.
+};
+
+/// Minimises sum rho(r^T Omega r) over the edges (r: between_factor.hpp) by Gauss-Newton on sparse Cholesky with step
+/// halving. The first node of each connected component keeps its given pose. `roles`: per edge, or empty: all robust.
+/// Deterministic. Numerical failures are in the summary. Edge indices out of range are a bug of the caller.
+PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& config,
+                                   std::span<const EdgeRole> roles = {});
+
+/// Sum of r^T Omega r over all edges at the graph's poses.
+double chi2(const PoseGraph& graph);
+
+}  // namespace tutti::estimation

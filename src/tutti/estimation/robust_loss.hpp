@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+namespace tutti::estimation {
+
+/// What a factor with whitened squared error s = r^T Omega r costs, rho(s), with c = scale (same unit as sqrt(s)):
+///   none            rho = s
+///   huber           rho = s for s <= c^2, else 2 c sqrt(s) - c^2
+///   cauchy          rho = c^2 log(1 + s / c^2)
+///   geman_mcclure   rho = c^2 s / (c^2 + s)
+/// All have rho(0) = 0 and rho'(0) = 1, so inliers weigh what they weigh without a loss.
+enum class LossKind { none, huber, cauchy, geman_mcclure };
+
+struct RobustLoss {
+  LossKind kind = LossKind::none;
+  double scale = 1.0;  ///< > 0
+
+  [[nodiscard]] double rho(double s) const;
+  /// Weight of the factor in iteratively re-weighted least squares: rho'(s), in (0, 1].
+  [[nodiscard]] double weight(double s) const;
+};
+
+/// From its name in a configuration ("none", "huber", "cauchy", "geman_mcclure"); another name is a bug of the caller.
+LossKind loss_kind(const std::string& name);
+
+}  // namespace tutti::estimation
