@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/consistency/constraint.hpp"
+
+namespace tutti::consistency {
+
+struct LedgerConfig {
+  double replace_translation_m = 0.01;
+  double replace_rotation_deg = 0.1;
+
+  template <class V>
+  void describe(V& v) {
+    v.field("replace_translation_m", replace_translation_m, at_least(0.0),
+            "A constraint is replaced when the new one differs by more than this, or by more than the rotation below.");
+    v.field("replace_rotation_deg", replace_rotation_deg, at_least(0.0), "See replace_translation_m.");
+  }
+};
+
+struct LedgerUpdate {
+  std::size_t added = 0;
+  std::size_t replaced = 0;
+  std::size_t unchanged = 0;  ///< Chosen again, but not different enough.
+  std::size_t removed = 0;    ///< Only when the choice replaces all.
+};
+
+/// The constraints a robot holds, at most one per pair of nodes. A value.
+class Ledger {
+ public:
+  Ledger() = default;
+  /// From a saved list; duplicates as in update().
+  explicit Ledger(std::vector<Constraint> constraints);
+
+  /// Sorted by (from_stamp, to_stamp), from before to.
+  [[nodiscard]] const std::vector<Constraint>& constraints() const { return constraints_; }
+  [[nodiscard]] std::size_t size() const { return constraints_.size(); }
+
+  /// Takes `chosen` in. A constraint between the same two nodes, either way round, is replaced only when the new one
+  /// differs beyond either threshold; otherwise it stays untouched. With `replaces_all`, constraints whose nodes are
+  /// not in `chosen` go. The same pair twice in `chosen`: the last counts.
+  LedgerUpdate update(std::vector<Constraint> chosen, const LedgerConfig& config, bool replaces_all);
+
+  friend bool operator==(const Ledger&, const Ledger&) = default;
+
+ private:
+  std::vector<Constraint> constraints_;
+};
+
+/// The same constraint running from the earlier node to the later.
+Constraint in_time_order(Constraint constraint);
+
+}  // namespace tutti::consistency

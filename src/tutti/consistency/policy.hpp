@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/consistency/compare.hpp"
+#include "tutti/consistency/constraint.hpp"
+#include "tutti/consistency/ledger.hpp"
+
+namespace tutti::consistency {
+
+/// Everything a policy may look at. References live only for the call.
+struct PolicyInput {
+  const ProxyGraph& graph;
+  RobotId robot;
+  std::span<const RobotNode> nodes;
+  const Comparison& comparison;
+  /// How many constraints the robot may hold after this update; existing ones are counted, never taken away by a policy
+  /// that adds to them. None: the policy's own rule.
+  std::optional<std::size_t> budget;
+  Rng rng;
+  const Ledger& ledger;
+};
+
+struct Selection {
+  std::vector<Constraint> constraints;
+  bool replaces_all = false;  ///< False: added to (or refreshing) the ledger. True: the ledger is to hold just these.
+};
+
+/// How constraints are chosen. Implementations are immutable values; same input, same selection.
+class ConstraintPolicy {
+ public:
+  virtual ~ConstraintPolicy() = default;
+  [[nodiscard]] virtual std::string name() const = 0;
+  [[nodiscard]] virtual Selection choose(const PolicyInput& input) const = 0;
+};
+
+struct PolicyConfig {
+  std::string name = "spectral";
+  std::string classifier = "thresholds";
+  double threshold_large_m = 0.1;
+  double threshold_mid_m = 0.1;
+  double threshold_small_m = 0.1;
+  int top_count = 10;
+  double top_threshold_m = 0.07;
+  int mid_hops = 5;
+  int nearest_submaps = 4;
+  double euclidean_threshold_m = 0.1;
+  int default_budget = 25;
+  ConstraintConfig constraint;
+
+  template <class V>
+  void describe(V& v) {
+    v.field("name", name, one_of({"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean"}),
+            "How a robot chooses constraints; 'spectral' is the paper's.");
+    v.field("classifier", classifier, one_of({"thresholds", "top"}),
+            "spectral: label nodes above a threshold per group (the paper) or the largest ones (the authors' code).");
+    v.field("threshold_large_m", threshold_large_m, at_least(0.0),
+            "spectral: summed disagreement of scales 0-1 above which a node gets links to the nearest submaps.");
+    v.field("threshold_mid_m", threshold_mid_m, at_least(0.0),
+            "spectral: summed disagreement of scales 2-3 above which a node gets links mid_hops away.");
+    v.field("threshold_small_m", threshold_small_m, at_least(0.0),
+            "spectral: summed disagreement of the other scales above which a node gets links to its neighbours.");
+    v.field("top_count", top_count, at_least(1.0), "spectral, classifier top: nodes labelled per update.");
+    v.field("top_threshold_m", top_threshold_m, at_least(0.0), "spectral, classifier top: and only above this.");
+    v.field("mid_hops", mid_hops, at_least(1.0), "Mid-scale links go this many nodes back and forth in time.");
+    v.field("nearest_submaps", nearest_submaps, at_least(1.0), "Large-scale links go to this many submaps.");
+    v.field("euclidean_threshold_m", euclidean_threshold_m, at_least(0.0),
+            "euclidean without a budget: distance above which a node gets links.");
+    v.field("default_budget", default_budget, at_least(1.0),
+            "uniform and random: constraints held when no budget is given.");
+    v.field("constraint", constraint);
+  }
+};
+
+/// Fails with ErrorCode::configuration when `name` is none of the above (config.name is not looked at).
+Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, const PolicyConfig& config);
+
+}  // namespace tutti::consistency

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/model/proxy_graph.hpp"
+
+namespace tutti::consistency {
+
+/// A representative node that the server keeps a reference to, with its latest estimate.
+struct ServerNode {
+  RobotId robot;
+  Timestamp stamp;
+  Pose3 T_world_body;
+  /// Of this pose relative to the same robot's previous ServerNode (right tangent); ignored for the first.
+  Matrix6d covariance = Matrix6d::Zero();
+  std::uint32_t support = 0;  ///< Independent closures that support the stretch from the previous node to this one.
+};
+
+struct ProxyGraphConfig {
+  double radius_m = 7.0;
+  double sigma_m = 1.0;
+  int node_budget = 0;
+  std::string reducer = "budget";
+  double sparsify_threshold = 1e-3;
+
+  template <class V>
+  void describe(V& v) {
+    v.field("radius_m", radius_m, greater_than(0.0), "Nodes closer than this are neighbours.");
+    v.field("sigma_m", sigma_m, greater_than(0.0), "Scale of the edge weights exp(-d / (2 sigma^2)), eq. 1.");
+    v.field("node_budget", node_budget, at_least(0.0),
+            "Reduce the proxy graph to at most this many nodes over all robots; 0 = never. The first and last node of "
+            "every robot are always kept.");
+    v.field(
+        "reducer", reducer, one_of({"budget", "paper"}),
+        "Which nodes stay: 'budget' meets node_budget exactly and is reproducible; 'paper' keeps u_max(n) >= 0 (eq. "
+        "3) once the graph exceeds node_budget.");
+    v.field("sparsify_threshold", sparsify_threshold, between(0.0, 1.0),
+            "Drop a reduced edge whose weight is below this fraction of the largest; 0 = keep all.");
+  }
+};
+
+/// What the graph monitor broadcasts: nodes sorted by (robot, stamp); whatever order `nodes` came in, the result is the
+/// same. A repeated (robot, stamp) is our own mistake (checked).
+///
+/// Reduction (only above the budget) is done per robot on the subgraph induced by that robot's nodes, so that the robot
+/// can repeat it on its own estimate: Schur complement of the Laplacian (eq. 3), then sparsified. The budget is shared
+/// between the robots in proportion to their nodes, at least two each (one if the robot has one node). The covariance
+/// of a kept node is compounded over the removed nodes before it, its support the smallest of them.
+ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
+                             std::vector<RobotComponent> components, const ProxyGraphConfig& config);
+
+}  // namespace tutti::consistency

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "tutti/base/timestamp.hpp"
+#include "tutti/geometry/pose3.hpp"
+
+namespace tutti::consistency {
+
+/// One of a robot's own representative nodes with its current (corrected) estimate. Lists of them are in time order.
+struct RobotNode {
+  Timestamp stamp;
+  Pose3 T_map_body;
+  std::size_t chain_index = 0;  ///< Position in the robot's odometry chain.
+  std::uint32_t submap = 0;     ///< SubmapId::index of the submap it belongs to.
+  friend bool operator==(const RobotNode&, const RobotNode&) = default;
+};
+
+}  // namespace tutti::consistency
