@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/model/trajectory.hpp"
+
+/// KITTI odometry files: a pose is 12 numbers a line, the row-major 3x4 matrix [R t] of T_world_body; there are no
+/// stamps in it. R is printed with few digits, so it must be a rotation within 1e-3 (each entry of R^T R, det > 0) and
+/// is then projected to SO(3).
+namespace tutti::formats {
+
+/// Pose k gets the stamp start + k / rate. 1e-3 <= rate_hz <= 1e6.
+Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start);
+Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz = 10.0, Timestamp start = {});
+
+/// One stamp in seconds a line, strictly increasing, read exactly.
+Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::string& name);
+Result<std::vector<Timestamp>> read_times(const std::string& path);
+
+/// The same poses with other stamps; as many stamps as poses, strictly increasing.
+Result<Trajectory> with_times(Trajectory poses, std::span<const Timestamp> times);
+
+}  // namespace tutti::formats

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "tutti/base/result.hpp"
+#include "tutti/model/point_cloud.hpp"
+
+namespace tutti::formats {
+
+struct Rgb {
+  std::uint8_t red = 0;
+  std::uint8_t green = 0;
+  std::uint8_t blue = 0;
+};
+
+/// PLY 1.0, binary little endian, vertices x y z (float) and, with colours, red green blue (uchar). `colours` is empty
+/// or has one entry per point.
+std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {});
+Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {});
+
+/// The vertices of an ascii or binary little-endian PLY file: x, y, z float or double at any position, other scalar
+/// properties skipped, elements after `vertex` (faces) ignored, points with a non-finite coordinate dropped. List
+/// properties in or before the vertices and big-endian files are ErrorCode::unsupported.
+Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name);
+Result<PointCloud> read_ply(const std::string& path);
+
+}  // namespace tutti::formats
