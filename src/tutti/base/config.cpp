@@ -238,6 +238,20 @@ std::string type_name(const std::uint64_t&) { return "a non-negative integer"; }
 std::string type_name(const double&) { return "a number"; }
 std::string type_name(const std::string&) { return "text"; }
 
+std::string show(const ConfigNode& node) {
+  switch (node.kind) {
+    case ConfigNode::Kind::scalar:
+      return fmt::format("'{}'", node.scalar);
+    case ConfigNode::Kind::list:
+      return "a list";
+    case ConfigNode::Kind::map:
+      return "a map";
+    case ConfigNode::Kind::null:
+      break;
+  }
+  return "nothing";
+}
+
 std::string violation(const Bound& bound, double value) {
   const bool inside = (bound.low_open ? value > bound.low : value >= bound.low) && value <= bound.high;  // NaN: outside
   return inside ? "" : "must be " + describe_bound(bound);

@@ -91,6 +91,8 @@ std::string type_name(const int&);
 std::string type_name(const std::uint64_t&);
 std::string type_name(const double&);
 std::string type_name(const std::string&);
+/// What stands there, for messages: "'2.5'", "a list", "a map", "nothing".
+std::string show(const ConfigNode& node);
 /// Empty when the value is inside; otherwise "must be > 0".
 std::string violation(const Bound& bound, double value);
 std::string violation(const Bound& bound, const std::string& value);
@@ -126,7 +128,7 @@ class Loader {
   void read(const ConfigNode& node, const std::string& path, T& value, const Bound& bound) {
     if constexpr (Scalar<T>) {
       if (node.kind != ConfigNode::Kind::scalar || !parse_scalar(node.scalar, value)) {
-        complain(node, path, fmt::format("expected {}, got '{}'", type_name(value), node.scalar));
+        complain(node, path, fmt::format("expected {}, got {}", type_name(value), show(node)));
         return;
       }
       if (auto text = check_bound(bound, value); !text.empty())
