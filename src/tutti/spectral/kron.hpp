@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "tutti/spectral/graph.hpp"
+
+/// Smaller graphs that behave like the large one. Lists of nodes that come back are ascending.
+namespace tutti::spectral {
+
+struct KronReduction {
+  SparseMatrix laplacian;  ///< Node i of it is node kept[i] of the original.
+  std::vector<int> kept;   ///< Ascending, without repetitions.
+};
+
+/// Kron reduction: the Schur complement L_aa - L_ab L_bb^-1 L_ba, a = `keep` (any order, repetitions ignored), b = the
+/// rest. Keeps effective resistances between kept nodes; the result is a valid Laplacian again. A component without any
+/// kept node vanishes (its block of L_bb is singular, but nothing couples to it).
+[[nodiscard]] KronReduction kron_reduce(const SparseMatrix& laplacian, std::span<const int> keep);
+
+/// Drops edge (a, b) when its weight is below relative_threshold * min(degree(a), degree(b)), unless it belongs to the
+/// maximum-weight spanning forest: connected nodes stay connected. Degrees shrink by what was dropped, so the result is
+/// a valid Laplacian.
+[[nodiscard]] SparseMatrix sparsify(const SparseMatrix& laplacian, double relative_threshold);
+
+/// The paper's selection, eq. (3): the nodes with u_max(n) >= 0, u_max the eigenvector of the largest eigenvalue with
+/// its largest-magnitude entry positive; and must_keep. |u_max(n)| <= noise_tolerance counts as 0, so such nodes are
+/// kept: u_max is localised, and on a long tunnel nearly all of its entries are noise.
+[[nodiscard]] std::vector<int> select_largest_eigenvector(const SparseMatrix& laplacian,
+                                                          std::span<const int> must_keep = {},
+                                                          double noise_tolerance = 1e-10);
+
+/// Exactly min(n, max(budget, |must_keep|)) nodes, must_keep among them, spread evenly over the graph. Depends on the
+/// positions, not on the numbering of the nodes (up to nodes at the very same place). positions: one per node, the ones
+/// that the graph was built from.
+[[nodiscard]] std::vector<int> select_budget(const SparseMatrix& laplacian, std::span<const Eigen::Vector3d> positions,
+                                             int budget, std::span<const int> must_keep = {});
+
+}  // namespace tutti::spectral
