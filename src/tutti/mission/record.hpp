@@ -9,6 +9,8 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
+#include "tutti/consistency/constraint.hpp"
+#include "tutti/evaluation/association.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
@@ -25,13 +27,11 @@ struct Accuracy {
   std::optional<double> rpe_m;        ///< RPE, root mean square of the translation.
 };
 
-enum class ConstraintKind { small, mid, large, other };  ///< The group of scales that asked for it; other = a baseline.
-
 /// A constraint that a robot holds at the end of the mission, between two of its own keyframes.
 struct ConstraintRecord {
   Timestamp from;
   Timestamp to;
-  ConstraintKind kind = ConstraintKind::other;
+  consistency::ConstraintKind kind = consistency::ConstraintKind::other;
 };
 
 /// One policy on one robot.
@@ -163,13 +163,14 @@ struct TimingRecord {
 struct MissionRecord {
   std::string mission;
   std::string description;
-  std::string input;  ///< E.g. "real recordings", "real odometry, closures from the reference", "simulated".
+  std::string input;               ///< "real recordings", "real odometry, closures from the reference", "simulated"...
   std::vector<std::string> notes;  ///< Plain words about input and limits, one sentence or two each.
   std::uint64_t seed = 0;
   std::string default_policy;
-  double duration_s = 0.0;             ///< Mission time.
-  double association_tolerance_s = 0;  ///< Stamps of estimate and reference this close belong together.
-  std::string version;                 ///< Program version and commit.
+  double duration_s = 0.0;                    ///< Mission time.
+  evaluation::AssociationConfig association;  ///< Of estimates with the reference.
+  std::string rpe_interval;                   ///< What RPE is measured over, in words: "10 m", "1 s".
+  std::string version;                        ///< Program version and commit.
   std::string effective_config_yaml;
   std::vector<RobotRecord> robots;
   ServerRecord server;
