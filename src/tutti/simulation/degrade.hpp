@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/model/trajectory.hpp"
+
+namespace tutti::simulation {
+
+/// A bad front end put on given odometry. The signs make it differ from robot to robot.
+struct DegradeConfig {
+  double yaw_deg_per_m = 0.0;
+  double scale_percent = 0.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("yaw_deg_per_m", yaw_deg_per_m, between(-90.0, 90.0), "Yaw drift per metre travelled, about odom z.");
+    v.field("scale_percent", scale_percent, between(-90.0, 90.0), "Scale error of every step.");
+  }
+};
+
+/// Every step is scaled and turned about the z axis of the odometry frame by the yaw drift of the metres travelled so
+/// far; roll and pitch keep their values. The first pose stays.
+Trajectory degrade_odometry(const Trajectory& odometry, const DegradeConfig& config);
+
+/// Any yaw, a tilt of up to `max_tilt_deg` about a horizontal axis, a shift of up to `max_shift_m` along each axis.
+Pose3 random_frame(Rng& rng, double max_tilt_deg, double max_shift_m);
+
+/// T_new_body from T_odom_body. Increments, and so their covariances, stay what they are.
+Trajectory move_frame(const Trajectory& trajectory, const Pose3& T_new_odom);
+
+/// How much to trust real odometry that comes without covariance. Variances add up along the way, so that cutting an
+/// increment in two changes nothing.
+struct OdometryCovarianceConfig {
+  double translation_m_per_sqrt_m = 0.02;
+  double translation_m_per_sqrt_deg = 0.001;
+  double translation_m_per_sqrt_s = 0.003;
+  double rotation_deg_per_sqrt_m = 0.1;
+  double rotation_deg_per_sqrt_deg = 0.02;
+  double rotation_deg_per_sqrt_s = 0.02;
+  template <class V>
+  void describe(V& v) {
+    v.field("translation_m_per_sqrt_m", translation_m_per_sqrt_m, at_least(0.0), "Position, per metre travelled.");
+    v.field("translation_m_per_sqrt_deg", translation_m_per_sqrt_deg, at_least(0.0), "Position, per degree turned.");
+    v.field("translation_m_per_sqrt_s", translation_m_per_sqrt_s, greater_than(0.0), "Position, per second.");
+    v.field("rotation_deg_per_sqrt_m", rotation_deg_per_sqrt_m, at_least(0.0), "Rotation, per metre travelled.");
+    v.field("rotation_deg_per_sqrt_deg", rotation_deg_per_sqrt_deg, at_least(0.0), "Rotation, per degree turned.");
+    v.field("rotation_deg_per_sqrt_s", rotation_deg_per_sqrt_s, greater_than(0.0), "Rotation, per second.");
+  }
+};
+
+/// Covariance of each increment k -> k + 1 (right tangent, diagonal); one fewer than poses.
+std::vector<Matrix6d> increment_covariances(const Trajectory& odometry, const OdometryCovarianceConfig& config);
+
+}  // namespace tutti::simulation

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/ids.hpp"
+#include "tutti/model/loop_closure.hpp"
+#include "tutti/model/submap.hpp"
+#include "tutti/model/trajectory.hpp"
+
+namespace tutti::simulation {
+
+struct ReferenceClosureConfig {
+  double radius_m = 4.0;
+  double max_heading_deg = 180.0;
+  int min_submap_gap = 3;
+  double min_time_gap_s = 30.0;
+  int per_pair = 1;
+  double sigma_m = 0.05;
+  double sigma_deg = 0.5;
+  double wrong_share = 0.1;
+  double distant_share = 0.5;
+  double agreeing_share = 0.3;
+  double wrong_min_m = 2.0;
+  double wrong_max_m = 8.0;
+  double wrong_max_deg = 60.0;
+  double max_reference_gap_s = 1.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("radius_m", radius_m, greater_than(0.0), "Two submaps overlap when two keyframes are this close.");
+    v.field("max_heading_deg", max_heading_deg, between(0.0, 180.0),
+            "... and their directions differ by at most this.");
+    v.field("min_submap_gap", min_submap_gap, at_least(1), "Submaps of one robot closer in sequence are not compared.");
+    v.field("min_time_gap_s", min_time_gap_s, at_least(0.0), "Keyframes of one robot closer in time are not compared.");
+    v.field("per_pair", per_pair, at_least(1), "At most this many closures from one pair of submaps.");
+    v.field("sigma_m", sigma_m, greater_than(0.0), "Noise of the translation, per axis.");
+    v.field("sigma_deg", sigma_deg, greater_than(0.0), "Noise of the rotation, per axis.");
+    v.field("wrong_share", wrong_share, between(0.0, 0.9),
+            "Share of the reporting pairs that are wrong, as confident as the others.");
+    v.field("distant_share", distant_share, between(0.0, 1.0), "Share of the wrong ones that join distant places.");
+    v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
+            "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
+    v.field("wrong_min_m", wrong_min_m, greater_than(0.0), "Least error of a wrong closure.");
+    v.field("wrong_max_m", wrong_max_m, greater_than(0.0), "Largest offset of a wrong closure; not below wrong_min_m.");
+    v.field("wrong_max_deg", wrong_max_deg, between(0.0, 180.0), "Largest turn of a wrong closure.");
+    v.field("max_reference_gap_s", max_reference_gap_s, greater_than(0.0),
+            "A keyframe needs reference poses before and after it, at most this far apart.");
+  }
+};
+
+/// The way to find closures when there is no sensor data: from the reference poses of two submaps, with noise and with
+/// wrong ones. A verdict depends on the reference, the seed and the two submaps only, never on what was asked before;
+/// all members are const and safe to call from several threads.
+class ReferenceClosures {
+ public:
+  /// `reference`: T_reference_body per robot, one frame for all of them.
+  ReferenceClosures(std::map<RobotId, Trajectory> reference, const ReferenceClosureConfig& config, std::uint64_t seed);
+
+  /// Would verify() report a closure? The order of the two does not matter.
+  [[nodiscard]] bool is_candidate(const Submap& a, const Submap& b) const;
+  /// The order of the two does not matter; refusals say why.
+  [[nodiscard]] ClosureVerdict verify(const Submap& a, const Submap& b) const;
+  /// True relative pose of a closure's keyframes at their stamps, for evaluation; nothing without reference there.
+  [[nodiscard]] std::optional<Pose3> true_relative_pose(RobotId robot_a, Timestamp stamp_a, RobotId robot_b,
+                                                        Timestamp stamp_b) const;
+
+ private:
+  struct Match;
+  struct Assessment;
+  [[nodiscard]] std::optional<Pose3> pose_at(RobotId robot, Timestamp stamp) const;
+  [[nodiscard]] Assessment assess(const Submap& first, const Submap& second) const;
+  [[nodiscard]] double distant_pairs_per_overlap() const;
+
+  std::map<RobotId, Trajectory> reference_;
+  ReferenceClosureConfig config_;
+  std::uint64_t seed_;
+  double overlap_wrong_probability_ = 0.0;
+  double distant_wrong_probability_ = 0.0;
+};
+
+}  // namespace tutti::simulation

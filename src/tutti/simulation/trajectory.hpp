@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/model/trajectory.hpp"
+#include "tutti/simulation/corridor_world.hpp"
+
+namespace tutti::simulation {
+
+struct WalkConfig {
+  double duration_s = 1200.0;
+  double rate_hz = 8.0;
+  double min_speed_mps = 0.6;
+  double max_speed_mps = 1.0;
+  double lookahead_m = 2.0;
+  double sway_deg = 0.8;
+  double bob_m = 0.01;
+  double step_hz = 1.3;
+  template <class V>
+  void describe(V& v) {
+    v.field("duration_s", duration_s, greater_than(0.0), "Length of the walk.");
+    v.field("rate_hz", rate_hz, greater_than(0.0), "Poses per second.");
+    v.field("min_speed_mps", min_speed_mps, greater_than(0.0), "Slowest speed along the path.");
+    v.field("max_speed_mps", max_speed_mps, greater_than(0.0), "Fastest speed along the path.");
+    v.field("lookahead_m", lookahead_m, greater_than(0.0), "How far ahead the robot steers; wider turns with more.");
+    v.field("sway_deg", sway_deg, between(0.0, 10.0), "Roll and pitch of the gait; 0 for a wheeled robot.");
+    v.field("bob_m", bob_m, between(0.0, 0.2), "Up and down of the gait; 0 for a wheeled robot.");
+    v.field("step_hz", step_hz, greater_than(0.0), "Gait frequency.");
+  }
+};
+
+/// A walk without U-turns from junction to junction, corridors seen least being preferred: covers the network, then
+/// revisits it, now and then in the other direction. Truth T_reference_body, body x ahead, z up; the first stamp is
+/// `start`. The first junction is drawn when not given. Heading, position and attitude are continuous: the robot
+/// steers towards a point ahead on the path (Coulter 1992, "Implementation of the Pure Pursuit Path Tracking
+/// Algorithm").
+Trajectory simulate_walk(const CorridorWorld& world, const WalkConfig& config, Timestamp start,
+                         std::optional<std::size_t> start_junction, Rng rng);
+
+}  // namespace tutti::simulation

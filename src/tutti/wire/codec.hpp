@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/model/loop_closure.hpp"
+#include "tutti/model/messages.hpp"
+#include "tutti/wire/message_kind.hpp"
+
+/// Messages as bytes and back. Every message is one frame: "TU", protocol version (2 bytes, little endian), kind (1
+/// byte), then one zstd frame (with content size and checksum) around a protobuf message of proto/tutti/v1.
+///
+/// Encoding expects a message that validate() accepts (else std::logic_error) and is deterministic. Decoding accepts
+/// any bytes: it returns an error or a message that validate() accepts, and never allocates more than the limits of
+/// frame.hpp. Encoding what was decoded, with the same settings, and decoding that changes nothing.
+namespace tutti::wire {
+
+/// Points are rounded to a grid of voxel_m / 2^offset_bits: an error of at most half a cell per axis (defaults: 4.7 mm,
+/// 8.2 mm in space). Their order is not kept: they come back sorted along a Morton curve.
+struct CloudCodec {
+  double voxel_m = 0.3;
+  int offset_bits = 5;
+  template <class V>
+  void describe(V& v) {
+    v.field("voxel_m", voxel_m, between(0.01, 10.0), "Voxel of the cloud on the wire; best equal to the cloud's own.");
+    v.field("offset_bits", offset_bits, between(0, 8), "Bits per axis of a point's place inside its voxel.");
+  }
+};
+
+/// Exact: ids, stamps, flags, counts. Poses: 1e-5 m, 1e-6 rad. Odometry covariance: 1 % of the variance in every
+/// direction. Odometry that follows from the keyframe poses is not carried but computed from them. Cloud: see
+/// CloudCodec; an empty one comes back as null.
+std::string encode(const SubmapMessage& message, const CloudCodec& cloud = {});
+Result<SubmapMessage> decode_submap(std::string_view bytes);
+
+/// Exact: ids, stamps, support, radius, sigma, edges' ends. Poses: 5e-4 m, 1e-4 rad. Covariance: 4 % of the variance in
+/// every direction. Reduced weights: relative 1e-7.
+std::string encode(const ProxyGraphMessage& message);
+Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
+
+/// Exact (job results and snapshots must not depend on having travelled).
+std::string encode(const ClosureVerdict& verdict);
+Result<ClosureVerdict> decode_verdict(std::string_view bytes);
+
+/// Kind of a frame with a supported version, judged by its first bytes only.
+Result<MessageKind> peek_kind(std::string_view bytes);
+
+/// What every message must fulfil, whoever made it: finite values, unit quaternions, consecutive indices, increasing
+/// stamps, symmetric positive semidefinite covariances, sorted nodes, indices in range, counts within limits.
+Status validate(const SubmapMessage& message);
+Status validate(const ProxyGraphMessage& message);
+Status validate(const ClosureVerdict& verdict);
+
+}  // namespace tutti::wire
