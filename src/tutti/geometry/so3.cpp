@@ -6,8 +6,11 @@
 
 namespace tutti {
 namespace {
-constexpr double kSmallAngle = 1e-4;  // below it series to 4th order are exact to double precision
-}
+// Below these angles (rad) the closed forms cancel; the first term the series leave out is below 1e-16 of the result.
+// Measured against long double on both sides (so3_test.cpp): Exp, Log and both Jacobians to 1e-15.
+constexpr double kSmallAngle = 1e-4;
+constexpr double kSmallAngleJacobian = 1e-3;
+}  // namespace
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -45,8 +48,9 @@ Eigen::Matrix3d so3_right_jacobian(const Eigen::Vector3d& theta) {
   const Eigen::Matrix3d w = skew(theta);
   double a = 0.5 - angle2 / 24.0;         // (1 - cos) / angle^2
   double b = 1.0 / 6.0 - angle2 / 120.0;  // (angle - sin) / angle^3
-  if (angle > 1e-3) {
-    a = (1.0 - std::cos(angle)) / angle2;
+  if (angle > kSmallAngleJacobian) {
+    const double half = std::sin(0.5 * angle);
+    a = 2.0 * half * half / angle2;  // 1 - cos(angle) would lose half of the digits
     b = (angle - std::sin(angle)) / (angle2 * angle);
   }
   return Eigen::Matrix3d::Identity() - a * w + b * w * w;
@@ -57,7 +61,7 @@ Eigen::Matrix3d so3_right_jacobian_inverse(const Eigen::Vector3d& theta) {
   const double angle = std::sqrt(angle2);
   const Eigen::Matrix3d w = skew(theta);
   double c = 1.0 / 12.0 + angle2 / 720.0;  // 1/angle^2 - (1 + cos) / (2 angle sin)
-  if (angle > 1e-3) c = 1.0 / angle2 - 0.5 / (angle * std::tan(0.5 * angle));
+  if (angle > kSmallAngleJacobian) c = 1.0 / angle2 - 0.5 / (angle * std::tan(0.5 * angle));
   return Eigen::Matrix3d::Identity() + 0.5 * w + c * w * w;
 }
 
