@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/constraint.hpp"
+
+#include <algorithm>
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::consistency {
+namespace {
+
+Matrix6d moved(const Pose3& T_a_b, const Matrix6d& covariance_b) {
+  const Matrix6d Ad = adjoint(T_a_b);
+  return Ad * covariance_b * Ad.transpose();
+}
+
+}  // namespace
+
+double distrust(std::uint32_t support, const ConstraintConfig& config) {
+  if (support == 0) return 1.0;
+  return std::min(1.0, config.trust * std::max(1.0, config.full_support / static_cast<double>(support)));
+}
+
+ConstraintMaker::ConstraintMaker(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+                                 std::span<const NodePair> pairs, const ConstraintConfig& config)
+    : revision_(graph.revision), config_(config) {
+  std::vector<std::size_t> chain;  // this robot's proxy nodes in time order
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i)
+    if (graph.nodes[i].robot == robot) chain.push_back(i);
+  std::stable_sort(chain.begin(), chain.end(),
+                   [&](std::size_t a, std::size_t b) { return graph.nodes[a].stamp < graph.nodes[b].stamp; });
+  nodes_.reserve(pairs.size());
+  if (chain.empty()) return;
+
+  // In the frame of the first proxy node the stretches' covariances simply add; make() moves the difference of two sums
+  // to the frame of the constraint. Equal to compounding from node to node, without the loop.
+  const Pose3 T_start_world = graph.nodes[chain[0]].T_world_body.inverse();
+  Matrix6d sum = Matrix6d::Zero();
+  std::size_t pair = 0;
+  for (std::size_t rank = 0; rank < chain.size(); ++rank) {
+    const ProxyNode& node = graph.nodes[chain[rank]];
+    const Pose3 T_start_body = T_start_world * node.T_world_body;
+    const double factor = distrust(node.support, config);
+    if (rank > 0) sum += moved(T_start_body, factor * factor * node.covariance);
+    support_.push_back(node.support);
+    if (pair < pairs.size() && pairs[pair].proxy == chain[rank]) {
+      nodes_.push_back({node.stamp, nodes[pairs[pair].robot].chain_index, T_start_body, sum, rank});
+      ++pair;
+    }
+  }
+  TUTTI_CHECK(pair == pairs.size(), "{} of {} pairs are nodes of robot {} in time order", pair, pairs.size(),
+              robot.value);
+}
+
+Constraint ConstraintMaker::make(std::size_t a, std::size_t b, ConstraintKind kind) const {
+  TUTTI_CHECK(a != b && a < nodes_.size() && b < nodes_.size(), "a = {}, b = {}, {} nodes", a, b, nodes_.size());
+  const Node& from = nodes_[std::min(a, b)];
+  const Node& to = nodes_[std::max(a, b)];
+  Constraint out{from.stamp, to.stamp, from.chain_index, to.chain_index, {}, kind, revision_};
+  out.measurement.T_a_b = from.T_start_body.inverse() * to.T_start_body;
+  Matrix6d covariance = moved(to.T_start_body.inverse(), to.covariance_sum - from.covariance_sum);
+  covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  covariance.diagonal().head<3>().array() += config_.floor_translation_m * config_.floor_translation_m;
+  covariance.diagonal().tail<3>().array() += config_.floor_rotation_rad * config_.floor_rotation_rad;
+  out.measurement.covariance = covariance;
+  out.support = *std::min_element(support_.begin() + static_cast<std::ptrdiff_t>(from.proxy) + 1,
+                                  support_.begin() + static_cast<std::ptrdiff_t>(to.proxy) + 1);
+  return out;
+}
+
+}  // namespace tutti::consistency

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "tutti/consistency/policy.hpp"
+
+namespace tutti::consistency::internal {
+
+/// The paper's baseline: node i linked to i + 1, ..., i + reach (reach 1 or 2), whatever the comparison says. The
+/// budget is not looked at.
+class EveryNodePolicy final : public ConstraintPolicy {
+ public:
+  EveryNodePolicy(int reach, const PolicyConfig& config) : reach_(reach), config_(config) {}
+  [[nodiscard]] std::string name() const override { return reach_ == 1 ? "every_node" : "every_node_2"; }
+  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
+
+ private:
+  int reach_;
+  PolicyConfig config_;
+};
+
+/// The paper's: per node, the disagreement summed over a group of scales against the group's threshold; small-scale ->
+/// links to the direct neighbours, mid-scale -> mid_hops away, large-scale -> to the nearest submaps. Adds to what is
+/// there. The largest disagreement over its threshold comes first within a group, groups take turns; this decides what
+/// a budget buys.
+class SpectralPolicy final : public ConstraintPolicy {
+ public:
+  explicit SpectralPolicy(const PolicyConfig& config) : config_(config) {}
+  [[nodiscard]] std::string name() const override { return "spectral"; }
+  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
+
+ private:
+  PolicyConfig config_;
+};
+
+/// A chain of equally long links (in nodes) from the first node to the last: min(budget, nodes - 1) of them.
+class UniformPolicy final : public ConstraintPolicy {
+ public:
+  explicit UniformPolicy(const PolicyConfig& config) : config_(config) {}
+  [[nodiscard]] std::string name() const override { return "uniform"; }
+  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
+
+ private:
+  PolicyConfig config_;
+};
+
+/// Draws node and kind with replacement, takes the links of that kind there, until `budget` different links are found
+/// (or, on a small graph, no new ones turn up).
+class RandomPolicy final : public ConstraintPolicy {
+ public:
+  explicit RandomPolicy(const PolicyConfig& config) : config_(config) {}
+  [[nodiscard]] std::string name() const override { return "random"; }
+  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
+
+ private:
+  PolicyConfig config_;
+};
+
+/// Ranks nodes by ||x_server - x_robot|| after laying node 0 of one on node 0 of the other; small- and mid-kind links
+/// to the largest first. Adds to what is there, up to the budget; without one, to every node above the threshold.
+class EuclideanPolicy final : public ConstraintPolicy {
+ public:
+  explicit EuclideanPolicy(const PolicyConfig& config) : config_(config) {}
+  [[nodiscard]] std::string name() const override { return "euclidean"; }
+  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
+
+ private:
+  PolicyConfig config_;
+};
+
+}  // namespace tutti::consistency::internal

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/ledger.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numbers>
+#include <utility>
+
+namespace tutti::consistency {
+namespace {
+
+using Key = std::pair<Timestamp, Timestamp>;
+Key key(const Constraint& constraint) { return {constraint.from_stamp, constraint.to_stamp}; }
+
+bool differs(const Constraint& a, const Constraint& b, const LedgerConfig& config) {
+  const Pose3 difference = a.measurement.T_a_b.inverse() * b.measurement.T_a_b;
+  return difference.translation.norm() > config.replace_translation_m ||
+         rotation_angle(difference) > config.replace_rotation_deg * std::numbers::pi / 180.0;
+}
+
+}  // namespace
+
+Constraint in_time_order(Constraint constraint) {
+  if (constraint.from_stamp <= constraint.to_stamp) return constraint;
+  std::swap(constraint.from_stamp, constraint.to_stamp);
+  std::swap(constraint.from, constraint.to);
+  auto& [T_a_b, covariance] = constraint.measurement;
+  const Matrix6d Ad = adjoint(T_a_b);  // the perturbation moves from frame b to frame a
+  covariance = Ad * covariance * Ad.transpose();
+  T_a_b = T_a_b.inverse();
+  return constraint;
+}
+
+Ledger::Ledger(std::vector<Constraint> constraints) { update(std::move(constraints), {}, true); }
+
+LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& config, bool replaces_all) {
+  std::map<Key, Constraint> fresh;
+  for (Constraint& constraint : chosen) {
+    Constraint ordered = in_time_order(std::move(constraint));
+    const Key k = key(ordered);
+    fresh.insert_or_assign(k, std::move(ordered));
+  }
+
+  LedgerUpdate counts;
+  std::vector<Constraint> next;
+  next.reserve(constraints_.size() + fresh.size());
+  for (Constraint& held : constraints_) {
+    const auto found = fresh.find(key(held));
+    if (found == fresh.end()) {
+      if (replaces_all)
+        ++counts.removed;
+      else
+        next.push_back(std::move(held));
+      continue;
+    }
+    const bool replace = differs(held, found->second, config);
+    ++(replace ? counts.replaced : counts.unchanged);
+    next.push_back(std::move(replace ? found->second : held));
+    fresh.erase(found);
+  }
+  counts.added = fresh.size();
+  for (auto& [_, constraint] : fresh) next.push_back(std::move(constraint));
+  std::sort(next.begin(), next.end(), [](const Constraint& a, const Constraint& b) { return key(a) < key(b); });
+  constraints_ = std::move(next);
+  return counts;
+}
+
+}  // namespace tutti::consistency

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/policy.hpp"
+
+#include "tutti/consistency/internal/policies.hpp"
+
+namespace tutti::consistency {
+
+Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, const PolicyConfig& config) {
+  if (name == "every_node") return std::make_unique<internal::EveryNodePolicy>(1, config);
+  if (name == "every_node_2") return std::make_unique<internal::EveryNodePolicy>(2, config);
+  if (name == "spectral") return std::make_unique<internal::SpectralPolicy>(config);
+  if (name == "uniform") return std::make_unique<internal::UniformPolicy>(config);
+  if (name == "random") return std::make_unique<internal::RandomPolicy>(config);
+  if (name == "euclidean") return std::make_unique<internal::EuclideanPolicy>(config);
+  return fail(ErrorCode::configuration,
+              "policy '{}' is unknown, expected every_node, every_node_2, spectral, uniform, random or euclidean",
+              name);
+}
+
+}  // namespace tutti::consistency

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/proxy_graph_builder.hpp"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/spectral/graph.hpp"
+#include "tutti/spectral/kron.hpp"
+
+namespace tutti::consistency {
+namespace {
+
+struct RobotRange {
+  std::size_t begin = 0, end = 0;
+  [[nodiscard]] std::size_t size() const { return end - begin; }
+};
+
+std::vector<RobotRange> robot_ranges(const std::vector<ServerNode>& nodes) {
+  std::vector<RobotRange> ranges;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (i == 0 || nodes[i].robot != nodes[i - 1].robot) ranges.push_back({i, i});
+    ranges.back().end = i + 1;
+  }
+  return ranges;
+}
+
+// Largest remainder: shares add up to the budget unless the ends of the robots alone exceed it.
+std::vector<std::size_t> share_budget(std::size_t budget, const std::vector<RobotRange>& ranges, std::size_t nodes) {
+  std::vector<std::size_t> share(ranges.size()), order(ranges.size());
+  std::size_t spent = 0;
+  for (std::size_t r = 0; r < ranges.size(); ++r) {
+    share[r] = std::max(budget * ranges[r].size() / nodes, std::min<std::size_t>(2, ranges[r].size()));
+    spent += share[r];
+    order[r] = r;
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return budget * ranges[a].size() % nodes > budget * ranges[b].size() % nodes;
+  });
+  for (const std::size_t r : order) {
+    if (spent >= budget) break;
+    if (share[r] < ranges[r].size()) ++share[r], ++spent;
+  }
+  return share;
+}
+
+// Appends robot nodes[range] to `graph`, reduced to about `budget` nodes.
+void append_reduced(ProxyGraph& graph, const std::vector<ServerNode>& nodes, RobotRange range, std::size_t budget,
+                    const ProxyGraphConfig& config) {
+  const int n = static_cast<int>(range.size());
+  std::vector<Eigen::Vector3d> positions;
+  for (std::size_t i = range.begin; i < range.end; ++i) positions.push_back(nodes[i].T_world_body.translation);
+  const auto L = spectral::laplacian(spectral::proximity_adjacency(positions, config.radius_m, config.sigma_m));
+  const std::vector<int> ends = n > 1 ? std::vector<int>{0, n - 1} : std::vector<int>{0};
+  const std::vector<int> kept = config.reducer == "paper"
+                                    ? spectral::select_largest_eigenvector(L, ends)
+                                    : spectral::select_budget(L, positions, static_cast<int>(budget), ends);
+  const auto reduced = spectral::sparsify(spectral::kron_reduce(L, kept).laplacian, config.sparsify_threshold);
+
+  const auto offset = static_cast<std::uint32_t>(graph.nodes.size());
+  Matrix6d covariance = Matrix6d::Zero();
+  std::uint32_t support = ~0U;
+  std::size_t next = 0;  // position in `kept`
+  for (int i = 0; i < n; ++i) {
+    const ServerNode& node = nodes[range.begin + static_cast<std::size_t>(i)];
+    if (i > 0) {
+      const ServerNode& previous = nodes[range.begin + static_cast<std::size_t>(i) - 1];
+      const Pose3 T_previous_body = previous.T_world_body.inverse() * node.T_world_body;
+      covariance = compound_covariance(T_previous_body, covariance, node.covariance);
+      support = std::min(support, node.support);
+    }
+    if (next < kept.size() && kept[next] == i) {
+      ++next;
+      graph.nodes.push_back({node.robot, node.stamp, node.T_world_body, covariance, i > 0 ? support : node.support});
+      covariance = Matrix6d::Zero();
+      support = ~0U;
+    } else {
+      graph.eliminated.push_back({node.robot, node.stamp});
+    }
+  }
+  for (int column = 0; column < reduced.outerSize(); ++column)
+    for (spectral::SparseMatrix::InnerIterator entry(reduced, column); entry; ++entry)
+      if (entry.row() < column && entry.value() < 0.0)
+        graph.edges.push_back({offset + static_cast<std::uint32_t>(entry.row()),
+                               offset + static_cast<std::uint32_t>(column), -entry.value()});
+}
+
+}  // namespace
+
+ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
+                             std::vector<RobotComponent> components, const ProxyGraphConfig& config) {
+  std::sort(nodes.begin(), nodes.end(), [](const ServerNode& a, const ServerNode& b) {
+    return std::pair(a.robot, a.stamp) < std::pair(b.robot, b.stamp);
+  });
+  for (std::size_t i = 1; i < nodes.size(); ++i)
+    TUTTI_CHECK(nodes[i - 1].robot != nodes[i].robot || nodes[i - 1].stamp != nodes[i].stamp, "robot {} stamp {} twice",
+                nodes[i].robot.value, nodes[i].stamp.ns);
+  std::sort(components.begin(), components.end(),
+            [](const RobotComponent& a, const RobotComponent& b) { return a.robot < b.robot; });
+
+  ProxyGraph graph{.revision = revision, .radius_m = config.radius_m, .sigma_m = config.sigma_m};
+  graph.components = std::move(components);
+  const auto ranges = robot_ranges(nodes);
+  for (const RobotRange& range : ranges) nodes[range.begin].covariance.setZero();
+
+  const auto budget = static_cast<std::size_t>(config.node_budget);
+  if (budget == 0 || nodes.size() <= budget) {
+    for (const ServerNode& node : nodes)
+      graph.nodes.push_back({node.robot, node.stamp, node.T_world_body, node.covariance, node.support});
+    return graph;
+  }
+  graph.reduced = true;
+  const auto shares = share_budget(budget, ranges, nodes.size());
+  for (std::size_t r = 0; r < ranges.size(); ++r) append_reduced(graph, nodes, ranges[r], shares[r], config);
+  return graph;
+}
+
+}  // namespace tutti::consistency
