@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/internal/block_structure.hpp"
+
+#include <cholmod.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::estimation::internal {
+namespace {
+
+using Pair = std::pair<int, int>;  // column < row
+
+/// Component of every node, numbered by first node (which is its anchor).
+int find_components(const PoseGraph& graph, std::vector<int>& component) {
+  std::vector<std::size_t> parent(graph.poses.size());
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  const auto root = [&](std::size_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (const auto& edge : graph.edges) {
+    const std::size_t a = root(edge.from);
+    const std::size_t b = root(edge.to);
+    parent[std::max(a, b)] = std::min(a, b);  // the root stays the first node
+  }
+  int count = 0;
+  component.resize(parent.size());
+  for (std::size_t i = 0; i < parent.size(); ++i) {
+    const std::size_t r = root(i);
+    component[i] = r == i ? count++ : component[r];
+  }
+  return count;
+}
+
+/// Fill-reducing, postordered elimination order: position of each variable.
+std::vector<int> elimination_order(int n, std::vector<Pair>& pairs, Ordering ordering) {
+  cholmod_common common;
+  cholmod_start(&common);
+  common.print = 0;
+  common.nmethods = 1;
+  common.method[0].ordering = ordering == Ordering::metis ? CHOLMOD_METIS : CHOLMOD_AMD;
+  common.supernodal = CHOLMOD_SIMPLICIAL;
+
+  std::vector<int> start(n + 1, 0);
+  std::vector<int> rows(pairs.size());
+  for (const auto& [column, row] : pairs) ++start[column + 1];
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  for (std::size_t k = 0; k < pairs.size(); ++k) rows[k] = pairs[k].second;
+  cholmod_sparse matrix{};
+  matrix.nrow = matrix.ncol = static_cast<std::size_t>(n);
+  matrix.nzmax = pairs.size();
+  matrix.p = start.data();
+  matrix.i = rows.data();
+  matrix.stype = -1;
+  matrix.itype = CHOLMOD_INT;
+  matrix.xtype = CHOLMOD_PATTERN;
+  matrix.sorted = 1;
+  matrix.packed = 1;
+
+  std::vector<int> position(n);
+  cholmod_factor* factor = cholmod_analyze(&matrix, &common);
+  for (int k = 0; k < n; ++k) position[factor ? static_cast<int*>(factor->Perm)[k] : k] = k;
+  cholmod_free_factor(&factor, &common);
+  cholmod_finish(&common);
+  return position;
+}
+
+void sort_unique(std::vector<Pair>& pairs) {
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+}
+
+}  // namespace
+
+BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<std::size_t, std::size_t>> extra,
+                              Ordering ordering) {
+  const std::size_t nodes = graph.poses.size();
+  for (const auto& edge : graph.edges)
+    TUTTI_CHECK(edge.from < nodes && edge.to < nodes, "edge {} -> {} of {} nodes", edge.from, edge.to, nodes);
+  BlockStructure s;
+  s.components = find_components(graph, s.component);
+  s.variable.assign(nodes, -1);
+  for (std::size_t i = 0, seen = 0; i < nodes; ++i) {
+    if (s.component[i] == static_cast<int>(seen))
+      ++seen;  // the first node of its component
+    else
+      s.variable[i] = s.variables++;
+  }
+
+  std::vector<Pair> pairs;
+  pairs.reserve(graph.edges.size() + extra.size());
+  const auto add = [&](std::size_t a, std::size_t b) {
+    const int u = s.variable[a];
+    const int v = s.variable[b];
+    if (u >= 0 && v >= 0 && u != v && s.component[a] == s.component[b])
+      pairs.emplace_back(std::min(u, v), std::max(u, v));
+  };
+  for (const auto& edge : graph.edges) add(edge.from, edge.to);
+  for (const auto& [a, b] : extra) {
+    TUTTI_CHECK(a < nodes && b < nodes, "pair {}, {} of {} nodes", a, b, nodes);
+    add(a, b);
+  }
+  sort_unique(pairs);
+  const std::vector<int> position = elimination_order(s.variables, pairs, ordering);
+  for (int& variable : s.variable)
+    if (variable >= 0) variable = position[variable];
+  for (auto& [column, row] : pairs) std::tie(column, row) = std::minmax({position[column], position[row]});
+  for (int k = 0; k < s.variables; ++k) pairs.emplace_back(k, k);
+  sort_unique(pairs);
+
+  s.column_start.assign(s.variables + 1, 0);
+  s.block_row.reserve(pairs.size());
+  for (const auto& [column, row] : pairs) {
+    ++s.column_start[column + 1];
+    s.block_row.push_back(row);
+  }
+  std::partial_sum(s.column_start.begin(), s.column_start.end(), s.column_start.begin());
+
+  s.edges.reserve(graph.edges.size());
+  for (const auto& edge : graph.edges) {
+    EdgeSlot slot{.from = s.variable[edge.from], .to = s.variable[edge.to]};
+    if (slot.from >= 0 && slot.to >= 0 && slot.from != slot.to) {
+      const auto [column, row] = std::minmax(slot.from, slot.to);
+      const auto begin = s.block_row.begin();
+      slot.block = static_cast<int>(
+          std::lower_bound(begin + s.column_start[column], begin + s.column_start[column + 1], row) - begin);
+      slot.row_is_from = row == slot.from;
+    }
+    s.edges.push_back(slot);
+  }
+  return s;
+}
+
+bool is_finite(const PoseGraph& graph) {
+  return std::all_of(graph.poses.begin(), graph.poses.end(), [](const Pose3& T) { return is_valid(T, 1e-3); }) &&
+         std::all_of(graph.edges.begin(), graph.edges.end(), [](const PoseGraphEdge& edge) {
+           return is_valid(edge.T_from_to, 1e-3) && edge.information.allFinite();
+         });
+}
+
+}  // namespace tutti::estimation::internal

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/internal/gauss_newton.hpp"
+
+#include <cmath>
+
+#include "tutti/estimation/between_factor.hpp"
+
+namespace tutti::estimation::internal {
+namespace {
+
+/// A cost below this (chi2 has no unit) is zero: tolerances relative to it would ask for more digits than there are.
+constexpr double kCostFloor = 1e-6;
+/// Once a step promises less than this share of the cost, the Hessian hardly changes and its factor is used again...
+constexpr double kReuseBelow = 1e-2;
+/// ...as long as every such step still shrinks the promised decrease by this factor.
+constexpr double kReuseContraction = 0.1;
+
+}  // namespace
+
+GaussNewton::GaussNewton(const PoseGraph& graph, const BlockStructure& structure)
+    : graph_(graph), structure_(structure), hessian_(structure, 6), gradient_(6 * structure.variables) {}
+
+double GaussNewton::cost(std::span<const Pose3> poses, const EdgeCosts& costs) const {
+  double sum = 0.0;
+  for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
+    const auto& edge = graph_.edges[e];
+    const Vector6d r = between_residual(poses[edge.from], poses[edge.to], edge.T_from_to);
+    sum += costs.cost(e, r.dot(edge.information * r));
+  }
+  return sum;
+}
+
+void GaussNewton::linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian) {
+  gradient_.setZero();
+  if (with_hessian) hessian_.set_zero();
+  for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
+    const auto& edge = graph_.edges[e];
+    const auto& slot = structure_.edges[e];
+    if (edge.from == edge.to) continue;
+    const auto factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
+    Vector6d weighted_residual = edge.information * factor.residual;
+    const double weight = costs.weight(e, factor.residual.dot(weighted_residual));
+    weighted_residual *= weight;
+    if (slot.from >= 0) gradient_.segment<6>(6 * slot.from).noalias() += factor.J_i.transpose() * weighted_residual;
+    if (slot.to >= 0) gradient_.segment<6>(6 * slot.to).noalias() += factor.J_j.transpose() * weighted_residual;
+    if (!with_hessian) continue;
+    const Matrix6d WJ_j = weight * edge.information * factor.J_j;
+    if (slot.to >= 0) hessian_.add_diagonal(slot.to, Matrix6d(factor.J_j.transpose() * WJ_j));
+    if (slot.from >= 0) {
+      const Matrix6d WJ_i = weight * edge.information * factor.J_i;
+      hessian_.add_diagonal(slot.from, Matrix6d(factor.J_i.transpose() * WJ_i));
+      hessian_.add_edge(slot, Matrix6d(factor.J_i.transpose() * WJ_j));
+    }
+  }
+}
+
+SolveSummary GaussNewton::minimise(std::vector<Pose3>& poses, const EdgeCosts& costs, const SolverConfig& config) {
+  SolveSummary summary{.components = structure_.components};
+  summary.initial_cost = summary.final_cost = cost(poses, costs);
+  summary.termination = Termination::max_iterations;
+  std::vector<Pose3> candidate = poses;
+  Eigen::MatrixXd step;
+  double previous_decrease = 0.0;
+  bool reuse_factor = false;
+  while (summary.iterations < config.max_iterations) {
+    linearise(poses, costs, !reuse_factor);
+    if (!reuse_factor && !hessian_.factorise()) {
+      summary.termination = Termination::singular;
+      break;
+    }
+    step = -gradient_;
+    hessian_.solve(step);
+    const double decrease = -step.col(0).dot(gradient_);  // of the cost, predicted by the linear model
+    if (!std::isfinite(decrease)) {
+      summary.termination = Termination::singular;
+      break;
+    }
+    const double relative = decrease / (summary.final_cost + kCostFloor);
+    if (reuse_factor && decrease > kReuseContraction * previous_decrease) {
+      reuse_factor = false;
+      continue;
+    }
+    previous_decrease = decrease;
+    ++summary.iterations;
+    summary.gradient_norm = gradient_.size() > 0 ? gradient_.lpNorm<Eigen::Infinity>() : 0.0;
+
+    double scale = 1.0;
+    double new_cost = 0.0;
+    for (int halvings = 0;; ++halvings, scale *= 0.5) {
+      for (std::size_t i = 0; i < poses.size(); ++i)
+        if (const int v = structure_.variable[i]; v >= 0)
+          candidate[i] = retract(poses[i], scale * step.col(0).segment<6>(6 * v));
+      new_cost = cost(candidate, costs);
+      if (new_cost <= summary.final_cost || halvings == config.max_step_halvings) break;
+    }
+    const bool converged = relative <= config.relative_cost_tolerance;
+    if (!(new_cost <= summary.final_cost)) {  // not by more than rounding, when converged
+      summary.termination = converged ? Termination::converged : Termination::stalled;
+      break;
+    }
+    poses.swap(candidate);
+    summary.final_cost = new_cost;
+    summary.step_norm = step.size() > 0 ? scale * step.lpNorm<Eigen::Infinity>() : 0.0;
+    if (converged) {
+      summary.termination = Termination::converged;
+      break;
+    }
+    reuse_factor = scale == 1.0 && relative < kReuseBelow;
+  }
+  return summary;
+}
+
+}  // namespace tutti::estimation::internal

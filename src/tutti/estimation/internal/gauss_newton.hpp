@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "tutti/estimation/internal/block_cholesky.hpp"
+#include "tutti/estimation/internal/block_structure.hpp"
+#include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/estimation/robust_loss.hpp"
+
+namespace tutti::estimation::internal {
+
+/// What an edge costs: scale[e] * rho(r^T Omega r), rho only where the role is robust.
+struct EdgeCosts {
+  RobustLoss loss;
+  std::span<const EdgeRole> roles;  ///< Empty: all robust.
+  std::span<const double> scale;    ///< Empty: all 1.
+
+  [[nodiscard]] bool is_robust(std::size_t e) const {
+    return loss.kind != LossKind::none && (roles.empty() || roles[e] == EdgeRole::robust);
+  }
+  [[nodiscard]] double scale_of(std::size_t e) const { return scale.empty() ? 1.0 : scale[e]; }
+  [[nodiscard]] double cost(std::size_t e, double s) const { return scale_of(e) * (is_robust(e) ? loss.rho(s) : s); }
+  [[nodiscard]] double weight(std::size_t e, double s) const {
+    return scale_of(e) * (is_robust(e) ? loss.weight(s) : 1.0);
+  }
+};
+
+/// Gauss-Newton over one graph; the symbolic factorisation is shared by all calls.
+class GaussNewton {
+ public:
+  /// Both must outlive this.
+  GaussNewton(const PoseGraph& graph, const BlockStructure& structure);
+
+  /// Moves `poses` to a minimum. Uses of config: iterations, tolerance, halvings.
+  SolveSummary minimise(std::vector<Pose3>& poses, const EdgeCosts& costs, const SolverConfig& config);
+
+  [[nodiscard]] double cost(std::span<const Pose3> poses, const EdgeCosts& costs) const;
+  /// Fills the Hessian J^T W J and, in elimination order, the gradient J^T W r.
+  void linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian);
+  [[nodiscard]] BlockCholesky& hessian() { return hessian_; }
+
+ private:
+  const PoseGraph& graph_;
+  const BlockStructure& structure_;
+  BlockCholesky hessian_;
+  Eigen::VectorXd gradient_;
+};
+
+}  // namespace tutti::estimation::internal

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/robust_loss.hpp"
+
+#include <cmath>
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::estimation {
+
+double RobustLoss::rho(double s) const {
+  const double c2 = scale * scale;
+  switch (kind) {
+    case LossKind::none:
+      return s;
+    case LossKind::huber:
+      return s <= c2 ? s : 2.0 * scale * std::sqrt(s) - c2;
+    case LossKind::cauchy:
+      return c2 * std::log1p(s / c2);
+    case LossKind::geman_mcclure:
+      return c2 * s / (c2 + s);
+  }
+  return s;
+}
+
+double RobustLoss::weight(double s) const {
+  const double c2 = scale * scale;
+  switch (kind) {
+    case LossKind::none:
+      return 1.0;
+    case LossKind::huber:
+      return s <= c2 ? 1.0 : scale / std::sqrt(s);
+    case LossKind::cauchy:
+      return c2 / (c2 + s);
+    case LossKind::geman_mcclure: {
+      const double w = c2 / (c2 + s);
+      return w * w;
+    }
+  }
+  return 1.0;
+}
+
+LossKind loss_kind(const std::string& name) {
+  if (name == "none") return LossKind::none;
+  if (name == "huber") return LossKind::huber;
+  if (name == "cauchy") return LossKind::cauchy;
+  TUTTI_CHECK(name == "geman_mcclure", "unknown loss '{}'", name);
+  return LossKind::geman_mcclure;
+}
+
+}  // namespace tutti::estimation
