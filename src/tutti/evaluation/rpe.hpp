@@ -9,7 +9,7 @@
 
 namespace tutti::evaluation {
 
-/// Relative pose error (Sturm et al., IROS 2012, eqs. 1 to 3): with Q the reference and P the estimate,
+/// Relative pose error (Sturm et al., IROS 2012, eqs. 1, 2): with Q the reference and P the estimate,
 ///   E_i = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j),
 /// rmse over all i of |translation of E_i| and of its rotation angle. Needs no alignment. From every pair i, j is the
 /// first pair at least the asked interval later; where that overshoots by more than half the interval (a gap), i is

@@ -14,7 +14,7 @@
 /// is then projected to SO(3).
 namespace tutti::formats {
 
-/// Pose k gets the stamp start + k / rate. 1e-3 <= rate_hz <= 1e6.
+/// Pose k gets the stamp start + k / rate. 0.01 <= rate_hz <= 1e6.
 Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start);
 Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz = 10.0, Timestamp start = {});
 

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/formats/g2o.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <numeric>
+
+#include "tutti/base/check.hpp"
+#include "tutti/formats/internal/chain.hpp"
+#include "tutti/formats/internal/text.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::formats {
+namespace {
+
+using internal::LineReader;
+using internal::quoted;
+
+constexpr double kSemiDefiniteTolerance = 1e-6;
+constexpr std::array<int, 3> kPlanarAxes = {0, 1, 5};  // x y theta within [tx ty tz rx ry rz]
+
+struct Vertex {
+  std::int64_t id = 0;
+  Pose3 pose;
+};
+/// Edge between ids; PoseGraphEdge has positions.
+struct IdEdge {
+  std::int64_t from = 0;
+  std::int64_t to = 0;
+  Pose3 T_from_to;
+  Matrix6d information;
+  int line = 0;
+};
+struct Lines {
+  std::vector<Vertex> vertices;
+  std::vector<IdEdge> edges;
+  std::vector<std::int64_t> fixed;
+  bool has_2d = false;
+  bool has_3d = false;
+};
+
+Pose3 lift(double x, double y, double theta) { return {so3_exp({0.0, 0.0, theta}), {x, y, 0.0}}; }
+
+/// Pose in the columns from `first` on: x y theta, or x y z qx qy qz qw.
+Result<Pose3> read_pose(const LineReader& line, std::size_t first, bool is_2d) {
+  if (is_2d) {
+    double v[3];
+    if (auto ok = line.numbers(first, v); !ok) return tl::unexpected(ok.error());
+    return lift(v[0], v[1], v[2]);
+  }
+  double v[7];
+  if (auto ok = line.numbers(first, v); !ok) return tl::unexpected(ok.error());
+  const auto q = internal::to_unit(line, {v[6], v[3], v[4], v[5]});
+  if (!q) return tl::unexpected(q.error());
+  return Pose3{*q, {v[0], v[1], v[2]}};
+}
+
+Status check_semi_definite(const LineReader& line, const Matrix6d& information) {
+  if (information.llt().info() == Eigen::Success) return {};  // positive definite, the usual case
+  const Vector6d eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Matrix6d>(information, Eigen::EigenvaluesOnly).eigenvalues();
+  if (eigenvalues.minCoeff() >= -kSemiDefiniteTolerance * eigenvalues.cwiseAbs().maxCoeff()) return {};
+  return line.fail(ErrorCode::invalid,
+                   "smallest eigenvalue of the information is {:.3g}, expected it not to be negative",
+                   eigenvalues.minCoeff());
+}
+
+/// Upper triangle, row by row, from column `first` on.
+Result<Matrix6d> read_information(const LineReader& line, std::size_t first, bool is_2d) {
+  Matrix6d information = Matrix6d::Zero();
+  std::array<double, 21> upper{};
+  const int size = is_2d ? 3 : 6;
+  if (auto ok = line.numbers(first, std::span(upper).first(is_2d ? 6 : 21)); !ok) return tl::unexpected(ok.error());
+  std::size_t next = 0;
+  for (int row = 0; row < size; ++row) {
+    for (int column = row; column < size; ++column) {
+      const int i = is_2d ? kPlanarAxes[static_cast<std::size_t>(row)] : row;
+      const int j = is_2d ? kPlanarAxes[static_cast<std::size_t>(column)] : column;
+      information(i, j) = information(j, i) = upper[next++];
+    }
+  }
+  if (is_2d) {
+    const auto or_one = [](double value) { return value > 0.0 ? value : 1.0; };
+    information(2, 2) = or_one(0.5 * (information(0, 0) + information(1, 1)));
+    information(3, 3) = information(4, 4) = or_one(information(5, 5));
+  }
+  if (auto ok = check_semi_definite(line, information); !ok) return tl::unexpected(ok.error());
+  return information;
+}
+
+Status read_vertex(const LineReader& line, bool is_2d, Lines& lines) {
+  const auto layout = is_2d ? "VERTEX_SE2 id x y theta" : "VERTEX_SE3:QUAT id x y z qx qy qz qw";
+  if (auto ok = line.expect_columns(is_2d ? 5 : 9, layout); !ok) return ok;
+  const auto id = line.integer(1, "vertex id");
+  if (!id) return tl::unexpected(id.error());
+  const auto pose = read_pose(line, 2, is_2d);
+  if (!pose) return tl::unexpected(pose.error());
+  lines.vertices.push_back({*id, *pose});
+  return {};
+}
+
+Status read_edge(const LineReader& line, bool is_2d, Lines& lines) {
+  const auto layout = is_2d ? "EDGE_SE2 from to, 3 of the pose, 6 of the information"
+                            : "EDGE_SE3:QUAT from to, 7 of the pose, 21 of the information";
+  if (auto ok = line.expect_columns(is_2d ? 12 : 31, layout); !ok) return ok;
+  const auto from = line.integer(1, "vertex id");
+  if (!from) return tl::unexpected(from.error());
+  const auto to = line.integer(2, "vertex id");
+  if (!to) return tl::unexpected(to.error());
+  if (*from == *to) return line.fail(ErrorCode::invalid, "edge from vertex {} to itself", *from);
+  const auto pose = read_pose(line, 3, is_2d);
+  if (!pose) return tl::unexpected(pose.error());
+  const auto information = read_information(line, is_2d ? 6 : 10, is_2d);
+  if (!information) return tl::unexpected(information.error());
+  lines.edges.push_back({*from, *to, *pose, *information, line.line()});
+  return {};
+}
+
+Status read_line(const LineReader& line, Lines& lines) {
+  const std::string_view tag = line.columns()[0];
+  if (tag == "FIX") {
+    for (std::size_t i = 1; i < line.columns().size(); ++i) {
+      const auto id = line.integer(i, "vertex id");
+      if (!id) return tl::unexpected(id.error());
+      lines.fixed.push_back(*id);
+    }
+    return {};
+  }
+  const bool is_vertex = tag == "VERTEX_SE2" || tag == "VERTEX_SE3:QUAT";
+  const bool is_2d = tag == "VERTEX_SE2" || tag == "EDGE_SE2";
+  if (!is_vertex && tag != "EDGE_SE2" && tag != "EDGE_SE3:QUAT")
+    return line.fail(ErrorCode::unsupported,
+                     "tag is {}, expected VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT or FIX", quoted(tag));
+  (is_2d ? lines.has_2d : lines.has_3d) = true;
+  if (lines.has_2d && lines.has_3d)
+    return line.fail(ErrorCode::unsupported, "tag is {} after lines of the other dimension, expected one of both", tag);
+  return is_vertex ? read_vertex(line, is_2d, lines) : read_edge(line, is_2d, lines);
+}
+
+/// Sorted ids of all poses; an error when a vertex comes twice.
+Result<std::vector<std::int64_t>> collect_ids(const Lines& lines, const std::string& name) {
+  std::vector<std::int64_t> ids;
+  for (const Vertex& vertex : lines.vertices) ids.push_back(vertex.id);
+  if (lines.vertices.empty())
+    for (const IdEdge& edge : lines.edges) ids.insert(ids.end(), {edge.from, edge.to});
+  std::sort(ids.begin(), ids.end());
+  const auto repeated = std::adjacent_find(ids.begin(), ids.end());
+  if (!lines.vertices.empty() && repeated != ids.end())
+    return fail(ErrorCode::invalid, "{}: vertex {} comes twice", name, *repeated);
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  return ids;
+}
+
+/// Ids to positions in `ids`.
+class Positions {
+ public:
+  explicit Positions(const std::vector<std::int64_t>& ids) : ids_(ids) {}
+  [[nodiscard]] Result<std::size_t> of(std::int64_t id, const std::string& where) const {
+    const auto found = std::lower_bound(ids_.begin(), ids_.end(), id);
+    if (found == ids_.end() || *found != id)
+      return fail(ErrorCode::invalid, "{}: names vertex {}, which is not in the file", where, id);
+    return static_cast<std::size_t>(found - ids_.begin());
+  }
+
+ private:
+  const std::vector<std::int64_t>& ids_;
+};
+
+Result<G2oFile> assemble(const Lines& lines, const std::string& name) {
+  auto ids = collect_ids(lines, name);
+  if (!ids) return tl::unexpected(ids.error());
+  if (ids->empty()) return fail(ErrorCode::parse, "{}: no vertex and no edge, expected a pose graph", name);
+
+  G2oFile file;
+  file.vertex_ids = std::move(*ids);
+  file.has_vertices = !lines.vertices.empty();
+  file.is_2d = lines.has_2d;
+  const Positions positions(file.vertex_ids);
+  for (const std::int64_t id : lines.fixed)
+    if (const auto found = positions.of(id, name + ": FIX"); !found) return tl::unexpected(found.error());
+  file.graph.edges.reserve(lines.edges.size());
+  for (const IdEdge& edge : lines.edges) {
+    const std::string where = fmt::format("{}:{}: edge", name, edge.line);
+    const auto from = positions.of(edge.from, where);
+    if (!from) return tl::unexpected(from.error());
+    const auto to = positions.of(edge.to, where);
+    if (!to) return tl::unexpected(to.error());
+    file.graph.edges.push_back({*from, *to, edge.T_from_to, edge.information});
+  }
+
+  file.graph.poses.resize(file.vertex_ids.size());
+  for (const Vertex& vertex : lines.vertices) file.graph.poses[*positions.of(vertex.id, name)] = vertex.pose;
+  if (!file.has_vertices) {
+    const std::size_t components = internal::chain_poses(file.graph, file.vertex_ids);
+    if (components != 1)
+      return fail(ErrorCode::invalid, "{}: no VERTEX lines and {} connected components, expected 1 to chain poses in",
+                  name, components);
+  }
+  return file;
+}
+
+void write_pose(std::string& out, const Pose3& pose, bool is_2d) {
+  const Eigen::Vector3d& t = pose.translation;
+  const Eigen::Quaterniond& q = pose.rotation;
+  if (is_2d)
+    fmt::format_to(std::back_inserter(out), " {} {} {}", t.x(), t.y(), 2.0 * std::atan2(q.z(), q.w()));
+  else
+    fmt::format_to(std::back_inserter(out), " {} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+void write_information(std::string& out, const Matrix6d& information, bool is_2d) {
+  static constexpr std::array<int, 6> kAllAxes = {0, 1, 2, 3, 4, 5};
+  const std::span<const int> axes = is_2d ? std::span<const int>(kPlanarAxes) : std::span<const int>(kAllAxes);
+  for (std::size_t row = 0; row < axes.size(); ++row)
+    for (std::size_t column = row; column < axes.size(); ++column)
+      fmt::format_to(std::back_inserter(out), " {}", information(axes[row], axes[column]));
+}
+
+}  // namespace
+
+Result<G2oFile> parse_g2o(std::string_view text, const std::string& name) {
+  LineReader line(text, name);
+  Lines lines;
+  while (line.next())
+    if (auto ok = read_line(line, lines); !ok) return tl::unexpected(ok.error());
+  return assemble(lines, name);
+}
+
+Result<G2oFile> read_g2o(const std::string& path) {
+  return internal::read_file(path).and_then([&](const std::string& text) { return parse_g2o(text, path); });
+}
+
+std::string to_g2o(const G2oFile& file) {
+  const auto& [poses, edges] = file.graph;
+  TUTTI_CHECK(file.vertex_ids.size() == poses.size(), "{} ids for {} poses", file.vertex_ids.size(), poses.size());
+  std::string out;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    fmt::format_to(std::back_inserter(out), "{} {}", file.is_2d ? "VERTEX_SE2" : "VERTEX_SE3:QUAT", file.vertex_ids[i]);
+    write_pose(out, poses[i], file.is_2d);
+    out += '\n';
+  }
+  for (const PoseGraphEdge& edge : edges) {
+    fmt::format_to(std::back_inserter(out), "{} {} {}", file.is_2d ? "EDGE_SE2" : "EDGE_SE3:QUAT",
+                   file.vertex_ids.at(edge.from), file.vertex_ids.at(edge.to));
+    write_pose(out, edge.T_from_to, file.is_2d);
+    write_information(out, edge.information, file.is_2d);
+    out += '\n';
+  }
+  return out;
+}
+
+Status write_g2o(const std::string& path, const G2oFile& file) { return internal::write_file(path, to_g2o(file)); }
+
+Status write_g2o(const std::string& path, const PoseGraph& graph) {
+  G2oFile file{.graph = graph, .vertex_ids = std::vector<std::int64_t>(graph.poses.size())};
+  std::iota(file.vertex_ids.begin(), file.vertex_ids.end(), 0);
+  return write_g2o(path, file);
+}
+
+}  // namespace tutti::formats

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/formats/internal/text.hpp"
+
+/// What point files share: records of fixed size with x, y, z somewhere in them.
+namespace tutti::formats::internal {
+
+/// Bound on one header number, so that products of two fit an int64 and nonsense is refused before it is allocated.
+inline constexpr std::int64_t kMaxCount = std::int64_t{1} << 31;
+
+/// One coordinate within a record.
+struct Coordinate {
+  bool found = false;
+  std::size_t offset = 0;  ///< Bytes, in binary files.
+  std::size_t column = 0;  ///< In ascii files.
+  bool is_double = false;
+};
+
+struct RecordLayout {
+  std::array<Coordinate, 3> xyz;
+  std::size_t stride = 0;   ///< Bytes a record.
+  std::size_t columns = 0;  ///< Columns a record.
+};
+
+/// Infinite where the value is beyond a float's range (a plain cast would be undefined).
+float to_float(double value);
+
+/// The points of the `count` records in `data` that are finite.
+std::vector<Eigen::Vector3f> binary_points(std::string_view data, std::size_t count, const RecordLayout& layout);
+/// The same from the next `count` lines.
+Result<std::vector<Eigen::Vector3f>> ascii_points(LineReader& line, std::size_t count, const RecordLayout& layout);
+
+/// Appends the bytes of a little-endian number.
+template <class T>
+void put(std::string& out, const T& value) {
+  out.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+}  // namespace tutti::formats::internal

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/formats/internal/text.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+
+namespace tutti::formats::internal {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r\f\v";
+constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+template <class T>
+std::optional<T> parse_whole(std::string_view text) {
+  if (text.starts_with('+')) {  // std::from_chars knows no plus sign
+    text.remove_prefix(1);
+    if (text.starts_with('-')) return std::nullopt;
+  }
+  T value{};
+  const char* end = text.data() + text.size();
+  const auto [last, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc{} || last != end) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+Result<std::string> read_file(const std::string& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return fail(ErrorCode::io, "{}: is a folder, expected a file", path);
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail(ErrorCode::io, "{}: cannot open for reading: {}", path, std::strerror(errno));
+  constexpr std::size_t kChunk = std::size_t{1} << 18;  // pipes have no size to ask for
+  std::string bytes;
+  while (file) {
+    const std::size_t size = bytes.size();
+    bytes.resize(size + kChunk);
+    file.read(bytes.data() + size, kChunk);
+    bytes.resize(size + static_cast<std::size_t>(file.gcount()));
+  }
+  if (file.bad()) return fail(ErrorCode::io, "{}: cannot read: {}", path, std::strerror(errno));
+  return bytes;
+}
+
+Status write_file(const std::string& path, std::string_view bytes) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  if (!file) return fail(ErrorCode::io, "{}: cannot open for writing: {}", path, std::strerror(errno));
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) return fail(ErrorCode::io, "{}: cannot write {} bytes: {}", path, bytes.size(), std::strerror(errno));
+  return {};
+}
+
+std::optional<double> parse_number(std::string_view text) { return parse_whole<double>(text); }
+std::optional<std::int64_t> parse_integer(std::string_view text) { return parse_whole<std::int64_t>(text); }
+
+std::optional<Timestamp> parse_seconds(std::string_view text) {
+  const bool negative = text.starts_with('-');
+  if (negative || text.starts_with('+')) text.remove_prefix(1);
+
+  std::int64_t exponent = 0;
+  if (const std::size_t e = text.find_first_of("eE"); e != std::string_view::npos) {
+    const auto parsed = parse_integer(text.substr(e + 1));
+    if (!parsed) return std::nullopt;
+    exponent = std::clamp<std::int64_t>(*parsed, -1'000'000'000, 1'000'000'000);
+    text = text.substr(0, e);
+  }
+  const std::size_t point = std::min(text.find('.'), text.size());
+  if (text.empty() || text == ".") return std::nullopt;
+
+  std::int64_t ns = 0;
+  bool round_up = false;
+  std::int64_t power = static_cast<std::int64_t>(point) - 1 + exponent;  // of ten, of the digit at hand, in seconds
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (i == point) continue;
+    if (!is_digit(text[i])) return std::nullopt;
+    const int digit = text[i] - '0';
+    if (power >= -9) {
+      if (ns > kMaxStampNs / 10) return std::nullopt;
+      ns = 10 * ns + digit;
+    } else if (power == -10) {
+      round_up = digit >= 5;
+    }
+    --power;
+  }
+  for (; power >= -9 && ns != 0; --power) {
+    if (ns > kMaxStampNs / 10) return std::nullopt;
+    ns *= 10;
+  }
+  if (round_up) ++ns;
+  if (ns > kMaxStampNs) return std::nullopt;
+  return Timestamp{negative ? -ns : ns};
+}
+
+std::string to_seconds(Timestamp stamp) {
+  const std::uint64_t magnitude =
+      stamp.ns < 0 ? std::uint64_t{0} - static_cast<std::uint64_t>(stamp.ns) : static_cast<std::uint64_t>(stamp.ns);
+  return fmt::format("{}{}.{:09}", stamp.ns < 0 ? "-" : "", magnitude / 1'000'000'000, magnitude % 1'000'000'000);
+}
+
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kLongest = 40;
+  std::string out(text.substr(0, kLongest));
+  std::replace_if(
+      out.begin(), out.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return fmt::format("'{}{}'", out, text.size() > kLongest ? "..." : "");
+}
+
+bool LineReader::next() {
+  while (!rest_.empty()) {
+    const std::size_t end = std::min(rest_.find('\n'), rest_.size());
+    std::string_view line = rest_.substr(0, end);
+    rest_.remove_prefix(std::min(end + 1, rest_.size()));
+    ++line_;
+    line = trimmed(line.substr(0, line.find('#')));
+    if (line.empty()) continue;
+
+    columns_.clear();
+    while (true) {
+      const std::size_t cut = separator_ == Separator::comma ? line.find(',') : line.find_first_of(kBlanks);
+      columns_.push_back(trimmed(line.substr(0, cut)));
+      if (cut == std::string_view::npos) break;
+      line.remove_prefix(cut + 1);
+      if (separator_ == Separator::whitespace) line = trimmed(line);
+    }
+    return true;
+  }
+  columns_.clear();
+  return false;
+}
+
+Status LineReader::expect_columns(std::size_t count, std::string_view layout) const {
+  if (columns_.size() == count) return {};
+  return fail(ErrorCode::parse, "row has {} columns, expected {} ({})", columns_.size(), count, layout);
+}
+
+Status LineReader::numbers(std::size_t first, std::span<double> out) const {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::string_view text = columns_[first + i];
+    const auto value = parse_number(text);
+    if (!value) return fail(ErrorCode::parse, "column {} is {}, expected a number", first + i + 1, quoted(text));
+    if (!std::isfinite(*value))
+      return fail(ErrorCode::invalid, "column {} is {}, expected a finite number", first + i + 1, quoted(text));
+    out[i] = *value;
+  }
+  return {};
+}
+
+Result<std::int64_t> LineReader::integer(std::size_t column, std::string_view what) const {
+  if (const auto value = parse_integer(columns_[column])) return *value;
+  return fail(ErrorCode::parse, "{} in column {} is {}, expected a 64-bit integer", what, column + 1,
+              quoted(columns_[column]));
+}
+
+Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quaterniond& q) {
+  constexpr double kRounding = 1e-14;  // of a normalised quaternion's squared norm
+  if (std::abs(q.squaredNorm() - 1.0) <= kRounding) return q;
+  const double norm = q.norm();
+  if (!(std::abs(norm - 1.0) <= kUnitTolerance))
+    return where.fail(ErrorCode::invalid, "quaternion has norm {:.6g}, expected 1 within {}", norm, kUnitTolerance);
+  return Eigen::Quaterniond(q.coeffs() / norm);
+}
+
+Status append(const LineReader& where, Trajectory& trajectory, const StampedPose& pose) {
+  if (!is_in_range(pose.stamp))
+    return where.fail(ErrorCode::invalid, "stamp is {} ns, expected at most 2^62 either way", pose.stamp.ns);
+  if (!trajectory.empty() && pose.stamp <= trajectory.back().stamp)
+    return where.fail(ErrorCode::invalid,
+                      "stamp {} s does not come after the previous {} s, expected increasing stamps",
+                      to_seconds(pose.stamp), to_seconds(trajectory.back().stamp));
+  trajectory.push_back(pose);
+  return {};
+}
+
+}  // namespace tutti::formats::internal

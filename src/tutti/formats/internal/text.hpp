@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/model/trajectory.hpp"
+
+/// What the readers share: whole files, numbers, and lines that know where they are.
+namespace tutti::formats::internal {
+
+Result<std::string> read_file(const std::string& path);
+Status write_file(const std::string& path, std::string_view bytes);
+
+/// Stamps are kept within +-2^62 ns (years 1823 to 2116), so that the difference of any two fits an int64.
+inline constexpr std::int64_t kMaxStampNs = std::int64_t{1} << 62;
+constexpr bool is_in_range(Timestamp stamp) { return -kMaxStampNs <= stamp.ns && stamp.ns <= kMaxStampNs; }
+/// Quaternions off unit norm by more than this are refused.
+inline constexpr double kUnitTolerance = 1e-3;
+
+/// All of `text` must be the number. NaN and infinity are numbers here; callers decide.
+std::optional<double> parse_number(std::string_view text);
+std::optional<std::int64_t> parse_integer(std::string_view text);
+/// Decimal seconds, with or without exponent, to the nearest ns (halves away from zero) without going through a double.
+std::optional<Timestamp> parse_seconds(std::string_view text);
+/// Nine decimals: "-0.500000000".
+std::string to_seconds(Timestamp stamp);
+/// `text` in quotes as it may appear in a message: at most 40 characters, nothing unprintable.
+std::string quoted(std::string_view text);
+
+/// Where the columns of a line end.
+enum class Separator { whitespace, comma };
+
+/// Walks over the lines of a text and splits them into columns. Whatever a '#' starts is a comment; empty lines are
+/// passed over. Its errors begin with "name:line: ".
+class LineReader {
+ public:
+  LineReader(std::string_view text, std::string name, Separator separator = Separator::whitespace)
+      : rest_(text), name_(std::move(name)), separator_(separator) {}
+
+  /// The next line with content; false at the end of the text.
+  bool next();
+  [[nodiscard]] std::span<const std::string_view> columns() const { return columns_; }
+  /// Text behind the current line.
+  [[nodiscard]] std::string_view rest() const { return rest_; }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] int line() const { return line_; }
+
+  template <class... Args>
+  [[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> format, Args&&... args) const {
+    return tutti::fail(code, "{}:{}: {}", name_, line_, fmt::format(format, std::forward<Args>(args)...));
+  }
+  /// `layout` names the columns for the message.
+  [[nodiscard]] Status expect_columns(std::size_t count, std::string_view layout) const;
+  /// Fills `out` from the columns that start at `first` (they must exist); every number must be finite.
+  [[nodiscard]] Status numbers(std::size_t first, std::span<double> out) const;
+  [[nodiscard]] Result<std::int64_t> integer(std::size_t column, std::string_view what) const;
+
+ private:
+  std::string_view rest_;
+  std::string name_;
+  Separator separator_;
+  int line_ = 0;
+  std::vector<std::string_view> columns_;
+};
+
+/// The unit quaternion that is meant, or what is wrong with it; left bit for bit when already unit to rounding.
+Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quaterniond& q);
+/// Appends if the stamp comes after the last one and is within range.
+Status append(const LineReader& where, Trajectory& trajectory, const StampedPose& pose);
+
+}  // namespace tutti::formats::internal

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/formats/kitti.hpp"
+
+#include <Eigen/LU>
+
+#include "tutti/formats/internal/text.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::formats {
+
+Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start) {
+  constexpr double kLowestRate = 1e-2;
+  constexpr double kHighestRate = 1e6;
+  constexpr double kRotationTolerance = 1e-3;
+  if (!(rate_hz >= kLowestRate && rate_hz <= kHighestRate))
+    return fail(ErrorCode::configuration, "{}: rate of the poses is {} Hz, expected {} to {}", name, rate_hz,
+                kLowestRate, kHighestRate);
+  if (!internal::is_in_range(start))
+    return fail(ErrorCode::configuration, "{}: first stamp is {} ns, expected at most 2^62 either way", name, start.ns);
+
+  internal::LineReader line(text, name);
+  Trajectory trajectory;
+  while (line.next()) {
+    if (auto ok = line.expect_columns(12, "row-major 3x4 matrix [R t]"); !ok) return tl::unexpected(ok.error());
+    Eigen::Matrix<double, 3, 4, Eigen::RowMajor> m;
+    if (auto ok = line.numbers(0, {m.data(), 12}); !ok) return tl::unexpected(ok.error());
+    const Eigen::Matrix3d R = m.leftCols<3>();
+    const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    if (!(error <= kRotationTolerance) || R.determinant() < 0.0)
+      return line.fail(ErrorCode::invalid, "|R^T R - I| is {:.3g}, det R {:.3g}, expected a rotation within {}", error,
+                       R.determinant(), kRotationTolerance);
+    const Timestamp stamp = start + static_cast<double>(trajectory.size()) / rate_hz;
+    const Eigen::Quaterniond q(project_to_so3(R));
+    if (auto ok = append(line, trajectory, {stamp, {q.normalized(), m.col(3)}}); !ok) return tl::unexpected(ok.error());
+  }
+  return trajectory;
+}
+
+Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz, Timestamp start) {
+  return internal::read_file(path).and_then(
+      [&](const std::string& text) { return parse_kitti_poses(text, path, rate_hz, start); });
+}
+
+Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::string& name) {
+  internal::LineReader line(text, name);
+  std::vector<Timestamp> times;
+  while (line.next()) {
+    if (auto ok = line.expect_columns(1, "stamp"); !ok) return tl::unexpected(ok.error());
+    const auto stamp = internal::parse_seconds(line.columns()[0]);
+    if (!stamp)
+      return line.fail(ErrorCode::parse, "stamp is {}, expected seconds", internal::quoted(line.columns()[0]));
+    if (!times.empty() && *stamp <= times.back())
+      return line.fail(ErrorCode::invalid, "stamp {} s does not come after the previous {} s",
+                       internal::to_seconds(*stamp), internal::to_seconds(times.back()));
+    times.push_back(*stamp);
+  }
+  return times;
+}
+
+Result<std::vector<Timestamp>> read_times(const std::string& path) {
+  return internal::read_file(path).and_then([&](const std::string& text) { return parse_times(text, path); });
+}
+
+Result<Trajectory> with_times(Trajectory poses, std::span<const Timestamp> times) {
+  if (poses.size() != times.size())
+    return fail(ErrorCode::invalid, "{} stamps for {} poses, expected one each", times.size(), poses.size());
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    if (k > 0 && times[k] <= times[k - 1])
+      return fail(ErrorCode::invalid, "stamp {} is {} s, expected more than the previous {} s", k,
+                  internal::to_seconds(times[k]), internal::to_seconds(times[k - 1]));
+    poses[k].stamp = times[k];
+  }
+  return poses;
+}
+
+}  // namespace tutti::formats
