@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# All tracked C++ files are formatted as .clang-format says (clang-format 14, Debian 12's; others format differently).
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+skip() {
+  echo "$1: formatting not checked"
+  echo TUTTI_ALL_SKIPPED # ctest's word for it
+  exit 0
+}
+formatter="$(command -v clang-format-14 || command -v clang-format)" || skip "no clang-format"
+[[ "$("$formatter" --version)" =~ version\ 14\. ]] || skip "$("$formatter" --version) is not version 14"
+git rev-parse --is-inside-work-tree >/dev/null 2>&1 || skip "not a git checkout"
+
+git ls-files -z -- '*.cpp' '*.hpp' | while IFS= read -r -d '' file; do
+  if [ -f "$file" ]; then printf '%s\0' "$file"; fi # deleted, but not yet committed
+done | xargs -0 -r "$formatter" --dry-run -Werror

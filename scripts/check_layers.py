@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Holds every file below src/tutti to the architecture (docs/architecture.md); prints file:line for each breach.
+
+usage: check_layers.py [project root]
+"""
+import pathlib
+import re
+import sys
+
+# (what an #include looks like, which files may have it, in words)
+CONFINED = [
+    (r"yaml-cpp/", r"base/config\.cpp$", "base/config.cpp"),
+    (r"google/protobuf|.*\.pb\.h$", r"(wire|bus)/", "wire/ and bus/"),
+    (r"ceres/", r"(estimation/.*\.cpp|.*_test\.cpp)$", "estimation/*.cpp and tests"),
+    (r"Spectra/", r"spectral/.*\.cpp$", "spectral/*.cpp"),
+    (r"nanoflann", r"(perception|spectral|consistency)/.*\.cpp$", "perception/, spectral/, consistency/ *.cpp"),
+    (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
+    (r"CLI/", r"(?!)", "apps/"),
+]
+# A library returns what it has to say, and never ends the program.
+FORBIDDEN = re.compile(
+    r"\bstd::(cout|cerr|clog)\b|\bfmt::print\b|(?<![\w.>])(std::|::)?"
+    r"(f?printf|puts|abort|exit|_Exit|quick_exit|terminate)\s*\(")
+INCLUDE = re.compile(r'\s*#\s*include\s*[<"]([^>"]+)[>"]')
+
+
+def layer_order(root):
+    """The one list of layers is the list CMake builds them by; perception/lidar is layer perception."""
+    cmake = (root / "src/tutti/CMakeLists.txt").read_text()
+    modules = re.search(r"foreach\(module IN ITEMS ([^)]*)\)", cmake).group(1).split()
+    order = []
+    for module in modules:
+        if (layer := module.split("/")[0]) not in order:
+            order.append(layer)
+    return order
+
+
+def include_breach(order, relative, include):
+    layer = relative.split("/")[0]
+    if include.startswith("tutti/"):
+        other = include.split("/")[1]
+        if other not in order:
+            return f"'{other}' is no layer"
+        if order.index(other) > order.index(layer):
+            return f"{layer} may not use {other}, a layer below it"
+        if (layer, other) == ("server", "robot"):
+            return "robot and server never include each other"
+    for library, allowed, words in CONFINED:
+        if re.match(library, include) and not re.match(allowed, relative):
+            return f"{include} belongs only in {words}"
+    return None
+
+
+def breaches(root):
+    order = layer_order(root)
+    source = root / "src/tutti"
+    for path in sorted(p for p in source.rglob("*") if p.suffix in (".hpp", ".cpp")):
+        relative = path.relative_to(source).as_posix()
+        if relative.split("/")[0] not in order:
+            yield f"{path}:1: '{relative.split('/')[0]}' is missing in src/tutti/CMakeLists.txt"
+            continue
+        text = re.sub(r"/\*.*?\*/", lambda m: "\n" * m.group().count("\n"), path.read_text(), flags=re.S)
+        for number, line in enumerate(text.splitlines(), 1):
+            breach = None
+            if match := INCLUDE.match(line):
+                breach = include_breach(order, relative, match.group(1))
+            elif not relative.endswith("_test.cpp"):
+                code = re.sub(r'"(\\.|[^"\\])*"', '""', line).split("//")[0]
+                if match := FORBIDDEN.search(code):
+                    breach = f"a library may not call {match.group().strip(' (')}"
+            if breach:
+                yield f"{path}:{number}: {breach}"
+
+
+if __name__ == "__main__":
+    found = list(breaches(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1])))
+    print("\n".join(found) or "layers: nothing to complain about")
+    sys.exit(1 if found else 0)

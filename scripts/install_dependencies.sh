@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Installs the Debian packages that are missing, and nothing when none is.
+#   scripts/install_dependencies.sh [--tests] [--bench]
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+packages=(
+  cmake ninja-build g++ ccache pkg-config
+  libeigen3-dev libsuitesparse-dev libopenblas-dev liblapacke-dev libspectra-dev libnanoflann-dev
+  libprotobuf-dev protobuf-compiler libzstd-dev
+  libexpected-dev libfmt-dev libcli11-dev libyaml-cpp-dev libtbb-dev nlohmann-json3-dev
+)
+for option in "$@"; do
+  case "$option" in
+    --tests) packages+=(libgtest-dev librapidcheck-dev libceres-dev clang-format python3) ;;
+    --bench) packages+=(libbenchmark-dev) ;;
+    *)
+      echo "usage: $0 [--tests] [--bench]" >&2
+      exit 2
+      ;;
+  esac
+done
+
+if ! command -v apt-get >/dev/null; then
+  echo "$0: no apt-get here. Install what these Debian packages hold: ${packages[*]}" >&2
+  exit 1
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  status="$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)"
+  [ "$status" = installed ] || missing+=("$package")
+done
+[ "${#missing[@]}" -gt 0 ] || exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "$0: needs root or sudo to install: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+say "installing ${#missing[@]} packages: ${missing[*]}"
+apt_get=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=300)
+quietly "${apt_get[@]}" update
+quietly "${apt_get[@]}" install -y --no-install-recommends "${missing[@]}"
