@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/ids.hpp"
@@ -43,7 +44,7 @@ struct ReferenceClosureConfig {
     v.field("distant_share", distant_share, between(0.0, 1.0), "Share of the wrong ones that join distant places.");
     v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
             "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
-    v.field("wrong_min_m", wrong_min_m, greater_than(0.0), "Least error of a wrong closure.");
+    v.field("wrong_min_m", wrong_min_m, greater_than(0.0), "Least offset of a wrong closure.");
     v.field("wrong_max_m", wrong_max_m, greater_than(0.0), "Largest offset of a wrong closure; not below wrong_min_m.");
     v.field("wrong_max_deg", wrong_max_deg, between(0.0, 180.0), "Largest turn of a wrong closure.");
     v.field("max_reference_gap_s", max_reference_gap_s, greater_than(0.0),
@@ -68,11 +69,15 @@ class ReferenceClosures {
                                                         Timestamp stamp_b) const;
 
  private:
-  struct Match;
+  struct PlacedSubmap;
   struct Assessment;
   [[nodiscard]] std::optional<Pose3> pose_at(RobotId robot, Timestamp stamp) const;
-  [[nodiscard]] Assessment assess(const Submap& first, const Submap& second) const;
-  [[nodiscard]] double distant_pairs_per_overlap() const;
+  [[nodiscard]] PlacedSubmap place(const Submap& submap) const;
+  [[nodiscard]] Assessment assess(const PlacedSubmap& first, const PlacedSubmap& second) const;
+  [[nodiscard]] std::vector<PlacedSubmap> cut_reference() const;
+  void set_wrong_probabilities();
+  /// Is the pair reported wrong, and then by which error of the pose in first's anchor frame?
+  [[nodiscard]] std::optional<Pose3> draw_error(const SubmapPair& pair, bool overlap) const;
 
   std::map<RobotId, Trajectory> reference_;
   ReferenceClosureConfig config_;
