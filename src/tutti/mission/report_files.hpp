@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+
+#include "tutti/base/result.hpp"
+#include "tutti/mission/record.hpp"
+
+namespace tutti::mission {
+
+/// Writes everything a mission leaves behind into `out_dir` (made when missing, files of the same name replaced):
+/// report.json, timing.json, report.html, config.yaml, per robot <name>_{onboard,corrected,server,reference}.tum where
+/// there are such poses, graph.g2o with graph_stamps.csv, and map.ply when there is a cloud. In file names, characters
+/// of a robot's name other than letters, digits, '-' and '_' become '_'. docs/report.md describes every file.
+Status write_report(const MissionRecord& record, const std::filesystem::path& out_dir);
+
+}  // namespace tutti::mission

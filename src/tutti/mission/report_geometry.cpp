@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report_geometry.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <unordered_map>
+
+#include "tutti/evaluation/association.hpp"
+#include "tutti/evaluation/ate.hpp"
+#include "tutti/mission/report_format.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// An estimate in the display frame, and its distance to the base at every stamp that has one.
+struct Aligned {
+  Pose3 T_base_estimate;
+  Points3d positions;
+  std::unordered_map<Timestamp, double> errors_m;
+};
+
+Aligned align_to(const Trajectory& base, const Trajectory& estimate, const evaluation::AssociationConfig& config) {
+  const auto pairs = evaluation::associate(estimate, base, config);
+  const auto fit = evaluation::ate(pairs);
+  Aligned out;
+  if (fit) out.T_base_estimate = fit->T_reference_estimate;
+  for (const auto& p : estimate) out.positions.push_back(out.T_base_estimate * p.pose.translation);
+  for (const auto& pair : pairs)
+    out.errors_m[pair.stamp] = (out.T_base_estimate * pair.estimate.translation - pair.reference.translation).norm();
+  return out;
+}
+
+double at(const Aligned& aligned, Timestamp stamp) {
+  const auto found = aligned.errors_m.find(stamp);
+  return found == aligned.errors_m.end() ? kNaN : found->second;
+}
+
+}  // namespace
+
+RobotGeometry robot_geometry(const MissionRecord& record, const RobotRecord& robot) {
+  RobotGeometry out;
+  out.has_reference = !evaluation::associate(robot.odometry, robot.reference, record.association).empty();
+  const Trajectory& base = out.has_reference                ? robot.reference
+                           : !robot.server_estimate.empty() ? robot.server_estimate
+                                                            : robot.odometry;
+  const PolicyRecord* policy = find_policy(robot, record.default_policy);
+  const Aligned onboard = align_to(base, robot.odometry, record.association);
+  const Aligned corrected = policy != nullptr ? align_to(base, policy->corrected, record.association) : Aligned{};
+  const Aligned server = align_to(base, robot.server_estimate, record.association);
+  out.onboard = onboard.positions;
+  out.corrected = corrected.positions;
+  out.server = server.positions;
+  for (const auto& other : robot.whereabouts)
+    out.whereabouts.push_back(corrected.T_base_estimate * other.T_map_body.translation);
+  if (out.has_reference)
+    for (const auto& p : robot.reference) out.reference.push_back(p.pose.translation);
+
+  double distance_m = 0.0;
+  for (std::size_t k = 0; k < robot.odometry.size(); ++k) {
+    const auto& [stamp, pose] = robot.odometry[k];
+    if (k > 0) distance_m += (pose.translation - robot.odometry[k - 1].pose.translation).norm();
+    out.errors.push_back({distance_m, stamp - robot.odometry.front().stamp, at(onboard, stamp), at(corrected, stamp),
+                          out.has_reference ? at(server, stamp) : kNaN});
+  }
+  return out;
+}
+
+std::uint32_t largest_component(const MissionRecord& record) {
+  std::map<std::uint32_t, std::size_t> sizes;
+  for (const auto& robot : record.robots) ++sizes[robot.component];
+  const auto largest =
+      std::max_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  return largest == sizes.end() ? 0 : largest->first;
+}
+
+Pose3 display_T_reference_world(const MissionRecord& record) {
+  const std::uint32_t component = largest_component(record);
+  std::vector<evaluation::PosePair> pairs;
+  for (const auto& robot : record.robots) {
+    if (robot.component != component) continue;
+    const auto more = evaluation::associate(robot.server_estimate, robot.reference, record.association);
+    pairs.insert(pairs.end(), more.begin(), more.end());
+  }
+  const auto fit = evaluation::ate(pairs);
+  return fit ? fit->T_reference_estimate : Pose3{};
+}
+
+Points2d GroundPlane::operator()(const Points3d& points) const {
+  Points2d out;
+  out.reserve(points.size());
+  for (const auto& p : points) out.push_back((*this)(p));
+  return out;
+}
+
+GroundPlane ground_plane(const std::vector<Points3d>& layers) {
+  constexpr double kMuchMore = 3.0;
+  constexpr double kFlat_m = 0.1;  // of the smaller extent: a straight line on the ground stays seen from above
+  Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Array3d high = -low;
+  for (const auto& layer : layers)
+    for (const auto& p : layer)
+      if (p.allFinite()) {
+        low = low.min(p.array());
+        high = high.max(p.array());
+      }
+  if (!(low <= high).all()) return {};
+  const Eigen::Array3d extent = high - low;
+  if (extent.z() > kMuchMore * std::max(extent.y(), kFlat_m)) return {0, 2};
+  if (extent.z() > kMuchMore * std::max(extent.x(), kFlat_m)) return {1, 2};
+  return {};
+}
+
+const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp stamp) {
+  const auto found = std::lower_bound(trajectory.begin(), trajectory.end(), stamp,
+                                      [](const StampedPose& p, Timestamp t) { return p.stamp < t; });
+  return found == trajectory.end() || found->stamp != stamp ? nullptr : &found->pose.translation;
+}
+
+std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const ServerRecord& server) {
+  std::map<KeyframeId, Eigen::Vector3d> out;
+  for (std::size_t i = 0; i < std::min(server.nodes.size(), server.graph.poses.size()); ++i)
+    out[server.nodes[i].id] = server.graph.poses[i].translation;
+  return out;
+}
+
+}  // namespace tutti::mission

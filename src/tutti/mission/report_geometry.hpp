@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <vector>
+
+#include "tutti/mission/record.hpp"
+#include "tutti/mission/report_svg.hpp"
+
+/// Where everything is drawn: estimates live in unrelated frames, so for display each is moved by one rigid transform.
+namespace tutti::mission {
+
+using Points3d = std::vector<Eigen::Vector3d>;
+
+/// One keyframe on an error-over-distance plot; NaN = not measured.
+struct KeyframeError {
+  double distance_m;  ///< Along the odometry keyframes.
+  double time_s;      ///< Since the robot's first keyframe.
+  double onboard_m, corrected_m, server_m;
+};
+
+/// One robot's trajectories in one frame: the reference's, or the server's where there is no reference.
+struct RobotGeometry {
+  Points3d onboard, corrected, server;  ///< At keyframes; empty when there is no such estimate.
+  Points3d reference;                   ///< All of it; empty when there is none.
+  /// Distance to the reference, or without one to the server's estimate, after the alignment; one per odometry
+  /// keyframe.
+  std::vector<KeyframeError> errors;
+  /// Where this robot believes the others to be: as RobotRecord::whereabouts, moved with `corrected`.
+  Points3d whereabouts;
+  bool has_reference = false;
+};
+RobotGeometry robot_geometry(const MissionRecord& record, const RobotRecord& robot);
+
+/// Robots of the largest component together against the reference: one alignment, the one of ServerRecord::joint.
+/// Identity when there is no reference.
+Pose3 display_T_reference_world(const MissionRecord& record);
+
+/// The component most robots belong to (the lowest numbered of several).
+std::uint32_t largest_component(const MissionRecord& record);
+
+/// Which two coordinates make the view from above: x and y, unless the mission spreads much more along z than along
+/// one of them (camera frames, y down).
+struct GroundPlane {
+  Eigen::Index right = 0;
+  Eigen::Index up = 1;
+  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector3d& p) const { return {p[right], p[up]}; }
+  [[nodiscard]] Points2d operator()(const Points3d& points) const;
+};
+GroundPlane ground_plane(const std::vector<Points3d>& layers);
+
+/// Position of a robot's estimate at a stamp of its keyframes.
+const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp stamp);
+
+/// The server's final estimate of every keyframe.
+std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const ServerRecord& server);
+
+}  // namespace tutti::mission

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Views from above: all robots in one map, and each robot's estimates on top of each other.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <unordered_map>
+
+#include "tutti/mission/report_format.hpp"
+#include "tutti/mission/report_html_parts.hpp"
+#include "tutti/mission/report_plot.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr double kWide_px = 1160.0;
+constexpr double kHalf_px = 560.0;
+constexpr std::size_t kHoverPoints = 60;
+
+Points3d transformed(const Pose3& T_a_b, const Trajectory& trajectory_b) {
+  Points3d out;
+  for (const auto& p : trajectory_b) out.push_back(T_a_b * p.pose.translation);
+  return out;
+}
+
+/// Cells of the plan that hold many points, as three shades: walls are dense seen from above. At most kMaxCells.
+void draw_cloud(Svg& svg, const PlanView& view, const std::vector<Points2d>& clouds) {
+  constexpr double kCell_px = 2.0;
+  constexpr std::size_t kMaxCells = 24000;
+  const auto columns = static_cast<std::uint32_t>(view.width() / kCell_px) + 1;
+  std::unordered_map<std::uint32_t, std::uint32_t> counts;
+  for (const auto& cloud : clouds)
+    for (const auto& p : cloud) {
+      const Eigen::Vector2d pixel = view(p);
+      if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < view.width() && pixel.y() < view.height())) continue;
+      ++counts[static_cast<std::uint32_t>(pixel.y() / kCell_px) * columns +
+               static_cast<std::uint32_t>(pixel.x() / kCell_px)];
+    }
+  if (counts.empty()) return;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> cells(counts.begin(), counts.end());
+  std::sort(cells.begin(), cells.end(), [](const auto& a, const auto& b) {
+    return a.second != b.second ? a.second > b.second : a.first < b.first;
+  });
+  cells.resize(std::min(cells.size(), kMaxCells));
+  const std::uint32_t dense = std::max(3U, cells[cells.size() / 8].second);
+  const std::uint32_t middle = std::max(2U, cells[cells.size() / 3].second);
+  std::array<Points2d, 3> shades;
+  for (const auto& [cell, count] : cells)
+    shades[count >= dense    ? 2
+           : count >= middle ? 1
+                             : 0]
+        .push_back({kCell_px * (cell % columns), kCell_px * (cell / columns)});
+  for (std::size_t s = 0; s < shades.size(); ++s) svg.squares(shades[s], kCell_px, fmt::format("cloud{}", s + 1));
+}
+
+/// Two corners that hold all but the outermost 1 % on every side: a few stray returns must not shrink the picture.
+Points2d trimmed_box(const std::vector<Points2d>& clouds) {
+  std::vector<double> x;
+  std::vector<double> y;
+  for (const auto& cloud : clouds)
+    for (const auto& p : cloud)
+      if (p.allFinite()) {
+        x.push_back(p.x());
+        y.push_back(p.y());
+      }
+  if (x.empty()) return {};
+  std::sort(x.begin(), x.end());
+  std::sort(y.begin(), y.end());
+  const std::size_t low = x.size() / 100;
+  const std::size_t high = x.size() - 1 - low;
+  return {{x[low], y[low]}, {x[high], y[high]}};
+}
+
+std::vector<std::size_t> members(const MissionRecord& record, std::uint32_t component) {
+  std::vector<std::size_t> out;
+  for (std::size_t r = 0; r < record.robots.size(); ++r)
+    if (record.robots[r].component == component) out.push_back(r);
+  return out;
+}
+
+bool is_member(const MissionRecord& record, const std::vector<std::size_t>& robots, RobotId id) {
+  return std::any_of(robots.begin(), robots.end(), [&](std::size_t r) { return record.robots[r].id == id; });
+}
+
+void draw_closures(Svg& svg, const MissionRecord& record, const Pose3& T_display_world, const GroundPlane& ground,
+                   const PlanView& view, const std::vector<std::size_t>& robots) {
+  const auto positions = keyframe_positions(record.server);
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> intra;
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> inter;
+  for (const auto& closure : record.server.closures) {
+    const auto from = positions.find(closure.from);
+    const auto to = positions.find(closure.to);
+    if (from == positions.end() || to == positions.end() || !is_member(record, robots, closure.from.robot)) continue;
+    (closure.from.robot == closure.to.robot ? intra : inter)
+        .emplace_back(view(ground(T_display_world * from->second)), view(ground(T_display_world * to->second)));
+  }
+  svg.segments(intra, "intra", fmt::format("{} loop closures within one robot", intra.size()));
+  svg.segments(inter, "inter", fmt::format("{} loop closures between robots", inter.size()));
+}
+
+/// Invisible until pointed at.
+void draw_hover_points(Svg& svg, const Points2d& pixels, const std::vector<std::string>& titles) {
+  const std::size_t step = std::max<std::size_t>(1, pixels.size() / kHoverPoints);
+  for (std::size_t i = 0; i < std::min(pixels.size(), titles.size()); i += step)
+    svg.circle(pixels[i], 6.0, "hover", titles[i]);
+}
+
+std::vector<std::string> route_titles(const RobotRecord& robot) {
+  std::vector<std::string> out;
+  for (const auto& p : robot.server_estimate)
+    out.push_back(
+        fmt::format("{} after {}", robot.name, format_mission_time(p.stamp - robot.server_estimate.front().stamp)));
+  return out;
+}
+
+std::string component_figure(const MissionRecord& record, std::uint32_t component) {
+  const auto robots = members(record, component);
+  const Pose3 T_display_world = component == largest_component(record) ? display_T_reference_world(record) : Pose3{};
+  std::vector<Points3d> routes;
+  for (const std::size_t r : robots) routes.push_back(transformed(T_display_world, record.robots[r].server_estimate));
+  const GroundPlane ground = ground_plane(routes);
+
+  std::vector<Points2d> layers;
+  for (const auto& route : routes) layers.push_back(ground(route));
+  std::vector<Points2d> clouds;
+  for (const auto& seen : record.server.clouds) {
+    if (!is_member(record, robots, seen.robot)) continue;
+    Points2d& cloud = clouds.emplace_back();
+    for (const auto& p : seen.cloud.points) cloud.push_back(ground(T_display_world * p.cast<double>().eval()));
+  }
+  std::vector<Points2d> box = layers;
+  box.push_back(trimmed_box(clouds));
+  const PlanView view(box, kWide_px, 0.56 * kWide_px);
+  Svg svg(view.width(), view.height(), "The joint map from above: every robot's way in the server's estimate");
+  draw_cloud(svg, view, clouds);
+  draw_closures(svg, record, T_display_world, ground, view, robots);
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    const RobotRecord& robot = record.robots[robots[i]];
+    const std::string colour = robot_class(record, robot.id);
+    const Points2d pixels = view(layers[i]);
+    svg.polyline(pixels, "route " + colour, robot.name);
+    draw_hover_points(svg, pixels, route_titles(robot));
+  }
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    if (layers[i].empty()) continue;
+    const RobotRecord& robot = record.robots[robots[i]];
+    const std::string colour = robot_class(record, robot.id);
+    svg.circle(view(layers[i].front()), 5.0, "start " + colour, robot.name + " starts here");
+    svg.circle(view(layers[i].back()), 4.0, "end " + colour, robot.name + " ends here");
+    svg.text(view(layers[i].front()) + Eigen::Vector2d(9.0, -7.0), robot.name, "name");
+  }
+  view.draw_scale_bar(svg);
+  return figure(svg.str(), "", "", true);
+}
+
+}  // namespace
+
+std::string joint_map_html(const MissionRecord& record) {
+  std::set<std::uint32_t> components;
+  for (const auto& robot : record.robots)
+    if (!robot.server_estimate.empty()) components.insert(robot.component);
+  if (components.empty()) return "";
+  std::vector<LegendEntry> legend;
+  for (const auto& robot : record.robots) legend.push_back({"route " + robot_class(record, robot.id), robot.name});
+  const ClosureCounts closures = count_closures(record.server);
+  if (closures.accepted_inter > 0)
+    legend.push_back({"inter", fmt::format("{} loop closures between robots", closures.accepted_inter)});
+  if (closures.accepted_intra > 0)
+    legend.push_back({"intra", fmt::format("{} loop closures within a robot", closures.accepted_intra)});
+  if (!record.server.clouds.empty()) legend.push_back({"cloudkey", "what the robots saw"});
+  std::string body = legend_html(legend) + "<div class=\"figures\">\n";
+  for (const std::uint32_t component : components) body += component_figure(record, component);
+  return section("The joint map",
+                 components.size() == 1
+                     ? "Seen from above, in the server's final estimate. Rings are starts, dots are ends."
+                     : "Seen from above, in the server's final estimate: one picture per group of robots, because the "
+                       "groups never met and nobody knows how they lie to each other. Rings are starts, dots are ends.",
+                 body + "</div>\n");
+}
+
+std::string robot_maps_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry) {
+  std::string body = legend_html({{"onboard", "onboard: raw odometry"},
+                                  {"corrected", "corrected: robot with policy " + record.default_policy},
+                                  {"server", "server"},
+                                  {"reference", "reference"}}) +
+                     "<div class=\"figures\">\n";
+  for (std::size_t r = 0; r < record.robots.size(); ++r) {
+    const RobotRecord& robot = record.robots[r];
+    const RobotGeometry& g = geometry[r];
+    if (g.onboard.empty()) continue;
+    const GroundPlane ground = ground_plane({g.onboard, g.server, g.reference});
+    const PlanView view({ground(g.onboard), ground(g.corrected), ground(g.server), ground(g.reference)}, kHalf_px,
+                        0.85 * kHalf_px);
+    Svg svg(view.width(), view.height(), fmt::format("Estimates of {} from above", robot.name));
+    svg.polyline(view(ground(g.server)), "server", "server");
+    svg.polyline(view(ground(g.reference)), "reference", "reference");
+    svg.polyline(view(ground(g.onboard)), "onboard", "onboard");
+    svg.polyline(view(ground(g.corrected)), "corrected", "corrected");
+    std::vector<std::string> titles;
+    for (const auto& e : g.errors)
+      titles.push_back(fmt::format("{} after {}, {}: corrected {}, onboard {} off", robot.name,
+                                   format_mission_time(e.time_s), format_distance(e.distance_m),
+                                   format_metres(e.corrected_m), format_metres(e.onboard_m)));
+    draw_hover_points(svg, view(ground(g.corrected.empty() ? g.onboard : g.corrected)), titles);
+    for (std::size_t i = 0; i < g.whereabouts.size(); ++i) {
+      const RobotId other = robot.whereabouts[i].other;
+      const Eigen::Vector2d p = view(ground(g.whereabouts[i]));
+      svg.circle(p, 6.0, "seen " + robot_class(record, other),
+                 "where it believes " + robot_name(record, other) + " is");
+      svg.text(p + Eigen::Vector2d(10.0, 4.0), robot_name(record, other), "name");
+    }
+    view.draw_scale_bar(svg);
+    body += figure(svg.str(), robot.name,
+                   fmt::format("{} in {}", format_distance(robot.distance_m), format_mission_time(robot.duration_s)),
+                   false);
+  }
+  const bool any_reference =
+      std::any_of(geometry.begin(), geometry.end(), [](const RobotGeometry& g) { return g.has_reference; });
+  return section(
+      "Each robot by itself",
+      fmt::format("Every estimate is laid on the {} by one rigid alignment, without scale. Named rings: where "
+                  "the robot believes the others to be at the end.",
+                  any_reference ? "reference" : "server's estimate"),
+      body + "</div>\n");
+}
+
+}  // namespace tutti::mission

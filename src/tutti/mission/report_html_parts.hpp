@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/mission/record.hpp"
+#include "tutti/mission/report_geometry.hpp"
+
+/// The page's sections, each a function of the record that gives HTML; empty when there is nothing to show.
+namespace tutti::mission {
+
+/// The style sheet: colours for light and dark, layout.
+std::string_view report_style();
+
+/// Colour class of a robot's strokes: "r0", "r1", ... in the order of the record, repeating after 8.
+std::string robot_class(const MissionRecord& record, RobotId robot);
+std::string robot_name(const MissionRecord& record, RobotId robot);
+
+/// A titled part of the page. `lead`: one or two plain sentences (text, escaped here). `body`: HTML.
+std::string section(std::string_view title, std::string_view lead, const std::string& body);
+/// A picture under its name and a few words (text, may be empty); `wide` ones take the whole row.
+std::string figure(const std::string& svg, std::string_view name, std::string_view words, bool wide);
+/// Cells are HTML. The first `left` columns are left-aligned, the others right-aligned.
+struct HtmlTable {
+  std::vector<std::string> head;
+  std::vector<std::vector<std::string>> rows;
+  std::size_t left = 1;
+};
+std::string html(const HtmlTable& table);
+
+std::string headline_html(const MissionRecord& record);
+std::string joint_map_html(const MissionRecord& record);
+std::string robot_maps_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
+std::string proxy_graph_html(const MissionRecord& record);
+std::string disagreement_html(const MissionRecord& record);
+std::string errors_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
+std::string policies_html(const MissionRecord& record);
+std::string closures_html(const MissionRecord& record);
+std::string radio_html(const MissionRecord& record);
+std::string transforms_html(const MissionRecord& record);
+std::string timing_html(const MissionRecord& record);
+
+}  // namespace tutti::mission

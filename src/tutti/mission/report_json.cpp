@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report_json.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tutti/mission/report_format.hpp"
+
+namespace tutti::mission {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Rounded, so that the shortest text that reads back the same is also short; null unless finite.
+Json number(std::optional<double> value, double per_unit = 1e6) {
+  if (!value || !std::isfinite(*value)) return nullptr;
+  const double rounded = std::round(*value * per_unit) / per_unit;
+  return rounded == 0.0 ? 0.0 : rounded;  // no "-0.0"
+}
+
+Json robot_json(const RobotRecord& robot) {
+  Json policies = Json::object();
+  for (const auto& policy : robot.policies)
+    policies[policy.name] = {{"rmse_m", number(policy.accuracy.rmse_m)},
+                             {"max_error_m", number(policy.accuracy.max_error_m)},
+                             {"rpe_m", number(policy.accuracy.rpe_m)},
+                             {"agreement_rmse_m", number(policy.agreement_rmse_m)},
+                             {"constraints", policy.constraints_added}};
+  return {{"name", robot.name},
+          {"distance_m", number(robot.distance_m)},
+          {"duration_s", number(robot.duration_s)},
+          {"odometry_factors", robot.odometry_factors},
+          {"keyframes", robot.keyframes},
+          {"submaps", robot.submaps},
+          {"component", robot.component},
+          {"onboard_rmse_m", number(robot.onboard.rmse_m)},
+          {"onboard_max_error_m", number(robot.onboard.max_error_m)},
+          {"onboard_rpe_m", number(robot.onboard.rpe_m)},
+          {"server_rmse_m", number(robot.server.rmse_m)},
+          {"server_max_error_m", number(robot.server.max_error_m)},
+          {"server_rpe_m", number(robot.server.rpe_m)},
+          {"policies", std::move(policies)},
+          {"bytes_up", robot.bytes_up},
+          {"bytes_down", robot.bytes_down},
+          {"messages_up", robot.messages_up},
+          {"messages_down", robot.messages_down},
+          {"proxy_nodes", robot.proxy_nodes},
+          {"updates", robot.updates.size()}};
+}
+
+Json server_json(const ServerRecord& server) {
+  const ClosureCounts counts = count_closures(server);
+  Json rejections = Json::array();
+  for (const auto& rejection : server.rejections)
+    rejections.push_back({{"reason", rejection.reason}, {"intra", rejection.intra}, {"inter", rejection.inter}});
+  return {{"components", server.components},
+          {"closures_accepted", counts.accepted()},
+          {"closures_accepted_intra", counts.accepted_intra},
+          {"closures_accepted_inter", counts.accepted_inter},
+          {"closures_rejected", counts.rejected()},
+          {"rejections", std::move(rejections)},
+          {"rmse_m", number(server.joint.rmse_m)},
+          {"max_error_m", number(server.joint.max_error_m)},
+          {"rpe_m", number(server.joint.rpe_m)}};
+}
+
+Json transform_json(const TransformRecord& transform) {
+  const Eigen::Vector3d& t = transform.T_from_to.translation;
+  Eigen::Vector4d q = transform.T_from_to.rotation.coeffs();
+  if (q.w() < 0.0) q = -q;  // q and -q are one rotation: always print the same
+  constexpr double kPerUnit = 1e9;
+  return {{"from", transform.from},
+          {"to", transform.to},
+          {"translation_m", {number(t.x()), number(t.y()), number(t.z())}},
+          {"quaternion_xyzw",
+           {number(q.x(), kPerUnit), number(q.y(), kPerUnit), number(q.z(), kPerUnit), number(q.w(), kPerUnit)}},
+          {"error_m", number(transform.error_m)},
+          {"error_deg", number(transform.error_deg)}};
+}
+
+/// {"count", "median_ms", "max_ms"}; the two figures are null without samples.
+Json spread_json(const std::vector<double>& samples) {
+  const auto s = spread(samples);
+  return {{"count", samples.size()},
+          {"median_ms", s ? number(s->median) : Json(nullptr)},
+          {"max_ms", s ? number(s->max) : Json(nullptr)}};
+}
+
+/// Foreign text with broken UTF-8 must not make the writer throw.
+std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+}  // namespace
+
+std::string report_json(const MissionRecord& record) {
+  Json robots = Json::array();
+  for (const auto& robot : record.robots) robots.push_back(robot_json(robot));
+  Json transforms = Json::array();
+  for (const auto& transform : record.transforms) transforms.push_back(transform_json(transform));
+  return dump(Json{{"mission", record.mission},
+                   {"description", record.description},
+                   {"input", record.input},
+                   {"notes", record.notes},
+                   {"seed", record.seed},
+                   {"default_policy", record.default_policy},
+                   {"duration_s", number(record.duration_s)},
+                   {"association",
+                    {{"interpolate", record.association.interpolate},
+                     {"max_gap_s", number(record.association.max_gap_s)},
+                     {"max_difference_s", number(record.association.max_difference_s)}}},
+                   {"rpe_interval", record.rpe_interval},
+                   {"robots", std::move(robots)},
+                   {"server", server_json(record.server)},
+                   {"transforms", std::move(transforms)}});
+}
+
+std::string timing_json(const MissionRecord& record) {
+  const TimingRecord& timing = record.timing;
+  Json policies = Json::array();
+  for (const auto& policy : timing.policies)
+    policies.push_back({{"robot", policy.robot},
+                        {"policy", policy.policy},
+                        {"update", spread_json(policy.update_ms)},
+                        {"comparison", spread_json(policy.comparison_ms)},
+                        {"optimisation", spread_json(policy.optimisation_ms)}});
+  Json load = Json::array();
+  for (const auto& entry : timing.load)
+    load.push_back({{"name", entry.name},
+                    {"cpu_share", number(entry.cpu_share)},
+                    {"worst_latency_ms", number(entry.worst_latency_ms)}});
+  return dump(Json{{"mission", record.mission},
+                   {"seed", record.seed},
+                   {"version", record.version},
+                   {"machine", timing.machine},
+                   {"wall_s", number(timing.wall_s)},
+                   {"rate", number(timing.rate)},
+                   {"policies", std::move(policies)},
+                   {"server",
+                    {{"verification", spread_json(timing.server_verification_ms)},
+                     {"optimisation", spread_json(timing.server_optimisation_ms)},
+                     {"proxy_graph", spread_json(timing.proxy_graph_ms)}}},
+                   {"load", std::move(load)}});
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "tutti/mission/report_format.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr std::size_t kColumns = 100;
+constexpr std::size_t kRobotsPerPolicyTable = 2;
+
+/// Rows of cells, aligned: the first `left` columns to the left, the others to the right. An empty row is a gap.
+class Table {
+ public:
+  explicit Table(std::size_t left) : left_(left) {}
+  void add(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
+  /// A line under everything so far.
+  void rule() { rules_.push_back(rows_.size()); }
+
+  [[nodiscard]] std::string str() const {
+    std::vector<std::size_t> widths;
+    for (const auto& row : rows_)
+      for (std::size_t c = 0; c < row.size(); ++c) {
+        if (c == widths.size()) widths.push_back(0);
+        widths[c] = std::max(widths[c], row[c].size());
+      }
+    std::size_t total = 0;
+    for (const std::size_t width : widths) total += width + kGap;
+    std::string out;
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      if (std::find(rules_.begin(), rules_.end(), r) != rules_.end())
+        out += fmt::format("  {:-<{}}\n", "", total - kGap);
+      std::string line = "  ";
+      for (std::size_t c = 0; c < rows_[r].size(); ++c) {
+        line +=
+            c < left_ ? fmt::format("{:<{}}", rows_[r][c], widths[c]) : fmt::format("{:>{}}", rows_[r][c], widths[c]);
+        line += std::string(kGap, ' ');
+      }
+      line.erase(line.find_last_not_of(' ') + 1);
+      out += line + "\n";
+    }
+    return out;
+  }
+
+ private:
+  static constexpr std::size_t kGap = 2;
+  std::size_t left_;
+  std::vector<std::vector<std::string>> rows_;
+  std::vector<std::size_t> rules_;
+};
+
+/// Breaks at spaces; continuation lines start under the text of the first.
+std::string wrap(const std::string& text, const std::string& prefix) {
+  std::string out = prefix;
+  std::size_t column = prefix.size();
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    if (column > prefix.size() && column + 1 + word.size() > kColumns) {
+      out.append("\n").append(prefix.size(), ' ');
+      column = prefix.size();
+    }
+    if (column > prefix.size()) {
+      out += ' ';
+      ++column;
+    }
+    out += word;
+    column += word.size();
+  }
+  return out + "\n";
+}
+
+std::string plural(std::size_t count, const std::string& noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+std::string robots_table(const MissionRecord& record) {
+  Table table(2);
+  table.add({"robot", "estimate", "RMSE", "max", "RPE", "to server", "constraints", "update"});
+  for (const auto& robot : record.robots) {
+    table.rule();
+    const auto row = [&](const std::string& left, const std::string& estimate, const Accuracy& accuracy,
+                         std::vector<std::string> rest) {
+      std::vector<std::string> cells{left, estimate, format_metres(accuracy.rmse_m),
+                                     format_metres(accuracy.max_error_m), format_metres(accuracy.rpe_m)};
+      cells.insert(cells.end(), rest.begin(), rest.end());
+      table.add(std::move(cells));
+    };
+    row(robot.name, "onboard", robot.onboard, {});
+    const PolicyRecord* policy = find_policy(robot, record.default_policy);
+    const PolicyTiming* timing = find_timing(record, robot.name, record.default_policy);
+    const std::string size = format_distance(robot.distance_m);
+    if (policy != nullptr)
+      row(size, "corrected", policy->accuracy,
+          {format_metres(policy->agreement_rmse_m), std::to_string(policy->constraints_added),
+           timing != nullptr ? format_spread_ms(timing->update_ms) : "-"});
+    row(policy != nullptr ? "" : size, "server", robot.server, {});
+  }
+  return table.str();
+}
+
+/// Policies down, robots across; several tables when there are many robots.
+std::string policies_table(const MissionRecord& record, std::size_t first, std::size_t last) {
+  std::vector<std::string> names;
+  for (std::size_t r = first; r < last; ++r)
+    for (const auto& policy : record.robots[r].policies)
+      if (std::find(names.begin(), names.end(), policy.name) == names.end()) names.push_back(policy.name);
+  if (names.empty()) return "";
+
+  Table table(1);
+  std::vector<std::string> robots{""};
+  std::vector<std::string> head{"policy"};
+  for (std::size_t r = first; r < last; ++r) {
+    robots.insert(robots.end(), {"", "", "", record.robots[r].name});
+    head.insert(head.end(), {"RMSE", "to server", "constr.", "update"});
+  }
+  table.add(robots);
+  table.add(head);
+  table.rule();
+  for (const auto& name : names) {
+    std::vector<std::string> cells{name == record.default_policy ? name + " *" : name};
+    for (std::size_t r = first; r < last; ++r) {
+      const RobotRecord& robot = record.robots[r];
+      const PolicyRecord* policy = find_policy(robot, name);
+      const PolicyTiming* timing = find_timing(record, robot.name, name);
+      if (policy == nullptr)
+        cells.insert(cells.end(), {"-", "-", "-", "-"});
+      else
+        cells.insert(cells.end(), {format_metres(policy->accuracy.rmse_m), format_metres(policy->agreement_rmse_m),
+                                   std::to_string(policy->constraints_added),
+                                   timing != nullptr ? format_spread_ms(timing->update_ms) : "-"});
+    }
+    table.add(std::move(cells));
+  }
+  return table.str();
+}
+
+std::string radio_table(const MissionRecord& record) {
+  Table table(1);
+  table.add({"radio", "up", "total", "down", "total", "proxy nodes"});
+  table.rule();
+  const auto rate = [](std::uint64_t bytes, double seconds) {
+    return seconds > 0.0 ? format_bytes(static_cast<double>(bytes) / seconds) + "/s" : std::string("-");
+  };
+  for (const auto& robot : record.robots)
+    table.add({robot.name, rate(robot.bytes_up, robot.duration_s), format_bytes(static_cast<double>(robot.bytes_up)),
+               rate(robot.bytes_down, robot.duration_s), format_bytes(static_cast<double>(robot.bytes_down)),
+               std::to_string(robot.proxy_nodes)});
+  return table.str();
+}
+
+std::string server_lines(const MissionRecord& record) {
+  const ServerRecord& server = record.server;
+  const ClosureCounts closures = count_closures(server);
+  std::string text = fmt::format("{} of {}, {} ({} between robots), {} refused", plural(server.components, "map"),
+                                 plural(record.robots.size(), "robot"), plural(closures.accepted(), "loop closure"),
+                                 closures.accepted_inter, closures.rejected());
+  if (server.joint.rmse_m)
+    text += fmt::format(", RMSE {} over all robots at once (max {})", format_metres(server.joint.rmse_m),
+                        format_metres(server.joint.max_error_m));
+  std::string out = wrap(text + ".", "  server   ");
+  for (const auto& transform : record.transforms) {
+    const Eigen::Vector3d& t = transform.T_from_to.translation;
+    std::string line =
+        fmt::format("{} in {}'s frame: [{:.2f} {:.2f} {:.2f}] m, turned by {:.1f} deg", transform.to, transform.from,
+                    t.x(), t.y(), t.z(), rotation_angle(transform.T_from_to) * 180.0 / M_PI);
+    if (transform.error_m && transform.error_deg)
+      line +=
+          fmt::format("; off the reference by {}, {:.2f} deg", format_metres(transform.error_m), *transform.error_deg);
+    out += wrap(line + ".", "  frames   ");
+  }
+  for (const auto& load : record.timing.load)
+    out += wrap(fmt::format("{}: {:.0f} % of one core, answers after {} at worst.", load.name, 100.0 * load.cpu_share,
+                            format_duration_ms(load.worst_latency_ms)),
+                "  load     ");
+  return out;
+}
+
+}  // namespace
+
+std::string report_text(const MissionRecord& record, const std::string& report_html_path) {
+  std::string out = "\n";
+  out +=
+      wrap(record.description.empty() ? record.mission : fmt::format("{}: {}", record.mission, record.description), "");
+  out += wrap(fmt::format("Input: {}. Seed {}, {} of mission time.", record.input, record.seed,
+                          format_mission_time(record.duration_s)),
+              "");
+  if (!record.robots.empty()) {
+    const bool referenced = std::any_of(record.robots.begin(), record.robots.end(),
+                                        [](const RobotRecord& robot) { return robot.onboard.rmse_m.has_value(); });
+    out += "\n";
+    out += robots_table(record);
+    out += wrap(referenced ? "RMSE, max: distance to the reference at keyframes after one rigid alignment per robot. "
+                             "to server: corrected against server."
+                           : "No reference: only the distance of the corrected robots to the server could be measured.",
+                "  ");
+    out += wrap(fmt::format("corrected: by policy {}. update: median / max.", record.default_policy), "  ");
+    out += "\n  Policies side by side, on the same broadcasts (* shown above)\n";
+    for (std::size_t first = 0; first < record.robots.size(); first += kRobotsPerPolicyTable)
+      out += policies_table(record, first, std::min(first + kRobotsPerPolicyTable, record.robots.size())) + "\n";
+    out += radio_table(record) + "\n";
+  }
+  out += server_lines(record);
+  for (const auto& note : record.notes) out += wrap(note, "  note     ");
+  if (record.timing.wall_s > 0.0)
+    out += wrap(fmt::format("{} for {} of mission time.", format_duration_ms(1000.0 * record.timing.wall_s),
+                            format_mission_time(record.duration_s)),
+                "  took     ");
+  return out + "\nReport: " + report_html_path + "\n";
+}
+
+}  // namespace tutti::mission
