@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/ledger.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "tutti/consistency/test_support/runs.hpp"
+
+namespace tutti::consistency {
+namespace {
+
+constexpr LedgerConfig kConfig{.replace_translation_m = 0.05, .replace_rotation_deg = 0.5};
+
+Constraint link(std::size_t from, std::size_t to, double x = 1.0, double yaw_deg = 0.0, std::uint64_t revision = 1) {
+  Constraint out{test::stamp_of(from), test::stamp_of(to), from, to};
+  out.measurement.T_a_b = {so3_exp(Eigen::Vector3d(0, 0, yaw_deg * std::numbers::pi / 180)), {x, 0.2, 0.0}};
+  out.revision = revision;
+  return out;
+}
+
+TEST(Ledger, AddsSortedAndCounts) {
+  Ledger ledger;
+  const auto update = ledger.update({link(3, 4), link(0, 1), link(0, 5)}, kConfig, false);
+  EXPECT_EQ(update.added, 3U);
+  ASSERT_EQ(ledger.size(), 3U);
+  EXPECT_EQ(ledger.constraints()[0], link(0, 1));
+  EXPECT_EQ(ledger.constraints()[1], link(0, 5));
+  EXPECT_EQ(ledger.constraints()[2], link(3, 4));
+}
+
+TEST(Ledger, KeepsAConstraintUntilItDiffersReasonably) {
+  Ledger ledger({link(0, 1)});
+  EXPECT_EQ(ledger.update({link(0, 1, 1.04, 0.4, 2)}, kConfig, false).unchanged, 1U);
+  EXPECT_EQ(ledger.constraints()[0].revision, 1U);
+  EXPECT_EQ(ledger.update({link(0, 1, 1.06, 0.0, 3)}, kConfig, false).replaced, 1U);
+  EXPECT_EQ(ledger.constraints()[0].revision, 3U);
+  EXPECT_EQ(ledger.update({link(0, 1, 1.06, 0.6, 4)}, kConfig, false).replaced, 1U);
+  EXPECT_EQ(ledger.constraints()[0].revision, 4U);
+}
+
+// Small steps each below the threshold must not add up unseen: the comparison is with what is held.
+TEST(Ledger, SmallStepsAddUpToAReplacement) {
+  Ledger ledger({link(0, 1)});
+  std::size_t replaced = 0;
+  for (int step = 1; step <= 10; ++step)
+    replaced += ledger.update({link(0, 1, 1.0 + 0.02 * step)}, kConfig, false).replaced;
+  EXPECT_EQ(replaced, 3U);
+}
+
+TEST(Ledger, EitherDirectionIsTheSameConstraint) {
+  Constraint backward = link(0, 1, 1.0, 30.0);
+  std::swap(backward.from, backward.to);
+  std::swap(backward.from_stamp, backward.to_stamp);
+  backward.measurement.T_a_b = backward.measurement.T_a_b.inverse();
+  Ledger ledger({link(0, 1, 1.0, 30.0)});
+  const auto update = ledger.update({backward}, kConfig, false);
+  EXPECT_EQ(update.unchanged, 1U);
+  EXPECT_EQ(ledger.size(), 1U);
+}
+
+TEST(Ledger, TurningAConstraintRoundTwiceChangesNothing) {
+  Constraint backward = link(5, 2, 2.0, 40.0);
+  backward.measurement.covariance = test::covariance_of({}) + 1e-6 * Matrix6d::Ones();
+  const Constraint forward = in_time_order(backward);
+  EXPECT_EQ(forward.from, 2U);
+  EXPECT_LT(forward.from_stamp, forward.to_stamp);
+  Constraint again = forward;
+  std::swap(again.from, again.to);
+  std::swap(again.from_stamp, again.to_stamp);
+  // in_time_order(again) treats T as running backward: it must undo the first turn.
+  again = in_time_order(again);
+  EXPECT_LT(local(again.measurement.T_a_b, backward.measurement.T_a_b).norm(), 1e-12);
+  EXPECT_LT((again.measurement.covariance - backward.measurement.covariance).norm(), 1e-15);
+}
+
+TEST(Ledger, ReplacingAllRemovesWhatIsNotChosenAndKeepsWhatIs) {
+  Ledger ledger({link(0, 1), link(1, 2), link(2, 3)});
+  const auto update = ledger.update({link(1, 2, 1.01, 0.0, 9), link(4, 5)}, kConfig, true);
+  EXPECT_EQ(update.removed, 2U);
+  EXPECT_EQ(update.unchanged, 1U);
+  EXPECT_EQ(update.added, 1U);
+  EXPECT_EQ(ledger.constraints()[0].revision, 1U);
+}
+
+RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
+  Ledger ledger;
+  for (int round = 0; round < 4; ++round) {
+    std::vector<Constraint> chosen;
+    for (int i = *rc::gen::inRange(0, 20); i > 0; --i) {
+      const auto from = *rc::gen::inRange<std::size_t>(0, 6);
+      const auto to = from + *rc::gen::inRange<std::size_t>(1, 4);
+      chosen.push_back(link(from, to, *rc::gen::inRange(0, 5) * 0.04));
+      if (*rc::gen::arbitrary<bool>()) {
+        std::swap(chosen.back().from, chosen.back().to);
+        std::swap(chosen.back().from_stamp, chosen.back().to_stamp);
+      }
+    }
+    const std::size_t before = ledger.size();
+    const bool replaces_all = *rc::gen::arbitrary<bool>();
+    const auto update = ledger.update(chosen, kConfig, replaces_all);
+    RC_ASSERT(ledger.size() == before + update.added - update.removed);
+    RC_ASSERT(replaces_all || update.removed == 0U);
+    const auto& held = ledger.constraints();
+    for (std::size_t i = 0; i < held.size(); ++i) {
+      RC_ASSERT(held[i].from_stamp < held[i].to_stamp);
+      RC_ASSERT(held[i].from < held[i].to);
+      if (i > 0)
+        RC_ASSERT(std::pair(held[i - 1].from_stamp, held[i - 1].to_stamp) <
+                  std::pair(held[i].from_stamp, held[i].to_stamp));
+    }
+    RC_ASSERT(Ledger(held) == ledger);  // saved and loaded
+    Ledger again = ledger;
+    RC_ASSERT(again.update(held, kConfig, true).unchanged == held.size());
+    RC_ASSERT(again == ledger);
+  }
+}
+
+}  // namespace
+}  // namespace tutti::consistency

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/proxy_graph_builder.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+
+#include "tutti/consistency/test_support/runs.hpp"
+
+namespace tutti::consistency {
+namespace {
+
+using test::kAlpha, test::kBravo;
+
+std::vector<ServerNode> two_robots(std::size_t alpha, std::size_t bravo) {
+  auto nodes = test::server_nodes(kAlpha, test::corridor(alpha));
+  const auto more = test::server_nodes(kBravo, test::corridor(bravo), 2);
+  nodes.insert(nodes.end(), more.begin(), more.end());
+  return nodes;
+}
+
+std::size_t nodes_of(const ProxyGraph& graph, RobotId robot) {
+  return static_cast<std::size_t>(
+      std::count_if(graph.nodes.begin(), graph.nodes.end(), [&](const ProxyNode& n) { return n.robot == robot; }));
+}
+
+TEST(ProxyGraphBuilder, EmptyAndSingle) {
+  EXPECT_TRUE(build_proxy_graph(3, {}, {}, {.node_budget = 5}).nodes.empty());
+  const auto one = build_proxy_graph(3, test::server_nodes(kAlpha, {Pose3{}}), {{kAlpha, 0}}, {.node_budget = 5});
+  ASSERT_EQ(one.nodes.size(), 1U);
+  EXPECT_EQ(one.revision, 3U);
+  EXPECT_FALSE(one.reduced);
+  EXPECT_TRUE(one.nodes[0].covariance.isZero());
+}
+
+RC_GTEST_PROP(ProxyGraphBuilder, OrderOfTheNodesDoesNotMatter, (std::uint64_t seed, bool reduce)) {
+  auto nodes = two_robots(60, 30);
+  const ProxyGraphConfig config{.node_budget = reduce ? 40 : 0};
+  const auto expected = build_proxy_graph(1, nodes, {{kAlpha, 0}, {kBravo, 0}}, config);
+  Rng rng(seed);
+  for (std::size_t i = nodes.size(); i > 1; --i) std::swap(nodes[i - 1], nodes[rng.index(i)]);
+  RC_ASSERT(build_proxy_graph(1, nodes, {{kBravo, 0}, {kAlpha, 0}}, config) == expected);
+}
+
+RC_GTEST_PROP(ProxyGraphBuilder, MeetsTheBudgetAndKeepsTheEnds, ()) {
+  const auto alpha = *rc::gen::inRange<std::size_t>(1, 90), bravo = *rc::gen::inRange<std::size_t>(1, 90);
+  const auto budget = *rc::gen::inRange<int>(4, 200);
+  const auto nodes = two_robots(alpha, bravo);
+  const auto graph = build_proxy_graph(1, nodes, {}, {.node_budget = budget});
+  const std::size_t expected = std::min<std::size_t>(static_cast<std::size_t>(budget), alpha + bravo);
+  RC_ASSERT(graph.nodes.size() == expected);
+  RC_ASSERT(graph.nodes.size() + graph.eliminated.size() == alpha + bravo);
+  RC_ASSERT(graph.reduced == (alpha + bravo > static_cast<std::size_t>(budget)));
+  for (const RobotId robot : {kAlpha, kBravo}) {
+    const std::size_t all = robot == kAlpha ? alpha : bravo, kept = nodes_of(graph, robot);
+    RC_ASSERT(kept >= std::min<std::size_t>(2, all));
+    // In proportion, but for rounding and the two ends that everybody keeps.
+    RC_ASSERT(static_cast<double>(kept) <=
+              static_cast<double>(expected * all) / static_cast<double>(alpha + bravo) + 2);
+    for (const std::size_t end : {std::size_t{0}, all - 1})
+      RC_ASSERT(std::any_of(graph.nodes.begin(), graph.nodes.end(),
+                            [&](const ProxyNode& n) { return n.robot == robot && n.stamp == test::stamp_of(end); }));
+  }
+}
+
+TEST(ProxyGraphBuilder, EdgesStayWithinARobotAndArePositive) {
+  const auto graph = build_proxy_graph(1, two_robots(80, 60), {}, {.node_budget = 70});
+  ASSERT_TRUE(graph.reduced);
+  ASSERT_FALSE(graph.edges.empty());
+  for (const ProxyEdge& edge : graph.edges) {
+    EXPECT_LT(edge.a, edge.b);
+    ASSERT_LT(edge.b, graph.nodes.size());
+    EXPECT_EQ(graph.nodes[edge.a].robot, graph.nodes[edge.b].robot);
+    EXPECT_GT(edge.weight, 0.0);
+  }
+}
+
+TEST(ProxyGraphBuilder, ReductionCompoundsCovarianceAndTakesTheSmallestSupport) {
+  auto nodes = test::server_nodes(kAlpha, test::corridor(40), 9);
+  nodes[17].support = 1;
+  const auto graph = build_proxy_graph(1, nodes, {}, {.node_budget = 8});
+  ASSERT_EQ(graph.nodes.size(), 8U);
+  std::size_t previous = 0;
+  for (std::size_t k = 1; k < graph.nodes.size(); ++k) {
+    const auto index =
+        static_cast<std::size_t>(std::lround((graph.nodes[k].stamp - nodes[0].stamp) / test::kNodePeriod_s));
+    Matrix6d expected = Matrix6d::Zero();
+    for (std::size_t i = previous + 1; i <= index; ++i)
+      expected = compound_covariance(nodes[i - 1].T_world_body.inverse() * nodes[i].T_world_body, expected,
+                                     nodes[i].covariance);
+    EXPECT_LT((graph.nodes[k].covariance - expected).norm(), 1e-15);
+    EXPECT_EQ(graph.nodes[k].support, previous < 17 && 17 <= index ? 1U : 9U);
+    previous = index;
+  }
+}
+
+TEST(ProxyGraphBuilder, ThePapersReducerKeepsTheEndsToo) {
+  const auto graph = build_proxy_graph(1, two_robots(80, 60), {}, {.node_budget = 70, .reducer = "paper"});
+  EXPECT_TRUE(graph.reduced);
+  EXPECT_FALSE(graph.eliminated.empty());
+  for (const RobotId robot : {kAlpha, kBravo})
+    EXPECT_TRUE(std::any_of(graph.nodes.begin(), graph.nodes.end(), [&](const ProxyNode& n) {
+      return n.robot == robot && n.stamp == test::stamp_of(robot == kAlpha ? 79 : 59);
+    }));
+}
+
+TEST(ProxyGraphBuilder, ARepeatedStampIsOurOwnMistake) {
+  auto nodes = test::server_nodes(kAlpha, test::corridor(3));
+  nodes[2].stamp = nodes[1].stamp;
+  EXPECT_THROW(build_proxy_graph(1, nodes, {}, {}), std::logic_error);
+}
+
+}  // namespace
+}  // namespace tutti::consistency
