@@ -18,7 +18,7 @@ namespace tutti::formats {
 namespace {
 
 using internal::LineReader;
-using internal::quoted;
+using internal::shown;
 
 constexpr double kSemiDefiniteTolerance = 1e-6;
 constexpr std::array<int, 3> kPlanarAxes = {0, 1, 5};  // x y theta within [tx ty tz rx ry rz]
@@ -134,7 +134,7 @@ Status read_line(const LineReader& line, Lines& lines) {
   const bool is_2d = tag == "VERTEX_SE2" || tag == "EDGE_SE2";
   if (!is_vertex && tag != "EDGE_SE2" && tag != "EDGE_SE3:QUAT")
     return line.fail(ErrorCode::unsupported,
-                     "tag is {}, expected VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT or FIX", quoted(tag));
+                     "tag is {}, expected VERTEX_SE2, EDGE_SE2, VERTEX_SE3:QUAT, EDGE_SE3:QUAT or FIX", shown(tag));
   (is_2d ? lines.has_2d : lines.has_3d) = true;
   if (lines.has_2d && lines.has_3d)
     return line.fail(ErrorCode::unsupported, "tag is {} after lines of the other dimension, expected one of both", tag);

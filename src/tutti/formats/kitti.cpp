@@ -47,8 +47,7 @@ Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::str
   while (line.next()) {
     if (auto ok = line.expect_columns(1, "stamp"); !ok) return tl::unexpected(ok.error());
     const auto stamp = internal::parse_seconds(line.columns()[0]);
-    if (!stamp)
-      return line.fail(ErrorCode::parse, "stamp is {}, expected seconds", internal::quoted(line.columns()[0]));
+    if (!stamp) return line.fail(ErrorCode::parse, "stamp is {}, expected seconds", internal::shown(line.columns()[0]));
     if (!times.empty() && *stamp <= times.back())
       return line.fail(ErrorCode::invalid, "stamp {} s does not come after the previous {} s",
                        internal::to_seconds(*stamp), internal::to_seconds(times.back()));

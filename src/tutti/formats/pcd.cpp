@@ -10,7 +10,7 @@ namespace tutti::formats {
 namespace {
 
 using internal::LineReader;
-using internal::quoted;
+using internal::shown;
 
 struct Field {
   std::string_view name;
@@ -75,7 +75,7 @@ Result<Header> read_header(LineReader& line) {
       if (!value) return tl::unexpected(value.error());
       (keyword == "WIDTH" ? header.width : keyword == "HEIGHT" ? header.height : header.points) = *value;
     } else {
-      return line.fail(ErrorCode::parse, "header keyword is {}, expected one of PCD v0.7", quoted(keyword));
+      return line.fail(ErrorCode::parse, "header keyword is {}, expected one of PCD v0.7", shown(keyword));
     }
   }
   return fail(ErrorCode::parse, "{}: no DATA line, expected a PCD v0.7 header", line.name());
@@ -88,7 +88,7 @@ Result<internal::RecordLayout> layout_of(const Header& header, const std::string
     const bool known_size = field.size == 1 || field.size == 2 || field.size == 4 || field.size == 8;
     if (!known_type || !known_size)
       return fail(ErrorCode::parse, "{}: field {} has type {} and size {}, expected F, I or U of 1, 2, 4 or 8 bytes",
-                  name, quoted(field.name), quoted(field.type), field.size);
+                  name, shown(field.name), shown(field.type), field.size);
     if (field.name == "x" || field.name == "y" || field.name == "z") {
       if (field.type != "F" || field.size < 4 || field.count != 1)
         return fail(ErrorCode::unsupported, "{}: field {} is {} x {}{}, expected one F4 or F8", name, field.name,
@@ -114,7 +114,7 @@ Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name) {
   const auto header = read_header(line);
   if (!header) return tl::unexpected(header.error());
   if (header->data != "ascii" && header->data != "binary")
-    return line.fail(ErrorCode::unsupported, "DATA is {}, expected ascii or binary", quoted(header->data));
+    return line.fail(ErrorCode::unsupported, "DATA is {}, expected ascii or binary", shown(header->data));
   const auto layout = layout_of(*header, name);
   if (!layout) return tl::unexpected(layout.error());
   const std::int64_t size = header->width < 0 ? header->points : header->width * header->height;

@@ -8,7 +8,7 @@ namespace tutti::formats {
 namespace {
 
 using internal::LineReader;
-using internal::quoted;
+using internal::shown;
 
 struct Element {
   std::string_view name;
@@ -42,7 +42,7 @@ Status add_property(const LineReader& line, Element& element) {
   const std::string_view type = columns[1];
   const std::string_view name = columns[2];
   const std::size_t size = size_of(type);
-  if (size == 0) return line.fail(ErrorCode::parse, "property type is {}, expected a PLY type", quoted(type));
+  if (size == 0) return line.fail(ErrorCode::parse, "property type is {}, expected a PLY type", shown(type));
   if (name == "x" || name == "y" || name == "z") {
     const bool is_real = type == "float" || type == "float32" || size == 8;
     if (!is_real && element.name == "vertex")
@@ -79,7 +79,7 @@ Result<Header> read_header(LineReader& line) {
       if (header.elements.empty()) return line.fail(ErrorCode::parse, "property before any element");
       if (auto ok = add_property(line, header.elements.back()); !ok) return tl::unexpected(ok.error());
     } else {
-      return line.fail(ErrorCode::parse, "header keyword is {}, expected one of PLY 1.0", quoted(keyword));
+      return line.fail(ErrorCode::parse, "header keyword is {}, expected one of PLY 1.0", shown(keyword));
     }
   }
   return fail(ErrorCode::parse, "{}: no end_header line", line.name());
@@ -88,15 +88,15 @@ Result<Header> read_header(LineReader& line) {
 Status skip(LineReader& line, std::string_view& data, bool ascii, const Element& element) {
   if (element.has_list)
     return fail(ErrorCode::unsupported, "{}: lists in or before the vertices (element {}), expected plain numbers",
-                line.name(), quoted(element.name));
+                line.name(), shown(element.name));
   if (!ascii) {
     if (element.layout.stride > 0 && data.size() / element.layout.stride < element.count)
-      return fail(ErrorCode::parse, "{}: ends within element {}", line.name(), quoted(element.name));
+      return fail(ErrorCode::parse, "{}: ends within element {}", line.name(), shown(element.name));
     data.remove_prefix(element.count * element.layout.stride);
     return {};
   }
   for (std::size_t i = 0; i < element.count; ++i)
-    if (!line.next()) return fail(ErrorCode::parse, "{}: ends within element {}", line.name(), quoted(element.name));
+    if (!line.next()) return fail(ErrorCode::parse, "{}: ends within element {}", line.name(), shown(element.name));
   return {};
 }
 
@@ -109,7 +109,7 @@ Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name) {
   const bool ascii = header->format == "ascii";
   if (!ascii && header->format != "binary_little_endian")
     return fail(ErrorCode::unsupported, "{}: format is {}, expected ascii or binary_little_endian", name,
-                quoted(header->format));
+                shown(header->format));
 
   std::string_view data = line.rest();
   for (const Element& element : header->elements) {

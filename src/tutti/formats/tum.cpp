@@ -13,8 +13,7 @@ Result<Trajectory> parse_tum(std::string_view text, const std::string& name) {
   while (line.next()) {
     if (auto ok = line.expect_columns(8, "stamp x y z qx qy qz qw"); !ok) return tl::unexpected(ok.error());
     const auto stamp = internal::parse_seconds(line.columns()[0]);
-    if (!stamp)
-      return line.fail(ErrorCode::parse, "stamp is {}, expected seconds", internal::quoted(line.columns()[0]));
+    if (!stamp) return line.fail(ErrorCode::parse, "stamp is {}, expected seconds", internal::shown(line.columns()[0]));
     double v[7];
     if (auto ok = line.numbers(1, v); !ok) return tl::unexpected(ok.error());
     const auto q = internal::to_unit(line, {v[6], v[3], v[4], v[5]});

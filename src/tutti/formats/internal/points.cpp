@@ -56,7 +56,7 @@ Result<std::vector<Eigen::Vector3f>> ascii_points(LineReader& line, std::size_t 
     for (int axis = 0; axis < 3; ++axis) {
       const std::string_view text = line.columns()[layout.xyz[static_cast<std::size_t>(axis)].column];
       const auto value = parse_number(text);
-      if (!value) return line.fail(ErrorCode::parse, "coordinate is {}, expected a number", quoted(text));
+      if (!value) return line.fail(ErrorCode::parse, "coordinate is {}, expected a number", shown(text));
       p[axis] = to_float(*value);
     }
     if (p.allFinite()) points.push_back(p);

@@ -112,7 +112,7 @@ std::string to_seconds(Timestamp stamp) {
   return fmt::format("{}{}.{:09}", stamp.ns < 0 ? "-" : "", magnitude / 1'000'000'000, magnitude % 1'000'000'000);
 }
 
-std::string quoted(std::string_view text) {
+std::string shown(std::string_view text) {
   constexpr std::size_t kLongest = 40;
   std::string out(text.substr(0, kLongest));
   std::replace_if(
@@ -152,9 +152,9 @@ Status LineReader::numbers(std::size_t first, std::span<double> out) const {
   for (std::size_t i = 0; i < out.size(); ++i) {
     const std::string_view text = columns_[first + i];
     const auto value = parse_number(text);
-    if (!value) return fail(ErrorCode::parse, "column {} is {}, expected a number", first + i + 1, quoted(text));
+    if (!value) return fail(ErrorCode::parse, "column {} is {}, expected a number", first + i + 1, shown(text));
     if (!std::isfinite(*value))
-      return fail(ErrorCode::invalid, "column {} is {}, expected a finite number", first + i + 1, quoted(text));
+      return fail(ErrorCode::invalid, "column {} is {}, expected a finite number", first + i + 1, shown(text));
     out[i] = *value;
   }
   return {};
@@ -163,7 +163,7 @@ Status LineReader::numbers(std::size_t first, std::span<double> out) const {
 Result<std::int64_t> LineReader::integer(std::size_t column, std::string_view what) const {
   if (const auto value = parse_integer(columns_[column])) return *value;
   return fail(ErrorCode::parse, "{} in column {} is {}, expected a 64-bit integer", what, column + 1,
-              quoted(columns_[column]));
+              shown(columns_[column]));
 }
 
 Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quaterniond& q) {

@@ -31,7 +31,7 @@ std::optional<Timestamp> parse_seconds(std::string_view text);
 /// Nine decimals: "-0.500000000".
 std::string to_seconds(Timestamp stamp);
 /// `text` in quotes as it may appear in a message: at most 40 characters, nothing unprintable.
-std::string quoted(std::string_view text);
+std::string shown(std::string_view text);
 
 /// Where the columns of a line end.
 enum class Separator { whitespace, comma };

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/formats/internal/text.hpp"
+
+#include <gtest/gtest.h>
+// RapidCheck after gtest.
+#include <rapidcheck/gtest.h>
+
+#include "tutti/formats/internal/mutations.hpp"
+
+namespace tutti::formats::internal {
+namespace {
+
+RC_GTEST_PROP(Seconds, EveryNanosecondSurvivesText, ()) {
+  const Timestamp stamp{*rc::gen::inRange<std::int64_t>(-kMaxStampNs, kMaxStampNs)};
+  RC_ASSERT(parse_seconds(to_seconds(stamp)) == stamp);
+}
+
+RC_GTEST_PROP(Seconds, ExponentMovesThePoint, ()) {
+  const auto ns = *rc::gen::inRange<std::int64_t>(-kMaxStampNs, kMaxStampNs);
+  const int shift = *rc::gen::inRange(0, 30);
+  RC_ASSERT(parse_seconds(fmt::format("{}{}e-{}", ns, std::string(static_cast<std::size_t>(shift), '0'), 9 + shift)) ==
+            Timestamp{ns});
+  RC_ASSERT(parse_seconds(fmt::format(
+                "{}0.{}{}E{}", ns < 0 ? "-" : "", std::string(static_cast<std::size_t>(shift), '0'), std::abs(ns),
+                std::to_string(std::abs(ns)).size() + static_cast<std::size_t>(shift) - 9)) == Timestamp{ns});
+}
+
+TEST(Seconds, KnownTexts) {
+  EXPECT_EQ(parse_seconds("1403636580.838555648"), Timestamp{1403636580838555648});
+  EXPECT_EQ(parse_seconds("1.403636580838555574e+09"), Timestamp{1403636580838555574});
+  EXPECT_EQ(parse_seconds("1577836980.0991046"), Timestamp{1577836980099104600});
+  EXPECT_EQ(parse_seconds("-.5"), Timestamp{-500000000});
+  EXPECT_EQ(parse_seconds("+7."), Timestamp{7000000000});
+  EXPECT_EQ(parse_seconds("0.00000000049"), Timestamp{0});
+  EXPECT_EQ(parse_seconds("0.0000000005"), Timestamp{1});
+  EXPECT_EQ(parse_seconds("-0.0000000005"), Timestamp{-1});
+  EXPECT_EQ(parse_seconds("5e-10"), Timestamp{1});
+  EXPECT_EQ(parse_seconds("9e-11"), Timestamp{0});
+  EXPECT_EQ(parse_seconds("0e999999999999"), Timestamp{0});
+  EXPECT_EQ(parse_seconds("1e-999999999"), Timestamp{0});
+}
+
+TEST(Seconds, WhatIsNoStamp) {
+  for (const char* text : {"", ".", "-", "e9", "1e", "1.2.3", "nan", "inf", "0x10", "1 ", "--1", "+-1", "1e1000000000",
+                           "4611686018.427387905", "99999999999999999999", "1,5"})
+    EXPECT_FALSE(parse_seconds(text)) << text;
+}
+
+TEST(Seconds, RangeEndsAt2To62Nanoseconds) {
+  EXPECT_EQ(parse_seconds("4611686018.427387904"), Timestamp{kMaxStampNs});
+  EXPECT_EQ(parse_seconds("-4611686018.427387904"), Timestamp{-kMaxStampNs});
+  EXPECT_FALSE(parse_seconds("4611686018.4273879045"));  // rounds past the end
+}
+
+RC_GTEST_PROP(Seconds, TakesAnyText, (const std::string& text)) { (void)parse_seconds(text); }
+
+TEST(Number, PlusSignsButNoRubbish) {
+  EXPECT_EQ(parse_number("+1.5e3"), 1500.0);
+  EXPECT_EQ(parse_integer("-12"), -12);
+  for (const char* text : {"", "+", "+-1", "1x", "1 2", "1e999"}) EXPECT_FALSE(parse_number(text)) << text;
+  for (const char* text : {"", "1.0", "9223372036854775808"}) EXPECT_FALSE(parse_integer(text)) << text;
+}
+
+TEST(LineReader, PassesOverCommentsAndEmptyLinesButCountsThem) {
+  LineReader line("# head\r\n\r\n 1\t2  3 # tail\r\n\n4", "f");
+  ASSERT_TRUE(line.next());
+  ASSERT_EQ(line.columns().size(), 3U);
+  EXPECT_EQ(line.columns()[2], "3");
+  EXPECT_EQ(line.line(), 3);
+  ASSERT_TRUE(line.next());
+  EXPECT_EQ(line.line(), 5);
+  EXPECT_FALSE(line.next());
+}
+
+TEST(LineReader, CommasKeepEmptyColumns) {
+  LineReader line("1, 2 ,,4,", "f", Separator::comma);
+  ASSERT_TRUE(line.next());
+  ASSERT_EQ(line.columns().size(), 5U);
+  EXPECT_EQ(line.columns()[1], "2");
+  EXPECT_EQ(line.columns()[2], "");
+  EXPECT_EQ(line.columns()[4], "");
+}
+
+TEST(Shown, ShortAndPrintable) {
+  EXPECT_EQ(shown("a\x01\xff"),
+            "'a?"
+            "?'");
+  EXPECT_EQ(shown(std::string(50, 'a')), "'" + std::string(40, 'a') + "...'");
+}
+
+TEST(Files, MissingAndFolderAreIoErrors) {
+  for (const std::string path : {"/does/not/exist", "."}) {
+    const auto bytes = read_file(path);
+    ASSERT_FALSE(bytes);
+    EXPECT_EQ(bytes.error().code, ErrorCode::io);
+    EXPECT_TRUE(bytes.error().message.starts_with(path));
+  }
+  EXPECT_FALSE(write_file("/does/not/exist", "x"));
+}
+
+TEST(Files, BytesSurviveDisk) {
+  std::string bytes(600'000, '\0');  // several chunks
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * 2654435761U >> 13U);
+  const std::string path = testing::TempDir() + "tutti_text_test.bin";
+  ASSERT_TRUE(write_file(path, bytes));
+  EXPECT_EQ(read_file(path).value(), bytes);
+}
+
+RC_GTEST_PROP(UnitQuaternion, UnitOnesAreLeftAlone, ()) {
+  const Eigen::Quaterniond q = any_pose().rotation;
+  RC_ASSERT(to_unit(LineReader("", "f"), q)->coeffs() == q.coeffs());
+}
+
+TEST(UnitQuaternion, NormalisedWithinToleranceRefusedBeyond) {
+  const Eigen::Quaterniond q(0.5, 0.5, -0.5, 0.5);
+  const LineReader where("", "f");
+  EXPECT_NEAR(to_unit(where, Eigen::Quaterniond(q.coeffs() * 1.0009))->norm(), 1.0, 1e-15);
+  EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(q.coeffs() * 1.0011)));
+  EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(0, 0, 0, 0)));
+  EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(1e200, 1e200, 0, 0)));
+}
+
+}  // namespace
+}  // namespace tutti::formats::internal
