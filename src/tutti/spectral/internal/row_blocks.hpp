@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "tutti/spectral/graph.hpp"
+
+namespace tutti::spectral::internal {
+
+/// A sparse symmetric matrix laid out for many products with few vectors. Nodes are renumbered so that neighbours sit
+/// close together (reverse Cuthill-McKee); then eight consecutive rows have nearly the same columns and share one list
+/// of them: per column one index, one entry of the vector and eight coefficients, no gather. Vectors are in the new
+/// numbering and padded with zeros to size().
+class RowBlocks {
+ public:
+  static constexpr int kRows = 8;
+
+  /// scale * matrix + shift * I.
+  RowBlocks(const SparseMatrix& matrix, double scale, double shift);
+
+  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(start_.size() - 1) * kRows; }
+  [[nodiscard]] Eigen::VectorXd to_blocks(const Eigen::Ref<const Eigen::VectorXd>& nodes) const;
+  void from_blocks(const Eigen::Ref<const Eigen::VectorXd>& blocks, Eigen::Ref<Eigen::VectorXd> nodes) const;
+
+  /// y = M x - y.
+  void multiply_subtract(const Eigen::VectorXd& x, Eigen::VectorXd& y) const;
+
+  /// One step of the Chebyshev recurrence and of every sum that runs along it:
+  ///   y = M x - y;  sums.col(s) += weights[s] * y  for s < weights.size().
+  void chebyshev_step(const Eigen::VectorXd& x, Eigen::VectorXd& y, std::span<const double> weights,
+                      Eigen::MatrixXd& sums) const;
+
+ private:
+  std::vector<int> node_;        ///< Node at each place.
+  std::vector<int> start_;       ///< Per block of rows: its first column; one more at the end.
+  std::vector<int> column_;      ///< Place in the vector.
+  Eigen::VectorXd coefficient_;  ///< kRows per column.
+};
+
+}  // namespace tutti::spectral::internal
