@@ -14,8 +14,8 @@
 /// byte), then one zstd frame (with content size and checksum) around a protobuf message of proto/tutti/v1.
 ///
 /// Encoding expects a message that validate() accepts (else std::logic_error) and is deterministic. Decoding accepts
-/// any bytes: it returns an error or a message that validate() accepts, and never allocates more than the limits of
-/// frame.hpp. Encoding what was decoded, with the same settings, and decoding that changes nothing.
+/// any bytes: it returns an error or a message that validate() accepts, and never takes more memory than the limits of
+/// limits.hpp allow. Encoding what was decoded, with the same settings, and decoding that changes nothing.
 namespace tutti::wire {
 
 /// Points are rounded to a grid of voxel_m / 2^offset_bits: an error of at most half a cell per axis (defaults: 4.7 mm,
@@ -25,8 +25,8 @@ struct CloudCodec {
   int offset_bits = 5;
   template <class V>
   void describe(V& v) {
-    v.field("voxel_m", voxel_m, between(0.01, 10.0), "Voxel of the cloud on the wire; best equal to the cloud's own.");
-    v.field("offset_bits", offset_bits, between(0, 8), "Bits per axis of a point's place inside its voxel.");
+    v.field("voxel_m", voxel_m, between(0.1, 10.0), "Voxel of the cloud on the wire; best equal to the cloud's own.");
+    v.field("offset_bits", offset_bits, between(0, 6), "Bits per axis of a point's place inside its voxel.");
   }
 };
 

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+
+/// What the decoders accept at most. Checked before memory is taken.
+namespace tutti::wire {
+
+inline constexpr std::size_t kMaxMessageBytes = 16U << 20U;  ///< Of the protobuf message, before compression.
+inline constexpr std::size_t kMaxKeyframes = 10'000;         ///< Per submap.
+inline constexpr std::size_t kMaxCloudPoints = 1'000'000;
+inline constexpr std::size_t kMaxProxyNodes = 200'000;  ///< Also of eliminated ones.
+inline constexpr std::size_t kMaxProxyEdges = 1'000'000;
+inline constexpr std::size_t kMaxRobots = 1'000;
+inline constexpr std::size_t kMaxClosures = 1'000;  ///< Per verdict.
+inline constexpr std::size_t kMaxReasonBytes = 1'000;
+
+inline constexpr double kMaxCoordinate_m = 1e9;     ///< Of a pose, per axis.
+inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.
+inline constexpr double kMaxVariance = 1e20;
+
+}  // namespace tutti::wire

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <vector>
+
+#include "tutti/base/check.hpp"
+#include "tutti/v1/messages.pb.h"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/cloud_codec.hpp"
+#include "tutti/wire/internal/columns.hpp"
+#include "tutti/wire/internal/quantise.hpp"
+#include "tutti/wire/limits.hpp"
+
+namespace tutti::wire {
+namespace {
+
+constexpr double kSameOdometry = 1e-7;  // m and rad: far below the rounding of the poses
+
+Pose3 odometry_from_poses(const Submap& submap, std::size_t k) {
+  return submap.keyframes[k].T_odom_body.inverse() * submap.keyframes[k + 1].T_odom_body;
+}
+
+bool odometry_follows_from_poses(const Submap& submap) {
+  for (std::size_t k = 0; k < submap.odometry.size(); ++k)
+    if (local(odometry_from_poses(submap, k), submap.odometry[k].T_a_b).norm() > kSameOdometry) return false;
+  return true;
+}
+
+void write_odometry(const Submap& submap, v1::Submap& out) {
+  std::vector<CovarianceCode> covariances;
+  std::vector<PoseCode> poses;
+  for (const RelativePose& odometry : submap.odometry) {
+    covariances.push_back(quantise(odometry.covariance, kKeyframeCovarianceStep));
+    poses.push_back(quantise(odometry.T_a_b, kKeyframePoseSteps));
+  }
+  write_columns(covariances, *out.mutable_odometry_covariance());
+  if (!odometry_follows_from_poses(submap)) write_columns(poses, *out.mutable_odometry());
+}
+
+Status read_keyframes(const v1::Submap& in, Submap& submap) {
+  const auto count = static_cast<std::size_t>(in.stamp_ns_size());
+  if (count == 0 || count > kMaxKeyframes)
+    return fail(ErrorCode::invalid, "{} keyframes, expected 1 to {}", count, kMaxKeyframes);
+  const auto stamps = read_columns<1>(in.stamp_ns(), count);
+  const auto poses = read_columns<6>(in.pose(), count);
+  if (!poses || static_cast<std::size_t>(in.representative_size()) != count)
+    return fail(ErrorCode::parse, "{} pose numbers and {} flags for {} keyframes", in.pose_size(),
+                in.representative_size(), count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::optional<Pose3> T_odom_body = dequantise((*poses)[k], kKeyframePoseSteps);
+    if (!T_odom_body) return fail(ErrorCode::invalid, "pose {} is out of range", k);
+    submap.keyframes.push_back({in.first_keyframe() + static_cast<std::uint32_t>(k), Timestamp{(*stamps)[k][0]},
+                                *T_odom_body, in.representative(static_cast<int>(k))});
+  }
+  return {};
+}
+
+Status read_odometry(const v1::Submap& in, Submap& submap) {
+  const std::size_t count = submap.keyframes.size() - 1;
+  const auto covariances = read_columns<21>(in.odometry_covariance(), count);
+  if (!covariances)
+    return fail(ErrorCode::parse, "{} covariance numbers for {} odometry factors", in.odometry_covariance_size(),
+                count);
+  const bool follows = in.odometry_size() == 0;
+  const auto poses = read_columns<6>(in.odometry(), follows ? 0 : count);
+  if (!poses) return fail(ErrorCode::parse, "{} pose numbers for {} odometry factors", in.odometry_size(), count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::optional<Pose3> T =
+        follows ? odometry_from_poses(submap, k) : dequantise((*poses)[k], kKeyframePoseSteps);
+    const std::optional<Matrix6d> covariance = dequantise((*covariances)[k], kKeyframeCovarianceStep);
+    if (!T || !covariance) return fail(ErrorCode::invalid, "odometry factor {} is out of range", k);
+    submap.odometry.push_back({*T, *covariance});
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
+  const Status valid = validate(message);
+  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  const Submap& submap = message.submap;
+  v1::Submap out;
+  out.mutable_header()->set_robot(message.header.robot.value);
+  out.mutable_header()->set_session(message.header.session);
+  out.mutable_header()->set_sequence(message.header.sequence);
+  out.set_index(submap.id.index);
+  out.set_first_keyframe(submap.keyframes.front().index);
+  std::vector<std::array<std::int64_t, 1>> stamps;
+  std::vector<PoseCode> poses;
+  for (const Keyframe& keyframe : submap.keyframes) {
+    stamps.push_back({keyframe.stamp.ns});
+    poses.push_back(quantise(keyframe.T_odom_body, kKeyframePoseSteps));
+    out.add_representative(keyframe.representative);
+  }
+  write_columns(stamps, *out.mutable_stamp_ns());
+  write_columns(poses, *out.mutable_pose());
+  write_odometry(submap, out);
+  if (submap.cloud && !submap.cloud->points.empty()) encode_cloud(*submap.cloud, cloud, *out.mutable_cloud());
+  return pack_frame(MessageKind::submap, out.SerializeAsString());
+}
+
+Result<SubmapMessage> decode_submap(std::string_view bytes) {
+  const Result<std::string> payload = unpack_frame(MessageKind::submap, bytes);
+  if (!payload) return tl::unexpected(payload.error());
+  v1::Submap in;
+  if (!in.ParseFromString(*payload)) return fail(ErrorCode::parse, "submap: not the protobuf message expected");
+
+  SubmapMessage message;
+  message.header = {RobotId{in.header().robot()}, in.header().session(), in.header().sequence()};
+  message.submap.id = {message.header.robot, in.index()};
+  const std::string where = fmt::format("submap {}/{}", in.header().robot(), in.index());
+  if (auto ok = read_keyframes(in, message.submap); !ok) return in_context(where, ok.error());
+  if (auto ok = read_odometry(in, message.submap); !ok) return in_context(where, ok.error());
+  if (in.has_cloud() && in.cloud().voxel_size() > 0) {
+    auto cloud = decode_cloud(in.cloud());
+    if (!cloud) return in_context(where, cloud.error());
+    message.submap.cloud = std::move(*cloud);
+  }
+  if (auto ok = validate(message); !ok) return tl::unexpected(ok.error());
+  return message;
+}
+
+}  // namespace tutti::wire

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/limits.hpp"
+
+namespace tutti::wire {
+namespace {
+
+constexpr double kPsdTolerance = 1e-9;  // of the trace
+
+Status at_most(std::size_t count, std::size_t limit, const char* what) {
+  if (count <= limit) return {};
+  return fail(ErrorCode::invalid, "{} {}, at most {} are accepted", count, what, limit);
+}
+
+Status check_pose(const Pose3& T) {
+  if (!is_valid(T))
+    return fail(ErrorCode::invalid, "pose is not finite or its quaternion has norm {}, expected 1", T.rotation.norm());
+  const double largest = T.translation.cwiseAbs().maxCoeff();
+  if (largest > kMaxCoordinate_m)
+    return fail(ErrorCode::invalid, "coordinate of {} m, at most {} m", largest, kMaxCoordinate_m);
+  return {};
+}
+
+Status check_covariance(const Matrix6d& covariance) {
+  if (!covariance.allFinite()) return fail(ErrorCode::invalid, "covariance is not finite");
+  const double largest = covariance.cwiseAbs().maxCoeff();
+  if (largest > kMaxVariance)
+    return fail(ErrorCode::invalid, "covariance entry of {}, at most {}", largest, kMaxVariance);
+  if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > kPsdTolerance * largest)
+    return fail(ErrorCode::invalid, "covariance is not symmetric");
+  // Scaled to a unit diagonal, so that metres and radians are judged alike.
+  if (covariance.diagonal().minCoeff() < 0.0) return fail(ErrorCode::invalid, "negative variance");
+  Vector6d scale;
+  for (int i = 0; i < 6; ++i) scale(i) = covariance(i, i) > 0.0 ? 1.0 / std::sqrt(covariance(i, i)) : 0.0;
+  Matrix6d correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
+  for (int i = 0; i < 6; ++i) {
+    if (covariance(i, i) == 0.0 && covariance.row(i).cwiseAbs().maxCoeff() > 0.0)
+      return fail(ErrorCode::invalid, "covariance row {} has no variance but correlations", i);
+    correlation(i, i) = 1.0 + 6.0 * kPsdTolerance;
+  }
+  if (correlation.llt().info() != Eigen::Success)
+    return fail(ErrorCode::invalid, "covariance is not positive semidefinite");
+  return {};
+}
+
+Status check_submap(const Submap& submap) {
+  if (submap.keyframes.empty()) return fail(ErrorCode::invalid, "no keyframes, expected at least one");
+  if (auto ok = at_most(submap.keyframes.size(), kMaxKeyframes, "keyframes"); !ok) return ok;
+  if (submap.odometry.size() + 1 != submap.keyframes.size())
+    return fail(ErrorCode::invalid, "{} odometry factors for {} keyframes, expected one fewer", submap.odometry.size(),
+                submap.keyframes.size());
+  for (std::size_t k = 0; k < submap.keyframes.size(); ++k) {
+    const Keyframe& keyframe = submap.keyframes[k];
+    const auto where = [&] { return "keyframe " + std::to_string(keyframe.index); };
+    if (auto ok = check_pose(keyframe.T_odom_body); !ok) return in_context(where(), ok.error());
+    if (k == 0) continue;
+    const Keyframe& previous = submap.keyframes[k - 1];
+    if (previous.index == 0xffffffffU || keyframe.index != previous.index + 1)
+      return fail(ErrorCode::invalid, "keyframe {} follows keyframe {}, expected consecutive indices", keyframe.index,
+                  previous.index);
+    if (keyframe.stamp <= previous.stamp)
+      return fail(ErrorCode::invalid, "{}: stamp {} ns is not after {} ns", where(), keyframe.stamp.ns,
+                  previous.stamp.ns);
+    const RelativePose& odometry = submap.odometry[k - 1];
+    if (auto ok = check_pose(odometry.T_a_b); !ok) return in_context("odometry to " + where(), ok.error());
+    if (auto ok = check_covariance(odometry.covariance); !ok) return in_context("odometry to " + where(), ok.error());
+  }
+  if (submap.cloud == nullptr) return {};
+  if (auto ok = at_most(submap.cloud->points.size(), kMaxCloudPoints, "points"); !ok) return ok;
+  for (const Eigen::Vector3f& point : submap.cloud->points)
+    if (!point.allFinite() || point.cwiseAbs().maxCoeff() > static_cast<float>(kMaxCloudRange_m))
+      return fail(ErrorCode::invalid, "point ({}, {}, {}) is not within {} m", point.x(), point.y(), point.z(),
+                  kMaxCloudRange_m);
+  return {};
+}
+
+/// Strictly ascending by (robot, stamp).
+template <class Node>
+Status check_order(const std::vector<Node>& nodes, const char* what) {
+  for (std::size_t i = 1; i < nodes.size(); ++i) {
+    const Node& a = nodes[i - 1];
+    const Node& b = nodes[i];
+    if (b.robot < a.robot || (b.robot == a.robot && b.stamp <= a.stamp))
+      return fail(ErrorCode::invalid, "{} {} (robot {}, {} ns) does not come after (robot {}, {} ns)", what, i,
+                  b.robot.value, b.stamp.ns, a.robot.value, a.stamp.ns);
+  }
+  return {};
+}
+
+Status check_edges(const ProxyGraph& graph) {
+  if (!graph.reduced && (!graph.edges.empty() || !graph.eliminated.empty()))
+    return fail(ErrorCode::invalid, "{} edges and {} eliminated nodes in an unreduced graph, expected none",
+                graph.edges.size(), graph.eliminated.size());
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    const ProxyEdge& edge = graph.edges[i];
+    if (edge.a >= graph.nodes.size() || edge.b >= graph.nodes.size() || edge.a == edge.b)
+      return fail(ErrorCode::invalid, "edge {} joins nodes {} and {} of {}", i, edge.a, edge.b, graph.nodes.size());
+    if (graph.nodes[edge.a].robot != graph.nodes[edge.b].robot)
+      return fail(ErrorCode::invalid, "edge {} joins robots {} and {}, expected one robot", i,
+                  graph.nodes[edge.a].robot.value, graph.nodes[edge.b].robot.value);
+    if (!std::isfinite(static_cast<float>(edge.weight)) || edge.weight < 0.0)
+      return fail(ErrorCode::invalid, "edge {} has weight {}, expected a finite one >= 0", i, edge.weight);
+  }
+  return {};
+}
+
+Status check_nodes(const ProxyGraph& graph) {
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const auto where = [&] { return "node " + std::to_string(i); };
+    if (auto ok = check_pose(graph.nodes[i].T_world_body); !ok) return in_context(where(), ok.error());
+    if (auto ok = check_covariance(graph.nodes[i].covariance); !ok) return in_context(where(), ok.error());
+  }
+  return check_order(graph.nodes, "node");
+}
+
+Status check_graph(const ProxyGraph& graph) {
+  for (const auto& ok : {at_most(graph.nodes.size(), kMaxProxyNodes, "nodes"),
+                         at_most(graph.eliminated.size(), kMaxProxyNodes, "eliminated nodes"),
+                         at_most(graph.edges.size(), kMaxProxyEdges, "edges"),
+                         at_most(graph.components.size(), kMaxRobots, "components")})
+    if (!ok) return ok;
+  for (const double value : {graph.radius_m, graph.sigma_m})
+    if (!std::isfinite(value) || value <= 0.0)
+      return fail(ErrorCode::invalid, "radius {} m, sigma {} m, expected > 0", graph.radius_m, graph.sigma_m);
+  std::set<RobotId> robots;
+  for (const RobotComponent& component : graph.components)
+    if (!robots.insert(component.robot).second)
+      return fail(ErrorCode::invalid, "robot {} has two components", component.robot.value);
+  if (auto ok = check_nodes(graph); !ok) return ok;
+  if (auto ok = check_order(graph.eliminated, "eliminated node"); !ok) return ok;
+  return check_edges(graph);
+}
+
+}  // namespace
+
+Status validate(const SubmapMessage& message) {
+  const SubmapId id = message.submap.id;
+  const std::string where = fmt::format("submap {}/{}", id.robot.value, id.index);
+  if (message.header.robot != id.robot)
+    return fail(ErrorCode::invalid, "{}: sent by robot {}, expected its own robot", where, message.header.robot.value);
+  if (auto ok = check_submap(message.submap); !ok) return in_context(where, ok.error());
+  return {};
+}
+
+Status validate(const ProxyGraphMessage& message) {
+  if (auto ok = check_graph(message.graph); !ok)
+    return in_context(fmt::format("proxy graph {}", message.graph.revision), ok.error());
+  return {};
+}
+
+Status validate(const ClosureVerdict& verdict) {
+  const auto& [first, second] = verdict.pair;
+  const std::string where = fmt::format("verdict on submaps {}/{} and {}/{}", first.robot.value, first.index,
+                                        second.robot.value, second.index);
+  if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where);
+  if (auto ok = at_most(verdict.closures.size(), kMaxClosures, "closures"); !ok) return in_context(where, ok.error());
+  if (auto ok = at_most(verdict.reason.size(), kMaxReasonBytes, "bytes of reason"); !ok)
+    return in_context(where, ok.error());
+  for (const LoopClosure& closure : verdict.closures) {
+    if (closure.from.robot != first.robot || closure.to.robot != second.robot)
+      return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where, closure.from.robot.value,
+                  closure.to.robot.value);
+    if (auto ok = check_pose(closure.measurement.T_a_b); !ok) return in_context(where, ok.error());
+    if (auto ok = check_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
+  }
+  return {};
+}
+
+}  // namespace tutti::wire

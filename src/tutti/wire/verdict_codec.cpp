@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/base/check.hpp"
+#include "tutti/v1/messages.pb.h"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
+
+namespace tutti::wire {
+namespace {
+
+void write(const LoopClosure& closure, v1::LoopClosure& out) {
+  out.set_from_robot(closure.from.robot.value);
+  out.set_from_index(closure.from.index);
+  out.set_to_robot(closure.to.robot.value);
+  out.set_to_index(closure.to.index);
+  for (const double x : closure.measurement.T_a_b.translation) out.add_pose(x);
+  for (const double q : closure.measurement.T_a_b.rotation.coeffs()) out.add_pose(q);
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) out.add_covariance(closure.measurement.covariance(i, j));
+}
+
+Result<LoopClosure> read(const v1::LoopClosure& in) {
+  if (in.pose_size() != 7 || in.covariance_size() != 21)
+    return fail(ErrorCode::parse, "closure with {} pose numbers and {} covariance numbers, expected 7 and 21",
+                in.pose_size(), in.covariance_size());
+  LoopClosure closure{.from = {RobotId{in.from_robot()}, in.from_index()},
+                      .to = {RobotId{in.to_robot()}, in.to_index()}};
+  for (int i = 0; i < 3; ++i) closure.measurement.T_a_b.translation(i) = in.pose(i);
+  for (int i = 0; i < 4; ++i) closure.measurement.T_a_b.rotation.coeffs()(i) = in.pose(3 + i);
+  int at = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j, ++at)
+      closure.measurement.covariance(i, j) = closure.measurement.covariance(j, i) = in.covariance(at);
+  return closure;
+}
+
+}  // namespace
+
+std::string encode(const ClosureVerdict& verdict) {
+  const Status valid = validate(verdict);
+  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  v1::Verdict out;
+  out.set_first_robot(verdict.pair.first.robot.value);
+  out.set_first_index(verdict.pair.first.index);
+  out.set_second_robot(verdict.pair.second.robot.value);
+  out.set_second_index(verdict.pair.second.index);
+  for (const LoopClosure& closure : verdict.closures) write(closure, *out.add_closure());
+  out.set_reason(verdict.reason);
+  return pack_frame(MessageKind::verdict, out.SerializeAsString());
+}
+
+Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
+  const Result<std::string> payload = unpack_frame(MessageKind::verdict, bytes);
+  if (!payload) return tl::unexpected(payload.error());
+  v1::Verdict in;
+  if (!in.ParseFromString(*payload)) return fail(ErrorCode::parse, "verdict: not the protobuf message expected");
+  ClosureVerdict verdict{
+      .pair = {{RobotId{in.first_robot()}, in.first_index()}, {RobotId{in.second_robot()}, in.second_index()}}};
+  for (const v1::LoopClosure& closure : in.closure()) {
+    const Result<LoopClosure> read_closure = read(closure);
+    if (!read_closure) return in_context("verdict", read_closure.error());
+    verdict.closures.push_back(*read_closure);
+  }
+  verdict.reason = in.reason();
+  if (auto ok = validate(verdict); !ok) return tl::unexpected(ok.error());
+  return verdict;
+}
+
+}  // namespace tutti::wire
