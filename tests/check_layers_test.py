@@ -28,7 +28,7 @@ class CheckLayers(unittest.TestCase):
             "base/b.cpp": '// std::cout\nauto s = "std::cout";\n/* abort()\n exit(1); */\n',
             "base/a_test.cpp": "#include <ceres/ceres.h>\nstd::cout << 1;\n",
             "perception/lidar/a.cpp": '#include "tutti/geometry/a.hpp"\n#include <nanoflann.hpp>\n',
-            "wire/a.cpp": '#include "tutti.pb.h"\n#include <google/protobuf/message.h>\n',
+            "wire/a.cpp": '#include "tutti/v1/a.pb.h"\n#include <google/protobuf/message.h>\n',
         })
         self.assertEqual(code, 0, out)
 
@@ -42,7 +42,7 @@ class CheckLayers(unittest.TestCase):
             ("base/a.hpp", '#include "tutti/nowhere/a.hpp"'),
             ("attic/a.hpp", "int x;"),
             ("base/other.cpp", "#include <yaml-cpp/yaml.h>"),
-            ("robot/a.cpp", '#include "tutti.pb.h"'),
+            ("robot/a.cpp", '#include "tutti/v1/a.pb.h"'),
             ("robot/a.cpp", "#include <google/protobuf/message.h>"),
             ("geometry/a.cpp", "#include <ceres/ceres.h>"),
             ("estimation/a.hpp", "#include <ceres/ceres.h>"),
@@ -53,6 +53,8 @@ class CheckLayers(unittest.TestCase):
             ("base/a.cpp", '  printf("");'),
             ("base/a.cpp", "  std::abort();"),
             ("base/a.cpp", "  exit(1);"),
+            ("base/a.cpp", '  const char* home = std::getenv("HOME");'),
+            ("base/a.cpp", "  auto now = std::chrono::system_clock::now();"),
         ]:
             number = 1 if name.startswith("attic") else 3
             code, out = check({name: f"//\n\n{line}\n"})
