@@ -63,9 +63,9 @@ std::optional<Spread> spread(std::span<const double> samples) {
   return Spread{sorted.size(), median, sorted.back()};
 }
 
-std::string format_spread_ms(std::span<const double> samples) {
+std::string format_spread(std::span<const double> samples) {
   const auto s = spread(samples);
-  return s ? fmt::format("{:.1f} / {:.1f} ms", s->median, s->max) : "-";
+  return s ? fmt::format("{:.1f} / {:.1f}", s->median, s->max) : "-";
 }
 
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name) {

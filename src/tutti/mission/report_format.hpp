@@ -31,8 +31,8 @@ struct Spread {
   double max = 0.0;
 };
 std::optional<Spread> spread(std::span<const double> samples);
-/// "12.3 / 45.0 ms" (median / max); "-" without samples.
-std::string format_spread_ms(std::span<const double> samples);
+/// "12.3 / 45.0" (median / max); "-" without samples.
+std::string format_spread(std::span<const double> samples);
 
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name);
 const PolicyTiming* find_timing(const MissionRecord& record, const std::string& robot, const std::string& policy);

@@ -52,9 +52,9 @@ Card error_card(const MissionRecord& record) {
   });
   const std::string to_server = "corrected robots differ from the server by " + format_metres(agreement);
   if (onboard && corrected)
-    return {"Error of the robots, RMSE: onboard, then corrected",
+    return {"Error of the robots, RMSE: onboard → corrected",
             fmt::format("<small>{} →</small> {}", format_metres(onboard), format_metres(corrected)),
-            "mean over robots; " + to_server};
+            "mean; " + to_server};
   return {"Corrected robots against the server, RMSE", format_metres(agreement),
           "no reference: errors could not be measured"};
 }
@@ -87,9 +87,9 @@ std::vector<Card> headline_cards(const MissionRecord& record) {
                    fmt::format("{} of {} odometry factors", format_share(constraints, factors), factors)});
   if (seconds > 0.0)
     cards.push_back(
-        {"Radio per robot: down to it, up from it",
+        {"Radio per robot: down ↓ and up ↑",
          fmt::format("{}/s <small>↓ {}/s ↑</small>", format_bytes(down / seconds), format_bytes(up / seconds)),
-         "encoded messages, mean over the run"});
+         "encoded messages, mean over the mission"});
   if (const auto update = spread(update_ms))
     cards.push_back({"A robot's answer to a broadcast", format_duration_ms(update->median),
                      fmt::format("median of {}; slowest {}", update->count, format_duration_ms(update->max))});
@@ -124,6 +124,10 @@ std::string header_html(const MissionRecord& record) {
 }
 
 }  // namespace
+
+std::size_t detail_per_robot(const MissionRecord& record, std::size_t total, std::size_t least, std::size_t most) {
+  return std::clamp(total / std::max<std::size_t>(record.robots.size(), 1), least, most);
+}
 
 std::string robot_class(const MissionRecord& record, RobotId robot) {
   const auto found =

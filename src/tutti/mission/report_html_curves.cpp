@@ -15,7 +15,6 @@ namespace {
 constexpr double kWidth_px = 560.0;
 constexpr double kLeft_px = 66.0;
 constexpr double kRight_px = 14.0;
-constexpr std::size_t kMaxColumns = 120;
 
 /// One column of the heat map: consecutive updates taken together when there are too many to draw.
 struct Column {
@@ -27,9 +26,9 @@ struct Column {
   Eigen::VectorXd max;
 };
 
-std::vector<Column> columns(const std::vector<UpdateRecord>& updates, double end_s) {
+std::vector<Column> columns(const std::vector<UpdateRecord>& updates, double end_s, std::size_t max_columns) {
   std::vector<Column> out;
-  const std::size_t step = (updates.size() + kMaxColumns - 1) / kMaxColumns;
+  const std::size_t step = (updates.size() + max_columns - 1) / max_columns;
   for (std::size_t first = 0; first < updates.size(); first += step) {
     const std::size_t last = std::min(first + step, updates.size());
     const UpdateRecord& newest = updates[last - 1];
@@ -71,15 +70,16 @@ struct HeatScale {
 
 std::string colour_bar(const HeatScale& scale) {
   constexpr double kBar_px = 240.0;
+  constexpr double kBarLeft_px = 24.0;
   constexpr int kSteps = 60;
   Svg svg(kWidth_px, 38.0, "Colour scale of the disagreement");
   for (int i = 0; i < kSteps; ++i)
-    svg.rect({kLeft_px + kBar_px * i / kSteps, 6.0}, {kBar_px / kSteps + 0.6, 12.0}, "cell", {},
+    svg.rect({kBarLeft_px + kBar_px * i / kSteps, 6.0}, {kBar_px / kSteps + 0.6, 12.0}, "cell", {},
              heat_colour((i + 0.5) / kSteps));
   for (double decade = std::ceil(scale.low - 1e-9); decade <= scale.high + 1e-9; ++decade)
-    svg.text({kLeft_px + kBar_px * (decade - scale.low) / (scale.high - scale.low), 32.0},
+    svg.text({kBarLeft_px + kBar_px * (decade - scale.low) / (scale.high - scale.low), 32.0},
              length_label(std::pow(10.0, decade)), "tick", "middle");
-  svg.text({kLeft_px + kBar_px + 28.0, 16.0}, "mean disagreement over the nodes", "tick");
+  svg.text({kBarLeft_px + kBar_px + 28.0, 16.0}, "mean disagreement over the nodes", "tick");
   return svg.str();
 }
 
@@ -87,7 +87,7 @@ std::string disagreement_figure(const MissionRecord& record, const RobotRecord& 
   constexpr double kRow_px = 22.0;
   constexpr double kStrip_px = 70.0;
   constexpr double kTop_px = 6.0;
-  const auto cells = columns(robot.updates, record.duration_s);
+  const auto cells = columns(robot.updates, record.duration_s, detail_per_robot(record, 360, 24, 120));
   Eigen::Index scales = 0;
   Range time;
   time.include(0.0);
@@ -102,8 +102,8 @@ std::string disagreement_figure(const MissionRecord& record, const RobotRecord& 
   const double map_bottom = kTop_px + kRow_px * static_cast<double>(scales);
   const double strip_top = map_bottom + 14.0;
   const double bottom = strip_top + kStrip_px;
-  const Axis x = Axis::linear(time, kLeft_px, kWidth_px - kRight_px, 8);
-  const Axis y = Axis::linear(held, bottom, strip_top, 3);
+  const Axis x = Axis::linear(time, kLeft_px, kWidth_px - kRight_px, 8, false);
+  const Axis y = Axis::linear(held, bottom, strip_top, 3, true);
   Svg svg(kWidth_px, bottom + 40.0, fmt::format("Disagreement of {} with the server per scale over time", robot.name));
   for (Eigen::Index s = 0; s < scales; ++s)
     svg.text({kLeft_px - 8.0, kTop_px + kRow_px * (static_cast<double>(s) + 0.5) + 4.0},
@@ -147,13 +147,22 @@ bool wants_logarithm(const std::vector<RobotGeometry>& geometry) {
   return middle && middle->median > 0.0 && largest > 12.0 * middle->median;
 }
 
-std::string error_figure(const RobotRecord& robot, const RobotGeometry& g, const Range& distance, const Range& error,
-                         bool logarithmic) {
+/// What all robots' error plots share, so that they can be compared.
+struct ErrorPlots {
+  Range error;
+  bool logarithmic = false;
+  std::size_t hover_points = 0;
+};
+
+std::string error_figure(const RobotRecord& robot, const RobotGeometry& g, const ErrorPlots& common) {
   constexpr double kTop_px = 10.0;
   constexpr double kBottom_px = 250.0;
-  const Axis x = Axis::linear(distance, kLeft_px, kWidth_px - kRight_px, 8);
-  const Axis y =
-      logarithmic ? Axis::logarithmic(error, kBottom_px, kTop_px) : Axis::linear(error, kBottom_px, kTop_px, 6);
+  Range distance;
+  distance.include(0.0);
+  for (const auto& e : g.errors) distance.include(e.distance_m);
+  const Axis x = Axis::linear(distance, kLeft_px, kWidth_px - kRight_px, 8, false);
+  const Axis y = common.logarithmic ? Axis::logarithmic(common.error, kBottom_px, kTop_px)
+                                    : Axis::linear(common.error, kBottom_px, kTop_px, 6, true);
   Svg svg(kWidth_px, kBottom_px + 40.0, fmt::format("Error of {} over the distance travelled", robot.name));
   draw_axes(svg, x, y, {kLeft_px, kTop_px}, {kWidth_px - kRight_px, kBottom_px}, "distance travelled [m]", true);
   const auto curve = [&](double KeyframeError::*value, const std::string& css_class, const std::string& title) {
@@ -164,7 +173,7 @@ std::string error_figure(const RobotRecord& robot, const RobotGeometry& g, const
   curve(&KeyframeError::server_m, "server", "server");
   curve(&KeyframeError::onboard_m, "onboard", "onboard");
   curve(&KeyframeError::corrected_m, "corrected", "corrected");
-  const std::size_t step = std::max<std::size_t>(1, g.errors.size() / 60);
+  const std::size_t step = std::max<std::size_t>(1, g.errors.size() / common.hover_points);
   for (std::size_t i = 0; i < g.errors.size(); i += step) {
     const KeyframeError& e = g.errors[i];
     svg.circle({x(e.distance_m), y(std::isfinite(e.corrected_m) ? e.corrected_m : e.onboard_m)}, 6.0, "hover",
@@ -181,7 +190,7 @@ std::string disagreement_html(const MissionRecord& record) {
   if (std::all_of(record.robots.begin(), record.robots.end(), [](const RobotRecord& r) { return r.updates.empty(); }))
     return "";
   const HeatScale scale(record);
-  std::string body = "<div class=\"figures\">\n";
+  std::string body = "<div class=\"colourbar\">" + colour_bar(scale) + "</div>\n<div class=\"figures\">\n";
   for (const auto& robot : record.robots)
     if (!robot.updates.empty()) body += disagreement_figure(record, robot, scale);
   return section(
@@ -189,41 +198,36 @@ std::string disagreement_html(const MissionRecord& record) {
       fmt::format("At every broadcast each robot compares its map with the server's, scale by scale, before it "
                   "corrects itself with policy {}. Below: the constraints it then holds.",
                   record.default_policy),
-      body + figure(colour_bar(scale), "", "", false) + "</div>\n");
+      body + "</div>\n");
 }
 
 std::string errors_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry) {
-  Range error;
+  ErrorPlots common{.hover_points = detail_per_robot(record, 300, 20, 60)};
   bool any_reference = false;
+  std::vector<double> small;
   for (const auto& g : geometry) {
     any_reference = any_reference || g.has_reference;
-    for (const auto& e : g.errors)
-      for (const double value : {e.onboard_m, e.corrected_m, e.server_m}) error.include(value);
+    for (const auto& e : g.errors) {
+      for (const double value : {e.onboard_m, e.corrected_m, e.server_m}) common.error.include(value);
+      for (const double value : {e.corrected_m, e.server_m})
+        if (std::isfinite(value)) small.push_back(value);
+    }
   }
-  if (error.empty) return "";
-  const bool logarithmic = wants_logarithm(geometry);
-  if (logarithmic) {  // single zero crossings must not stretch the axis
-    std::vector<double> small;
-    for (const auto& g : geometry)
-      for (const auto& e : g.errors)
-        for (const double value : {e.corrected_m, e.server_m})
-          if (std::isfinite(value)) small.push_back(value);
-    error.low = std::max(1e-4, 0.2 * spread(small)->median);
-  } else {
-    error.include(0.0);
-  }
-  std::string body = legend_html({{"onboard", "onboard"}, {"corrected", "corrected"}, {"curve server", "server"}}) +
-                     "<div class=\"figures\">\n";
-  for (std::size_t r = 0; r < geometry.size(); ++r) {
-    Range distance;
-    distance.include(0.0);
-    for (const auto& e : geometry[r].errors) distance.include(e.distance_m);
-    if (!geometry[r].errors.empty()) body += error_figure(record.robots[r], geometry[r], distance, error, logarithmic);
-  }
+  if (common.error.empty) return "";
+  common.logarithmic = wants_logarithm(geometry);
+  if (common.logarithmic)  // single zero crossings must not stretch the axis
+    common.error.low = std::max(1e-4, 0.2 * spread(small)->median);
+  else
+    common.error.include(0.0);
+  std::vector<LegendEntry> legend{{"onboard", "onboard"}, {"corrected", "corrected"}};
+  if (any_reference) legend.push_back({"curve server", "server"});
+  std::string body = legend_html(legend) + "<div class=\"figures\">\n";
+  for (std::size_t r = 0; r < geometry.size(); ++r)
+    if (!geometry[r].errors.empty()) body += error_figure(record.robots[r], geometry[r], common);
   return section("Error over distance",
                  fmt::format("Distance of every keyframe to the {} after the alignment above{}.",
                              any_reference ? "reference" : "server's estimate",
-                             logarithmic ? "; logarithmic, because the curves are far apart" : ""),
+                             common.logarithmic ? "; logarithmic, because the curves are far apart" : ""),
                  body + "</div>\n");
 }
 

@@ -17,7 +17,6 @@ namespace {
 
 constexpr double kWide_px = 1160.0;
 constexpr double kHalf_px = 560.0;
-constexpr std::size_t kHoverPoints = 60;
 
 Points3d transformed(const Pose3& T_a_b, const Trajectory& trajectory_b) {
   Points3d out;
@@ -28,7 +27,7 @@ Points3d transformed(const Pose3& T_a_b, const Trajectory& trajectory_b) {
 /// Cells of the plan that hold many points, as three shades: walls are dense seen from above. At most kMaxCells.
 void draw_cloud(Svg& svg, const PlanView& view, const std::vector<Points2d>& clouds) {
   constexpr double kCell_px = 2.0;
-  constexpr std::size_t kMaxCells = 24000;
+  constexpr std::size_t kMaxCells = 16000;
   const auto columns = static_cast<std::uint32_t>(view.width() / kCell_px) + 1;
   std::unordered_map<std::uint32_t, std::uint32_t> counts;
   for (const auto& cloud : clouds)
@@ -87,8 +86,8 @@ bool is_member(const MissionRecord& record, const std::vector<std::size_t>& robo
 void draw_closures(Svg& svg, const MissionRecord& record, const Pose3& T_display_world, const GroundPlane& ground,
                    const PlanView& view, const std::vector<std::size_t>& robots) {
   const auto positions = keyframe_positions(record.server);
-  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> intra;
-  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> inter;
+  Strokes intra;
+  Strokes inter;
   for (const auto& closure : record.server.closures) {
     const auto from = positions.find(closure.from);
     const auto to = positions.find(closure.to);
@@ -96,13 +95,13 @@ void draw_closures(Svg& svg, const MissionRecord& record, const Pose3& T_display
     (closure.from.robot == closure.to.robot ? intra : inter)
         .emplace_back(view(ground(T_display_world * from->second)), view(ground(T_display_world * to->second)));
   }
-  svg.segments(intra, "intra", fmt::format("{} loop closures within one robot", intra.size()));
-  svg.segments(inter, "inter", fmt::format("{} loop closures between robots", inter.size()));
+  svg.segments(thinned(intra), "intra", fmt::format("{} loop closures within one robot", intra.size()));
+  svg.segments(thinned(inter), "inter", fmt::format("{} loop closures between robots", inter.size()));
 }
 
 /// Invisible until pointed at.
-void draw_hover_points(Svg& svg, const Points2d& pixels, const std::vector<std::string>& titles) {
-  const std::size_t step = std::max<std::size_t>(1, pixels.size() / kHoverPoints);
+void draw_hover_points(Svg& svg, const Points2d& pixels, const std::vector<std::string>& titles, std::size_t count) {
+  const std::size_t step = std::max<std::size_t>(1, pixels.size() / count);
   for (std::size_t i = 0; i < std::min(pixels.size(), titles.size()); i += step)
     svg.circle(pixels[i], 6.0, "hover", titles[i]);
 }
@@ -141,7 +140,7 @@ std::string component_figure(const MissionRecord& record, std::uint32_t componen
     const std::string colour = robot_class(record, robot.id);
     const Points2d pixels = view(layers[i]);
     svg.polyline(pixels, "route " + colour, robot.name);
-    draw_hover_points(svg, pixels, route_titles(robot));
+    draw_hover_points(svg, pixels, route_titles(robot), detail_per_robot(record, 300, 20, 60));
   }
   for (std::size_t i = 0; i < robots.size(); ++i) {
     if (layers[i].empty()) continue;
@@ -181,29 +180,34 @@ std::string joint_map_html(const MissionRecord& record) {
 }
 
 std::string robot_maps_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry) {
-  std::string body = legend_html({{"onboard", "onboard: raw odometry"},
+  if (record.robots.empty()) return "";
+  const bool any_reference =
+      std::any_of(geometry.begin(), geometry.end(), [](const RobotGeometry& g) { return g.has_reference; });
+  std::vector<LegendEntry> legend{{"onboard", "onboard: raw odometry"},
                                   {"corrected", "corrected: robot with policy " + record.default_policy},
-                                  {"server", "server"},
-                                  {"reference", "reference"}}) +
-                     "<div class=\"figures\">\n";
+                                  {"server", "server"}};
+  if (any_reference) legend.push_back({"reference", "reference"});
+  std::string body = legend_html(legend) + "<div class=\"figures\">\n";
   for (std::size_t r = 0; r < record.robots.size(); ++r) {
     const RobotRecord& robot = record.robots[r];
     const RobotGeometry& g = geometry[r];
     if (g.onboard.empty()) continue;
     const GroundPlane ground = ground_plane({g.onboard, g.server, g.reference});
-    const PlanView view({ground(g.onboard), ground(g.corrected), ground(g.server), ground(g.reference)}, kHalf_px,
-                        0.85 * kHalf_px);
+    const PlanView view(
+        {ground(g.onboard), ground(g.corrected), ground(g.server), ground(g.reference), ground(g.whereabouts)},
+        kHalf_px, 0.85 * kHalf_px);
     Svg svg(view.width(), view.height(), fmt::format("Estimates of {} from above", robot.name));
     svg.polyline(view(ground(g.server)), "server", "server");
-    svg.polyline(view(ground(g.reference)), "reference", "reference");
     svg.polyline(view(ground(g.onboard)), "onboard", "onboard");
     svg.polyline(view(ground(g.corrected)), "corrected", "corrected");
+    svg.polyline(view(ground(g.reference)), "reference", "reference");
     std::vector<std::string> titles;
     for (const auto& e : g.errors)
       titles.push_back(fmt::format("{} after {}, {}: corrected {}, onboard {} off", robot.name,
                                    format_mission_time(e.time_s), format_distance(e.distance_m),
                                    format_metres(e.corrected_m), format_metres(e.onboard_m)));
-    draw_hover_points(svg, view(ground(g.corrected.empty() ? g.onboard : g.corrected)), titles);
+    draw_hover_points(svg, view(ground(g.corrected.empty() ? g.onboard : g.corrected)), titles,
+                      detail_per_robot(record, 300, 20, 60));
     for (std::size_t i = 0; i < g.whereabouts.size(); ++i) {
       const RobotId other = robot.whereabouts[i].other;
       const Eigen::Vector2d p = view(ground(g.whereabouts[i]));
@@ -216,8 +220,6 @@ std::string robot_maps_html(const MissionRecord& record, const std::vector<Robot
                    fmt::format("{} in {}", format_distance(robot.distance_m), format_mission_time(robot.duration_s)),
                    false);
   }
-  const bool any_reference =
-      std::any_of(geometry.begin(), geometry.end(), [](const RobotGeometry& g) { return g.has_reference; });
   return section(
       "Each robot by itself",
       fmt::format("Every estimate is laid on the {} by one rigid alignment, without scale. Named rings: where "

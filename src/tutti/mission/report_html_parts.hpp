@@ -14,6 +14,9 @@ namespace tutti::mission {
 /// The style sheet: colours for light and dark, layout.
 std::string_view report_style();
 
+/// How much detail each robot's pictures may have: `total` shared among the robots, within [least, most].
+std::size_t detail_per_robot(const MissionRecord& record, std::size_t total, std::size_t least, std::size_t most);
+
 /// Colour class of a robot's strokes: "r0", "r1", ... in the order of the record, repeating after 8.
 std::string robot_class(const MissionRecord& record, RobotId robot);
 std::string robot_name(const MissionRecord& record, RobotId robot);

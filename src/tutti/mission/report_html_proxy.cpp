@@ -13,8 +13,8 @@
 namespace tutti::mission {
 namespace {
 
-using Stroke = std::pair<Eigen::Vector2d, Eigen::Vector2d>;
 constexpr double kWide_px = 1160.0;
+constexpr std::size_t kMaxEdges = 6000;
 constexpr std::array<const char*, 4> kKindClass{"small", "mid", "large", "other"};
 constexpr std::array<const char*, 4> kKindName{"small scale", "mid scale", "large scale", "chosen without scales"};
 
@@ -24,7 +24,7 @@ struct Edges {
 };
 
 /// Carried edges of a reduced graph, otherwise the radius rule within each robot and between robots that share a frame;
-/// of these the shortest (heaviest), three per node.
+/// of these the heaviest (shortest), three per node, at most kMaxEdges.
 Edges proxy_edges(const ProxyGraph& graph, const std::vector<std::uint32_t>& component) {
   Edges out;
   std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> all;
@@ -42,7 +42,7 @@ Edges proxy_edges(const ProxyGraph& graph, const std::vector<std::uint32_t>& com
       }
   }
   out.total = all.size();
-  const std::size_t shown = std::min(all.size(), std::size_t{3} * n);
+  const std::size_t shown = std::min({all.size(), std::size_t{3} * n, kMaxEdges});
   std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(shown), all.end());
   for (std::size_t i = 0; i < shown; ++i) out.shown.emplace_back(std::get<1>(all[i]), std::get<2>(all[i]));
   return out;
@@ -87,26 +87,26 @@ std::string proxy_graph_html(const MissionRecord& record) {
   Svg svg(view.width(), view.height(), "The proxy graph from above with loop closures and constraints");
 
   const Edges edges = proxy_edges(graph, component);
-  std::vector<Stroke> strokes;
+  Strokes strokes;
   for (const auto& [a, b] : edges.shown)
     if (component[a] == shown) strokes.emplace_back(pixels[a], pixels[b]);
   svg.segments(strokes, "edge", fmt::format("{} of {} edges", edges.shown.size(), edges.total));
 
   const auto keyframes = keyframe_positions(record.server);
-  std::vector<Stroke> closures;
+  Strokes closures;
   for (const auto& closure : record.server.closures) {
     const auto from = keyframes.find(closure.from);
     const auto to = keyframes.find(closure.to);
     if (from != keyframes.end() && to != keyframes.end() && component_of(graph, closure.from.robot) == shown)
       closures.emplace_back(view(ground(T_display_world * from->second)), view(ground(T_display_world * to->second)));
   }
-  svg.segments(closures, "inter", fmt::format("{} loop closures", closures.size()));
+  svg.segments(thinned(closures), "closure", fmt::format("{} loop closures", closures.size()));
 
   std::array<std::size_t, 4> kinds{};
   for (const auto& robot : record.robots) {
     const PolicyRecord* policy = find_policy(robot, record.default_policy);
     if (policy == nullptr || component_of(graph, robot.id) != shown) continue;
-    std::array<std::vector<Stroke>, 4> arcs;
+    std::array<Strokes, 4> arcs;
     for (const auto& constraint : policy->constraints) {
       const Eigen::Vector3d* from = find_position(robot.server_estimate, constraint.from);
       const Eigen::Vector3d* to = find_position(robot.server_estimate, constraint.to);
@@ -120,15 +120,19 @@ std::string proxy_graph_html(const MissionRecord& record) {
                fmt::format("{}: {} constraints, {}", robot.name, arcs[k].size(), kKindName[k]));
     }
   }
-  for (std::size_t i = 0; i < pixels.size(); ++i)
-    if (component[i] == shown) svg.circle(pixels[i], 2.1, "node " + robot_class(record, graph.nodes[i].robot));
+  for (const auto& robot : record.robots) {
+    Points2d nodes;
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      if (graph.nodes[i].robot == robot.id && component[i] == shown) nodes.push_back(pixels[i]);
+    svg.dots(nodes, "node " + robot_class(record, robot.id));
+  }
   view.draw_scale_bar(svg);
 
   std::vector<LegendEntry> legend;
   for (const auto& robot : record.robots)
     legend.push_back({"route " + robot_class(record, robot.id), "nodes of " + robot.name});
   legend.push_back({"edge", fmt::format("edges (the {} heaviest of {})", edges.shown.size(), edges.total)});
-  legend.push_back({"inter", fmt::format("{} loop closures", closures.size())});
+  legend.push_back({"closure", fmt::format("{} loop closures", closures.size())});
   for (std::size_t k = 0; k < kinds.size(); ++k)
     if (kinds[k] > 0)
       legend.push_back(

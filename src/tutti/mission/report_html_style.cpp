@@ -34,7 +34,7 @@ h2 { font-size: 21px; margin: 52px 0 4px; letter-spacing: -0.01em; }
 .facts { display: flex; flex-wrap: wrap; gap: 8px; margin: 0 0 24px; padding: 0; list-style: none; }
 .facts li { border: 1px solid var(--line); background: var(--card); border-radius: 999px; padding: 3px 12px; font-size: 13px; }
 .facts li.input { border-color: var(--accent); color: var(--accent); font-weight: 600; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(250px, 1fr)); gap: 14px; }
+.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(330px, 1fr)); gap: 14px; }
 .card { background: var(--card); border: 1px solid var(--line); border-radius: 14px; padding: 16px 18px; }
 .card .what { color: var(--soft); font-size: 13px; margin: 0; }
 .card .value { font-size: 28px; line-height: 1.3; font-weight: 650; letter-spacing: -0.02em; margin: 2px 0;
@@ -43,14 +43,16 @@ h2 { font-size: 21px; margin: 52px 0 4px; letter-spacing: -0.01em; }
 .card .detail { color: var(--soft); font-size: 13px; margin: 0; }
 .figures { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 18px; }
 @media (max-width: 820px) { .figures { grid-template-columns: minmax(0, 1fr); } }
-figure { margin: 0; background: var(--card); border: 1px solid var(--line); border-radius: 14px; padding: 14px 16px 12px; }
+figure { display: flex; flex-direction: column; margin: 0; background: var(--card); border: 1px solid var(--line); border-radius: 14px; padding: 14px 16px 12px; }
 figure.wide { grid-column: 1 / -1; }
-figure svg { display: block; width: 100%; height: auto; }
+figure svg { display: block; width: 100%; height: auto; margin: auto 0; }
 figcaption { font-size: 13px; color: var(--soft); margin: 0 0 8px; }
 figcaption b { color: var(--ink); font-size: 15px; margin-right: 8px; }
 .legend { display: flex; flex-wrap: wrap; gap: 4px 20px; margin: 0 0 12px; font-size: 13px; color: var(--soft); }
 .legend span { display: inline-flex; align-items: center; gap: 7px; }
 .legend svg { width: 26px; height: 10px; }
+.legend .edge, .legend .intra, .legend .inter, .legend .closure { stroke-width: 2; stroke-opacity: 0.9; }
+.colourbar { max-width: 560px; margin: -6px 0 10px; } .colourbar svg { display: block; width: 100%; }
 .scroll { overflow-x: auto; background: var(--card); border: 1px solid var(--line); border-radius: 14px; padding: 4px 14px; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 14px; }
 th { font-weight: 600; color: var(--soft); font-size: 12.5px; text-align: right; padding: 9px 10px 7px; white-space: nowrap; }
@@ -58,8 +60,9 @@ td { text-align: right; padding: 6px 10px; border-top: 1px solid var(--line); wh
 th.left, td.left { text-align: left; }
 tr.group td { border-top: 2px solid var(--line); font-weight: 650; padding-top: 12px; }
 tr.chosen td { background: color-mix(in srgb, var(--accent) 9%, transparent); font-weight: 600; }
-td .bar { display: inline-block; height: 8px; border-radius: 4px; background: var(--accent); vertical-align: middle;
-  margin-right: 10px; min-width: 2px; }
+td .track { display: inline-block; width: 130px; height: 8px; border-radius: 4px; background: var(--grid); vertical-align: middle;
+  margin-right: 12px; overflow: hidden; text-align: left; }
+td .bar { display: block; height: 8px; border-radius: 4px; background: var(--accent); min-width: 2px; }
 td .bar.onboard { background: var(--onboard); } td .bar.server { background: var(--server); }
 td .bar.other { background: var(--soft); opacity: 0.55; }
 .swatch { display: inline-block; width: 10px; height: 10px; border-radius: 3px; margin-right: 8px; }
@@ -74,18 +77,20 @@ svg text { fill: var(--soft); font: 11.5px system-ui, "Segoe UI", Roboto, "DejaV
 svg text.name { fill: var(--ink); font-size: 12.5px; font-weight: 600; paint-order: stroke; stroke: var(--card); stroke-width: 3.5px; }
 svg path { fill: none; stroke-linecap: round; stroke-linejoin: round; }
 .gridline { stroke: var(--grid); stroke-width: 1; }
+.baseline { stroke: var(--soft); stroke-width: 1; stroke-opacity: 0.6; }
 .scalebar { stroke: var(--soft); stroke-width: 1.5; }
 .onboard { stroke: var(--onboard); stroke-width: 1.4; }
 .corrected { stroke: var(--corrected); stroke-width: 1.7; }
 .server { stroke: var(--server); stroke-width: 5; stroke-opacity: 0.38; }
 .curve.server { stroke-width: 2.4; stroke-opacity: 0.75; }
-.reference { stroke: var(--reference); stroke-width: 1.1; stroke-dasharray: 2 4; stroke-opacity: 0.8; }
+.reference { stroke: var(--reference); stroke-width: 1.3; stroke-dasharray: 0.5 5; stroke-opacity: 0.9; }
 path.cloud1 { fill: var(--cloud); fill-opacity: 0.10; } path.cloud2 { fill: var(--cloud); fill-opacity: 0.24; }
 path.cloud3 { fill: var(--cloud); fill-opacity: 0.42; }
 path.cloudkey { stroke: var(--cloud); stroke-width: 7; stroke-opacity: 0.35; }
 .route { stroke-width: 2; }
 .edge { stroke: var(--soft); stroke-width: 0.6; stroke-opacity: 0.35; }
 .intra { stroke: var(--soft); stroke-width: 0.9; stroke-opacity: 0.65; }
+.closure { stroke: var(--soft); stroke-width: 1.2; stroke-opacity: 0.8; stroke-dasharray: 1 3; }
 .inter { stroke: var(--closure); stroke-width: 1.1; stroke-opacity: 0.85; }
 .small { stroke: var(--r5); stroke-width: 2.2; } .mid { stroke: var(--r4); stroke-width: 2.2; }
 .large { stroke: var(--r6); stroke-width: 2.2; } .other { stroke: var(--r3); stroke-width: 2.2; }
@@ -96,13 +101,13 @@ path.cloudkey { stroke: var(--cloud); stroke-width: 7; stroke-opacity: 0.35; }
 .cell { stroke: none; }
 .r0 { stroke: var(--r0); } .r1 { stroke: var(--r1); } .r2 { stroke: var(--r2); } .r3 { stroke: var(--r3); }
 .r4 { stroke: var(--r4); } .r5 { stroke: var(--r5); } .r6 { stroke: var(--r6); } .r7 { stroke: var(--r7); }
-.node.r0, .end.r0 { fill: var(--r0); } .node.r1, .end.r1 { fill: var(--r1); } .node.r2, .end.r2 { fill: var(--r2); }
-.node.r3, .end.r3 { fill: var(--r3); } .node.r4, .end.r4 { fill: var(--r4); } .node.r5, .end.r5 { fill: var(--r5); }
-.node.r6, .end.r6 { fill: var(--r6); } .node.r7, .end.r7 { fill: var(--r7); }
-.node { stroke: none; fill-opacity: 0.85; }
+.end.r0 { fill: var(--r0); } .end.r1 { fill: var(--r1); } .end.r2 { fill: var(--r2); } .end.r3 { fill: var(--r3); } 
+.end.r4 { fill: var(--r4); } .end.r5 { fill: var(--r5); } .end.r6 { fill: var(--r6); } .end.r7 { fill: var(--r7); } 
+.node { stroke-width: 4.4; stroke-opacity: 0.85; }
 .swatch.r0 { background: var(--r0); } .swatch.r1 { background: var(--r1); } .swatch.r2 { background: var(--r2); }
 .swatch.r3 { background: var(--r3); } .swatch.r4 { background: var(--r4); } .swatch.r5 { background: var(--r5); }
 .swatch.r6 { background: var(--r6); } .swatch.r7 { background: var(--r7); }
+@media (max-width: 1120px) { table { font-size: 13px; } th, td { padding-left: 6px; padding-right: 6px; } th { white-space: normal; } td .track { width: 60px; } }
 @media print { main { max-width: none; padding: 0; } figure, .card, .scroll { break-inside: avoid; } }
 )css";
 }

@@ -16,8 +16,8 @@ std::string metres(std::optional<double> value) { return format_metres(value); }
 /// A figure with a bar as long as its share of `largest`.
 std::string with_bar(std::optional<double> value, double largest, std::string_view css_class) {
   if (!value || !std::isfinite(*value) || !(largest > 0.0)) return metres(value);
-  return fmt::format("<span class=\"bar {}\" style=\"width:{:.0f}px\"></span>{}", css_class,
-                     120.0 * std::min(1.0, *value / largest), metres(value));
+  return fmt::format("<span class=\"track\"><span class=\"bar {}\" style=\"width:{:.1f}%\"></span></span>{}", css_class,
+                     100.0 * std::min(1.0, *value / largest), metres(value));
 }
 
 std::string rate(std::uint64_t bytes, double seconds) {
@@ -52,7 +52,7 @@ void add_policy_rows(const MissionRecord& record, const RobotRecord& robot, std:
          metres(policy.accuracy.max_error_m), metres(policy.accuracy.rpe_m),
          referenced ? metres(policy.agreement_rmse_m) : with_bar(policy.agreement_rmse_m, largest, bar),
          std::to_string(policy.constraints_added), format_share(policy.constraints_added, robot.odometry_factors),
-         timing != nullptr ? format_spread_ms(timing->update_ms) : "-"});
+         timing != nullptr ? format_spread(timing->update_ms) : "-"});
   }
   row("", {"server", with_bar(robot.server.rmse_m, largest, "server"), metres(robot.server.max_error_m),
            metres(robot.server.rpe_m), "", "", "", ""});
@@ -77,7 +77,7 @@ std::string policies_html(const MissionRecord& record) {
   std::string body =
       "<div class=\"scroll\"><table>\n<thead><tr><th class=\"left\">estimate or policy</th><th>RMSE</th><th>largest "
       "error</th><th>RPE</th><th>RMSE to server</th><th>constraints</th><th>of odometry</th><th>update, median / "
-      "max</th></tr></thead>\n<tbody>\n";
+      "max, ms</th></tr></thead>\n<tbody>\n";
   for (const auto& robot : record.robots) add_policy_rows(record, robot, body);
   return section(
       "Policies side by side",

@@ -31,30 +31,37 @@ void Range::include(double value) {
   empty = false;
 }
 
-Axis Axis::linear(Range values, double pixel_low, double pixel_high, int max_ticks) {
+Axis Axis::linear(Range values, double pixel_low, double pixel_high, int max_ticks, bool widen) {
   Axis axis;
   if (values.empty) values = {0.0, 1.0, false};
   if (values.high - values.low < 1e-9 * std::max(1.0, std::abs(values.high)))
     values.high = values.low + std::max(1e-3, std::abs(values.low));
   const double step = round_up((values.high - values.low) / max_ticks);
-  const auto first = static_cast<long long>(std::floor(values.low / step + 1e-9));
-  const auto last = static_cast<long long>(std::ceil(values.high / step - 1e-9));
-  for (long long i = first; i <= last; ++i) axis.ticks_.push_back(static_cast<double>(i) * step);
-  axis.low_ = axis.ticks_.front();
-  axis.high_ = axis.ticks_.back();
+  const double first = widen ? std::floor(values.low / step + 1e-9) : std::ceil(values.low / step - 1e-9);
+  const double last = widen ? std::ceil(values.high / step - 1e-9) : std::floor(values.high / step + 1e-9);
+  for (double i = first; i <= last; ++i) axis.ticks_.push_back(i * step);
+  axis.low_ = widen ? axis.ticks_.front() : values.low;
+  axis.high_ = widen ? axis.ticks_.back() : values.high;
   axis.pixel_low_ = pixel_low;
   axis.pixel_high_ = pixel_high;
   return axis;
 }
 
 Axis Axis::logarithmic(Range values, double pixel_low, double pixel_high) {
+  constexpr double kFewDecades = 2.5;
   Axis axis;
-  if (values.empty || values.high <= 0.0) values = {0.1, 1.0, false};
-  const double high = std::ceil(std::log10(values.high) - 1e-9);
-  const double low = values.low > 0.0 ? std::floor(std::log10(values.low) + 1e-9) : high - kMaxDecades;
-  axis.high_ = high;
-  axis.low_ = std::clamp(low, high - kMaxDecades, high - 1.0);
-  for (double exponent = axis.low_; exponent <= high + 0.5; ++exponent) axis.ticks_.push_back(std::pow(10.0, exponent));
+  if (values.empty || !(values.high > 0.0)) values = {0.1, 1.0, false};
+  const double high = round_up(values.high);
+  const double low = std::clamp(values.low, high * std::pow(10.0, -kMaxDecades), high / 2.0);
+  axis.high_ = std::log10(high);
+  axis.low_ = std::log10(1.0 / round_up(1.0 / low));  // 1, 2, 5 x 10^n are their own reciprocals
+  const bool few = axis.high_ - axis.low_ < kFewDecades;
+  for (double decade = std::floor(axis.low_ - 1e-9); decade <= axis.high_ + 1e-9; ++decade)
+    for (const double digit : {1.0, 2.0, 5.0}) {
+      const double exponent = decade + std::log10(digit);
+      if ((few || digit == 1.0) && exponent > axis.low_ - 1e-9 && exponent < axis.high_ + 1e-9)
+        axis.ticks_.push_back(std::pow(10.0, exponent));
+    }
   axis.logarithmic_ = true;
   axis.pixel_low_ = pixel_low;
   axis.pixel_high_ = pixel_high;
@@ -88,6 +95,7 @@ void draw_axes(Svg& svg, const Axis& x, const Axis& y, const Eigen::Vector2d& to
     svg.text({top_left.x() - 8.0, y(tick) + 4.0}, y_is_length ? length_label(tick) : tick_label(tick), "tick", "end");
   }
   svg.segments(grid, "gridline");
+  svg.polyline(Points2d{{top_left.x(), bottom_right.y()}, bottom_right}, "baseline");
   svg.text({0.5 * (top_left.x() + bottom_right.x()), bottom_right.y() + 33.0}, x_name, "axis", "middle");
 }
 

@@ -18,12 +18,13 @@ struct Range {
   void include(double value);
 };
 
-/// One axis: values to pixels, linear or logarithmic, with ticks at 1, 2, 5 x 10^n (logarithmic: powers of ten).
+/// One axis: values to pixels, linear or logarithmic, with ticks at 1, 2, 5 x 10^n (many decades: powers of ten).
 class Axis {
  public:
-  /// Linear: widened to the next tick on both sides. An empty or single-valued range gets some room.
-  static Axis linear(Range values, double pixel_low, double pixel_high, int max_ticks);
-  /// Widened to whole decades, at most 6 (the smallest values are then clamped to the lower end); values must be > 0.
+  /// Linear; `widen`: to the next tick on both sides. An empty or single-valued range gets some room.
+  static Axis linear(Range values, double pixel_low, double pixel_high, int max_ticks, bool widen);
+  /// Widened to the next 1, 2 or 5 x 10^n; at most 6 decades. Values below the lower end, and those <= 0, are clamped
+  /// to it.
   static Axis logarithmic(Range values, double pixel_low, double pixel_high);
 
   [[nodiscard]] double operator()(double value) const;

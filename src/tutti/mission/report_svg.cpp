@@ -10,6 +10,7 @@ namespace tutti::mission {
 namespace {
 
 constexpr double kSimplifyPx = 0.15;
+constexpr std::size_t kMaxPoints = 800;
 
 /// 0.1 px, without a needless ".0" or "-0".
 std::string px(double value) {
@@ -96,6 +97,14 @@ Points2d simplify(std::span<const Eigen::Vector2d> points, double tolerance) {
   return out;
 }
 
+Strokes thinned(const Strokes& strokes) {
+  constexpr std::size_t kMaxStrokes = 4000;
+  if (strokes.size() <= kMaxStrokes) return strokes;
+  Strokes out;
+  for (std::size_t i = 0; i < kMaxStrokes; ++i) out.push_back(strokes[i * strokes.size() / kMaxStrokes]);
+  return out;
+}
+
 Svg::Svg(double width, double height, std::string_view label) : width_(width), height_(height), label_(label) {}
 
 void Svg::path(const std::string& data, std::string_view css_class, std::string_view title) {
@@ -108,7 +117,9 @@ void Svg::polyline(std::span<const Eigen::Vector2d> points, std::string_view css
   for (std::size_t first = 0; first < points.size();) {
     std::size_t last = first;
     while (last < points.size() && points[last].allFinite()) ++last;
-    const Points2d run = simplify(points.subspan(first, last - first), kSimplifyPx);
+    const auto original = points.subspan(first, last - first);
+    Points2d run = simplify(original, kSimplifyPx);
+    for (double tolerance = kSimplifyPx; run.size() > kMaxPoints; run = simplify(original, tolerance)) tolerance *= 1.5;
     for (std::size_t i = 0; i < run.size(); ++i) data.append(i == 0 ? "M" : "L").append(xy(run[i]));
     first = last + 1;
   }
@@ -125,12 +136,14 @@ void Svg::segments(std::span<const std::pair<Eigen::Vector2d, Eigen::Vector2d>> 
 
 void Svg::arcs(std::span<const std::pair<Eigen::Vector2d, Eigen::Vector2d>> strokes, std::string_view css_class,
                std::string_view title) {
-  constexpr double kBend = 0.18;  // of the stroke's length
+  constexpr double kBend = 0.25;         // control point's distance from the stroke, as a share of its length,
+  constexpr double kLargestBend = 44.0;  // but at most this: the arc itself goes half as far
   std::string data;
   for (const auto& [a, b] : strokes) {
     if (!a.allFinite() || !b.allFinite()) continue;
+    const double bend = std::min(kBend, kLargestBend / std::max((b - a).norm(), 1e-9));
     const Eigen::Vector2d side(a.y() - b.y(), b.x() - a.x());
-    data += fmt::format("M{}Q{} {}", xy(a), xy(0.5 * (a + b) + kBend * side), xy(b));
+    data += fmt::format("M{}Q{} {}", xy(a), xy(0.5 * (a + b) + bend * side), xy(b));
   }
   path(data, css_class, title);
 }
@@ -139,6 +152,13 @@ void Svg::squares(std::span<const Eigen::Vector2d> corners, double side, std::st
   std::string data;
   for (const auto& p : corners)
     if (p.allFinite()) data += fmt::format("M{}h{}v{}h-{}z", xy(p), px(side), px(side), px(side));
+  path(data, css_class, {});
+}
+
+void Svg::dots(std::span<const Eigen::Vector2d> centers, std::string_view css_class) {
+  std::string data;
+  for (const auto& p : centers)
+    if (p.allFinite()) data += fmt::format("M{}h0", xy(p));  // an empty stroke with round ends
   path(data, css_class, {});
 }
 

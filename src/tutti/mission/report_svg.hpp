@@ -13,6 +13,7 @@
 namespace tutti::mission {
 
 using Points2d = std::vector<Eigen::Vector2d>;
+using Strokes = std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>;
 
 /// For text and attributes of XML and HTML: the five special characters; control characters become spaces.
 std::string escape_xml(std::string_view text);
@@ -20,12 +21,15 @@ std::string escape_xml(std::string_view text);
 /// Douglas-Peucker: a subset of the points, ends included, that stays within `tolerance` of all of them.
 Points2d simplify(std::span<const Eigen::Vector2d> points, double tolerance);
 
+/// Evenly picked, at most a few thousand: more would only darken the picture and swell the page.
+Strokes thinned(const Strokes& strokes);
+
 class Svg {
  public:
   /// `label` says what the picture shows, for those who cannot see it.
   Svg(double width, double height, std::string_view label);
 
-  /// Simplified to 0.15 px; breaks at points that are not finite.
+  /// Simplified to 0.15 px, coarser when more than 800 points remain; breaks at points that are not finite.
   void polyline(std::span<const Eigen::Vector2d> points, std::string_view css_class, std::string_view title = {});
   /// Many separate strokes as one shape.
   void segments(std::span<const std::pair<Eigen::Vector2d, Eigen::Vector2d>> strokes, std::string_view css_class,
@@ -35,6 +39,8 @@ class Svg {
             std::string_view title = {});
   /// Many squares with the given lower-left corners (in pixels: smallest x and y) as one shape.
   void squares(std::span<const Eigen::Vector2d> corners, double side, std::string_view css_class);
+  /// Many dots as one shape; their size is the class's stroke width.
+  void dots(std::span<const Eigen::Vector2d> centers, std::string_view css_class);
   void circle(const Eigen::Vector2d& center, double radius, std::string_view css_class, std::string_view title = {});
   /// `fill`: a colour that overrides the class, or empty.
   void rect(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::string_view css_class,

@@ -82,7 +82,7 @@ std::string plural(std::size_t count, const std::string& noun) {
 
 std::string robots_table(const MissionRecord& record) {
   Table table(2);
-  table.add({"robot", "estimate", "RMSE", "max", "RPE", "to server", "constraints", "update"});
+  table.add({"robot", "estimate", "RMSE", "max", "RPE", "to server", "constraints", "update ms"});
   for (const auto& robot : record.robots) {
     table.rule();
     const auto row = [&](const std::string& left, const std::string& estimate, const Accuracy& accuracy,
@@ -99,7 +99,7 @@ std::string robots_table(const MissionRecord& record) {
     if (policy != nullptr)
       row(size, "corrected", policy->accuracy,
           {format_metres(policy->agreement_rmse_m), std::to_string(policy->constraints_added),
-           timing != nullptr ? format_spread_ms(timing->update_ms) : "-"});
+           timing != nullptr ? format_spread(timing->update_ms) : "-"});
     row(policy != nullptr ? "" : size, "server", robot.server, {});
   }
   return table.str();
@@ -118,7 +118,7 @@ std::string policies_table(const MissionRecord& record, std::size_t first, std::
   std::vector<std::string> head{"policy"};
   for (std::size_t r = first; r < last; ++r) {
     robots.insert(robots.end(), {"", "", "", record.robots[r].name});
-    head.insert(head.end(), {"RMSE", "to server", "constr.", "update"});
+    head.insert(head.end(), {"RMSE", "to server", "constr.", "update ms"});
   }
   table.add(robots);
   table.add(head);
@@ -134,7 +134,7 @@ std::string policies_table(const MissionRecord& record, std::size_t first, std::
       else
         cells.insert(cells.end(), {format_metres(policy->accuracy.rmse_m), format_metres(policy->agreement_rmse_m),
                                    std::to_string(policy->constraints_added),
-                                   timing != nullptr ? format_spread_ms(timing->update_ms) : "-"});
+                                   timing != nullptr ? format_spread(timing->update_ms) : "-"});
     }
     table.add(std::move(cells));
   }
@@ -196,12 +196,10 @@ std::string report_text(const MissionRecord& record, const std::string& report_h
                                         [](const RobotRecord& robot) { return robot.onboard.rmse_m.has_value(); });
     out += "\n";
     out += robots_table(record);
-    out += wrap(referenced ? "RMSE, max: distance to the reference at keyframes after one rigid alignment per robot. "
-                             "to server: corrected against server."
-                           : "No reference: only the distance of the corrected robots to the server could be measured.",
-                "  ");
-    out += wrap(fmt::format("corrected: by policy {}. update: median / max.", record.default_policy), "  ");
-    out += "\n  Policies side by side, on the same broadcasts (* shown above)\n";
+    out += referenced ? "  RMSE, max, RPE: against the reference, after one rigid alignment per robot.\n"
+                      : "  No reference: only the distance of corrected to server could be measured.\n";
+    out += "  to server: RMSE of corrected against server. update ms: median / max, wall clock.\n";
+    out += "\n  Policies side by side, on the same broadcasts (* = corrected above)\n";
     for (std::size_t first = 0; first < record.robots.size(); first += kRobotsPerPolicyTable)
       out += policies_table(record, first, std::min(first + kRobotsPerPolicyTable, record.robots.size())) + "\n";
     out += radio_table(record) + "\n";
