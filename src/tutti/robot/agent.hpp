@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+#include "tutti/consistency/compare.hpp"
+#include "tutti/consistency/ledger.hpp"
+#include "tutti/consistency/policy.hpp"
+#include "tutti/consistency/robot_node.hpp"
+#include "tutti/estimation/onboard_smoother.hpp"
+#include "tutti/model/messages.hpp"
+#include "tutti/model/trajectory.hpp"
+#include "tutti/robot/submap_builder.hpp"
+
+namespace tutti::robot {
+
+struct AgentConfig {
+  SubmapConfig submap;
+  consistency::CompareConfig compare;
+  consistency::PolicyConfig policy;
+  consistency::LedgerConfig ledger;
+  estimation::OnboardSmootherConfig smoother;
+  template <class V>
+  void describe(V& v) {
+    v.field("submap", submap);
+    v.field("compare", compare);
+    v.field("policy", policy);
+    v.field("ledger", ledger);
+    v.field("smoother", smoother);
+  }
+};
+
+/// Where another robot was last known to be, in this robot's `map` frame.
+struct Whereabouts {
+  RobotId robot;
+  Timestamp stamp;
+  Pose3 T_map_body;
+};
+
+/// What one proxy graph changed.
+struct UpdateSummary {
+  std::uint64_t revision = 0;
+  std::size_t synchronised = 0;       ///< Pairs of nodes compared.
+  std::size_t proposed = 0;           ///< Constraints the policy chose.
+  std::size_t constraints = 0;        ///< In the ledger afterwards.
+  Eigen::VectorXd mean_disagreement;  ///< Per scale, before the correction, in the signal's unit.
+  Eigen::VectorXd max_disagreement;
+  int order = 0;  ///< Of the Chebyshev transform; 0 = exact.
+};
+
+/// The steps of an update, in order. An observer is told when each ends, so that whoever owns a clock can time them.
+enum class UpdateStage { compare, choose, optimise };
+using StageObserver = std::function<void(UpdateStage)>;
+
+/// One robot: odometry and scans in, submaps out; proxy graphs in, corrected trajectory out. No threads, sockets or
+/// clocks inside; works the same whether or not a server is ever heard.
+class RobotAgent {
+ public:
+  /// `config.policy.name` must be a known policy (checked: throws on our own mistake; validate user input before).
+  RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng);
+  ~RobotAgent();
+  RobotAgent(RobotAgent&&) noexcept;
+  RobotAgent& operator=(RobotAgent&&) noexcept;
+
+  /// Raw odometry, see SubmapBuilder::add_odometry; a bad sample is refused and nothing changes.
+  Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
+  Status add_scan(const Scan& scan);
+  /// Ends the run: the last, shorter submap becomes an outgoing message.
+  void finish();
+  /// Submaps ready to be sent, oldest first; taken once.
+  std::vector<SubmapMessage> take_outgoing();
+
+  /// Compares the server's graph with the own one and adds the constraints it takes. An older revision than the newest
+  /// seen changes nothing (synchronised = 0). `budget` limits policies that need one.
+  UpdateSummary receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget = std::nullopt,
+                        const StageObserver& stage_ended = {});
+
+  [[nodiscard]] RobotId robot() const { return robot_; }
+  [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
+  [[nodiscard]] const consistency::Ledger& ledger() const { return ledger_; }
+  [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - (last_odometry_ ? 1 : 0); }
+  /// T_map_body at the keyframes; `map` starts where `odom` does.
+  [[nodiscard]] Trajectory corrected() const;
+  [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return whereabouts_; }
+
+ private:
+  void send(Submap submap);
+  [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
+  void optimise();
+  void locate_others(const ProxyGraph& graph, std::span<const consistency::NodePair> pairs);
+
+  RobotId robot_;
+  std::uint64_t session_;
+  AgentConfig config_;
+  Rng rng_;
+  SubmapBuilder submaps_;
+  estimation::OnboardSmoother smoother_;
+  std::unique_ptr<consistency::ConstraintPolicy> policy_;
+  consistency::Ledger ledger_;
+  std::vector<Keyframe> keyframes_;
+  std::vector<std::size_t> chain_index_;  // of each keyframe in the odometry chain
+  std::vector<std::uint32_t> submap_of_;  // of each keyframe: the submap it was first in
+  std::optional<Pose3> last_odometry_;
+  std::vector<SubmapMessage> outgoing_;
+  std::uint64_t sequence_ = 0;
+  std::uint64_t revision_ = 0;
+  std::vector<Whereabouts> whereabouts_;
+};
+
+}  // namespace tutti::robot

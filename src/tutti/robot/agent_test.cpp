@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/robot/agent.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tutti/evaluation/agreement.hpp"
+#include "tutti/geometry/alignment.hpp"
+
+namespace tutti::robot {
+namespace {
+
+const Matrix6d kStepCovariance = Vector6d(1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-4).asDiagonal();
+
+Timestamp at(int sample) { return Timestamp{1'700'000'000'000'000'000LL} + 0.5 * sample; }
+
+/// A loop of 40 m radius, half a metre a sample.
+Pose3 true_pose(int sample) {
+  const double angle = 0.0125 * sample;
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle + std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
+          {40.0 * std::cos(angle), 40.0 * std::sin(angle), 0.0}};
+}
+
+/// Odometry that turns 0.1 degrees too much per step.
+Trajectory drifting_odometry(int samples) {
+  const Pose3 bend{Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ())), {}};
+  Trajectory out{{at(0), {}}};
+  for (int i = 1; i < samples; ++i)
+    out.push_back({at(i), out.back().pose * (true_pose(i - 1).inverse() * true_pose(i)) * bend});
+  return out;
+}
+
+void feed(RobotAgent& agent, const Trajectory& odometry) {
+  for (const StampedPose& sample : odometry)
+    ASSERT_TRUE(agent.add_odometry(sample.stamp, sample.pose, kStepCovariance).has_value());
+}
+
+/// The server's view of what the agent uploaded: the truth, in a frame of its own, and another robot.
+ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revision, const Pose3& T_world_true) {
+  ProxyGraphMessage message;
+  message.graph.revision = revision;
+  Matrix6d covariance = Matrix6d::Identity() * 1e-6;
+  for (const Keyframe& k : agent.keyframes()) {
+    if (!k.representative) continue;
+    const int sample = static_cast<int>(std::lround((k.stamp - at(0)) / 0.5));
+    message.graph.nodes.push_back({.robot = agent.robot(),
+                                   .stamp = k.stamp,
+                                   .T_world_body = T_world_true * true_pose(sample),
+                                   .covariance = message.graph.nodes.empty() ? Matrix6d::Zero() : covariance,
+                                   .support = 5});
+  }
+  message.graph.nodes.push_back({.robot = RobotId{9}, .stamp = at(3), .T_world_body = T_world_true * true_pose(7)});
+  message.graph.components = {{agent.robot(), 0}, {RobotId{9}, 0}};
+  return message;
+}
+
+const Pose3 kWorld{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized())), {100, -50, 7}};
+
+class AgentPolicies : public testing::TestWithParam<const char*> {};
+
+TEST_P(AgentPolicies, CorrectsTheRobotFromAnUnrelatedFrame) {
+  AgentConfig config;
+  config.policy.name = GetParam();
+  RobotAgent agent(RobotId{1}, 1, config, Rng(1));
+  feed(agent, drifting_odometry(240));
+  Trajectory truth;
+  for (const Keyframe& k : agent.keyframes())
+    truth.push_back({k.stamp, true_pose(static_cast<int>(std::lround((k.stamp - at(0)) / 0.5)))});
+  const double before = evaluation::agreement(agent.corrected(), truth)->rmse_m;
+  ASSERT_GT(before, 1.0);
+  UpdateSummary summary;
+  for (std::uint64_t revision = 1; revision <= 10; ++revision)
+    summary = agent.receive(broadcast(agent, revision, kWorld), 40);
+  EXPECT_GT(summary.synchronised, 90U);
+  EXPECT_GT(summary.constraints, 0U);
+  EXPECT_LT(evaluation::agreement(agent.corrected(), truth)->rmse_m, 0.1 * before);
+  EXPECT_LT(local(agent.keyframes().front().T_odom_body, agent.corrected().front().pose).norm(), 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, AgentPolicies,
+                         testing::Values("spectral", "every_node", "every_node_2", "uniform", "random", "euclidean"));
+
+TEST(Agent, KnowsWhereTheOthersAre) {
+  AgentConfig config;
+  config.policy.name = "every_node";
+  RobotAgent agent(RobotId{1}, 1, config, Rng(1));
+  feed(agent, drifting_odometry(240));
+  agent.receive(broadcast(agent, 1, kWorld));
+  ASSERT_EQ(agent.whereabouts().size(), 1U);
+  const Whereabouts& other = agent.whereabouts().front();
+  EXPECT_EQ(other.robot, RobotId{9});
+  const Pose3 expected = true_pose(0).inverse() * true_pose(7);  // the map starts at the first pose
+  EXPECT_LT((other.T_map_body.translation - expected.translation).norm(), 0.2);
+}
+
+TEST(Agent, RobotsOfAnotherComponentAreNowhere) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  feed(agent, drifting_odometry(60));
+  ProxyGraphMessage message = broadcast(agent, 1, kWorld);
+  message.graph.components[1].component = 1;
+  agent.receive(message);
+  EXPECT_TRUE(agent.whereabouts().empty());
+}
+
+TEST(Agent, AnOlderBroadcastChangesNothing) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  feed(agent, drifting_odometry(240));
+  agent.receive(broadcast(agent, 5, kWorld));
+  const Trajectory corrected = agent.corrected();
+  const auto ledger = agent.ledger();
+  ProxyGraphMessage old = broadcast(agent, 4, kWorld);
+  for (ProxyNode& node : old.graph.nodes) node.T_world_body.translation *= 1.5;
+  EXPECT_EQ(agent.receive(old).synchronised, 0U);
+  EXPECT_EQ(agent.receive(broadcast(agent, 5, kWorld)).synchronised, 0U);  // a duplicate
+  EXPECT_EQ(agent.corrected(), corrected);
+  EXPECT_EQ(agent.ledger(), ledger);
+}
+
+TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {
+  AgentConfig config;
+  config.policy.name = "every_node";
+  RobotAgent alone(RobotId{1}, 1, config, Rng(1));
+  RobotAgent corrected(RobotId{1}, 1, config, Rng(1));
+  const Trajectory odometry = drifting_odometry(240);
+  for (const StampedPose& sample : odometry) {
+    ASSERT_TRUE(alone.add_odometry(sample.stamp, sample.pose, kStepCovariance).has_value());
+    ASSERT_TRUE(corrected.add_odometry(sample.stamp, sample.pose, kStepCovariance).has_value());
+    if (sample.stamp == at(100)) corrected.receive(broadcast(corrected, 1, kWorld));
+  }
+  alone.finish();
+  corrected.finish();
+  const auto a = alone.take_outgoing();
+  const auto b = corrected.take_outgoing();
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_GT(a.size(), 5U);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].header, b[i].header);
+    EXPECT_EQ(a[i].header.sequence, i);
+    EXPECT_EQ(a[i].submap.keyframes, b[i].submap.keyframes);
+    EXPECT_EQ(a[i].submap.odometry, b[i].submap.odometry);
+  }
+  EXPECT_EQ(alone.corrected().size(), alone.keyframes().size());
+  EXPECT_EQ(alone.odometry_factors(), 239U);
+}
+
+TEST(Agent, AnEmptyAgentTakesABroadcast) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  ProxyGraphMessage message;
+  message.graph.revision = 1;
+  message.graph.nodes.push_back({.robot = RobotId{1}, .stamp = at(0)});
+  EXPECT_EQ(agent.receive(message).synchronised, 0U);
+  EXPECT_TRUE(agent.corrected().empty());
+  EXPECT_EQ(agent.odometry_factors(), 0U);
+}
+
+}  // namespace
+}  // namespace tutti::robot

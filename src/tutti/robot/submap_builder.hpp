@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/model/submap.hpp"
+#include "tutti/perception/lidar/voxel_filter.hpp"
+
+namespace tutti::robot {
+
+struct SubmapConfig {
+  double duration_s = 10.0;                ///< A submap is closed at the first keyframe this long after its start.
+  double keyframe_distance_m = 0.3;        ///< A keyframe after this much travel,
+  double keyframe_angle_deg = 15.0;        ///< or this much rotation,
+  double keyframe_time_s = 1.0;            ///< or this much time, whichever comes first.
+  double representative_distance_m = 1.0;  ///< Travel between representative keyframes.
+  double voxel_m = 0.3;                    ///< Edge of the voxels a submap cloud is reduced to.
+  double min_range_m = 0.5;                ///< Scan points nearer than this are the robot itself.
+  double max_range_m = 60.0;               ///< Scan points farther than this are not used.
+  template <class V>
+  void describe(V& v) {
+    v.field("duration_s", duration_s, greater_than(0.0), "Length of a submap.");
+    v.field("keyframe_distance_m", keyframe_distance_m, greater_than(0.0), "Travel that makes a keyframe.");
+    v.field("keyframe_angle_deg", keyframe_angle_deg, greater_than(0.0), "Rotation that makes a keyframe.");
+    v.field("keyframe_time_s", keyframe_time_s, greater_than(0.0), "Time that makes a keyframe.");
+    v.field("representative_distance_m", representative_distance_m, greater_than(0.0),
+            "Travel between representative keyframes, which become proxy nodes.");
+    v.field("voxel_m", voxel_m, greater_than(0.0), "Voxel edge of a submap cloud.");
+    v.field("min_range_m", min_range_m, at_least(0.0), "Nearer scan points are dropped.");
+    v.field("max_range_m", max_range_m, greater_than(0.0), "Farther scan points are dropped.");
+  }
+};
+
+/// Turns raw odometry and scans into keyframes and overlapping submaps. Only raw odometry goes in, so a submap never
+/// carries what the server said before.
+class SubmapBuilder {
+ public:
+  SubmapBuilder(RobotId robot, const SubmapConfig& config);
+
+  /// Raw pose with the covariance of the increment since the previous one (ignored for the first). Stamps must
+  /// increase; poses must be finite with unit quaternions: otherwise an error, and nothing changes. Returns the
+  /// keyframe this sample became, if it did.
+  Result<std::optional<Keyframe>> add_odometry(Timestamp stamp, const Pose3& T_odom_body,
+                                               const Matrix6d& increment_covariance);
+  /// A scan taken at the latest odometry sample's stamp; points in the body frame.
+  Status add_scan(const Scan& scan);
+
+  /// The submap that the last keyframe completed, once.
+  std::optional<Submap> take_submap();
+  /// Closes the last, shorter submap; nothing when no keyframe was added since the previous one.
+  std::optional<Submap> finish();
+
+  [[nodiscard]] std::uint32_t current_submap() const { return next_submap_; }
+
+ private:
+  void start_submap(const Keyframe& first);
+  [[nodiscard]] bool is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const;
+  Submap close_submap();
+
+  RobotId robot_;
+  SubmapConfig config_;
+  std::uint32_t next_submap_ = 0;
+  std::vector<Keyframe> keyframes_;     // of the open submap
+  std::vector<RelativePose> odometry_;  // between them
+  std::vector<lidar::PosedCloud> scans_;
+  std::optional<Submap> finished_;
+  RelativePose since_keyframe_{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  std::optional<Pose3> last_pose_;
+  Timestamp last_stamp_;
+  double distance_ = 0.0;                 // travelled so far
+  double representative_distance_ = 0.0;  // at the last representative keyframe
+};
+
+}  // namespace tutti::robot

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/robot/submap_builder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace tutti::robot {
+namespace {
+
+const Matrix6d kStepCovariance = Matrix6d::Identity() * 1e-4;
+
+Timestamp at(double seconds) { return Timestamp{1'700'000'000'000'000'000LL} + seconds; }
+Pose3 ahead(double metres) { return {Eigen::Quaterniond::Identity(), {metres, 0.0, 0.0}}; }
+
+/// Straight ahead at 0.5 m/s for `seconds`, ten samples a second.
+std::vector<Submap> drive(SubmapBuilder& builder, double seconds, bool with_scans = false) {
+  std::vector<Submap> out;
+  auto cloud = std::make_shared<PointCloud>();
+  for (int i = 0; i < 50; ++i) cloud->points.emplace_back(5.0F, 0.5F * static_cast<float>(i), 1.0F);
+  for (int i = 0; i <= static_cast<int>(std::lround(seconds * 10)); ++i) {
+    const double t = 0.1 * i;
+    EXPECT_TRUE(builder.add_odometry(at(t), ahead(0.5 * t), kStepCovariance).has_value());
+    if (with_scans) {
+      EXPECT_TRUE(builder.add_scan({at(t), cloud}).has_value());
+    }
+    if (auto submap = builder.take_submap()) out.push_back(std::move(*submap));
+  }
+  if (auto last = builder.finish()) out.push_back(std::move(*last));
+  return out;
+}
+
+TEST(SubmapBuilder, SubmapsOverlapByOneKeyframe) {
+  SubmapBuilder builder(RobotId{3}, {});
+  const std::vector<Submap> submaps = drive(builder, 34.0);
+  ASSERT_EQ(submaps.size(), 4U);  // three of 10 s and the rest
+  for (std::size_t i = 0; i < submaps.size(); ++i) {
+    EXPECT_EQ(submaps[i].id, (SubmapId{RobotId{3}, static_cast<std::uint32_t>(i)}));
+    ASSERT_EQ(submaps[i].odometry.size() + 1, submaps[i].keyframes.size());
+    if (i > 0) {
+      EXPECT_EQ(submaps[i].keyframes.front(), submaps[i - 1].keyframes.back());
+    }
+    if (i < 3) {
+      EXPECT_NEAR(submaps[i].keyframes.back().stamp - submaps[i].keyframes.front().stamp, 10.0, 1.0);
+    }
+  }
+}
+
+TEST(SubmapBuilder, OdometryFactorsAreTheRawMotionWithItsCompoundedCovariance) {
+  SubmapBuilder builder(RobotId{0}, {.keyframe_distance_m = 0.5, .keyframe_time_s = 100.0});
+  const std::vector<Submap> submaps = drive(builder, 12.0);
+  ASSERT_FALSE(submaps.empty());
+  for (const Submap& submap : submaps)
+    for (std::size_t k = 0; k < submap.odometry.size(); ++k) {
+      const Pose3 step = submap.keyframes[k].T_odom_body.inverse() * submap.keyframes[k + 1].T_odom_body;
+      EXPECT_LT(local(step, submap.odometry[k].T_a_b).norm(), 1e-9);
+      // Ten steps of 5 cm: rotations add up, translations get the levers' share on top.
+      EXPECT_NEAR(submap.odometry[k].covariance(5, 5), 10 * 1e-4, 1e-9);
+      EXPECT_GT(submap.odometry[k].covariance(1, 1), 10 * 1e-4);
+    }
+}
+
+TEST(SubmapBuilder, RepresentativeKeyframesComeAboutEveryMetre) {
+  SubmapBuilder builder(RobotId{0}, {});
+  std::vector<double> positions;
+  for (const Submap& submap : drive(builder, 60.0))
+    for (std::size_t k = submap.id.index == 0 ? 0 : 1; k < submap.keyframes.size(); ++k)
+      if (submap.keyframes[k].representative) positions.push_back(submap.keyframes[k].T_odom_body.translation.x());
+  ASSERT_GT(positions.size(), 20U);  // 30 m
+  EXPECT_EQ(positions.front(), 0.0);
+  for (std::size_t i = 1; i < positions.size(); ++i) EXPECT_NEAR(positions[i] - positions[i - 1], 1.2, 0.25);
+}
+
+TEST(SubmapBuilder, CloudIsInTheSubmapFrame) {
+  SubmapBuilder builder(RobotId{0}, {});
+  const std::vector<Submap> submaps = drive(builder, 20.0, true);
+  ASSERT_EQ(submaps.size(), 2U);
+  for (const Submap& submap : submaps) {
+    ASSERT_TRUE(submap.cloud);
+    float low = 1e9F;
+    float high = -1e9F;
+    for (const Eigen::Vector3f& p : submap.cloud->points) {
+      low = std::min(low, p.x());
+      high = std::max(high, p.x());
+    }
+    EXPECT_NEAR(low, 5.0F, 0.2F);          // from the first keyframe
+    EXPECT_NEAR(high, 5.0F + 5.0F, 0.5F);  // and on, 5 m later, to a voxel
+  }
+}
+
+TEST(SubmapBuilder, BadInputIsRefusedAndChangesNothing) {
+  SubmapBuilder builder(RobotId{0}, {});
+  const auto message = [](const auto& result) { return result.has_value() ? std::string() : result.error().message; };
+  EXPECT_NE(message(builder.add_scan({at(0), nullptr})).find("no odometry"), std::string::npos);
+  ASSERT_TRUE(builder.add_odometry(at(0), ahead(0), kStepCovariance).has_value());
+  EXPECT_NE(message(builder.add_odometry(at(0), ahead(1), kStepCovariance)).find("does not follow"), std::string::npos);
+  EXPECT_NE(message(builder.add_odometry(at(-1), ahead(1), kStepCovariance)).find("does not follow"),
+            std::string::npos);
+  Pose3 nan = ahead(1);
+  nan.translation.y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(builder.add_odometry(at(1), nan, kStepCovariance).has_value());
+  Pose3 long_quaternion = ahead(1);
+  long_quaternion.rotation.coeffs() *= 1.1;
+  EXPECT_NE(message(builder.add_odometry(at(1), long_quaternion, kStepCovariance)).find("1.1"), std::string::npos);
+  EXPECT_FALSE(builder.add_odometry(at(1), ahead(1), -kStepCovariance).has_value());
+  EXPECT_NE(message(builder.add_scan({at(0), std::make_shared<PointCloud>()})).find("empty"), std::string::npos);
+  EXPECT_NE(message(builder.add_scan({at(5), std::make_shared<PointCloud>()})).find("no odometry"), std::string::npos);
+  ASSERT_TRUE(builder.add_odometry(at(1), ahead(1), kStepCovariance).has_value());
+  const auto last = builder.finish();
+  ASSERT_TRUE(last.has_value());
+  EXPECT_EQ(last->keyframes.size(), 2U);
+}
+
+}  // namespace
+}  // namespace tutti::robot
