@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "eval_command.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "tutti/evaluation/ate.hpp"
+#include "tutti/evaluation/rpe.hpp"
+#include "tutti/formats/trajectory_file.hpp"
+
+namespace tutti::app {
+namespace {
+
+using formats::TrajectoryFormat;
+
+const std::map<std::string, TrajectoryFormat> kFormats = {{"auto", TrajectoryFormat::automatic},
+                                                          {"tum", TrajectoryFormat::tum},
+                                                          {"euroc", TrajectoryFormat::euroc},
+                                                          {"kitti", TrajectoryFormat::kitti}};
+
+struct Options {
+  std::string estimate_path;
+  std::string reference_path;
+  std::string format = "auto";
+  double kitti_rate_hz = 10.0;
+  std::optional<double> max_difference_s;  // set: nearest stamp instead of interpolation
+  double max_gap_s = evaluation::AssociationConfig{}.max_gap_s;
+  double rpe_time_s = 1.0;
+  double rpe_distance_m = 10.0;
+  bool json = false;
+};
+
+struct Report {
+  Trajectory estimate;
+  Trajectory reference;
+  evaluation::AteResult ate;
+  std::optional<evaluation::RpeResult> rpe_time;
+  std::optional<evaluation::RpeResult> rpe_distance;
+};
+
+double duration_s(const Trajectory& trajectory) { return trajectory.back().stamp - trajectory.front().stamp; }
+double seconds(Timestamp stamp) { return static_cast<double>(stamp.ns) * 1e-9; }
+
+Result<Trajectory> load(const std::string& path, const Options& options) {
+  auto trajectory = formats::read_trajectory(path, kFormats.at(options.format), options.kitti_rate_hz);
+  if (trajectory && trajectory->empty())
+    return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
+  return trajectory;
+}
+
+Result<Report> evaluate(const Options& options) {
+  auto estimate = load(options.estimate_path, options);
+  if (!estimate) return tl::unexpected(estimate.error());
+  auto reference = load(options.reference_path, options);
+  if (!reference) return tl::unexpected(reference.error());
+
+  const evaluation::AssociationConfig config = {.interpolate = !options.max_difference_s,
+                                                .max_gap_s = options.max_gap_s,
+                                                .max_difference_s = options.max_difference_s.value_or(0.0)};
+  const auto pairs = evaluation::associate(*estimate, *reference, config);
+  const auto ate = evaluation::ate(pairs);
+  if (!ate)
+    return fail(
+        ErrorCode::invalid,
+        "no pose of {} has a reference: its stamps are {:.3f} to {:.3f} s, those of {} {:.3f} to {:.3f} s; expected "
+        "overlapping times (--max-gap and --max-difference say how close)",
+        options.estimate_path, seconds(estimate->front().stamp), seconds(estimate->back().stamp),
+        options.reference_path, seconds(reference->front().stamp), seconds(reference->back().stamp));
+  auto rpe_time = evaluation::rpe_over_time(pairs, options.rpe_time_s);
+  auto rpe_distance = evaluation::rpe_over_distance(pairs, options.rpe_distance_m);
+  return Report{std::move(*estimate), std::move(*reference), *ate, rpe_time, rpe_distance};
+}
+
+std::string rpe_line(const std::optional<evaluation::RpeResult>& rpe) {
+  if (!rpe) return "no two poses are that far apart";
+  return fmt::format("{:.4f} m   {:.4f} deg   rmse of {} intervals", rpe->rmse_m, rpe->rmse_deg, rpe->count);
+}
+
+void print_table(const Options& options, const Report& report) {
+  const auto& ate = report.ate;
+  const auto file_line = [](const char* what, const std::string& path, const Trajectory& trajectory) {
+    fmt::print("{:<12} {}: {} poses in {:.1f} s\n", what, path, trajectory.size(), duration_s(trajectory));
+  };
+  file_line("estimate", options.estimate_path, report.estimate);
+  file_line("reference", options.reference_path, report.reference);
+  fmt::print("{:<12} {} of {} estimate poses, {}\n", "paired", ate.pairs, report.estimate.size(),
+             options.max_difference_s
+                 ? fmt::format("with the nearest reference stamp within {} s", *options.max_difference_s)
+                 : fmt::format("reference interpolated across gaps of up to {} s", options.max_gap_s));
+  fmt::print("{:<12} one rigid transform SE(3), no scale, least squares of positions\n\n", "aligned");
+  fmt::print("{:<20} {:>10} {:>10} {:>10} {:>10}\n", "ATE", "rmse", "mean", "median", "max");
+  fmt::print("{:<20} {:>10.4f} {:>10.4f} {:>10.4f} {:>10.4f}\n", "  position [m]", ate.rmse_m, ate.mean_m, ate.median_m,
+             ate.max_m);
+  fmt::print("{:<20} {:>10.4f}\n", "  rotation [deg]", ate.rmse_deg);
+  fmt::print("{:<20} {}\n", fmt::format("RPE over {} s", options.rpe_time_s), rpe_line(report.rpe_time));
+  fmt::print("{:<20} {}\n", fmt::format("RPE over {} m", options.rpe_distance_m), rpe_line(report.rpe_distance));
+}
+
+nlohmann::ordered_json rpe_json(const char* interval_key, double interval,
+                                const std::optional<evaluation::RpeResult>& rpe) {
+  if (!rpe) return nullptr;
+  return {{interval_key, interval}, {"count", rpe->count}, {"rmse_m", rpe->rmse_m}, {"rmse_deg", rpe->rmse_deg}};
+}
+
+void print_json(const Options& options, const Report& report) {
+  using Json = nlohmann::ordered_json;
+  const auto& ate = report.ate;
+  const auto& t = ate.T_reference_estimate.translation;
+  const auto& q = ate.T_reference_estimate.rotation;
+  Json association;
+  if (options.max_difference_s)
+    association = {{"method", "nearest"}, {"max_difference_s", *options.max_difference_s}};
+  else
+    association = {{"method", "interpolate"}, {"max_gap_s", options.max_gap_s}};
+  association["pairs"] = ate.pairs;
+  const Json out = {{"estimate", {{"path", options.estimate_path}, {"poses", report.estimate.size()}}},
+                    {"reference", {{"path", options.reference_path}, {"poses", report.reference.size()}}},
+                    {"association", association},
+                    {"alignment", "SE3"},
+                    {"ate",
+                     {{"rmse_m", ate.rmse_m},
+                      {"mean_m", ate.mean_m},
+                      {"median_m", ate.median_m},
+                      {"max_m", ate.max_m},
+                      {"rmse_deg", ate.rmse_deg},
+                      {"T_reference_estimate",
+                       {{"translation_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}}},
+                    {"rpe_time", rpe_json("interval_s", options.rpe_time_s, report.rpe_time)},
+                    {"rpe_distance", rpe_json("interval_m", options.rpe_distance_m, report.rpe_distance)}};
+  // Paths may hold any bytes: replaced where they are not UTF-8.
+  fmt::print("{}\n", out.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+int run(const Options& options) {
+  const auto report = evaluate(options);
+  if (!report) {
+    fmt::print(stderr, "tutti eval: {}\n", report.error().message);
+    return 1;
+  }
+  if (options.json)
+    print_json(options, *report);
+  else
+    print_table(options, *report);
+  return 0;
+}
+
+/// CLI11's own PositiveNumber and NonNegativeNumber let NaN through.
+CLI::Validator finite(bool zero_too) {
+  return {[zero_too](const std::string& input) {
+            double value = 0.0;
+            const bool is_finite = CLI::detail::lexical_cast(input, value) && std::isfinite(value);
+            if (is_finite && (value > 0.0 || (zero_too && value == 0.0))) return std::string();
+            return fmt::format("is '{}', expected a finite number {} 0", input, zero_too ? ">=" : ">");
+          },
+          ""};
+}
+
+}  // namespace
+
+void add_eval_command(CLI::App& app, int& exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("eval", "Error of a trajectory against a reference: ATE and RPE");
+  command->footer(
+      "ATE, absolute trajectory error: distance between the two after the one rigid transform of EST (rotation and\n"
+      "translation, no scale) that brings their positions closest together. Says how true the trajectory is as a "
+      "whole.\n"
+      "RPE, relative pose error: error of the motion over a fixed time or a fixed distance travelled, from every pose\n"
+      "on. Says how fast EST drifts; needs no alignment.\n\n"
+      "Both files hold poses of the same body, as TUM, EuRoC csv or KITTI. Errors are in metres and degrees.\n"
+      "Exit code 0; 1 when a file is bad or no poses can be paired; 2 on wrong usage.");
+  command->add_option("EST", options->estimate_path, "Trajectory to judge")->required()->type_name("FILE");
+  command->add_option("REF", options->reference_path, "Ground truth, or the best there is")
+      ->required()
+      ->type_name("FILE");
+  command
+      ->add_option("--max-difference", options->max_difference_s,
+                   "Pair each pose with the reference pose nearest in time, at most this far away, instead of\n"
+                   "interpolating the reference")
+      ->check(finite(true))
+      ->type_name("SECONDS");
+  command
+      ->add_option("--max-gap", options->max_gap_s, "Interpolate only between reference poses at most this far apart")
+      ->check(finite(true))
+      ->capture_default_str()
+      ->type_name("SECONDS");
+  command->add_option("--rpe-time", options->rpe_time_s, "Interval of the RPE over time")
+      ->check(finite(false))
+      ->capture_default_str()
+      ->type_name("SECONDS");
+  command->add_option("--rpe-distance", options->rpe_distance_m, "Interval of the RPE over distance")
+      ->check(finite(false))
+      ->capture_default_str()
+      ->type_name("METRES");
+  command->add_option("--format", options->format, "Format of both files; auto looks at each file's first row")
+      ->check(CLI::IsMember({"auto", "tum", "euroc", "kitti"}))
+      ->capture_default_str()
+      ->type_name("");
+  command->add_option("--kitti-rate", options->kitti_rate_hz, "Poses a second in KITTI files, which hold no stamps")
+      ->check(finite(false))
+      ->capture_default_str()
+      ->type_name("HZ");
+  command->add_flag("--json", options->json, "Print JSON instead of the table");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace tutti::app
