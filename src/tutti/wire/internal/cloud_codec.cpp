@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -67,12 +68,16 @@ Cell to_cell(const Eigen::Vector3f& point, const CloudCodec& codec) {
   return cell;
 }
 
-Eigen::Vector3f to_point(const Cell& cell, const CloudCodec& codec) {
+/// Nothing beyond kMaxCloudRange_m. (A cell at the border may have its centre outside; the point then is on the
+/// border.)
+std::optional<Eigen::Vector3f> to_point(const Cell& cell, const CloudCodec& codec) {
   Eigen::Vector3f point;
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto voxel = static_cast<std::int64_t>(gather_bits(cell.voxel >> axis)) - kMaxCells;
     const std::int64_t number = voxel * (std::int64_t{1} << codec.offset_bits) + cell.offset[axis];
-    point(axis) = static_cast<float>((static_cast<double>(number) + 0.5) * cell_size_m(codec));
+    const double centre = (static_cast<double>(number) + 0.5) * cell_size_m(codec);
+    if (std::abs(centre) > kMaxCloudRange_m + cell_size_m(codec)) return std::nullopt;
+    point(axis) = static_cast<float>(std::clamp(centre, -kMaxCloudRange_m, kMaxCloudRange_m));
   }
   return point;
 }
@@ -126,7 +131,9 @@ Result<std::shared_ptr<const PointCloud>> decode_cloud(const v1::Cloud& in) {
         return fail(ErrorCode::invalid, "cloud: point {}: offset {} has more than {} bits", i, cell.offset[axis],
                     in.offset_bits());
     }
-    cloud->points.push_back(to_point(cell, codec));
+    const std::optional<Eigen::Vector3f> point = to_point(cell, codec);
+    if (!point) return fail(ErrorCode::invalid, "cloud: point {} is not within {} m", i, kMaxCloudRange_m);
+    cloud->points.push_back(*point);
   }
   return cloud;
 }

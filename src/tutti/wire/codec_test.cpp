@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/wire/codec.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "tutti/wire/limits.hpp"
+#include "tutti/wire/test_messages.hpp"
+
+namespace tutti::wire {
+namespace {
+
+Rng any_rng() { return Rng(*rc::gen::arbitrary<std::uint32_t>()); }
+
+bool same_submap(const SubmapMessage& a, const SubmapMessage& b) {
+  const bool clouds = (a.submap.cloud == nullptr) == (b.submap.cloud == nullptr) &&
+                      (a.submap.cloud == nullptr || *a.submap.cloud == *b.submap.cloud);
+  return a.header == b.header && a.submap.id == b.submap.id && a.submap.keyframes == b.submap.keyframes &&
+         a.submap.odometry == b.submap.odometry && clouds;
+}
+
+bool near(const Pose3& a, const Pose3& b, double max_m, double max_rad) {
+  const Vector6d error = local(a, b);
+  return error.head<3>().norm() <= max_m && error.tail<3>().norm() <= max_rad;
+}
+
+RC_GTEST_PROP(SubmapCodec, RoundTrip, ()) {
+  Rng rng = any_rng();
+  SubmapMessage message =
+      test::any_submap(rng, *rc::gen::inRange<std::size_t>(1, 20), *rc::gen::inRange<std::size_t>(0, 200));
+  const bool own_odometry = *rc::gen::arbitrary<bool>();
+  if (own_odometry)
+    for (RelativePose& odometry : message.submap.odometry) odometry.T_a_b = test::any_pose(rng, 1.0, 0.5);
+
+  const auto decoded = decode_submap(encode(message));
+  RC_ASSERT(decoded.has_value());
+  const Submap& in = message.submap;
+  const Submap& out = decoded->submap;
+  RC_ASSERT(decoded->header == message.header);
+  RC_ASSERT(out.id == in.id);
+  RC_ASSERT(out.keyframes.size() == in.keyframes.size());
+  RC_ASSERT(out.odometry.size() == in.odometry.size());
+  for (std::size_t k = 0; k < in.keyframes.size(); ++k) {
+    RC_ASSERT(out.keyframes[k].index == in.keyframes[k].index);
+    RC_ASSERT(out.keyframes[k].stamp == in.keyframes[k].stamp);
+    RC_ASSERT(out.keyframes[k].representative == in.keyframes[k].representative);
+    RC_ASSERT(near(in.keyframes[k].T_odom_body, out.keyframes[k].T_odom_body, 1e-5, 1e-6));
+  }
+  for (std::size_t k = 0; k < in.odometry.size(); ++k)
+    RC_ASSERT(near(in.odometry[k].T_a_b, out.odometry[k].T_a_b, 2.5e-5, 2e-6));
+
+  const auto again = decode_submap(encode(*decoded));
+  RC_ASSERT(again.has_value());
+  RC_ASSERT(same_submap(*again, *decoded));
+}
+
+RC_GTEST_PROP(SubmapCodec, CloudKeepsEveryPointWithinItsError, ()) {
+  Rng rng = any_rng();
+  const CloudCodec codec{.voxel_m = *rc::gen::element(0.1, 0.3, 1.0), .offset_bits = *rc::gen::inRange(0, 7)};
+  SubmapMessage message = test::any_submap(rng, 1, *rc::gen::inRange<std::size_t>(1, 60));
+  auto cloud = std::make_shared<PointCloud>(*message.submap.cloud);
+  const auto range = static_cast<float>(kMaxCloudRange_m);
+  cloud->points.emplace_back(range, -range, 0.0F);
+  cloud->points.push_back(cloud->points.front());  // two points in one cell
+  message.submap.cloud = cloud;
+  const auto decoded = decode_submap(encode(message, codec));
+  RC_ASSERT(decoded.has_value());
+  std::vector<Eigen::Vector3f> left = decoded->submap.cloud->points;
+  RC_ASSERT(left.size() == cloud->points.size());
+  const double error = 0.5 * codec.voxel_m / (1 << codec.offset_bits);
+  for (const Eigen::Vector3f& point : cloud->points) {
+    const auto partner = std::ranges::find_if(left, [&](const Eigen::Vector3f& other) {
+      return (other - point).cwiseAbs().maxCoeff() <= error + 2e-4;  // 2e-4: a float at 1500 m
+    });
+    RC_ASSERT(partner != left.end());
+    left.erase(partner);
+  }
+  RC_ASSERT(*decode_submap(encode(*decoded, codec))->submap.cloud == *decoded->submap.cloud);
+}
+
+TEST(SubmapCodec, DefaultCloudErrorIsBelowACentimetre) {
+  Rng rng(3);
+  SubmapMessage message = test::any_submap(rng, 1, 1);
+  for (int i = 0; i < 500; ++i) {
+    auto cloud = std::make_shared<PointCloud>();
+    cloud->points.emplace_back(rng.uniform(-80, 80), rng.uniform(-80, 80), rng.uniform(-80, 80));
+    message.submap.cloud = cloud;
+    EXPECT_LT((decode_submap(encode(message))->submap.cloud->points[0] - cloud->points[0]).norm(), 0.0083F);
+  }
+}
+
+TEST(SubmapCodec, EmptyCloudComesBackAsNone) {
+  Rng rng(4);
+  SubmapMessage message = test::any_submap(rng, 3, 0);
+  message.submap.cloud = std::make_shared<PointCloud>();
+  EXPECT_EQ(decode_submap(encode(message))->submap.cloud, nullptr);
+}
+
+RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
+  Rng rng = any_rng();
+  const ProxyGraphMessage message = test::any_proxy_graph(
+      rng, *rc::gen::inRange<std::size_t>(0, 4), *rc::gen::inRange<std::size_t>(1, 40), *rc::gen::arbitrary<bool>());
+  const auto decoded = decode_proxy_graph(encode(message));
+  RC_ASSERT(decoded.has_value());
+  const ProxyGraph& in = message.graph;
+  const ProxyGraph& out = decoded->graph;
+  RC_ASSERT(decoded->header == message.header);
+  RC_ASSERT(out.revision == in.revision);
+  RC_ASSERT(out.radius_m == in.radius_m);
+  RC_ASSERT(out.sigma_m == in.sigma_m);
+  RC_ASSERT(out.reduced == in.reduced);
+  RC_ASSERT(out.components == in.components);
+  RC_ASSERT(out.eliminated == in.eliminated);
+  RC_ASSERT(out.nodes.size() == in.nodes.size());
+  RC_ASSERT(out.edges.size() == in.edges.size());
+  for (std::size_t i = 0; i < in.nodes.size(); ++i) {
+    RC_ASSERT(out.nodes[i].robot == in.nodes[i].robot);
+    RC_ASSERT(out.nodes[i].stamp == in.nodes[i].stamp);
+    RC_ASSERT(out.nodes[i].support == in.nodes[i].support);
+    RC_ASSERT(near(in.nodes[i].T_world_body, out.nodes[i].T_world_body, 5e-4, 1e-4));
+    const Matrix6d difference = out.nodes[i].covariance - in.nodes[i].covariance;
+    const Vector6d sigma = in.nodes[i].covariance.diagonal().cwiseSqrt();
+    RC_ASSERT((difference.cwiseAbs().array() <= 0.04 * (sigma * sigma.transpose()).array() + 1e-300).all());
+  }
+  for (std::size_t i = 0; i < in.edges.size(); ++i) {
+    RC_ASSERT(out.edges[i].a == in.edges[i].a);
+    RC_ASSERT(out.edges[i].b == in.edges[i].b);
+    RC_ASSERT(std::abs(out.edges[i].weight - in.edges[i].weight) <= 1e-7 * in.edges[i].weight + 1e-38);
+  }
+  const auto again = decode_proxy_graph(encode(*decoded));
+  RC_ASSERT(again.has_value());
+  RC_ASSERT(again->graph == out);
+}
+
+RC_GTEST_PROP(VerdictCodec, IsExact, ()) {
+  Rng rng = any_rng();
+  const ClosureVerdict verdict = test::any_verdict(rng, *rc::gen::inRange<std::size_t>(0, 4));
+  const auto decoded = decode_verdict(encode(verdict));
+  RC_ASSERT(decoded.has_value());
+  RC_ASSERT(*decoded == verdict);
+}
+
+TEST(Codec, BytesOnTheRadio) {
+  Rng rng(5);
+  const ProxyGraphMessage graph = test::any_proxy_graph(rng, 1, 1295, false);
+  const double per_node = static_cast<double>(encode(graph).size()) / static_cast<double>(graph.graph.nodes.size());
+  SubmapMessage submap = test::any_submap(rng, 12, 0);
+  for (RelativePose& odometry : submap.submap.odometry) odometry.covariance = test::odometry_covariance(1.0, 0.1);
+  const std::size_t without_cloud = encode(submap).size();
+  std::printf("%.1f bytes per proxy node, %zu bytes per submap of 12 keyframes without cloud\n", per_node,
+              without_cloud);
+  EXPECT_LT(per_node, 32.0);
+  EXPECT_LT(without_cloud, 700U);
+}
+
+/// One corruption of a valid message and a word its complaint must contain.
+template <class Message>
+struct Corruption {
+  const char* word;
+  void (*corrupt)(Message&);
+};
+
+template <class Message>
+void expect_refused(const Message& good, const std::vector<Corruption<Message>>& corruptions) {
+  EXPECT_TRUE(validate(good).has_value());
+  for (const auto& corruption : corruptions) {
+    Message bad = good;
+    corruption.corrupt(bad);
+    const Status status = validate(bad);
+    ASSERT_FALSE(status.has_value()) << corruption.word;
+    EXPECT_NE(status.error().message.find(corruption.word), std::string::npos) << status.error().message;
+    EXPECT_THROW(encode(bad), std::logic_error) << corruption.word;
+  }
+}
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Validate, Submap) {
+  Rng rng(6);
+  const SubmapMessage good = test::any_submap(rng, 5, 10);
+  using M = SubmapMessage;
+  expect_refused<M>(good, {{"robot", [](M& m) { m.header.robot.value += 1; }},
+                           {"no keyframes", [](M& m) { m.submap.keyframes.clear(), m.submap.odometry.clear(); }},
+                           {"one fewer", [](M& m) { m.submap.odometry.pop_back(); }},
+                           {"consecutive", [](M& m) { m.submap.keyframes[2].index += 1; }},
+                           {"not after", [](M& m) { m.submap.keyframes[2].stamp = m.submap.keyframes[1].stamp; }},
+                           {"not finite", [](M& m) { m.submap.keyframes[2].T_odom_body.translation.x() = kNan; }},
+                           {"quaternion", [](M& m) { m.submap.keyframes[2].T_odom_body.rotation.coeffs() *= 1.1; }},
+                           {"at most", [](M& m) { m.submap.keyframes[2].T_odom_body.translation.x() = 1e10; }},
+                           {"odometry to", [](M& m) { m.submap.odometry[1].T_a_b.translation.z() = kNan; }},
+                           {"covariance is not finite", [](M& m) { m.submap.odometry[1].covariance(2, 2) = kNan; }},
+                           {"symmetric", [](M& m) { m.submap.odometry[1].covariance(1, 2) += 1.0; }},
+                           {"negative variance", [](M& m) { m.submap.odometry[1].covariance(1, 1) = -1.0; }},
+                           {"semidefinite",
+                            [](M& m) {
+                              m.submap.odometry[1].covariance.setIdentity();
+                              m.submap.odometry[1].covariance(0, 1) = m.submap.odometry[1].covariance(1, 0) = 1.5;
+                            }},
+                           {"point", [](M& m) {
+                              m.submap.cloud = std::make_shared<PointCloud>(PointCloud{{Eigen::Vector3f(0, 2e3F, 0)}});
+                            }}});
+}
+
+TEST(Validate, ProxyGraph) {
+  Rng rng(7);
+  const ProxyGraphMessage good = test::any_proxy_graph(rng, 2, 10, true);
+  using M = ProxyGraphMessage;
+  expect_refused<M>(good, {{"radius", [](M& m) { m.graph.radius_m = 0.0; }},
+                           {"sigma", [](M& m) { m.graph.sigma_m = kNan; }},
+                           {"come after", [](M& m) { std::swap(m.graph.nodes[0], m.graph.nodes[1]); }},
+                           {"eliminated node", [](M& m) { m.graph.eliminated[1] = m.graph.eliminated[0]; }},
+                           {"node 3", [](M& m) { m.graph.nodes[3].covariance(0, 0) = kNan; }},
+                           {"node 3", [](M& m) { m.graph.nodes[3].T_world_body.rotation.coeffs().setZero(); }},
+                           {"two components", [](M& m) { m.graph.components[1].robot = m.graph.components[0].robot; }},
+                           {"joins nodes", [](M& m) { m.graph.edges[0].b = 1000; }},
+                           {"joins nodes", [](M& m) { m.graph.edges[0].b = m.graph.edges[0].a; }},
+                           {"joins robots",
+                            [](M& m) {
+                              m.graph.edges[0] = {0, m.graph.edges.back().b, 1.0};
+                            }},
+                           {"weight", [](M& m) { m.graph.edges[0].weight = -1.0; }},
+                           {"weight", [](M& m) { m.graph.edges[0].weight = 1e300; }},
+                           {"unreduced", [](M& m) { m.graph.reduced = false; }}});
+}
+
+TEST(Validate, Verdict) {
+  Rng rng(8);
+  const ClosureVerdict good = test::any_verdict(rng, 2);
+  using M = ClosureVerdict;
+  expect_refused<M>(good, {{"smaller", [](M& m) { m.pair.second = m.pair.first; }},
+                           {"closure from robot", [](M& m) { m.closures[1].from.robot.value = 9; }},
+                           {"not finite", [](M& m) { m.closures[1].measurement.T_a_b.translation.x() = kNan; }},
+                           {"symmetric", [](M& m) { m.closures[1].measurement.covariance(0, 1) += 1e3; }},
+                           {"reason", [](M& m) { m.reason.assign(kMaxReasonBytes + 1, '!'); }}});
+}
+
+}  // namespace
+}  // namespace tutti::wire

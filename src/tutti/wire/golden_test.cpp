@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bytes of earlier builds must stay readable. When the format changes on purpose: raise kProtocolVersion, then write
+// new files with TUTTI_WRITE_GOLDEN=1 and commit them alone.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::wire {
+namespace {
+
+std::string golden_bytes(const std::string& name, const std::string& current) {
+  const std::filesystem::path path = std::filesystem::path(TUTTI_WIRE_TESTDATA) / name;
+  if (std::getenv("TUTTI_WRITE_GOLDEN") != nullptr) std::ofstream(path, std::ios::binary) << current;
+  std::ostringstream bytes;
+  bytes << std::ifstream(path, std::ios::binary).rdbuf();
+  return bytes.str();
+}
+
+const Eigen::Quaterniond kQuarterTurn(Eigen::AngleAxisd(1.5707963267948966, Eigen::Vector3d::UnitZ()));
+
+Matrix6d diagonal(double translation, double rotation) {
+  Vector6d d;
+  d << Eigen::Vector3d::Constant(translation), Eigen::Vector3d::Constant(rotation);
+  return d.asDiagonal();
+}
+
+TEST(Golden, Submap) {
+  SubmapMessage message;
+  message.header = {RobotId{2}, 1234567890123, 17};
+  message.submap.id = {RobotId{2}, 16};
+  message.submap.keyframes = {{160, {1'577'836'980'099'104'643}, {Eigen::Quaterniond::Identity(), {1, 2, 3}}, true},
+                              {161, {1'577'836'981'199'104'651}, {kQuarterTurn, {2, 2, 3}}, false}};
+  message.submap.odometry = {{{kQuarterTurn, {1, 0, 0}}, diagonal(4e-4, 1e-4)}};
+  message.submap.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}});
+  const auto decoded = decode_submap(golden_bytes("submap_v1.bin", encode(message)));
+  ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+  const Submap& submap = decoded->submap;
+  EXPECT_EQ(decoded->header, message.header);
+  EXPECT_EQ(submap.id, message.submap.id);
+  ASSERT_EQ(submap.keyframes.size(), 2U);
+  EXPECT_EQ(submap.keyframes[1].index, 161U);
+  EXPECT_EQ(submap.keyframes[1].stamp.ns, 1'577'836'981'199'104'651);
+  EXPECT_TRUE(submap.keyframes[0].representative);
+  EXPECT_FALSE(submap.keyframes[1].representative);
+  EXPECT_LT(local(submap.keyframes[1].T_odom_body, {kQuarterTurn, {2, 2, 3}}).norm(), 1e-5);
+  EXPECT_LT(local(submap.odometry[0].T_a_b, {kQuarterTurn, {1, 0, 0}}).norm(), 1e-5);
+  EXPECT_NEAR(submap.odometry[0].covariance(0, 0), 4e-4, 4e-6);
+  EXPECT_NEAR(submap.odometry[0].covariance(5, 5), 1e-4, 1e-6);
+  ASSERT_EQ(submap.cloud->points.size(), 3U);  // along the Morton curve: z, y, x from the highest bit
+  double nearest = 1.0;
+  for (const auto& point : submap.cloud->points)
+    nearest = std::min(nearest, static_cast<double>((point - Eigen::Vector3f(10, -7, 0)).norm()));
+  EXPECT_LT(nearest, 0.0083);
+}
+
+TEST(Golden, ProxyGraph) {
+  ProxyGraphMessage message;
+  message.header = {RobotId{0}, 99, 3};
+  ProxyGraph& graph = message.graph;
+  graph.revision = 42;
+  graph.nodes = {{RobotId{0}, {1'000'000'001}, {Eigen::Quaterniond::Identity(), {0, 0, 0}}, Matrix6d::Zero(), 0},
+                 {RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}, diagonal(1e-4, 1e-6), 5},
+                 {RobotId{7}, {2'000'000'000}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1}};
+  graph.components = {{RobotId{0}, 0}, {RobotId{7}, 1}};
+  graph.reduced = true;
+  graph.edges = {{0, 1, 0.625}};
+  graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
+  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v1.bin", encode(message)));
+  ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+  EXPECT_EQ(decoded->header, message.header);
+  EXPECT_EQ(decoded->graph.revision, 42U);
+  EXPECT_EQ(decoded->graph.radius_m, 7.0);
+  EXPECT_EQ(decoded->graph.components, graph.components);
+  EXPECT_EQ(decoded->graph.edges, graph.edges);
+  EXPECT_EQ(decoded->graph.eliminated, graph.eliminated);
+  ASSERT_EQ(decoded->graph.nodes.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(decoded->graph.nodes[i].robot, graph.nodes[i].robot);
+    EXPECT_EQ(decoded->graph.nodes[i].stamp, graph.nodes[i].stamp);
+    EXPECT_EQ(decoded->graph.nodes[i].support, graph.nodes[i].support);
+    EXPECT_LT(local(decoded->graph.nodes[i].T_world_body, graph.nodes[i].T_world_body).norm(), 5e-4);
+  }
+  EXPECT_EQ(decoded->graph.nodes[0].covariance, Matrix6d::Zero().eval());
+  EXPECT_NEAR(decoded->graph.nodes[1].covariance(2, 2), 1e-4, 4e-6);
+}
+
+TEST(Golden, Verdict) {
+  const ClosureVerdict verdict{
+      .pair = {{RobotId{0}, 3}, {RobotId{1}, 4}},
+      .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}}};
+  const auto decoded = decode_verdict(golden_bytes("verdict_v1.bin", encode(verdict)));
+  ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+  EXPECT_EQ(*decoded, verdict);
+}
+
+}  // namespace
+}  // namespace tutti::wire

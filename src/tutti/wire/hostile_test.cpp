@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bytes from outside: every decoder answers any input with an error or a valid message.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+#include <zstd.h>
+
+#include <array>
+#include <string>
+
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
+#include "tutti/wire/limits.hpp"
+#include "tutti/wire/test_messages.hpp"
+
+namespace tutti::wire {
+namespace {
+
+constexpr std::array kKinds = {MessageKind::submap, MessageKind::proxy_graph, MessageKind::verdict};
+
+std::string sample(MessageKind kind, Rng rng) {
+  if (kind == MessageKind::submap) return encode(test::any_submap(rng, 6, 30));
+  if (kind == MessageKind::proxy_graph) return encode(test::any_proxy_graph(rng, 2, 8, true));
+  return encode(test::any_verdict(rng, 2));
+}
+
+/// Nothing when accepted: then it must also survive another round.
+template <class Message>
+std::optional<Error> outcome(const Result<Message>& result) {
+  if (!result) {
+    EXPECT_FALSE(result.error().message.empty());
+    return result.error();
+  }
+  EXPECT_TRUE(validate(*result).has_value());
+  EXPECT_FALSE(encode(*result).empty());
+  return std::nullopt;
+}
+
+std::optional<Error> decode(MessageKind kind, std::string_view bytes) {
+  if (kind == MessageKind::submap) return outcome(decode_submap(bytes));
+  if (kind == MessageKind::proxy_graph) return outcome(decode_proxy_graph(bytes));
+  return outcome(decode_verdict(bytes));
+}
+
+std::string mutate(std::string bytes, Rng& rng) {
+  const auto edits = 1 + rng.index(4);
+  for (std::uint64_t i = 0; i < edits && !bytes.empty(); ++i) {
+    const std::size_t at = rng.index(bytes.size());
+    const auto any_byte = static_cast<char>(rng.index(256));
+    switch (rng.index(4)) {
+      case 0:
+        bytes[at] = any_byte;
+        break;
+      case 1:
+        bytes[at] = static_cast<char>(static_cast<unsigned char>(bytes[at]) ^ (1U << rng.index(8)));
+        break;
+      case 2:
+        bytes.erase(at, 1 + rng.index(4));
+        break;
+      default:
+        bytes.insert(at, 1 + rng.index(4), any_byte);
+    }
+  }
+  return bytes;
+}
+
+TEST(Hostile, EveryTruncationAndEveryAppendixIsRefused) {
+  for (const MessageKind kind : kKinds) {
+    const std::string frame = sample(kind, Rng(1));
+    ASSERT_FALSE(decode(kind, frame).has_value());
+    for (std::size_t size = 0; size < frame.size(); ++size)
+      EXPECT_TRUE(decode(kind, std::string_view(frame).substr(0, size)).has_value()) << size;
+    EXPECT_TRUE(decode(kind, frame + '\0').has_value());
+    EXPECT_TRUE(decode(kind, frame + frame).has_value());
+  }
+}
+
+TEST(Hostile, EveryFlippedByteIsRefused) {  // zstd's checksum sees what its format does not
+  for (const MessageKind kind : kKinds) {
+    const std::string frame = sample(kind, Rng(2));
+    for (std::size_t at = 0; at < frame.size(); ++at) {
+      std::string bad = frame;
+      bad[at] = static_cast<char>(~bad[at]);
+      EXPECT_TRUE(decode(kind, bad).has_value()) << at;
+    }
+  }
+}
+
+RC_GTEST_PROP(Hostile, MutatedPayloadsNeverCrash, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  for (const MessageKind kind : kKinds) {
+    const std::string payload = *unpack_frame(kind, sample(kind, rng));
+    decode(kind, pack_frame(kind, mutate(payload, rng)));
+    decode(kind, pack_frame(kind, payload.substr(0, rng.index(payload.size()))));
+    for (const MessageKind other : kKinds) decode(other, pack_frame(other, payload));
+  }
+}
+
+RC_GTEST_PROP(Hostile, RandomBytesNeverCrash, (const std::string& bytes)) {
+  for (const MessageKind kind : kKinds) {
+    RC_ASSERT(decode(kind, bytes).has_value());
+    decode(kind, pack_frame(kind, bytes));
+  }
+}
+
+TEST(Hostile, WrongVersionNamesBoth) {
+  std::string frame = sample(MessageKind::submap, Rng(3));
+  frame[2] = 77;
+  const auto error = decode(MessageKind::submap, frame);
+  ASSERT_TRUE(error.has_value());
+  EXPECT_EQ(error->code, ErrorCode::unsupported);
+  EXPECT_NE(error->message.find("77"), std::string::npos) << error->message;
+  EXPECT_NE(error->message.find("version " + std::to_string(kProtocolVersion)), std::string::npos) << error->message;
+}
+
+TEST(Hostile, WrongKindNamesBoth) {
+  const auto error = decode(MessageKind::submap, sample(MessageKind::verdict, Rng(4)));
+  ASSERT_TRUE(error.has_value());
+  EXPECT_NE(error->message.find("verdict"), std::string::npos);
+  EXPECT_NE(error->message.find("submap"), std::string::npos);
+  EXPECT_EQ(peek_kind(sample(MessageKind::verdict, Rng(4))), MessageKind::verdict);
+}
+
+TEST(Hostile, DecompressionBombsAreRefusedBeforeMemoryIsTaken) {
+  const std::string zeros(kMaxMessageBytes + 1, '\0');
+  std::string bomb(ZSTD_compressBound(zeros.size()), '\0');
+  bomb.resize(ZSTD_compress(bomb.data(), bomb.size(), zeros.data(), zeros.size(), 1));
+  ASSERT_LT(bomb.size(), 10'000U);
+  const std::string header = sample(MessageKind::submap, Rng(5)).substr(0, 5);
+  const auto error = decode(MessageKind::submap, header + bomb);
+  ASSERT_TRUE(error.has_value());
+  EXPECT_NE(error->message.find("at most"), std::string::npos) << error->message;
+}
+
+TEST(Hostile, ClaimedCountsAreBoundedBeforeMemoryIsTaken) {
+  // One run of a robot that claims 4 billion nodes: field 5 { robot: 0, nodes: 0xffffffff }.
+  const std::string payload("\x2a\x08\x08\x00\x10\xff\xff\xff\xff\x0f", 10);
+  const auto error = decode(MessageKind::proxy_graph, pack_frame(MessageKind::proxy_graph, payload));
+  ASSERT_TRUE(error.has_value());
+  EXPECT_NE(error->message.find("4294967295 nodes"), std::string::npos) << error->message;
+}
+
+}  // namespace
+}  // namespace tutti::wire

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+#include <memory>
+
+#include "tutti/base/random.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/model/loop_closure.hpp"
+#include "tutti/model/messages.hpp"
+
+/// Valid messages for the tests of wire/.
+namespace tutti::wire::test {
+
+inline Pose3 any_pose(Rng& rng, double extent_m, double extent_rad = 3.0) {
+  Pose3 T;
+  for (double& t : T.translation) t = rng.uniform(-extent_m, extent_m);
+  Eigen::Vector3d theta;
+  for (double& r : theta) r = rng.uniform(-1.0, 1.0);
+  T.rotation = so3_exp(theta * rng.uniform(0.0, extent_rad) / std::max(theta.norm(), 1e-9)).normalized();
+  return T;
+}
+
+/// Positive definite with correlations of any strength and variances over many magnitudes.
+inline Matrix6d any_covariance(Rng& rng) {
+  Matrix6d mix;
+  for (double& m : mix.reshaped()) m = rng.normal();
+  mix.diagonal().array() += rng.uniform(0.0, 5.0);
+  Vector6d scale;
+  for (double& s : scale) s = std::exp(rng.uniform(-9.0, 1.0));
+  const Matrix6d G = scale.asDiagonal() * mix;
+  const Matrix6d covariance = G * G.transpose();
+  return 0.5 * (covariance + covariance.transpose());
+}
+
+/// Pairs of steps of a walking robot: the covariance of odometry over `metres`, turning a little.
+inline Matrix6d odometry_covariance(double metres, double turn_rad) {
+  Matrix6d step = Matrix6d::Zero();
+  step.diagonal() << 1e-6, 1e-6, 1e-6, 4e-9, 4e-9, 1e-7;
+  const Pose3 T{so3_exp({0, 0, 0.02 * turn_rad}), {0.02 * metres, 0, 0}};
+  Matrix6d covariance = step;
+  for (int i = 1; i < 50; ++i) covariance = compound_covariance(T, covariance, step);
+  return covariance * metres;
+}
+
+inline SubmapMessage any_submap(Rng& rng, std::size_t keyframes, std::size_t points) {
+  SubmapMessage message;
+  const RobotId robot{static_cast<std::uint32_t>(rng.index(5))};
+  message.header = {robot, rng.index(1'000'000'000'000), rng.index(1000)};
+  Submap& submap = message.submap;
+  submap.id = {robot, static_cast<std::uint32_t>(rng.index(1000))};
+  Keyframe keyframe{static_cast<std::uint32_t>(rng.index(100'000)), {1'700'000'000'123'456'789}, any_pose(rng, 100.0)};
+  for (std::size_t k = 0; k < keyframes; ++k) {
+    if (k > 0) {
+      const Pose3 step = any_pose(rng, 1.0, 0.5);
+      submap.odometry.push_back({step, any_covariance(rng)});
+      keyframe.T_odom_body = keyframe.T_odom_body * step;
+    }
+    keyframe.representative = rng.bernoulli(0.7);
+    submap.keyframes.push_back(keyframe);
+    ++keyframe.index;
+    keyframe.stamp.ns += 1 + static_cast<std::int64_t>(rng.index(2'000'000'000));
+  }
+  if (points > 0) {
+    auto cloud = std::make_shared<PointCloud>();
+    for (std::size_t i = 0; i < points; ++i)
+      cloud->points.emplace_back(rng.uniform(-40, 40), rng.uniform(-40, 40), rng.uniform(-2, 4));
+    submap.cloud = cloud;
+  }
+  return message;
+}
+
+/// Nodes about every metre along each robot's way.
+inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t robots, std::size_t nodes_each, bool reduced) {
+  ProxyGraphMessage message;
+  message.header.session = rng.index(1'000'000'000'000);
+  message.header.sequence = rng.index(1000);
+  ProxyGraph& graph = message.graph;
+  graph.revision = rng.index(1000);
+  graph.reduced = reduced;
+  for (std::size_t r = 0; r < robots; ++r) {
+    const RobotId robot{static_cast<std::uint32_t>(3 * r)};
+    graph.components.push_back({robot, static_cast<std::uint32_t>(rng.index(2))});
+    Timestamp stamp{1'700'000'000'123'456'789 + static_cast<std::int64_t>(rng.index(1'000'000'000))};
+    Pose3 T = any_pose(rng, 50.0);
+    const std::size_t first = graph.nodes.size();
+    for (std::size_t k = 0; k < nodes_each; ++k) {
+      stamp.ns += 1'000'000'000 + static_cast<std::int64_t>(rng.index(500'000'000));
+      const double turn = rng.normal(0.1);
+      T = T * Pose3{so3_exp({rng.normal(0.01), rng.normal(0.01), turn}), {rng.uniform(0.9, 1.2), 0.0, 0.0}};
+      if (reduced && k > 0 && k + 1 < nodes_each && rng.bernoulli(0.5)) {
+        graph.eliminated.push_back({robot, stamp});
+        continue;
+      }
+      const Matrix6d covariance = k == 0 ? Matrix6d::Zero() : odometry_covariance(rng.uniform(0.9, 1.2), turn);
+      graph.nodes.push_back({robot, stamp, T, covariance, static_cast<std::uint32_t>(rng.index(20))});
+    }
+    if (!reduced) continue;
+    for (std::size_t a = first; a < graph.nodes.size(); ++a)
+      for (std::size_t b = a + 1; b < std::min(a + 5, graph.nodes.size()); ++b)
+        graph.edges.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), rng.uniform(0.0, 2.0)});
+  }
+  return message;
+}
+
+inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
+  ClosureVerdict verdict{.pair = {{RobotId{0}, static_cast<std::uint32_t>(rng.index(1000))},
+                                  {RobotId{1}, static_cast<std::uint32_t>(rng.index(1000))}}};
+  for (std::size_t i = 0; i < closures; ++i)
+    verdict.closures.push_back({{RobotId{0}, static_cast<std::uint32_t>(rng.index(1000))},
+                                {RobotId{1}, static_cast<std::uint32_t>(rng.index(1000))},
+                                {any_pose(rng, 5.0), any_covariance(rng)}});
+  if (closures == 0) verdict.reason = "overlap 0.12, at least 0.30 wanted";
+  return verdict;
+}
+
+}  // namespace tutti::wire::test
