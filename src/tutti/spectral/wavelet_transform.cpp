@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/spectral/internal/lanczos.hpp"
 #include "tutti/spectral/internal/row_blocks.hpp"
 
 namespace tutti::spectral {
@@ -27,38 +28,44 @@ struct Expansion {
   RowMajor tail;         ///< N x scales; entry (k, s) bounds sup |h_s - its polynomial of degree k|.
 };
 
-/// c_k = (2 / N) sum_q value_q cos(k pi (q + 1/2) / N) by one FFT [Makhoul 1980].
-Eigen::VectorXd cosine_transform(const Eigen::VectorXd& value, Eigen::FFT<double>& fft) {
-  const Index n = value.size();
-  Eigen::VectorXd folded(n);
-  for (Index q = 0; q < n / 2; ++q) {
-    folded[q] = value[2 * q];
-    folded[n - 1 - q] = value[2 * q + 1];
+/// On n points theta_q = pi (q + 1/2) / n: values to Chebyshev coefficients, c_k = 2/n sum_q value_q cos(k theta_q), by
+/// one FFT [Makhoul 1980].
+class CosineTransform {
+ public:
+  explicit CosineTransform(Index n) : folded_(n), turn_(n) {
+    for (Index k = 0; k < n; ++k)
+      turn_[k] = std::polar(2.0 / static_cast<double>(n),
+                            -std::numbers::pi * static_cast<double>(k) / (2.0 * static_cast<double>(n)));
   }
-  Eigen::VectorXcd transformed;
-  fft.fwd(transformed, folded);
-  Eigen::VectorXd out(n);
-  for (Index k = 0; k < n; ++k) {
-    const double angle = -std::numbers::pi * static_cast<double>(k) / (2.0 * static_cast<double>(n));
-    out[k] = 2.0 / static_cast<double>(n) * (std::polar(1.0, angle) * transformed[k]).real();
+  [[nodiscard]] Eigen::VectorXd operator()(const Eigen::VectorXd& value) {
+    const Index n = value.size();
+    for (Index q = 0; q < n / 2; ++q) {
+      folded_[q] = value[2 * q];
+      folded_[n - 1 - q] = value[2 * q + 1];
+    }
+    fft_.fwd(transformed_, folded_);
+    return (turn_.array() * transformed_.array()).real();
   }
-  return out;
-}
 
-/// N a power of two. The kernels have three continuous derivatives, so coefficients fall like k^-5 and all those from N
-/// on sum up to about a fifteenth of those in [N/2, N): the latter bound what N leaves out and what it aliases.
+ private:
+  Eigen::FFT<double> fft_;
+  Eigen::VectorXd folded_;
+  Eigen::VectorXcd turn_, transformed_;
+};
+
+/// n a power of two. The kernels have three continuous derivatives, so coefficients fall like k^-5 and all those from n
+/// on sum up to about a fifteenth of those in [n/2, n): the latter bound what n leaves out and what it aliases.
 Expansion expand(const MeyerFilterBank& bank, double domain, Index n) {
   Expansion out{.coefficient = RowMajor(n, bank.scales()), .tail = RowMajor(n, bank.scales())};
-  Eigen::FFT<double> fft;
+  CosineTransform transform(n);
+  const Eigen::VectorXd angle =
+      (Eigen::VectorXd::LinSpaced(n, 0.5, static_cast<double>(n) - 0.5)) * (std::numbers::pi / static_cast<double>(n));
+  const Eigen::VectorXd x = 0.5 * domain * (1.0 + angle.array().cos());
   Eigen::VectorXd value(n);
   for (int s = 0; s < bank.scales(); ++s) {
     const double at_zero = bank.kernel(s, 0.0);
-    for (Index q = 0; q < n; ++q) {
-      const double angle = std::numbers::pi * (static_cast<double>(q) + 0.5) / static_cast<double>(n);
-      const double x = 0.5 * domain * (1.0 + std::cos(angle));
-      value[q] = (bank.kernel(s, x) - at_zero) / x;
-    }
-    Eigen::VectorXd c = cosine_transform(value, fft);
+    for (Index q = 0; q < n; ++q) value[q] = (bank.kernel(s, x[q]) - at_zero) / x[q];
+    Eigen::VectorXd c = transform(value);
     c[0] *= 0.5;
     out.coefficient.col(s) = c;
     double tail = c.tail(n / 2).cwiseAbs().sum();
@@ -82,20 +89,20 @@ std::vector<Index> choose_degrees(const Expansion& expansion, double norm, doubl
   return degrees;
 }
 
-/// sums.col(s) = h_s(L) y by the recurrence T_{k+1} = 2 X T_k - T_{k-1} with X = (2 / domain) L - I; `doubled` is 2 X.
-Eigen::MatrixXd run_recurrence(const internal::RowBlocks& doubled, const Expansion& expansion,
-                               std::span<const Index> degrees, Eigen::VectorXd current) {
-  Eigen::MatrixXd sums = current * expansion.coefficient.row(0);
+/// Column s = h_s(L) y by the recurrence T_{k+1} = 2 X T_k - T_{k-1} with X = (2 / domain) L - I.
+Eigen::MatrixXd run_recurrence(const internal::RowBlocks& laplacian, double domain, const Expansion& expansion,
+                               std::span<const Index> degrees, const Eigen::VectorXd& y) {
+  Eigen::MatrixXd sums = y * expansion.coefficient.row(0);
   if (degrees.front() == 0) return sums;
-  Eigen::VectorXd next = Eigen::VectorXd::Zero(current.size());
-  doubled.multiply_subtract(current, next);
-  next *= 0.5;  // T_1 = X T_0
+  Eigen::VectorXd current = y;
+  Eigen::VectorXd next = Eigen::VectorXd::Zero(y.size());
+  laplacian.step(2.0 / domain, -1.0, current, next);  // T_1 y = X y
   sums += next * expansion.coefficient.row(1);
   auto active = degrees.size();
   for (Index k = 2; k <= degrees.front(); ++k) {
     std::swap(current, next);
     while (degrees[active - 1] < k) --active;
-    doubled.chebyshev_step(current, next, std::span(&expansion.coefficient(k, 0), active), sums);
+    laplacian.step(4.0 / domain, -2.0, current, next, std::span(&expansion.coefficient(k, 0), active), sums);
   }
   return sums;
 }
@@ -129,26 +136,28 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
   if (norm == 0.0) return result;  // constant on every component
 
   // A hair more than the largest eigenvalue, because T_k grows exponentially outside of the domain.
+  constexpr double kAccuracy = 1e-9;
   constexpr double kMargin = 1.0 + 1e-8;
-  const double domain = std::min(kMargin * largest_eigenvalue(laplacian), largest_eigenvalue_bound(laplacian));
+  const internal::RowBlocks blocks(laplacian);
+  const double bound = largest_eigenvalue_bound(laplacian);
+  const double domain = std::min(bound, kMargin * internal::largest_eigenvalue(blocks, bound, kAccuracy));
   const Index max_degree = config.max_order - 1;  // one product made L f
   Index size = 2048;
   Expansion expansion = expand(bank, domain, size);
   while (choose_degrees(expansion, norm, config.tolerance).front() >= size / 2 && size / 2 <= max_degree)
     expansion = expand(bank, domain, size *= 2);
 
-  const internal::RowBlocks doubled(laplacian, 4.0 / domain, -2.0);
   for (Index c = 0; c < signals.cols(); ++c) {
     const double column_norm = smoothed.col(c).norm();
     auto degrees = choose_degrees(expansion, column_norm, config.tolerance);
     for (auto& degree : degrees) degree = std::min(degree, max_degree);
-    const Eigen::MatrixXd sums = run_recurrence(doubled, expansion, degrees, doubled.to_blocks(smoothed.col(c)));
+    const Eigen::MatrixXd sums = run_recurrence(blocks, domain, expansion, degrees, blocks.to_blocks(smoothed.col(c)));
     Eigen::VectorXd column(signals.rows());
     for (int s = 0; s < bank.scales(); ++s) {
-      doubled.from_blocks(sums.col(s), column);
+      blocks.from_blocks(sums.col(s), column);
       result.coefficients.col(s * signals.cols() + c) += column;
-      const double bound = expansion.tail(degrees[static_cast<std::size_t>(s)], s) * column_norm;
-      result.error_bound = std::max(result.error_bound, bound);
+      const double error = expansion.tail(degrees[static_cast<std::size_t>(s)], s) * column_norm;
+      result.error_bound = std::max(result.error_bound, error);
     }
     result.order = std::max(result.order, static_cast<int>(degrees.front()) + 1);
   }

@@ -17,20 +17,18 @@ class RowBlocks {
  public:
   static constexpr int kRows = 8;
 
-  /// scale * matrix + shift * I.
-  RowBlocks(const SparseMatrix& matrix, double scale, double shift);
+  explicit RowBlocks(const SparseMatrix& matrix);
 
+  [[nodiscard]] Eigen::Index nodes() const { return static_cast<Eigen::Index>(node_.size()); }
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(start_.size() - 1) * kRows; }
   [[nodiscard]] Eigen::VectorXd to_blocks(const Eigen::Ref<const Eigen::VectorXd>& nodes) const;
   void from_blocks(const Eigen::Ref<const Eigen::VectorXd>& blocks, Eigen::Ref<Eigen::VectorXd> nodes) const;
 
-  /// y = M x - y.
-  void multiply_subtract(const Eigen::VectorXd& x, Eigen::VectorXd& y) const;
-
-  /// One step of the Chebyshev recurrence and of every sum that runs along it:
-  ///   y = M x - y;  sums.col(s) += weights[s] * y  for s < weights.size().
-  void chebyshev_step(const Eigen::VectorXd& x, Eigen::VectorXd& y, std::span<const double> weights,
-                      Eigen::MatrixXd& sums) const;
+  /// One step of a three-term recurrence, and of every sum that runs along it:
+  ///   y = scale M x + shift x - y;  sums.col(s) += weights[s] y  for s < weights.size().
+  void step(double scale, double shift, const Eigen::VectorXd& x, Eigen::VectorXd& y, std::span<const double> weights,
+            Eigen::MatrixXd& sums) const;
+  void step(double scale, double shift, const Eigen::VectorXd& x, Eigen::VectorXd& y) const;
 
  private:
   std::vector<int> node_;        ///< Node at each place.
