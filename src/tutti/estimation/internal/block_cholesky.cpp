@@ -4,15 +4,20 @@
 #include <cholmod.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "tutti/base/check.hpp"
+#include "tutti/estimation/internal/single_thread.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
 
 /// A pivot below this share of its diagonal entry has no correct digit left.
 constexpr double kSmallestPivotShare = 1e-14;
+
+/// Supernodes are merged up to so many blocks with at most this share of explicit zeros. CHOLMOD's defaults are made
+/// for scalar unknowns; these are 30 % faster on parking-garage, 10 % on torus3D.
+constexpr int kRelaxedBlocks[3] = {4, 8, 20};
+constexpr double kRelaxedZeros[3] = {0.8, 0.2, 0.05};
 
 #ifdef TUTTI_SUPERNODAL
 constexpr int kFactorisation = CHOLMOD_SUPERNODAL;  // GPL part of CHOLMOD
@@ -31,13 +36,17 @@ struct BlockCholesky::Cholmod {
   cholmod_dense* work_y = nullptr;
   cholmod_dense* work_e = nullptr;
 
-  Cholmod() {
+  explicit Cholmod(int block_size) {
     cholmod_start(&common);
     common.print = 0;
     common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_NATURAL;  // the structure is already in (postordered) elimination order
     common.postorder = 0;
     common.supernodal = kFactorisation;
+    for (int k = 0; k < 3; ++k) {
+      common.nrelax[k] = static_cast<std::size_t>(kRelaxedBlocks[k]) * block_size;
+      common.zrelax[k] = kRelaxedZeros[k];
+    }
     common.final_ll = 1;
     common.quick_return_if_not_posdef = 1;
   }
@@ -53,7 +62,7 @@ struct BlockCholesky::Cholmod {
 };
 
 BlockCholesky::BlockCholesky(const BlockStructure& structure, int block_size)
-    : structure_(structure), block_size_(block_size), cholmod_(std::make_unique<Cholmod>()) {
+    : structure_(structure), block_size_(block_size), cholmod_(std::make_unique<Cholmod>(block_size)) {
   const int b = block_size;
   const auto blocks = structure.block_row.size();
   values_.assign(blocks * b * b, 0.0);
@@ -91,6 +100,7 @@ bool BlockCholesky::factorise() {
   auto& c = *cholmod_;
   if (structure_.variables == 0) return true;
   if (c.factor == nullptr) return false;
+  const SingleThread single_thread;
   cholmod_factorize(&c.matrix, c.factor, &c.common);
   if (c.common.status != CHOLMOD_OK || c.factor->minor < c.factor->n) return false;
   return pivots_are_sound();

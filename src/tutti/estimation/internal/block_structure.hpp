@@ -30,11 +30,8 @@ struct BlockStructure {
   std::vector<EdgeSlot> edges;    ///< Per edge.
 };
 
-enum class Ordering { amd, metis };
-
 /// `extra` pairs of nodes get a (structurally zero) block too; pairs across components are ignored.
-BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<std::size_t, std::size_t>> extra = {},
-                              Ordering ordering = Ordering::amd);
+BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<std::size_t, std::size_t>> extra = {});
 
 /// Everything finite and every rotation a unit quaternion within 1e-3.
 bool is_finite(const PoseGraph& graph);
