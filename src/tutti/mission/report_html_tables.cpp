@@ -98,7 +98,13 @@ std::string closures_html(const MissionRecord& record) {
   add("<b>accepted</b>", counts.accepted_intra, counts.accepted_inter);
   for (const auto& rejection : server.rejections)
     add("refused: " + escape_xml(rejection.reason), rejection.intra, rejection.inter);
-  return section("Loop closures", "What the server took into the map, and why it refused the rest.", html(table));
+  std::string lead = "What the server took into the map, and why it refused the rest.";
+  if (const auto& check = server.closure_check)
+    lead += fmt::format(
+        " Against the reference, {} of {} accepted closures are wrong by more than 0.5 m or 2 degrees; the largest "
+        "errors are {} and {:.2f} degrees.",
+        check->wrong, check->checked, format_metres(check->max_error_m), check->max_error_deg);
+  return section("Loop closures", lead, html(table));
 }
 
 std::string radio_html(const MissionRecord& record) {

@@ -53,12 +53,19 @@ Json server_json(const ServerRecord& server) {
   Json rejections = Json::array();
   for (const auto& rejection : server.rejections)
     rejections.push_back({{"reason", rejection.reason}, {"intra", rejection.intra}, {"inter", rejection.inter}});
+  Json check = nullptr;
+  if (server.closure_check)
+    check = {{"checked", server.closure_check->checked},
+             {"wrong", server.closure_check->wrong},
+             {"max_error_m", number(server.closure_check->max_error_m)},
+             {"max_error_deg", number(server.closure_check->max_error_deg)}};
   return {{"components", server.components},
           {"closures_accepted", counts.accepted()},
           {"closures_accepted_intra", counts.accepted_intra},
           {"closures_accepted_inter", counts.accepted_inter},
           {"closures_rejected", counts.rejected()},
           {"rejections", std::move(rejections)},
+          {"closure_check", std::move(check)},
           {"rmse_m", number(server.joint.rmse_m)},
           {"max_error_m", number(server.joint.max_error_m)},
           {"rpe_m", number(server.joint.rpe_m)}};

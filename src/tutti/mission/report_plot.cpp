@@ -142,7 +142,7 @@ void PlanView::draw_scale_bar(Svg& svg) const {
 std::string heat_colour(double t) {
   static constexpr std::array<std::array<double, 3>, 5> kStops{
       {{18, 35, 84}, {48, 85, 130}, {88, 142, 148}, {160, 196, 120}, {253, 231, 76}}};
-  const double s = std::clamp(t, 0.0, 1.0) * static_cast<double>(kStops.size() - 1);
+  const double s = (t > 0.0 ? std::min(t, 1.0) : 0.0) * static_cast<double>(kStops.size() - 1);
   const auto i = std::min(static_cast<std::size_t>(s), kStops.size() - 2);
   std::array<int, 3> rgb{};
   for (std::size_t c = 0; c < 3; ++c)

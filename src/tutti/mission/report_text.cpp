@@ -164,6 +164,10 @@ std::string server_lines(const MissionRecord& record) {
   if (server.joint.rmse_m)
     text += fmt::format(", RMSE {} over all robots at once (max {})", format_metres(server.joint.rmse_m),
                         format_metres(server.joint.max_error_m));
+  if (const auto& check = server.closure_check)
+    text += fmt::format(". Of {} closures checked against the reference {} wrong (largest error {}, {:.2f} deg)",
+                        check->checked, check->wrong == 1 ? "1 is" : fmt::format("{} are", check->wrong),
+                        format_metres(check->max_error_m), check->max_error_deg);
   std::string out = wrap(text + ".", "  server   ");
   for (const auto& transform : record.transforms) {
     const Eigen::Vector3d& t = transform.T_from_to.translation;

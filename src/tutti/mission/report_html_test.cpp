@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report_html.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <limits>
+#include <set>
+#include <string_view>
+#include <vector>
+
+#include "tutti/mission/report_example.hpp"
+
+namespace tutti::mission {
+namespace {
+
+bool has_bare_ampersand(std::string_view text) {
+  for (std::size_t at = text.find('&'); at != std::string_view::npos; at = text.find('&', at + 1)) {
+    const std::string_view rest = text.substr(at + 1);
+    const auto names = {"amp;", "lt;", "gt;", "quot;", "#39;"};
+    if (std::none_of(names.begin(), names.end(), [&](const char* name) { return rest.starts_with(name); })) return true;
+  }
+  return false;
+}
+
+/// Empty when every tag is closed in order, attributes are quoted, and text holds no bare '<', '>' or '&'; otherwise
+/// what is wrong.
+std::string malformed(const std::string& html) {
+  static const std::set<std::string, std::less<>> kVoid{"!DOCTYPE", "meta", "br"};
+  const std::string_view page = html;
+  std::vector<std::string_view> open;
+  std::size_t position = 0;
+  while (position < page.size()) {
+    const std::size_t begin = page.find('<', position);
+    const std::string_view text = page.substr(position, begin - position);
+    const bool style = !open.empty() && open.back() == "style";
+    if (!style && (text.find('>') != std::string_view::npos || has_bare_ampersand(text)))
+      return "unescaped text: " + std::string(text.substr(0, 200));
+    if (begin == std::string_view::npos) break;
+    std::size_t end = begin + 1;  // the '>' outside quotes
+    for (bool quoted = false; end < page.size() && (quoted || page[end] != '>'); ++end) {
+      if (page[end] == '"') quoted = !quoted;
+      if (page[end] == '<') return "'<' inside a tag: " + std::string(page.substr(begin, 200));
+    }
+    if (end >= page.size()) return "tag never ends: " + std::string(page.substr(begin, 200));
+    std::string_view tag = page.substr(begin + 1, end - begin - 1);
+    position = end + 1;
+    if (has_bare_ampersand(tag)) return "unescaped attribute: " + std::string(tag);
+    const bool closing = tag.starts_with('/');
+    if (closing) tag.remove_prefix(1);
+    const std::string_view name = tag.substr(0, tag.find_first_of(" /\n"));
+    if (name.empty() || (std::isalpha(static_cast<unsigned char>(name[0])) == 0 && name[0] != '!'))
+      return "not a tag: " + std::string(tag);
+    if (closing) {
+      if (open.empty() || open.back() != name) return "closed out of order: " + std::string(name);
+      open.pop_back();
+    } else if (!tag.ends_with('/') && !kVoid.contains(name)) {
+      open.push_back(name);
+    }
+  }
+  return open.empty() ? "" : "never closed: " + std::string(open.back());
+}
+
+/// "nan" or "inf" as a word of its own, the way a number that is not finite would be printed.
+bool has_number_that_is_not_finite(const std::string& html) {
+  const auto is_letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
+  for (const std::string word : {"nan", "inf"})
+    for (std::size_t at = html.find(word); at != std::string::npos; at = html.find(word, at + 1)) {
+      const char before = at > 0 ? html[at - 1] : ' ';  // path data has letters before numbers: "M1 nanLinf"
+      if ((!is_letter(before) || before == 'M' || before == 'L' || before == 'Q' || before == 'h' || before == 'v') &&
+          !std::islower(static_cast<unsigned char>(html[at + 3])))
+        return true;
+    }
+  return false;
+}
+
+void expect_good_page(const std::string& html) {
+  EXPECT_EQ(malformed(html), "");
+  EXPECT_FALSE(has_number_that_is_not_finite(html));
+  for (const char* outside : {"http:", "https:", "<script", "@import", "url(", "<link", "<img"})
+    EXPECT_EQ(html.find(outside), std::string::npos) << "not self-contained: " << outside;
+}
+
+TEST(CheckerOfThisTest, SeesMistakes) {
+  EXPECT_EQ(malformed("<style>a > b</style><p class=\"x\">a &amp; b<br></p><path d=\"M0\"/>"), "");
+  for (const char* wrong : {"<p><b></p></b>", "<p>", "</p>", "<p>a & b</p>", "<p>a < b</p>", "<p>a > b</p>",
+                            "<p title=\"a & b\"></p>", "<p title=\"a</p>", "<p"})
+    EXPECT_NE(malformed(wrong), "") << wrong;
+  EXPECT_TRUE(has_number_that_is_not_finite("d=\"M0 0L1 nan\""));
+  EXPECT_TRUE(has_number_that_is_not_finite("width:-inf%"));
+  EXPECT_TRUE(has_number_that_is_not_finite("<td>nan m</td>"));
+  EXPECT_FALSE(has_number_that_is_not_finite("information, finance, banana"));
+}
+
+TEST(ReportHtml, IsWellFormedAndSelfContained) { expect_good_page(report_html(test::example_record())); }
+
+TEST(ReportHtml, HasEverySection) {
+  const std::string html = report_html(test::example_record());
+  for (const char* title :
+       {"The joint map", "Each robot by itself", "Error over distance", "Policies side by side",
+        "Where and when the maps disagree", "The proxy graph", "Loop closures", "How the robots&#39; frames lie",
+        "What goes over the radio", "Time", "What to keep in mind", "Effective configuration"})
+    EXPECT_NE(html.find(title), std::string::npos) << title;
+  for (const char* policy : {"every_node_2", "uniform", "random", "euclidean"})
+    EXPECT_NE(html.find(policy), std::string::npos) << policy;
+  EXPECT_NE(html.find("slides along one direction"), std::string::npos);
+}
+
+TEST(ReportHtml, IsAFunctionOfTheRecord) {
+  EXPECT_EQ(report_html(test::example_record()), report_html(test::example_record()));
+}
+
+TEST(ReportHtml, EscapesEveryText) {
+  MissionRecord record = test::example_record({.keyframes = 40});
+  const std::string evil = "</title><b>&\"'";
+  record.mission = record.description = record.input = record.version = evil;
+  record.effective_config_yaml = record.timing.machine = record.rpe_interval = evil;
+  record.notes = {evil};
+  record.default_policy = evil;
+  for (auto& robot : record.robots) {
+    robot.name = evil + robot.name;
+    robot.policies[2].name = evil;
+  }
+  record.server.rejections = {{evil, 1, 2}};
+  record.transforms[0].from = record.transforms[0].to = evil;
+  for (auto& timing : record.timing.policies) timing.robot = timing.policy = evil;
+  record.timing.load = {{evil, 0.5, 12.0}};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_EQ(html.find(evil), std::string::npos);
+}
+
+TEST(ReportHtml, WorksWithoutReferenceCloudOrUpdates) {
+  MissionRecord record = test::example_record({.reference = false, .cloud = false});
+  for (auto& robot : record.robots) robot.updates.clear();
+  record.timing = {};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_EQ(html.find("Where and when"), std::string::npos);
+  EXPECT_NE(html.find("no reference"), std::string::npos);
+}
+
+TEST(ReportHtml, EmptyMission) { expect_good_page(report_html(MissionRecord{})); }
+
+TEST(ReportHtml, RobotThatNeverMovedOrSpoke) {
+  MissionRecord record;
+  record.robots.push_back({.name = "silent"});
+  RobotRecord& still = record.robots.emplace_back(RobotRecord{.id = {1}, .name = "still"});
+  still.odometry = {{Timestamp{5}, Pose3{}}};
+  still.server_estimate = still.reference = still.odometry;
+  still.updates = {{.time_s = 20.0, .revision = 1}};
+  expect_good_page(report_html(record));
+}
+
+TEST(ReportHtml, SurvivesNumbersThatAreNotFinite) {
+  MissionRecord record = test::example_record({.keyframes = 60});
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  record.robots[0].odometry[7].pose.translation.x() = kNaN;
+  record.robots[0].policies[2].corrected[9].pose.translation.y() = std::numeric_limits<double>::infinity();
+  record.robots[0].updates[0].mean_disagreement_m[2] = kNaN;
+  record.robots[0].updates[0].max_disagreement_m.resize(3);
+  record.robots[0].onboard.rmse_m = kNaN;
+  record.server.proxy.nodes[5].T_world_body.translation.z() = kNaN;
+  record.transforms[0].T_from_to.translation.x() = kNaN;
+  expect_good_page(report_html(record));
+}
+
+TEST(ReportHtml, GroupsThatNeverMetGetTheirOwnPicture) {
+  MissionRecord record = test::example_record({.robots = 3, .keyframes = 60});
+  record.robots[2].component = 1;
+  record.server.components = 2;
+  record.server.proxy.components[2].component = 1;
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  std::size_t pictures = 0;
+  for (std::size_t at = html.find("The joint map from above"); at != std::string::npos;
+       at = html.find("The joint map from above", at + 1))
+    ++pictures;
+  EXPECT_EQ(pictures, 2U);
+}
+
+TEST(ReportHtml, LongMissionStaysSmall) {
+  const std::string html = report_html(test::example_record({.robots = 3, .keyframes = 1000}));
+  EXPECT_LT(html.size(), 2'000'000U);
+}
+
+}  // namespace
+}  // namespace tutti::mission

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report_json.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "tutti/mission/report_example.hpp"
+
+namespace tutti::mission {
+namespace {
+
+using nlohmann::json;
+
+std::set<std::string> keys(const json& object) {
+  std::set<std::string> out;
+  for (const auto& [key, value] : object.items()) out.insert(key);
+  return out;
+}
+
+void expect_keys(const json& object, const std::vector<std::string>& wanted) {
+  const auto have = keys(object);
+  for (const auto& key : wanted) EXPECT_TRUE(have.contains(key)) << "missing " << key << " in " << object.dump();
+}
+
+TEST(ReportJson, HasTheDocumentedKeys) {
+  const json report = json::parse(report_json(test::example_record()));
+  expect_keys(report, {"mission", "seed", "default_policy", "robots", "server", "transforms", "input", "notes",
+                       "association", "rpe_interval", "duration_s", "description"});
+  ASSERT_EQ(report["robots"].size(), 2U);
+  for (const auto& robot : report["robots"]) {
+    expect_keys(robot, {"name", "distance_m", "odometry_factors", "onboard_rmse_m", "server_rmse_m", "policies",
+                        "bytes_up", "bytes_down", "proxy_nodes"});
+    ASSERT_EQ(robot["policies"].size(), 6U);
+    for (const auto& policy : robot["policies"])
+      EXPECT_EQ(keys(policy),
+                (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "agreement_rmse_m", "constraints"}));
+  }
+  expect_keys(report["server"], {"components", "closures_accepted", "closures_rejected", "rmse_m"});
+  for (const auto& transform : report["transforms"])
+    expect_keys(transform, {"from", "to", "translation_m", "quaternion_xyzw"});
+}
+
+TEST(ReportJson, CarriesTheRecordsFigures) {
+  MissionRecord record = test::example_record();
+  record.robots[0].onboard.rmse_m = 0.1234567891;
+  const json report = json::parse(report_json(record));
+  EXPECT_EQ(report["seed"], 7);
+  EXPECT_DOUBLE_EQ(report["robots"][0]["onboard_rmse_m"], 0.123457);
+  EXPECT_EQ(report["robots"][0]["policies"]["spectral"]["constraints"], 24);
+  EXPECT_EQ(report["server"]["closures_accepted"], record.server.closures.size());
+  EXPECT_EQ(report["server"]["closure_check"]["wrong"], 0);
+  EXPECT_EQ(report["server"]["closures_rejected"], 31 + 55 + 4 + 9 + 0 + 3);
+  EXPECT_EQ(
+      report["server"]["closures_accepted_intra"].get<int>() + report["server"]["closures_accepted_inter"].get<int>(),
+      report["server"]["closures_accepted"].get<int>());
+}
+
+TEST(ReportJson, NotMeasuredIsNull) {
+  MissionRecord record = test::example_record({.reference = false});
+  record.robots[0].policies[0].agreement_rmse_m = std::numeric_limits<double>::quiet_NaN();
+  record.robots[0].distance_m = std::numeric_limits<double>::infinity();
+  const json report = json::parse(report_json(record));
+  const json& robot = report["robots"][0];
+  EXPECT_TRUE(robot["onboard_rmse_m"].is_null());
+  EXPECT_TRUE(robot["server_rmse_m"].is_null());
+  EXPECT_TRUE(robot["distance_m"].is_null());
+  EXPECT_TRUE(robot["policies"]["every_node"]["rmse_m"].is_null());
+  EXPECT_TRUE(robot["policies"]["every_node"]["agreement_rmse_m"].is_null());
+  EXPECT_FALSE(robot["policies"]["spectral"]["agreement_rmse_m"].is_null());
+  EXPECT_TRUE(report["server"]["rmse_m"].is_null());
+}
+
+TEST(ReportJson, IsTheSameWhateverTheClockSays) {
+  MissionRecord record = test::example_record();
+  const std::string before = report_json(record);
+  record.timing.wall_s = 99.0;
+  record.timing.machine = "another";
+  record.timing.policies.clear();
+  record.version = "1.2.3";
+  EXPECT_EQ(report_json(record), before);
+  record.seed = 8;
+  EXPECT_NE(report_json(record), before);
+}
+
+TEST(ReportJson, OneRotationIsPrintedOneWay) {
+  MissionRecord record = test::example_record();
+  const std::string before = report_json(record);
+  auto& q = record.transforms[0].T_from_to.rotation;
+  q.coeffs() = -q.coeffs();
+  EXPECT_EQ(report_json(record), before);
+}
+
+TEST(ReportJson, EmptyMission) {
+  const json report = json::parse(report_json(MissionRecord{}));
+  EXPECT_TRUE(report["robots"].is_array());
+  EXPECT_TRUE(report["robots"].empty());
+  EXPECT_TRUE(report["transforms"].empty());
+  EXPECT_EQ(report["server"]["components"], 0);
+  EXPECT_NO_THROW(std::ignore = json::parse(timing_json(MissionRecord{})));
+}
+
+TEST(ReportJson, BrokenUtf8DoesNotThrow) {
+  MissionRecord record;
+  record.mission = "caf\xe9 \"quoted\"\n";
+  EXPECT_NO_THROW(std::ignore = json::parse(report_json(record)));
+}
+
+TEST(TimingJson, MedianAndLargestPerPolicy) {
+  MissionRecord record;
+  record.timing.policies.push_back({"alpha", "spectral", {3.0, 1.0, 10.0, 2.0}, {}, {5.0}});
+  const json policy = json::parse(timing_json(record))["policies"][0];
+  EXPECT_EQ(policy["robot"], "alpha");
+  EXPECT_EQ(policy["policy"], "spectral");
+  EXPECT_EQ(policy["update"]["count"], 4);
+  EXPECT_DOUBLE_EQ(policy["update"]["median_ms"], 2.5);
+  EXPECT_DOUBLE_EQ(policy["update"]["max_ms"], 10.0);
+  EXPECT_TRUE(policy["comparison"]["median_ms"].is_null());
+  EXPECT_DOUBLE_EQ(policy["optimisation"]["median_ms"], 5.0);
+}
+
+}  // namespace
+}  // namespace tutti::mission

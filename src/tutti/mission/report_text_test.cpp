@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report_text.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "tutti/mission/report_example.hpp"
+#include "tutti/mission/report_format.hpp"
+
+namespace tutti::mission {
+namespace {
+
+void expect_readable(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    EXPECT_LE(line.size(), 100U) << line;
+    EXPECT_TRUE(line.empty() || line.back() != ' ') << "trailing blank: " << line;
+  }
+  EXPECT_TRUE(std::all_of(text.begin(), text.end(), [](char c) { return c == '\n' || (c >= ' ' && c <= '~'); }));
+}
+
+std::string line_with(const std::string& text, const std::string& word) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    if (line.find(word) != std::string::npos) return line;
+  return "";
+}
+
+TEST(ReportText, FitsTheScreenAndEndsWithThePath) {
+  for (const std::size_t robots : {0U, 1U, 2U, 3U, 5U}) {
+    const std::string text = report_text(test::example_record({.robots = robots}), "out/report.html");
+    expect_readable(text);
+    EXPECT_TRUE(text.ends_with("Report: out/report.html\n"));
+  }
+}
+
+TEST(ReportText, ShowsTheFigures) {
+  const std::string text = report_text(test::example_record(), "x");
+  EXPECT_NE(line_with(text, "onboard").find("0.712 m  1.400 m"), std::string::npos) << text;
+  EXPECT_NE(line_with(text, "every_node ").find("119"), std::string::npos) << text;
+  EXPECT_NE(line_with(text, "spectral *").find("0.034 m"), std::string::npos) << text;
+  EXPECT_NE(line_with(text, "server   1 map of 2 robots").find("18 between robots"), std::string::npos) << text;
+  EXPECT_NE(text.find("simulated"), std::string::npos);
+  EXPECT_NE(text.find("kB/s"), std::string::npos);
+}
+
+TEST(ReportText, SaysWhenThereIsNoReference) {
+  const std::string text = report_text(test::example_record({.reference = false}), "x");
+  EXPECT_NE(text.find("No reference"), std::string::npos);
+  expect_readable(text);
+}
+
+TEST(ReportText, EmptyMission) { expect_readable(report_text(MissionRecord{}, "x")); }
+
+TEST(Format, Words) {
+  EXPECT_EQ(format_metres(std::nullopt), "-");
+  EXPECT_EQ(format_metres(0.0126), "0.013 m");
+  EXPECT_EQ(format_distance(999.4), "999 m");
+  EXPECT_EQ(format_distance(1210.0), "1.21 km");
+  EXPECT_EQ(format_duration_ms(0.4249), "0.42 ms");
+  EXPECT_EQ(format_duration_ms(12.34), "12.3 ms");
+  EXPECT_EQ(format_duration_ms(1234.0), "1.23 s");
+  EXPECT_EQ(format_mission_time(59.6), "1 min 00 s");
+  EXPECT_EQ(format_mission_time(580.0), "9 min 40 s");
+  EXPECT_EQ(format_mission_time(3720.0), "1 h 02 min");
+  EXPECT_EQ(format_bytes(812.0), "812 B");
+  EXPECT_EQ(format_bytes(3424.0), "3.42 kB");
+  EXPECT_EQ(format_bytes(999'600.0), "1.00 MB");
+  EXPECT_EQ(format_share(26, 1000), "2.6 %");
+  EXPECT_EQ(format_share(1, 0), "-");
+}
+
+TEST(Format, SpreadIsMedianAndLargest) {
+  EXPECT_FALSE(spread({}).has_value());
+  const std::vector<double> odd{5.0, 1.0, 3.0};
+  EXPECT_DOUBLE_EQ(spread(odd)->median, 3.0);
+  EXPECT_DOUBLE_EQ(spread(odd)->max, 5.0);
+  const std::vector<double> even{4.0, 1.0, 2.0, 9.0};
+  EXPECT_DOUBLE_EQ(spread(even)->median, 3.0);
+  EXPECT_EQ(format_spread(even), "3.0 / 9.0");
+}
+
+}  // namespace
+}  // namespace tutti::mission
