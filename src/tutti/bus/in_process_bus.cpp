@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/in_process_bus.hpp"
+
+#include <algorithm>
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::bus {
+namespace {
+
+/// A proxy graph is worth sending only until there is a newer one.
+bool only_latest_counts(MessageKind kind) { return kind == MessageKind::proxy_graph; }
+
+/// First time not before `t` with contact.
+Timestamp in_contact(const LinkConfig& link, Timestamp start, Timestamp t) {
+  for (bool moved = true; moved;) {
+    moved = false;
+    for (const Outage& outage : link.outages) {
+      const Timestamp until = start + outage.until_s;
+      if (t < start + outage.from_s || t >= until) continue;
+      t = until;
+      moved = true;
+    }
+  }
+  return t;
+}
+
+}  // namespace
+
+InProcessBus::InProcessBus(Timestamp start, const LinkConfig& link, std::uint64_t seed)
+    : start_(start), now_(start), link_(link), rng_(seed) {}
+
+void InProcessBus::set_link(RobotId robot, const LinkConfig& link) {
+  for (const auto& [ends, direction] : directions_)
+    TUTTI_CHECK(ends.first.robot != robot && ends.second.robot != robot, "robot {} has sent already", robot.value);
+  links_[robot] = link;
+}
+
+void InProcessBus::subscribe(Endpoint endpoint, MessageKind kind) { subscriptions_.insert({kind, endpoint}); }
+
+void InProcessBus::unsubscribe(Endpoint endpoint, MessageKind kind) { subscriptions_.erase({kind, endpoint}); }
+
+InProcessBus::Direction& InProcessBus::direction(Endpoint from, Endpoint to) {
+  const auto found = directions_.find({from, to});
+  if (found != directions_.end()) return found->second;
+  Direction created{.free_at = start_, .last_arrival = start_};
+  const std::optional<RobotId> robot = from.robot ? from.robot : to.robot;
+  if (!robot) {
+    created.link.latency_s = 0.0;
+  } else {
+    const auto own = links_.find(*robot);
+    created.link = own == links_.end() ? link_ : own->second;
+  }
+  return directions_.emplace(std::pair{from, to}, std::move(created)).first->second;
+}
+
+TopicStatistics& InProcessBus::statistics_of(const Delivery& message) {
+  return statistics_[{message.from, message.to, message.kind}];
+}
+
+void InProcessBus::publish(Timestamp now, Endpoint from, std::optional<Endpoint> to, MessageKind kind,
+                           std::string bytes) {
+  TUTTI_CHECK(now >= now_, "time goes back from {} to {} ns", now_.ns, now.ns);
+  TUTTI_CHECK(!from.robot || !to || !to->robot, "robot {} writes to robot {}", from.robot->value, to->robot->value);
+  now_ = now;
+  advance(now);
+  Delivery message{.sent = now, .from = from, .kind = kind};
+  message.bytes = std::make_shared<const std::string>(std::move(bytes));
+  if (to) {
+    message.to = *to;
+    enqueue(now, message);
+    return;
+  }
+  for (auto at = subscriptions_.lower_bound({kind, Endpoint{}}); at != subscriptions_.end() && at->first == kind;
+       ++at) {
+    if (at->second == from || (from.robot && at->second.robot)) continue;
+    message.to = at->second;
+    enqueue(now, message);
+  }
+}
+
+void InProcessBus::enqueue(Timestamp now, Delivery message) {
+  TopicStatistics& statistics = statistics_of(message);
+  ++statistics.published;
+  statistics.published_bytes += message.bytes->size();
+  Direction& way = direction(message.from, message.to);
+  const MessageKind kind = message.kind;
+  if (only_latest_counts(kind))
+    statistics.superseded += std::erase_if(way.queue, [&](const Waiting& w) { return w.message.kind == kind; });
+  if (way.queue.size() >= static_cast<std::size_t>(way.link.queue_messages)) {
+    ++statistics_of(way.queue.front().message).dropped;
+    way.queue.pop_front();
+  }
+  way.queue.push_back({next_number_++, std::move(message)});
+  advance(now);
+}
+
+Timestamp InProcessBus::transmission_start(const Direction& way) const {
+  return in_contact(way.link, start_, std::max(way.free_at, way.queue.front().message.sent));
+}
+
+/// Sends the front of the queue.
+void InProcessBus::transmit(Direction& way, Timestamp start) {
+  const LinkConfig& link = way.link;
+  const Waiting front = std::move(way.queue.front());
+  way.queue.pop_front();
+  Delivery message = front.message;
+  TopicStatistics& statistics = statistics_of(message);
+
+  Rng rng = rng_.fork(front.number);
+  int attempts = 1;
+  bool arrives = !rng.bernoulli(link.loss);
+  while (!arrives && !only_latest_counts(message.kind)) {
+    ++attempts;
+    arrives = !rng.bernoulli(link.loss);
+  }
+  const auto size = static_cast<double>(message.bytes->size());
+  const double airtime_s = link.bandwidth_bytes_per_s > 0.0 ? attempts * size / link.bandwidth_bytes_per_s : 0.0;
+  way.free_at = start + airtime_s;
+  statistics.transmitted_bytes += static_cast<std::uint64_t>(attempts) * message.bytes->size();
+  if (!arrives) {
+    ++statistics.lost;
+    return;
+  }
+  const double retransmissions_s = (attempts - 1) * link.retransmit_s;
+  const int copies = rng.bernoulli(link.duplicate) ? 2 : 1;
+  for (int copy = 0; copy < copies; ++copy) {
+    message.arrived = way.free_at + (retransmissions_s + link.latency_s + rng.uniform(0.0, 1.0) * link.jitter_s);
+    if (link.in_order) message.arrived = std::max(message.arrived, way.last_arrival);
+    way.last_arrival = std::max(way.last_arrival, message.arrived);
+    in_flight_.emplace(message.arrived, message);
+  }
+}
+
+void InProcessBus::advance(Timestamp now) {
+  for (auto& [ends, way] : directions_)
+    while (!way.queue.empty()) {
+      const Timestamp start = transmission_start(way);
+      if (start > now) break;
+      transmit(way, start);
+    }
+}
+
+std::vector<Delivery> InProcessBus::deliver_until(Timestamp now) {
+  TUTTI_CHECK(now >= now_, "time goes back from {} to {} ns", now_.ns, now.ns);
+  now_ = now;
+  advance(now);
+  std::vector<Delivery> arrived;
+  const auto end = in_flight_.upper_bound(now);
+  for (auto at = in_flight_.begin(); at != end; ++at) {
+    ++statistics_of(at->second).delivered;
+    arrived.push_back(std::move(at->second));
+  }
+  in_flight_.erase(in_flight_.begin(), end);
+  return arrived;
+}
+
+std::optional<Timestamp> InProcessBus::next_delivery() const {
+  std::optional<Timestamp> next;
+  const auto consider = [&](Timestamp t) { next = next ? std::min(*next, t) : t; };
+  if (!in_flight_.empty()) consider(in_flight_.begin()->first);
+  for (const auto& [ends, way] : directions_)
+    if (!way.queue.empty()) consider(transmission_start(way));
+  return next;
+}
+
+}  // namespace tutti::bus

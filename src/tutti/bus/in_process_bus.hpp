@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/ids.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/base/timestamp.hpp"
+#include "tutti/wire/message_kind.hpp"
+
+namespace tutti::bus {
+
+using wire::MessageKind;
+
+/// The server, or one robot.
+struct Endpoint {
+  std::optional<RobotId> robot;  ///< Nothing = the server.
+  static Endpoint server() { return {}; }
+  static Endpoint of(RobotId id) { return {id}; }
+  friend auto operator<=>(const Endpoint&, const Endpoint&) = default;
+};
+
+/// Time without contact: [from_s, until_s) in seconds after the bus's start.
+struct Outage {
+  double from_s = 0.0;
+  double until_s = 0.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("from_s", from_s, at_least(0.0), "Contact is lost, seconds after the start of the mission.");
+    v.field("until_s", until_s, at_least(0.0), "Contact is back.");
+  }
+};
+
+/// The radio between one robot and the server, with equal properties in both directions.
+struct LinkConfig {
+  double latency_s = 0.02;
+  double jitter_s = 0.0;
+  double loss = 0.0;
+  double retransmit_s = 0.5;
+  double duplicate = 0.0;
+  bool in_order = false;
+  double bandwidth_bytes_per_s = 0.0;
+  int queue_messages = 10000;
+  std::vector<Outage> outages;
+  template <class V>
+  void describe(V& v) {
+    v.field("latency_s", latency_s, at_least(0.0), "Time from sending to arrival.");
+    v.field("jitter_s", jitter_s, at_least(0.0),
+            "Up to this much later, at random; larger than the spacing = reordered.");
+    v.field("loss", loss, between(0.0, 0.95), "Share of transmissions lost; all but proxy graphs are sent again.");
+    v.field("retransmit_s", retransmit_s, at_least(0.0), "A lost transmission is repeated after this time.");
+    v.field("duplicate", duplicate, between(0.0, 1.0), "Share of messages that arrive twice.");
+    v.field("in_order", in_order, any(), "Messages of one direction never overtake each other.");
+    v.field("bandwidth_bytes_per_s", bandwidth_bytes_per_s, at_least(0.0), "0 = unlimited.");
+    v.field("queue_messages", queue_messages, at_least(1),
+            "Messages that wait for contact or bandwidth; then the oldest is dropped.");
+    v.field("outages", outages, any(), "Times out of range; messages wait.");
+  }
+};
+
+struct Delivery {
+  Timestamp sent;
+  Timestamp arrived;
+  Endpoint from;
+  Endpoint to;
+  MessageKind kind = MessageKind::submap;
+  std::shared_ptr<const std::string> bytes;  ///< Shared by all receivers of a broadcast.
+};
+
+/// Of one (from, to, kind).
+struct TopicStatistics {
+  std::uint64_t published = 0;          ///< Messages.
+  std::uint64_t delivered = 0;          ///< Messages, duplicates counted.
+  std::uint64_t lost = 0;               ///< Messages lost for good by the link.
+  std::uint64_t superseded = 0;         ///< Waiting proxy graphs replaced by a newer one.
+  std::uint64_t dropped = 0;            ///< Messages dropped because the queue was full.
+  std::uint64_t published_bytes = 0;    ///< Payload handed to the bus.
+  std::uint64_t transmitted_bytes = 0;  ///< Payload on the radio, repetitions counted.
+  friend bool operator==(const TopicStatistics&, const TopicStatistics&) = default;
+};
+
+/// All messages of a mission in one process, in virtual time, without threads. Each robot has one link to the server;
+/// one end of every message is the server (server to server needs no link). What happens to a message is drawn from
+/// (seed, its number), so the same calls give the same deliveries. A message waits in the bounded queue of its
+/// direction until there is contact and bandwidth; of the waiting proxy graphs only the newest is kept. A lost proxy
+/// graph is lost (a newer one follows); everything else is sent again until it arrives.
+class InProcessBus {
+ public:
+  InProcessBus(Timestamp start, const LinkConfig& link, std::uint64_t seed);
+
+  /// For one robot instead of the common link; before its first message.
+  void set_link(RobotId robot, const LinkConfig& link);
+  /// Broadcasts of this kind reach this endpoint from now on.
+  void subscribe(Endpoint endpoint, MessageKind kind);
+  void unsubscribe(Endpoint endpoint, MessageKind kind);
+
+  /// `to`: one receiver, or nothing = every subscriber but the sender. `now` never goes back.
+  void publish(Timestamp now, Endpoint from, std::optional<Endpoint> to, MessageKind kind, std::string bytes);
+  /// All messages that have arrived by `now`, in the order of arrival, each once (duplicates of the link: twice).
+  std::vector<Delivery> deliver_until(Timestamp now);
+  /// Nothing arrives before this time, and nothing is under way when there is none. deliver_until() at this time may
+  /// still return nothing: a message that only now leaves its queue arrives later.
+  [[nodiscard]] std::optional<Timestamp> next_delivery() const;
+
+  using Topic = std::tuple<Endpoint, Endpoint, MessageKind>;  ///< (from, to, kind)
+  [[nodiscard]] const std::map<Topic, TopicStatistics>& statistics() const { return statistics_; }
+
+ private:
+  struct Waiting {
+    std::uint64_t number = 0;
+    Delivery message;
+  };
+  struct Direction {
+    LinkConfig link;
+    std::deque<Waiting> queue;
+    Timestamp free_at;  ///< The bandwidth is used up to here.
+    Timestamp last_arrival;
+  };
+  Direction& direction(Endpoint from, Endpoint to);
+  void enqueue(Timestamp now, Delivery message);
+  void transmit(Direction& direction, Timestamp start);
+  void advance(Timestamp now);
+  [[nodiscard]] Timestamp transmission_start(const Direction& direction) const;
+  TopicStatistics& statistics_of(const Delivery& message);
+
+  Timestamp start_;
+  Timestamp now_;
+  LinkConfig link_;
+  Rng rng_;
+  std::uint64_t next_number_ = 0;
+  std::map<RobotId, LinkConfig> links_;
+  std::set<std::pair<MessageKind, Endpoint>> subscriptions_;
+  std::map<std::pair<Endpoint, Endpoint>, Direction> directions_;
+  std::multimap<Timestamp, Delivery> in_flight_;  ///< By arrival; equal ones in the order they were sent.
+  std::map<Topic, TopicStatistics> statistics_;
+};
+
+}  // namespace tutti::bus
