@@ -105,6 +105,14 @@ struct NodeRecord {
   Timestamp stamp;
 };
 
+/// Accepted closures against the reference, where there is one (also when it does not score trajectories).
+struct ClosureCheckRecord {
+  std::size_t checked = 0;
+  std::size_t wrong = 0;  ///< By more than 0.5 m or 2 degrees.
+  double max_error_m = 0.0;
+  double max_error_deg = 0.0;
+};
+
 /// What one robot saw, in the server's world frame.
 struct CloudRecord {
   RobotId robot;
@@ -115,6 +123,7 @@ struct ServerRecord {
   std::size_t components = 0;           ///< Groups of robots that share a frame.
   std::vector<ClosureRecord> closures;  ///< Accepted.
   std::vector<RejectionRecord> rejections;
+  std::optional<ClosureCheckRecord> closure_check;
   Accuracy joint;                   ///< All robots of the largest component together, one alignment.
   std::vector<NodeRecord> nodes;    ///< One per pose of `graph`, sorted by (robot, index).
   PoseGraph graph;                  ///< T_world_body.
