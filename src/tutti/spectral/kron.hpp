@@ -17,7 +17,8 @@ struct KronReduction {
 
 /// Kron reduction: the Schur complement L_aa - L_ab L_bb^-1 L_ba, a = `keep` (any order, repetitions ignored), b = the
 /// rest. Keeps effective resistances between kept nodes; the result is a valid Laplacian again. A component without any
-/// kept node vanishes (its block of L_bb is singular, but nothing couples to it).
+/// kept node vanishes (its block of L_bb is singular, but nothing couples to it). Connected nodes stay connected; edges
+/// below 1e-16 of their nodes' degrees may be left out. The result is much denser than the original: sparsify() it.
 [[nodiscard]] KronReduction kron_reduce(const SparseMatrix& laplacian, std::span<const int> keep);
 
 /// Drops edge (a, b) when its weight is below relative_threshold * min(degree(a), degree(b)), unless it belongs to the
@@ -32,9 +33,9 @@ struct KronReduction {
                                                           std::span<const int> must_keep = {},
                                                           double noise_tolerance = 1e-10);
 
-/// Exactly min(n, max(budget, |must_keep|)) nodes, must_keep among them, spread evenly over the graph. Depends on the
-/// positions, not on the numbering of the nodes (up to nodes at the very same place). positions: one per node, the ones
-/// that the graph was built from.
+/// Exactly min(n, max(budget, |must_keep|)) nodes, must_keep among them, spread over the graph in proportion to how
+/// dense it is. Depends on the positions, not on the numbering of the nodes (up to nodes at the very same place and
+/// rounding of the degrees). Time: nodes * budget. positions: one per node, the ones that the graph was built from.
 [[nodiscard]] std::vector<int> select_budget(const SparseMatrix& laplacian, std::span<const Eigen::Vector3d> positions,
                                              int budget, std::span<const int> must_keep = {});
 
