@@ -9,16 +9,22 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/termination.hpp"
+#include "tutti/model/pose_graph.hpp"
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti::estimation {
+
+namespace internal {
+struct EdgeCosts;
+class GaussNewton;
+}  // namespace internal
 
 struct OnboardSmootherConfig {
   int max_iterations = 20;
   double relative_cost_tolerance = 1e-6;
   std::string loss = "none";
   double loss_scale = 3.0;
-  int polishing_steps = 1;
+  int polishing_steps = 0;
 
   template <class V>
   void describe(V& v) {
@@ -87,6 +93,13 @@ class OnboardSmoother {
   [[nodiscard]] const SmootherState& state() const { return state_; }
 
  private:
+  using Nodes = std::vector<std::size_t>;
+  PoseGraph reduce(const Nodes& nodes, Nodes& constraint_edges);
+  void distribute(const Nodes& nodes, const PoseGraph& graph, const std::vector<Pose3>& reduced);
+  bool polish(const Nodes& nodes, const PoseGraph& graph, const internal::EdgeCosts& costs,
+              internal::GaussNewton& gauss_newton);
+  void compose_tail(std::size_t last);
+
   OnboardSmootherConfig config_;
   SmootherState state_;
   std::vector<Pose3> poses_;

@@ -30,27 +30,54 @@ double GaussNewton::cost(std::span<const Pose3> poses, const EdgeCosts& costs) c
   return sum;
 }
 
+void GaussNewton::start_linearisation() {
+  gradient_.setZero();
+  hessian_.set_zero();
+}
+
+void GaussNewton::add_gradient(const EdgeSlot& slot, const BetweenLinearisation& factor,
+                               const Vector6d& weighted_residual) {
+  if (slot.from >= 0) gradient_.segment<6>(6 * slot.from).noalias() += factor.J_i.transpose() * weighted_residual;
+  if (slot.to >= 0) gradient_.segment<6>(6 * slot.to).noalias() += factor.J_j.transpose() * weighted_residual;
+}
+
+void GaussNewton::add_factor(std::size_t edge, const BetweenLinearisation& factor, const Matrix6d& information) {
+  const EdgeSlot& slot = structure_.edges[edge];
+  add_gradient(slot, factor, information * factor.residual);
+  const Matrix6d WJ_j = information * factor.J_j;
+  if (slot.to >= 0) hessian_.add_diagonal(slot.to, Matrix6d(factor.J_j.transpose() * WJ_j));
+  if (slot.from >= 0) {
+    const Matrix6d WJ_i = information * factor.J_i;
+    hessian_.add_diagonal(slot.from, Matrix6d(factor.J_i.transpose() * WJ_i));
+    hessian_.add_edge(slot, Matrix6d(factor.J_i.transpose() * WJ_j));
+  }
+}
+
+bool GaussNewton::solve_step(Eigen::VectorXd& step) {
+  if (!hessian_.factorise()) return false;
+  step = -gradient_;
+  hessian_.solve(step);
+  return step.allFinite();
+}
+
+Vector6d GaussNewton::step_of(const Eigen::VectorXd& step, std::size_t node) const {
+  const int variable = structure_.variable[node];
+  return variable < 0 ? Vector6d(Vector6d::Zero()) : Vector6d(step.segment<6>(6 * variable));
+}
+
 void GaussNewton::linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian) {
   gradient_.setZero();
   if (with_hessian) hessian_.set_zero();
   for (std::size_t e = 0; e < graph_.edges.size(); ++e) {
     const auto& edge = graph_.edges[e];
-    const auto& slot = structure_.edges[e];
     if (edge.from == edge.to) continue;
     const auto factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
-    Vector6d weighted_residual = edge.information * factor.residual;
-    const double weight = costs.weight(e, factor.residual.dot(weighted_residual));
-    weighted_residual *= weight;
-    if (slot.from >= 0) gradient_.segment<6>(6 * slot.from).noalias() += factor.J_i.transpose() * weighted_residual;
-    if (slot.to >= 0) gradient_.segment<6>(6 * slot.to).noalias() += factor.J_j.transpose() * weighted_residual;
-    if (!with_hessian) continue;
-    const Matrix6d WJ_j = weight * edge.information * factor.J_j;
-    if (slot.to >= 0) hessian_.add_diagonal(slot.to, Matrix6d(factor.J_j.transpose() * WJ_j));
-    if (slot.from >= 0) {
-      const Matrix6d WJ_i = weight * edge.information * factor.J_i;
-      hessian_.add_diagonal(slot.from, Matrix6d(factor.J_i.transpose() * WJ_i));
-      hessian_.add_edge(slot, Matrix6d(factor.J_i.transpose() * WJ_j));
-    }
+    const Vector6d weighted = edge.information * factor.residual;
+    const double weight = costs.weight(e, factor.residual.dot(weighted));
+    if (with_hessian)
+      add_factor(e, factor, weight * edge.information);
+    else
+      add_gradient(structure_.edges[e], factor, weight * weighted);
   }
 }
 

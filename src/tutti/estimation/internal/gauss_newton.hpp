@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/internal/block_cholesky.hpp"
 #include "tutti/estimation/internal/block_structure.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
@@ -37,12 +38,22 @@ class GaussNewton {
   /// Moves `poses` to a minimum. Uses of config: iterations, tolerance, halvings.
   SolveSummary minimise(std::vector<Pose3>& poses, const EdgeCosts& costs, const SolverConfig& config);
 
+  /// One linear system, factor by factor: start_linearisation, add_factor (position of its edge, residual and
+  /// Jacobians, weighted information), solve_step (the minimiser, in elimination order; false = singular), step_of (of
+  /// one node).
+  void start_linearisation();
+  void add_factor(std::size_t edge, const BetweenLinearisation& factor, const Matrix6d& information);
+  [[nodiscard]] bool solve_step(Eigen::VectorXd& step);
+  [[nodiscard]] Vector6d step_of(const Eigen::VectorXd& step, std::size_t node) const;
+
   [[nodiscard]] double cost(std::span<const Pose3> poses, const EdgeCosts& costs) const;
   /// Fills the Hessian J^T W J and, in elimination order, the gradient J^T W r.
   void linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian);
   [[nodiscard]] BlockCholesky& hessian() { return hessian_; }
 
  private:
+  void add_gradient(const EdgeSlot& slot, const BetweenLinearisation& factor, const Vector6d& weighted_residual);
+
   const PoseGraph& graph_;
   const BlockStructure& structure_;
   BlockCholesky hessian_;

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/internal/chain_run.hpp"
+
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::estimation::internal {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// One step in the tangent of node a: rows of the map w -> zeta are M = [R1, [t]x R2; 0, R2], that is
+/// Ad(C_k) diag(Exp(-r_theta), Jr(r_theta)).
+struct StepMap {
+  Matrix3d R1;
+  Matrix3d R2;
+  Vector3d t;
+
+  [[nodiscard]] Vector6d apply(const Vector6d& w) const {
+    Vector6d zeta;
+    zeta.tail<3>() = R2 * w.tail<3>();
+    zeta.head<3>() = R1 * w.head<3>() + t.cross(zeta.tail<3>());
+    return zeta;
+  }
+  [[nodiscard]] Vector6d apply_transposed(const Vector6d& lambda) const {
+    Vector6d out;
+    out.head<3>() = R1.transpose() * lambda.head<3>();
+    out.tail<3>() = R2.transpose() * (lambda.tail<3>() - t.cross(lambda.head<3>()));
+    return out;
+  }
+  /// sum += M Q M^T, upper and lower.
+  void add_covariance(const Matrix6d& Q, Matrix6d& sum) const {
+    const Matrix3d T = skew(t);
+    const Matrix3d A = R1 * Q.topLeftCorner<3, 3>() * R1.transpose();
+    const Matrix3d B = R1 * Q.topRightCorner<3, 3>() * R2.transpose();
+    const Matrix3d C = R2 * Q.bottomRightCorner<3, 3>() * R2.transpose();
+    const Matrix3d TC = T * C;
+    const Matrix3d BT = B * T;
+    sum.topLeftCorner<3, 3>() += A - BT - BT.transpose() - TC * T;
+    sum.topRightCorner<3, 3>() += B + TC;
+    sum.bottomLeftCorner<3, 3>() += (B + TC).transpose();
+    sum.bottomRightCorner<3, 3>() += C;
+  }
+};
+
+/// Ad(C^-1) zeta.
+Vector6d to_node(const Matrix3d& R, const Vector3d& t, const Vector6d& zeta) {
+  Vector6d delta;
+  delta.head<3>() = R.transpose() * (zeta.head<3>() - t.cross(zeta.tail<3>()));
+  delta.tail<3>() = R.transpose() * zeta.tail<3>();
+  return delta;
+}
+
+/// Linearised step: its map, and b_k already in the tangent of a.
+struct LinearStep {
+  StepMap map;
+  Matrix3d R_a_k;
+  Vector6d offset;
+};
+
+LinearStep linearise(const RelativePose& step, const Pose3& T_w_a, const Pose3& previous, const Pose3& current) {
+  const Pose3& meas = step.T_a_b;
+  const Eigen::Quaterniond q_a_w = T_w_a.rotation.conjugate();
+  const Eigen::Quaterniond q_previous = previous.rotation.conjugate();
+  const Vector3d r_t =
+      meas.rotation.conjugate() * (q_previous * (current.translation - previous.translation) - meas.translation);
+  const Vector3d r_theta = so3_log(meas.rotation.conjugate() * (q_previous * current.rotation));
+  LinearStep out;
+  out.R_a_k = (q_a_w * current.rotation).toRotationMatrix();
+  out.map.R1 = (q_a_w * (previous.rotation * meas.rotation)).toRotationMatrix();  // R_a_k Exp(-r_theta)
+  out.map.R2 = out.R_a_k * so3_right_jacobian(r_theta);
+  out.map.t = q_a_w * (current.translation - T_w_a.translation);
+  Vector6d r;
+  r << r_t, r_theta;
+  out.offset = -out.map.apply(r);
+  return out;
+}
+
+}  // namespace
+
+RunSum sum_odometry(std::span<const RelativePose> steps) {
+  RunSum sum;
+  for (const auto& step : steps) {
+    sum.T_a_b = sum.T_a_b * step.T_a_b;
+    const Matrix3d R = sum.T_a_b.rotation.toRotationMatrix();
+    StepMap{R, R, sum.T_a_b.translation}.add_covariance(step.covariance, sum.covariance);
+  }
+  return sum;
+}
+
+RunSum sum_about(std::span<const RelativePose> steps, std::span<const Pose3> poses) {
+  RunSum sum;
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const LinearStep step = linearise(steps[k], poses.front(), poses[k], poses[k + 1]);
+    step.map.add_covariance(steps[k].covariance, sum.covariance);
+    sum.offset += step.offset;
+  }
+  sum.T_a_b = poses.front().inverse() * poses.back();
+  return sum;
+}
+
+void distribute_about(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& zeta_a,
+                      const Vector6d& lambda) {
+  const Pose3 T_w_a = poses.front();
+  Pose3 previous = poses.front();
+  Vector6d zeta = zeta_a;
+  for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
+    Pose3& pose = poses[k + 1];
+    const LinearStep step = linearise(steps[k], T_w_a, previous, pose);
+    zeta += step.offset + step.map.apply(steps[k].covariance * step.map.apply_transposed(lambda));
+    previous = pose;
+    pose = retract(pose, to_node(step.R_a_k, step.map.t, zeta));
+  }
+}
+
+void distribute_odometry(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& lambda) {
+  const Pose3 T_w_a = poses.front();
+  Pose3 T_a_k;
+  Vector6d zeta = Vector6d::Zero();
+  for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
+    T_a_k = T_a_k * steps[k].T_a_b;
+    const Matrix3d R = T_a_k.rotation.toRotationMatrix();
+    const StepMap map{R, R, T_a_k.translation};
+    zeta += map.apply(steps[k].covariance * map.apply_transposed(lambda));
+    poses[k + 1] = retract(T_w_a * T_a_k, to_node(R, T_a_k.translation, zeta));
+  }
+}
+
+}  // namespace tutti::estimation::internal

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+
+#include "tutti/model/relative_pose.hpp"
+
+namespace tutti::estimation::internal {
+
+/// A run of odometry steps T_k-1_k, k = 1..m, between two nodes a = 0 and b = m, linearised about poses X_k. With
+/// E_k = X_k-1^-1 X_k and r_k = local(T_k-1_k, E_k), a step says
+///   delta_k = Ad(E_k^-1) delta_k-1 + b_k + w_k,   b_k = -G_k^-1 r_k,   w_k ~ N(0, G_k^-1 Q_k G_k^-T),
+/// G_k = d r_k / d delta_k. In the tangent of node a, zeta_k = Ad(C_k) delta_k with C_k = X_a^-1 X_k, the transport is
+/// the identity, so a whole run is a plain sum of its steps:
+///   zeta_b = zeta_a + offset + w,   w ~ N(0, covariance).
+struct RunSum {
+  Pose3 T_a_b;
+  Vector6d offset = Vector6d::Zero();
+  Matrix6d covariance = Matrix6d::Zero();
+};
+
+/// Raw odometry: X_k composed, every r_k = 0, so the offset is zero.
+RunSum sum_odometry(std::span<const RelativePose> steps);
+/// About given poses (one more than steps).
+RunSum sum_about(std::span<const RelativePose> steps, std::span<const Pose3> poses);
+
+/// The most likely inner perturbations given those of both ends, delta_a and delta_b (tangent of a, see above):
+/// zeta_k follows w_k = Q'_k Ad(C_k)^T lambda with lambda = covariance^-1 (zeta_b - zeta_a - offset). Applies them to
+/// poses 1..m-1 in place; the ends are left to the caller.
+/// `zeta_a`, `lambda` in the tangent of a.
+void distribute_about(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& zeta_a,
+                      const Vector6d& lambda);
+/// The same for raw odometry composed from the pose poses[0] on (zeta_a = 0); writes poses 1..m-1.
+void distribute_odometry(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& lambda);
+
+}  // namespace tutti::estimation::internal
