@@ -54,22 +54,30 @@ void draw_cloud(Svg& svg, const PlanView& view, const std::vector<Points2d>& clo
   for (std::size_t s = 0; s < shades.size(); ++s) svg.squares(shades[s], kCell_px, fmt::format("cloud{}", s + 1));
 }
 
-/// Two corners that hold all but the outermost 1 % on every side: a few stray returns must not shrink the picture.
-Points2d trimmed_box(const std::vector<Points2d>& clouds) {
-  std::vector<double> x;
-  std::vector<double> y;
+/// Two corners of the part of the clouds worth showing: all but the outermost 1 % on every side, and no farther from
+/// the routes than half their size (at least 4 m). A range sensor sees far more than where the robots were.
+Points2d cloud_corners(const std::vector<Points2d>& clouds, const std::vector<Points2d>& routes) {
+  constexpr double kLeast_m = 4.0;
+  std::array<std::vector<double>, 2> seen;
+  std::array<Range, 2> visited;
   for (const auto& cloud : clouds)
     for (const auto& p : cloud)
-      if (p.allFinite()) {
-        x.push_back(p.x());
-        y.push_back(p.y());
-      }
-  if (x.empty()) return {};
-  std::sort(x.begin(), x.end());
-  std::sort(y.begin(), y.end());
-  const std::size_t low = x.size() / 100;
-  const std::size_t high = x.size() - 1 - low;
-  return {{x[low], y[low]}, {x[high], y[high]}};
+      for (std::size_t axis = 0; p.allFinite() && axis < 2; ++axis) seen[axis].push_back(p[static_cast<int>(axis)]);
+  for (const auto& route : routes)
+    for (const auto& p : route)
+      for (std::size_t axis = 0; axis < 2; ++axis) visited[axis].include(p[static_cast<int>(axis)]);
+  if (seen[0].empty() || visited[0].empty || visited[1].empty) return {};
+  const double around =
+      std::max({kLeast_m, 0.5 * (visited[0].high - visited[0].low), 0.5 * (visited[1].high - visited[1].low)});
+  Points2d corners(2);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    auto& values = seen[axis];
+    std::sort(values.begin(), values.end());
+    const std::size_t cut = values.size() / 100;
+    corners[0][static_cast<int>(axis)] = std::max(values[cut], visited[axis].low - around);
+    corners[1][static_cast<int>(axis)] = std::min(values[values.size() - 1 - cut], visited[axis].high + around);
+  }
+  return corners;
 }
 
 std::vector<std::size_t> members(const MissionRecord& record, std::uint32_t component) {
@@ -130,7 +138,7 @@ std::string component_figure(const MissionRecord& record, std::uint32_t componen
     for (const auto& p : seen.cloud.points) cloud.push_back(ground(T_display_world * p.cast<double>().eval()));
   }
   std::vector<Points2d> box = layers;
-  box.push_back(trimmed_box(clouds));
+  box.push_back(cloud_corners(clouds, layers));
   const PlanView view(box, kWide_px, 0.56 * kWide_px);
   Svg svg(view.width(), view.height(), "The joint map from above: every robot's way in the server's estimate");
   draw_cloud(svg, view, clouds);
@@ -146,9 +154,13 @@ std::string component_figure(const MissionRecord& record, std::uint32_t componen
     if (layers[i].empty()) continue;
     const RobotRecord& robot = record.robots[robots[i]];
     const std::string colour = robot_class(record, robot.id);
-    svg.circle(view(layers[i].front()), 5.0, "start " + colour, robot.name + " starts here");
+    const double radius = 5.0 + 2.5 * static_cast<double>((robots.size() - 1 - i) % 4);  // rings around rings
+    svg.circle(view(layers[i].front()), radius, "start " + colour, robot.name + " starts here");
     svg.circle(view(layers[i].back()), 4.0, "end " + colour, robot.name + " ends here");
-    svg.text(view(layers[i].front()) + Eigen::Vector2d(9.0, -7.0), robot.name, "name");
+    const bool below = i % 2 == 1;  // robots often start side by side: keep the names apart
+    const bool left = i % 4 >= 2;
+    svg.text(view(layers[i].front()) + Eigen::Vector2d(left ? -9.0 : 9.0, below ? 16.0 : -7.0), robot.name, "name",
+             left ? "end" : "start");
   }
   view.draw_scale_bar(svg);
   return figure(svg.str(), "", "", true);
