@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/gnc.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/base/check.hpp"
+#include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/chi_square.hpp"
+#include "tutti/estimation/internal/chordal.hpp"
+#include "tutti/estimation/internal/gauss_newton.hpp"
+
+namespace tutti::estimation {
+namespace {
+
+/// A rejected edge keeps this weight inside the solver, so that what it alone connected stays determined.
+constexpr double kWeightFloor = 1e-8;
+/// Inner solves only follow the changing weights; the last one uses the caller's tolerance.
+constexpr double kInnerTolerance = 1e-3;
+constexpr int kInnerIterations = 4;
+
+/// Yang et al. eq. (14): weight for whitened squared error s, truncation c2 and control parameter mu.
+double tls_weight(double s, double c2, double mu) {
+  if (s >= (mu + 1.0) / mu * c2) return 0.0;
+  if (s <= mu / (mu + 1.0) * c2) return 1.0;
+  return std::sqrt(c2 * mu * (mu + 1.0) / s) - mu;
+}
+
+double squared_error(const PoseGraphEdge& edge, const std::vector<Pose3>& poses) {
+  const Vector6d r = between_residual(poses[edge.from], poses[edge.to], edge.T_from_to);
+  return r.dot(edge.information * r);
+}
+
+bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
+
+}  // namespace
+
+GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles) {
+  TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
+              graph.edges.size());
+  const std::size_t edges = graph.edges.size();
+  GncResult out;
+  out.inlier_weight.assign(edges, 1.0);
+  SolverConfig inner = config.solver;
+  inner.loss = "none";
+  out.solution = solve_pose_graph(graph, inner, roles);
+  if (!is_usable(out.solution.summary.termination)) return out;
+
+  const auto is_robust = [&](std::size_t e) { return roles.empty() || roles[e] == EdgeRole::robust; };
+  const double c2 = chi_square_6_quantile(config.confidence);
+  double worst = 0.0;
+  for (std::size_t e = 0; e < edges; ++e)
+    if (is_robust(e)) worst = std::max(worst, squared_error(graph.edges[e], out.solution.poses));
+  if (worst <= c2) return out;  // nothing to reject
+
+  const auto structure = internal::analyse_blocks(graph);
+  internal::GaussNewton gauss_newton(graph, structure);
+  std::vector<double> scale(edges, 1.0);
+  const internal::EdgeCosts costs{.loss = {}, .roles = roles, .scale = scale};
+  inner.relative_cost_tolerance = std::max(kInnerTolerance, config.solver.relative_cost_tolerance);
+  inner.max_iterations = kInnerIterations;
+  double mu = c2 / (2.0 * worst - c2);  // remark 5
+  for (bool binary = false; !binary && out.outer_iterations < config.max_outer_iterations; ++out.outer_iterations) {
+    binary = true;
+    for (std::size_t e = 0; e < edges; ++e) {
+      if (!is_robust(e)) continue;
+      out.inlier_weight[e] = tls_weight(squared_error(graph.edges[e], out.solution.poses), c2, mu);
+      binary = binary && is_binary(out.inlier_weight[e]);
+      scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
+    }
+    if (binary) inner = config.solver;
+    out.solution.summary = gauss_newton.minimise(out.solution.poses, costs, inner);
+    if (!is_usable(out.solution.summary.termination)) return out;
+    mu *= config.control_step;
+  }
+  out.solution.weights = out.inlier_weight;
+  return out;
+}
+
+}  // namespace tutti::estimation

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/internal/selected_inverse.hpp"
+
+#include <algorithm>
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::estimation::internal {
+
+SelectedInverse::SelectedInverse(const BlockCholesky::Columns& factor) {
+  const int n = static_cast<int>(factor.start.size()) - 1;
+  const auto count = [&](int j) { return factor.start[j + 1] - factor.start[j]; };
+  // Column j + 1 continues a panel when it is j's parent with one row less: its structure contains j's.
+  const auto continues = [&](int j) {
+    return count(j) == count(j + 1) + 1 && factor.row[factor.start[j] + 1] == j + 1;
+  };
+  panel_of_column_.resize(n);
+  for (int j = 0; j < n;) {
+    int end = j + 1;
+    while (end < n && count(end - 1) > 1 && continues(end - 1)) ++end;
+    Panel panel{.first = j, .columns = end - j};
+    panel.rows.assign(factor.row.begin() + factor.start[j], factor.row.begin() + factor.start[j + 1]);
+    panel.values.setZero(count(j), end - j);
+    for (int k = j; k < end; ++k) {
+      panel_of_column_[k] = static_cast<int>(panels_.size());
+      std::copy(factor.value.begin() + factor.start[k], factor.value.begin() + factor.start[k + 1],
+                panel.values.col(k - j).data() + (k - j));
+    }
+    panels_.push_back(std::move(panel));
+    j = end;
+  }
+  for (auto panel = panels_.rbegin(); panel != panels_.rend(); ++panel) invert(*panel);
+}
+
+void SelectedInverse::invert(Panel& panel) {
+  const int w = panel.columns;
+  const int m = static_cast<int>(panel.rows.size()) - w;
+  Eigen::MatrixXd L_inverse = Eigen::MatrixXd::Identity(w, w);
+  panel.values.topRows(w).triangularView<Eigen::Lower>().solveInPlace(L_inverse);
+  Eigen::MatrixXd Z_JJ = L_inverse.transpose() * L_inverse;
+  if (m > 0) {
+    const Eigen::MatrixXd Y = panel.values.bottomRows(m) * L_inverse;
+    panel.values.bottomRows(m).noalias() = -(gather_below(panel).selfadjointView<Eigen::Lower>() * Y);
+    Z_JJ.noalias() -= Y.transpose() * panel.values.bottomRows(m);
+  }
+  panel.values.topRows(w) = 0.5 * (Z_JJ + Z_JJ.transpose());
+}
+
+/// Lower triangle of Z_II. All its entries lie in the pattern of L (the rows of a column are a clique after filling).
+Eigen::MatrixXd SelectedInverse::gather_below(const Panel& panel) const {
+  const auto begin = panel.rows.begin() + panel.columns;
+  const int m = static_cast<int>(panel.rows.end() - begin);
+  Eigen::MatrixXd Z(m, m);
+  std::vector<int> index(m);
+  for (int c = 0; c < m;) {
+    const Panel& source = panels_[panel_of_column_[begin[c]]];
+    auto position = source.rows.begin();
+    for (int r = c; r < m; ++r) {  // both lists increase
+      while (*position != begin[r]) ++position;
+      index[r] = static_cast<int>(position - source.rows.begin());
+    }
+    const int group = c;
+    for (; c < m && begin[c] < source.first + source.columns; ++c) {
+      const double* column = source.values.col(begin[c] - source.first).data();
+      double* target = Z.col(c).data();
+      for (int r = std::max(c, group); r < m; ++r) target[r] = column[index[r]];
+    }
+  }
+  return Z;
+}
+
+double SelectedInverse::entry(int row, int column) const {
+  if (row < column) std::swap(row, column);
+  const Panel& panel = panels_[panel_of_column_[column]];
+  const auto found = std::lower_bound(panel.rows.begin(), panel.rows.end(), row);
+  TUTTI_CHECK(found != panel.rows.end() && *found == row, "entry {}, {} is not in the pattern", row, column);
+  return panel.values(found - panel.rows.begin(), column - panel.first);
+}
+
+Matrix6d SelectedInverse::block(int row_variable, int column_variable) const {
+  Matrix6d out;
+  for (int c = 0; c < 6; ++c)
+    for (int r = 0; r < 6; ++r) out(r, c) = entry(6 * row_variable + r, 6 * column_variable + c);
+  return out;
+}
+
+}  // namespace tutti::estimation::internal

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "tutti/estimation/internal/block_cholesky.hpp"
+#include "tutti/geometry/pose3.hpp"
+
+namespace tutti::estimation::internal {
+
+/// Entries of (L L^T)^-1 on the pattern of L (Takahashi, Fagan, Chin 1973), by panels of columns of equal structure,
+/// last panel first: with J a panel's columns, I its rows below, Y = L_IJ L_JJ^-1,
+///   Z_IJ = -Z_II Y,   Z_JJ = (L_JJ L_JJ^T)^-1 - Y^T Z_IJ.
+class SelectedInverse {
+ public:
+  explicit SelectedInverse(const BlockCholesky::Columns& factor);
+  /// 6 x 6 block of two block variables; it must be in the pattern of L.
+  [[nodiscard]] Matrix6d block(int row_variable, int column_variable) const;
+
+ private:
+  struct Panel {
+    int first = 0;           ///< First column.
+    int columns = 0;         ///< |J|
+    std::vector<int> rows;   ///< J, then I, increasing.
+    Eigen::MatrixXd values;  ///< rows x columns: first L, then Z (Z_JJ complete).
+  };
+  void invert(Panel& panel);
+  [[nodiscard]] Eigen::MatrixXd gather_below(const Panel& panel) const;
+  [[nodiscard]] double entry(int row, int column) const;
+
+  std::vector<Panel> panels_;
+  std::vector<int> panel_of_column_;
+};
+
+}  // namespace tutti::estimation::internal
