@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/evaluation/association.hpp"
 
-#include <algorithm>
+#include <cmath>
+#include <optional>
 
 namespace tutti::evaluation {
 namespace {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <iterator>
 #include <numeric>
+#include <span>
 
 #include "tutti/base/check.hpp"
 #include "tutti/formats/internal/chain.hpp"
@@ -85,7 +86,7 @@ Result<Matrix6d> read_information(const LineReader& line, std::size_t first, boo
   }
   if (is_2d) {
     const auto or_one = [](double value) { return value > 0.0 ? value : 1.0; };
-    information(2, 2) = or_one(0.5 * (information(0, 0) + information(1, 1)));
+    information(2, 2) = or_one(0.5 * information(0, 0) + 0.5 * information(1, 1));
     information(3, 3) = information(4, 4) = or_one(information(5, 5));
   }
   if (auto ok = check_semi_definite(line, information); !ok) return tl::unexpected(ok.error());
@@ -199,6 +200,10 @@ Result<G2oFile> assemble(const Lines& lines, const std::string& name) {
     if (components != 1)
       return fail(ErrorCode::invalid, "{}: no VERTEX lines and {} connected components, expected 1 to chain poses in",
                   name, components);
+    for (std::size_t i = 0; i < file.graph.poses.size(); ++i)
+      if (!file.graph.poses[i].translation.allFinite())
+        return fail(ErrorCode::invalid, "{}: position of vertex {}, chained from the edges, is not finite", name,
+                    file.vertex_ids[i]);
   }
   return file;
 }

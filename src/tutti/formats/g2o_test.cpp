@@ -241,6 +241,7 @@ TEST(G2o, SurvivesAnyBytes) {
   const auto is_sound = [](const G2oFile& file) {
     const auto valid = [](const Pose3& pose) { return is_valid(pose, 1e-9); };
     return file.graph.poses.size() == file.vertex_ids.size() &&
+           std::all_of(file.graph.poses.begin(), file.graph.poses.end(), valid) &&
            std::all_of(file.graph.edges.begin(), file.graph.edges.end(), [&](const PoseGraphEdge& edge) {
              return edge.from < file.graph.poses.size() && edge.to < file.graph.poses.size() && edge.from != edge.to &&
                     valid(edge.T_from_to) && edge.information.allFinite();

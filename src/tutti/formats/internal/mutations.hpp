@@ -32,6 +32,7 @@ inline std::string damaged(std::string text) {
                                                   ",",
                                                   "4294967297",
                                                   "1e18",
+                                                  "1e308",
                                                   "x"};
   const int changes = *rc::gen::inRange(1, 5);
   for (int i = 0; i < changes; ++i) {

@@ -13,13 +13,28 @@
 namespace tutti::formats::internal {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\f\v";
+constexpr bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+/// `line` is trimmed and not empty.
+void split(std::string_view line, Separator separator, std::vector<std::string_view>& columns) {
+  const auto is_separator = [separator](char c) { return separator == Separator::comma ? c == ',' : is_blank(c); };
+  columns.clear();
+  while (true) {
+    std::size_t end = 0;
+    while (end < line.size() && !is_separator(line[end])) ++end;
+    columns.push_back(trimmed(line.substr(0, end)));
+    if (end == line.size()) return;
+    line.remove_prefix(end + 1);
+    if (separator == Separator::whitespace)
+      while (is_blank(line.front())) line.remove_prefix(1);  // stops: the line does not end with one
+  }
 }
 
 template <class T>
@@ -129,14 +144,7 @@ bool LineReader::next() {
     line = trimmed(line.substr(0, line.find('#')));
     if (line.empty()) continue;
 
-    columns_.clear();
-    while (true) {
-      const std::size_t cut = separator_ == Separator::comma ? line.find(',') : line.find_first_of(kBlanks);
-      columns_.push_back(trimmed(line.substr(0, cut)));
-      if (cut == std::string_view::npos) break;
-      line.remove_prefix(cut + 1);
-      if (separator_ == Separator::whitespace) line = trimmed(line);
-    }
+    split(line, separator_, columns_);
     return true;
   }
   columns_.clear();
