@@ -2,6 +2,7 @@
 #include "tutti/consistency/constraint.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "tutti/base/check.hpp"
 
@@ -56,14 +57,15 @@ Constraint ConstraintMaker::make(std::size_t a, std::size_t b, ConstraintKind ki
   const Node& from = nodes_[std::min(a, b)];
   const Node& to = nodes_[std::max(a, b)];
   Constraint out{from.stamp, to.stamp, from.chain_index, to.chain_index, {}, kind, revision_};
+  out.support = *std::min_element(support_.begin() + static_cast<std::ptrdiff_t>(from.proxy) + 1,
+                                  support_.begin() + static_cast<std::ptrdiff_t>(to.proxy) + 1);
   out.measurement.T_a_b = from.T_start_body.inverse() * to.T_start_body;
   Matrix6d covariance = moved(to.T_start_body.inverse(), to.covariance_sum - from.covariance_sum);
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
-  covariance.diagonal().head<3>().array() += config_.floor_translation_m * config_.floor_translation_m;
-  covariance.diagonal().tail<3>().array() += config_.floor_rotation_rad * config_.floor_rotation_rad;
+  const double factor = distrust(out.support, config_);
+  covariance.diagonal().head<3>().array() += std::pow(factor * config_.floor_translation_m, 2);
+  covariance.diagonal().tail<3>().array() += std::pow(factor * config_.floor_rotation_rad, 2);
   out.measurement.covariance = covariance;
-  out.support = *std::min_element(support_.begin() + static_cast<std::ptrdiff_t>(from.proxy) + 1,
-                                  support_.begin() + static_cast<std::ptrdiff_t>(to.proxy) + 1);
   return out;
 }
 

@@ -37,9 +37,9 @@ struct ConstraintConfig {
   template <class V>
   void describe(V& v) {
     v.field("floor_translation_m", floor_translation_m, greater_than(0.0),
-            "Standard deviation added to every constraint's translation.");
+            "Least standard deviation of the server's relative position, before trust.");
     v.field("floor_rotation_rad", floor_rotation_rad, greater_than(0.0),
-            "Standard deviation added to every constraint's rotation.");
+            "Least standard deviation of the server's relative rotation, before trust.");
     v.field(
         "trust", trust, between(1e-3, 1.0),
         "Standard deviation of a well supported constraint as a fraction of the server's own: the server's estimate "
@@ -57,9 +57,12 @@ double distrust(std::uint32_t support, const ConstraintConfig& config);
 
 /// Makes constraints between synchronised nodes of one robot from the server's poses.
 ///   T_from_to = T_world_from^-1 T_world_to,
-///   cov = sum over the proxy nodes k in (from, to] of distrust(k)^2 Ad(T_to_k) cov_k Ad(T_to_k)^T + floor^2,
-/// that is: the nodes' covariances compounded along the chain. O(1) per constraint after O(n) preparation.
-/// Keeps copies only; the arguments may go.
+///   cov = sum over the proxy nodes k in (from, to] of distrust(k)^2 Ad(T_to_k) cov_k Ad(T_to_k)^T
+///         + distrust(the least supported k)^2 floor^2,
+/// that is: the nodes' covariances compounded along the chain, none better than the floor, each scaled by trust. The
+/// floor is scaled too: a floor of 1 mrad on a link of 1 m between nodes whose odometry is as good would leave the
+/// robot half-way (measured: 1295 consecutive links end 1.1 m from the server instead of centimetres). O(1) per
+/// constraint after O(n) preparation, but for the least support. Keeps copies only; the arguments may go.
 class ConstraintMaker {
  public:
   ConstraintMaker(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,

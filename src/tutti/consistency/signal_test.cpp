@@ -30,7 +30,7 @@ TEST(Signal, ShapesOfNothingAndOne) {
 }
 
 TEST(Signal, DistanceIsThePapers) {
-  const std::vector<Pose3> poses{{{}, {1, 2, 3}}, {{}, {4, 6, 3}}, {{}, {1, 2, 5}}};
+  const std::vector<Pose3> poses{test::at(1, 2, 3), test::at(4, 6, 3), test::at(1, 2, 5)};
   EXPECT_TRUE(DistanceSignal().evaluate(poses).isApprox(Eigen::Vector3d(0, 5, 2)));
 }
 

@@ -29,6 +29,8 @@ inline Pose3 random_pose(Rng& rng, double extent_m) {
   return {so3_exp(turn), extent_m * Eigen::Vector3d(rng.normal(), rng.normal(), rng.normal())};
 }
 
+inline Pose3 at(double x, double y, double z) { return {Eigen::Quaterniond::Identity(), {x, y, z}}; }
+
 inline std::vector<Pose3> moved(const Pose3& T, std::vector<Pose3> poses) {
   for (Pose3& pose : poses) pose = T * pose;
   return poses;
@@ -60,6 +62,24 @@ inline std::vector<Pose3> corridor(std::size_t length) {
   return poses;
 }
 
+/// `length` nodes, one per metre, half of them into a winding tunnel and half of them back, 3 m beside: some 26
+/// neighbours within 7 m, as in the paper's tunnel.
+inline std::vector<Pose3> tunnel(std::size_t length) {
+  std::vector<Pose3> out;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  for (std::size_t n = 0; n < (length + 1) / 2; ++n) {
+    const double heading = 0.8 * std::sin(static_cast<double>(n) / 70.0);
+    out.push_back({so3_exp(Eigen::Vector3d(0, 0, heading)), at});
+    at += Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.02);
+  }
+  for (std::size_t n = out.size(); out.size() < length;) {
+    const Pose3& there = out[--n];
+    out.push_back({there.rotation * so3_exp(Eigen::Vector3d(0, 0, std::numbers::pi)),
+                   there.translation + there.rotation * Eigen::Vector3d(0.5, 3.0, 0.0)});
+  }
+  return out;
+}
+
 struct ServerNoise {
   double smooth_m = 0.07;  ///< Amplitude of an error with wavelengths of some 100 m.
   double local_m = 0.005;  ///< Independent per node.
@@ -84,10 +104,10 @@ inline std::vector<Pose3> server_estimate(const std::vector<Pose3>& truth, const
 }
 
 struct OdometryNoise {
-  double translation_m = 0.005;  ///< Random walk, per square root of metre.
-  double rotation_rad = 0.0005;  ///< Random walk, per square root of metre.
-  double yaw_bias_rad = 0.0;     ///< Per metre.
-  double scale_bias = 0.0;       ///< Share of the distance.
+  double translation_m = 0.01;  ///< Random walk, per square root of metre.
+  double rotation_rad = 0.001;  ///< Random walk, per square root of metre.
+  double yaw_bias_rad = 0.0;    ///< Per metre.
+  double scale_bias = 0.0;      ///< Share of the distance.
 };
 
 /// Increments node -> node + 1 as odometry measures them.
