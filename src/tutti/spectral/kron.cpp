@@ -174,7 +174,8 @@ SparseMatrix sparsify(const SparseMatrix& laplacian, double relative_threshold) 
 std::vector<int> select_largest_eigenvector(const SparseMatrix& laplacian, std::span<const int> must_keep,
                                             double noise_tolerance) {
   std::vector<char> mask = mask_of(static_cast<int>(laplacian.cols()), must_keep);
-  const Eigen::VectorXd u_max = largest_eigenpair(laplacian).vector;
+  constexpr double kTolerance = 1e-13;  // signs of small entries hang on it
+  const Eigen::VectorXd u_max = largest_eigenpair(laplacian, kTolerance).vector;
   for (Eigen::Index n = 0; n < u_max.size(); ++n)
     if (u_max[n] >= -noise_tolerance) mask[static_cast<std::size_t>(n)] = 1;  // eq. (3)
   return nodes_of(mask);

@@ -55,31 +55,39 @@ Spectrum dense_spectrum(const SparseMatrix& laplacian) {
   return out;
 }
 
+namespace {
+
+ExtremalPair dense_largest_eigenpair(const SparseMatrix& laplacian) {
+  const Spectrum spectrum = dense_spectrum(laplacian);
+  const Index last = laplacian.rows() - 1;
+  return {.value = spectrum.eigenvalues[last], .vector = spectrum.eigenvectors.col(last), .converged = true};
+}
+
+}  // namespace
+
 ExtremalPair largest_eigenpair(const SparseMatrix& laplacian, double tolerance) {
   constexpr Index kDenseUpTo = 64;
   const Index n = laplacian.rows();
   if (n == 0) return {.converged = true};
   if (largest_eigenvalue_bound(laplacian) == 0.0) return {.vector = Eigen::VectorXd::Unit(n, 0), .converged = true};
-  if (n <= kDenseUpTo) {
-    const Spectrum spectrum = dense_spectrum(laplacian);
-    return {.value = spectrum.eigenvalues[n - 1], .vector = spectrum.eigenvectors.col(n - 1), .converged = true};
-  }
+  if (n <= kDenseUpTo) return dense_largest_eigenpair(laplacian);
   constexpr Index kKrylov = 40;
   constexpr Index kMaxRestarts = 1000;
   const internal::RowBlocks blocks(laplacian);
   Operator product(blocks);
   Spectra::SymEigsSolver<Operator> solver(product, 1, kKrylov);
-  const Eigen::VectorXd start = internal::start_vector(blocks);
-  solver.init(start.data());
+  solver.init(internal::start_vector(blocks).data());
   solver.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, tolerance);
   ExtremalPair out{.vector = Eigen::VectorXd::Zero(n), .iterations = static_cast<int>(solver.num_operations())};
-  if (solver.info() != Spectra::CompInfo::Successful) return out;
-  out.value = solver.eigenvalues()[0];
-  blocks.from_blocks(solver.eigenvectors(1).col(0), out.vector);
-  out.vector.normalize();
-  fix_sign(out.vector);
-  out.converged = (laplacian * out.vector - out.value * out.vector).norm() <= tolerance * out.value;
-  return out;
+  if (solver.info() == Spectra::CompInfo::Successful) {
+    out.value = solver.eigenvalues()[0];
+    blocks.from_blocks(solver.eigenvectors(1).col(0), out.vector);
+    out.vector.normalize();
+    fix_sign(out.vector);
+    out.converged = (laplacian * out.vector - out.value * out.vector).norm() <= tolerance * out.value;
+  }
+  // Spectra 1.0 breaks down where a start vector holds fewer than kKrylov eigenvectors (the complete graph has two).
+  return out.converged ? out : dense_largest_eigenpair(laplacian);
 }
 
 double largest_eigenvalue(const SparseMatrix& laplacian, double tolerance) {

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/spectral/wavelet_transform.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+
+#include "tutti/spectral/testing/graphs.hpp"
+
+namespace tutti::spectral {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd random_signals(int nodes, int count, Rng& rng) {
+  return MatrixXd::NullaryExpr(nodes, count, [&] { return rng.uniform(-100.0, 100.0); });
+}
+
+SparseMatrix random_graph(int nodes, Rng& rng) {
+  return testing::laplacian_of(nodes, testing::random_edges(nodes, *rc::gen::inRange(1, 4), rng));
+}
+
+RC_GTEST_PROP(ExactTransform, KeepsTheEnergyAndConstants, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const int nodes = *rc::gen::inRange(1, 60);
+  const int scales = *rc::gen::inRange(1, 9);
+  const Spectrum spectrum = dense_spectrum(random_graph(nodes, rng));
+  const MeyerFilterBank bank(scales, spectrum.eigenvalues[nodes - 1]);
+  const MatrixXd signals = random_signals(nodes, 2, rng);
+  const MatrixXd coefficients = exact_transform(spectrum, bank, signals);
+  RC_ASSERT(coefficients.cols() == 2 * scales);
+  for (int c = 0; c < 2; ++c) {
+    double energy = 0.0;
+    for (int s = 0; s < scales; ++s) energy += coefficients.col(2 * s + c).squaredNorm();
+    RC_ASSERT(std::abs(energy - signals.col(c).squaredNorm()) <= 1e-11 * (1.0 + energy));  // tight frame
+  }
+  const MatrixXd constant = exact_transform(spectrum, bank, VectorXd::Constant(nodes, 300.0));
+  RC_ASSERT((constant.col(0).array() - 300.0).abs().maxCoeff() <= 1e-9);
+  RC_ASSERT((scales == 1 || constant.rightCols(scales - 1).cwiseAbs().maxCoeff() <= 1e-9));
+}
+
+RC_GTEST_PROP(ChebyshevTransform, IsWithinTheToleranceAskedFor, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const int nodes = *rc::gen::inRange(1, 80);
+  const int scales = *rc::gen::inRange(1, 8);
+  const SparseMatrix L = random_graph(nodes, rng);
+  const Spectrum spectrum = dense_spectrum(L);
+  // A bank for this graph, for one with a larger, or for one with a smaller spectrum.
+  const MeyerFilterBank bank(scales, spectrum.eigenvalues[nodes - 1] * *rc::gen::element(1.0, 1.0, 2.5, 0.6));
+  const MatrixXd signals = random_signals(nodes, 3, rng);
+  const MatrixXd exact = exact_transform(spectrum, bank, signals);
+  const double tolerance = *rc::gen::element(10.0, 1.0, 0.1, 1e-2, 1e-4);
+  const auto result = chebyshev_transform(L, bank, signals, {.tolerance = tolerance, .max_order = 100000});
+  RC_ASSERT(result.converged);
+  RC_ASSERT(result.error_bound <= tolerance);
+  RC_ASSERT((result.coefficients - exact).cwiseAbs().maxCoeff() <= result.error_bound + 1e-10);
+}
+
+RC_GTEST_PROP(ChebyshevTransform, SaysSoWhenTheOrderIsTooSmall, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const int nodes = *rc::gen::inRange(20, 80);
+  const SparseMatrix L = random_graph(nodes, rng);
+  const Spectrum spectrum = dense_spectrum(L);
+  const MeyerFilterBank bank(6, spectrum.eigenvalues[nodes - 1]);
+  const MatrixXd signals = random_signals(nodes, 1, rng);
+  const int max_order = *rc::gen::inRange(1, 60);
+  const auto result = chebyshev_transform(L, bank, signals, {.tolerance = 1e-6, .max_order = max_order});
+  RC_ASSERT(!result.converged);
+  RC_ASSERT(result.order <= max_order);
+  const double error = (result.coefficients - exact_transform(spectrum, bank, signals)).cwiseAbs().maxCoeff();
+  RC_ASSERT(error <= result.error_bound);  // the bound holds all the same
+}
+
+RC_GTEST_PROP(ChebyshevTransform, CoefficientsMoveWithTheNodes, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const int nodes = *rc::gen::inRange(2, 60);
+  const auto edges = testing::random_edges(nodes, 2, rng);
+  const auto to = testing::random_permutation(nodes, rng);
+  std::vector<WeightedEdge> moved_edges;
+  for (const auto& e : edges)
+    moved_edges.push_back({to[static_cast<std::size_t>(e.a)], to[static_cast<std::size_t>(e.b)], e.weight});
+  const SparseMatrix L = testing::laplacian_of(nodes, edges);
+  const SparseMatrix moved_L = testing::laplacian_of(nodes, moved_edges);
+  const MatrixXd signal = random_signals(nodes, 1, rng);
+  MatrixXd moved_signal(nodes, 1);
+  for (int n = 0; n < nodes; ++n) moved_signal(to[static_cast<std::size_t>(n)], 0) = signal(n, 0);
+
+  const MeyerFilterBank bank(7, largest_eigenvalue(L));
+  const MatrixXd exact = exact_transform(dense_spectrum(L), bank, signal);
+  const MatrixXd moved_exact = exact_transform(dense_spectrum(moved_L), bank, moved_signal);
+  const ChebyshevConfig config{.tolerance = 1e-3, .max_order = 100000};
+  const MatrixXd chebyshev = chebyshev_transform(L, bank, signal, config).coefficients;
+  const MatrixXd moved_chebyshev = chebyshev_transform(moved_L, bank, moved_signal, config).coefficients;
+  for (int n = 0; n < nodes; ++n) {
+    const int m = to[static_cast<std::size_t>(n)];
+    RC_ASSERT((exact.row(n) - moved_exact.row(m)).cwiseAbs().maxCoeff() <= 1e-10);
+    RC_ASSERT((chebyshev.row(n) - moved_chebyshev.row(m)).cwiseAbs().maxCoeff() <= 1e-10);
+  }
+}
+
+TEST(ChebyshevTransform, ConstantsPerComponentPassExactly) {
+  const SparseMatrix L = testing::laplacian_of(6, {{0, 1, 1.0}, {1, 2, 2.0}, {3, 4, 0.5}});  // node 5 is isolated
+  const VectorXd signal = (VectorXd(6) << 7, 7, 7, -300, -300, 1e6).finished();
+  const auto result = chebyshev_transform(L, MeyerFilterBank(4, 5.0), signal);
+  EXPECT_EQ(result.coefficients.col(0), signal);
+  EXPECT_EQ(result.coefficients.rightCols(3), MatrixXd::Zero(6, 3));
+  EXPECT_TRUE(result.converged);
+  EXPECT_EQ(result.error_bound, 0.0);
+}
+
+TEST(ChebyshevTransform, TunnelOfSeveralTolerances) {
+  const auto positions = testing::tunnel(400, 1.0, Rng(3));
+  const SparseMatrix L = laplacian(proximity_adjacency(positions, 7.0, 1.0));
+  const VectorXd signal = testing::distance_signal(positions);
+  const MeyerFilterBank bank(7, largest_eigenvalue(L));
+  const MatrixXd exact = exact_transform(dense_spectrum(L), bank, signal);
+  int order = 0;
+  for (const double tolerance : {1.0, 1e-2, 1e-4}) {
+    const auto result = chebyshev_transform(L, bank, signal, {.tolerance = tolerance, .max_order = 20000});
+    EXPECT_TRUE(result.converged);
+    EXPECT_LE((result.coefficients - exact).cwiseAbs().maxCoeff(), tolerance);
+    EXPECT_GT(result.order, order);
+    order = result.order;
+  }
+}
+
+TEST(Transforms, SmallestGraphs) {
+  const MeyerFilterBank bank(3, 0.0);
+  const SparseMatrix none(0, 0);
+  EXPECT_EQ(exact_transform(dense_spectrum(none), bank, MatrixXd(0, 2)).cols(), 6);
+  EXPECT_EQ(chebyshev_transform(none, bank, MatrixXd(0, 2)).coefficients.cols(), 6);
+  const SparseMatrix one = testing::laplacian_of(1, {});
+  const MatrixXd expected = (MatrixXd(1, 3) << 5, 0, 0).finished();
+  EXPECT_EQ(exact_transform(dense_spectrum(one), bank, MatrixXd::Constant(1, 1, 5.0)), expected);
+  EXPECT_EQ(chebyshev_transform(one, bank, MatrixXd::Constant(1, 1, 5.0)).coefficients, expected);
+  EXPECT_EQ(chebyshev_transform(one, bank, MatrixXd(1, 0)).coefficients.cols(), 0);
+  EXPECT_THROW((void)chebyshev_transform(one, bank, MatrixXd(2, 1)), std::logic_error);
+}
+
+}  // namespace
+}  // namespace tutti::spectral
