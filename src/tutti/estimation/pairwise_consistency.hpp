@@ -20,7 +20,7 @@ struct OdometryChain {
 };
 
 struct PairwiseConsistencyConfig {
-  double confidence = 0.99;
+  double confidence = 0.999;
   std::uint64_t max_search_steps = 200'000;
 
   template <class V>

@@ -73,9 +73,9 @@ class Search {
     return static_cast<int>(64 * w) + std::countr_zero(word);
   }
 
-  /// Greedy from the best-connected vertices, each result improved.
+  /// Greedy from vertices of every degree, the best result improved.
   void grow_from_every_vertex(const Bits& all) {
-    constexpr std::size_t kStarts = 32;
+    constexpr std::size_t kStarts = 8;
     std::vector<int> order(graph_.vertices());
     std::iota(order.begin(), order.end(), 0);
     std::vector<int> degree(order.size());
@@ -87,9 +87,9 @@ class Search {
       Bits candidates = all;
       intersect(candidates, graph_.row(start));
       grow(clique, candidates);
-      while (exchange(clique, all)) {
-      }
       if (clique.size() > best_.size()) best_ = clique;
+    }
+    while (exchange(best_, all)) {
     }
   }
 

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimise_command.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tutti/estimation/gnc.hpp"
+#include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/formats/g2o.hpp"
+
+namespace {
+
+using namespace tutti;
+using namespace tutti::estimation;
+
+struct OptimiseOptions {
+  std::string input;
+  std::string output;
+  std::string initialisation = "chordal";
+  std::string loss = "none";
+  int max_iterations = SolverConfig{}.max_iterations;
+  bool json = false;
+};
+
+struct Outcome {
+  PoseGraphSolution solution;
+  double chi2_before = 0.0;
+  double chi2_after = 0.0;
+  int rejected = 0;  ///< Edges with weight below 0.5.
+  double time_s = 0.0;
+};
+
+Outcome optimise(PoseGraph graph, const OptimiseOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  Outcome out;
+  out.chi2_before = chi2(graph);
+  const auto roles = roles_from_numbering(graph);
+  SolverConfig config{.max_iterations = options.max_iterations, .initialisation = options.initialisation};
+  if (options.loss == "gnc") {
+    out.solution = solve_pose_graph_gnc(graph, {.solver = config}, roles).solution;
+  } else {
+    config.loss = options.loss;
+    config.loss_scale = 3.0;  // standard deviations
+    out.solution = solve_pose_graph(graph, config, roles);
+  }
+  graph.poses = out.solution.poses;
+  out.chi2_after = chi2(graph);
+  for (const double weight : out.solution.weights) out.rejected += weight < 0.5 ? 1 : 0;
+  out.time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return out;
+}
+
+void print(const PoseGraph& graph, const Outcome& outcome, const OptimiseOptions& options) {
+  const auto& summary = outcome.solution.summary;
+  if (options.json) {
+    const nlohmann::ordered_json json{{"nodes", graph.poses.size()},
+                                      {"edges", graph.edges.size()},
+                                      {"components", summary.components},
+                                      {"chi2_before", outcome.chi2_before},
+                                      {"chi2_after", outcome.chi2_after},
+                                      {"downweighted_edges", outcome.rejected},
+                                      {"iterations", summary.iterations},
+                                      {"time_s", outcome.time_s},
+                                      {"termination", std::string(to_string(summary.termination))}};
+    fmt::print("{}\n", json.dump(2));
+    return;
+  }
+  fmt::print("nodes        {}\nedges        {}\ncomponents   {}\n", graph.poses.size(), graph.edges.size(),
+             summary.components);
+  fmt::print("chi2         {:.6g} -> {:.6g}\n", outcome.chi2_before, outcome.chi2_after);
+  if (options.loss != "none") fmt::print("down-weighted edges {}\n", outcome.rejected);
+  fmt::print("iterations   {}\ntime         {:.1f} ms\ntermination  {}\n", summary.iterations, 1e3 * outcome.time_s,
+             to_string(summary.termination));
+}
+
+int run(const OptimiseOptions& options) {
+  auto file = formats::read_g2o(options.input);
+  if (!file) {
+    fmt::print(stderr, "tutti optimise: {}\n", file.error().message);
+    return 1;
+  }
+  const Outcome outcome = optimise(file->graph, options);
+  print(file->graph, outcome, options);
+  const auto termination = outcome.solution.summary.termination;
+  if (!is_usable(termination)) {
+    fmt::print(stderr, "tutti optimise: {}: {}; nothing written\n", options.input,
+               termination == Termination::singular ? "the edges do not determine every pose (singular)"
+                                                    : "a pose or an edge is not a number");
+    return 1;
+  }
+  file->graph.poses = outcome.solution.poses;
+  if (const auto written = formats::write_g2o(options.output, *file); !written) {
+    fmt::print(stderr, "tutti optimise: {}\n", written.error().message);
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_optimise_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<OptimiseOptions>();
+  auto* command = app.add_subcommand("optimise", "Optimise one pose graph, from g2o file to g2o file.");
+  command->footer(
+      "Gauss-Newton on sparse Cholesky; the first vertex of every connected component stays where it is.\n"
+      "SE(2) graphs are optimised lifted to SE(3). With a robust loss or gnc, edges between vertices that follow each\n"
+      "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
+      "Example: tutti optimise sphere2500.g2o -o out.g2o\n");
+  command->add_option("input", options->input, "Graph to read (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional).")
+      ->required()
+      ->type_name("IN.g2o");
+  command->add_option("-o,--output", options->output, "Where to write the optimised graph.")
+      ->required()
+      ->type_name("OUT.g2o");
+  command
+      ->add_option("--init", options->initialisation,
+                   "Start from the measurements alone (chordal) or from the file's vertices (given).")
+      ->check(CLI::IsMember({"chordal", "given"}))
+      ->capture_default_str();
+  command->add_option("--loss", options->loss, "Against wrong edges; huber and cauchy at 3 standard deviations.")
+      ->check(CLI::IsMember({"none", "huber", "cauchy", "gnc"}))
+      ->capture_default_str();
+  command->add_option("--max-iterations", options->max_iterations, "Gauss-Newton steps at most.")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "Print the summary as JSON.");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}

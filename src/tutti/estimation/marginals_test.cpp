@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/marginals.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/testing/random_graphs.hpp"
+
+namespace tutti::estimation {
+namespace {
+
+using namespace testing;
+using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
+
+/// The same by a dense inverse; node 0 fixed.
+Matrix6d dense_relative_covariance(const PoseGraph& graph, std::size_t a, std::size_t b,
+                                   const std::vector<double>& weights) {
+  const auto n = static_cast<Eigen::Index>(6 * graph.poses.size());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const auto& edge = graph.edges[e];
+    const auto factor = linearise_between(graph.poses[edge.from], graph.poses[edge.to], edge.T_from_to);
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, n);
+    J.middleCols<6>(static_cast<Eigen::Index>(6 * edge.from)) = factor.J_i;
+    J.middleCols<6>(static_cast<Eigen::Index>(6 * edge.to)) = factor.J_j;
+    H += weights[e] * J.transpose() * edge.information * J;
+  }
+  H.topLeftCorner<6, 6>() += 1e12 * Matrix6d::Identity();  // the anchor
+  const Eigen::MatrixXd covariance = H.inverse();
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, n);
+  J.middleCols<6>(static_cast<Eigen::Index>(6 * a)) = -adjoint(graph.poses[b].inverse() * graph.poses[a]);
+  J.middleCols<6>(static_cast<Eigen::Index>(6 * b)) = Matrix6d::Identity();
+  return J * covariance * J.transpose();
+}
+
+TEST(Marginals, AreTheBlocksOfTheDenseInverse) {
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    Rng rng(seed);
+    const PoseGraph graph = random_graph(rng, 30, 5 * seed, 1.0).graph;
+    std::vector<double> weights;
+    for (std::size_t e = 0; e < graph.edges.size(); ++e) weights.push_back(rng.uniform(0.5, 1.0));
+    const Pairs pairs{{0, 1}, {1, 0}, {4, 5}, {17, 3}, {29, 0}, {28, 29}, {7, 22}};
+    const auto covariances = relative_covariances(graph, graph.poses, pairs, weights);
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const Matrix6d expected = dense_relative_covariance(graph, pairs[k].first, pairs[k].second, weights);
+      EXPECT_LT((covariances[k] - expected).norm(), 1e-7 * expected.norm()) << seed << " " << k;
+    }
+  }
+}
+
+TEST(Marginals, OfAChainAreItsStepsCompounded) {
+  Rng rng(3);
+  const auto random = random_graph(rng, 40, 0, 0.0);
+  Matrix6d expected = random.covariances[10];
+  for (std::size_t k = 11; k < 25; ++k)
+    expected = compound_covariance(random.graph.edges[k].T_from_to, expected, random.covariances[k]);
+  const auto covariances = relative_covariances(random.graph, random.truth, Pairs{{10, 25}, {12, 13}});
+  EXPECT_LT((covariances[0] - expected).norm(), 1e-8 * expected.norm());
+  EXPECT_LT((covariances[1] - random.covariances[12]).norm(), 1e-8 * expected.norm());
+}
+
+TEST(Marginals, DescribeTheScatterOfTheSolution) {
+  // A loop closure halfway round must not raise any covariance.
+  Rng rng(4);
+  const auto random = random_graph(rng, 40, 0, 0.0);
+  PoseGraph closed = random.graph;
+  closed.edges.push_back({0, 39, random.truth[0].inverse() * random.truth[39], closed.edges[0].information});
+  const Pairs pairs{{5, 6}, {0, 39}, {10, 30}};
+  const auto open = relative_covariances(random.graph, random.truth, pairs);
+  const auto tied = relative_covariances(closed, random.truth, pairs);
+  for (std::size_t k = 0; k < pairs.size(); ++k) EXPECT_LT(tied[k].trace(), open[k].trace());
+}
+
+TEST(Marginals, SayWhatIsNotDetermined) {
+  Rng rng(5);
+  PoseGraph graph = random_graph(rng, 10, 0, 0.0).graph;
+  graph.edges.erase(graph.edges.begin() + 4);  // nodes 0..4 and 5..9
+  const auto covariances = relative_covariances(graph, graph.poses, Pairs{{4, 5}, {3, 3}, {5, 6}});
+  EXPECT_TRUE(std::isinf(covariances[0](0, 0)));
+  EXPECT_EQ(covariances[1], Matrix6d(Matrix6d::Zero()));
+  EXPECT_TRUE(covariances[2].allFinite());
+  graph.edges[0].information.setZero();
+  EXPECT_TRUE(std::isinf(relative_covariances(graph, graph.poses, Pairs{{0, 1}})[0](5, 5)));
+  EXPECT_TRUE(relative_covariances({}, {}, {}).empty());
+}
+
+}  // namespace
+}  // namespace tutti::estimation

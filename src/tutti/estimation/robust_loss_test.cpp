@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/robust_loss.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tutti/estimation/chi_square.hpp"
+
+namespace tutti::estimation {
+namespace {
+
+constexpr LossKind kKinds[] = {LossKind::none, LossKind::huber, LossKind::cauchy, LossKind::geman_mcclure};
+
+TEST(RobustLoss, WeightIsTheDerivative) {
+  for (const LossKind kind : kKinds)
+    for (const double scale : {0.5, 1.0, 3.0})
+      for (const double s : {1e-3, 0.1, 0.9, 2.0, 30.0, 1e4}) {
+        const RobustLoss loss{kind, scale};
+        const double h = 1e-5 * s;
+        const double numeric = (loss.rho(s + h) - loss.rho(s - h)) / (2.0 * h);
+        EXPECT_NEAR(loss.weight(s), numeric, 1e-6 * (1.0 + numeric)) << static_cast<int>(kind) << " " << s;
+      }
+}
+
+TEST(RobustLoss, LeavesInliersAloneAndGrowsSlower) {
+  for (const LossKind kind : kKinds) {
+    const RobustLoss loss{kind, 2.0};
+    EXPECT_EQ(loss.rho(0.0), 0.0);
+    EXPECT_DOUBLE_EQ(loss.weight(0.0), 1.0);
+    for (double s = 0.0; s < 100.0; s += 0.5) {
+      EXPECT_LE(loss.rho(s), s);
+      EXPECT_LE(loss.weight(s + 0.5), loss.weight(s));
+      EXPECT_GT(loss.weight(s), 0.0);
+    }
+  }
+  EXPECT_LT((RobustLoss{LossKind::geman_mcclure, 2.0}.rho(1e9)), 4.0);  // bounded by c^2
+}
+
+TEST(RobustLoss, KnowsItsNames) {
+  EXPECT_EQ(loss_kind("geman_mcclure"), LossKind::geman_mcclure);
+  EXPECT_THROW(loss_kind("tukey"), std::logic_error);
+}
+
+TEST(ChiSquare, AgreesWithTables) {
+  // Abramowitz & Stegun, table 26.8, 6 degrees of freedom.
+  EXPECT_NEAR(chi_square_6_quantile(0.5), 5.348, 5e-4);
+  EXPECT_NEAR(chi_square_6_quantile(0.95), 12.592, 5e-4);
+  EXPECT_NEAR(chi_square_6_quantile(0.99), 16.812, 5e-4);
+  EXPECT_NEAR(chi_square_6_quantile(0.999), 22.458, 5e-4);
+  EXPECT_NEAR(chi_square_6_quantile(0.0), 0.0, 1e-3);
+}
+
+TEST(ChiSquare, QuantileInvertsProbability) {
+  for (double p = 0.01; p < 1.0; p += 0.07) EXPECT_NEAR(chi_square_6_probability(chi_square_6_quantile(p)), p, 1e-12);
+}
+
+}  // namespace
+}  // namespace tutti::estimation
