@@ -21,13 +21,13 @@ struct OdometryChain {
 
 struct PairwiseConsistencyConfig {
   double confidence = 0.999;
-  std::uint64_t max_search_steps = 200'000;
+  std::uint64_t max_search_steps = 5'000'000;
 
   template <class V>
   void describe(V& v) {
     v.field("confidence", confidence, between(0.5, 0.999999999), "Share of pairs of true closures that should pass.");
     v.field("max_search_steps", max_search_steps, at_least(0.0),
-            "Branches of the exact clique search per group; beyond, the best clique found counts.");
+            "Vertices visited by the exact clique search per group; beyond, the best clique found counts.");
   }
 };
 
@@ -49,10 +49,10 @@ struct PairwiseConsistencyResult {
 /// a, b of one group agree when the 4-cycle a - odometry of the second robot - b^-1 - odometry of the first robot
 /// closes within the chi-square quantile (6 dof) of its covariance *compounded along the odometry between them*, so
 /// closures far apart are not held to one rigid transform (which loses true ones under drift). The largest set of
-/// pairwise agreeing closures of a group is its maximum clique: exact branch and bound, bounded in steps. A lone
-/// closure of a group is accepted (nothing contradicts it): the caller may ask for more by the group's size. The
-/// accepted set does not depend on the order of the input. Closures that name an unknown robot or keyframe, or carry
-/// NaN or a covariance that is not positive definite, are never accepted and belong to no group.
+/// pairwise agreeing closures of a group is its maximum clique: exact branch and bound, bounded in steps (the default:
+/// below a second). A lone closure of a group is accepted (nothing contradicts it): the caller may ask for more by the
+/// group's size. The accepted set does not depend on the order of the input. Closures that name an unknown robot or
+/// keyframe, or carry NaN or a covariance that is not positive definite, are never accepted and belong to no group.
 PairwiseConsistencyResult pairwise_consistency(std::span<const OdometryChain> chains,
                                                std::span<const LoopClosure> closures,
                                                const PairwiseConsistencyConfig& config = {});

@@ -37,7 +37,7 @@ class Search {
     Bits all(graph_.words(), 0);
     for (int v = 0; v < graph_.vertices(); ++v) set(all, v);
     grow_from_every_vertex(all);
-    const bool finished = expand(all);
+    const bool finished = expand(core(all));
     std::sort(best_.begin(), best_.end());
     return {best_, finished};
   }
@@ -112,6 +112,19 @@ class Search {
     return false;
   }
 
+  /// Without the vertices that have too few neighbours to be in a larger clique than the best one.
+  [[nodiscard]] Bits core(Bits candidates) const {
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (int v = first(candidates); v >= 0; v = next(candidates, v)) {
+        if (common(candidates, graph_.row(v)) >= static_cast<int>(best_.size())) continue;
+        reset(candidates, v);
+        changed = true;
+      }
+    }
+    return candidates;
+  }
+
   /// Colours the candidates greedily; a clique has at most one vertex per colour. `order`: by colour, ascending.
   void colour(Bits candidates, std::vector<int>& order, std::vector<int>& colours) const {
     for (int c = 1; first(candidates) >= 0; ++c) {
@@ -130,10 +143,10 @@ class Search {
     std::vector<int> order;
     std::vector<int> colours;
     colour(candidates, order, colours);
+    if (order.size() > steps_left_) return false;
+    steps_left_ -= order.size();
     for (std::size_t k = order.size(); k-- > 0;) {
       if (current_.size() + static_cast<std::size_t>(colours[k]) <= best_.size()) return true;
-      if (steps_left_ == 0) return false;
-      --steps_left_;
       current_.push_back(order[k]);
       Bits inner = candidates;
       intersect(inner, graph_.row(order[k]));

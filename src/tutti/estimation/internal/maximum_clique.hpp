@@ -34,7 +34,7 @@ struct Clique {
 };
 
 /// A greedy clique, improved by exchanging one vertex for two, then branch and bound with colouring (Tomita & Seki
-/// 2003; bitsets as in San Segundo 2011) for at most `max_steps` branches. Deterministic.
+/// 2003; bitsets as in San Segundo 2011) for at most `max_steps` colourings of a vertex. Deterministic.
 Clique maximum_clique(const BitGraph& graph, std::uint64_t max_steps);
 
 }  // namespace tutti::estimation::internal

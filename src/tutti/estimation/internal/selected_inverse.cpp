@@ -6,6 +6,15 @@
 #include "tutti/base/check.hpp"
 
 namespace tutti::estimation::internal {
+namespace {
+
+Eigen::Map<Eigen::MatrixXd> workspace(std::vector<double>& buffer, int rows, int columns) {
+  const auto size = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+  if (buffer.size() < size) buffer.resize(size);
+  return {buffer.data(), rows, columns};
+}
+
+}  // namespace
 
 SelectedInverse::SelectedInverse(const BlockCholesky::Columns& factor) {
   const int n = static_cast<int>(factor.start.size()) - 1;
@@ -39,18 +48,19 @@ void SelectedInverse::invert(Panel& panel) {
   panel.values.topRows(w).triangularView<Eigen::Lower>().solveInPlace(L_inverse);
   Eigen::MatrixXd Z_JJ = L_inverse.transpose() * L_inverse;
   if (m > 0) {
-    const Eigen::MatrixXd Y = panel.values.bottomRows(m) * L_inverse;
-    panel.values.bottomRows(m).noalias() = -(gather_below(panel).selfadjointView<Eigen::Lower>() * Y);
+    Eigen::Map<Eigen::MatrixXd> Y = workspace(scaled_, m, w);
+    Y.noalias() = panel.values.bottomRows(m) * L_inverse;
+    panel.values.bottomRows(m).noalias() = -(gather_below(panel) * Y);
     Z_JJ.noalias() -= Y.transpose() * panel.values.bottomRows(m);
   }
   panel.values.topRows(w) = 0.5 * (Z_JJ + Z_JJ.transpose());
 }
 
-/// Lower triangle of Z_II. All its entries lie in the pattern of L (the rows of a column are a clique after filling).
-Eigen::MatrixXd SelectedInverse::gather_below(const Panel& panel) const {
+/// Z_II. All its entries lie in the pattern of L (the rows of a column are a clique after filling).
+Eigen::Map<Eigen::MatrixXd> SelectedInverse::gather_below(const Panel& panel) {
   const auto begin = panel.rows.begin() + panel.columns;
   const int m = static_cast<int>(panel.rows.end() - begin);
-  Eigen::MatrixXd Z(m, m);
+  Eigen::Map<Eigen::MatrixXd> Z = workspace(gathered_, m, m);
   std::vector<int> index(m);
   for (int c = 0; c < m;) {
     const Panel& source = panels_[panel_of_column_[begin[c]]];
@@ -66,22 +76,18 @@ Eigen::MatrixXd SelectedInverse::gather_below(const Panel& panel) const {
       for (int r = std::max(c, group); r < m; ++r) target[r] = column[index[r]];
     }
   }
+  Z.triangularView<Eigen::StrictlyUpper>() = Z.transpose();
   return Z;
 }
 
-double SelectedInverse::entry(int row, int column) const {
-  if (row < column) std::swap(row, column);
-  const Panel& panel = panels_[panel_of_column_[column]];
-  const auto found = std::lower_bound(panel.rows.begin(), panel.rows.end(), row);
-  TUTTI_CHECK(found != panel.rows.end() && *found == row, "entry {}, {} is not in the pattern", row, column);
-  return panel.values(found - panel.rows.begin(), column - panel.first);
-}
-
 Matrix6d SelectedInverse::block(int row_variable, int column_variable) const {
-  Matrix6d out;
-  for (int c = 0; c < 6; ++c)
-    for (int r = 0; r < 6; ++r) out(r, c) = entry(6 * row_variable + r, 6 * column_variable + c);
-  return out;
+  if (row_variable < column_variable) return block(column_variable, row_variable).transpose();
+  // Panels hold whole blocks: the columns of a block have the same structure.
+  const Panel& panel = panels_[panel_of_column_[6 * column_variable]];
+  const auto found = std::lower_bound(panel.rows.begin(), panel.rows.end(), 6 * row_variable);
+  TUTTI_CHECK(found != panel.rows.end() && *found == 6 * row_variable, "block {}, {} is not in the pattern",
+              row_variable, column_variable);
+  return panel.values.block<6, 6>(found - panel.rows.begin(), 6 * column_variable - panel.first);
 }
 
 }  // namespace tutti::estimation::internal

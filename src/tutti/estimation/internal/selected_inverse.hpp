@@ -26,11 +26,12 @@ class SelectedInverse {
     Eigen::MatrixXd values;  ///< rows x columns: first L, then Z (Z_JJ complete).
   };
   void invert(Panel& panel);
-  [[nodiscard]] Eigen::MatrixXd gather_below(const Panel& panel) const;
-  [[nodiscard]] double entry(int row, int column) const;
+  [[nodiscard]] Eigen::Map<Eigen::MatrixXd> gather_below(const Panel& panel);
 
   std::vector<Panel> panels_;
   std::vector<int> panel_of_column_;
+  std::vector<double> gathered_;  ///< Workspace, so that large panels do not map fresh memory each.
+  std::vector<double> scaled_;    ///< Y
 };
 
 }  // namespace tutti::estimation::internal
