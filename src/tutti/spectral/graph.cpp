@@ -50,19 +50,20 @@ SparseMatrix symmetric_from(int nodes, const EdgeList& edges) {
   return out;
 }
 
-/// Cell of a grid with the radius as its edge. Coordinates are cut off far out, which only makes the outermost cells
-/// large: neighbours still lie in neighbouring cells.
+/// Cell of a grid a hair wider than the radius (rounding must not put close nodes two cells apart), with the first node
+/// in the middle of its cell (a level run then fills one layer). Cells far out are cut off to one, which costs time
+/// only.
 struct Cell {
-  std::int64_t x, y, z;
+  int x, y, z;
   friend auto operator<=>(const Cell&, const Cell&) = default;
 };
 
-Cell cell_of(const Eigen::Vector3d& position, double radius_m) {
-  constexpr double kFarthest = 1e15;
-  const auto along = [&](double x) {
-    return static_cast<std::int64_t>(std::clamp(std::floor(x / radius_m), -kFarthest, kFarthest));
-  };
-  return {along(position.x()), along(position.y()), along(position.z())};
+Cell cell_of(const Eigen::Vector3d& position, const Eigen::Vector3d& first, double radius_m) {
+  constexpr double kFarthest = 1e6;
+  constexpr double kSlack = 1e-9;
+  const Eigen::Array3d cell =
+      ((position - first).array() / (radius_m * (1.0 + kSlack)) + 0.5).floor().max(-kFarthest).min(kFarthest);
+  return {static_cast<int>(cell.x()), static_cast<int>(cell.y()), static_cast<int>(cell.z())};
 }
 
 struct Entry {
@@ -77,7 +78,7 @@ void for_each_close_pair(std::span<const Eigen::Vector3d> positions, double radi
   entries.reserve(positions.size());
   for (const auto& position : positions) {
     TUTTI_CHECK(position.allFinite(), "node {} has a position that is not finite", entries.size());
-    entries.push_back({cell_of(position, radius_m), static_cast<int>(entries.size())});
+    entries.push_back({cell_of(position, positions.front(), radius_m), static_cast<int>(entries.size())});
   }
   std::sort(entries.begin(), entries.end(),
             [](const Entry& a, const Entry& b) { return std::tie(a.cell, a.node) < std::tie(b.cell, b.node); });

@@ -54,7 +54,7 @@ class CosineTransform {
 };
 
 /// n a power of two. The kernels have three continuous derivatives, so coefficients fall like k^-5 and all those from n
-/// on sum up to about a fifteenth of those in [n/2, n): the latter bound what n leaves out and what it aliases.
+/// on sum up to less than half of those in [3n/4, n): the latter bound what n leaves out and what it aliases.
 Expansion expand(const MeyerFilterBank& bank, double domain, Index n) {
   Expansion out{.coefficient = RowMajor(n, bank.scales()), .tail = RowMajor(n, bank.scales())};
   CosineTransform transform(n);
@@ -68,7 +68,7 @@ Expansion expand(const MeyerFilterBank& bank, double domain, Index n) {
     Eigen::VectorXd c = transform(value);
     c[0] *= 0.5;
     out.coefficient.col(s) = c;
-    double tail = c.tail(n / 2).cwiseAbs().sum();
+    double tail = c.tail(n / 4).cwiseAbs().sum();
     for (Index k = n - 1; k >= 0; --k) {
       out.tail(k, s) = tail;
       tail += std::abs(c[k]);
@@ -77,34 +77,117 @@ Expansion expand(const MeyerFilterBank& bank, double domain, Index n) {
   return out;
 }
 
-/// Degree of each scale's polynomial. Larger scales never get less than smaller ones, so that the scales still running
-/// at any degree are the first ones.
-std::vector<Index> choose_degrees(const Expansion& expansion, double norm, double tolerance) {
-  std::vector<Index> degrees(static_cast<std::size_t>(expansion.tail.cols()));
-  Index least = 0;
-  for (Index s = expansion.tail.cols() - 1; s >= 0; --s) {
-    while (least + 1 < expansion.tail.rows() && expansion.tail(least, s) * norm > tolerance) ++least;
-    degrees[static_cast<std::size_t>(s)] = least;
+/// Smallest degree of each scale's polynomial whose worst case meets the tolerance.
+std::vector<Index> worst_case_degrees(const Expansion& expansion, double norm, double tolerance) {
+  std::vector<Index> degrees;
+  for (Index s = 0; s < expansion.tail.cols(); ++s) {
+    Index degree = 0;
+    while (degree + 1 < expansion.tail.rows() && expansion.tail(degree, s) * norm > tolerance) ++degree;
+    degrees.push_back(degree);
   }
   return degrees;
 }
 
-/// Column s = h_s(L) y by the recurrence T_{k+1} = 2 X T_k - T_{k-1} with X = (2 / domain) L - I.
-Eigen::MatrixXd run_recurrence(const internal::RowBlocks& laplacian, double domain, const Expansion& expansion,
-                               std::span<const Index> degrees, const Eigen::VectorXd& y) {
-  Eigen::MatrixXd sums = y * expansion.coefficient.row(0);
-  if (degrees.front() == 0) return sums;
-  Eigen::VectorXd current = y;
-  Eigen::VectorXd next = Eigen::VectorXd::Zero(y.size());
-  laplacian.step(2.0 / domain, -1.0, current, next);  // T_1 y = X y
-  sums += next * expansion.coefficient.row(1);
-  auto active = degrees.size();
-  for (Index k = 2; k <= degrees.front(); ++k) {
-    std::swap(current, next);
-    while (degrees[active - 1] < k) --active;
-    laplacian.step(4.0 / domain, -2.0, current, next, std::span(&expansion.coefficient(k, 0), active), sums);
+/// T_k(X) y for k = 0, 1, ..., with X = (2 / domain) L - I, its sums over k for every scale, and the moments
+/// mu_m = y^T T_m(X) y, two for every product [T_j T_k = (T_{j+k} + T_|j-k|) / 2].
+class Recurrence {
+ public:
+  Recurrence(const internal::RowBlocks& laplacian, double domain, const Expansion& expansion, const Eigen::VectorXd& y)
+      : laplacian_(laplacian),
+        domain_(domain),
+        expansion_(expansion),
+        current_(y),
+        previous_(Eigen::VectorXd::Zero(y.size())),
+        sums_(y * expansion.coefficient.row(0)),
+        moments_{y.squaredNorm()} {}
+
+  /// Goes on to the highest of the degrees; scale s gets no term above degrees[s]. Degrees must not grow with s.
+  void run(std::span<const Index> degrees, bool with_moments) {
+    for (auto active = degrees.size(); degree_ < degrees.front();) {
+      ++degree_;
+      while (degrees[active - 1] < degree_) --active;
+      const double half = degree_ == 1 ? 0.5 : 1.0;  // T_1 = X T_0, then T_{k+1} = 2 X T_k - T_{k-1}
+      const std::span weights(&expansion_.coefficient(degree_, 0), active);
+      laplacian_.step(half * 4.0 / domain_, half * -2.0, current_, previous_, weights, sums_);
+      std::swap(current_, previous_);
+      if (!with_moments) continue;
+      const double odd = current_.dot(previous_);
+      moments_.push_back(degree_ == 1 ? odd : 2.0 * odd - moments_[1]);
+      moments_.push_back(2.0 * current_.squaredNorm() - moments_[0]);
+    }
   }
-  return sums;
+  [[nodiscard]] const Eigen::MatrixXd& sums() const { return sums_; }
+  [[nodiscard]] std::span<const double> moments() const { return moments_; }
+
+ private:
+  const internal::RowBlocks& laplacian_;
+  double domain_;
+  const Expansion& expansion_;
+  Index degree_ = 0;
+  Eigen::VectorXd current_, previous_;
+  Eigen::MatrixXd sums_;
+  std::vector<double> moments_;
+};
+
+/// Entry K - from bounds || sum_{K < j <= to} c_j T_j(X) y ||_2 for K = from .. to, `to - from` <= number of moments:
+/// with x = cos(theta) and mu the signal's spectral measure, the square is
+///   int (sum c_j cos(j theta))^2 dmu <= int |sum c_j e^{i j theta}|^2 dmu = sum_{j, k} c_j c_k mu_|j-k|.
+/// Unlike sum |c_j| ||y|| it knows that the signal has little energy where the polynomial is still wrong.
+std::vector<double> measured_bounds(const Eigen::Ref<const Eigen::VectorXd>& c, std::span<const double> moments,
+                                    Index from, Index to) {
+  constexpr double kRounding = 1e-14;
+  std::vector<double> out(static_cast<std::size_t>(to - from) + 1, 0.0);
+  const auto mu = Eigen::VectorXd::Map(moments.data(), static_cast<Index>(moments.size()));
+  double square = 0.0;
+  double sum = 0.0;
+  for (Index j = to; j > from; --j) {
+    square += c[j] * (c[j] * mu[0] + 2.0 * c.segment(j + 1, to - j).dot(mu.segment(1, to - j)));
+    sum += std::abs(c[j]);
+    out[static_cast<std::size_t>(j - 1 - from)] = std::sqrt(std::max(square, 0.0) + kRounding * sum * sum * mu[0]);
+  }
+  return out;
+}
+
+struct Filtered {
+  Eigen::MatrixXd sums;  ///< Column s = h_s(L) y.
+  Index degree = 0;
+  double error_bound = 0.0;
+};
+
+/// First a third of the degree that the worst case asks for. The moments found on the way then tell how far to go,
+/// usually less than half of it.
+Filtered filter(const internal::RowBlocks& laplacian, double domain, const Expansion& expansion,
+                const Eigen::VectorXd& y, double tolerance, Index max_degree) {
+  const double norm = y.norm();
+  const std::vector<Index> worst_case = worst_case_degrees(expansion, norm, 0.5 * tolerance);
+  const Index probe = std::min(max_degree, (*std::max_element(worst_case.begin(), worst_case.end()) + 2) / 3);
+  Recurrence recurrence(laplacian, domain, expansion, y);
+  recurrence.run(std::vector<Index>(worst_case.size(), probe), true);
+
+  Filtered out;
+  std::vector<Index> degrees(worst_case.size(), probe);
+  for (std::size_t s = worst_case.size(); s-- > 0;) {
+    const Index scale = static_cast<Index>(s);
+    const auto left_out = [&](Index degree) { return expansion.tail(degree, scale) * norm; };
+    if (s + 1 < degrees.size()) degrees[s] = degrees[s + 1];  // larger scales never get less than smaller ones
+    double error = left_out(degrees[s]);
+    const Index known = probe + static_cast<Index>(recurrence.moments().size()) - 1;
+    if (error > tolerance && worst_case[s] <= known) {
+      const Eigen::VectorXd c = expansion.coefficient.col(scale).head(worst_case[s] + 1);
+      const auto bounds = measured_bounds(c, recurrence.moments(), probe, worst_case[s]);
+      const auto bound_at = [&](Index degree) {
+        return left_out(std::max(degree, worst_case[s])) +
+               (degree < worst_case[s] ? bounds[static_cast<std::size_t>(degree - probe)] : 0.0);
+      };
+      while (bound_at(degrees[s]) > tolerance && degrees[s] < max_degree) ++degrees[s];
+      error = std::min(bound_at(degrees[s]), left_out(degrees[s]));
+    }
+    out.error_bound = std::max(out.error_bound, error);
+  }
+  recurrence.run(degrees, false);
+  out.sums = recurrence.sums();
+  out.degree = degrees.front();
+  return out;
 }
 
 }  // namespace
@@ -144,22 +227,22 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
   const Index max_degree = config.max_order - 1;  // one product made L f
   Index size = 2048;
   Expansion expansion = expand(bank, domain, size);
-  while (choose_degrees(expansion, norm, config.tolerance).front() >= size / 2 && size / 2 <= max_degree)
-    expansion = expand(bank, domain, size *= 2);
+  const auto resolved = [&] {
+    const auto degrees = worst_case_degrees(expansion, norm, 0.5 * config.tolerance);
+    return *std::max_element(degrees.begin(), degrees.end()) + 1 < size;
+  };
+  while (!resolved() && size <= 2 * max_degree) expansion = expand(bank, domain, size *= 2);
 
   for (Index c = 0; c < signals.cols(); ++c) {
-    const double column_norm = smoothed.col(c).norm();
-    auto degrees = choose_degrees(expansion, column_norm, config.tolerance);
-    for (auto& degree : degrees) degree = std::min(degree, max_degree);
-    const Eigen::MatrixXd sums = run_recurrence(blocks, domain, expansion, degrees, blocks.to_blocks(smoothed.col(c)));
+    const auto [sums, degree, error_bound] =
+        filter(blocks, domain, expansion, blocks.to_blocks(smoothed.col(c)), config.tolerance, max_degree);
     Eigen::VectorXd column(signals.rows());
     for (int s = 0; s < bank.scales(); ++s) {
       blocks.from_blocks(sums.col(s), column);
       result.coefficients.col(s * signals.cols() + c) += column;
-      const double error = expansion.tail(degrees[static_cast<std::size_t>(s)], s) * column_norm;
-      result.error_bound = std::max(result.error_bound, error);
     }
-    result.order = std::max(result.order, static_cast<int>(degrees.front()) + 1);
+    result.order = std::max(result.order, static_cast<int>(degree) + 1);
+    result.error_bound = std::max(result.error_bound, error_bound);
   }
   result.converged = result.error_bound <= config.tolerance;
   return result;

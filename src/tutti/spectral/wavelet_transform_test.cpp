@@ -100,6 +100,19 @@ RC_GTEST_PROP(ChebyshevTransform, CoefficientsMoveWithTheNodes, (std::uint64_t s
   }
 }
 
+TEST(ChebyshevTransform, TheOrderFollowsTheSignal) {
+  // As large as each other, but only the rough signal has energy where polynomials of small degree are still wrong.
+  const SparseMatrix L = testing::path(300);
+  const Spectrum spectrum = dense_spectrum(L);
+  const MeyerFilterBank bank(7, spectrum.eigenvalues[299]);
+  const ChebyshevConfig config{.tolerance = 1e-3, .max_order = 20000};
+  const auto smooth = chebyshev_transform(L, bank, 1e3 * spectrum.eigenvectors.col(2), config);
+  const auto rough = chebyshev_transform(L, bank, 1e3 * spectrum.eigenvectors.col(30), config);
+  EXPECT_TRUE(smooth.converged);
+  EXPECT_TRUE(rough.converged);
+  EXPECT_LT(3 * smooth.order, rough.order);
+}
+
 TEST(ChebyshevTransform, ConstantsPerComponentPassExactly) {
   const SparseMatrix L = testing::laplacian_of(6, {{0, 1, 1.0}, {1, 2, 2.0}, {3, 4, 0.5}});  // node 5 is isolated
   const VectorXd signal = (VectorXd(6) << 7, 7, 7, -300, -300, 1e6).finished();
