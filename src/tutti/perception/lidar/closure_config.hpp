@@ -34,10 +34,10 @@ struct RegistrationLevel {
 };
 
 struct RegistrationConfig {
-  std::vector<RegistrationLevel> levels{{1.5, 700, 10}, {0.6, 1500, 8}, {0.3, 4000, 10}};  ///< Coarse to fine.
+  std::vector<RegistrationLevel> levels{{1.5, 500, 8}, {0.6, 1000, 8}, {0.3, 4000, 12}};  ///< Coarse to fine.
   double max_normal_angle_deg = 45.0;  ///< Between the normals of two corresponding points.
   double overlap_distance_m = 0.3;     ///< A point overlaps when a target point with a like normal is this close.
-  double residual_scale_m = 0.05;      ///< Of the robust loss at the finest level; grows with the level's distance.
+  double residual_scale_m = 0.1;       ///< Of the robust loss at the finest level; grows with the level's distance.
   double covariance_scale = 30.0;      ///< Neighbouring residuals are not independent: divides the information.
   double min_translation_sigma_m = 0.004;
   double min_rotation_sigma_rad = 0.001;
@@ -57,15 +57,17 @@ struct RegistrationConfig {
 
 /// Search for the rough relative pose by correlating views from above.
 struct CandidateConfig {
-  double cell_m = 0.4;     ///< Cell of the 128 x 128 view from above.
-  int yaw_steps = 120;     ///< Of the full turn; a multiple of 4.
-  int max_guesses = 3;     ///< Best alignments handed to the registration.
-  double min_score = 0.1;  ///< Correlation (0..1) below which a guess is not worth a registration.
+  double cell_m = 0.8;         ///< Cell of the 128 x 128 view from above.
+  int yaw_steps = 120;         ///< Of the full turn; a multiple of 4.
+  int max_guesses = 3;         ///< Best alignments handed to the registration.
+  double distinct_deg = 12.0;  ///< Two guesses differ by at least this yaw.
+  double min_score = 0.1;      ///< Correlation (0..1) below which a guess is not worth a registration.
   template <class V>
   void describe(V& v) {
     v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 128 x 128 view from above.");
     v.field("yaw_steps", yaw_steps, between(4, 720), "Steps of the full turn; a multiple of 4.");
     v.field("max_guesses", max_guesses, between(1, 16), "Best alignments handed to the registration.");
+    v.field("distinct_deg", distinct_deg, between(0.0, 180.0), "Two guesses differ by at least this yaw.");
     v.field("min_score", min_score, between(0.0, 1.0), "Correlation below which a guess is dropped.");
   }
 };
@@ -73,14 +75,20 @@ struct CandidateConfig {
 /// From two submap clouds to a loop closure or a refusal. Every gate is a physical quantity.
 struct LidarClosureConfig {
   double min_duration_s = 5.0;  ///< Shorter submaps saw too little: they gave wrong closures.
-  int min_keyframes = 3;
+  int min_keyframes = 6;
   int min_points = 500;
+  double voxel_m = 0.3;  ///< Clouds are thinned to this; denser ones cost time and gain nothing.
   NormalConfig normals;
   CandidateConfig candidates;
   RegistrationConfig registration;
   double min_overlap = 0.3;              ///< Mean of both directions.
+  double early_refusal = 0.6;            ///< Of min_overlap: with less after the coarse levels a pair is given up.
   double max_plane_rmse_m = 0.085;       ///< Point to plane, over the overlap.
   double min_eigenvalue = 0.05;          ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
+  double max_contradiction = 0.15;       ///< Share of the points in view that stand where the other looked through.
+  double visibility_margin_m = 0.5;      ///< A point this much nearer than the surface seen behind it contradicts.
+  int visibility_points = 2000;          ///< Of each submap, evenly spread.
+  double max_rival_ratio = 0.9;          ///< A second, different alignment nearly as good: the place is ambiguous.
   double max_forward_backward_m = 0.05;  ///< Between a-to-b and b-to-a, at the centre of the overlap.
   double max_forward_backward_deg = 0.5;
   template <class V>
@@ -88,13 +96,23 @@ struct LidarClosureConfig {
     v.field("min_duration_s", min_duration_s, at_least(0.0), "Shorter submaps are not used.");
     v.field("min_keyframes", min_keyframes, at_least(1), "Submaps with fewer keyframes are not used.");
     v.field("min_points", min_points, at_least(10), "Submaps with fewer points are not used.");
+    v.field("voxel_m", voxel_m, greater_than(0.0), "Clouds are thinned to voxels of this edge.");
     v.field("normals", normals, any(), "Surface normals.");
     v.field("candidates", candidates, any(), "Rough alignment.");
     v.field("registration", registration, any(), "Point-to-plane registration.");
     v.field("min_overlap", min_overlap, between(0.0, 1.0), "Mean overlap of both directions.");
+    v.field("early_refusal", early_refusal, between(0.0, 1.0),
+            "Share of min_overlap below which a pair is given up after the coarse levels.");
     v.field("max_plane_rmse_m", max_plane_rmse_m, greater_than(0.0), "Point-to-plane residual over the overlap.");
     v.field("min_eigenvalue", min_eigenvalue, between(0.0, 0.34),
             "Smallest eigenvalue of the normalised translation Hessian; below it the clouds can slide.");
+    v.field("max_contradiction", max_contradiction, between(0.0, 1.0),
+            "Share of the points in view that stand where the other submap looked through.");
+    v.field("visibility_margin_m", visibility_margin_m, greater_than(0.0),
+            "A point this much nearer than the surface seen behind it contradicts.");
+    v.field("visibility_points", visibility_points, at_least(10), "Points of each submap tested for visibility.");
+    v.field("max_rival_ratio", max_rival_ratio, between(0.0, 1.0),
+            "Quality of the second best alignment over the best above which the place is ambiguous.");
     v.field("max_forward_backward_m", max_forward_backward_m, greater_than(0.0),
             "Between the registrations of a to b and b to a.");
     v.field("max_forward_backward_deg", max_forward_backward_deg, greater_than(0.0),

@@ -20,6 +20,9 @@ struct PairVerification {
   double plane_rmse_m = 0.0;                   ///< The larger of both directions.
   double min_eigenvalue = 0.0;                 ///< The smaller of both directions.
   double forward_backward_m = 0.0;             ///< At the centre of the overlap.
+  double forward_backward_deg = 0.0;
+  double contradiction = 0.0;  ///< Share of points in view that stand where the other submap looked through.
+  double rival_ratio = 0.0;    ///< Quality of the second best alignment over that of the best.
   double correlation_score = 0.0;
 };
 

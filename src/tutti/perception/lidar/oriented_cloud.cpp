@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/perception/lidar/oriented_cloud.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nanoflann.hpp>
+
+namespace tutti::lidar {
+namespace {
+
+/// nanoflann's view of the points.
+struct PointSource {
+  std::vector<Eigen::Vector3f> points;
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return points[i][static_cast<Eigen::Index>(axis)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSource>, PointSource, 3, std::int32_t>;
+
+/// nanoflann result set: the nearest point within a radius. The bound prunes the search from its first step.
+class NearestWithin {
+ public:
+  using DistanceType = float;
+  explicit NearestWithin(float squared_distance) : squared_distance_(squared_distance) {}
+  bool addPoint(float squared_distance, std::int32_t index) {
+    if (squared_distance < squared_distance_) {
+      squared_distance_ = squared_distance;
+      index_ = index;
+    }
+    return true;
+  }
+  [[nodiscard]] float worstDist() const { return squared_distance_; }
+  [[nodiscard]] bool full() const { return true; }
+  [[nodiscard]] std::size_t size() const { return index_ == NeighbourIndex::kNone ? 0 : 1; }
+  [[nodiscard]] std::int32_t index() const { return index_; }
+
+ private:
+  float squared_distance_;
+  std::int32_t index_ = NeighbourIndex::kNone;
+};
+
+/// Unit normal of the plane through the neighbours, of either sign; zero when they are not flat.
+Eigen::Vector3f fit_normal(const NeighbourIndex& index, std::span<const std::int32_t> neighbours, double max_ratio) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto i : neighbours) mean += index.points()[static_cast<std::size_t>(i)].cast<double>();
+  mean /= static_cast<double>(neighbours.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const auto i : neighbours) {
+    const Eigen::Vector3d d = index.points()[static_cast<std::size_t>(i)].cast<double>() - mean;
+    scatter += d * d.transpose();
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(scatter);
+  if (!(solver.eigenvalues()[0] <= max_ratio * solver.eigenvalues()[1])) return Eigen::Vector3f::Zero();
+  return solver.eigenvectors().col(0).cast<float>().normalized();
+}
+
+Eigen::Vector3f nearest_viewpoint(std::span<const Eigen::Vector3f> viewpoints, const Eigen::Vector3f& p) {
+  if (viewpoints.empty()) return Eigen::Vector3f::Zero();
+  return *std::min_element(viewpoints.begin(), viewpoints.end(),
+                           [&](const auto& a, const auto& b) { return (a - p).squaredNorm() < (b - p).squaredNorm(); });
+}
+
+}  // namespace
+
+struct NeighbourIndex::Tree {
+  static constexpr std::size_t kLeafSize = 10;
+  explicit Tree(std::vector<Eigen::Vector3f> points)
+      : source{std::move(points)}, kd_tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {}
+  PointSource source;
+  KdTree kd_tree;
+};
+
+NeighbourIndex::NeighbourIndex(std::vector<Eigen::Vector3f> points)
+    : tree_(std::make_unique<Tree>(std::move(points))) {}
+NeighbourIndex::~NeighbourIndex() = default;
+
+const std::vector<Eigen::Vector3f>& NeighbourIndex::points() const { return tree_->source.points; }
+
+std::int32_t NeighbourIndex::nearest(const Eigen::Vector3f& query, float max_distance) const {
+  if (points().empty()) return kNone;
+  NearestWithin result(max_distance * max_distance);
+  tree_->kd_tree.findNeighbors(result, query.data(), {});
+  return result.index();
+}
+
+std::size_t NeighbourIndex::nearest_k(const Eigen::Vector3f& query, std::span<std::int32_t> out) const {
+  if (points().empty()) return 0;
+  std::vector<float> squared_distances(out.size());
+  return tree_->kd_tree.knnSearch(query.data(), out.size(), out.data(), squared_distances.data());
+}
+
+OrientedCloud orient(std::vector<Eigen::Vector3f> points, std::span<const Eigen::Vector3f> viewpoints,
+                     const NormalConfig& config) {
+  auto index = std::make_shared<const NeighbourIndex>(std::move(points));
+  const auto& stored = index->points();
+  auto normals = std::make_shared<std::vector<Eigen::Vector3f>>(stored.size(), Eigen::Vector3f::Zero());
+  std::vector<std::int32_t> neighbours(static_cast<std::size_t>(config.neighbours));
+  const auto max_squared = static_cast<float>(config.max_radius_m * config.max_radius_m);
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    std::size_t count = index->nearest_k(stored[i], neighbours);
+    while (count > 0 &&
+           (stored[static_cast<std::size_t>(neighbours[count - 1])] - stored[i]).squaredNorm() > max_squared)
+      --count;
+    if (count < 4) continue;  // a plane fit needs more than the three points that any plane passes through
+    Eigen::Vector3f normal = fit_normal(*index, std::span(neighbours).first(count), config.max_surface_ratio);
+    if (normal.dot(nearest_viewpoint(viewpoints, stored[i]) - stored[i]) < 0.0F) normal = -normal;
+    (*normals)[i] = normal;
+  }
+  return {std::move(index), std::move(normals)};
+}
+
+}  // namespace tutti::lidar
