@@ -14,9 +14,9 @@
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/formats/g2o.hpp"
 
+namespace tutti::app {
 namespace {
 
-using namespace tutti;
 using namespace tutti::estimation;
 
 struct OptimiseOptions {
@@ -132,3 +132,5 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "Print the summary as JSON.");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
+
+}  // namespace tutti::app

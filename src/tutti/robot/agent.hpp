@@ -84,7 +84,7 @@ class RobotAgent {
   [[nodiscard]] RobotId robot() const { return robot_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] const consistency::Ledger& ledger() const { return ledger_; }
-  [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - (last_odometry_ ? 1 : 0); }
+  [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - 1; }
   /// T_map_body at the keyframes; `map` starts where `odom` does.
   [[nodiscard]] Trajectory corrected() const;
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return whereabouts_; }

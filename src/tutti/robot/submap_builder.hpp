@@ -29,7 +29,7 @@ struct SubmapConfig {
     v.field("keyframe_time_s", keyframe_time_s, greater_than(0.0), "Time that makes a keyframe.");
     v.field("representative_distance_m", representative_distance_m, greater_than(0.0),
             "Travel between representative keyframes, which become proxy nodes.");
-    v.field("voxel_m", voxel_m, greater_than(0.0), "Voxel edge of a submap cloud.");
+    v.field("voxel_m", voxel_m, between(0.1, 10.0), "Voxel edge of a submap cloud.");
     v.field("min_range_m", min_range_m, at_least(0.0), "Nearer scan points are dropped.");
     v.field("max_range_m", max_range_m, greater_than(0.0), "Farther scan points are dropped.");
   }

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One program, one thin file per subcommand. Exit codes: 0 fine, 1 the run failed, 2 usage or configuration.
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+
+#include "demo_command.hpp"
+#include "eval_command.hpp"
+#include "optimise_command.hpp"
+#include "run_command.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "tutti: collaborative robot mapping by spectral graph analysis.\n"
+      "Several robots map the same place; a server joins their maps and sends back, in kilobytes, what each robot "
+      "needs\n"
+      "to agree with the joint map.\n\n"
+      "Start here:   tutti demo\n"
+      "Your mission: tutti run MISSION.yaml --data FOLDER     (docs/report.md explains what comes out)",
+      "tutti"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", TUTTI_VERSION);
+  app.get_formatter()->column_width(36);
+  int exit_code = 0;
+  tutti::app::add_demo_command(app, exit_code);
+  tutti::app::add_run_command(app, exit_code);
+  tutti::app::add_eval_command(app, exit_code);
+  tutti::app::add_optimise_command(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::cerr << "tutti: internal error: " << error.what() << "\n(please report this with the command you ran)\n";
+    return 1;
+  }
+  return exit_code;
+}

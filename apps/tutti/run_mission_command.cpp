@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "run_mission_command.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <iostream>
+
+#include "tutti/mission/report_files.hpp"
+#include "tutti/mission/report_text.hpp"
+#include "tutti/mission/runner.hpp"
+
+namespace tutti::app {
+namespace {
+
+/// One line on stderr that is rewritten on a terminal, and a line every ten per cent elsewhere.
+class ProgressLine {
+ public:
+  void operator()(const mission::Progress& progress) {
+    const double share = progress.duration_s > 0.0 ? std::min(1.0, progress.time_s / progress.duration_s) : 1.0;
+    const std::string line = fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {} map{}", 100.0 * share,
+                                         progress.duration_s, progress.submaps, progress.closures, progress.components,
+                                         progress.components == 1 ? "" : "s (not joined yet)");
+    if (terminal_) {
+      std::cerr << "\r\033[K" << line << std::flush;
+      open_ = true;
+    } else if (share >= next_) {
+      std::cerr << line << '\n';
+      while (next_ <= share) next_ += 0.1;
+    }
+  }
+  void close() {
+    if (open_) std::cerr << '\n';
+    open_ = false;
+  }
+
+ private:
+  bool terminal_ = isatty(STDERR_FILENO) != 0;
+  bool open_ = false;
+  double next_ = 0.1;
+};
+
+}  // namespace
+
+void add_mission_options(CLI::App& command, MissionArguments& arguments) {
+  command.add_option("--out", arguments.out, "Folder for the report (made if missing)")->type_name("DIR");
+  command.add_option("--seed", arguments.seed, "Everything random comes from this number")->type_name("N");
+  command
+      .add_option("--rate", arguments.rate,
+                  "Times real time, e.g. 1; shows each robot's and the server's CPU share and worst update\n"
+                  "latency. Without it: as fast as possible")
+      ->type_name("R")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--threads", arguments.threads, "Threads for verifying closures; 0 = all cores")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024));
+  command
+      .add_option("--set", arguments.assignments,
+                  "Change a setting, e.g. --set agent.policy.name=uniform or --set robots.0.start_s=60;\n"
+                  "may be given several times")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_flag("--print-config", arguments.print_config, "Print every setting with its value, and stop");
+}
+
+int run_and_report(const Result<mission::MissionConfig>& config, const MissionArguments& arguments) {
+  if (!config) {
+    std::cerr << "tutti: " << config.error().message << '\n';
+    return 2;
+  }
+  if (arguments.print_config) {
+    std::cout << to_yaml(dump_config(*config));
+    return 0;
+  }
+  ProgressLine progress;
+  const mission::RunOptions options{.data = arguments.data,
+                                    .seed = arguments.seed,
+                                    .rate = arguments.rate,
+                                    .threads = arguments.threads,
+                                    .progress = std::ref(progress)};
+  const auto record = mission::run_mission(*config, options);
+  progress.close();
+  if (!record) {
+    std::cerr << "tutti: " << record.error().message << '\n';
+    return 1;
+  }
+  if (const auto ok = mission::write_report(*record, arguments.out); !ok) {
+    std::cerr << "tutti: " << ok.error().message << '\n';
+    return 1;
+  }
+  std::cout << mission::report_text(*record, (arguments.out / "report.html").string());
+  return 0;
+}
+
+}  // namespace tutti::app

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/perception/lidar/submap_features.hpp"
+#include "tutti/server/closure_finder.hpp"
+
+namespace tutti::mission {
+
+/// From the submap clouds alone.
+class LidarClosureFinder final : public server::ClosureFinder {
+ public:
+  LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap);
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
+  [[nodiscard]] ClosureVerdict verify(const Submap& first, const Submap& second) const override;
+
+ private:
+  [[nodiscard]] std::shared_ptr<const lidar::SubmapFeatures> features_of(const Submap& submap) const;
+
+  lidar::LidarClosureConfig config_;
+  std::uint32_t min_submap_gap_;
+  mutable std::mutex mutex_;  // guards features_
+  mutable std::map<SubmapId, std::shared_ptr<const lidar::SubmapFeatures>> features_;
+};
+
+/// For recordings without sensor data: true relative poses plus noise and a share of wrong ones.
+class ReferenceClosureFinder final : public server::ClosureFinder {
+ public:
+  explicit ReferenceClosureFinder(simulation::ReferenceClosures closures) : closures_(std::move(closures)) {}
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return closures_.is_candidate(first, second);
+  }
+  [[nodiscard]] ClosureVerdict verify(const Submap& first, const Submap& second) const override {
+    return closures_.verify(first, second);
+  }
+
+ private:
+  simulation::ReferenceClosures closures_;
+};
+
+std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
+                                                                 const std::vector<MissionRecording>& recordings,
+                                                                 std::uint64_t seed);
+
+}  // namespace tutti::mission

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tutti/evaluation/association.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/record.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/robot/agent.hpp"
+#include "tutti/server/map_server.hpp"
+
+namespace tutti::mission {
+
+inline constexpr double kRpeInterval_s = 1.0;
+
+/// One robot after a mission: the agent that talked to the server and the shadow agents that only listened.
+struct RobotOutcome {
+  const MissionRecording* recording = nullptr;
+  std::string default_policy;
+  std::vector<std::pair<std::string, const robot::RobotAgent*>> agents;  ///< By policy; the default one is among them.
+};
+
+/// Fills in what is measured at the end: accuracy of every estimate, the final map, transforms between robots.
+/// Accuracy: ATE after one rigid alignment (SE(3), no scale) and RPE over 1 s, at keyframes; the server's joint figure
+/// over all robots of its largest component with one alignment. Agreement: ATE of a robot's estimate with the server's
+/// in the role of the reference. Robots whose reference is not for scoring get no accuracy.
+void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
+                     const evaluation::AssociationConfig& association, MissionRecord& record);
+void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
+                     const evaluation::AssociationConfig& association, MissionRecord& record);
+
+/// T_odom-of-robot <- world, from the server's and the raw poses of the robot's keyframes: the rigid motion that fits
+/// the whole trajectory best.
+std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& map);
+
+}  // namespace tutti::mission

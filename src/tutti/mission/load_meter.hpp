@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+
+namespace tutti::mission {
+
+/// CPU seconds of the calling thread.
+double thread_cpu_s();
+
+/// Wall-clock milliseconds since it was made or last asked.
+class Stopwatch {
+ public:
+  double lap_ms() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return ms;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// Adds the CPU time of a scope to a total.
+class CpuScope {
+ public:
+  explicit CpuScope(double& total_s) : total_s_(total_s), begin_s_(thread_cpu_s()) {}
+  ~CpuScope() { total_s_ += thread_cpu_s() - begin_s_; }
+  CpuScope(const CpuScope&) = delete;
+  CpuScope& operator=(const CpuScope&) = delete;
+
+ private:
+  double& total_s_;
+  double begin_s_;
+};
+
+}  // namespace tutti::mission

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/mission_config.hpp"
+
+#include <set>
+
+#include "tutti/consistency/policy.hpp"
+#include "tutti/mission/demo_mission.hpp"
+
+namespace tutti::mission {
+namespace {
+
+/// What a single field cannot know.
+Status check_mission(const MissionConfig& config, const std::string& name) {
+  std::vector<std::string> problems;
+  const auto problem = [&](std::string text) { problems.push_back(": " + std::move(text)); };
+  if (config.source == "recordings" && config.robots.empty())
+    problem("robots: none given, expected at least one (or source: simulation)");
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < config.robots.size(); ++i) {
+    const RobotConfig& robot = config.robots[i];
+    const std::string path = fmt::format("robots.{}", i);
+    if (robot.name.empty()) problem(path + ".name: missing");
+    if (!robot.name.empty() &&
+        robot.name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") !=
+            std::string::npos)
+      problem(fmt::format("{}.name: is '{}', expected only letters, digits, '_' and '-'", path, robot.name));
+    if (!names.insert(robot.name).second) problem(fmt::format("{}.name: '{}' is there twice", path, robot.name));
+    if (robot.odometry.file.empty()) problem(path + ".odometry.file: missing");
+    if (!robot.reference_offset_m.empty() && robot.reference_offset_m.size() != 3)
+      problem(fmt::format("{}.reference_offset_m: {} numbers, expected 3", path, robot.reference_offset_m.size()));
+    if (robot.from_share >= robot.to_share)
+      problem(fmt::format("{}: from_share {} is not below to_share {}", path, robot.from_share, robot.to_share));
+    if (config.closures.finder == "reference" && robot.reference.file.empty())
+      problem(path + ".reference.file: missing, but closures.finder is 'reference'");
+    if (config.closures.finder == "lidar" && robot.scans.empty())
+      problem(path + ".scans: missing, but closures.finder is 'lidar'");
+  }
+  if (config.source == "simulation" && config.closures.finder == "lidar")
+    problem("closures.finder: is 'lidar', but simulated robots have no scans yet; expected 'reference'");
+  for (const std::string& policy : config.compare_policies)
+    if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
+      problem("compare_policies: " + known.error().message);
+  return config_internal::to_status(name, problems);
+}
+
+Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std::vector<std::string>& assignments) {
+  for (const std::string& assignment : assignments)
+    if (const auto ok = apply_override(root, assignment); !ok) return in_context("--set", ok.error());
+  MissionConfig config;
+  if (const auto ok = tutti::load_config(root, config, name); !ok) return tl::unexpected(ok.error());
+  if (const auto ok = check_mission(config, name); !ok) return tl::unexpected(ok.error());
+  return config;
+}
+
+}  // namespace
+
+Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments) {
+  auto root = load_yaml(file.string());
+  if (!root) return tl::unexpected(root.error());
+  return finish(std::move(*root), file.string(), assignments);
+}
+
+Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments) {
+  auto root = parse_yaml(kDemoMission, "missions/demo.yaml");
+  if (!root) return tl::unexpected(root.error());
+  return finish(std::move(*root), "missions/demo.yaml", assignments);
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/bus/in_process_bus.hpp"
+#include "tutti/evaluation/association.hpp"
+#include "tutti/perception/lidar/closure_config.hpp"
+#include "tutti/robot/agent.hpp"
+#include "tutti/server/map_server.hpp"
+#include "tutti/simulation/degrade.hpp"
+#include "tutti/simulation/recordings.hpp"
+#include "tutti/simulation/reference_closures.hpp"
+
+namespace tutti::mission {
+
+/// A trajectory file below the --data folder.
+struct TrajectoryFile {
+  std::string file;            ///< Empty = none.
+  std::string format = "tum";  ///< tum | euroc | kitti (12 numbers a line, stamps from `times` or `rate_hz`)
+  std::string times;           ///< kitti: one stamp in seconds per line; empty = index / rate_hz.
+  double rate_hz = 10.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("file", file, any(), "File below the --data folder.");
+    v.field("format", format, one_of({"tum", "euroc", "kitti"}), "How the file is written.");
+    v.field("times", times, any(), "kitti format: file with one stamp in seconds per line.");
+    v.field("rate_hz", rate_hz, greater_than(0.0), "kitti format without times: poses per second.");
+  }
+};
+
+/// One robot whose recording is replayed.
+struct RobotConfig {
+  std::string name;
+  TrajectoryFile odometry;
+  TrajectoryFile reference;
+  std::string reference_transform;         ///< File with the 4x4 T_common_reference of this robot; empty = identity.
+  std::vector<double> reference_offset_m;  ///< x, y, z; recordings of different places share no frame: put them apart.
+  bool score_against_reference = true;     ///< false: the reference only judges closures and transforms.
+  std::string scans;                       ///< Folder of NNNNNN.pcd, one per odometry pose; empty = no scans.
+  double start_s = 0.0;                    ///< Mission time of its first sample.
+  double from_share = 0.0;                 ///< Part of the recording to replay.
+  double to_share = 1.0;
+  bool random_frame = false;  ///< Draw the odometry frame from the seed: any yaw, tilt, shift.
+  simulation::DegradeConfig degrade;
+  simulation::OdometryCovarianceConfig covariance;
+  simulation::WalkConfig walk;            ///< Simulated robots only.
+  simulation::OdometryNoiseConfig noise;  ///< Simulated robots only.
+  template <class V>
+  void describe(V& v) {
+    v.field("name", name, any(), "Unique name.");
+    v.field("odometry", odometry);
+    v.field("reference", reference);
+    v.field("reference_transform", reference_transform, any(), "File with 4x4 T_common_reference.");
+    v.field("reference_offset_m", reference_offset_m, any(),
+            "x, y, z added to the reference: recordings of different places share no frame, put them apart.");
+    v.field("score_against_reference", score_against_reference, any(),
+            "false: the reference judges only closures and transforms, not trajectories.");
+    v.field("scans", scans, any(), "Folder with one PCD per odometry pose, numbered 000000.pcd up.");
+    v.field("start_s", start_s, at_least(0.0), "Mission time of the first sample.");
+    v.field("from_share", from_share, between(0.0, 1.0), "First part of the recording to replay.");
+    v.field("to_share", to_share, between(0.0, 1.0), "Last part of the recording to replay.");
+    v.field("random_frame", random_frame, any(), "Draw the odometry frame from the seed.");
+    v.field("degrade", degrade);
+    v.field("covariance", covariance);
+  }
+};
+
+struct ClosureConfig {
+  std::string finder = "lidar";
+  int min_submap_gap =
+      2;  ///< lidar: submaps of one robot nearer than this are not compared; neighbours overlap anyway.
+  lidar::LidarClosureConfig lidar;
+  simulation::ReferenceClosureConfig reference;
+  template <class V>
+  void describe(V& v) {
+    v.field("finder", finder, one_of({"lidar", "reference"}),
+            "lidar: from the submap clouds; reference: true relative poses plus noise and a share of wrong ones.");
+    v.field("min_submap_gap", min_submap_gap, at_least(1.0),
+            "lidar: submaps of one robot nearer than this are not compared.");
+    v.field("lidar", lidar);
+    v.field("reference", reference);
+  }
+};
+
+struct MissionConfig {
+  std::string mission = "unnamed";
+  std::string description;
+  std::string input;                          ///< In plain words: real, replayed or simulated.
+  std::vector<std::string> notes;             ///< Shown in the report.
+  double duration_s = 0.0;                    ///< 0 = until the last sample.
+  evaluation::AssociationConfig association;  ///< Of estimates with the reference.
+  double max_tilt_deg = 3.0;                  ///< Of a random frame.
+  double max_shift_m = 50.0;
+  std::string source = "recordings";  ///< recordings (`robots`) | simulation
+  std::vector<RobotConfig> robots;
+  simulation::SimulationConfig simulation;
+  robot::AgentConfig agent;
+  server::ServerConfig server;
+  ClosureConfig closures;
+  bus::LinkConfig link;
+  std::vector<std::string> compare_policies = {"every_node", "every_node_2", "spectral",
+                                               "uniform",    "random",       "euclidean"};
+  template <class V>
+  void describe(V& v) {
+    v.field("mission", mission, any(), "Name of the mission.");
+    v.field("description", description, any(), "One sentence.");
+    v.field("input", input, any(), "What is real, replayed or simulated, in plain words.");
+    v.field("notes", notes, any(), "Sentences shown in the report.");
+    v.field("duration_s", duration_s, at_least(0.0), "Mission time; 0 = until the last sample.");
+    v.field("association", association);
+    v.field("max_tilt_deg", max_tilt_deg, at_least(0.0), "Largest tilt of a random frame.");
+    v.field("max_shift_m", max_shift_m, at_least(0.0), "Largest shift of a random frame.");
+    v.field("source", source, one_of({"recordings", "simulation"}), "Replay `robots`, or simulate.");
+    v.field("robots", robots, any(), "The robots whose recordings are replayed.");
+    v.field("simulation", simulation);
+    v.field("agent", agent);
+    v.field("server", server);
+    v.field("closures", closures);
+    v.field("link", link);
+    v.field("compare_policies", compare_policies, any(), "Policies run side by side as shadow agents.");
+  }
+};
+
+/// Loads a mission file, then applies --set assignments; checks what a single field cannot (unique names, files given).
+Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments);
+/// The mission of `tutti demo`: nothing needed but the program.
+Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments);
+
+}  // namespace tutti::mission

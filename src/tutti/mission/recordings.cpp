@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/recordings.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "tutti/base/random.hpp"
+#include "tutti/formats/euroc_csv.hpp"
+#include "tutti/formats/kitti.hpp"
+#include "tutti/formats/tum.hpp"
+
+namespace tutti::mission {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data) {
+  const fs::path path = data / source.file;
+  if (source.format == "tum") return formats::read_tum(path.string());
+  if (source.format == "euroc") return formats::read_euroc_csv(path.string());
+  auto poses = formats::read_kitti_poses(path.string(), source.rate_hz, Timestamp{0});
+  if (!poses || source.times.empty()) return poses;
+  const auto times = formats::read_times((data / source.times).string());
+  if (!times) return tl::unexpected(times.error());
+  return formats::with_times(*poses, *times);
+}
+
+/// Four rows of four numbers; '#' starts a comment.
+Result<Pose3> read_transform(const fs::path& path) {
+  std::ifstream in(path);
+  if (!in) return fail(ErrorCode::io, "{}: cannot be read (expected a 4x4 transform)", path.string());
+  std::vector<double> values;
+  std::string line;
+  while (std::getline(in, line)) {
+    std::istringstream numbers(line.substr(0, line.find('#')));
+    for (double value = 0.0; numbers >> value;) values.push_back(value);
+  }
+  if (values.size() != 16)
+    return fail(ErrorCode::parse, "{}: {} numbers, expected the 16 of a 4x4 transform", path.string(), values.size());
+  return Pose3::from_matrix(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data()));
+}
+
+/// The samples between two shares of a recording, and which they were.
+template <class T>
+std::vector<T> part(const std::vector<T>& all, double from_share, double to_share) {
+  const auto n = static_cast<double>(all.size());
+  const auto from = static_cast<std::ptrdiff_t>(std::floor(from_share * n));
+  const auto to = static_cast<std::ptrdiff_t>(std::ceil(to_share * n));
+  if (from >= to) return {};
+  return {all.begin() + from, all.begin() + to};
+}
+
+std::vector<std::string> scan_files(const fs::path& folder, std::size_t count) {
+  std::vector<std::string> files(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const fs::path file = folder / fmt::format("{:06d}.pcd", i);
+    if (fs::exists(file)) files[i] = file.string();
+  }
+  return files;
+}
+
+bool is_degraded(const simulation::DegradeConfig& degrade) {
+  return degrade.yaw_deg_per_m != 0.0 || degrade.scale_percent != 0.0;
+}
+
+Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& config, const fs::path& data, Rng rng) {
+  auto odometry = read_trajectory(robot.odometry, data);
+  if (!odometry) return tl::unexpected(odometry.error());
+  MissionRecording out;
+  if (!robot.scans.empty()) {
+    if (!fs::is_directory(data / robot.scans))
+      return fail(ErrorCode::io, "{}: no such folder of scans (robot {})", (data / robot.scans).string(), robot.name);
+    out.recording.scan_files = part(scan_files(data / robot.scans, odometry->size()), robot.from_share, robot.to_share);
+  }
+  if (!robot.reference.file.empty()) {
+    auto reference = read_trajectory(robot.reference, data);
+    if (!reference) return tl::unexpected(reference.error());
+    Pose3 T_common_reference;
+    if (!robot.reference_transform.empty()) {
+      const auto transform = read_transform(data / robot.reference_transform);
+      if (!transform) return tl::unexpected(transform.error());
+      T_common_reference = *transform;
+    }
+    if (robot.reference_offset_m.size() == 3)
+      T_common_reference.translation += Eigen::Vector3d(robot.reference_offset_m.data());
+    for (StampedPose& sample : *reference) sample.pose = T_common_reference * sample.pose;
+    out.recording.reference = std::move(*reference);
+    if (robot.reference.file == robot.odometry.file) out.T_common_odom = T_common_reference;
+  }
+  Trajectory raw = part(*odometry, robot.from_share, robot.to_share);
+  if (raw.size() < 2)
+    return fail(ErrorCode::invalid, "robot {}: {} odometry poses to replay, expected at least 2", robot.name,
+                raw.size());
+  if (is_degraded(robot.degrade)) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
+  raw = simulation::degrade_odometry(raw, robot.degrade);
+  if (robot.random_frame) {
+    out.T_odom_recorded = simulation::random_frame(rng, config.max_tilt_deg, config.max_shift_m);
+    raw = simulation::move_frame(raw, out.T_odom_recorded);
+  }
+  if (out.T_common_odom) out.T_common_odom = *out.T_common_odom * out.T_odom_recorded.inverse();
+  out.recording.increment_covariance = simulation::increment_covariances(raw, robot.covariance);
+  out.recording.odometry = std::move(raw);
+  return out;
+}
+
+Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, const fs::path& data, const Rng& rng) {
+  std::vector<MissionRecording> out;
+  for (const RobotConfig& robot : config.robots) {
+    auto loaded = replay(robot, config, data, rng.fork("robot/" + robot.name));
+    if (!loaded) return in_context("robot " + robot.name, loaded.error());
+    loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
+    loaded->recording.name = robot.name;
+    loaded->start_s = robot.start_s;
+    loaded->score_against_reference = robot.score_against_reference && !loaded->recording.reference.empty();
+    out.push_back(std::move(*loaded));
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<std::vector<MissionRecording>> load_recordings(const MissionConfig& config, const std::filesystem::path& data,
+                                                      std::uint64_t seed) {
+  if (config.source == "recordings") return replay_all(config, data, Rng(seed));
+  std::vector<MissionRecording> out;
+  for (Recording& recording : simulation::simulate_recordings(config.simulation, Timestamp{0}, seed))
+    out.push_back({.recording = std::move(recording)});
+  return out;
+}
+
+}  // namespace tutti::mission

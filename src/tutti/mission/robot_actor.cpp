@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/robot_actor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/evaluation/agreement.hpp"
+#include "tutti/formats/pcd.hpp"
+#include "tutti/mission/load_meter.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr const char* kBudgetPolicy = "spectral";
+
+Trajectory broadcast_trajectory(const ProxyGraph& graph, RobotId robot) {
+  Trajectory out;
+  for (const ProxyNode& node : graph.nodes)
+    if (node.robot == robot) out.push_back({node.stamp, node.T_world_body});
+  return out;
+}
+
+}  // namespace
+
+RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
+                       const std::vector<std::string>& policies, Rng rng)
+    : recording_(recording) {
+  std::vector<std::string> ordered = policies;
+  std::stable_partition(ordered.begin(), ordered.end(), [](const std::string& p) { return p == kBudgetPolicy; });
+  for (const std::string& policy : ordered) {
+    robot::AgentConfig own = config;
+    own.policy.name = policy;
+    members_.push_back({policy,
+                        robot::RobotAgent(recording.recording.robot, 1, own, rng.fork(policy)),
+                        {.robot = recording.recording.name, .policy = policy}});
+    if (policy == config.policy.name) default_ = members_.size() - 1;
+  }
+  TUTTI_CHECK(!members_.empty() && members_[default_].policy == config.policy.name, "default policy {} does not run",
+              config.policy.name);
+}
+
+double RobotActor::next_time() const {
+  const Trajectory& odometry = recording_.recording.odometry;
+  if (next_ >= odometry.size()) return std::numeric_limits<double>::infinity();
+  return recording_.start_s + (odometry[next_].stamp - odometry.front().stamp);
+}
+
+void RobotActor::replay_next() {
+  const Recording& recording = recording_.recording;
+  const StampedPose& sample = recording.odometry[next_];
+  const Matrix6d covariance = next_ == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[next_ - 1];
+  for (std::size_t m = 0; m < members_.size(); ++m) {
+    double unused_s = 0.0;
+    const CpuScope cpu(m == default_ ? cpu_s_ : unused_s);
+    const auto ok = members_[m].agent.add_odometry(sample.stamp, sample.pose, covariance);
+    if (!ok && m == default_) note(refused_odometry_, ok.error().message);
+    if (m != default_) members_[m].agent.take_outgoing();  // shadows are never heard
+  }
+  feed_scan(next_);
+  if (++next_ == recording.odometry.size()) default_agent().finish();
+}
+
+void RobotActor::feed_scan(std::size_t sample) {
+  const Recording& recording = recording_.recording;
+  if (recording.scan_files.empty() || recording.scan_files[sample].empty()) return;
+  auto cloud = formats::read_pcd(recording.scan_files[sample]);
+  if (!cloud) return note(refused_scans_, cloud.error().message);
+  const CpuScope cpu(cpu_s_);
+  const auto ok = default_agent().add_scan(
+      {recording.odometry[sample].stamp, std::make_shared<const PointCloud>(std::move(*cloud))});
+  if (!ok) note(refused_scans_, ok.error().message);
+}
+
+void RobotActor::receive(const ProxyGraphMessage& message, double time_s) {
+  std::optional<std::size_t> budget;
+  for (Member& member : members_) {
+    update(member, message, member.policy == kBudgetPolicy ? std::nullopt : budget, time_s);
+    if (member.policy == kBudgetPolicy) budget = member.agent.ledger().size();
+  }
+}
+
+void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::optional<std::size_t> budget,
+                        double time_s) {
+  const bool is_default = &member.agent == &default_agent();
+  double unused_s = 0.0;
+  robot::UpdateSummary summary;
+  {
+    const CpuScope cpu(is_default ? cpu_s_ : unused_s);
+    Stopwatch whole;
+    Stopwatch stage;
+    summary = member.agent.receive(message, budget, [&](robot::UpdateStage ended) {
+      const double ms = stage.lap_ms();
+      if (ended == robot::UpdateStage::compare) member.timing.comparison_ms.push_back(ms);
+      if (ended == robot::UpdateStage::optimise) member.timing.optimisation_ms.push_back(ms);
+    });
+    if (summary.synchronised > 0) member.timing.update_ms.push_back(whole.lap_ms());
+  }
+  if (!is_default || summary.synchronised == 0) return;
+  UpdateRecord record{.time_s = time_s,
+                      .revision = summary.revision,
+                      .synchronised_nodes = summary.synchronised,
+                      .constraints_total = summary.constraints,
+                      .mean_disagreement_m = summary.mean_disagreement,
+                      .max_disagreement_m = summary.max_disagreement};
+  if (const auto agreement = evaluation::agreement(member.agent.corrected(), broadcast_trajectory(message.graph, id())))
+    record.agreement_rmse_m = agreement->rmse_m;
+  updates_.push_back(std::move(record));
+}
+
+RobotOutcome RobotActor::outcome() const {
+  RobotOutcome out{.recording = &recording_, .default_policy = members_[default_].policy};
+  for (const Member& member : members_) out.agents.emplace_back(member.policy, &member.agent);
+  return out;
+}
+
+std::vector<PolicyTiming> RobotActor::timing() const {
+  std::vector<PolicyTiming> out;
+  for (const Member& member : members_) out.push_back(member.timing);
+  return out;
+}
+
+void RobotActor::note(Refusal& refusal, const std::string& message) {
+  if (refusal.count++ == 0) refusal.first = message;
+}
+
+std::vector<std::string> RobotActor::refusals() const {
+  std::vector<std::string> out;
+  const auto add = [&](const Refusal& refusal, const char* what) {
+    if (refusal.count > 0)
+      out.push_back(fmt::format("{}: {} {} refused, the first because: {}", recording_.recording.name, refusal.count,
+                                what, refusal.first));
+  };
+  add(refused_odometry_, "odometry samples");
+  add(refused_scans_, "scans");
+  return out;
+}
+
+}  // namespace tutti::mission

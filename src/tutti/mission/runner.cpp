@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/runner.hpp"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <set>
+#include <thread>
+
+#include "tutti/bus/in_process_bus.hpp"
+#include "tutti/mission/closure_finders.hpp"
+#include "tutti/mission/evaluate.hpp"
+#include "tutti/mission/load_meter.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/mission/robot_actor.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr Timestamp kMissionStart{0};  // virtual time; robots' own stamps are never compared with it
+
+/// Keeps virtual time in step with the wall clock, when asked to.
+class Pace {
+ public:
+  explicit Pace(std::optional<double> rate) : rate_(rate) {}
+  void wait_until(double time_s) const {
+    if (rate_) std::this_thread::sleep_until(start_ + std::chrono::duration<double>(time_s / *rate_));
+  }
+  /// Wall milliseconds since the moment that `time_s` stood for.
+  [[nodiscard]] double late_ms(double time_s) const {
+    if (!rate_) return 0.0;
+    return std::chrono::duration<double, std::milli>(Clock::now() - start_).count() - 1e3 * time_s / *rate_;
+  }
+  [[nodiscard]] double wall_s() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::optional<double> rate_;
+  std::chrono::time_point<Clock, std::chrono::duration<double>> start_ = Clock::now();
+};
+
+class MissionRun {
+ public:
+  MissionRun(const MissionConfig& config, const RunOptions& options, std::vector<MissionRecording> recordings)
+      : config_(config),
+        options_(options),
+        recordings_(std::move(recordings)),
+        finder_(make_closure_finder(config.closures, recordings_, options.seed)),
+        server_(robot_ids(recordings_), finder_, config.server),
+        bus_(kMissionStart, config.link, options.seed),
+        workers_(options.threads > 0 ? options.threads : tbb::task_arena::automatic),
+        pace_(options.rate) {
+    std::vector<std::string> policies = config.compare_policies;
+    if (std::find(policies.begin(), policies.end(), config.agent.policy.name) == policies.end())
+      policies.insert(policies.begin(), config.agent.policy.name);
+    const Rng rng(options.seed);
+    for (const MissionRecording& recording : recordings_) {
+      robots_.push_back(std::make_unique<RobotActor>(recording, config.agent, policies,
+                                                     rng.fork("agent/" + recording.recording.name)));
+      bus_.subscribe(bus::Endpoint::of(recording.recording.robot), wire::MessageKind::proxy_graph);
+      const Trajectory& odometry = recording.recording.odometry;
+      duration_s_ = std::max(duration_s_, recording.start_s + (odometry.back().stamp - odometry.front().stamp));
+    }
+    if (config.duration_s > 0.0) duration_s_ = std::min(duration_s_, config.duration_s);
+    worst_latency_ms_.resize(robots_.size(), 0.0);
+  }
+
+  void run() {
+    double next_update_s = config_.server.update_period_s;
+    while (true) {
+      const double sample_s = next_sample();
+      if (sample_s == kNever) finish_robots();
+      const double delivery_s = next_delivery();
+      const double now_s = std::min({sample_s, delivery_s, next_update_s});
+      if (sample_s == kNever && delivery_s == kNever && !server_.has_news()) break;
+      pace_.wait_until(now_s);
+      time_s_ = now_s;
+      deliver();
+      if (sample_s <= now_s) replay(now_s);
+      if (next_update_s <= now_s) {
+        update_map();
+        next_update_s += config_.server.update_period_s;
+      }
+    }
+  }
+
+  MissionRecord record() const;
+
+ private:
+  static std::set<RobotId> robot_ids(const std::vector<MissionRecording>& recordings) {
+    std::set<RobotId> ids;
+    for (const MissionRecording& recording : recordings) ids.insert(recording.recording.robot);
+    return ids;
+  }
+
+  [[nodiscard]] double next_sample() const {
+    double next = kNever;
+    for (const auto& robot : robots_) next = std::min(next, robot->next_time());
+    return next > duration_s_ ? kNever : next;
+  }
+  [[nodiscard]] double next_delivery() const {
+    const auto next = bus_.next_delivery();
+    return next ? *next - kMissionStart : kNever;
+  }
+
+  void replay(double now_s) {
+    for (const auto& robot : robots_) {
+      if (robot->next_time() > now_s) continue;
+      robot->replay_next();
+      send_submaps(*robot);
+    }
+  }
+
+  /// Also when the mission ends before the recording; a second time nothing is left to send.
+  void finish_robots() {
+    for (const auto& robot : robots_) {
+      robot->finish();
+      send_submaps(*robot);
+    }
+  }
+
+  void send_submaps(RobotActor& robot) {
+    for (const SubmapMessage& message : robot.take_outgoing()) {
+      if (const Status ok = wire::validate(message); !ok) {
+        refusals_.push_back(ok.error().message);
+        continue;
+      }
+      bus_.publish(kMissionStart + time_s_, bus::Endpoint::of(robot.id()), bus::Endpoint::server(),
+                   wire::MessageKind::submap, wire::encode(message, {.voxel_m = config_.agent.submap.voxel_m}));
+    }
+  }
+
+  void deliver() {
+    for (const bus::Delivery& delivery : bus_.deliver_until(kMissionStart + time_s_)) {
+      if (delivery.kind == wire::MessageKind::submap)
+        receive_submap(*delivery.bytes);
+      else if (delivery.kind == wire::MessageKind::proxy_graph && delivery.to.robot)
+        receive_proxy_graph(*delivery.to.robot, *delivery.bytes);
+    }
+  }
+
+  void receive_submap(const std::string& bytes) {
+    if (const Status taken = take_submap(bytes); !taken) return refusals_.push_back(taken.error().message);
+    for (const ClosureVerdict& verdict : verify(server_.take_jobs()))
+      if (const Status ok = server_.receive(verdict); !ok) refusals_.push_back(ok.error().message);
+  }
+
+  Status take_submap(const std::string& bytes) {
+    const CpuScope cpu(server_cpu_s_);
+    const auto message = wire::decode_submap(bytes);
+    return message ? server_.receive(*message) : Status(tl::unexpected(message.error()));
+  }
+
+  /// The jobs' answers in the jobs' order, whatever the number of threads.
+  std::vector<ClosureVerdict> verify(const std::vector<server::VerificationJob>& jobs) {
+    std::vector<ClosureVerdict> verdicts(jobs.size());
+    std::vector<double> took_ms(jobs.size(), 0.0);
+    std::vector<double> cpu_s(jobs.size(), 0.0);
+    workers_.execute([&] {
+      tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t i) {
+        const CpuScope cpu(cpu_s[i]);
+        Stopwatch watch;
+        verdicts[i] = finder_->verify(*jobs[i].first, *jobs[i].second);
+        took_ms[i] = watch.lap_ms();
+      });
+    });
+    timing_.server_verification_ms.insert(timing_.server_verification_ms.end(), took_ms.begin(), took_ms.end());
+    for (const double s : cpu_s) worker_cpu_s_ += s;
+    return verdicts;
+  }
+
+  void receive_proxy_graph(RobotId robot, const std::string& bytes) {
+    const auto message = wire::decode_proxy_graph(bytes);
+    if (!message) return refusals_.push_back(message.error().message);
+    robots_[robot.value]->receive(*message, time_s_);
+    worst_latency_ms_[robot.value] = std::max(worst_latency_ms_[robot.value], pace_.late_ms(time_s_));
+  }
+
+  void update_map() {
+    if (server_.has_news()) {
+      const CpuScope cpu(server_cpu_s_);
+      Stopwatch watch;
+      const ProxyGraphMessage message = server_.optimise();
+      timing_.server_optimisation_ms.push_back(watch.lap_ms());
+      proxy_graph_ = message.graph;
+      bus_.publish(kMissionStart + time_s_, bus::Endpoint::server(), std::nullopt, wire::MessageKind::proxy_graph,
+                   wire::encode(message));
+      server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
+    }
+    if (options_.progress)
+      options_.progress(
+          {time_s_, duration_s_, server_.state().submaps.size(), accepted_closures(), server_.map().components});
+  }
+
+  [[nodiscard]] std::size_t accepted_closures() const {
+    return static_cast<std::size_t>(std::count_if(server_.map().closures.begin(), server_.map().closures.end(),
+                                                  [](const server::JudgedClosure& c) { return c.accepted; }));
+  }
+
+  void record_traffic(RobotRecord& robot) const;
+  void record_timing(MissionRecord& record) const;
+
+  const MissionConfig& config_;
+  const RunOptions& options_;
+  std::vector<MissionRecording> recordings_;
+  std::shared_ptr<const server::ClosureFinder> finder_;
+  server::MapServer server_;
+  bus::InProcessBus bus_;
+  tbb::task_arena workers_;
+  Pace pace_;
+  std::vector<std::unique_ptr<RobotActor>> robots_;  // by RobotId
+  double time_s_ = 0.0;
+  double duration_s_ = 0.0;
+  ProxyGraph proxy_graph_;  // the last broadcast
+  std::vector<std::string> refusals_;
+  TimingRecord timing_;
+  double server_cpu_s_ = 0.0;
+  double worker_cpu_s_ = 0.0;
+  double server_latency_ms_ = 0.0;
+  std::vector<double> worst_latency_ms_;  // of each robot's updates
+};
+
+void MissionRun::record_traffic(RobotRecord& robot) const {
+  for (const auto& [topic, statistics] : bus_.statistics()) {
+    const auto& [from, to, kind] = topic;
+    if (from.robot == robot.id) {
+      robot.bytes_up += statistics.published_bytes;
+      robot.messages_up += statistics.published;
+    } else if (to.robot == robot.id) {
+      robot.bytes_down += statistics.published_bytes;
+      robot.messages_down += statistics.published;
+    }
+  }
+}
+
+void MissionRun::record_timing(MissionRecord& record) const {
+  record.timing = timing_;
+  record.timing.wall_s = pace_.wall_s();
+  record.timing.rate = options_.rate;
+  for (const auto& robot : robots_)
+    for (PolicyTiming& policy : robot->timing()) record.timing.policies.push_back(std::move(policy));
+  if (!options_.rate) return;
+  for (const auto& robot : robots_)
+    record.timing.load.push_back({robot->recording().recording.name, robot->cpu_s() / record.timing.wall_s,
+                                  worst_latency_ms_[robot->id().value]});
+  record.timing.load.push_back({"server", (server_cpu_s_ + worker_cpu_s_) / record.timing.wall_s, server_latency_ms_});
+}
+
+MissionRecord MissionRun::record() const {
+  MissionRecord record{.mission = config_.mission,
+                       .description = config_.description,
+                       .input = config_.input,
+                       .notes = config_.notes,
+                       .seed = options_.seed,
+                       .default_policy = config_.agent.policy.name,
+                       .duration_s = duration_s_,
+                       .association = config_.association,
+                       .rpe_interval = fmt::format("{:g} s", kRpeInterval_s),
+                       .effective_config_yaml = to_yaml(dump_config(config_))};
+  std::vector<RobotOutcome> outcomes;
+  for (const auto& robot : robots_) {
+    outcomes.push_back(robot->outcome());
+    for (std::string& refusal : robot->refusals()) record.notes.push_back(std::move(refusal));
+  }
+  if (!refusals_.empty())
+    record.notes.push_back(
+        fmt::format("{} messages were refused, the first because: {}", refusals_.size(), refusals_.front()));
+  record.robots.resize(robots_.size());
+  evaluate_robots(outcomes, server_.map(), config_.association, record);
+  evaluate_server(outcomes, server_, config_.association, record);
+  record.server.proxy = proxy_graph_;
+  for (RobotRecord& robot : record.robots) {
+    record_traffic(robot);
+    robot.updates = robots_[robot.id.value]->updates();
+    robot.proxy_nodes =
+        static_cast<std::size_t>(std::count_if(proxy_graph_.nodes.begin(), proxy_graph_.nodes.end(),
+                                               [&](const ProxyNode& node) { return node.robot == robot.id; }));
+    for (const auto& [id, submap] : server_.state().submaps) robot.submaps += id.robot == robot.id ? 1 : 0;
+    for (const RobotComponent& entry : proxy_graph_.components)
+      if (entry.robot == robot.id) robot.component = entry.component;
+  }
+  record_timing(record);
+  return record;
+}
+
+}  // namespace
+
+Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options) {
+  auto recordings = load_recordings(config, options.data, options.seed);
+  if (!recordings) return tl::unexpected(recordings.error());
+  MissionRun mission(config, options, std::move(*recordings));
+  mission.run();
+  return mission.record();
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "tutti/base/result.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/record.hpp"
+
+namespace tutti::mission {
+
+struct Progress {
+  double time_s = 0.0;  ///< Mission time.
+  double duration_s = 0.0;
+  std::size_t submaps = 0;
+  std::size_t closures = 0;  ///< Accepted.
+  std::uint32_t components = 0;
+};
+
+struct RunOptions {
+  std::filesystem::path data;  ///< Folder the mission's files lie in.
+  std::uint64_t seed = 1;
+  std::optional<double> rate;  ///< Times real time; none = as fast as possible.
+  int threads = 0;             ///< For verifications; 0 = all cores. Does not change the result.
+  std::function<void(const Progress&)> progress;
+};
+
+/// Runs a whole mission in virtual time: robots, links, server and feedback, every message through its real encoding.
+/// The same configuration, data and seed give the same record (except its timing), whatever the threads or the rate.
+Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options);
+
+}  // namespace tutti::mission

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/graph_monitor.hpp"
+
+#include <algorithm>
+#include <map>
+#include <span>
+#include <utility>
+
+#include "tutti/estimation/marginals.hpp"
+
+namespace tutti::server {
+namespace {
+
+/// Indices of the nodes of each robot that become proxy nodes, in time order.
+std::map<RobotId, std::vector<std::size_t>> choose_nodes(const MapEstimate& map) {
+  std::map<RobotId, std::vector<std::size_t>> chosen;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const MapNode& node = map.nodes[i];
+    auto& nodes = chosen[node.id.robot];
+    const bool attached = nodes.empty() || map.nodes[nodes.front()].component == node.component;
+    if (attached && node.representative) nodes.push_back(i);
+  }
+  return chosen;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::vector<std::size_t>& chosen) {
+  const std::size_t n = chosen.size();
+  std::vector<std::uint32_t> support(n, 0);
+  if (n == 0) return support;
+  const RobotId robot = map.nodes[chosen.front()].id.robot;
+  // Stretch k runs from chosen[k - 1] to chosen[k]. A keyframe lies before the stretches above `after`, and after the
+  // stretches up to `before`.
+  struct Place {
+    std::size_t before = 0;  // how many chosen nodes, less one, are at or before it (0 when none)
+    std::size_t after = 0;   // the first chosen node at or after it (n when none)
+  };
+  const auto place = [&](const KeyframeId& id) {
+    const auto index_of = [&](std::size_t node) { return map.nodes[node].id.index; };
+    const auto at_or_after = std::ranges::lower_bound(chosen, id.index, {}, index_of);
+    const auto beyond = std::ranges::upper_bound(chosen, id.index, {}, index_of);
+    return Place{beyond == chosen.begin() ? 0 : static_cast<std::size_t>(beyond - chosen.begin()) - 1,
+                 static_cast<std::size_t>(at_or_after - chosen.begin())};
+  };
+  std::map<RobotId, std::vector<Place>> ends_with;  // per other robot: where its closures end on this one
+  for (const JudgedClosure& judged : map.closures) {
+    if (!judged.accepted) continue;
+    const auto& [from, to, measurement] = judged.closure;
+    if (from.robot == robot && to.robot == robot) {
+      const auto& [first, last] = std::minmax({from, to});
+      const std::size_t end = place(last).before;
+      for (std::size_t k = place(first).after + 1; k <= end; ++k) ++support[k];
+    } else if (from.robot == robot || to.robot == robot) {
+      ends_with[from.robot == robot ? to.robot : from.robot].push_back(place(from.robot == robot ? from : to));
+    }
+  }
+  for (const auto& [other, ends] : ends_with)
+    for (std::size_t k = 1; k < n; ++k) {
+      const auto before = std::ranges::count_if(ends, [k](const Place& end) { return end.after < k; });
+      const auto after = std::ranges::count_if(ends, [k](const Place& end) { return end.before >= k; });
+      support[k] += static_cast<std::uint32_t>(std::min(before, after));
+    }
+  return support;
+}
+
+ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config) {
+  const auto chosen = choose_nodes(map);
+  std::vector<std::pair<std::size_t, std::size_t>> stretches;
+  for (const auto& [robot, nodes] : chosen)
+    for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
+  const std::vector<Matrix6d> covariances = estimation::relative_covariances(map.graph, map.graph.poses, stretches);
+
+  std::vector<consistency::ServerNode> nodes;
+  std::vector<RobotComponent> components;
+  std::size_t stretch = 0;
+  for (const auto& [robot, indices] : chosen) {
+    if (indices.empty()) continue;
+    components.push_back({robot, map.nodes[indices.front()].component});
+    const std::vector<std::uint32_t> support = closure_support(map, indices);
+    for (std::size_t k = 0; k < indices.size(); ++k) {
+      const MapNode& node = map.nodes[indices[k]];
+      nodes.push_back({.robot = robot,
+                       .stamp = node.stamp,
+                       .T_world_body = node.T_world_body,
+                       .covariance = k == 0 ? Matrix6d::Zero() : covariances[stretch++],
+                       .support = support[k]});
+    }
+  }
+  return consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
+}
+
+}  // namespace tutti::server

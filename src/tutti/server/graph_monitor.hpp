@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/model/proxy_graph.hpp"
+#include "tutti/server/map_estimate.hpp"
+
+namespace tutti::server {
+
+/// Reads the latest estimate of the representative nodes into a proxy graph, with each node's uncertainty relative to
+/// the robot's previous one and its support. A robot's nodes that hang together with nothing (a submap before them is
+/// missing) are left out until they do.
+ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config);
+
+/// How many independent closures support the stretch between consecutive chosen nodes of one robot: the closures of the
+/// robot with itself that span it, plus for every other robot the smaller number of closures before and after it
+/// (closures on both sides make a cycle through the stretch). `chosen` are indices into map.nodes, all of one robot, in
+/// order; result[0] = 0.
+std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::vector<std::size_t>& chosen);
+
+}  // namespace tutti::server

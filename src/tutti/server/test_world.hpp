@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+#include "tutti/server/closure_finder.hpp"
+#include "tutti/server/map_estimate.hpp"
+
+/// Small maps with known truth for the tests of this folder.
+namespace tutti::server::test {
+
+/// Robots walk once and a half around a circle of 10 m radius, a keyframe a metre, half a metre apart sideways.
+inline Pose3 true_pose(RobotId robot, std::uint32_t index) {
+  const double angle = 0.1 * index + 0.3 * robot.value;
+  const double radius = 10.0 + 0.5 * robot.value;
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle + std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
+          {radius * std::cos(angle), radius * std::sin(angle), 0.1 * robot.value}};
+}
+
+struct TestWorldConfig {
+  std::uint32_t keyframes = 91;
+  std::uint32_t per_submap = 10;
+  double sigma_m = 0.02;
+  double sigma_rad = 0.005;
+};
+
+inline Matrix6d diagonal_covariance(double sigma_m, double sigma_rad) {
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+  return variance.asDiagonal();
+}
+
+inline Vector6d draw(Rng& rng, double sigma_m, double sigma_rad) {
+  Vector6d xi;
+  for (int i = 0; i < 3; ++i) {
+    xi(i) = rng.normal(sigma_m);
+    xi(i + 3) = rng.normal(sigma_rad);
+  }
+  return xi;
+}
+
+/// Overlapping submaps of one robot with noisy odometry, in an odom frame of its own.
+inline std::vector<Submap> make_submaps(RobotId robot, const TestWorldConfig& config, Rng rng) {
+  std::vector<Submap> submaps;
+  Submap open{.id = {robot, 0}};
+  Pose3 T_odom_body = retract({}, draw(rng, 5.0, 1.0));
+  for (std::uint32_t k = 0; k < config.keyframes; ++k) {
+    if (k > 0) {
+      const Pose3 step = true_pose(robot, k - 1).inverse() * true_pose(robot, k);
+      const Pose3 measured = retract(step, draw(rng, config.sigma_m, config.sigma_rad));
+      T_odom_body = T_odom_body * measured;
+      open.odometry.push_back({measured, diagonal_covariance(config.sigma_m, config.sigma_rad)});
+    }
+    open.keyframes.push_back({k, Timestamp{1'000'000'000LL * (k + 1)}, T_odom_body, k % 2 == 0});
+    if (open.keyframes.size() > config.per_submap || k + 1 == config.keyframes) {
+      submaps.push_back(open);
+      open = {.id = {robot, open.id.index + 1}, .keyframes = {open.keyframes.back()}};
+    }
+  }
+  return submaps;
+}
+
+/// True relative poses with noise between the middle keyframes of submaps closer than 4 m; every `wrong_every`-th
+/// reporting pair is wrong by 3 m.
+class TestFinder final : public ClosureFinder {
+ public:
+  explicit TestFinder(std::uint64_t seed, std::uint32_t wrong_every = 0) : seed_(seed), wrong_every_(wrong_every) {}
+
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    if (first.id.robot == second.id.robot && second.id.index - first.id.index < 3) return false;
+    const auto [a, b] = middles(first, second);
+    return (true_pose(a.robot, a.index).translation - true_pose(b.robot, b.index).translation).norm() < 4.0;
+  }
+  [[nodiscard]] ClosureVerdict verify(const Submap& first, const Submap& second) const override {
+    const auto [a, b] = middles(first, second);
+    const std::uint64_t key = (std::uint64_t{first.id.robot.value} << 48U) ^ (std::uint64_t{first.id.index} << 32U) ^
+                              (std::uint64_t{second.id.robot.value} << 16U) ^ second.id.index;
+    Rng rng = Rng(seed_).fork(key);
+    Pose3 T = retract(true_pose(a.robot, a.index).inverse() * true_pose(b.robot, b.index), draw(rng, 0.02, 0.005));
+    if (wrong_every_ > 0 && rng.index(wrong_every_) == 0)
+      T.translation += Eigen::Vector3d(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized() * 3.0;
+    return {{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, ""};
+  }
+  static bool is_wrong(const LoopClosure& closure) {
+    const Pose3 truth =
+        true_pose(closure.from.robot, closure.from.index).inverse() * true_pose(closure.to.robot, closure.to.index);
+    return local(truth, closure.measurement.T_a_b).head<3>().norm() > 0.5;
+  }
+
+ private:
+  static std::pair<KeyframeId, KeyframeId> middles(const Submap& first, const Submap& second) {
+    const auto middle = [](const Submap& s) {
+      return KeyframeId{s.id.robot, s.keyframes[s.keyframes.size() / 2].index};
+    };
+    return {middle(first), middle(second)};
+  }
+  std::uint64_t seed_;
+  std::uint32_t wrong_every_;
+};
+
+}  // namespace tutti::server::test

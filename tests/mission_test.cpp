@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Whole missions, small, in virtual time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tutti/mission/report_json.hpp"
+#include "tutti/mission/runner.hpp"
+
+namespace tutti::mission {
+namespace {
+
+MissionConfig small_mission() {
+  MissionConfig config;
+  config.mission = "small";
+  config.source = "simulation";
+  config.simulation.robots = 2;
+  config.simulation.world = {.rows = 2, .columns = 3, .block_m = 20.0, .jitter_m = 3.0, .missing_share = 0.0};
+  config.simulation.walk.duration_s = 300.0;
+  config.simulation.odometry.yaw_bias_deg_per_m = 0.05;
+  config.closures.finder = "reference";
+  config.closures.reference.min_time_gap_s = 20.0;
+  return config;
+}
+
+MissionRecord run(const MissionConfig& config, std::uint64_t seed = 1, int threads = 1) {
+  auto record = run_mission(config, {.seed = seed, .threads = threads});
+  EXPECT_TRUE(record.has_value()) << record.error().message;
+  return record ? *record : MissionRecord{};
+}
+
+const PolicyRecord& policy(const RobotRecord& robot, const std::string& name) {
+  const auto found =
+      std::find_if(robot.policies.begin(), robot.policies.end(), [&](const PolicyRecord& p) { return p.name == name; });
+  EXPECT_NE(found, robot.policies.end()) << name;
+  return *found;
+}
+
+TEST(Mission, ClosesTheLoop) {
+  const MissionRecord record = run(small_mission());
+  EXPECT_EQ(record.server.components, 1U);
+  EXPECT_GT(record.server.closures.size(), 10U);
+  ASSERT_TRUE(record.server.closure_check.has_value());
+  EXPECT_EQ(record.server.closure_check->wrong, 0U);
+  ASSERT_EQ(record.robots.size(), 2U);
+  for (const RobotRecord& robot : record.robots) {
+    const PolicyRecord& corrected = policy(robot, record.default_policy);
+    ASSERT_TRUE(robot.onboard.rmse_m && robot.server.rmse_m && corrected.accuracy.rmse_m);
+    EXPECT_LT(*robot.server.rmse_m, 0.5 * *robot.onboard.rmse_m);
+    EXPECT_LT(*corrected.accuracy.rmse_m, 1.1 * *robot.server.rmse_m + 0.02);
+    EXPECT_LE(*corrected.accuracy.rpe_m, *robot.onboard.rpe_m * 1.02);
+    EXPECT_GT(robot.bytes_up, 0U);
+    EXPECT_GT(robot.bytes_down, 0U);
+    EXPECT_GE(robot.updates.size(), static_cast<std::size_t>(record.duration_s / 20.0));  // one every 20 s at least
+    EXPECT_EQ(robot.whereabouts.size(), 1U);
+    EXPECT_EQ(policy(robot, "uniform").constraints_added, policy(robot, "spectral").constraints_added);
+  }
+}
+
+TEST(Mission, TheReportDependsOnTheSeedAndNotOnTheThreads) {
+  const MissionConfig config = small_mission();
+  const std::string one = report_json(run(config, 3, 1));
+  EXPECT_EQ(one, report_json(run(config, 3, 4)));
+  EXPECT_NE(one, report_json(run(config, 4, 1)));
+}
+
+TEST(Mission, SurvivesABadLink) {
+  MissionConfig config = small_mission();
+  const MissionRecord good = run(config);
+  config.link.latency_s = 1.0;
+  config.link.jitter_s = 30.0;  // submaps overtake each other
+  config.link.loss = 0.2;
+  config.link.duplicate = 0.3;
+  config.link.outages = {{.from_s = 100.0, .until_s = 160.0}};
+  const MissionRecord bad = run(config);
+  EXPECT_EQ(bad.server.components, 1U);
+  ASSERT_EQ(bad.server.graph.poses.size(), good.server.graph.poses.size());
+  for (std::size_t i = 0; i < bad.server.graph.poses.size(); ++i)
+    EXPECT_LT((bad.server.graph.poses[i].translation - good.server.graph.poses[i].translation).norm(), 1e-3);
+}
+
+TEST(Mission, RobotsThatNeverMeetStaySeparateMaps) {
+  MissionConfig config = small_mission();
+  config.closures.reference.radius_m = 0.001;
+  config.closures.reference.wrong_share = 0.0;
+  const MissionRecord record = run(config);
+  EXPECT_EQ(record.server.components, 2U);
+  EXPECT_TRUE(record.transforms.empty());
+  for (const RobotRecord& robot : record.robots) {
+    EXPECT_TRUE(robot.whereabouts.empty());
+    EXPECT_NEAR(*policy(robot, record.default_policy).accuracy.rmse_m, *robot.onboard.rmse_m, 1e-3);
+  }
+}
+
+TEST(Mission, ALoneRobotIsAMissionToo) {
+  MissionConfig config = small_mission();
+  config.simulation.robots = 1;
+  const MissionRecord record = run(config);
+  EXPECT_EQ(record.server.components, 1U);
+  EXPECT_LT(*policy(record.robots[0], record.default_policy).accuracy.rmse_m, *record.robots[0].onboard.rmse_m);
+}
+
+TEST(Mission, AMissingFileIsAClearError) {
+  MissionConfig config = small_mission();
+  config.source = "recordings";
+  config.robots = {{.name = "alpha", .odometry = {.file = "nowhere/odometry.tum"}}};
+  const auto record = run_mission(config, {.data = "data"});
+  ASSERT_FALSE(record.has_value());
+  EXPECT_NE(record.error().message.find("alpha"), std::string::npos) << record.error().message;
+  EXPECT_NE(record.error().message.find("nowhere/odometry.tum"), std::string::npos) << record.error().message;
+}
+
+}  // namespace
+}  // namespace tutti::mission

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The missions on real recordings, with the figures they have to hold. Skipped without ../shared.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+
+#include "support/shared_data.hpp"
+#include "tutti/mission/runner.hpp"
+
+namespace tutti::mission {
+namespace {
+
+MissionConfig mission_file(const std::string& name) {
+  auto config = load_mission(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions" / (name + ".yaml"), {});
+  EXPECT_TRUE(config.has_value()) << config.error().message;
+  return config ? *config : MissionConfig{};
+}
+
+MissionRecord run(const MissionConfig& config, std::uint64_t seed) {
+  auto record = run_mission(config, {.data = test::shared_path("data"), .seed = seed});
+  EXPECT_TRUE(record.has_value()) << record.error().message;
+  return record ? *record : MissionRecord{};
+}
+
+const PolicyRecord& corrected(const MissionRecord& record, const RobotRecord& robot) {
+  return *std::find_if(robot.policies.begin(), robot.policies.end(),
+                       [&](const PolicyRecord& p) { return p.name == record.default_policy; });
+}
+
+std::size_t inter_robot(const MissionRecord& record) {
+  return static_cast<std::size_t>(std::count_if(record.server.closures.begin(), record.server.closures.end(),
+                                                [](const ClosureRecord& c) { return c.from.robot != c.to.robot; }));
+}
+
+TEST(RealMissions, HkuTwoSessionsAreJoinedFromTheirScans) {
+  TUTTI_REQUIRE_SHARED("data/lidar/hku_two_sessions");
+  const MissionRecord record = run(mission_file("hku_two_sessions"), 1);
+  EXPECT_EQ(record.server.components, 1U);
+  EXPECT_GE(inter_robot(record), 60U);
+  ASSERT_TRUE(record.server.closure_check.has_value());
+  EXPECT_EQ(record.server.closure_check->wrong, 0U);
+  ASSERT_EQ(record.transforms.size(), 1U);
+  ASSERT_TRUE(record.transforms[0].error_m.has_value());
+  EXPECT_LT(*record.transforms[0].error_m, 0.03);
+  EXPECT_LT(*record.transforms[0].error_deg, 0.15);
+  for (const RobotRecord& robot : record.robots) {
+    EXPECT_LT(*corrected(record, robot).agreement_rmse_m, 0.02);
+    EXPECT_FALSE(robot.onboard.rmse_m.has_value());  // no ground truth: nothing is claimed
+  }
+}
+
+TEST(RealMissions, HkuDegradedIsRepaired) {
+  TUTTI_REQUIRE_SHARED("data/lidar/hku_two_sessions");
+  const MissionRecord record = run(mission_file("hku_degraded"), 1);
+  EXPECT_EQ(record.server.components, 1U);
+  EXPECT_EQ(record.server.closure_check->wrong, 0U);
+  EXPECT_LT(*record.server.joint.rmse_m, 0.05);
+  for (const RobotRecord& robot : record.robots) {
+    EXPECT_GT(*robot.onboard.rmse_m, 0.4);
+    EXPECT_LT(*corrected(record, robot).accuracy.rmse_m, 1.1 * *robot.server.rmse_m + 0.01);
+    EXPECT_LE(*corrected(record, robot).accuracy.rpe_m, *robot.onboard.rpe_m);
+  }
+}
+
+TEST(RealMissions, ADivergedRobotHarmsNobody) {
+  TUTTI_REQUIRE_SHARED("data/excavator_mm");
+  MissionConfig config = mission_file("excavator_diverged");
+  const MissionRecord with = run(config, 1);
+  config.robots.pop_back();  // the diverged one
+  const MissionRecord without = run(config, 1);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_NEAR(*with.robots[i].server.rmse_m, *without.robots[i].server.rmse_m, 0.01);
+    EXPECT_NEAR(*corrected(with, with.robots[i]).accuracy.rmse_m,
+                *corrected(without, without.robots[i]).accuracy.rmse_m, 0.01);
+  }
+}
+
+TEST(RealMissions, KittiSequencesOfTwoPlacesBecomeTwoMaps) {
+  TUTTI_REQUIRE_SHARED("data/kitti");
+  MissionConfig config = mission_file("kitti_00_05");
+  config.compare_policies.clear();
+  const MissionRecord record = run(config, 1);
+  EXPECT_EQ(record.server.components, 2U);
+  EXPECT_EQ(record.server.closure_check->wrong, 0U);
+  for (const RobotRecord& robot : record.robots)
+    EXPECT_LT(*corrected(record, robot).accuracy.rmse_m, 1.1 * *robot.server.rmse_m + 0.05);
+}
+
+TEST(RealMissions, EurocFlightsAgreeWithTheJointMap) {
+  TUTTI_REQUIRE_SHARED("data/euroc/MH_01");
+  MissionConfig config = mission_file("euroc_mh");
+  config.compare_policies.clear();
+  const MissionRecord record = run(config, 1);
+  EXPECT_EQ(record.server.components, 1U);
+  EXPECT_EQ(record.server.closure_check->wrong, 0U);
+  for (const RobotRecord& robot : record.robots) {
+    EXPECT_LT(*robot.server.rmse_m, *robot.onboard.rmse_m);
+    EXPECT_LT(*corrected(record, robot).accuracy.rmse_m, 1.1 * *robot.server.rmse_m + 0.02);
+  }
+}
+
+}  // namespace
+}  // namespace tutti::mission
