@@ -21,6 +21,7 @@ struct ClosedLoopConfig {
   int seeds = 2;
   int nodes_per_update = 7;
   bool late_closures = false;
+  bool settling = false;
   bool competitors = false;
   double odometry_translation_m = test::OdometryNoise{}.translation_m;
   double odometry_rotation_rad = test::OdometryNoise{}.rotation_rad;
@@ -39,6 +40,7 @@ struct ClosedLoopConfig {
     v.field("seeds", seeds, at_least(1), "Runs.");
     v.field("nodes_per_update", nodes_per_update, at_least(1), "New nodes per broadcast.");
     v.field("late_closures", late_closures, any(), "The server learns of a stretch only when it is revisited.");
+    v.field("settling", settling, any(), "The server comes to its final map bit by bit.");
     v.field("competitors", competitors, any(), "Also the other policies, at this one's number of constraints.");
     v.field("odometry_translation_m", odometry_translation_m, at_least(0), "Random walk per root metre.");
     v.field("odometry_rotation_rad", odometry_rotation_rad, at_least(0), "Random walk per root metre.");
@@ -60,6 +62,7 @@ void run(const ClosedLoopConfig& config, std::uint64_t seed) {
   const test::ServerNoise server{config.server_smooth_m, config.server_local_m, config.server_local_rad};
   auto mission = test::corridor_mission(static_cast<std::size_t>(config.length), noise, seed, server);
   mission.late_closures = config.late_closures;
+  mission.settling = config.settling;
   test::LoopConfig loop{config.compare,
                         config.policy,
                         config.ledger,

@@ -10,8 +10,8 @@
 namespace tutti::consistency {
 
 struct LedgerConfig {
-  double replace_translation_m = 0.002;
-  double replace_rotation_deg = 0.02;
+  double replace_translation_m = 0.0005;
+  double replace_rotation_deg = 0.005;
 
   template <class V>
   void describe(V& v) {

@@ -50,14 +50,14 @@ std::vector<Link> Neighbourhood::hop_links(std::size_t node, std::size_t hops) c
 }
 
 std::vector<Link> Neighbourhood::submap_links(std::size_t node) const {
+  const std::size_t own = submap_of_[node];
   std::vector<std::pair<double, std::size_t>> by_distance;
   for (std::size_t s = 0; s < submaps_.size(); ++s)
-    if (s != submap_of_[node])
-      by_distance.emplace_back((submaps_[s].centroid_world - positions_world_[node]).norm(), s);
+    if (s != own) by_distance.emplace_back((submaps_[s].centroid_world - submaps_[own].centroid_world).norm(), s);
   const std::size_t k = std::min(nearest_submaps_, by_distance.size());
   std::partial_sort(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(k), by_distance.end());
   std::vector<Link> out;
-  for (std::size_t i = 0; i < k; ++i) out.push_back({node, submaps_[by_distance[i].second].first});
+  for (std::size_t i = 0; i < k; ++i) out.push_back({submaps_[own].first, submaps_[by_distance[i].second].first});
   return out;
 }
 

@@ -22,9 +22,10 @@ class Neighbourhood {
  public:
   Neighbourhood(const PolicyInput& input, const PolicyConfig& config);
 
-  /// small: the direct neighbours in time. mid: the nodes `mid_hops` before and after. large: the first synchronised
-  /// node of each of the `nearest_submaps` other submaps whose centroids (server's estimate, over their synchronised
-  /// nodes) are nearest.
+  /// small: the node and its direct neighbours in time. mid: the node and those `mid_hops` before and after. large: the
+  /// node's submap and the `nearest_submaps` others whose centroids (server's estimate, over their synchronised nodes)
+  /// are nearest to its own, each submap linked at its first synchronised node: nodes of one submap ask for the same
+  /// links.
   [[nodiscard]] std::vector<Link> links(std::size_t node, ConstraintKind kind) const;
 
  private:

@@ -23,6 +23,8 @@ struct Mission {
   /// False: the server knows its final map from the start. True: what lies after the latest revisit is odometry to the
   /// server, too, with support 0.
   bool late_closures = false;
+  /// True: the server starts from odometry and comes to its final map bit by bit, by 4/5 of the mission.
+  bool settling = false;
 };
 
 inline Mission corridor_mission(std::size_t length, const OdometryNoise& noise, std::uint64_t seed,
@@ -37,6 +39,16 @@ inline Mission corridor_mission(std::size_t length, const OdometryNoise& noise, 
 
 /// What the server broadcasts after `count` nodes.
 inline std::vector<ServerNode> server_after(const Mission& mission, std::size_t count) {
+  if (mission.settling) {
+    const double done = static_cast<double>(count) / (0.8 * static_cast<double>(mission.truth.size()));
+    std::vector<Pose3> poses{mission.server[0]};
+    while (poses.size() < count) {
+      const std::size_t n = poses.size();
+      const Pose3 final_step = mission.server[n - 1].inverse() * mission.server[n];
+      poses.push_back(poses.back() * interpolate(mission.increments[n - 1], final_step, std::min(done, 1.0)));
+    }
+    return server_nodes(kAlpha, poses, 10, covariance_of(mission.noise));
+  }
   constexpr double kClosure_m = 5.0;
   constexpr std::size_t kRevisit = 60;
   std::size_t closed = mission.late_closures ? 0 : count - 1;

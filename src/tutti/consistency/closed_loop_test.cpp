@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole chain over a mission: proxy graph, comparison, policy, ledger, onboard optimisation.
+#include "tutti/consistency/test_support/closed_loop.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::consistency {
+namespace {
+
+using namespace test;
+
+/// 60 nodes, yaw drift of 0.3 degrees and 0.3 % of the way per metre: raw odometry some 0.7 m off.
+Mission short_mission(std::uint64_t seed) {
+  OdometryNoise noise{.translation_m = 0.02, .rotation_rad = 0.0018};
+  noise.yaw_bias_rad = 0.3 * std::numbers::pi / 180.0;
+  noise.scale_bias = 0.003;
+  return corridor_mission(60, noise, seed, {.smooth_m = 0.02, .local_m = 0.003, .local_rad = 0.0005});
+}
+
+TEST(ClosedLoop, SpectralBringsAShortRunToTheServersMap) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const auto result = run_closed_loop(short_mission(seed), {});
+    EXPECT_GT(result.onboard_m, 0.3);
+    EXPECT_LT(result.agreement_m, 0.02) << "seed " << seed;
+    EXPECT_LT(result.corrected_m, 0.05);
+  }
+}
+
+TEST(ClosedLoop, SpectralNeedsFewConstraintsOnALongerRun) {
+  const auto result = run_closed_loop(corridor_mission(400, {}, 1), {});
+  EXPECT_GT(result.onboard_m, 0.3);
+  EXPECT_LT(result.agreement_m, 0.08);
+  EXPECT_LT(result.constraints, 399U);  // fewer than a link per node
+  EXPECT_GT(result.constraints, 50U);
+}
+
+TEST(ClosedLoop, EveryNodeReachesTheServersMapAndUniformWithFewer) {
+  const auto mission = corridor_mission(300, {}, 2);
+  LoopConfig config;
+  config.policy.name = "every_node";
+  const auto all = run_closed_loop(mission, config);
+  EXPECT_EQ(all.constraints, 299U);
+  EXPECT_LT(all.agreement_m, 0.03);
+  config.policy.name = "uniform";
+  config.policy.default_budget = 30;
+  const auto few = run_closed_loop(mission, config);
+  EXPECT_EQ(few.constraints, 30U);
+  EXPECT_LT(few.agreement_m, 0.05);
+}
+
+TEST(ClosedLoop, WorksOnReducedProxyGraphs) {
+  LoopConfig config;
+  config.proxy_graph.node_budget = 120;
+  const auto result = run_closed_loop(corridor_mission(300, {}, 3), config);
+  EXPECT_LT(result.agreement_m, 0.08);
+}
+
+// Constraints of an old map are measured again, not fought by new ones.
+TEST(ClosedLoop, FollowsAMapThatChanges) {
+  auto mission = corridor_mission(300, {}, 4);
+  mission.settling = true;
+  const auto result = run_closed_loop(mission, {});
+  EXPECT_GT(result.replaced, 0U);
+  EXPECT_LT(result.agreement_m, 0.1);
+}
+
+// Without any closure the server's map is odometry: nothing to correct.
+TEST(ClosedLoop, AServerThatKnowsNothingChangesNothing) {
+  auto mission = corridor_mission(150, {}, 5);
+  mission.late_closures = true;  // the corridor first comes back after 320 m
+  const auto result = run_closed_loop(mission, {});
+  EXPECT_EQ(result.constraints, 0U);
+  EXPECT_LT(result.worst_agreement_m, 1e-6);
+}
+
+}  // namespace
+}  // namespace tutti::consistency
