@@ -144,7 +144,7 @@ TEST(Compare, MissingNodesDropOutOnBothSides) {
   const auto poses = test::corridor(90);
   auto nodes = test::robot_nodes(poses);
   nodes.erase(nodes.begin() + 20, nodes.begin() + 26);
-  nodes.push_back({test::stamp_of(500), {}, 1500, 9});
+  nodes.push_back({.stamp = test::stamp_of(500), .chain_index = 1500, .submap = 9});
   const auto plain = compare(test::proxy_graph(poses), kAlpha, nodes, {});
   EXPECT_EQ(plain.unmatched_proxy, 6U);
   EXPECT_EQ(plain.unmatched_robot, 1U);

@@ -146,9 +146,18 @@ inline std::vector<ServerNode> server_nodes(RobotId robot, const std::vector<Pos
   return out;
 }
 
-inline std::vector<RobotNode> robot_nodes(const std::vector<Pose3>& poses) {
+/// `increments`: raw odometry from node to node; without it the poses are what odometry says.
+inline std::vector<RobotNode> robot_nodes(const std::vector<Pose3>& poses, const std::vector<Pose3>& increments = {}) {
   std::vector<RobotNode> out;
-  for (std::size_t n = 0; n < poses.size(); ++n) out.push_back({stamp_of(n), poses[n], 3 * n, submap_of(n)});
+  for (std::size_t n = 0; n < poses.size(); ++n) {
+    RelativePose odometry{.covariance = covariance_of({})};
+    if (n > 0) odometry.T_a_b = increments.empty() ? poses[n - 1].inverse() * poses[n] : increments[n - 1];
+    out.push_back({.stamp = stamp_of(n),
+                   .T_map_body = poses[n],
+                   .chain_index = 3 * n,
+                   .odometry = odometry,
+                   .submap = submap_of(n)});
+  }
   return out;
 }
 
