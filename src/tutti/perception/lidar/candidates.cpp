@@ -5,9 +5,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <optional>
+#include <tuple>
 
-#include "tutti/base/check.hpp"
 #include "tutti/perception/lidar/fft.hpp"
 
 namespace tutti::lidar {
@@ -114,10 +113,10 @@ std::vector<Peak> correlate(const BirdsEyeView& a, const BirdsEyeView& b, const 
   const ComplexImage image_a = draw(a, 0.0, config.cell_m);
   const ComplexImage A = fft.forward(image_a), A_mirrored = mirrored(A);
   const double norm_a = norm(image_a);
-  const int quarter = config.yaw_steps / 4;
+  const int quarter = config.yaw_steps_per_quarter;
   std::vector<Peak> peaks;
   for (int step = 0; step < quarter; ++step) {
-    const ComplexImage image_b = draw(b, kTwoPi * step / config.yaw_steps, config.cell_m);
+    const ComplexImage image_b = draw(b, kTwoPi * step / (4 * quarter), config.cell_m);
     const double norm_b = norm(image_b);
     if (norm_a == 0.0 || norm_b == 0.0) return {};
     const auto scale = static_cast<float>(0.5 / (double{kN} * kN * norm_a * norm_b));
@@ -134,78 +133,87 @@ std::vector<Peak> correlate(const BirdsEyeView& a, const BirdsEyeView& b, const 
   return peaks;
 }
 
+/// The best peaks, best first, whose yaws differ enough to be different alignments.
+std::vector<Peak> select_distinct(std::vector<Peak> peaks, const CandidateConfig& config) {
+  const int yaw_steps = 4 * config.yaw_steps_per_quarter;
+  std::sort(peaks.begin(), peaks.end(),
+            [](const Peak& p, const Peak& q) { return std::tie(q.value, p.yaw_step) < std::tie(p.value, q.yaw_step); });
+  std::vector<Peak> chosen;
+  for (const Peak& peak : peaks) {
+    if (peak.value < static_cast<float>(config.min_score)) break;
+    if (chosen.size() >= static_cast<std::size_t>(config.max_guesses)) break;
+    const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Peak& other) {
+      const int turn = std::abs(other.yaw_step - peak.yaw_step);
+      return std::min(turn, yaw_steps - turn) * 360.0 / yaw_steps < config.distinct_deg;
+    });
+    if (!known) chosen.push_back(peak);
+  }
+  return chosen;
+}
+
+/// Where the smoothed histogram of the values is highest; 0 without values.
+double find_mode(const std::vector<double>& values, double bin_size) {
+  std::map<int, double> votes;
+  for (const double value : values) {
+    const double low = std::floor(value / bin_size), beyond = value / bin_size - low;
+    const int bin = static_cast<int>(low);
+    // The two nearest bins by distance, then smoothed with (1, 2, 1).
+    votes[bin - 1] += 1.0 - beyond;
+    votes[bin] += 2.0 - beyond;
+    votes[bin + 1] += 1.0 + beyond;
+    votes[bin + 2] += beyond;
+  }
+  const auto best =
+      std::max_element(votes.begin(), votes.end(), [](const auto& p, const auto& q) { return p.second < q.second; });
+  return best == votes.end() ? 0.0 : bin_size * best->first;
+}
+
 /// Height of b's level frame in a's: the most frequent difference between floors of both that lie above each other.
-double vote_height(const BirdsEyeView& a, const BirdsEyeView& b, double yaw, const Eigen::Vector2d& shift,
+double find_height(const BirdsEyeView& a, const BirdsEyeView& b, double yaw, const Eigen::Vector2d& shift,
                    double cell_m) {
-  constexpr double kBin = 0.1;
-  const auto key = [&](const Eigen::Vector2d& p, bool up) {
+  constexpr double kHeightBin = 0.1;
+  using Key = std::tuple<int, int, bool>;
+  const auto key = [&](const Eigen::Vector2d& p, bool faces_up) {
     const Eigen::Vector2d cell = (p / (2.0 * cell_m)).array().floor();
-    return std::tuple(static_cast<int>(cell.x()), static_cast<int>(cell.y()), up);
+    return Key(static_cast<int>(cell.x()), static_cast<int>(cell.y()), faces_up);
   };
-  std::multimap<std::tuple<int, int, bool>, double> floors;
+  std::multimap<Key, double> floors;
   for (const auto& floor : a.floors) floors.emplace(key(floor.position.cast<double>(), floor.faces_up), floor.height);
   const Eigen::Matrix2d R = Eigen::Rotation2Dd(yaw).toRotationMatrix();
-  std::map<int, double> votes;
+  std::vector<double> differences;
   for (const auto& floor : b.floors) {
     const auto [begin, end] = floors.equal_range(key(R * floor.position.cast<double>() + shift, floor.faces_up));
-    for (auto it = begin; it != end; ++it) {
-      const double position = (it->second - double{floor.height}) / kBin;
-      const double low = std::floor(position);
-      votes[static_cast<int>(low)] += 1.0 - (position - low);
-      votes[static_cast<int>(low) + 1] += position - low;
-    }
+    for (auto it = begin; it != end; ++it) differences.push_back(it->second - double{floor.height});
   }
-  double best = 0.0, height = 0.0;
-  for (const auto& [bin, weight] : votes) {
-    const auto neighbour = [&](int i) {
-      const auto it = votes.find(i);
-      return it == votes.end() ? 0.0 : it->second;
-    };
-    const double total = neighbour(bin - 1) + 2.0 * weight + neighbour(bin + 1);
-    if (total > best) {
-      best = total;
-      height = kBin * bin;
-    }
-  }
-  return height;
+  return find_mode(differences, kHeightBin);
+}
+
+AlignmentGuess to_guess(const SubmapFeatures& a, const SubmapFeatures& b, const Peak& peak,
+                        const CandidateConfig& config) {
+  const double yaw = kTwoPi * peak.yaw_step / (4 * config.yaw_steps_per_quarter);
+  const Eigen::Vector2d shift = config.cell_m * Eigen::Vector2d(peak.x, peak.y);
+  Pose3 T_level_a_level_b{Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))};
+  T_level_a_level_b.translation.head<2>() = a.view.centre + shift - Eigen::Rotation2Dd(yaw) * b.view.centre;
+  T_level_a_level_b.translation.z() = find_height(a.view, b.view, yaw, shift, config.cell_m);
+  return {Pose3{a.R_level_submap}.inverse() * T_level_a_level_b * Pose3{b.R_level_submap}, double{peak.value}};
 }
 
 }  // namespace
 
 std::vector<AlignmentGuess> propose_alignments(const SubmapFeatures& a, const SubmapFeatures& b,
                                                const LidarClosureConfig& config) {
-  const CandidateConfig& c = config.candidates;
-  TUTTI_CHECK(c.yaw_steps > 0 && c.yaw_steps % 4 == 0, "yaw_steps = {}", c.yaw_steps);
   if (!a.usable || !b.usable) return {};
-  auto peaks = correlate(a.view, b.view, c);
-  std::sort(peaks.begin(), peaks.end(),
-            [](const Peak& p, const Peak& q) { return std::tie(q.value, p.yaw_step) < std::tie(p.value, q.yaw_step); });
-  std::vector<Peak> chosen;
   std::vector<AlignmentGuess> guesses;
-  for (const Peak& peak : peaks) {
-    if (peak.value < static_cast<float>(c.min_score) || guesses.size() >= static_cast<std::size_t>(c.max_guesses))
-      break;
-    const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Peak& other) {
-      const int turn = std::abs(other.yaw_step - peak.yaw_step);
-      return std::min(turn, c.yaw_steps - turn) * 360.0 / c.yaw_steps < c.distinct_deg;
-    });
-    if (known) continue;
-    chosen.push_back(peak);
-    const double yaw = kTwoPi * peak.yaw_step / c.yaw_steps;
-    const Eigen::Vector2d shift = c.cell_m * Eigen::Vector2d(peak.x, peak.y);
-    const Eigen::Quaterniond R_yaw(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
-    // level_a = R_yaw (level_b - centre_b) + shift + centre_a
-    Pose3 T_la_lb{R_yaw, Eigen::Vector3d::Zero()};
-    T_la_lb.translation.head<2>() = shift + a.view.centre - Eigen::Rotation2Dd(yaw) * b.view.centre;
-    T_la_lb.translation.z() = vote_height(a.view, b.view, yaw, shift, c.cell_m);
-    const Pose3 T_la_a{a.R_level_submap, Eigen::Vector3d::Zero()}, T_lb_b{b.R_level_submap, Eigen::Vector3d::Zero()};
-    guesses.push_back({T_la_a.inverse() * T_la_lb * T_lb_b, peak.value});
-  }
+  for (const Peak& peak : select_distinct(correlate(a.view, b.view, config.candidates), config.candidates))
+    guesses.push_back(to_guess(a, b, peak, config.candidates));
   return guesses;
 }
 
-bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig&) {
-  return a.usable && b.usable;
+bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
+  const auto enough = [&](const SubmapFeatures& f) {
+    return f.usable && f.view.walls.size() >= static_cast<std::size_t>(config.candidates.min_wall_cells);
+  };
+  return enough(a) && enough(b);
 }
 
 }  // namespace tutti::lidar

@@ -20,7 +20,8 @@ struct AlignmentGuess {
 std::vector<AlignmentGuess> propose_alignments(const SubmapFeatures& a, const SubmapFeatures& b,
                                                const LidarClosureConfig& config);
 
-/// Cheap test, invariant to the pose of either: false only when the two cannot overlap enough to be accepted. Generous.
+/// Cheap test, invariant to the pose of either: false only when the two can never be accepted, because one is unusable
+/// or shows hardly any walls. (Two submaps of one size cannot be told apart more cheaply than by propose_alignments.)
 bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config);
 
 }  // namespace tutti::lidar

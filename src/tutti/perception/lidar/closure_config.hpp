@@ -57,16 +57,18 @@ struct RegistrationConfig {
 
 /// Search for the rough relative pose by correlating views from above.
 struct CandidateConfig {
-  double cell_m = 0.8;         ///< Cell of the 128 x 128 view from above.
-  int yaw_steps = 120;         ///< Of the full turn; a multiple of 4.
-  int max_guesses = 3;         ///< Best alignments handed to the registration.
-  double distinct_deg = 12.0;  ///< Two guesses differ by at least this yaw.
-  double min_score = 0.1;      ///< Correlation (0..1) below which a guess is not worth a registration.
+  double cell_m = 0.8;             ///< Cell of the 64 x 64 view from above.
+  int yaw_steps_per_quarter = 30;  ///< A quarter turn maps the image onto itself, so three quarters are cheap.
+  int max_guesses = 3;             ///< Best alignments handed to the registration.
+  int min_wall_cells = 30;         ///< A view from above with fewer (half cells) says nothing.
+  double distinct_deg = 12.0;      ///< Two guesses differ by at least this yaw.
+  double min_score = 0.1;          ///< Correlation (0..1) below which a guess is not worth a registration.
   template <class V>
   void describe(V& v) {
-    v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 128 x 128 view from above.");
-    v.field("yaw_steps", yaw_steps, between(4, 720), "Steps of the full turn; a multiple of 4.");
+    v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 64 x 64 view from above.");
+    v.field("yaw_steps_per_quarter", yaw_steps_per_quarter, between(1, 180), "Yaw steps per quarter turn.");
     v.field("max_guesses", max_guesses, between(1, 16), "Best alignments handed to the registration.");
+    v.field("min_wall_cells", min_wall_cells, at_least(1), "A view from above with fewer wall cells is not compared.");
     v.field("distinct_deg", distinct_deg, between(0.0, 180.0), "Two guesses differ by at least this yaw.");
     v.field("min_score", min_score, between(0.0, 1.0), "Correlation below which a guess is dropped.");
   }
@@ -87,6 +89,7 @@ struct LidarClosureConfig {
   double min_eigenvalue = 0.05;          ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
   double max_contradiction = 0.15;       ///< Share of the points in view that stand where the other looked through.
   double visibility_margin_m = 0.5;      ///< A point this much nearer than the surface seen behind it contradicts.
+  int visibility_views = 5;              ///< Viewpoints of each submap, evenly spread along its way.
   int visibility_points = 2000;          ///< Of each submap, evenly spread.
   double max_rival_ratio = 0.9;          ///< A second, different alignment nearly as good: the place is ambiguous.
   double max_forward_backward_m = 0.05;  ///< Between a-to-b and b-to-a, at the centre of the overlap.
@@ -110,6 +113,7 @@ struct LidarClosureConfig {
             "Share of the points in view that stand where the other submap looked through.");
     v.field("visibility_margin_m", visibility_margin_m, greater_than(0.0),
             "A point this much nearer than the surface seen behind it contradicts.");
+    v.field("visibility_views", visibility_views, at_least(1), "Viewpoints of each submap tested for visibility.");
     v.field("visibility_points", visibility_points, at_least(10), "Points of each submap tested for visibility.");
     v.field("max_rival_ratio", max_rival_ratio, between(0.0, 1.0),
             "Quality of the second best alignment over the best above which the place is ambiguous.");

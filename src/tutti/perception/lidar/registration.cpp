@@ -98,7 +98,6 @@ bool run_level(const OrientedCloud& target, const OrientedCloud& source, const R
 
 void assess(const OrientedCloud& target, const OrientedCloud& source, const RegistrationConfig& config,
             double min_cosine, RegistrationResult& result) {
-  const auto all = sample_surface(source, source.size());
   const auto sample = sample_surface(source, static_cast<std::size_t>(config.levels.back().max_points));
   const auto sums = linearise(target, source, sample, result.T_target_source, config.overlap_distance_m,
                               config.residual_scale_m, min_cosine);
@@ -113,7 +112,10 @@ void assess(const OrientedCloud& target, const OrientedCloud& source, const Regi
   result.min_translation_eigenvalue =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sums.normal_scatter / count).eigenvalues()[0];
   // Information of the whole overlap, however few of its points were sampled.
-  const double sampled_share = static_cast<double>(sample.size()) / static_cast<double>(all.size());
+  const auto& normals = *source.normals;
+  const auto without = std::count(normals.begin(), normals.end(), Eigen::Vector3f(Eigen::Vector3f::Zero()));
+  const double sampled_share =
+      static_cast<double>(sample.size()) / static_cast<double>(normals.size() - static_cast<std::size_t>(without));
   const double variance = sums.weighted_squares / sums.weights;
   Vector6d floor;
   floor << Eigen::Vector3d::Constant(config.min_translation_sigma_m),

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <tuple>
 
 #include "tutti/perception/lidar/levelling.hpp"
@@ -15,14 +16,14 @@
 namespace tutti::lidar {
 namespace {
 
-constexpr float kMaxWallTilt = 0.35F;   // |n_z| of a wall: within 20 degrees of vertical
-constexpr float kMinFloorTilt = 0.94F;  // |n_z| of a floor or ceiling: within 20 degrees of level
-constexpr double kPriorPreference = 1.25;
+constexpr float kMaxWallTilt = 0.35F;      // |n_z| of a wall: within 20 degrees of vertical
+constexpr float kMinFloorTilt = 0.94F;     // |n_z| of a floor or ceiling: within 20 degrees of level
+constexpr float kFloorLayer = 0.25F;       // m; floors at different heights are kept apart
+constexpr double kPriorPreference = 1.25;  // how much better the body's up must fit than the odometry's
 
-std::string why_unusable(const Submap& submap, const LidarClosureConfig& config) {
-  if (!submap.cloud || submap.cloud->points.size() < static_cast<std::size_t>(config.min_points))
-    return fmt::format("{} points, at least {} needed", submap.cloud ? submap.cloud->points.size() : 0,
-                       config.min_points);
+std::string why_unusable(const Submap& submap, std::size_t points, const LidarClosureConfig& config) {
+  if (points < static_cast<std::size_t>(config.min_points))
+    return fmt::format("{} points, at least {} needed", points, config.min_points);
   if (submap.keyframes.size() < static_cast<std::size_t>(config.min_keyframes))
     return fmt::format("{} keyframes, at least {} needed", submap.keyframes.size(), config.min_keyframes);
   const double duration = submap.keyframes.back().stamp - submap.keyframes.front().stamp;
@@ -38,11 +39,6 @@ std::vector<Pose3> poses_in_submap(const Submap& submap) {
   return out;
 }
 
-/// Finite points, in Morton order and thinned to the submap voxel if they were not already.
-std::vector<Eigen::Vector3f> clean(const PointCloud& cloud, double voxel_m) {
-  return voxel_downsample(cloud, voxel_m).points;
-}
-
 /// Up in the submap frame. Odometry frames are usually level to a few degrees; where one is not, the mean up of the
 /// body may be. The surfaces decide, and refine.
 Eigen::Vector3d find_up(const Submap& submap, std::span<const Pose3> poses, std::span<const Eigen::Vector3f> normals) {
@@ -55,7 +51,7 @@ Eigen::Vector3d find_up(const Submap& submap, std::span<const Pose3> poses, std:
   return by_body.support > kPriorPreference * by_odometry.support ? by_body.up : by_odometry.up;
 }
 
-/// Sums wall points per half cell, floors per two cells and 0.25 m of height, both in a deterministic order.
+/// Walls are summed per half cell, floors per cell and layer, both in a deterministic order.
 BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_level_submap, double cell_m) {
   struct Sum {
     Eigen::Vector3f point = Eigen::Vector3f::Zero();
@@ -71,7 +67,7 @@ BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_l
   std::map<std::tuple<int, int, int>, Sum> floors;
   const Eigen::Matrix3f R = R_level_submap.toRotationMatrix().cast<float>();
   const auto wall_cell = static_cast<float>(0.5 * cell_m);
-  const auto floor_cell = static_cast<float>(2.0 * cell_m);
+  const auto floor_cell = static_cast<float>(cell_m);
   const auto bin = [](float x, float size) { return static_cast<int>(std::floor(x / size)); };
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (cloud.normal(i) == Eigen::Vector3f::Zero()) continue;
@@ -79,7 +75,7 @@ BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_l
     if (std::abs(n.z()) < kMaxWallTilt)
       walls[{bin(p.x(), wall_cell), bin(p.y(), wall_cell)}].add(p, n);
     else if (std::abs(n.z()) > kMinFloorTilt)
-      floors[{bin(p.x(), floor_cell), bin(p.y(), floor_cell), 2 * bin(p.z(), 0.25F) + (n.z() > 0.0F)}].add(p, n);
+      floors[{bin(p.x(), floor_cell), bin(p.y(), floor_cell), 2 * bin(p.z(), kFloorLayer) + (n.z() > 0.0F)}].add(p, n);
   }
   BirdsEyeView view;
   Eigen::Vector2f centre = Eigen::Vector2f::Zero();
@@ -94,24 +90,34 @@ BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_l
   return view;
 }
 
+/// Panoramas from viewpoints evenly spread along the way.
+std::shared_ptr<const std::vector<DepthPanorama>> look_around(const OrientedCloud& cloud,
+                                                              std::span<const Eigen::Vector3f> viewpoints,
+                                                              const LidarClosureConfig& config) {
+  auto panoramas = std::make_shared<std::vector<DepthPanorama>>();
+  const auto count = static_cast<std::size_t>(config.visibility_views);
+  for (std::size_t k = 0; k < count; ++k)
+    panoramas->emplace_back(cloud, viewpoints[(2 * k + 1) * viewpoints.size() / (2 * count)],
+                            static_cast<float>(config.voxel_m));
+  return panoramas;
+}
+
 }  // namespace
 
 SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& config) {
-  SubmapFeatures features{.id = submap.id, .reason = why_unusable(submap, config)};
+  SubmapFeatures features{.id = submap.id};
+  // Finite points in Morton order, whatever the submap came with.
+  auto points = submap.cloud ? voxel_downsample(*submap.cloud, config.voxel_m).points : std::vector<Eigen::Vector3f>{};
+  features.reason = why_unusable(submap, points.size(), config);
   if (!features.reason.empty()) return features;
   const auto poses = poses_in_submap(submap);
   std::vector<Eigen::Vector3f> viewpoints;
   for (const auto& pose : poses) viewpoints.push_back(pose.translation.cast<float>());
-  features.cloud = orient(clean(*submap.cloud, config.voxel_m), viewpoints, config.normals);
+  features.cloud = orient(std::move(points), viewpoints, config.normals);
   const Eigen::Vector3d up = find_up(submap, poses, *features.cloud.normals);
   features.R_level_submap = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
   features.view = make_view(features.cloud, features.R_level_submap, config.candidates.cell_m);
-  auto panoramas = std::make_shared<std::vector<DepthPanorama>>();
-  constexpr std::size_t kViews = 5;
-  for (std::size_t k = 0; k < kViews; ++k)
-    panoramas->emplace_back(features.cloud, viewpoints[k * (viewpoints.size() - 1) / (kViews - 1)],
-                            static_cast<float>(config.voxel_m));
-  features.panoramas = std::move(panoramas);
+  features.panoramas = look_around(features.cloud, viewpoints, config);
   features.usable = true;
   return features;
 }
