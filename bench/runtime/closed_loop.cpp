@@ -31,7 +31,7 @@ struct ClosedLoopConfig {
   double server_local_m = test::ServerNoise{}.local_m;
   double server_local_rad = test::ServerNoise{}.local_rad;
   CompareConfig compare;
-  PolicyConfig policy;
+  PolicyConfig policy{.name = "spectral"};
   LedgerConfig ledger;
   ProxyGraphConfig proxy_graph;
   template <class V>

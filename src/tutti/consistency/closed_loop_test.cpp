@@ -48,6 +48,26 @@ TEST(ClosedLoop, EveryNodeReachesTheServersMapAndUniformWithFewer) {
   EXPECT_LT(few.agreement_m, 0.05);
 }
 
+TEST(ClosedLoop, SkeletonAgreesWithAHandfulOfConstraints) {
+  LoopConfig config;
+  config.policy.name = "skeleton";
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    config.policy.skeleton_tolerance_m = 0.02;
+    const auto close = run_closed_loop(short_mission(seed), config);
+    EXPECT_GT(close.onboard_m, 0.3);
+    EXPECT_LT(close.agreement_m, 0.015) << "seed " << seed;
+    config.policy.skeleton_tolerance_m = 0.06;
+    const auto rough = run_closed_loop(short_mission(seed), config);
+    EXPECT_LT(rough.agreement_m, 0.045) << "seed " << seed;
+    EXPECT_LE(rough.constraints, 15U) << "seed " << seed;
+    EXPECT_LT(rough.constraints, close.constraints);
+  }
+  config.policy.skeleton_tolerance_m = 0.1;
+  const auto longer = run_closed_loop(corridor_mission(400, {}, 1), config);
+  EXPECT_LT(longer.agreement_m, 0.08);
+  EXPECT_LT(longer.constraints, 40U);
+}
+
 TEST(ClosedLoop, WorksOnReducedProxyGraphs) {
   LoopConfig config;
   config.proxy_graph.node_budget = 120;

@@ -12,8 +12,10 @@ Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, c
   if (name == "uniform") return std::make_unique<internal::UniformPolicy>(config);
   if (name == "random") return std::make_unique<internal::RandomPolicy>(config);
   if (name == "euclidean") return std::make_unique<internal::EuclideanPolicy>(config);
+  if (name == "skeleton") return std::make_unique<internal::SkeletonPolicy>(config);
   return fail(ErrorCode::configuration,
-              "policy '{}' is unknown, expected every_node, every_node_2, spectral, uniform, random or euclidean",
+              "policy '{}' is unknown, expected every_node, every_node_2, spectral, uniform, random, euclidean or "
+              "skeleton",
               name);
 }
 

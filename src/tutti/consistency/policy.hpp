@@ -49,7 +49,7 @@ class ConstraintPolicy {
 /// group repairs bends within a submap (60 m with 0.3 degrees of yaw drift per metre: 0.7 m -> 0.010-0.016 m); the mid
 /// group hardly speaks unless something is badly wrong.
 struct PolicyConfig {
-  std::string name = "spectral";
+  std::string name = "skeleton";
   std::string classifier = "thresholds";
   double threshold_large_m = 0.25;
   double threshold_mid_m = 0.5;
@@ -60,12 +60,14 @@ struct PolicyConfig {
   int nearest_submaps = 4;
   double euclidean_threshold_m = 0.1;
   int default_budget = 25;
+  double skeleton_tolerance_m = 0.02;
   ConstraintConfig constraint;
 
   template <class V>
   void describe(V& v) {
-    v.field("name", name, one_of({"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean"}),
-            "How a robot chooses constraints; 'spectral' is the paper's.");
+    v.field("name", name,
+            one_of({"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"}),
+            "How a robot chooses constraints; 'spectral' is the paper's, 'skeleton' the product's default.");
     v.field("classifier", classifier, one_of({"thresholds", "top"}),
             "spectral: label nodes above a threshold per group (the paper) or the largest ones (the authors' code).");
     v.field("threshold_large_m", threshold_large_m, at_least(0.0),
@@ -82,6 +84,8 @@ struct PolicyConfig {
             "euclidean without a budget: distance above which a node gets links.");
     v.field("default_budget", default_budget, at_least(1.0),
             "uniform and random: constraints held when no budget is given.");
+    v.field("skeleton_tolerance_m", skeleton_tolerance_m, greater_than(0.0),
+            "skeleton: links are split until every node is this close to the server's map.");
     v.field("constraint", constraint);
   }
 };

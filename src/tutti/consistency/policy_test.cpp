@@ -47,13 +47,13 @@ TEST(Policy, UnknownNameIsAConfigurationError) {
 }
 
 TEST(Policy, NamesMatchTheFactory) {
-  for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean"})
+  for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"})
     EXPECT_EQ((*make_policy(name, {}))->name(), name);
 }
 
 TEST(Policy, ZeroOrOneNodeGivesNothingAndTakesNothingAway) {
   for (const std::size_t length : {0U, 1U})
-    for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean"}) {
+    for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"}) {
       Scene scene(length);
       scene.comparison.disagreement.setConstant(10.0);
       const auto selection = scene.choose(name, 5);
@@ -235,6 +235,60 @@ TEST(Euclidean, TakesTheFarthestAfterAligningNodeZero) {
   EXPECT_EQ(linked(scene.choose("euclidean", 5)).size(), 5U);
   EXPECT_EQ(linked(scene.choose("euclidean")),  // above 0.1 m
             (Pairs{{19, 20}, {20, 21}, {15, 20}, {20, 25}, {39, 40}, {40, 41}, {35, 40}, {40, 45}}));
+}
+
+/// The robot's chain bends at one node, everything else agrees.
+Scene bent_scene(std::size_t length, std::size_t at_node, double turn_rad) {
+  Scene scene(length);
+  scene.nodes[at_node].odometry.T_a_b.rotation =
+      scene.nodes[at_node].odometry.T_a_b.rotation * so3_exp(Eigen::Vector3d(0, 0, turn_rad));
+  return scene;
+}
+
+TEST(Skeleton, TakesNothingWhenTheRawChainAgrees) {
+  const auto selection = Scene(80).choose("skeleton");
+  EXPECT_TRUE(selection.constraints.empty());
+  EXPECT_TRUE(selection.replaces_all);  // and gives up what it held
+}
+
+TEST(Skeleton, LinksAreAChainFromTheFirstNodeToTheLast) {
+  const auto selection = bent_scene(80, 40, 0.2).choose("skeleton");
+  ASSERT_GE(selection.constraints.size(), 2U);
+  EXPECT_LT(selection.constraints.size(), 40U);
+  std::size_t end = 0;
+  for (const auto& [from, to] : linked(selection)) {
+    EXPECT_EQ(from, end);
+    end = to;
+  }
+  EXPECT_EQ(end, 79U);
+}
+
+TEST(Skeleton, LinksAreShortWhereTheDriftWasBorn) {
+  const auto links = linked(bent_scene(120, 60, 0.2).choose("skeleton"));
+  std::size_t shortest = 120;
+  double at = 0.0;
+  for (const auto& [from, to] : links)
+    if (to - from < shortest) {
+      shortest = to - from;
+      at = 0.5 * static_cast<double>(from + to);
+    }
+  EXPECT_LE(shortest, 3U);
+  EXPECT_NEAR(at, 60.0, 5.0);
+}
+
+TEST(Skeleton, ABudgetBuysTheWorstRunsFirst) {
+  const Scene scene = bent_scene(120, 60, 0.2);
+  const std::size_t all = scene.choose("skeleton").constraints.size();
+  for (const std::size_t budget : {1U, 2U, 4U})
+    EXPECT_EQ(scene.choose("skeleton", budget).constraints.size(), std::min(budget, all));
+  EXPECT_TRUE(linked(scene.choose("skeleton", 1)).contains({0, 119}));
+}
+
+TEST(Skeleton, LooksAtRawOdometryNotAtWhatItCorrectedBefore) {
+  Scene scene = bent_scene(80, 40, 0.2);
+  const auto before = linked(scene.choose("skeleton"));
+  for (RobotNode& node : scene.nodes) node.T_map_body = node.T_map_body * Pose3{so3_exp({0, 0, 0.1}), {1, 2, 3}};
+  EXPECT_EQ(linked(scene.choose("skeleton")), before);
 }
 
 }  // namespace

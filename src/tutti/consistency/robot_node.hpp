@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "tutti/base/timestamp.hpp"
-#include "tutti/geometry/pose3.hpp"
+#include "tutti/model/relative_pose.hpp"
 
 namespace tutti::consistency {
 
@@ -14,6 +14,7 @@ struct RobotNode {
   Timestamp stamp;
   Pose3 T_map_body;
   std::size_t chain_index = 0;  ///< Position in the robot's odometry chain.
+  RelativePose odometry;        ///< Raw, from the previous node of the list; unused for the first.
   std::uint32_t submap = 0;     ///< SubmapId::index of the submap it belongs to.
   friend bool operator==(const RobotNode&, const RobotNode&) = default;
 };

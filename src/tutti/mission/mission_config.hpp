@@ -104,8 +104,8 @@ struct MissionConfig {
   server::ServerConfig server;
   ClosureConfig closures;
   bus::LinkConfig link;
-  std::vector<std::string> compare_policies = {"every_node", "every_node_2", "spectral",
-                                               "uniform",    "random",       "euclidean"};
+  std::vector<std::string> compare_policies = {"every_node", "every_node_2", "spectral", "uniform",
+                                               "random",     "euclidean",    "skeleton"};
   template <class V>
   void describe(V& v) {
     v.field("mission", mission, any(), "Name of the mission.");

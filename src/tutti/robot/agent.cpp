@@ -32,15 +32,20 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const
   const std::uint32_t submap = submaps_.current_submap();
   const auto keyframe = submaps_.add_odometry(stamp, T_odom_body, increment_covariance);
   if (!keyframe) return tl::unexpected(keyframe.error());
-  if (last_odometry_)
-    smoother_.append({last_odometry_->inverse() * T_odom_body, increment_covariance});
-  else
+  if (last_odometry_) {
+    const Pose3 step = last_odometry_->inverse() * T_odom_body;
+    smoother_.append({step, increment_covariance});
+    since_node_ = {since_node_.T_a_b * step, compound_covariance(step, since_node_.covariance, increment_covariance)};
+  } else {
     smoother_.set_first_pose(T_odom_body);
+  }
   last_odometry_ = T_odom_body;
   if (*keyframe) {
     keyframes_.push_back(**keyframe);
     chain_index_.push_back(smoother_.size() - 1);
     submap_of_.push_back(submap);
+    if ((*keyframe)->representative)
+      node_odometry_.push_back(std::exchange(since_node_, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
   }
   if (auto submap_done = submaps_.take_submap()) send(std::move(*submap_done));
   return {};
@@ -66,6 +71,7 @@ std::vector<consistency::RobotNode> RobotAgent::nodes() const {
     nodes.push_back({.stamp = keyframes_[k].stamp,
                      .T_map_body = smoother_.pose(chain_index_[k]),
                      .chain_index = chain_index_[k],
+                     .odometry = node_odometry_[nodes.size()],
                      .submap = submap_of_[k]});
   }
   return nodes;

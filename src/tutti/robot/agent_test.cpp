@@ -81,7 +81,7 @@ TEST_P(AgentPolicies, CorrectsTheRobotFromAnUnrelatedFrame) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, AgentPolicies,
-                         testing::Values("spectral", "every_node", "every_node_2", "uniform", "random", "euclidean"));
+                         testing::Values("spectral", "every_node", "every_node_2", "uniform", "random", "skeleton"));
 
 TEST(Agent, KnowsWhereTheOthersAre) {
   AgentConfig config;

@@ -69,4 +69,18 @@ class EuclideanPolicy final : public ConstraintPolicy {
   PolicyConfig config_;
 };
 
+/// Links that span runs of nodes, as long as the disagreement allows: one link over the whole run first; where the
+/// robot's raw chain, spread between the links' ends, is farthest from the server's map, a link is split in two; worst
+/// run first, until every node is within `skeleton_tolerance_m` (or the budget is used up). Chosen anew from raw
+/// odometry at every update, so it replaces all; a robot that agrees as it is gets none.
+class SkeletonPolicy final : public ConstraintPolicy {
+ public:
+  explicit SkeletonPolicy(const PolicyConfig& config) : config_(config) {}
+  [[nodiscard]] std::string name() const override { return "skeleton"; }
+  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
+
+ private:
+  PolicyConfig config_;
+};
+
 }  // namespace tutti::consistency::internal

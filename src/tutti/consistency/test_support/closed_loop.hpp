@@ -78,7 +78,7 @@ inline double rmse(const std::vector<Pose3>& a, const std::vector<Pose3>& b) {
 
 struct LoopConfig {
   CompareConfig compare;
-  PolicyConfig policy;
+  PolicyConfig policy{.name = "spectral"};
   LedgerConfig ledger;
   ProxyGraphConfig proxy_graph;
   std::size_t nodes_per_update = 7;  ///< 20 s at 0.33 m/s.
@@ -120,7 +120,7 @@ inline LoopResult run_closed_loop(const Mission& mission, const LoopConfig& conf
     if (count % config.nodes_per_update != 0 && count != length) continue;
     const auto graph =
         build_proxy_graph(++out.updates, server_after(mission, count), {{kAlpha, 0}}, config.proxy_graph);
-    const auto nodes = robot_nodes(estimate(count));
+    const auto nodes = robot_nodes(estimate(count), mission.increments);
     const auto comparison = compare(graph, kAlpha, nodes, config.compare);
     std::optional<std::size_t> budget;
     if (!config.budgets.empty()) budget = config.budgets[out.updates - 1];

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <vector>
+
+#include "tutti/consistency/internal/links.hpp"
+#include "tutti/consistency/internal/policies.hpp"
+#include "tutti/estimation/onboard_smoother.hpp"
+#include "tutti/geometry/alignment.hpp"
+
+namespace tutti::consistency::internal {
+namespace {
+
+/// Where the server wants the synchronised nodes, and the raw odometry between them.
+struct Chain {
+  std::vector<Pose3> T_start_server;   // seen from node 0
+  std::vector<RelativePose> odometry;  // node k - 1 -> k; [0] unused
+};
+
+Chain make_chain(const PolicyInput& input) {
+  Chain chain;
+  const auto& pairs = input.comparison.pairs;
+  const Pose3 T_start_world = input.graph.nodes[pairs.front().proxy].T_world_body.inverse();
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    chain.T_start_server.push_back(T_start_world * input.graph.nodes[pairs[k].proxy].T_world_body);
+    RelativePose step{.covariance = Matrix6d::Zero()};
+    for (std::size_t n = k == 0 ? pairs[k].robot : pairs[k - 1].robot; n < pairs[k].robot; ++n) {
+      const RelativePose& next = input.nodes[n + 1].odometry;  // nodes between two pairs are passed over
+      step = {step.T_a_b * next.T_a_b, compound_covariance(next.T_a_b, step.covariance, next.covariance)};
+    }
+    chain.odometry.push_back(step);
+  }
+  return chain;
+}
+
+/// The robot's own chain with every joint held where the server has it: between two joints the smoother spreads the
+/// end error along the odometry by its covariance.
+std::vector<Pose3> spread(const Chain& chain, const std::vector<std::size_t>& joints) {
+  estimation::OnboardSmoother smoother;
+  for (std::size_t k = 1; k < chain.odometry.size(); ++k) smoother.append(chain.odometry[k]);
+  constexpr double kHeld = 1e-10;  // variance, m^2 and rad^2: as good as exact
+  std::vector<estimation::ChainConstraint> links;
+  for (std::size_t j = 1; j < joints.size(); ++j)
+    links.push_back({joints[j - 1],
+                     joints[j],
+                     {chain.T_start_server[joints[j - 1]].inverse() * chain.T_start_server[joints[j]],
+                      Matrix6d::Identity() * kHeld}});
+  smoother.set_constraints(std::move(links));
+  smoother.solve();
+  return smoother.poses();
+}
+
+/// Distance of every node from where the server has it. Without joints the frames are free: best rigid alignment.
+std::vector<double> disagreements(const Chain& chain, const std::vector<Pose3>& predicted, bool aligned) {
+  std::vector<Eigen::Vector3d> server;
+  std::vector<Eigen::Vector3d> own;
+  for (std::size_t k = 0; k < predicted.size(); ++k) {
+    server.push_back(chain.T_start_server[k].translation);
+    own.push_back(predicted[k].translation);
+  }
+  const Pose3 T = aligned ? Pose3{} : align_points(server, own);
+  std::vector<double> out;
+  for (std::size_t k = 0; k < own.size(); ++k) out.push_back((server[k] - T * own[k]).norm());
+  return out;
+}
+
+/// The worst node strictly inside each run between two joints, worst run first, those within tolerance left out.
+std::vector<std::size_t> worst_nodes(const std::vector<double>& disagreement, const std::vector<std::size_t>& joints,
+                                     double tolerance) {
+  std::vector<std::size_t> worst;
+  for (std::size_t j = 1; j < joints.size(); ++j) {
+    if (joints[j] - joints[j - 1] < 2) continue;
+    const auto begin = disagreement.begin() + static_cast<std::ptrdiff_t>(joints[j - 1]) + 1;
+    const auto end = disagreement.begin() + static_cast<std::ptrdiff_t>(joints[j]);
+    const auto most = std::max_element(begin, end);
+    if (*most > tolerance) worst.push_back(static_cast<std::size_t>(most - disagreement.begin()));
+  }
+  std::stable_sort(worst.begin(), worst.end(),
+                   [&](std::size_t a, std::size_t b) { return disagreement[a] > disagreement[b]; });
+  return worst;
+}
+
+}  // namespace
+
+Selection SkeletonPolicy::choose(const PolicyInput& input) const {
+  LinkCollector collector(input, config_.constraint, true);
+  const std::size_t nodes = input.comparison.pairs.size();
+  if (nodes < 2) return std::move(collector).take();
+  const Chain chain = make_chain(input);
+  std::vector<std::size_t> joints{0};
+  const std::vector<double> raw = disagreements(chain, spread(chain, joints), false);
+  if (*std::max_element(raw.begin(), raw.end()) <= config_.skeleton_tolerance_m)
+    return std::move(collector).take();  // the robot agrees as it is
+
+  joints.push_back(nodes - 1);
+  const auto room = [&] { return !input.budget || joints.size() - 1 < *input.budget; };
+  for (bool split = true; split && room();) {  // ends: every round adds a joint, and there are `nodes` of them
+    const std::vector<double> disagreement = disagreements(chain, spread(chain, joints), true);
+    split = false;
+    for (const std::size_t node : worst_nodes(disagreement, joints, config_.skeleton_tolerance_m)) {
+      if (!room()) break;
+      joints.push_back(node);
+      split = true;
+    }
+    std::sort(joints.begin(), joints.end());
+  }
+  for (std::size_t j = 1; j < joints.size(); ++j) collector.add({joints[j - 1], joints[j]}, ConstraintKind::other);
+  return std::move(collector).take();
+}
+
+}  // namespace tutti::consistency::internal
