@@ -47,10 +47,11 @@ struct Comparison {
 ///
 /// Compared are the subgraphs induced on this robot's synchronised nodes. If the server's graph is reduced, its side is
 /// the carried weights, and the robot reduces its own graph over kept + eliminated nodes to the kept ones and keeps the
-/// edges the server kept: equal poses then give d^s = 0 in both cases. If the robot lacks some eliminated nodes, it
-/// reduces what it has: d^s then has a floor around the gaps, and `missing_eliminated` says so.
-/// Fewer than two pairs: disagreement is 0 for the pairs there are. Nodes without edges keep their whole signal in
-/// scale 0. `config.signal` must be known (checked).
+/// edges the server kept: equal poses then give d^s = 0 in both cases. If the robot lacks some of the nodes of a
+/// reduced graph, it reduces what it has; the two graphs then differ and d^s does not vanish even for equal poses: near
+/// the gap in every scale, all along in the large ones. `missing_eliminated` and `unmatched_proxy` say so. Fewer than
+/// two pairs: disagreement is 0 for the pairs there are. Nodes without edges keep their whole signal in scale 0.
+/// `config.signal` must be known (checked).
 Comparison compare(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
                    const CompareConfig& config);
 
