@@ -15,8 +15,9 @@ MissionConfig small_mission() {
   config.mission = "small";
   config.source = "simulation";
   config.simulation.robots = 2;
-  config.simulation.world = {.rows = 2, .columns = 3, .block_m = 20.0, .jitter_m = 3.0, .missing_share = 0.0};
-  config.simulation.walk.duration_s = 300.0;
+  config.simulation.world = {.rows = 2, .columns = 3, .block_m = 15.0, .jitter_m = 2.0, .missing_share = 0.0};
+  config.simulation.walk.duration_s = 200.0;
+  config.compare_policies = {"spectral", "uniform"};
   config.simulation.odometry.yaw_bias_deg_per_m = 0.05;
   config.closures.finder = "reference";
   config.closures.reference.min_time_gap_s = 20.0;

@@ -81,6 +81,13 @@ Accuracy joint_accuracy(const std::vector<RobotOutcome>& robots, const server::M
   return out;
 }
 
+/// "overlap 0.16, at least 0.3 needed" -> "overlap": what is counted is the kind of reason.
+std::string without_values(const std::string& reason) {
+  std::string kind = reason.substr(0, reason.find_first_of("0123456789:"));
+  while (!kind.empty() && kind.back() == ' ') kind.pop_back();
+  return kind;
+}
+
 void judge_closures(const server::MapServer& server, MissionRecord& record) {
   std::map<std::string, RejectionRecord> refused;
   const auto count = [&](const std::string& reason, RobotId a, RobotId b) {
@@ -96,8 +103,7 @@ void judge_closures(const server::MapServer& server, MissionRecord& record) {
       count("inconsistent with the others", from.robot, to.robot);
   }
   for (const auto& [pair, verdict] : server.state().verdicts)
-    if (verdict.closures.empty())
-      count(verdict.reason.substr(0, verdict.reason.find(':')), pair.first.robot, pair.second.robot);
+    if (verdict.closures.empty()) count(without_values(verdict.reason), pair.first.robot, pair.second.robot);
   for (auto& [reason, entry] : refused) record.server.rejections.push_back(std::move(entry));
 }
 

@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs the two real LiDAR missions over seeds and drifts and writes docs/results/hku.md.
+
+Usage: bench/accuracy/hku.py TUTTI_PROGRAM --data FOLDER [--seeds 10]
+"""
+import argparse
+import json
+import pathlib
+import statistics
+import subprocess
+import tempfile
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+
+
+def run(arguments, mission, seed, *assignments):
+    """report.json of one run."""
+    with tempfile.TemporaryDirectory() as out:
+        command = [arguments.tutti, "run", SOURCE / "missions" / f"{mission}.yaml", "--data", arguments.data,
+                   "--out", out, "--seed", seed]
+        for assignment in assignments:
+            command += ["--set", assignment]
+        subprocess.run([str(c) for c in command], check=True, capture_output=True)
+        return json.loads((pathlib.Path(out) / "report.json").read_text())
+
+
+def corrected(report, robot):
+    return robot["policies"][report["default_policy"]]
+
+
+def row(*cells):
+    return "| " + " | ".join(str(c) for c in cells) + " |"
+
+
+def millimetres(value):
+    return "-" if value is None else f"{1000 * value:.1f}"
+
+
+def two_sessions(arguments):
+    lines = [row("seed", "components", "closures between robots", "wrong", "largest closure error",
+                 "transform off by", "alpha / bravo to server, mm RMS", "constraints"), row(*["---"] * 8)]
+    for seed in range(1, arguments.seeds + 1):
+        report = run(arguments, "hku_two_sessions", seed)
+        check, transform = report["server"]["closure_check"], report["transforms"][0]
+        robots = [corrected(report, robot) for robot in report["robots"]]
+        lines.append(row(seed, report["server"]["components"], report["server"]["closures_accepted_inter"], check["wrong"],
+                         f"{check['max_error_m']:.3f} m, {check['max_error_deg']:.2f} deg",
+                         f"{millimetres(transform['error_m'])} mm, {transform['error_deg']:.3f} deg",
+                         " / ".join(millimetres(r["agreement_rmse_m"]) for r in robots),
+                         " + ".join(str(r["constraints"]) for r in robots)))
+    return lines
+
+
+def degraded(arguments):
+    lines = [row("seed", "server", "robot", "onboard", "server", "corrected", "allowed: 1.1 x server + 10 mm",
+                 "RPE onboard", "RPE corrected", "constraints"), row(*["---"] * 10)]
+    for seed in range(1, arguments.seeds + 1):
+        report = run(arguments, "hku_degraded", seed, "compare_policies=[spectral]")
+        for robot in report["robots"]:
+            own = corrected(report, robot)
+            lines.append(row(seed, millimetres(report["server"]["rmse_m"]), robot["name"],
+                             millimetres(robot["onboard_rmse_m"]), millimetres(robot["server_rmse_m"]),
+                             millimetres(own["rmse_m"]), millimetres(1.1 * robot["server_rmse_m"] + 0.01),
+                             millimetres(robot["onboard_rpe_m"]), millimetres(own["rpe_m"]), own["constraints"]))
+    return lines
+
+
+def drift_sweep(arguments):
+    lines = [row("yaw drift", "onboard", "closures", "between robots", "wrong", "components", "server",
+                 "corrected alpha / bravo"), row(*["---"] * 8)]
+    for yaw in (0.1, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0):
+        runs = []
+        for seed in range(1, 4):
+            sets = [f"robots.{i}.degrade.yaw_deg_per_m={sign * yaw}" for i, sign in ((0, 1), (1, -1))]
+            sets += [f"robots.{i}.covariance.rotation_deg_per_sqrt_m={max(0.3, 2.3 * yaw)}" for i in (0, 1)]
+            runs.append(run(arguments, "hku_degraded", seed, "compare_policies=[spectral]", *sets))
+        median = lambda values: statistics.median(v if v is not None else float("nan") for v in values)
+        lines.append(row(
+            f"{yaw} deg/m",
+            f"{median(max(r['onboard_rmse_m'] for r in report['robots']) for report in runs):.2f} m",
+            f"{median(r['server']['closures_accepted'] for r in runs):.0f}",
+            f"{median(r['server']['closures_accepted_inter'] for r in runs):.0f}",
+            sum(r["server"]["closure_check"]["wrong"] if r["server"]["closure_check"] else 0 for r in runs),
+            "/".join(str(r["server"]["components"]) for r in runs),
+            f"{median(r['server']['rmse_m'] for r in runs):.3f} m",
+            " / ".join(f"{median(corrected(r, r['robots'][i])['rmse_m'] for r in runs):.3f} m" for i in (0, 1))))
+    return lines
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tutti")
+    parser.add_argument("--data", required=True)
+    parser.add_argument("--seeds", type=int, default=10)
+    arguments = parser.parse_args()
+    text = [
+        "# HKU: two real LiDAR recordings of one place",
+        "",
+        "Real scans and FAST-LIO2 odometry of both recordings, replayed side by side; written by",
+        "`bench/accuracy/hku.py TUTTI --data FOLDER`. There is no external ground truth: closures and the transform are",
+        "compared with a reference derived from the same scans (repeatable to 1 mm and 0.013 degrees).",
+        "",
+        "## `missions/hku_two_sessions.yaml`, bravo's frame drawn from the seed",
+        "",
+        "To hold: one component, at least 60 closures between the robots, none wrong by more than 0.5 m or 2 degrees,",
+        "transform within 30 mm and 0.15 degrees at bravo's centroid, corrected within 20 mm RMS of the server.",
+        "",
+        *two_sessions(arguments),
+        "",
+        "## `missions/hku_degraded.yaml`: 0.3 degrees of yaw per metre and 0.3 % of scale, opposite signs",
+        "",
+        "Millimetres. RMSE against the undegraded odometry after one rigid alignment, at keyframes; server: both robots",
+        "at once, then per robot. RPE over 1 s. To hold: server at most 50 mm; corrected as allowed; RPE no worse than",
+        "the raw odometry's.",
+        "",
+        *degraded(arguments),
+        "",
+        "## How much drift it stands",
+        "",
+        "The same mission with other yaw drifts (the front end's stated uncertainty grows with it), medians of three",
+        "seeds; closures wrong summed, components of each. Submap clouds are built with the drifting odometry, so they",
+        "bend: a 10 s submap is about 5 m long.",
+        "",
+        *drift_sweep(arguments),
+        "",
+    ]
+    (SOURCE / "docs" / "results" / "hku.md").write_text("\n".join(text))
+
+
+if __name__ == "__main__":
+    main()
