@@ -4,7 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include "tutti/consistency/compare.hpp"
-#include "tutti/consistency/test_support/runs.hpp"
+#include "tutti/consistency/testing/runs.hpp"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "support/shared_data.hpp"
-#include "tutti/consistency/test_support/runs.hpp"
+#include "tutti/consistency/testing/runs.hpp"
 #include "tutti/spectral/graph.hpp"
 #include "tutti/spectral/spectrum.hpp"
 

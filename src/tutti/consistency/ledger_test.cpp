@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "tutti/consistency/test_support/runs.hpp"
+#include "tutti/consistency/testing/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "tutti/consistency/test_support/runs.hpp"
+#include "tutti/consistency/testing/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "tutti/consistency/test_support/runs.hpp"
+#include "tutti/consistency/testing/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "support/shared_data.hpp"
-#include "tutti/formats/internal/mutations.hpp"
+#include "tutti/formats/testing/mutations.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/formats/tum.hpp"
 

@@ -6,7 +6,7 @@
 #include <rapidcheck/gtest.h>
 
 #include "support/shared_data.hpp"
-#include "tutti/formats/internal/mutations.hpp"
+#include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
 namespace {

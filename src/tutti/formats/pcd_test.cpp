@@ -6,8 +6,8 @@
 #include <rapidcheck/gtest.h>
 
 #include "support/shared_data.hpp"
-#include "tutti/formats/internal/mutations.hpp"
 #include "tutti/formats/internal/points.hpp"
+#include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
 namespace {

@@ -12,8 +12,8 @@
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/tum.hpp"
-#include "tutti/mission/report_example.hpp"
 #include "tutti/mission/report_json.hpp"
+#include "tutti/mission/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

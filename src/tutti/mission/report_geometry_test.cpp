@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tutti/mission/report_example.hpp"
+#include "tutti/mission/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tutti/mission/report_example.hpp"
+#include "tutti/mission/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

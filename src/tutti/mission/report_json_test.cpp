@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "tutti/mission/report_example.hpp"
+#include "tutti/mission/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

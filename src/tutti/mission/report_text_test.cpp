@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <sstream>
 
-#include "tutti/mission/report_example.hpp"
 #include "tutti/mission/report_format.hpp"
+#include "tutti/mission/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

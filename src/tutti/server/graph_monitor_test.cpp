@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tutti/server/test_world.hpp"
+#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

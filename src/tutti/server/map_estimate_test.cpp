@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "tutti/geometry/alignment.hpp"
-#include "tutti/server/test_world.hpp"
+#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

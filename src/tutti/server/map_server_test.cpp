@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "tutti/server/test_world.hpp"
+#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

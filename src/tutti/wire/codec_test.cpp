@@ -10,7 +10,7 @@
 #include <limits>
 
 #include "tutti/wire/limits.hpp"
-#include "tutti/wire/test_messages.hpp"
+#include "tutti/wire/testing/messages.hpp"
 
 namespace tutti::wire {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "tutti/geometry/so3.hpp"
 #include "tutti/wire/internal/columns.hpp"
-#include "tutti/wire/test_messages.hpp"
+#include "tutti/wire/testing/messages.hpp"
 
 namespace tutti::wire {
 namespace {

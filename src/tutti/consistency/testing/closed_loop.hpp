@@ -8,7 +8,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/policy.hpp"
-#include "tutti/consistency/test_support/runs.hpp"
+#include "tutti/consistency/testing/runs.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/geometry/alignment.hpp"
 
