@@ -2,6 +2,7 @@
 #include "tutti/perception/lidar/candidates.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -100,20 +101,28 @@ ComplexImage correlate_both(const Fft& fft, const ComplexImage& A, const Complex
   return fft.inverse(H);
 }
 
-Peak find_peak(const std::vector<float>& correlation, int yaw_step) {
-  const auto best = std::max_element(correlation.begin(), correlation.end());
-  const int k = static_cast<int>(best - correlation.begin());
+/// The highest point, and the highest one farther than `apart` cells (in either axis) from it.
+std::array<Peak, 2> find_peaks(std::vector<float> correlation, int yaw_step, int apart, float scale) {
+  std::array<Peak, 2> peaks;
   const auto centred = [](int i) { return i < kN / 2 ? i : i - kN; };
-  return {.yaw_step = yaw_step, .x = centred(k & kMask), .y = centred(k / kN), .value = *best};
+  for (Peak& peak : peaks) {
+    const auto best = std::max_element(correlation.begin(), correlation.end());
+    const int k = static_cast<int>(best - correlation.begin());
+    peak = {.yaw_step = yaw_step, .x = centred(k & kMask), .y = centred(k / kN), .value = *best * scale};
+    for (int dy = -apart; dy <= apart; ++dy)
+      for (int dx = -apart; dx <= apart; ++dx) correlation[((k / kN + dy) & kMask) * kN + ((k + dx) & kMask)] = 0.0F;
+  }
+  return peaks;
 }
 
-/// The best shift of every yaw.
+/// The best two shifts of every yaw.
 std::vector<Peak> correlate(const BirdsEyeView& a, const BirdsEyeView& b, const CandidateConfig& config) {
   const Fft fft;
   const ComplexImage image_a = draw(a, 0.0, config.cell_m);
   const ComplexImage A = fft.forward(image_a), A_mirrored = mirrored(A);
   const double norm_a = norm(image_a);
   const int quarter = config.yaw_steps_per_quarter;
+  const int apart = std::min(static_cast<int>(config.distinct_m / config.cell_m), kN / 2 - 1);
   std::vector<Peak> peaks;
   for (int step = 0; step < quarter; ++step) {
     const ComplexImage image_b = draw(b, kTwoPi * step / (4 * quarter), config.cell_m);
@@ -124,16 +133,14 @@ std::vector<Peak> correlate(const BirdsEyeView& a, const BirdsEyeView& b, const 
     for (int turn = 0; turn < 2; ++turn) {
       if (turn == 1) B = turned_by_quarter(B);
       const ComplexImage both = correlate_both(fft, A, A_mirrored, B);
-      peaks.push_back(find_peak(both.re, step + turn * quarter));
-      peaks.push_back(find_peak(both.im, step + (turn + 2) * quarter));
-      peaks[peaks.size() - 2].value *= scale;
-      peaks.back().value *= scale;
+      for (const Peak& peak : find_peaks(both.re, step + turn * quarter, apart, scale)) peaks.push_back(peak);
+      for (const Peak& peak : find_peaks(both.im, step + (turn + 2) * quarter, apart, scale)) peaks.push_back(peak);
     }
   }
   return peaks;
 }
 
-/// The best peaks, best first, whose yaws differ enough to be different alignments.
+/// The best peaks, best first, that differ enough in yaw or shift to be different alignments.
 std::vector<Peak> select_distinct(std::vector<Peak> peaks, const CandidateConfig& config) {
   const int yaw_steps = 4 * config.yaw_steps_per_quarter;
   std::sort(peaks.begin(), peaks.end(),
@@ -144,7 +151,8 @@ std::vector<Peak> select_distinct(std::vector<Peak> peaks, const CandidateConfig
     if (chosen.size() >= static_cast<std::size_t>(config.max_guesses)) break;
     const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Peak& other) {
       const int turn = std::abs(other.yaw_step - peak.yaw_step);
-      return std::min(turn, yaw_steps - turn) * 360.0 / yaw_steps < config.distinct_deg;
+      const double shift_m = config.cell_m * std::hypot(other.x - peak.x, other.y - peak.y);
+      return std::min(turn, yaw_steps - turn) * 360.0 / yaw_steps < config.distinct_deg && shift_m <= config.distinct_m;
     });
     if (!known) chosen.push_back(peak);
   }

@@ -61,7 +61,8 @@ struct CandidateConfig {
   int yaw_steps_per_quarter = 30;  ///< A quarter turn maps the image onto itself, so three quarters are cheap.
   int max_guesses = 3;             ///< Best alignments handed to the registration.
   int min_wall_cells = 30;         ///< A view from above with fewer (half cells) says nothing.
-  double distinct_deg = 12.0;      ///< Two guesses differ by at least this yaw.
+  double distinct_deg = 12.0;      ///< Two alignments differ by this yaw,
+  double distinct_m = 2.0;         ///< or this far: beyond what the registration would bridge.
   double min_score = 0.1;          ///< Correlation (0..1) below which a guess is not worth a registration.
   template <class V>
   void describe(V& v) {
@@ -69,7 +70,8 @@ struct CandidateConfig {
     v.field("yaw_steps_per_quarter", yaw_steps_per_quarter, between(1, 180), "Yaw steps per quarter turn.");
     v.field("max_guesses", max_guesses, between(1, 16), "Best alignments handed to the registration.");
     v.field("min_wall_cells", min_wall_cells, at_least(1), "A view from above with fewer wall cells is not compared.");
-    v.field("distinct_deg", distinct_deg, between(0.0, 180.0), "Two guesses differ by at least this yaw.");
+    v.field("distinct_deg", distinct_deg, between(0.0, 180.0), "Two alignments are different from this yaw on.");
+    v.field("distinct_m", distinct_m, greater_than(0.0), "Two alignments are different from this shift on.");
     v.field("min_score", min_score, between(0.0, 1.0), "Correlation below which a guess is dropped.");
   }
 };
@@ -91,7 +93,7 @@ struct LidarClosureConfig {
   double visibility_margin_m = 0.5;      ///< A point this much nearer than the surface seen behind it contradicts.
   int visibility_views = 5;              ///< Viewpoints of each submap, evenly spread along its way.
   int visibility_points = 2000;          ///< Of each submap, evenly spread.
-  double max_rival_ratio = 0.9;          ///< A second, different alignment nearly as good: the place is ambiguous.
+  double max_rival_ratio = 0.95;         ///< A second, different alignment nearly as good: the place is ambiguous.
   double max_forward_backward_m = 0.05;  ///< Between a-to-b and b-to-a, at the centre of the overlap.
   double max_forward_backward_deg = 0.5;
   template <class V>

@@ -12,8 +12,7 @@
 
 namespace tutti::lidar {
 
-/// Finds nearest points. Immutable after construction, safe to share between threads; equally near points: the one with
-/// the lower index.
+/// Finds nearest points. Immutable after construction, safe to share between threads, deterministic.
 class NeighbourIndex {
  public:
   static constexpr std::int32_t kNone = -1;

@@ -41,13 +41,7 @@ Middle find_middle(const Submap& submap) {
 
 ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerification& verification) {
   TUTTI_CHECK(!a.keyframes.empty() && !b.keyframes.empty() && a.id != b.id);
-  if (b.id < a.id) {
-    PairVerification inverse = verification;
-    inverse.T_a_b = verification.T_a_b.inverse();
-    const Matrix6d Ad = adjoint(verification.T_a_b);
-    inverse.covariance = Ad * verification.covariance * Ad.transpose();
-    return to_verdict(b, a, inverse);
-  }
+  if (b.id < a.id) return to_verdict(b, a, inverse(verification));
   ClosureVerdict verdict{.pair = {a.id, b.id}};
   if (!verification.accepted) {
     verdict.reason = verification.reason;

@@ -33,6 +33,8 @@ struct Contender {
   double score = 0.0;
 };
 
+Eigen::Vector3d with_zero(const Eigen::Vector2d& p) { return {p.x(), p.y(), 0.0}; }
+
 /// Coarsely registered guesses, best first; of those that ended in the same place, the best.
 std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
   RegistrationConfig coarse = config.registration;
@@ -47,14 +49,17 @@ std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures&
   std::vector<Contender> distinct;
   for (const auto& one : all) {
     const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Contender& other) {
-      return rotation_angle(other.T_a_b.inverse() * one.T_a_b) * kDegPerRad < config.candidates.distinct_deg;
+      const Pose3 difference = other.T_a_b.inverse() * one.T_a_b;
+      const Eigen::Vector3d centre = b.R_level_submap.conjugate() * with_zero(b.view.centre);
+      return rotation_angle(difference) * kDegPerRad < config.candidates.distinct_deg &&
+             (difference * centre - centre).norm() < config.candidates.distinct_m;
     });
     if (!known) distinct.push_back(one);
   }
   return distinct;
 }
 
-/// Registers both ways from one start and takes the middle, so that swapping a and b only inverts the result.
+/// Registers both ways from one start and takes the middle.
 void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, const LidarClosureConfig& config,
             PairVerification& out) {
   RegistrationConfig fine = config.registration;
@@ -64,8 +69,7 @@ void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_ini
   const Pose3& T_b_a = backward.T_target_source;
   const Vector6d gap = local(forward.T_target_source, T_b_a.inverse());
   out.T_a_b = retract(forward.T_target_source, 0.5 * gap);
-  // (T Exp(xi))^-1 = T^-1 Exp(-Ad(T) xi). What the two ways disagree by is uncertainty, too.
-  const Matrix6d Ad = adjoint(T_b_a);
+  const Matrix6d Ad = adjoint(T_b_a);  // as in inverse(); what the two ways disagree by is uncertainty, too
   out.covariance =
       0.5 * (forward.covariance + Ad * backward.covariance * Ad.transpose()) + 0.25 * gap * gap.transpose();
   out.overlap = 0.5 * (forward.overlap + backward.overlap);
@@ -97,13 +101,22 @@ std::string why_refused(const PairVerification& v, const LidarClosureConfig& c) 
 
 }  // namespace
 
+PairVerification inverse(PairVerification v) {
+  const Matrix6d Ad = adjoint(v.T_a_b);  // (T Exp(xi))^-1 = T^-1 Exp(-Ad(T) xi)
+  v.covariance = Ad * v.covariance * Ad.transpose();
+  v.T_a_b = v.T_a_b.inverse();
+  return v;
+}
+
 PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
+  TUTTI_CHECK(!config.registration.levels.empty(), "a registration needs at least one level");
   PairVerification out;
   if (!a.usable || !b.usable) {
     out.reason = fmt::format("submap {}/{} is not usable: {}", (a.usable ? b : a).id.robot.value,
                              (a.usable ? b : a).id.index, (a.usable ? b : a).reason);
     return out;
   }
+  if (b.id < a.id) return inverse(verify_pair(b, a, config));
   const auto ranked = contenders(a, b, config);
   if (ranked.empty()) {
     out.reason = "the walls do not correlate";

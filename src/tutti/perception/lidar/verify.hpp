@@ -26,9 +26,12 @@ struct PairVerification {
   double correlation_score = 0.0;
 };
 
-/// Decides from the two submaps alone whether they show the same place. verify_pair(b, a) is the inverse, to the
-/// rounding of floating point.
+/// Decides from the two submaps alone whether they show the same place. Computed in the order of the submap ids, so
+/// verify_pair(b, a) is exactly the inverse. config.registration.levels must not be empty.
 PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config);
+
+/// The other way round: T_b_a with its covariance.
+PairVerification inverse(PairVerification verification);
 
 /// The closure is expressed between the middle keyframes, where bent submaps agree best; its covariance is enlarged by
 /// the odometry between the middle and the rest of each submap. pair.first < pair.second whatever the order of a and b.

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/perception/lidar/voxel_filter.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <tuple>
+
+#include "tutti/base/random.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::lidar {
+namespace {
+
+PointCloud random_cloud(Rng& rng, std::size_t n, double half_size) {
+  PointCloud cloud;
+  const auto coordinate = [&] { return static_cast<float>(rng.uniform(-half_size, half_size)); };
+  for (std::size_t i = 0; i < n; ++i) cloud.points.emplace_back(coordinate(), coordinate(), coordinate());
+  return cloud;
+}
+
+std::tuple<int, int, int> voxel_of(const Eigen::Vector3f& p, double voxel) {
+  const auto cell = [&](float x) { return static_cast<int>(std::floor(double{x} / voxel)); };
+  return {cell(p.x()), cell(p.y()), cell(p.z())};
+}
+
+RC_GTEST_PROP(VoxelDownsample, doesNotDependOnTheOrderToTheBit, (std::uint64_t seed)) {
+  Rng rng(seed);
+  PointCloud cloud = random_cloud(rng, 300, 1.0);
+  const PointCloud before = voxel_downsample(cloud, 0.4);
+  for (std::size_t i = cloud.points.size(); i > 1; --i) std::swap(cloud.points[i - 1], cloud.points[rng.index(i)]);
+  RC_ASSERT(voxel_downsample(cloud, 0.4) == before);
+}
+
+RC_GTEST_PROP(VoxelDownsample, leavesOnePointInEveryOccupiedVoxel, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const PointCloud cloud = random_cloud(rng, 200, 2.0);
+  std::set<std::tuple<int, int, int>> occupied, left;
+  for (const auto& p : cloud.points) occupied.insert(voxel_of(p, 0.5));
+  const PointCloud thin = voxel_downsample(cloud, 0.5);
+  for (const auto& p : thin.points) left.insert(voxel_of(p, 0.5));
+  RC_ASSERT(left == occupied);
+  RC_ASSERT(thin.points.size() == occupied.size());
+}
+
+RC_GTEST_PROP(VoxelDownsample, isIdempotent, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const PointCloud once = voxel_downsample(random_cloud(rng, 100, 3.0), 0.7);
+  RC_ASSERT(voxel_downsample(once, 0.7) == once);
+}
+
+TEST(VoxelDownsample, takesTheCentroid) {
+  const PointCloud cloud{{{0.1F, 0.1F, 0.1F}, {0.3F, 0.1F, 0.1F}, {-0.1F, 0.1F, 0.1F}}};
+  const PointCloud thin = voxel_downsample(cloud, 1.0);
+  ASSERT_EQ(thin.points.size(), 2U);
+  EXPECT_TRUE(thin.points[0].isApprox(Eigen::Vector3f(-0.1F, 0.1F, 0.1F)));
+  EXPECT_TRUE(thin.points[1].isApprox(Eigen::Vector3f(0.2F, 0.1F, 0.1F)));
+}
+
+TEST(VoxelDownsample, skipsWhatIsNotFiniteOrTooFarAway) {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+  const PointCloud cloud{{{nan, 0, 0}, {0, infinity, 0}, {0, 0, -infinity}, {1e9F, 0, 0}, {1, 2, 3}}};
+  EXPECT_EQ(voxel_downsample(cloud, 0.3).points, (std::vector<Eigen::Vector3f>{{1, 2, 3}}));
+  EXPECT_TRUE(voxel_downsample({}, 0.3).points.empty());
+}
+
+TEST(VoxelDownsample, refusesAVoxelWithoutSize) { EXPECT_THROW(voxel_downsample({}, 0.0), std::logic_error); }
+
+TEST(MergeScans, movesEachScanAndKeepsTheRangeOfItsOwnBody) {
+  const auto cloud = std::make_shared<PointCloud>(PointCloud{{{1, 0, 0}, {5, 0, 0}, {0.1F, 0, 0}}});
+  const Pose3 turned{so3_exp({0, 0, 1.5707963267948966}), {10, 0, 0}};
+  const PosedCloud scans[] = {{Pose3{}, cloud}, {turned, cloud}, {turned, nullptr}};
+  const PointCloud merged = merge_scans(scans, 0.3, {.min_m = 0.5, .max_m = 2.0});
+  ASSERT_EQ(merged.points.size(), 2U);  // (1, 0, 0) of both: the others are too near or too far
+  EXPECT_TRUE(merged.points[0].isApprox(Eigen::Vector3f(1, 0, 0)));
+  EXPECT_TRUE(merged.points[1].isApprox(Eigen::Vector3f(10, 1, 0), 1e-6F));
+}
+
+RC_GTEST_PROP(MergeScans, doesNotDependOnTheOrderOfTheScans, (std::uint64_t seed)) {
+  Rng rng(seed);
+  std::vector<PosedCloud> scans;
+  for (int k = 0; k < 5; ++k)
+    scans.push_back({{so3_exp({0, 0, rng.uniform(-3, 3)}), {rng.uniform(-1, 1), 0, 0}},
+                     std::make_shared<PointCloud>(random_cloud(rng, 50, 2.0))});
+  const PointCloud forward = merge_scans(scans, 0.5);
+  std::reverse(scans.begin(), scans.end());
+  RC_ASSERT(merge_scans(scans, 0.5) == forward);
+}
+
+}  // namespace
+}  // namespace tutti::lidar
