@@ -9,7 +9,7 @@
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/fft.hpp"
 #include "tutti/perception/lidar/registration.hpp"
-#include "tutti/perception/lidar/test_rooms.hpp"
+#include "tutti/perception/lidar/testing/rooms.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 
 namespace {

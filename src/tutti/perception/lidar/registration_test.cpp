@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 
 #include "tutti/perception/lidar/submap_features.hpp"
-#include "tutti/perception/lidar/test_rooms.hpp"
+#include "tutti/perception/lidar/testing/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {

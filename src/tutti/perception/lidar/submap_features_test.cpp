@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "tutti/perception/lidar/levelling.hpp"
-#include "tutti/perception/lidar/test_rooms.hpp"
+#include "tutti/perception/lidar/testing/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "tutti/perception/lidar/test_rooms.hpp"
+#include "tutti/perception/lidar/testing/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {
