@@ -104,8 +104,8 @@ class RobotAgent {
   std::unique_ptr<consistency::ConstraintPolicy> policy_;
   consistency::Ledger ledger_;
   std::vector<Keyframe> keyframes_;
-  std::vector<std::size_t> chain_index_;  // of each keyframe in the odometry chain
-  std::vector<std::uint32_t> submap_of_;  // of each keyframe: the submap it was first in
+  std::vector<std::size_t> chain_index_;     // of each keyframe in the odometry chain
+  std::vector<std::uint32_t> submap_of_;     // of each keyframe: the submap it was first in
   std::vector<RelativePose> node_odometry_;  // raw, between representative keyframes; [k] ends at the k-th
   RelativePose since_node_{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   std::optional<Pose3> last_odometry_;
