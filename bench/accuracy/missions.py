@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs every mission once (and the demo) with all policies and writes docs/results/missions.md.
+
+Usage: bench/accuracy/missions.py TUTTI_PROGRAM --data FOLDER [--seed 1]
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import tempfile
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+
+
+def run(arguments, *command):
+    """(report.json, timing.json) of one run."""
+    with tempfile.TemporaryDirectory() as out:
+        call = [arguments.tutti, *command, "--out", out, "--seed", arguments.seed]
+        subprocess.run([str(c) for c in call], check=True, capture_output=True)
+        return [json.loads((pathlib.Path(out) / name).read_text()) for name in ("report.json", "timing.json")]
+
+
+def row(*cells):
+    return "| " + " | ".join(str(c) for c in cells) + " |"
+
+
+def metres(value):
+    return "-" if value is None else f"{value:.3f}"
+
+
+def section(report):
+    policies = list(report["robots"][0]["policies"])
+    lines = [f"## {report['mission']}", "", f"{report['description']} Input: {report['input']}.", "",
+             row("robot", "onboard", "server", *(p + (" *" if p == report["default_policy"] else "") for p in policies)),
+             row(*["---"] * (3 + len(policies)))]
+    for robot in report["robots"]:
+        cells = []
+        for policy in policies:
+            own = robot["policies"][policy]
+            error = own["rmse_m"] if own["rmse_m"] is not None else own["agreement_rmse_m"]
+            cells.append(f"{metres(error)} ({own['constraints']})")
+        lines.append(row(robot["name"], metres(robot["onboard_rmse_m"]), metres(robot["server_rmse_m"]), *cells))
+    server, check = report["server"], report["server"].get("closure_check")
+    lines += ["", f"{server['components']} map(s); {server['closures_accepted']} closures accepted "
+              f"({server['closures_accepted_inter']} between robots), {server['closures_rejected']} refused"
+              + (f"; {check['wrong']} of {check['checked']} checked are wrong" if check else "") + "; "
+              + ", ".join(f"{r['name']} {r['bytes_up'] / r['duration_s'] / 1000:.2f} kB/s up, "
+                          f"{r['bytes_down'] / r['duration_s'] / 1000:.2f} down" for r in report["robots"]) + ".", ""]
+    return lines
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tutti")
+    parser.add_argument("--data", required=True)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    text = [
+        "# All missions, all policies", "",
+        f"Seed {arguments.seed}; written by `bench/accuracy/missions.py TUTTI --data FOLDER`. RMSE in metres after one",
+        "rigid alignment (SE(3), no scale) at keyframes, in brackets the constraints held at the end; * is the policy the",
+        "robot follows. Where there is no reference, the figure is the RMSE to the server. Which part of the input is real",
+        "is said in each line. `uniform`, `random` and `euclidean` have the budget of `spectral`.", "",
+    ]
+    text += section(run(arguments, "demo")[0])
+    for mission in sorted((SOURCE / "missions").glob("*.yaml")):
+        if mission.stem != "demo":
+            text += section(run(arguments, "run", mission, "--data", arguments.data)[0])
+    (SOURCE / "docs" / "results" / "missions.md").write_text("\n".join(text))
+
+
+if __name__ == "__main__":
+    main()
