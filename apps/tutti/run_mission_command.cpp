@@ -80,6 +80,7 @@ int run_and_report(const Result<mission::MissionConfig>& config, const MissionAr
                                     .seed = arguments.seed,
                                     .rate = arguments.rate,
                                     .threads = arguments.threads,
+                                    .version = TUTTI_VERSION,
                                     .progress = std::ref(progress)};
   const auto record = mission::run_mission(*config, options);
   progress.close();

@@ -2,8 +2,12 @@
 #pragma once
 
 #include <chrono>
+#include <string>
 
 namespace tutti::mission {
+
+/// Processor and number of threads, in words, as far as the system tells.
+std::string machine_description();
 
 /// CPU seconds of the calling thread.
 double thread_cpu_s();

@@ -243,6 +243,7 @@ void MissionRun::record_traffic(RobotRecord& robot) const {
 
 void MissionRun::record_timing(MissionRecord& record) const {
   record.timing = timing_;
+  record.timing.machine = machine_description();
   record.timing.wall_s = pace_.wall_s();
   record.timing.rate = options_.rate;
   for (const auto& robot : robots_)
@@ -264,6 +265,7 @@ MissionRecord MissionRun::record() const {
                        .duration_s = duration_s_,
                        .association = config_.association,
                        .rpe_interval = fmt::format("{:g} s", kRpeInterval_s),
+                       .version = options_.version,
                        .effective_config_yaml = to_yaml(dump_config(config_))};
   std::vector<RobotOutcome> outcomes;
   for (const auto& robot : robots_) {

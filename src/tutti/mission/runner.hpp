@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "tutti/base/result.hpp"
 #include "tutti/mission/mission_config.hpp"
@@ -25,6 +26,7 @@ struct RunOptions {
   std::uint64_t seed = 1;
   std::optional<double> rate;  ///< Times real time; none = as fast as possible.
   int threads = 0;             ///< For verifications; 0 = all cores. Does not change the result.
+  std::string version;         ///< Of the program, for the report.
   std::function<void(const Progress&)> progress;
 };
 
