@@ -20,9 +20,11 @@ class ProgressLine {
  public:
   void operator()(const mission::Progress& progress) {
     const double share = progress.duration_s > 0.0 ? std::min(1.0, progress.time_s / progress.duration_s) : 1.0;
-    const std::string line = fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {} map{}", 100.0 * share,
-                                         progress.duration_s, progress.submaps, progress.closures, progress.components,
-                                         progress.components == 1 ? "" : "s (not joined yet)");
+    const std::string maps = progress.components == 0   ? "no map yet"
+                             : progress.components == 1 ? "1 map"
+                                                        : fmt::format("{} maps (not joined yet)", progress.components);
+    const std::string line = fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {}", 100.0 * share,
+                                         progress.duration_s, progress.submaps, progress.closures, maps);
     if (terminal_) {
       std::cerr << "\r\033[K" << line << std::flush;
       open_ = true;
@@ -45,8 +47,11 @@ class ProgressLine {
 }  // namespace
 
 void add_mission_options(CLI::App& command, MissionArguments& arguments) {
-  command.add_option("--out", arguments.out, "Folder for the report (made if missing)")->type_name("DIR");
-  command.add_option("--seed", arguments.seed, "Everything random comes from this number")->type_name("N");
+  command
+      .add_option("--out", arguments.out,
+                  "Folder for the report, made if missing; default: out/ and the mission's name")
+      ->type_name("DIR");
+  command.add_option("--seed", arguments.seed, "Everything random comes from this number; default: 1")->type_name("N");
   command
       .add_option("--rate", arguments.rate,
                   "Times real time, e.g. 1; shows each robot's and the server's CPU share and worst update\n"
@@ -75,6 +80,12 @@ int run_and_report(const Result<mission::MissionConfig>& config, const MissionAr
     std::cout << to_yaml(dump_config(*config));
     return 0;
   }
+  std::error_code failure;  // before the mission, not after it
+  std::filesystem::create_directories(arguments.out, failure);
+  if (failure) {
+    std::cerr << "tutti: --out " << arguments.out.string() << ": cannot make the folder: " << failure.message() << '\n';
+    return 1;
+  }
   ProgressLine progress;
   const mission::RunOptions options{.data = arguments.data,
                                     .seed = arguments.seed,
@@ -86,6 +97,8 @@ int run_and_report(const Result<mission::MissionConfig>& config, const MissionAr
   progress.close();
   if (!record) {
     std::cerr << "tutti: " << record.error().message << '\n';
+    if (record.error().code == ErrorCode::io && arguments.data.empty())
+      std::cerr << "tutti: the mission's files are looked for in this folder; --data FOLDER says where they are\n";
     return 1;
   }
   if (const auto ok = mission::write_report(*record, arguments.out); !ok) {
