@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/mission_config.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace tutti::mission {
+namespace {
+
+std::string problem_with(const std::string& yaml, const std::vector<std::string>& assignments = {}) {
+  const auto file = std::filesystem::temp_directory_path() / "tutti_mission_config_test.yaml";
+  std::ofstream(file) << yaml;
+  const auto config = load_mission(file, assignments);
+  std::filesystem::remove(file);
+  if (config) return "";
+  EXPECT_EQ(config.error().code, ErrorCode::configuration) << config.error().message;
+  return config.error().message;
+}
+
+constexpr const char* kGood =
+    "robots: [{name: a, odometry: {file: a.tum}, reference: {file: a.tum}}]\nclosures: {finder: reference}\n";
+
+TEST(MissionConfig, TheDemoIsAMission) {
+  const auto demo = demo_mission({});
+  ASSERT_TRUE(demo.has_value()) << demo.error().message;
+  EXPECT_EQ(demo->mission, "demo");
+  EXPECT_EQ(demo->source, "simulation");
+}
+
+TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {
+  EXPECT_EQ(problem_with(kGood), "");
+  EXPECT_NE(problem_with("mission: x\n").find("robots: none"), std::string::npos);
+  EXPECT_NE(problem_with("robots: [{name: a}]\n").find("robots.0.odometry.file"), std::string::npos);
+  EXPECT_NE(problem_with("robots: [{name: a, odometry: {file: a}}]\n").find("robots.0.scans"), std::string::npos);
+  EXPECT_NE(problem_with("source: simulation\n").find("have no scans"), std::string::npos);
+  const std::string twins =
+      "robots: [{name: a, odometry: {file: a}, scans: s}, {name: a, odometry: {file: b}, scans: s}]";
+  EXPECT_NE(problem_with(twins).find("'a' is there twice"), std::string::npos);
+  EXPECT_NE(problem_with("robots: [{name: 'a/b', odometry: {file: a}, scans: s}]").find("a/b"), std::string::npos);
+}
+
+TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
+  EXPECT_EQ(problem_with(kGood, {"agent.policy.name=uniform", "robots.0.start_s=5"}), "");
+  EXPECT_NE(problem_with(kGood, {"robots.0.from_share=0.7", "robots.0.to_share=0.7"}).find("from_share 0.7"),
+            std::string::npos);
+  EXPECT_NE(problem_with(kGood, {"compare_policies=[oracle]"}).find("oracle"), std::string::npos);
+  EXPECT_NE(problem_with(kGood, {"robots.0.reference_offset_m=[1, 2]"}).find("expected 3"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tutti::mission

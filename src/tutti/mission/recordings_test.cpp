@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/recordings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tutti/formats/tum.hpp"
+
+namespace tutti::mission {
+namespace {
+
+/// A folder with one straight recording of 100 samples, a tenth of a second and 10 cm apart.
+class Recordings : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / "tutti_recordings_test" /
+              testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::create_directories(folder_ / "scans");
+    for (int i = 0; i < 100; ++i)
+      recorded_.push_back({Timestamp{1'000'000'000LL} + 0.1 * i, {Eigen::Quaterniond::Identity(), {0.1 * i, 0, 0}}});
+    ASSERT_TRUE(formats::write_tum((folder_ / "odometry.tum").string(), recorded_).has_value());
+    config_.robots = {{.name = "a", .odometry = {.file = "odometry.tum"}, .reference = {.file = "odometry.tum"}}};
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path folder_;
+  Trajectory recorded_;
+  MissionConfig config_;
+};
+
+TEST_F(Recordings, AreReplayedAsTheyAre) {
+  const auto robots = load_recordings(config_, folder_, 1);
+  ASSERT_TRUE(robots.has_value()) << robots.error().message;
+  EXPECT_EQ(robots->front().recording.odometry, recorded_);
+  EXPECT_EQ(robots->front().recording.increment_covariance.size(), 99U);
+  ASSERT_TRUE(robots->front().T_common_odom.has_value());
+  EXPECT_LT(local({}, *robots->front().T_common_odom).norm(), 1e-12);
+}
+
+TEST_F(Recordings, HalvesMeetAndMissNothing) {
+  config_.robots.push_back(config_.robots.front());
+  config_.robots[0].to_share = config_.robots[1].from_share = 0.5;
+  config_.robots[1].name = std::string("b");
+  const auto robots = load_recordings(config_, folder_, 1);
+  ASSERT_TRUE(robots.has_value());
+  EXPECT_EQ((*robots)[0].recording.odometry.size() + (*robots)[1].recording.odometry.size(), 100U);
+  EXPECT_EQ((*robots)[1].recording.odometry.front(), recorded_[50]);
+  EXPECT_EQ((*robots)[1].recording.robot, RobotId{1});
+}
+
+TEST_F(Recordings, ARandomFrameMovesTheOdometryAndIsKnownToTheJudge) {
+  config_.robots[0].random_frame = true;
+  const auto robots = load_recordings(config_, folder_, 1);
+  const auto again = load_recordings(config_, folder_, 1);
+  const auto other = load_recordings(config_, folder_, 2);
+  const MissionRecording& robot = robots->front();
+  EXPECT_EQ(robot.recording.odometry, again->front().recording.odometry);
+  EXPECT_NE(robot.recording.odometry, other->front().recording.odometry);
+  for (std::size_t i = 0; i < recorded_.size(); ++i)
+    EXPECT_LT(local(*robot.T_common_odom * robot.recording.odometry[i].pose, recorded_[i].pose).norm(), 1e-9);
+}
+
+TEST_F(Recordings, DegradedOdometryHasNoOneTrueFrame) {
+  config_.robots[0].degrade.yaw_deg_per_m = 1.0;
+  const auto robots = load_recordings(config_, folder_, 1);
+  EXPECT_FALSE(robots->front().T_common_odom.has_value());
+  EXPECT_EQ(robots->front().recording.reference, recorded_);
+}
+
+TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
+  config_.robots[0].scans = std::string("scans");
+  config_.robots[0].from_share = 0.1;
+  std::ofstream(folder_ / "scans" / "000012.pcd") << "x";
+  const auto robots = load_recordings(config_, folder_, 1);
+  ASSERT_TRUE(robots.has_value());
+  const auto& files = robots->front().recording.scan_files;
+  ASSERT_EQ(files.size(), robots->front().recording.odometry.size());
+  EXPECT_NE(files[2].find("000012.pcd"), std::string::npos);
+  EXPECT_TRUE(files[3].empty());
+  config_.robots[0].scans = std::string("nowhere");
+  EXPECT_FALSE(load_recordings(config_, folder_, 1).has_value());
+}
+
+}  // namespace
+}  // namespace tutti::mission
