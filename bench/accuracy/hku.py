@@ -5,32 +5,20 @@
 Usage: bench/accuracy/hku.py TUTTI_PROGRAM --data FOLDER [--seeds 10]
 """
 import argparse
-import json
-import pathlib
 import statistics
-import subprocess
-import tempfile
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
+from runs import mission_file, report_of, row, write_results
 
 
 def run(arguments, mission, seed, *assignments):
-    """report.json of one run."""
-    with tempfile.TemporaryDirectory() as out:
-        command = [arguments.tutti, "run", SOURCE / "missions" / f"{mission}.yaml", "--data", arguments.data,
-                   "--out", out, "--seed", seed]
-        for assignment in assignments:
-            command += ["--set", assignment]
-        subprocess.run([str(c) for c in command], check=True, capture_output=True)
-        return json.loads((pathlib.Path(out) / "report.json").read_text())
+    command = [arguments.tutti, "run", mission_file(mission), "--data", arguments.data, "--seed", seed]
+    for assignment in assignments:
+        command += ["--set", assignment]
+    return report_of(*command)
 
 
 def corrected(report, robot):
     return robot["policies"][report["default_policy"]]
-
-
-def row(*cells):
-    return "| " + " | ".join(str(c) for c in cells) + " |"
 
 
 def millimetres(value):
@@ -133,7 +121,7 @@ def main():
         "bend, or shorter ones for a front end that says it is bad.",
         "",
     ]
-    (SOURCE / "docs" / "results" / "hku.md").write_text("\n".join(text))
+    write_results("hku.md", text)
 
 
 if __name__ == "__main__":

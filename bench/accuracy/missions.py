@@ -5,24 +5,8 @@
 Usage: bench/accuracy/missions.py TUTTI_PROGRAM --data FOLDER [--seed 1]
 """
 import argparse
-import json
-import pathlib
-import subprocess
-import tempfile
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
-
-
-def run(arguments, *command):
-    """(report.json, timing.json) of one run."""
-    with tempfile.TemporaryDirectory() as out:
-        call = [arguments.tutti, *command, "--out", out, "--seed", arguments.seed]
-        subprocess.run([str(c) for c in call], check=True, capture_output=True)
-        return [json.loads((pathlib.Path(out) / name).read_text()) for name in ("report.json", "timing.json")]
-
-
-def row(*cells):
-    return "| " + " | ".join(str(c) for c in cells) + " |"
+from runs import SOURCE, mission_file, report_of, row, write_results
 
 
 def metres(value):
@@ -63,11 +47,11 @@ def main():
         "robot follows. Where there is no reference, the figure is the RMSE to the server. Which part of the input is real",
         "is said in each line. `uniform`, `random` and `euclidean` have the budget of `spectral`.", "",
     ]
-    text += section(run(arguments, "demo")[0])
-    for mission in sorted((SOURCE / "missions").glob("*.yaml")):
-        if mission.stem != "demo":
-            text += section(run(arguments, "run", mission, "--data", arguments.data)[0])
-    (SOURCE / "docs" / "results" / "missions.md").write_text("\n".join(text))
+    seed = ["--seed", arguments.seed]
+    text += section(report_of(arguments.tutti, "demo", *seed))
+    for name in sorted(file.stem for file in (SOURCE / "missions").glob("*.yaml") if file.stem != "demo"):
+        text += section(report_of(arguments.tutti, "run", mission_file(name), "--data", arguments.data, *seed))
+    write_results("missions.md", text)
 
 
 if __name__ == "__main__":

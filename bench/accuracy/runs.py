@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the accuracy scripts share: one run of tutti as JSON, and rows of Markdown tables."""
+import json
+import pathlib
+import subprocess
+import tempfile
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+
+
+def report_of(*command):
+    """report.json of one call of the program; its output folder is thrown away."""
+    with tempfile.TemporaryDirectory() as out:
+        subprocess.run([str(part) for part in command] + ["--out", out], check=True, capture_output=True)
+        return json.loads((pathlib.Path(out) / "report.json").read_text())
+
+
+def mission_file(name):
+    return SOURCE / "missions" / f"{name}.yaml"
+
+
+def write_results(name, lines):
+    (SOURCE / "docs" / "results" / name).write_text("\n".join(lines).rstrip() + "\n")
+
+
+def row(*cells):
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
