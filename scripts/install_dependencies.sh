@@ -9,7 +9,7 @@ packages=(
   cmake ninja-build g++ ccache pkg-config
   libeigen3-dev libsuitesparse-dev libopenblas-dev liblapacke-dev libspectra-dev libnanoflann-dev
   libprotobuf-dev protobuf-compiler libzstd-dev
-  libexpected-dev libfmt-dev libcli11-dev libyaml-cpp-dev libtbb-dev nlohmann-json3-dev
+  libexpected-dev libfmt-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
 )
 for option in "$@"; do
   case "$option" in

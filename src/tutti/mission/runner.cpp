@@ -2,8 +2,6 @@
 #include "tutti/mission/runner.hpp"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
@@ -17,6 +15,7 @@
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/load_meter.hpp"
+#include "tutti/mission/parallel.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/wire/codec.hpp"
@@ -56,7 +55,8 @@ class MissionRun {
         finder_(make_closure_finder(config.closures, recordings_, options.seed)),
         server_(robot_ids(recordings_), finder_, config.server),
         bus_(kMissionStart, config.link, options.seed),
-        workers_(options.threads > 0 ? options.threads : tbb::task_arena::automatic),
+        threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
+                                     : std::max(1U, std::thread::hardware_concurrency())),
         pace_(options.rate) {
     std::vector<std::string> policies = config.compare_policies;
     if (std::find(policies.begin(), policies.end(), config.agent.policy.name) == policies.end())
@@ -164,13 +164,11 @@ class MissionRun {
     std::vector<ClosureVerdict> verdicts(jobs.size());
     std::vector<double> took_ms(jobs.size(), 0.0);
     std::vector<double> cpu_s(jobs.size(), 0.0);
-    workers_.execute([&] {
-      tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t i) {
-        const CpuScope cpu(cpu_s[i]);
-        Stopwatch watch;
-        verdicts[i] = finder_->verify(*jobs[i].first, *jobs[i].second);
-        took_ms[i] = watch.lap_ms();
-      });
+    for_each_parallel(jobs.size(), threads_, [&](std::size_t i) {
+      const CpuScope cpu(cpu_s[i]);
+      Stopwatch watch;
+      verdicts[i] = finder_->verify(*jobs[i].first, *jobs[i].second);
+      took_ms[i] = watch.lap_ms();
     });
     timing_.server_verification_ms.insert(timing_.server_verification_ms.end(), took_ms.begin(), took_ms.end());
     for (const double s : cpu_s) worker_cpu_s_ += s;
@@ -214,7 +212,7 @@ class MissionRun {
   std::shared_ptr<const server::ClosureFinder> finder_;
   server::MapServer server_;
   bus::InProcessBus bus_;
-  tbb::task_arena workers_;
+  std::size_t threads_;
   Pace pace_;
   std::vector<std::unique_ptr<RobotActor>> robots_;  // by RobotId
   double time_s_ = 0.0;
