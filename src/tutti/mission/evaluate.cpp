@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numbers>
 
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/evaluation/ate.hpp"
@@ -132,7 +133,7 @@ void check_closures(const std::vector<RobotOutcome>& robots, const server::MapSe
     auto& check = record.server.closure_check;
     if (!check) check.emplace();
     ++check->checked;
-    constexpr double kDegToRad = 0.017453292519943295;
+    constexpr double kDegToRad = std::numbers::pi / 180.0;
     if (error.head<3>().norm() > 0.5 || error.tail<3>().norm() > 2.0 * kDegToRad) ++check->wrong;
     check->max_error_m = std::max(check->max_error_m, error.head<3>().norm());
     check->max_error_deg = std::max(check->max_error_deg, error.tail<3>().norm() / kDegToRad);

@@ -102,7 +102,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   ended(UpdateStage::choose);
 
   optimise();
-  locate_others(message.graph, comparison.pairs);
+  locate_others(message.graph, own, comparison.pairs);
   ended(UpdateStage::optimise);
 
   summary.synchronised = comparison.pairs.size();
@@ -125,11 +125,12 @@ void RobotAgent::optimise() {
 }
 
 // Frames differ by an unknown transform; the newest common node ties them together where this robot is now.
-void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consistency::NodePair> pairs) {
+void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
+                               std::span<const consistency::NodePair> pairs) {
   whereabouts_.clear();
   if (pairs.empty()) return;
-  const std::vector<consistency::RobotNode> own = nodes();
-  const Pose3 T_map_world = own[pairs.back().robot].T_map_body * graph.nodes[pairs.back().proxy].T_world_body.inverse();
+  const Pose3& T_map_newest = smoother_.pose(own[pairs.back().robot].chain_index);  // as corrected now
+  const Pose3 T_map_world = T_map_newest * graph.nodes[pairs.back().proxy].T_world_body.inverse();
   const auto component_of = [&](RobotId robot) -> std::optional<std::uint32_t> {
     for (const RobotComponent& entry : graph.components)
       if (entry.robot == robot) return entry.component;

@@ -93,7 +93,8 @@ class RobotAgent {
   void send(Submap submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
   void optimise();
-  void locate_others(const ProxyGraph& graph, std::span<const consistency::NodePair> pairs);
+  void locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
+                     std::span<const consistency::NodePair> pairs);
 
   RobotId robot_;
   std::uint64_t session_;

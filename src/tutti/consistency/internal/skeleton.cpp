@@ -32,11 +32,17 @@ Chain make_chain(const PolicyInput& input) {
   return chain;
 }
 
-/// The robot's own chain with every joint held where the server has it: between two joints the smoother spreads the
-/// end error along the odometry by its covariance.
-std::vector<Pose3> spread(const Chain& chain, const std::vector<std::size_t>& joints) {
+/// The robot's raw chain as a smoother; each run of odometry is compounded once, however often the joints change.
+estimation::OnboardSmoother make_smoother(const Chain& chain) {
   estimation::OnboardSmoother smoother;
   for (std::size_t k = 1; k < chain.odometry.size(); ++k) smoother.append(chain.odometry[k]);
+  return smoother;
+}
+
+/// The robot's own chain with every joint held where the server has it: between two joints the smoother spreads the
+/// end error along the odometry by its covariance.
+const std::vector<Pose3>& spread(estimation::OnboardSmoother& smoother, const Chain& chain,
+                                 const std::vector<std::size_t>& joints) {
   constexpr double kHeld = 1e-10;  // variance, m^2 and rad^2: as good as exact
   std::vector<estimation::ChainConstraint> links;
   for (std::size_t j = 1; j < joints.size(); ++j)
@@ -86,15 +92,16 @@ Selection SkeletonPolicy::choose(const PolicyInput& input) const {
   const std::size_t nodes = input.comparison.pairs.size();
   if (nodes < 2) return std::move(collector).take();
   const Chain chain = make_chain(input);
+  estimation::OnboardSmoother smoother = make_smoother(chain);
   std::vector<std::size_t> joints{0};
-  const std::vector<double> raw = disagreements(chain, spread(chain, joints), false);
+  const std::vector<double> raw = disagreements(chain, spread(smoother, chain, joints), false);
   if (*std::max_element(raw.begin(), raw.end()) <= config_.skeleton_tolerance_m)
     return std::move(collector).take();  // the robot agrees as it is
 
   joints.push_back(nodes - 1);
   const auto room = [&] { return !input.budget || joints.size() - 1 < *input.budget; };
   for (bool split = true; split && room();) {  // ends: every round adds a joint, and there are `nodes` of them
-    const std::vector<double> disagreement = disagreements(chain, spread(chain, joints), true);
+    const std::vector<double> disagreement = disagreements(chain, spread(smoother, chain, joints), true);
     split = false;
     for (const std::size_t node : worst_nodes(disagreement, joints, config_.skeleton_tolerance_m)) {
       if (!room()) break;
