@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/model/point_cloud.hpp"
+#include "tutti/simulation/corridor_world.hpp"
+#include "tutti/simulation/triangle_mesh.hpp"
+
+namespace tutti::simulation {
+
+class FreeSpace;
+
+/// What the walls of a world look like. Lengths across a corridor are those of its smooth shape.
+struct SurfaceConfig {
+  double cell_m = 0.25;
+  double body_height_m = 0.55;
+  double width_m = 3.2;
+  double height_m = 2.8;
+  double roughness_m = 0.15;
+  double roughness_length_m = 1.0;
+  double width_variation = 0.2;
+  double width_variation_length_m = 12.0;
+  double alcoves_per_100m = 8.0;
+  double obstacles_per_100m = 8.0;
+  double office_width_m = 2.4;
+  double office_height_m = 2.6;
+  double doors_per_100m = 20.0;
+  double furniture_per_100m = 10.0;
+  double roof_margin_m = 4.0;
+  double parapet_height_m = 0.35;
+  int chimneys = 2;
+  template <class V>
+  void describe(V& v) {
+    v.field("cell_m", cell_m, between(0.05, 1.0), "Grid the surface is built on: details below it are lost.");
+    v.field("body_height_m", body_height_m, greater_than(0.0), "Height of the network's lines above the floor.");
+    v.field("width_m", width_m, greater_than(0.0), "Of rough and featureless corridors.");
+    v.field("height_m", height_m, greater_than(0.0), "Of rough and featureless corridors.");
+    v.field("roughness_m", roughness_m, at_least(0.0), "Rough walls stray from smooth by about this at most.");
+    v.field("roughness_length_m", roughness_length_m, greater_than(0.0), "Distance between bumps of rough walls.");
+    v.field("width_variation", width_variation, between(0.0, 0.3),
+            "Rough corridors widen and narrow by up to this share.");
+    v.field("width_variation_length_m", width_variation_length_m, greater_than(0.0), "How far apart wide places are.");
+    v.field("alcoves_per_100m", alcoves_per_100m, at_least(0.0), "Dug into the walls of rough corridors.");
+    v.field("obstacles_per_100m", obstacles_per_100m, at_least(0.0), "Standing at the walls of rough corridors.");
+    v.field("office_width_m", office_width_m, greater_than(0.0), "Of office corridors.");
+    v.field("office_height_m", office_height_m, greater_than(0.0), "Of office corridors.");
+    v.field("doors_per_100m", doors_per_100m, at_least(0.0), "Office: door niches; every third stands open to a room.");
+    v.field("furniture_per_100m", furniture_per_100m, at_least(0.0), "Office: cupboards and pillars at the walls.");
+    v.field("roof_margin_m", roof_margin_m, greater_than(1.0), "Roof: from the outermost open corridors to its edge.");
+    v.field("parapet_height_m", parapet_height_m, at_least(0.0), "Roof: wall around its edge.");
+    v.field("chimneys", chimneys, between(0, 20),
+            "Roof: the only things that stand on it, beside the house of the door.");
+  }
+};
+
+/// The walls, floors and ceilings around a world's corridors: zero set of FreeSpace by naive surface nets (Gibson,
+/// "Constrained Elastic Surface Nets", MICCAI 1998; without elasticity, each vertex then moved onto the zero set), on a
+/// grid that exists near the corridors only. Closed, except around the roof of open corridors, which ends at the middle
+/// of its parapet, under an open sky.
+TriangleMesh world_surface(const CorridorWorld& world, const SurfaceConfig& config, Rng rng);
+TriangleMesh extract_surface(const FreeSpace& space, double cell_m);
+
+/// A survey: points spread evenly over the surface, one per spacing_m^2 on average.
+PointCloud sample_surface(const TriangleMesh& mesh, double spacing_m, Rng rng);
+
+}  // namespace tutti::simulation

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/simulation/corridor_world.hpp"
+
+namespace tutti::simulation {
+
+/// Where robots can go and what it is like there.
+struct WorldConfig {
+  std::string kind = "tunnel";
+  CorridorWorldConfig network;      ///< tunnel
+  double featureless_share = 0.15;  ///< tunnel: of the corridors
+  double office_length_m = 30.0;    ///< terrace
+  double office_width_m = 18.0;
+  double roof_length_m = 45.0;
+  double roof_width_m = 30.0;
+  double ramp_length_m = 14.0;
+  double ramp_rise_m = 0.6;
+  template <class V>
+  void describe(V& v) {
+    v.field("kind", kind, one_of({"tunnel", "terrace"}),
+            "tunnel: a network of rough corridors; terrace: an office loop and a rooftop with almost nothing to see.");
+    v.field("network", network, any(), "tunnel: the corridors.");
+    v.field("featureless_share", featureless_share, between(0.0, 1.0),
+            "tunnel: share of the corridors that are straight, smooth and empty.");
+    v.field("office_length_m", office_length_m, greater_than(0.0), "terrace: the office loop, x.");
+    v.field("office_width_m", office_width_m, greater_than(0.0), "terrace: the office loop, y.");
+    v.field("roof_length_m", roof_length_m, greater_than(0.0), "terrace: the loop on the roof, x.");
+    v.field("roof_width_m", roof_width_m, greater_than(0.0), "terrace: the loop on the roof, y.");
+    v.field("ramp_length_m", ramp_length_m, greater_than(0.0), "terrace: from the office to the loop on the roof.");
+    v.field("ramp_rise_m", ramp_rise_m, any(), "terrace: the roof above the office.");
+  }
+};
+
+/// The network robots walk on, every corridor with its kind (Corridor::kind); no dead ends.
+/// tunnel: make_corridor_world; the longest corridors are featureless, the others rough.
+/// terrace: junctions about every 10 m, counter-clockwise on both loops. Office first, from the corner at the origin
+/// (for the default size 0 to 9: corners 0, 3, 5, 8), with a cross-corridor (1 to 7); then the roof, level, from the
+/// end of the ramp on (10 to 25; the ramp is 4 to 10). Corridors of the roof are open, all others office.
+CorridorWorld make_world(const WorldConfig& config, Rng rng);
+
+/// The corridor nearest to a position, which lies on it or within `max_distance_m` of its centre line.
+std::optional<std::size_t> corridor_at(const CorridorWorld& world, const Eigen::Vector3d& position,
+                                       double max_distance_m);
+
+}  // namespace tutti::simulation
