@@ -71,6 +71,8 @@ class RobotAgent {
   /// Raw odometry, see SubmapBuilder::add_odometry; a bad sample is refused and nothing changes.
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
   Status add_scan(const Scan& scan);
+  /// The latest odometry sample is a keyframe; a scan elsewhere is hardly worth taking.
+  [[nodiscard]] bool wants_scan() const { return submaps_.wants_scan(); }
   /// Ends the run: the last, shorter submap becomes an outgoing message.
   void finish();
   /// Submaps ready to be sent, oldest first; taken once.

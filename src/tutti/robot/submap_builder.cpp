@@ -2,13 +2,13 @@
 #include "tutti/robot/submap_builder.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <utility>
+
+#include "tutti/geometry/so3.hpp"
+#include "tutti/perception/lidar/undistort.hpp"
 
 namespace tutti::robot {
 namespace {
-
-constexpr double kDegToRad = std::numbers::pi / 180.0;
 
 Status check_sample(RobotId robot, Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& covariance) {
   if (!is_valid(T_odom_body, 1e-3))
@@ -29,24 +29,32 @@ bool SubmapBuilder::is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const
   const Keyframe& last = keyframes_.back();
   const Pose3 step = last.T_odom_body.inverse() * T_odom_body;
   return step.translation.norm() >= config_.keyframe_distance_m ||
-         rotation_angle(step) >= config_.keyframe_angle_deg * kDegToRad ||
+         rotation_angle(step) >= config_.keyframe_angle_deg * kRadPerDeg ||
          stamp - last.stamp >= config_.keyframe_time_s;
+}
+
+/// Keeps what is newer than the longest sweep's begin, and one sample before it.
+void SubmapBuilder::remember(Timestamp stamp, const Pose3& T_odom_body) {
+  recent_.push_back({stamp, T_odom_body});
+  std::size_t old = 0;
+  while (old + 1 < recent_.size() && stamp - recent_[old + 1].stamp >= kSweepHistoryS) ++old;
+  recent_.erase(recent_.begin(), recent_.begin() + static_cast<std::ptrdiff_t>(old));
 }
 
 Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body,
                                                             const Matrix6d& increment_covariance) {
   if (auto ok = check_sample(robot_, stamp, T_odom_body, increment_covariance); !ok) return tl::unexpected(ok.error());
-  if (last_pose_) {
-    if (stamp <= last_stamp_)
+  if (!recent_.empty()) {
+    const StampedPose& last = recent_.back();
+    if (stamp <= last.stamp)
       return fail(ErrorCode::invalid, "robot {}: odometry stamp {} ns does not follow {} ns", robot_.value, stamp.ns,
-                  last_stamp_.ns);
-    const Pose3 step = last_pose_->inverse() * T_odom_body;
+                  last.stamp.ns);
+    const Pose3 step = last.pose.inverse() * T_odom_body;
     distance_ += step.translation.norm();
     since_keyframe_ = {since_keyframe_.T_a_b * step,
                        compound_covariance(step, since_keyframe_.covariance, increment_covariance)};
   }
-  last_pose_ = T_odom_body;
-  last_stamp_ = stamp;
+  remember(stamp, T_odom_body);
   if (!is_keyframe(stamp, T_odom_body)) return std::optional<Keyframe>{};
 
   const bool first = keyframes_.empty();
@@ -70,12 +78,14 @@ Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, con
 }
 
 Status SubmapBuilder::add_scan(const Scan& scan) {
-  if (!last_pose_ || scan.stamp != last_stamp_)
+  if (recent_.empty() || scan.stamp != recent_.back().stamp)
     return fail(ErrorCode::invalid, "robot {}: scan at {} ns has no odometry at its stamp (latest: {} ns)",
-                robot_.value, scan.stamp.ns, last_stamp_.ns);
+                robot_.value, scan.stamp.ns, recent_.empty() ? 0 : recent_.back().stamp.ns);
   if (!scan.cloud || scan.cloud->points.empty())
     return fail(ErrorCode::invalid, "robot {}: scan at {} ns is empty", robot_.value, scan.stamp.ns);
-  scans_.push_back({keyframes_.front().T_odom_body.inverse() * *last_pose_, scan.cloud});
+  const auto undistorted = lidar::undistort(scan, recent_);
+  if (!undistorted) return fail(ErrorCode::invalid, "robot {}: {}", robot_.value, undistorted.error().message);
+  scans_.push_back({keyframes_.front().T_odom_body.inverse() * recent_.back().pose, undistorted->cloud});
   return {};
 }
 

@@ -8,6 +8,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/submap.hpp"
+#include "tutti/model/trajectory.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 
 namespace tutti::robot {
@@ -46,17 +47,25 @@ class SubmapBuilder {
   /// keyframe this sample became, if it did.
   Result<std::optional<Keyframe>> add_odometry(Timestamp stamp, const Pose3& T_odom_body,
                                                const Matrix6d& increment_covariance);
-  /// A scan taken at the latest odometry sample's stamp; points in the body frame.
+  /// A scan that ends at the latest odometry sample's stamp; points in the body frame. A sweep with ages is undistorted
+  /// by the odometry; it must not begin before the first sample, nor more than `kSweepHistoryS` ago.
   Status add_scan(const Scan& scan);
+  /// The latest odometry sample became a keyframe: a scan there shows something new. Others are accepted, too.
+  [[nodiscard]] bool wants_scan() const {
+    return !keyframes_.empty() && keyframes_.back().stamp == recent_.back().stamp;
+  }
 
   /// The submap that the last keyframe completed, once.
   std::optional<Submap> take_submap();
   /// Closes the last, shorter submap; nothing when no keyframe was added since the previous one.
   std::optional<Submap> finish();
 
+  static constexpr double kSweepHistoryS = 0.5;  ///< Longest sweep that can be undistorted.
+
   [[nodiscard]] std::uint32_t current_submap() const { return next_submap_; }
 
  private:
+  void remember(Timestamp stamp, const Pose3& T_odom_body);
   void start_submap(const Keyframe& first);
   [[nodiscard]] bool is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const;
   Submap close_submap();
@@ -69,8 +78,7 @@ class SubmapBuilder {
   std::vector<lidar::PosedCloud> scans_;
   std::optional<Submap> finished_;
   RelativePose since_keyframe_{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  std::optional<Pose3> last_pose_;
-  Timestamp last_stamp_;
+  Trajectory recent_;                     // raw odometry that covers the longest sweep ending now
   double distance_ = 0.0;                 // travelled so far
   double representative_distance_ = 0.0;  // at the last representative keyframe
 };

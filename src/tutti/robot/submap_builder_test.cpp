@@ -88,6 +88,52 @@ TEST(SubmapBuilder, CloudIsInTheSubmapFrame) {
   }
 }
 
+TEST(SubmapBuilder, SweepsAreUndistortedByTheOwnOdometry) {
+  SubmapBuilder builder(RobotId{0}, {});
+  constexpr double kSpeed = 2.0, kWall = 5.0;  // a wall ahead of the start
+  for (int i = 0; i <= 90; ++i) {
+    const double t = 0.125 * i;
+    ASSERT_TRUE(builder.add_odometry(at(t), ahead(kSpeed * t), kStepCovariance).has_value());
+    if (!builder.wants_scan() || t < 0.25) continue;
+    auto cloud = std::make_shared<PointCloud>();
+    auto ages = std::make_shared<std::vector<float>>();
+    for (int k = 0; k < 50; ++k) {
+      ages->push_back(0.004F * static_cast<float>(k));
+      const double then = t - static_cast<double>(ages->back());
+      cloud->points.emplace_back(static_cast<float>(kWall - kSpeed * then), 0.5F * static_cast<float>(k), 1.0F);
+    }
+    ASSERT_TRUE(builder.add_scan({at(t), cloud, ages}).has_value());
+  }
+  const auto submap = builder.take_submap();
+  ASSERT_TRUE(submap && submap->cloud);
+  ASSERT_FALSE(submap->cloud->points.empty());
+  for (const Eigen::Vector3f& p : submap->cloud->points) EXPECT_NEAR(p.x(), kWall, 1e-3F);
+}
+
+TEST(SubmapBuilder, WantsScansAtKeyframesOnly) {
+  SubmapBuilder builder(RobotId{0}, {.keyframe_distance_m = 0.3, .keyframe_time_s = 100.0});
+  EXPECT_FALSE(builder.wants_scan());
+  for (int i = 0; i <= 60; ++i) {
+    const auto keyframe = builder.add_odometry(at(0.1 * i), ahead(0.05 * i), kStepCovariance);
+    ASSERT_TRUE(keyframe.has_value());
+    EXPECT_EQ(builder.wants_scan(), keyframe->has_value());
+  }
+}
+
+TEST(SubmapBuilder, ASweepOlderThanTheKnownOdometryIsRefused) {
+  SubmapBuilder builder(RobotId{0}, {});
+  const auto cloud = std::make_shared<const PointCloud>(PointCloud{{{5.0F, 0.0F, 0.0F}}});
+  const auto message = [&](double t, float age) {
+    const auto ok = builder.add_scan({at(t), cloud, std::make_shared<const std::vector<float>>(1, age)});
+    return ok.has_value() ? std::string() : ok.error().message;
+  };
+  ASSERT_TRUE(builder.add_odometry(at(0), ahead(0), kStepCovariance).has_value());
+  EXPECT_NE(message(0, 0.1F).find("0.1 s old"), std::string::npos);
+  for (int i = 1; i <= 80; ++i) ASSERT_TRUE(builder.add_odometry(at(0.125 * i), ahead(0), kStepCovariance).has_value());
+  EXPECT_EQ(message(10, static_cast<float>(SubmapBuilder::kSweepHistoryS)), "");
+  EXPECT_NE(message(10, 2.0F).find("2 s old"), std::string::npos);
+}
+
 TEST(SubmapBuilder, BadInputIsRefusedAndChangesNothing) {
   SubmapBuilder builder(RobotId{0}, {});
   const auto message = [](const auto& result) { return result.has_value() ? std::string() : result.error().message; };
