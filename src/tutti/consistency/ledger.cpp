@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <map>
-#include <numbers>
 #include <utility>
+
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::consistency {
 namespace {
@@ -15,7 +16,7 @@ Key key(const Constraint& constraint) { return {constraint.from_stamp, constrain
 bool differs(const Constraint& a, const Constraint& b, const LedgerConfig& config) {
   const Pose3 difference = a.measurement.T_a_b.inverse() * b.measurement.T_a_b;
   return difference.translation.norm() > config.replace_translation_m ||
-         rotation_angle(difference) > config.replace_rotation_deg * std::numbers::pi / 180.0;
+         rotation_angle(difference) > config.replace_rotation_deg * kRadPerDeg;
 }
 
 }  // namespace

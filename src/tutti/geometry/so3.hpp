@@ -2,10 +2,13 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <numbers>
 
 /// Rotations, as unit quaternions, with tangent theta in R^3 (radians, right perturbation).
 /// Equations: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018).
 namespace tutti {
+
+inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 

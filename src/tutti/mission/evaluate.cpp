@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <map>
-#include <numbers>
 
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/evaluation/transform_error.hpp"
 #include "tutti/geometry/alignment.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -133,10 +133,9 @@ void check_closures(const std::vector<RobotOutcome>& robots, const server::MapSe
     auto& check = record.server.closure_check;
     if (!check) check.emplace();
     ++check->checked;
-    constexpr double kDegToRad = std::numbers::pi / 180.0;
-    if (error.head<3>().norm() > 0.5 || error.tail<3>().norm() > 2.0 * kDegToRad) ++check->wrong;
+    if (error.head<3>().norm() > 0.5 || error.tail<3>().norm() > 2.0 * kRadPerDeg) ++check->wrong;
     check->max_error_m = std::max(check->max_error_m, error.head<3>().norm());
-    check->max_error_deg = std::max(check->max_error_deg, error.tail<3>().norm() / kDegToRad);
+    check->max_error_deg = std::max(check->max_error_deg, error.tail<3>().norm() / kRadPerDeg);
   }
 }
 

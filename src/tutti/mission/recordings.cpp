@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <numeric>
 #include <sstream>
 
 #include "tutti/base/random.hpp"
 #include "tutti/formats/euroc_csv.hpp"
 #include "tutti/formats/kitti.hpp"
+#include "tutti/formats/pcd.hpp"
 #include "tutti/formats/tum.hpp"
 
 namespace tutti::mission {
@@ -55,13 +57,34 @@ std::vector<T> part(const std::vector<T>& all, double from_share, double to_shar
   return {all.begin() + from, all.begin() + to};
 }
 
-std::vector<std::string> scan_files(const fs::path& folder, std::size_t count) {
-  std::vector<std::string> files(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const fs::path file = folder / fmt::format("{:06d}.pcd", i);
-    if (fs::exists(file)) files[i] = file.string();
+/// A folder with one PCD per odometry pose, NNNNNN.pcd, points already undistorted to the pose's stamp.
+class ScanFolder final : public ScanSource {
+ public:
+  /// `numbers`: of the files, one per odometry pose.
+  ScanFolder(fs::path folder, std::vector<std::size_t> numbers, std::vector<Timestamp> stamps)
+      : folder_(std::move(folder)), numbers_(std::move(numbers)), stamps_(std::move(stamps)) {}
+
+  [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
+    const fs::path file = folder_ / fmt::format("{:06d}.pcd", numbers_[sample]);
+    if (!fs::exists(file)) return std::nullopt;
+    auto cloud = formats::read_pcd(file.string());
+    if (!cloud) return tl::unexpected(cloud.error());
+    return Scan{.stamp = stamps_[sample], .cloud = std::make_shared<const PointCloud>(std::move(*cloud)), .age_s = {}};
   }
-  return files;
+
+ private:
+  fs::path folder_;
+  std::vector<std::size_t> numbers_;
+  std::vector<Timestamp> stamps_;
+};
+
+std::shared_ptr<const ScanSource> scans_of(const fs::path& folder, std::size_t count, double from_share,
+                                           double to_share, const Trajectory& replayed) {
+  std::vector<std::size_t> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), std::size_t{0});
+  std::vector<Timestamp> stamps;
+  for (const StampedPose& sample : replayed) stamps.push_back(sample.stamp);
+  return std::make_shared<ScanFolder>(folder, part(numbers, from_share, to_share), std::move(stamps));
 }
 
 bool is_degraded(const simulation::DegradeConfig& degrade) {
@@ -75,7 +98,6 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
   if (!robot.scans.empty()) {
     if (!fs::is_directory(data / robot.scans))
       return fail(ErrorCode::io, "{}: no such folder of scans (robot {})", (data / robot.scans).string(), robot.name);
-    out.recording.scan_files = part(scan_files(data / robot.scans, odometry->size()), robot.from_share, robot.to_share);
   }
   if (!robot.reference.file.empty()) {
     auto reference = read_trajectory(robot.reference, data);
@@ -97,6 +119,8 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
     return fail(ErrorCode::invalid, "robot {}: {} odometry poses to replay, expected at least 2", robot.name,
                 raw.size());
   if (is_degraded(robot.degrade)) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
+  if (!robot.scans.empty())
+    out.recording.scans = scans_of(data / robot.scans, odometry->size(), robot.from_share, robot.to_share, raw);
   raw = simulation::degrade_odometry(raw, robot.degrade);
   if (robot.random_frame) {
     out.T_odom_recorded = simulation::random_frame(rng, config.max_tilt_deg, config.max_shift_m);

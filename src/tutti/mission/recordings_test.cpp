@@ -72,13 +72,18 @@ TEST_F(Recordings, DegradedOdometryHasNoOneTrueFrame) {
 TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
   config_.robots[0].scans = std::string("scans");
   config_.robots[0].from_share = 0.1;
-  std::ofstream(folder_ / "scans" / "000012.pcd") << "x";
+  std::ofstream(folder_ / "scans" / "000012.pcd") << "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 "
+                                                     "1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n1 2 3\n";
   const auto robots = load_recordings(config_, folder_, 1);
   ASSERT_TRUE(robots.has_value());
-  const auto& files = robots->front().recording.scan_files;
-  ASSERT_EQ(files.size(), robots->front().recording.odometry.size());
-  EXPECT_NE(files[2].find("000012.pcd"), std::string::npos);
-  EXPECT_TRUE(files[3].empty());
+  const Recording& recording = robots->front().recording;
+  const auto there = recording.scans->scan(2);
+  ASSERT_TRUE(there.has_value() && there->has_value());
+  EXPECT_EQ((*there)->stamp, recording.odometry[2].stamp);
+  EXPECT_EQ((*there)->cloud->points.size(), 1U);
+  const auto absent = recording.scans->scan(3);
+  ASSERT_TRUE(absent.has_value());
+  EXPECT_FALSE(absent->has_value());
   config_.robots[0].scans = std::string("nowhere");
   EXPECT_FALSE(load_recordings(config_, folder_, 1).has_value());
 }

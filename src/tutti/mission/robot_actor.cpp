@@ -9,7 +9,6 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/evaluation/agreement.hpp"
-#include "tutti/formats/pcd.hpp"
 #include "tutti/mission/load_meter.hpp"
 
 namespace tutti::mission {
@@ -66,12 +65,12 @@ void RobotActor::replay_next() {
 
 void RobotActor::feed_scan(std::size_t sample) {
   const Recording& recording = recording_.recording;
-  if (recording.scan_files.empty() || recording.scan_files[sample].empty()) return;
-  auto cloud = formats::read_pcd(recording.scan_files[sample]);
-  if (!cloud) return note(refused_scans_, cloud.error().message);
+  if (!recording.scans) return;
+  const auto scan = recording.scans->scan(sample);
+  if (!scan) return note(refused_scans_, scan.error().message);
+  if (!*scan) return;
   const CpuScope cpu(cpu_s_);
-  const auto ok = default_agent().add_scan(
-      {recording.odometry[sample].stamp, std::make_shared<const PointCloud>(std::move(*cloud))});
+  const auto ok = default_agent().add_scan(**scan);
   if (!ok) note(refused_scans_, ok.error().message);
 }
 

@@ -1,14 +1,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 
 namespace tutti {
+
+/// Where a recording's scans come from: files, or a simulated sensor. Safe to call from several threads.
+class ScanSource {
+ public:
+  virtual ~ScanSource() = default;
+  /// The sweep that ends at this odometry sample; nothing when there is none.
+  [[nodiscard]] virtual Result<std::optional<Scan>> scan(std::size_t sample) const = 0;
+};
+
+/// Where simulated odometry really went wrong. Known to the evaluation only.
+struct DriftOrigin {
+  enum class Kind { slip, degeneracy, failure };
+  Kind kind = Kind::slip;
+  Timestamp from;
+  Timestamp until;
+  double translation_m = 0.0;  ///< Error of the pose increment from -> until.
+  double rotation_rad = 0.0;
+};
 
 /// One robot's recorded or simulated run: everything a mission replays.
 struct Recording {
@@ -16,8 +39,9 @@ struct Recording {
   std::string name;
   Trajectory odometry;                         ///< T_odom_body, raw, drifting.
   std::vector<Matrix6d> increment_covariance;  ///< Of odometry k -> k + 1; one fewer than odometry.
-  Trajectory reference;                 ///< T_reference_body, one frame for all robots; empty when there is none.
-  std::vector<std::string> scan_files;  ///< Empty, or one per odometry pose (body frame); "" = no scan there.
+  Trajectory reference;                     ///< T_reference_body, one frame for all robots; empty when there is none.
+  std::shared_ptr<const ScanSource> scans;  ///< Null when there is no range sensor.
+  std::vector<DriftOrigin> drift_origins;   ///< In time order; empty when unknown.
 };
 
 }  // namespace tutti

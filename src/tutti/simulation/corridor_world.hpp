@@ -31,10 +31,15 @@ struct CorridorWorldConfig {
   }
 };
 
+/// rough: something to see everywhere; featureless: straight, smooth and empty, a sensor cannot tell how far along it
+/// is; office: flat walls, doors and corners; open: under the sky, with almost nothing to see.
+enum class CorridorKind { rough, featureless, office, open };
+
 struct Corridor {
   std::size_t a = 0;  ///< Junctions at its ends, a < b.
   std::size_t b = 0;
   double length_m = 0.0;
+  CorridorKind kind = CorridorKind::rough;
 };
 
 /// Straight corridors between junctions, in the frame `reference`, z up.

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "tutti/geometry/so3.hpp"
+
 namespace tutti::simulation {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 double variance(double per_sqrt_m, double per_sqrt_deg, double per_sqrt_s, double m, double deg, double s) {
   return per_sqrt_m * per_sqrt_m * m + per_sqrt_deg * per_sqrt_deg * deg + per_sqrt_s * per_sqrt_s * s;

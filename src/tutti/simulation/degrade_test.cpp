@@ -5,14 +5,11 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::simulation {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 Trajectory any_odometry() {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());

@@ -2,14 +2,12 @@
 #include "tutti/simulation/odometry.hpp"
 
 #include <cmath>
-#include <numbers>
 
+#include "tutti/geometry/so3.hpp"
 #include "tutti/simulation/degrade.hpp"
 
 namespace tutti::simulation {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 double square(double x) { return x * x; }
 

@@ -11,11 +11,10 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::simulation {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kNominalSubmap_s = 10.0;  // to count pairs before any submap has come
 constexpr double kNominalKeyframe_s = 1.0;
 constexpr double kWrongHeight_m = 0.5;

@@ -3,12 +3,11 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
-#include <numbers>
+
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::lidar {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kSearchDeg[] = {25.0, 25.0, 12.0, 8.0, kUpToleranceDeg, kUpToleranceDeg};
 constexpr double kMinShare = 0.1;  // fewer normals than this cannot overrule the prior
 

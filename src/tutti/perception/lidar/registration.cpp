@@ -5,10 +5,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::lidar {
 namespace {
@@ -132,7 +132,7 @@ RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCl
   TUTTI_CHECK(!config.levels.empty(), "a registration needs at least one level");
   RegistrationResult result{.T_target_source = T_init};
   if (target.size() == 0 || source.size() == 0) return result;
-  const double min_cosine = std::cos(config.max_normal_angle_deg * std::numbers::pi / 180.0);
+  const double min_cosine = std::cos(config.max_normal_angle_deg * kRadPerDeg);
   for (const auto& level : config.levels)
     result.converged = run_level(target, source, level, config, min_cosine, result);
   assess(target, source, config, min_cosine, result);
