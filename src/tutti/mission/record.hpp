@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,9 +12,11 @@
 #include "tutti/base/timestamp.hpp"
 #include "tutti/consistency/constraint.hpp"
 #include "tutti/evaluation/association.hpp"
+#include "tutti/evaluation/cloud_distance.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
+#include "tutti/model/recording.hpp"
 #include "tutti/model/trajectory.hpp"
 
 /// Everything a finished mission knows, as plain values: filled by the mission, read by the report writers. What could
@@ -62,9 +65,17 @@ struct WhereaboutsRecord {
   Pose3 T_map_body;  ///< Map frame of the robot that believes it.
 };
 
+/// What one robot saw, put together by one of its own estimates, against the survey: one rigid alignment, that of the
+/// trajectory to the reference.
+struct MapErrorRecord {
+  std::optional<evaluation::CloudDistance> onboard;
+  std::optional<evaluation::CloudDistance> corrected;  ///< Default policy.
+};
+
 struct RobotRecord {
   RobotId id;
   std::string name;
+  double start_s = 0.0;     ///< Mission time of its first odometry pose.
   double distance_m = 0.0;  ///< Along the raw odometry, every pose.
   double duration_s = 0.0;  ///< First to last odometry pose.
   std::size_t odometry_factors = 0;
@@ -84,6 +95,11 @@ struct RobotRecord {
   Trajectory reference;         ///< T_reference_body, one frame for all robots; empty when there is none.
   std::vector<UpdateRecord> updates;
   std::vector<WhereaboutsRecord> whereabouts;
+  std::vector<DriftOrigin> drift_origins;  ///< Where its odometry really went wrong; empty when unknown.
+  /// What it saw, put together by raw odometry and laid rigidly on the reference (without one: on the server's
+  /// estimate); thinned. Empty without a range sensor.
+  PointCloud onboard_cloud;
+  MapErrorRecord map_error;
 };
 
 /// A loop closure of the final map.
@@ -113,10 +129,19 @@ struct ClosureCheckRecord {
   double max_error_deg = 0.0;
 };
 
-/// What one robot saw, in the server's world frame.
+/// What one robot saw, in the server's world frame; thinned.
 struct CloudRecord {
   RobotId robot;
   PointCloud cloud;
+  std::vector<float> distance_m;  ///< Of every point to the survey; empty when not measured.
+};
+
+/// A stretch of odometry that the server convicts: several closures agree with each other against it.
+struct FailedOdometryRecord {
+  RobotId robot;
+  Timestamp from;
+  Timestamp until;
+  double error_m = 0.0;  ///< By how much closures and odometry differ over the stretch.
 };
 
 struct ServerRecord {
@@ -124,7 +149,12 @@ struct ServerRecord {
   std::vector<ClosureRecord> closures;  ///< Accepted.
   std::vector<RejectionRecord> rejections;
   std::optional<ClosureCheckRecord> closure_check;
-  Accuracy joint;                   ///< All robots of the largest component together, one alignment.
+  std::uint32_t largest_component = 0;                 ///< Most keyframes.
+  Accuracy joint;                                      ///< All robots of the largest component together, one alignment.
+  std::optional<Pose3> T_reference_world;              ///< That alignment.
+  std::optional<evaluation::CloudDistance> map_error;  ///< The joint map against the survey, same robots and alignment.
+  std::optional<double> survey_covered;  ///< Share of the survey's points with a point of the joint map within 0.3 m.
+  std::vector<FailedOdometryRecord> failed_odometry;
   std::vector<NodeRecord> nodes;    ///< One per pose of `graph`, sorted by (robot, index).
   PoseGraph graph;                  ///< T_world_body.
   ProxyGraph proxy;                 ///< The last broadcast.
@@ -183,6 +213,7 @@ struct MissionRecord {
   std::string effective_config_yaml;
   std::vector<RobotRecord> robots;
   ServerRecord server;
+  std::shared_ptr<const PointCloud> survey;  ///< What the world really looks like, reference frame; null when unknown.
   std::vector<TransformRecord> transforms;
   TimingRecord timing;
 };

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/evaluation/cloud_distance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nanoflann.hpp>
+
+namespace tutti::evaluation {
+namespace {
+
+/// nanoflann's view of the points.
+struct PointSource {
+  std::vector<Eigen::Vector3f> points;
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return points[i][static_cast<Eigen::Index>(axis)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSource>, PointSource, 3,
+                                                   std::uint32_t>;
+
+PointSource finite_points(const PointCloud& cloud) {
+  PointSource source;
+  source.points.reserve(cloud.points.size());
+  std::copy_if(cloud.points.begin(), cloud.points.end(), std::back_inserter(source.points),
+               [](const Eigen::Vector3f& p) { return p.allFinite(); });
+  return source;
+}
+
+}  // namespace
+
+struct CloudIndex::Tree {
+  static constexpr std::size_t kLeafSize = 10;
+  explicit Tree(PointSource from)
+      : source(std::move(from)), kd_tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {}
+  PointSource source;
+  KdTree kd_tree;
+};
+
+CloudIndex::CloudIndex(const PointCloud& cloud_a) : tree_(std::make_unique<Tree>(finite_points(cloud_a))) {}
+CloudIndex::~CloudIndex() = default;
+
+std::vector<float> CloudIndex::distances(const PointCloud& cloud_b, const Pose3& T_a_b) const {
+  std::vector<float> out(cloud_b.points.size(), std::numeric_limits<float>::quiet_NaN());
+  if (tree_->source.points.empty()) return out;
+  const Eigen::Isometry3d T(T_a_b.matrix());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (!cloud_b.points[i].allFinite()) continue;
+    const Eigen::Vector3f p_a = (T * cloud_b.points[i].cast<double>()).cast<float>();
+    std::uint32_t nearest = 0;
+    float squared = 0.0F;
+    tree_->kd_tree.knnSearch(p_a.data(), 1, &nearest, &squared);
+    out[i] = std::sqrt(squared);
+  }
+  return out;
+}
+
+std::optional<CloudDistance> summarise(std::span<const float> distances_m) {
+  std::vector<float> finite;
+  finite.reserve(distances_m.size());
+  std::copy_if(distances_m.begin(), distances_m.end(), std::back_inserter(finite),
+               [](float d) { return std::isfinite(d); });
+  if (finite.empty()) return std::nullopt;
+  std::sort(finite.begin(), finite.end());
+  const auto n = static_cast<double>(finite.size());
+  const auto within = [&](float limit_m) {
+    return static_cast<double>(std::upper_bound(finite.begin(), finite.end(), limit_m) - finite.begin()) / n;
+  };
+  CloudDistance out{.points = finite.size()};
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const double d : finite) {
+    sum += d;
+    squares += d * d;
+  }
+  out.mean_m = sum / n;
+  out.rms_m = std::sqrt(squares / n);
+  out.p95_m = finite[static_cast<std::size_t>(std::ceil(0.95 * n)) - 1];
+  out.within_10cm = within(0.1F);
+  out.within_30cm = within(0.3F);
+  out.within_1m = within(1.0F);
+  return out;
+}
+
+}  // namespace tutti::evaluation
