@@ -27,10 +27,12 @@ struct SmallMission {
 
 SmallMission make_mission() {
   SmallMission out;
-  simulation::SimulationConfig config{.robots = 2};
-  config.world = {.rows = 2, .columns = 3, .block_m = 15.0, .jitter_m = 2.0, .missing_share = 0.0};
-  config.walk.duration_s = 200.0;
-  for (Recording& recording : simulation::simulate_recordings(config, Timestamp{0}, 11)) {
+  simulation::SimulationConfig config;
+  config.world.network = {.rows = 2, .columns = 3, .block_m = 15.0, .jitter_m = 2.0, .missing_share = 0.0};
+  for (simulation::SimulatedRobotConfig& robot : config.robots) robot.walk.duration_s = 200.0;
+  auto world = simulation::simulate_recordings(config, Timestamp{0}, 11);
+  EXPECT_TRUE(world.has_value());
+  for (Recording& recording : world->recordings) {
     out.robots.insert(recording.robot);
     robot::RobotAgent agent(recording.robot, 1, {}, Rng(1));
     for (std::size_t i = 0; i < recording.odometry.size(); ++i)
@@ -56,11 +58,11 @@ server::MapEstimate final_map(server::MapServer& server) {
 
 /// Every message once, in order, verdicts at once.
 server::MapEstimate map_in_order(const SmallMission& mission) {
-  server::MapServer server(mission.robots, mission.finder, {});
+  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {});
   for (const std::string& bytes : mission.uploads) {
     EXPECT_TRUE(server.receive(*wire::decode_submap(bytes)).has_value());
     for (const auto& job : server.take_jobs())
-      EXPECT_TRUE(server.receive(mission.finder->verify(*job.first, *job.second)).has_value());
+      EXPECT_TRUE(server.receive(*mission.finder->verify(*job.first, *job.second, server.clouds())).has_value());
   }
   return final_map(server);
 }
@@ -75,7 +77,7 @@ server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
     if (rng.bernoulli(0.2)) uploads.push_back(bytes);
   shuffle(uploads);
 
-  server::MapServer server(mission.robots, mission.finder, {});
+  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {});
   std::vector<ClosureVerdict> late;
   const auto hand_in = [&](double share) {
     shuffle(late);
@@ -90,7 +92,8 @@ server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
   };
   for (const std::string& bytes : uploads) {
     EXPECT_TRUE(server.receive(*wire::decode_submap(bytes)).has_value());
-    for (const auto& job : server.take_jobs()) late.push_back(mission.finder->verify(*job.first, *job.second));
+    for (const auto& job : server.take_jobs())
+      late.push_back(*mission.finder->verify(*job.first, *job.second, server.clouds()));
     if (rng.bernoulli(0.3)) hand_in(rng.uniform(0.0, 1.0));
     if (rng.bernoulli(0.03)) server.optimise();
   }

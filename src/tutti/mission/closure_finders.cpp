@@ -11,27 +11,35 @@ LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, 
     : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)) {}
 
 bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  const auto has_cloud = [](const Submap& s) { return s.cloud && !s.cloud->points.empty(); };
-  const bool neighbours =
-      first.id.robot == second.id.robot && second.id.index - first.id.index < min_submap_gap_;  // first < second
-  return !neighbours && has_cloud(first) && has_cloud(second);
+  return first.id.robot != second.id.robot || second.id.index - first.id.index >= min_submap_gap_;  // first < second
 }
 
-ClosureVerdict LidarClosureFinder::verify(const Submap& first, const Submap& second) const {
-  const auto a = features_of(first);
-  const auto b = features_of(second);
-  if (!a->usable || !b->usable) return {{first.id, second.id}, {}, a->usable ? b->reason : a->reason};
-  if (!lidar::plausible_pair(*a, *b, config_)) return {{first.id, second.id}, {}, "too unlike from above"};
+Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Submap& second,
+                                                  const server::CloudStore& clouds) const {
+  const auto features_a = features_of(first, clouds);
+  if (!features_a) return tl::unexpected(features_a.error());
+  const auto features_b = features_of(second, clouds);
+  if (!features_b) return tl::unexpected(features_b.error());
+  const auto& a = *features_a;
+  const auto& b = *features_b;
+  if (!a->usable || !b->usable) return ClosureVerdict{{first.id, second.id}, {}, a->usable ? b->reason : a->reason};
+  if (!lidar::plausible_pair(*a, *b, config_))
+    return ClosureVerdict{{first.id, second.id}, {}, "too unlike from above"};
   return lidar::to_verdict(first, second, lidar::verify_pair(*a, *b, config_));
 }
 
-std::shared_ptr<const lidar::SubmapFeatures> LidarClosureFinder::features_of(const Submap& submap) const {
+Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
+    const Submap& submap, const server::CloudStore& clouds) const {
   {
     const std::lock_guard lock(mutex_);
     if (const auto found = features_.find(submap.id); found != features_.end()) return found->second;
   }
+  auto cloud = clouds.get(submap.id);
+  if (!cloud) return tl::unexpected(cloud.error());
+  Submap seen = submap;
+  seen.cloud = std::move(*cloud);
   // Computed outside the lock; two threads may do it twice, with the same result.
-  auto features = std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(submap, config_));
+  auto features = std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(seen, config_));
   const std::lock_guard lock(mutex_);
   return features_.try_emplace(submap.id, std::move(features)).first->second;
 }

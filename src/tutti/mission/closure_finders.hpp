@@ -16,11 +16,14 @@ namespace tutti::mission {
 class LidarClosureFinder final : public server::ClosureFinder {
  public:
   LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap);
+  [[nodiscard]] bool needs_clouds() const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
-  [[nodiscard]] ClosureVerdict verify(const Submap& first, const Submap& second) const override;
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const override;
 
  private:
-  [[nodiscard]] std::shared_ptr<const lidar::SubmapFeatures> features_of(const Submap& submap) const;
+  [[nodiscard]] Result<std::shared_ptr<const lidar::SubmapFeatures>> features_of(
+      const Submap& submap, const server::CloudStore& clouds) const;
 
   lidar::LidarClosureConfig config_;
   std::uint32_t min_submap_gap_;
@@ -32,10 +35,12 @@ class LidarClosureFinder final : public server::ClosureFinder {
 class ReferenceClosureFinder final : public server::ClosureFinder {
  public:
   explicit ReferenceClosureFinder(simulation::ReferenceClosures closures) : closures_(std::move(closures)) {}
+  [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return closures_.is_candidate(first, second);
   }
-  [[nodiscard]] ClosureVerdict verify(const Submap& first, const Submap& second) const override {
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore&) const override {
     return closures_.verify(first, second);
   }
 

@@ -150,15 +150,20 @@ void collect_map(const std::vector<RobotOutcome>& robots, const server::MapServe
   for (const RobotOutcome& robot : robots) {
     CloudRecord cloud{.robot = robot.recording->recording.robot};
     for (const auto& [id, submap] : server.state().submaps) {
-      if (id.robot != cloud.robot || !submap->cloud) continue;
+      if (id.robot != cloud.robot || !server.state().cloud_sizes.contains(id)) continue;
       // The cloud hangs on the keyframe in its middle, as its closures do.
       const Keyframe& first = submap->keyframes.front();
       const Keyframe& middle = submap->keyframes[submap->keyframes.size() / 2];
       const auto found = pose.find({id.robot, middle.index});
       if (found == pose.end()) continue;
+      const auto seen = server.clouds().get(id);
+      if (!seen) {
+        record.notes.push_back("Missing in the map: " + seen.error().message + ".");
+        continue;
+      }
       const Eigen::Isometry3f T_world_submap(
           (found->second * middle.T_odom_body.inverse() * first.T_odom_body).matrix().cast<float>());
-      for (const Eigen::Vector3f& p : submap->cloud->points) cloud.cloud.points.push_back(T_world_submap * p);
+      for (const Eigen::Vector3f& p : (*seen)->points) cloud.cloud.points.push_back(T_world_submap * p);
     }
     if (!cloud.cloud.points.empty()) record.server.clouds.push_back(std::move(cloud));
   }

@@ -53,7 +53,8 @@ class MissionRun {
         options_(options),
         recordings_(std::move(recordings)),
         finder_(make_closure_finder(config.closures, recordings_, options.seed)),
-        server_(robot_ids(recordings_), finder_, config.server),
+        clouds_(std::make_shared<server::MemoryCloudStore>()),
+        server_(robot_ids(recordings_), finder_, clouds_, config.server),
         bus_(kMissionStart, config.link, options.seed),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                      : std::max(1U, std::thread::hardware_concurrency())),
@@ -149,8 +150,10 @@ class MissionRun {
 
   void receive_submap(const std::string& bytes) {
     if (const Status taken = take_submap(bytes); !taken) return refusals_.push_back(taken.error().message);
-    for (const ClosureVerdict& verdict : verify(server_.take_jobs()))
-      if (const Status ok = server_.receive(verdict); !ok) refusals_.push_back(ok.error().message);
+    for (const auto& verdict : verify(server_.take_jobs())) {
+      const Status ok = verdict ? server_.receive(*verdict) : Status(tl::unexpected(verdict.error()));
+      if (!ok) refusals_.push_back(ok.error().message);
+    }
   }
 
   Status take_submap(const std::string& bytes) {
@@ -160,14 +163,14 @@ class MissionRun {
   }
 
   /// The jobs' answers in the jobs' order, whatever the number of threads.
-  std::vector<ClosureVerdict> verify(const std::vector<server::VerificationJob>& jobs) {
-    std::vector<ClosureVerdict> verdicts(jobs.size());
+  std::vector<Result<ClosureVerdict>> verify(const std::vector<server::VerificationJob>& jobs) {
+    std::vector<Result<ClosureVerdict>> verdicts(jobs.size());
     std::vector<double> took_ms(jobs.size(), 0.0);
     std::vector<double> cpu_s(jobs.size(), 0.0);
     for_each_parallel(jobs.size(), threads_, [&](std::size_t i) {
       const CpuScope cpu(cpu_s[i]);
       Stopwatch watch;
-      verdicts[i] = finder_->verify(*jobs[i].first, *jobs[i].second);
+      verdicts[i] = finder_->verify(*jobs[i].first, *jobs[i].second, *clouds_);
       took_ms[i] = watch.lap_ms();
     });
     timing_.server_verification_ms.insert(timing_.server_verification_ms.end(), took_ms.begin(), took_ms.end());
@@ -210,6 +213,7 @@ class MissionRun {
   const RunOptions& options_;
   std::vector<MissionRecording> recordings_;
   std::shared_ptr<const server::ClosureFinder> finder_;
+  std::shared_ptr<server::CloudStore> clouds_;
   server::MapServer server_;
   bus::InProcessBus bus_;
   std::size_t threads_;

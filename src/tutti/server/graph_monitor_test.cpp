@@ -55,7 +55,7 @@ TEST(MonitorGraph, SaysLessWhereClosuresHelp) {
   for (auto a = submaps.begin(); a != submaps.end(); ++a)
     for (auto b = std::next(a); b != submaps.end(); ++b)
       if (finder.is_candidate(*a->second, *b->second))
-        verdicts[{a->first, b->first}] = finder.verify(*a->second, *b->second);
+        verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
   ASSERT_GT(verdicts.size(), 2U);
   const ProxyGraph without = monitor_graph(estimate_map(submaps, {}, {}), 1, {});
   const ProxyGraph with = monitor_graph(estimate_map(submaps, verdicts, {}), 2, {});

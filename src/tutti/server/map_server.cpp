@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "tutti/base/check.hpp"
 #include "tutti/server/graph_monitor.hpp"
 
 namespace tutti::server {
@@ -32,12 +33,18 @@ SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : S
 
 }  // namespace
 
-MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, const ServerConfig& config)
-    : MapServer(std::move(robots), std::move(finder), config, MapServerState{}) {}
+MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config)
+    : MapServer(std::move(robots), std::move(finder), std::move(clouds), config, MapServerState{}) {}
 
-MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, const ServerConfig& config,
-                     MapServerState state)
-    : robots_(std::move(robots)), finder_(std::move(finder)), config_(config), state_(std::move(state)) {
+MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config, MapServerState state)
+    : robots_(std::move(robots)),
+      finder_(std::move(finder)),
+      clouds_(std::move(clouds)),
+      config_(config),
+      state_(std::move(state)) {
+  TUTTI_CHECK(finder_ != nullptr && clouds_ != nullptr, "no finder or no store of clouds");
   for (const auto& [pair, verdict] : state_.verdicts) asked_.insert(pair);
   for (const auto& [id, submap] : state_.submaps) plan_verifications(submap);
   news_ = !state_.submaps.empty();
@@ -50,17 +57,28 @@ Status MapServer::receive(const SubmapMessage& message) {
                 "submap {}/{} from robot {}: expected one of the mission's {} robots, as sender", id.robot.value,
                 id.index, message.header.robot.value, robots_.size());
   if (auto ok = check_submap(message.submap); !ok) return ok;
-  const auto [entry, is_new] = state_.submaps.try_emplace(id);
-  if (!is_new) return {};  // a duplicate
-  entry->second = std::make_shared<const Submap>(message.submap);
-  plan_verifications(entry->second);
+  if (state_.submaps.contains(id)) return {};  // a duplicate
+  const std::shared_ptr<const PointCloud>& cloud = message.submap.cloud;
+  if (cloud != nullptr && !cloud->points.empty()) {
+    if (auto ok = clouds_->put(id, cloud); !ok) return ok;
+    state_.cloud_sizes[id] = cloud->points.size();
+  }
+  Submap submap = message.submap;
+  submap.cloud.reset();
+  const auto& kept = state_.submaps[id] = std::make_shared<const Submap>(std::move(submap));
+  plan_verifications(kept);
   news_ = true;
   return {};
 }
 
+bool MapServer::may_be_verified(SubmapId id) const {
+  return !finder_->needs_clouds() || state_.cloud_sizes.contains(id);
+}
+
 void MapServer::plan_verifications(const std::shared_ptr<const Submap>& submap) {
+  if (!may_be_verified(submap->id)) return;
   for (const auto& [id, other] : state_.submaps) {
-    if (id == submap->id) continue;
+    if (id == submap->id || !may_be_verified(id)) continue;
     const SubmapPair pair = ordered(id, submap->id);
     if (asked_.contains(pair)) continue;
     const auto& first = id < submap->id ? other : submap;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <map>
 #include <memory>
 #include <set>
 #include <vector>
@@ -9,6 +11,7 @@
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/server/closure_finder.hpp"
+#include "tutti/server/cloud_store.hpp"
 #include "tutti/server/map_estimate.hpp"
 
 namespace tutti::server {
@@ -26,16 +29,19 @@ struct ServerConfig {
   }
 };
 
-/// Heavy work that leaves the server as a message; ClosureFinder::verify(*first, *second) answers it, anywhere.
+/// Heavy work that leaves the server as a message; ClosureFinder::verify(*first, *second, clouds) answers it, anywhere
+/// that the clouds can be got at.
 struct VerificationJob {
   SubmapPair pair;
   std::shared_ptr<const Submap> first;
   std::shared_ptr<const Submap> second;
 };
 
-/// The server's whole state, by value: kill it, restore it, and it goes on with the same map.
+/// The server's whole state, by value, but for the clouds, which lie in its store: kill it, restore it with the same
+/// store, and it goes on with the same map.
 struct MapServerState {
-  SubmapSet submaps;
+  SubmapSet submaps;                            ///< Without their clouds.
+  std::map<SubmapId, std::size_t> cloud_sizes;  ///< Points of each submap's cloud; of those that have one.
   VerdictSet verdicts;
   std::uint64_t revision = 0;
 };
@@ -43,13 +49,14 @@ struct MapServerState {
 /// Submaps in; attach, close loops, optimise; proxy graphs out. No threads, sockets or clocks inside.
 class MapServer {
  public:
-  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, const ServerConfig& config);
+  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
+            const ServerConfig& config);
   /// Goes on from a saved state; verifications that had no verdict yet become jobs again.
-  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, const ServerConfig& config,
-            MapServerState state);
+  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
+            const ServerConfig& config, MapServerState state);
 
   /// A submap, in any order, any number of times. Unknown robots and malformed submaps are refused; what is already
-  /// mapped stays.
+  /// mapped stays. So is one whose cloud the store cannot keep; it may be sent again.
   Status receive(const SubmapMessage& message);
   /// The answer to a job, in any order, any number of times.
   Status receive(const ClosureVerdict& verdict);
@@ -63,12 +70,15 @@ class MapServer {
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
   [[nodiscard]] const MapServerState& state() const { return state_; }
+  [[nodiscard]] const CloudStore& clouds() const { return *clouds_; }
 
  private:
+  [[nodiscard]] bool may_be_verified(SubmapId id) const;
   void plan_verifications(const std::shared_ptr<const Submap>& submap);
 
   std::set<RobotId> robots_;
   std::shared_ptr<const ClosureFinder> finder_;
+  std::shared_ptr<CloudStore> clouds_;
   ServerConfig config_;
   MapServerState state_;
   std::set<SubmapPair> asked_;

@@ -16,13 +16,20 @@ const std::set<RobotId> kRobots{RobotId{0}, RobotId{1}};
 
 SubmapMessage message_of(const Submap& submap) { return {.header = {.robot = submap.id.robot}, .submap = submap}; }
 
-void do_jobs(MapServer& server, const ClosureFinder& finder) {
-  for (const VerificationJob& job : server.take_jobs())
-    ASSERT_TRUE(server.receive(finder.verify(*job.first, *job.second)).has_value());
+void do_job(MapServer& server, const ClosureFinder& finder, const VerificationJob& job) {
+  const auto verdict = finder.verify(*job.first, *job.second, server.clouds());
+  ASSERT_TRUE(verdict.has_value()) << verdict.error().message;
+  ASSERT_TRUE(server.receive(*verdict).has_value());
 }
 
+void do_jobs(MapServer& server, const ClosureFinder& finder) {
+  for (const VerificationJob& job : server.take_jobs()) do_job(server, finder, job);
+}
+
+std::shared_ptr<CloudStore> some_store() { return std::make_shared<MemoryCloudStore>(); }
+
 MapServer filled_server(const std::shared_ptr<const TestFinder>& finder) {
-  MapServer server(kRobots, finder, {});
+  MapServer server(kRobots, finder, some_store(), {});
   for (const RobotId robot : kRobots)
     for (const Submap& submap : test::make_submaps(robot, {}, Rng(1).fork(robot.value)))
       EXPECT_TRUE(server.receive(message_of(submap)).has_value());
@@ -97,18 +104,110 @@ TEST(MapServer, GoesOnFromASavedState) {
   const auto finder = std::make_shared<const TestFinder>(1, 5);
   MapServer whole = filled_server(finder);
   std::vector<VerificationJob> jobs = whole.take_jobs();
-  for (std::size_t i = 0; i < jobs.size() / 2; ++i)
-    ASSERT_TRUE(whole.receive(finder->verify(*jobs[i].first, *jobs[i].second)).has_value());
+  for (std::size_t i = 0; i < jobs.size() / 2; ++i) do_job(whole, *finder, jobs[i]);
   whole.optimise();
 
-  MapServer restored(kRobots, finder, {}, whole.state());  // killed with half of the verdicts
+  MapServer restored(kRobots, finder, some_store(), {}, whole.state());  // killed with half of the verdicts
   EXPECT_TRUE(restored.has_news());
   do_jobs(restored, *finder);
-  for (std::size_t i = jobs.size() / 2; i < jobs.size(); ++i)
-    ASSERT_TRUE(whole.receive(finder->verify(*jobs[i].first, *jobs[i].second)).has_value());
+  for (std::size_t i = jobs.size() / 2; i < jobs.size(); ++i) do_job(whole, *finder, jobs[i]);
   const ProxyGraphMessage a = whole.optimise();
   const ProxyGraphMessage b = restored.optimise();
   EXPECT_EQ(a.graph, b.graph);  // the same revision too
+}
+
+/// Verifies by looking at the clouds: as many points as the submap's number says, each at x = that number.
+class CloudReader final : public ClosureFinder {
+ public:
+  [[nodiscard]] bool needs_clouds() const override { return true; }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return first.cloud == nullptr && second.cloud == nullptr;  // as promised
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const CloudStore& clouds) const override {
+    std::string seen;
+    for (const SubmapId id : {first.id, second.id}) {
+      const auto cloud = clouds.get(id);
+      if (!cloud) return tl::unexpected(cloud.error());
+      seen += fmt::format("{} x {}, ", (*cloud)->points.size(), (*cloud)->points.front().x());
+    }
+    return ClosureVerdict{{first.id, second.id}, {}, seen};
+  }
+};
+
+/// Forgets what it is told to, and cannot keep what it is told not to.
+class BrokenStore final : public CloudStore {
+ public:
+  Status put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) override {
+    if (is_full) return fail(ErrorCode::io, "disk full");
+    return inner_.put(id, cloud);
+  }
+  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override {
+    if (lost.contains(id)) return fail(ErrorCode::io, "cloud of submap {}/{} is lost", id.robot.value, id.index);
+    return inner_.get(id);
+  }
+  bool is_full = false;
+  std::set<SubmapId> lost;
+
+ private:
+  MemoryCloudStore inner_;
+};
+
+/// Of robot 0; the odd ones have clouds.
+std::vector<SubmapMessage> submaps_with_some_clouds() {
+  std::vector<SubmapMessage> messages;
+  for (Submap& submap : test::make_submaps(RobotId{0}, {}, Rng(1))) {
+    const std::uint32_t i = submap.id.index;
+    submap.cloud = std::make_shared<PointCloud>();
+    if (i % 2 == 1)
+      submap.cloud = std::make_shared<PointCloud>(
+          PointCloud{std::vector<Eigen::Vector3f>(i, Eigen::Vector3f::Constant(static_cast<float>(i)))});
+    messages.push_back(message_of(submap));
+  }
+  return messages;
+}
+
+TEST(MapServer, KeepsCloudsInTheStoreOnlyAndHandsThemToTheFinder) {
+  const auto finder = std::make_shared<const CloudReader>();
+  const auto store = std::make_shared<BrokenStore>();
+  MapServer server(kRobots, finder, store, {});
+  for (const SubmapMessage& message : submaps_with_some_clouds()) ASSERT_TRUE(server.receive(message).has_value());
+  for (const auto& [id, submap] : server.state().submaps) EXPECT_EQ(submap->cloud, nullptr);
+  EXPECT_EQ(server.state().cloud_sizes.size(), 4U);  // of submaps 1, 3, 5, 7 of 0 ... 8
+  EXPECT_EQ(server.state().cloud_sizes.at({RobotId{0}, 5}), 5U);
+
+  const auto jobs = server.take_jobs();
+  EXPECT_EQ(jobs.size(), 4U * 3U / 2U);
+  do_job(server, *finder, jobs.back());
+  EXPECT_EQ(server.state().verdicts.begin()->second.reason, "5 x 5, 7 x 7, ");
+
+  // All but one were not answered: after a restart they are asked again, from the same store.
+  MapServer restored(kRobots, finder, store, {}, server.state());
+  EXPECT_EQ(restored.take_jobs().size(), 5U);
+}
+
+TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
+  const auto finder = std::make_shared<const CloudReader>();
+  const auto store = std::make_shared<BrokenStore>();
+  MapServer server(kRobots, finder, store, {});
+  const auto messages = submaps_with_some_clouds();
+  store->is_full = true;
+  EXPECT_TRUE(server.receive(messages[0]).has_value());  // has none
+  EXPECT_FALSE(server.receive(messages[1]).has_value());
+  EXPECT_EQ(server.state().submaps.size(), 1U);
+  store->is_full = false;
+  for (const SubmapMessage& message : messages) EXPECT_TRUE(server.receive(message).has_value());
+  store->lost = {{RobotId{0}, 3}};
+  std::size_t failures = 0;
+  for (const VerificationJob& job : server.take_jobs()) {
+    const auto verdict = finder->verify(*job.first, *job.second, server.clouds());
+    failures += verdict ? 0 : 1;
+    if (!verdict) continue;
+    EXPECT_TRUE(server.receive(*verdict).has_value());
+  }
+  EXPECT_EQ(failures, 3U);
+  EXPECT_EQ(server.state().verdicts.size(), 3U);
+  EXPECT_GT(server.optimise().graph.nodes.size(), 10U);
 }
 
 }  // namespace

@@ -71,12 +71,14 @@ class TestFinder final : public ClosureFinder {
  public:
   explicit TestFinder(std::uint64_t seed, std::uint32_t wrong_every = 0) : seed_(seed), wrong_every_(wrong_every) {}
 
+  [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     if (first.id.robot == second.id.robot && second.id.index - first.id.index < 3) return false;
     const auto [a, b] = middles(first, second);
     return (true_pose(a.robot, a.index).translation - true_pose(b.robot, b.index).translation).norm() < 4.0;
   }
-  [[nodiscard]] ClosureVerdict verify(const Submap& first, const Submap& second) const override {
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const CloudStore&) const override {
     const auto [a, b] = middles(first, second);
     const std::uint64_t key = (std::uint64_t{first.id.robot.value} << 48U) ^ (std::uint64_t{first.id.index} << 32U) ^
                               (std::uint64_t{second.id.robot.value} << 16U) ^ second.id.index;
@@ -84,7 +86,7 @@ class TestFinder final : public ClosureFinder {
     Pose3 T = retract(true_pose(a.robot, a.index).inverse() * true_pose(b.robot, b.index), draw(rng, 0.02, 0.005));
     if (wrong_every_ > 0 && rng.index(wrong_every_) == 0)
       T.translation += Eigen::Vector3d(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized() * 3.0;
-    return {{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, ""};
+    return ClosureVerdict{{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, ""};
   }
   static bool is_wrong(const LoopClosure& closure) {
     const Pose3 truth =

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/cloud_store.hpp"
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::server {
+
+Status MemoryCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) {
+  TUTTI_CHECK(cloud != nullptr, "submap {}/{} without a cloud", id.robot.value, id.index);
+  const std::lock_guard lock(mutex_);
+  clouds_[id] = cloud;
+  return {};
+}
+
+Result<std::shared_ptr<const PointCloud>> MemoryCloudStore::get(SubmapId id) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = clouds_.find(id);
+  if (found == clouds_.end())
+    return fail(ErrorCode::io, "cloud of submap {}/{}: not in the store", id.robot.value, id.index);
+  return found->second;
+}
+
+}  // namespace tutti::server
