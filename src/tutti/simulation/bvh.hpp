@@ -45,6 +45,7 @@ class Bvh {
     Eigen::Vector3f corner, edge1, edge2;
   };
   struct Builder;
+  struct Ray;
 
   std::vector<Node> nodes_;
   std::vector<Triangle> triangles_;        ///< In the order of the leaves.

@@ -43,7 +43,7 @@ struct WorldConfig {
 /// tunnel: make_corridor_world; the longest corridors are featureless, the others rough.
 /// terrace: junctions about every 10 m, counter-clockwise on both loops. Office first, from the corner at the origin
 /// (for the default size 0 to 9: corners 0, 3, 5, 8), with a cross-corridor (1 to 7); then the roof, level, from the
-/// end of the ramp on (10 to 25; the ramp is 4 to 10). Corridors of the roof are open, all others office.
+/// end of the ramp on (10 to 24; the ramp is 4 to 10). Corridors of the roof are open, all others office.
 CorridorWorld make_world(const WorldConfig& config, Rng rng);
 
 /// The corridor nearest to a position, which lies on it or within `max_distance_m` of its centre line.

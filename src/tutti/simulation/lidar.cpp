@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/simulation/lidar.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::simulation {
+namespace {
+
+/// Poses between the samples of a trajectory, asked for in any order but found fastest in increasing time.
+class PoseAt {
+ public:
+  PoseAt(const Trajectory& trajectory, Timestamp from)
+      : trajectory_(trajectory),
+        next_(std::ranges::upper_bound(trajectory, from, {}, &StampedPose::stamp) - trajectory.begin()) {}
+
+  Pose3 operator()(Timestamp stamp) {
+    while (next_ + 1 < std::ssize(trajectory_) && trajectory_[next_].stamp < stamp) ++next_;
+    const StampedPose& a = trajectory_[next_ - 1];
+    const StampedPose& b = trajectory_[next_];
+    return interpolate(a.pose, b.pose, (stamp - a.stamp) / (b.stamp - a.stamp));
+  }
+
+ private:
+  const Trajectory& trajectory_;
+  std::ptrdiff_t next_;
+};
+
+/// Unit directions of all beams at azimuth 0 (ahead), sensor frame.
+std::vector<Eigen::Vector3d> beam_directions(const LidarConfig& config) {
+  std::vector<Eigen::Vector3d> directions;
+  for (int i = 0; i < config.beams; ++i) {
+    const double share = config.beams == 1 ? 0.5 : static_cast<double>(i) / (config.beams - 1);
+    const double elevation = kRadPerDeg * std::lerp(config.lowest_deg, config.highest_deg, share);
+    directions.emplace_back(std::cos(elevation), 0.0, std::sin(elevation));
+  }
+  return directions;
+}
+
+/// Measured range along a ray of unit length; nothing when there is no echo.
+std::optional<double> measure(const Bvh& surface, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                              const LidarConfig& config, Rng& rng) {
+  const auto hit = surface.cast(origin, direction, static_cast<float>(config.max_range_m));
+  if (!hit) return std::nullopt;
+  const double cosine = std::abs(surface.normal(hit->triangle).dot(direction));
+  const double echo = config.grazing_cosine > 0.0 ? std::min(1.0, cosine / config.grazing_cosine) : 1.0;
+  if (!rng.bernoulli((1.0 - config.dropout_share) * echo)) return std::nullopt;
+  const double range = hit->distance + rng.normal(config.range_sigma_m);
+  if (range < config.min_range_m || range > config.max_range_m) return std::nullopt;
+  return range;
+}
+
+}  // namespace
+
+std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, Timestamp end,
+                                   const LidarConfig& config, Rng rng) {
+  const double turn_s = 1.0 / config.rate_hz;
+  const Timestamp begin = end - turn_s;
+  if (truth.size() < 2 || begin < truth.front().stamp || truth.back().stamp < end) return std::nullopt;
+
+  const auto firings = static_cast<std::size_t>(std::lround(360.0 / config.azimuth_step_deg));
+  const std::vector<Eigen::Vector3d> beams = beam_directions(config);
+  const Eigen::Vector3d mount(0.0, 0.0, config.mount_height_m);
+  auto cloud = std::make_shared<PointCloud>();
+  auto ages = std::make_shared<std::vector<float>>();
+  PoseAt pose_at(truth, begin);
+  for (std::size_t i = 0; i < firings; ++i) {
+    const double share = static_cast<double>(i + 1) / static_cast<double>(firings);  // The last one fires at `end`.
+    const double age_s = (1.0 - share) * turn_s;
+    const Pose3 T_reference_body = pose_at(end - age_s);
+    const Eigen::Matrix3d R_reference_body = T_reference_body.rotation.toRotationMatrix();
+    const Eigen::Vector3f origin = (T_reference_body * mount).cast<float>();
+    const double azimuth = std::numbers::pi * (1.0 - 2.0 * share);
+    const Eigen::AngleAxisd turned(azimuth, Eigen::Vector3d::UnitZ());
+    for (const Eigen::Vector3d& beam : beams) {
+      const Eigen::Vector3d direction = turned * beam;
+      const auto range = measure(surface, origin, (R_reference_body * direction).cast<float>(), config, rng);
+      if (!range) continue;
+      cloud->points.push_back((mount + *range * direction).cast<float>());
+      ages->push_back(static_cast<float>(age_s));
+    }
+  }
+  return Scan{end, std::move(cloud), std::move(ages)};
+}
+
+SimulatedLidar::SimulatedLidar(std::shared_ptr<const Bvh> surface, Trajectory truth, LidarConfig config, Rng rng)
+    : surface_(std::move(surface)), truth_(std::move(truth)), config_(config), rng_(rng) {
+  TUTTI_CHECK(surface_ != nullptr);
+}
+
+Result<std::optional<Scan>> SimulatedLidar::scan(std::size_t sample) const {
+  TUTTI_CHECK(sample < truth_.size(), "sample {} of {}", sample, truth_.size());
+  return simulate_sweep(*surface_, truth_, truth_[sample].stamp, config_, rng_.fork(sample));
+}
+
+}  // namespace tutti::simulation
