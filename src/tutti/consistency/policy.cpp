@@ -6,6 +6,7 @@
 namespace tutti::consistency {
 
 Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, const PolicyConfig& config) {
+  if (name == "none") return std::make_unique<internal::NonePolicy>();
   if (name == "every_node") return std::make_unique<internal::EveryNodePolicy>(1, config);
   if (name == "every_node_2") return std::make_unique<internal::EveryNodePolicy>(2, config);
   if (name == "spectral") return std::make_unique<internal::SpectralPolicy>(config);
@@ -14,8 +15,8 @@ Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, c
   if (name == "euclidean") return std::make_unique<internal::EuclideanPolicy>(config);
   if (name == "skeleton") return std::make_unique<internal::SkeletonPolicy>(config);
   return fail(ErrorCode::configuration,
-              "policy '{}' is unknown, expected every_node, every_node_2, spectral, uniform, random, euclidean or "
-              "skeleton",
+              "policy '{}' is unknown, expected none, every_node, every_node_2, spectral, uniform, random, "
+              "euclidean or skeleton",
               name);
 }
 

@@ -66,8 +66,9 @@ struct PolicyConfig {
   template <class V>
   void describe(V& v) {
     v.field("name", name,
-            one_of({"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"}),
-            "How a robot chooses constraints; 'spectral' is the paper's, 'skeleton' the product's default.");
+            one_of({"none", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"}),
+            "How a robot chooses constraints; 'spectral' is the paper's, 'skeleton' the product's default, "
+            "'none' leaves it alone.");
     v.field("classifier", classifier, one_of({"thresholds", "top"}),
             "spectral: label nodes above a threshold per group (the paper) or the largest ones (the authors' code).");
     v.field("threshold_large_m", threshold_large_m, at_least(0.0),

@@ -7,6 +7,13 @@
 
 namespace tutti::consistency::internal {
 
+/// No feedback: what a robot is without Tutti.
+class NonePolicy final : public ConstraintPolicy {
+ public:
+  [[nodiscard]] std::string name() const override { return "none"; }
+  [[nodiscard]] Selection choose(const PolicyInput&) const override { return {}; }
+};
+
 /// The paper's baseline: node i linked to i + 1, ..., i + reach (reach 1 or 2), whatever the comparison says. The
 /// budget is not looked at.
 class EveryNodePolicy final : public ConstraintPolicy {
