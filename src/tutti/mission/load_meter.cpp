@@ -21,6 +21,13 @@ std::string machine_description() {
   return fmt::format("{}, {} threads", processor, std::thread::hardware_concurrency());
 }
 
+double peak_memory_mb() {
+  std::ifstream in("/proc/self/status");
+  for (std::string line; std::getline(in, line);)
+    if (line.starts_with("VmHWM:")) return std::stod(line.substr(6)) * 1024.0 / 1e6;
+  return 0.0;
+}
+
 double thread_cpu_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -9,6 +9,9 @@ namespace tutti::mission {
 /// Processor and number of threads, in words, as far as the system tells.
 std::string machine_description();
 
+/// The most memory this process ever held resident, in 10^6 bytes; 0 where the system does not tell.
+double peak_memory_mb();
+
 /// CPU seconds of the calling thread.
 double thread_cpu_s();
 

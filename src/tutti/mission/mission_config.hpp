@@ -10,6 +10,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/bus/in_process_bus.hpp"
 #include "tutti/evaluation/association.hpp"
+#include "tutti/mission/spoiled_closures.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
@@ -49,8 +50,6 @@ struct RobotConfig {
   bool random_frame = false;  ///< Draw the odometry frame from the seed: any yaw, tilt, shift.
   simulation::DegradeConfig degrade;
   simulation::OdometryCovarianceConfig covariance;
-  simulation::WalkConfig walk;            ///< Simulated robots only.
-  simulation::OdometryNoiseConfig noise;  ///< Simulated robots only.
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name.");
@@ -77,6 +76,8 @@ struct ClosureConfig {
       2;  ///< lidar: submaps of one robot nearer than this are not compared; neighbours overlap anyway.
   lidar::LidarClosureConfig lidar;
   simulation::ReferenceClosureConfig reference;
+  double wrong_share = 0.0;
+  SpoiledClosureConfig wrong;
   template <class V>
   void describe(V& v) {
     v.field("finder", finder, one_of({"lidar", "reference"}),
@@ -85,6 +86,20 @@ struct ClosureConfig {
             "lidar: submaps of one robot nearer than this are not compared.");
     v.field("lidar", lidar);
     v.field("reference", reference);
+    v.field("wrong_share", wrong_share, between(0.0, 0.9),
+            "Share of the closures found that are made wrong on purpose.");
+    v.field("wrong", wrong, any(), "How wrong these are.");
+  }
+};
+
+/// The radio of one robot, instead of the common `link`.
+struct RobotLinkConfig {
+  std::string robot;
+  bus::LinkConfig link;
+  template <class V>
+  void describe(V& v) {
+    v.field("robot", robot, any(), "Name of the robot.");
+    v.field("link", link, any(), "Its radio; nothing of the common link applies.");
   }
 };
 
@@ -104,6 +119,7 @@ struct MissionConfig {
   server::ServerConfig server;
   ClosureConfig closures;
   bus::LinkConfig link;
+  std::vector<RobotLinkConfig> robot_links;
   std::vector<std::string> compare_policies = {"every_node", "every_node_2", "spectral", "uniform",
                                                "random",     "euclidean",    "skeleton"};
   template <class V>
@@ -123,6 +139,7 @@ struct MissionConfig {
     v.field("server", server);
     v.field("closures", closures);
     v.field("link", link);
+    v.field("robot_links", robot_links, any(), "Radios of single robots.");
     v.field("compare_policies", compare_policies, any(), "Policies run side by side as shadow agents.");
   }
 };

@@ -187,6 +187,17 @@ struct LoadRecord {
   double worst_latency_ms = 0.0;
 };
 
+/// What the server took of one core over the mission, and how long its answers took.
+struct ServerLoadRecord {
+  double mission_s = 0.0;
+  double map_cpu_s = 0.0;           ///< Receiving submaps, optimising, proxy graphs.
+  double verification_cpu_s = 0.0;  ///< Features and comparing submaps.
+  /// One per submap: from its arrival to the first broadcast that contains it; mission time spent waiting for the next
+  /// update (or for one core to verify its pairs, if that takes longer), plus the computing of that update.
+  std::vector<double> update_latency_ms;
+  double peak_memory_mb = 0.0;  ///< Of the whole process: server, robots and simulator.
+};
+
 /// Everything that depends on the clock of this machine: never mixed with the rest.
 struct TimingRecord {
   std::string machine;  ///< CPU, threads, BLAS, in words.
@@ -195,7 +206,7 @@ struct TimingRecord {
   std::vector<PolicyTiming> policies;
   std::vector<double> server_verification_ms;  ///< One per candidate pair.
   std::vector<double> server_optimisation_ms;
-  std::vector<double> proxy_graph_ms;
+  ServerLoadRecord server_load;
   std::vector<LoadRecord> load;
 };
 

@@ -156,7 +156,7 @@ std::string timing_html(const MissionRecord& record) {
   }
   add("verification of one candidate closure", "server", timing.server_verification_ms);
   add("joint optimisation", "server", timing.server_optimisation_ms);
-  add("building a proxy graph", "server", timing.proxy_graph_ms);
+  add("submap in to proxy graph out (mission time)", "server", timing.server_load.update_latency_ms);
   std::string body = table.rows.empty() ? "" : html(table);
   if (!timing.load.empty()) {
     HtmlTable load{{"who", "share of one core", "worst latency"}, {}, 1};

@@ -93,6 +93,16 @@ Json spread_json(const std::vector<double>& samples) {
           {"max_ms", s ? number(s->max) : Json(nullptr)}};
 }
 
+Json load_json(const ServerLoadRecord& load) {
+  const double busy_s = load.map_cpu_s + load.verification_cpu_s;
+  return {{"mission_s", number(load.mission_s)},
+          {"map_cpu_s", number(load.map_cpu_s)},
+          {"verification_cpu_s", number(load.verification_cpu_s)},
+          {"share_of_one_core", load.mission_s > 0.0 ? number(busy_s / load.mission_s) : Json(nullptr)},
+          {"update_latency", spread_json(load.update_latency_ms)},
+          {"peak_memory_mb", number(load.peak_memory_mb)}};
+}
+
 /// Foreign text with broken UTF-8 must not make the writer throw.
 std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
@@ -144,7 +154,7 @@ std::string timing_json(const MissionRecord& record) {
                    {"server",
                     {{"verification", spread_json(timing.server_verification_ms)},
                      {"optimisation", spread_json(timing.server_optimisation_ms)},
-                     {"proxy_graph", spread_json(timing.proxy_graph_ms)}}},
+                     {"load", load_json(timing.server_load)}}},
                    {"load", std::move(load)}});
 }
 

@@ -65,7 +65,7 @@ void RobotActor::replay_next() {
 
 void RobotActor::feed_scan(std::size_t sample) {
   const Recording& recording = recording_.recording;
-  if (!recording.scans) return;
+  if (!recording.scans || !default_agent().wants_scan()) return;  // only keyframes need one
   const auto scan = recording.scans->scan(sample);
   if (!scan) return note(refused_scans_, scan.error().message);
   if (!*scan) return;

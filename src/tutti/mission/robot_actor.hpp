@@ -23,6 +23,7 @@ class RobotActor {
 
   /// Mission time of the next sample; infinity when there is none left.
   [[nodiscard]] double next_time() const;
+  [[nodiscard]] bool has_scans() const { return recording_.recording.scans != nullptr; }
   /// Replays one odometry sample and its scan; after the last one the default agent closes its last submap.
   void replay_next();
   /// Closes the last submap before the recording ends.

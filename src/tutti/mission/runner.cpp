@@ -18,6 +18,7 @@
 #include "tutti/mission/parallel.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
+#include "tutti/mission/spoiled_closures.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mission {
@@ -52,7 +53,8 @@ class MissionRun {
       : config_(config),
         options_(options),
         recordings_(std::move(recordings)),
-        finder_(make_closure_finder(config.closures, recordings_, options.seed)),
+        finder_(
+            spoiled(make_closure_finder(config.closures, recordings_, options.seed), config.closures, options.seed)),
         clouds_(std::make_shared<server::MemoryCloudStore>()),
         server_(robot_ids(recordings_), finder_, clouds_, config.server),
         bus_(kMissionStart, config.link, options.seed),
@@ -62,6 +64,9 @@ class MissionRun {
     std::vector<std::string> policies = config.compare_policies;
     if (std::find(policies.begin(), policies.end(), config.agent.policy.name) == policies.end())
       policies.insert(policies.begin(), config.agent.policy.name);
+    for (const RobotLinkConfig& own : config.robot_links)
+      for (const MissionRecording& recording : recordings_)
+        if (recording.recording.name == own.robot) bus_.set_link(recording.recording.robot, own.link);
     const Rng rng(options.seed);
     for (const MissionRecording& recording : recordings_) {
       robots_.push_back(std::make_unique<RobotActor>(recording, config.agent, policies,
@@ -96,6 +101,11 @@ class MissionRun {
   MissionRecord record() const;
 
  private:
+  static std::shared_ptr<const server::ClosureFinder> spoiled(std::shared_ptr<const server::ClosureFinder> finder,
+                                                              const ClosureConfig& config, std::uint64_t seed) {
+    if (config.wrong_share == 0.0) return finder;
+    return std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
+  }
   static std::set<RobotId> robot_ids(const std::vector<MissionRecording>& recordings) {
     std::set<RobotId> ids;
     for (const MissionRecording& recording : recordings) ids.insert(recording.recording.robot);
@@ -113,11 +123,13 @@ class MissionRun {
   }
 
   void replay(double now_s) {
-    for (const auto& robot : robots_) {
-      if (robot->next_time() > now_s) continue;
-      robot->replay_next();
-      send_submaps(*robot);
-    }
+    std::vector<RobotActor*> due;
+    for (const auto& robot : robots_)
+      if (robot->next_time() <= now_s) due.push_back(robot.get());
+    // A simulated scan is much work, an odometry sample hardly any.
+    const bool heavy = std::any_of(due.begin(), due.end(), [](const RobotActor* robot) { return robot->has_scans(); });
+    for_each_parallel(due.size(), heavy ? threads_ : 1, [&](std::size_t i) { due[i]->replay_next(); });
+    for (RobotActor* robot : due) send_submaps(*robot);
   }
 
   /// Also when the mission ends before the recording; a second time nothing is left to send.
@@ -150,14 +162,16 @@ class MissionRun {
 
   void receive_submap(const std::string& bytes) {
     if (const Status taken = take_submap(bytes); !taken) return refusals_.push_back(taken.error().message);
+    const double before_s = load_.verification_cpu_s;
     for (const auto& verdict : verify(server_.take_jobs())) {
       const Status ok = verdict ? server_.receive(*verdict) : Status(tl::unexpected(verdict.error()));
       if (!ok) refusals_.push_back(ok.error().message);
     }
+    unanswered_.push_back({time_s_, load_.verification_cpu_s - before_s});
   }
 
   Status take_submap(const std::string& bytes) {
-    const CpuScope cpu(server_cpu_s_);
+    const CpuScope cpu(load_.map_cpu_s);
     const auto message = wire::decode_submap(bytes);
     return message ? server_.receive(*message) : Status(tl::unexpected(message.error()));
   }
@@ -174,7 +188,7 @@ class MissionRun {
       took_ms[i] = watch.lap_ms();
     });
     timing_.server_verification_ms.insert(timing_.server_verification_ms.end(), took_ms.begin(), took_ms.end());
-    for (const double s : cpu_s) worker_cpu_s_ += s;
+    for (const double s : cpu_s) load_.verification_cpu_s += s;
     return verdicts;
   }
 
@@ -187,10 +201,11 @@ class MissionRun {
 
   void update_map() {
     if (server_.has_news()) {
-      const CpuScope cpu(server_cpu_s_);
+      const CpuScope cpu(load_.map_cpu_s);
       Stopwatch watch;
       const ProxyGraphMessage message = server_.optimise();
       timing_.server_optimisation_ms.push_back(watch.lap_ms());
+      note_latencies(timing_.server_optimisation_ms.back());
       proxy_graph_ = message.graph;
       bus_.publish(kMissionStart + time_s_, bus::Endpoint::server(), std::nullopt, wire::MessageKind::proxy_graph,
                    wire::encode(message));
@@ -204,6 +219,15 @@ class MissionRun {
   [[nodiscard]] std::size_t accepted_closures() const {
     return static_cast<std::size_t>(std::count_if(server_.map().closures.begin(), server_.map().closures.end(),
                                                   [](const server::JudgedClosure& c) { return c.accepted; }));
+  }
+
+  /// Of the submaps that the update now ready is the first to contain. A lone core verifies a submap's pairs while it
+  /// waits for the next update.
+  void note_latencies(double update_ms) {
+    for (const Unanswered& submap : unanswered_)
+      load_.update_latency_ms.push_back(1e3 * std::max(time_s_ - submap.arrived_s, submap.verification_cpu_s) +
+                                        update_ms);
+    unanswered_.clear();
   }
 
   void record_traffic(RobotRecord& robot) const;
@@ -224,8 +248,12 @@ class MissionRun {
   ProxyGraph proxy_graph_;  // the last broadcast
   std::vector<std::string> refusals_;
   TimingRecord timing_;
-  double server_cpu_s_ = 0.0;
-  double worker_cpu_s_ = 0.0;
+  struct Unanswered {
+    double arrived_s = 0.0;
+    double verification_cpu_s = 0.0;
+  };
+  std::vector<Unanswered> unanswered_;  // submaps that no broadcast contains yet
+  ServerLoadRecord load_;
   double server_latency_ms_ = 0.0;
   std::vector<double> worst_latency_ms_;  // of each robot's updates
 };
@@ -250,11 +278,15 @@ void MissionRun::record_timing(MissionRecord& record) const {
   record.timing.rate = options_.rate;
   for (const auto& robot : robots_)
     for (PolicyTiming& policy : robot->timing()) record.timing.policies.push_back(std::move(policy));
+  record.timing.server_load = load_;
+  record.timing.server_load.mission_s = duration_s_;
+  record.timing.server_load.peak_memory_mb = peak_memory_mb();
   if (!options_.rate) return;
   for (const auto& robot : robots_)
     record.timing.load.push_back({robot->recording().recording.name, robot->cpu_s() / record.timing.wall_s,
                                   worst_latency_ms_[robot->id().value]});
-  record.timing.load.push_back({"server", (server_cpu_s_ + worker_cpu_s_) / record.timing.wall_s, server_latency_ms_});
+  record.timing.load.push_back(
+      {"server", (load_.map_cpu_s + load_.verification_cpu_s) / record.timing.wall_s, server_latency_ms_});
 }
 
 MissionRecord MissionRun::record() const {

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "tutti/base/config.hpp"
+#include "tutti/server/closure_finder.hpp"
+
+namespace tutti::mission {
+
+/// Wrong closures forced into a mission, to see what the server makes of them.
+struct SpoiledClosureConfig {
+  double agreeing_share = 0.3;
+  double min_m = 2.0;
+  double max_m = 8.0;
+  double max_deg = 60.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
+            "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
+    v.field("min_m", min_m, greater_than(0.0), "Least offset of a wrong closure.");
+    v.field("max_m", max_m, greater_than(0.0), "Largest offset; not below min_m.");
+    v.field("max_deg", max_deg, between(0.0, 180.0), "Largest turn.");
+  }
+};
+
+/// Makes a share of the verdicts that another finder accepts wrong, as confident as before. Which ones, and how wrong,
+/// depends on (seed, pair) only; agreeing ones share their error over blocks of two submaps of each robot.
+class SpoiledClosureFinder final : public server::ClosureFinder {
+ public:
+  SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
+                       const SpoiledClosureConfig& config, std::uint64_t seed);
+  [[nodiscard]] bool needs_clouds() const override { return inner_->needs_clouds(); }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const override;
+
+ private:
+  std::shared_ptr<const server::ClosureFinder> inner_;
+  double wrong_share_;
+  SpoiledClosureConfig config_;
+  std::uint64_t seed_;
+};
+
+}  // namespace tutti::mission
