@@ -10,8 +10,8 @@ import unittest
 
 TUTTI, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 SMALL = [
-    "--set", "simulation.walk.duration_s=120",
-    "--set", "simulation.world={rows: 2, columns: 3, block_m: 15, jitter_m: 2}",
+    "--set", "simulation.robots=[{walk: {duration_s: 120}}, {walk: {duration_s: 120}}]",
+    "--set", "simulation.world.network={rows: 2, columns: 3, block_m: 15, jitter_m: 2}",
 ]
 
 

@@ -14,11 +14,12 @@ MissionConfig small_mission() {
   MissionConfig config;
   config.mission = "small";
   config.source = "simulation";
-  config.simulation.robots = 2;
-  config.simulation.world = {.rows = 2, .columns = 3, .block_m = 15.0, .jitter_m = 2.0, .missing_share = 0.0};
-  config.simulation.walk.duration_s = 200.0;
+  config.simulation.world.network = {.rows = 2, .columns = 3, .block_m = 15.0, .jitter_m = 2.0, .missing_share = 0.0};
+  for (simulation::SimulatedRobotConfig& robot : config.simulation.robots) {
+    robot.walk.duration_s = 200.0;
+    robot.odometry.yaw_bias_deg_per_m = 0.05;
+  }
   config.compare_policies = {"spectral", "uniform"};
-  config.simulation.odometry.yaw_bias_deg_per_m = 0.05;
   config.closures.finder = "reference";
   config.closures.reference.min_time_gap_s = 20.0;
   return config;
@@ -95,7 +96,7 @@ TEST(Mission, RobotsThatNeverMeetStaySeparateMaps) {
 
 TEST(Mission, ALoneRobotIsAMissionToo) {
   MissionConfig config = small_mission();
-  config.simulation.robots = 1;
+  config.simulation.robots.resize(1);
   const MissionRecord record = run(config);
   EXPECT_EQ(record.server.components, 1U);
   EXPECT_LT(*policy(record.robots[0], record.default_policy).accuracy.rmse_m, *record.robots[0].onboard.rmse_m);

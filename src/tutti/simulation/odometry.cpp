@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/simulation/odometry.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
 
+#include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/simulation/degrade.hpp"
+#include "tutti/simulation/world.hpp"
 
 namespace tutti::simulation {
 namespace {
@@ -71,36 +77,183 @@ Vector6d draw_slip(const OdometryNoiseConfig& config, double distance, Rng& rng)
   return (Vector6d() << x, y, 0.0, 0.0, 0.0, yaw).finished();
 }
 
+/// A stay in one featureless corridor: increments [from, until).
+struct Visit {
+  std::size_t from = 0;
+  std::size_t until = 0;
+  double slide = 0.0;           // error per metre along the axis
+  double variance_per_m = 0.0;  // that is honest for the whole visit
+};
+
+double way_along(const Trajectory& truth, const Surroundings& at, std::size_t k) {
+  return (truth[k + 1].pose.translation - truth[k].pose.translation).dot(at.axis);
+}
+
+std::vector<Visit> draw_visits(const Trajectory& truth, std::span<const Surroundings> surroundings,
+                               const DegeneracyConfig& config, Rng& rng) {
+  std::vector<Visit> visits;
+  for (std::size_t k = 0; k + 1 < surroundings.size();) {
+    Visit visit{.from = k};
+    double way = 0.0;
+    for (; k + 1 < surroundings.size() && surroundings[k].corridor == surroundings[visit.from].corridor; ++k)
+      way += std::abs(way_along(truth, surroundings[k], k));
+    visit.until = k;
+    if (surroundings[visit.from].kind != CorridorKind::featureless) continue;
+    visit.slide = rng.normal(0.01 * config.slide_percent);
+    visit.variance_per_m = square(0.01 * config.slide_percent) * way + square(config.along_m_per_sqrt_m);
+    visits.push_back(visit);
+  }
+  return visits;
+}
+
+/// Errors that grow evenly with the way while localisation fails: increments [from, until).
+struct Failure {
+  std::size_t from = 0;
+  std::size_t until = 0;
+  double yaw_per_m = 0.0;
+  Eigen::Vector3d drift_per_m = Eigen::Vector3d::Zero();  // in the frame of the truth
+
+  [[nodiscard]] bool contains(std::size_t increment) const { return from <= increment && increment < until; }
+  [[nodiscard]] Vector6d error(const Pose3& T_reference_body, double distance) const {
+    Vector6d error = Vector6d::Zero();
+    error.head<3>() = distance * (T_reference_body.rotation.conjugate() * drift_per_m);
+    error(5) = distance * yaw_per_m;
+    return error;
+  }
+};
+
+std::optional<Failure> draw_failure(const Trajectory& truth, std::span<const Surroundings> surroundings,
+                                    const FailureConfig& config, Rng rng) {
+  const double side = rng.bernoulli(0.5) ? 1.0 : -1.0;
+  const double direction = rng.uniform(-std::numbers::pi, std::numbers::pi);
+  if (config.yaw_deg == 0.0 && config.drift_m == 0.0) return std::nullopt;
+  std::optional<Failure> failure;
+  double outside_m = 0.0;
+  for (std::size_t k = 0; k + 1 < surroundings.size(); ++k) {
+    const bool inside = surroundings[k].kind != CorridorKind::open;
+    if (failure && (inside || outside_m >= config.after_m + config.length_m)) break;
+    if (!failure && !inside && outside_m >= config.after_m) failure = Failure{.from = k};
+    if (failure) failure->until = k + 1;
+    if (!inside) outside_m += (truth[k + 1].pose.translation - truth[k].pose.translation).norm();
+  }
+  if (!failure) return std::nullopt;
+  failure->yaw_per_m = side * config.yaw_deg * kRadPerDeg / config.length_m;
+  failure->drift_per_m =
+      config.drift_m / config.length_m * Eigen::Vector3d(std::cos(direction), std::sin(direction), 0.0);
+  return failure;
+}
+
+/// What is wrong with an increment, and what the robot thinks of it; translations in the frame of its start.
+struct IncrementError {
+  Vector6d error;
+  Matrix6d covariance;
+};
+
+/// All that goes wrong along one run, increment by increment.
+class RunErrors {
+ public:
+  RunErrors(const Trajectory& truth, std::span<const Surroundings> surroundings, const OdometryNoiseConfig& config,
+            const Rng& rng)
+      : truth_(truth),
+        surroundings_(surroundings),
+        config_(config),
+        slow_rng_(rng.fork("slow")),
+        white_rng_(rng.fork("white")),
+        slip_rng_(rng.fork("slips")),
+        slide_rng_(rng.fork("slides")),
+        slow_(config, slow_rng_),
+        visits_(draw_visits(truth, surroundings, config.degeneracy, slide_rng_)),
+        failure_(draw_failure(truth, surroundings, config.failure, rng.fork("failure"))) {}
+
+  /// Of increment k; call in order.
+  IncrementError next(std::size_t k, const Eigen::Vector3d& translation) {
+    const double distance = translation.norm();
+    IncrementError out{white_sigma(config_, distance), honest_covariance(config_, translation)};
+    for (double& e : out.error) e *= white_rng_.normal();
+    out.error += slow_.next(translation, slow_rng_);
+    const Vector6d slip = draw_slip(config_, distance, slip_rng_);
+    if (!slip.isZero(0.0)) slips_.push_back(k);
+    out.error += slip;
+    if (failure_ && failure_->contains(k)) out.error += failure_->error(truth_[k].pose, distance);
+    while (visit_ < visits_.size() && visits_[visit_].until <= k) ++visit_;
+    if (visit_ < visits_.size() && visits_[visit_].from <= k) slide(visits_[visit_], k, out);
+    return out;
+  }
+
+  /// Where it went wrong, in time order; sizes from what came of it.
+  [[nodiscard]] std::vector<DriftOrigin> origins(const Trajectory& odometry) const {
+    std::vector<DriftOrigin> out;
+    const auto add = [&](DriftOrigin::Kind kind, std::size_t from, std::size_t until) {
+      const Vector6d error =
+          local(truth_[from].pose.inverse() * truth_[until].pose, odometry[from].pose.inverse() * odometry[until].pose);
+      out.push_back({kind, truth_[from].stamp, truth_[until].stamp, error.head<3>().norm(), error.tail<3>().norm()});
+    };
+    for (const std::size_t k : slips_) add(DriftOrigin::Kind::slip, k, k + 1);
+    for (const Visit& visit : visits_) add(DriftOrigin::Kind::degeneracy, visit.from, visit.until);
+    if (failure_) add(DriftOrigin::Kind::failure, failure_->from, failure_->until);
+    std::ranges::stable_sort(out, {}, &DriftOrigin::from);
+    return out;
+  }
+
+ private:
+  void slide(const Visit& visit, std::size_t k, IncrementError& out) {
+    const Eigen::Vector3d axis = truth_[k].pose.rotation.conjugate() * surroundings_[k].axis;
+    const double way = way_along(truth_, surroundings_[k], k);
+    const double walk = slide_rng_.normal(config_.degeneracy.along_m_per_sqrt_m * std::sqrt(std::abs(way)));
+    out.error.head<3>() += (visit.slide * way + walk) * axis;
+    out.covariance.topLeftCorner<3, 3>() += visit.variance_per_m * std::abs(way) * axis * axis.transpose();
+  }
+
+  const Trajectory& truth_;
+  std::span<const Surroundings> surroundings_;
+  const OdometryNoiseConfig& config_;
+  Rng slow_rng_, white_rng_, slip_rng_, slide_rng_;
+  SlowErrors slow_;
+  std::vector<Visit> visits_;
+  std::size_t visit_ = 0;
+  std::optional<Failure> failure_;
+  std::vector<std::size_t> slips_;
+};
+
 }  // namespace
 
-OdometrySimulation simulate_odometry(const Trajectory& truth, const OdometryNoiseConfig& config, Rng rng) {
+std::vector<Surroundings> surroundings_along(const CorridorWorld& world, const Trajectory& truth) {
+  std::vector<Surroundings> out;
+  out.reserve(truth.size());
+  for (const StampedPose& sample : truth) {
+    const auto at = corridor_at(world, sample.pose.translation, std::numeric_limits<double>::infinity());
+    TUTTI_CHECK(at.has_value(), "a world without corridors");
+    const Corridor& corridor = world.corridors[*at];
+    out.push_back({.kind = corridor.kind,
+                   .corridor = *at,
+                   .axis = (world.junctions[corridor.b] - world.junctions[corridor.a]).normalized()});
+  }
+  return out;
+}
+
+OdometrySimulation simulate_odometry(const Trajectory& truth, std::span<const Surroundings> surroundings,
+                                     const OdometryNoiseConfig& config, Rng rng) {
+  TUTTI_CHECK(surroundings.empty() || surroundings.size() == truth.size(), "{} surroundings, {} poses",
+              surroundings.size(), truth.size());
   OdometrySimulation result;
   if (truth.empty()) return result;
+  RunErrors errors(truth, surroundings, config, rng);
   Rng frame_rng = rng.fork("frame");
-  Rng slow_rng = rng.fork("slow");
-  Rng white_rng = rng.fork("white");
-  Rng slip_rng = rng.fork("slips");
-  SlowErrors slow(config, slow_rng);
   result.odometry.reserve(truth.size());
   result.increment_covariance.reserve(truth.size() - 1);
   result.odometry.push_back(
       {truth.front().stamp, random_frame(frame_rng, config.start_tilt_deg, config.start_shift_m)});
   for (std::size_t k = 0; k + 1 < truth.size(); ++k) {
     const Pose3 increment = truth[k].pose.inverse() * truth[k + 1].pose;
-    const double distance = increment.translation.norm();
-    Vector6d error = white_sigma(config, distance);
-    for (double& e : error) e *= white_rng.normal();
-    error += slow.next(increment.translation, slow_rng);
-    error += draw_slip(config, distance, slip_rng);
-    // The translation part of the error is meant in the frame of the increment's start; the tangent is its end's.
-    error.head<3>() = increment.rotation.conjugate() * error.head<3>();
-    result.odometry.push_back({truth[k + 1].stamp, result.odometry.back().pose * retract(increment, error)});
-
-    Matrix6d covariance = honest_covariance(config, increment.translation);
+    auto [error, covariance] = errors.next(k, increment.translation);
+    // The translation part of both is meant in the frame of the increment's start; the tangent is its end's.
     const Eigen::Matrix3d R = increment.rotation.toRotationMatrix();
+    error.head<3>() = (R.transpose() * error.head<3>()).eval();
     covariance.topLeftCorner<3, 3>() = (R.transpose() * covariance.topLeftCorner<3, 3>() * R).eval();
+    result.odometry.push_back({truth[k + 1].stamp, result.odometry.back().pose * retract(increment, error)});
     result.increment_covariance.push_back(0.5 * (covariance + covariance.transpose()));
   }
+  result.drift_origins = errors.origins(result.odometry);
   return result;
 }
 

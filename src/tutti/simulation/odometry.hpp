@@ -1,14 +1,47 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/model/recording.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
+
+/// What happens along featureless corridors, where nothing tells how far along one is. The robot notices: the
+/// covariance is inflated along the corridor's axis.
+struct DegeneracyConfig {
+  double slide_percent = 3.0;
+  double along_m_per_sqrt_m = 0.05;
+  template <class V>
+  void describe(V& v) {
+    v.field("slide_percent", slide_percent, between(0.0, 50.0),
+            "Error of the speed along the axis, drawn anew at every visit.");
+    v.field("along_m_per_sqrt_m", along_m_per_sqrt_m, at_least(0.0), "Random walk along the axis.");
+  }
+};
+
+/// A localisation failure under the open sky, once per run, that the covariance does not know.
+struct FailureConfig {
+  double after_m = 5.0;
+  double length_m = 20.0;
+  double yaw_deg = 0.0;
+  double drift_m = 0.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("after_m", after_m, at_least(0.0), "Begins after this way in the open.");
+    v.field("length_m", length_m, greater_than(0.0), "Lasts this long, or until the robot is back inside.");
+    v.field("yaw_deg", yaw_deg, between(0.0, 180.0), "Yaw error it ends with, to either side.");
+    v.field("drift_m", drift_m, at_least(0.0), "Position error it ends with, in one drawn horizontal direction.");
+  }
+};
 
 /// Errors of an odometry that knows gravity: yaw drifts more than tilt. All are standard deviations; the constants of
 /// one run (scale, yaw drift) are drawn once from them.
@@ -26,6 +59,8 @@ struct OdometryNoiseConfig {
   double slips_per_km = 0.0;
   double slip_m = 1.0;
   double slip_deg = 10.0;
+  DegeneracyConfig degeneracy;
+  FailureConfig failure;
   double start_tilt_deg = 3.0;
   double start_shift_m = 50.0;
   template <class V>
@@ -42,23 +77,39 @@ struct OdometryNoiseConfig {
     v.field("scale_percent", scale_percent, between(0.0, 50.0), "Constant scale error of the run.");
     v.field("consistent_length_m", consistent_length_m, greater_than(0.0),
             "Length at which the covariance of independent increments matches the constant errors.");
-    v.field("slips_per_km", slips_per_km, at_least(0.0), "Failures: sudden errors that the covariance does not know.");
+    v.field("slips_per_km", slips_per_km, at_least(0.0), "Sudden errors that the covariance does not know.");
     v.field("slip_m", slip_m, at_least(0.0), "Horizontal size of a slip, per axis.");
     v.field("slip_deg", slip_deg, at_least(0.0), "Yaw of a slip.");
+    v.field("degeneracy", degeneracy, any(), "Along featureless corridors.");
+    v.field("failure", failure, any(), "In the open.");
     v.field("start_tilt_deg", start_tilt_deg, between(0.0, 30.0), "Largest tilt of the odom frame.");
     v.field("start_shift_m", start_shift_m, at_least(0.0), "Largest distance of the odom origin, per axis.");
   }
 };
 
+/// The corridor a robot is in at one sample.
+struct Surroundings {
+  CorridorKind kind = CorridorKind::rough;
+  std::size_t corridor = 0;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< Of the corridor, unit, in the frame `reference`.
+};
+
+/// Per sample the nearest corridor.
+std::vector<Surroundings> surroundings_along(const CorridorWorld& world, const Trajectory& truth);
+
 struct OdometrySimulation {
   Trajectory odometry;                         ///< T_odom_body at the stamps of the truth, in an odom frame of its own.
   std::vector<Matrix6d> increment_covariance;  ///< Of k -> k + 1, right tangent; one fewer than odometry.
+  std::vector<DriftOrigin> drift_origins;      ///< Slips, visits of featureless corridors, the failure; in time order.
 };
 
-/// Measures the increments of a true trajectory with noise. The covariances are meant for independent increments;
-/// correlated errors are therefore inflated so that stretches stay honest: a Gauss-Markov bias with standard deviation
-/// s per metre and length L turns by a variance of 2 s^2 L per metre in the long run, a constant error c by c^2 times
-/// `consistent_length_m` per metre. Shorter stretches are then overestimated, never underestimated.
-OdometrySimulation simulate_odometry(const Trajectory& truth, const OdometryNoiseConfig& config, Rng rng);
+/// Measures the increments of a true trajectory with noise. `surroundings`: one per pose, or empty = rough everywhere.
+/// The covariances are meant for independent increments; correlated errors are therefore inflated so that stretches
+/// stay honest: a Gauss-Markov bias with standard deviation s per metre and length L turns by a variance of 2 s^2 L per
+/// metre in the long run, a constant error c by c^2 times `consistent_length_m` per metre, the slide along a
+/// featureless corridor by its square times the length of the visit. Shorter stretches are then overestimated, never
+/// underestimated.
+OdometrySimulation simulate_odometry(const Trajectory& truth, std::span<const Surroundings> surroundings,
+                                     const OdometryNoiseConfig& config, Rng rng);
 
 }  // namespace tutti::simulation

@@ -6,8 +6,10 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <vector>
 
-#include "tutti/simulation/recordings.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/simulation/trajectory.hpp"
 
 namespace tutti::simulation {
 namespace {
@@ -49,7 +51,7 @@ double mean_normalised_error(const OdometryNoiseConfig& config, double stretch_m
   double sum = 0.0;
   double count = 0.0;
   for (std::uint64_t seed = 0; seed < runs; ++seed) {
-    const OdometrySimulation simulated = simulate_odometry(truth, config, Rng(seed));
+    const OdometrySimulation simulated = simulate_odometry(truth, {}, config, Rng(seed));
     if (stretch_m <= 0.0) {
       for (std::size_t k = 0; k + 1 < truth.size(); k += 50, count += 1.0)
         sum += normalised_error(truth, simulated, k, k + 1);
@@ -103,6 +105,133 @@ TEST(SimulateOdometry, SlipsAreNotInTheCovariance) {
   EXPECT_GT(mean_normalised_error(config, 50.0, 100), 10.0);
 }
 
+/// Straight along x at 1 m/s.
+Trajectory straight(double length_m) {
+  Trajectory truth;
+  for (int k = 0; k <= static_cast<int>(length_m * kRate_hz); ++k)
+    truth.push_back({Timestamp{} + k / kRate_hz, {Eigen::Quaterniond::Identity(), {k / kRate_hz, 0.0, 0.0}}});
+  return truth;
+}
+
+/// A corridor of this kind between two x; rough elsewhere.
+std::vector<Surroundings> corridor_between(const Trajectory& truth, CorridorKind kind, double from_m, double until_m) {
+  std::vector<Surroundings> out;
+  for (const StampedPose& sample : truth) {
+    const bool in = from_m <= sample.pose.translation.x() && sample.pose.translation.x() < until_m;
+    out.push_back({.kind = in ? kind : CorridorKind::rough, .corridor = in ? 1U : 0U});
+  }
+  return out;
+}
+
+TEST(SimulateOdometry, FeaturelessCorridorsHideTheWayAlongThemAndTheRobotKnows) {
+  const Trajectory truth = straight(50.0);
+  const auto around = corridor_between(truth, CorridorKind::featureless, 10.0, 40.0);
+  OdometryNoiseConfig config = white_noise();
+  config.degeneracy = {.slide_percent = 4.0, .along_m_per_sqrt_m = 0.05};
+  double along = 0.0, aside = 0.0, known = 0.0, half = 0.0;
+  constexpr int kRuns = 400;
+  for (std::uint64_t seed = 0; seed < kRuns; ++seed) {
+    const auto simulated = simulate_odometry(truth, around, config, Rng(seed));
+    const std::size_t from = 80, until = 320;
+    const Vector6d error = local(truth[from].pose.inverse() * truth[until].pose,
+                                 simulated.odometry[from].pose.inverse() * simulated.odometry[until].pose);
+    along += error.x() * error.x() / kRuns;
+    aside += error.y() * error.y() / kRuns;
+    known += normalised_error(truth, simulated, from, until) / kRuns;
+    half += normalised_error(truth, simulated, from, from + 120) / kRuns;
+    const Matrix6d& inside = simulated.increment_covariance[200];
+    const Matrix6d& outside = simulated.increment_covariance[40];
+    ASSERT_GT(inside(0, 0), 5.0 * outside(0, 0));   // along the axis
+    ASSERT_LT(inside(1, 1), 1.01 * outside(1, 1));  // not across it
+  }
+  // Slide 4 % of 30 m, walk 0.05 m per root of 30 m, beside the usual walk of 0.01.
+  EXPECT_NEAR(std::sqrt(along), std::hypot(1.2, 0.27), 0.12);
+  EXPECT_LT(std::sqrt(aside), 0.15);
+  EXPECT_NEAR(known, 1.0, 0.15);
+  EXPECT_LT(half, 1.1);
+  EXPECT_GT(half, 0.5);
+}
+
+TEST(SimulateOdometry, CovariancesStayHonestOnWalksThroughFeaturelessCorridors) {
+  CorridorWorld world = make_corridor_world({}, Rng(7));
+  for (std::size_t i = 0; i < world.corridors.size(); i += 3) world.corridors[i].kind = CorridorKind::featureless;
+  const Trajectory truth = walk(1, 400.0);
+  const auto around = surroundings_along(world, truth);
+  for (const double stretch_m : {1.0, 10.0, 30.0, 100.0}) {
+    double sum = 0.0, count = 0.0;
+    for (std::uint64_t seed = 0; seed < 60; ++seed) {
+      const auto simulated = simulate_odometry(truth, around, {}, Rng(seed));
+      for (std::size_t from = 0; from + 1 < truth.size(); from += 401, count += 1.0)
+        sum += normalised_error(truth, simulated, from, after_distance(truth, from, stretch_m));
+    }
+    EXPECT_LT(sum / count, 1.5) << stretch_m;
+    EXPECT_GT(sum / count, 0.3) << stretch_m;
+  }
+}
+
+RC_GTEST_PROP(SimulateOdometry, AFailureBendsTheTrajectoryInTheOpenOnceAndUnknown, ()) {
+  const Trajectory truth = straight(100.0);
+  const auto around = corridor_between(truth, CorridorKind::open, 20.0, *rc::gen::element(40.0, 90.0));
+  OdometryNoiseConfig config = white_noise();
+  config.translation_m_per_sqrt_m = config.yaw_deg_per_sqrt_m = config.tilt_deg_per_sqrt_m = 0.0;
+  const bool turns = *rc::gen::arbitrary<bool>();
+  config.failure = {.after_m = 10.0, .length_m = 30.0, .yaw_deg = turns ? 20.0 : 0.0, .drift_m = turns ? 0.0 : 1.5};
+  const bool cut_short = around[400].kind == CorridorKind::rough;  // back inside before it ends
+  const double share = cut_short ? 1.0 / 3.0 : 1.0;
+  const auto simulated = simulate_odometry(truth, around, config, Rng(*rc::gen::arbitrary<std::uint32_t>()));
+  RC_ASSERT(simulated.drift_origins.size() == 1U);
+  const DriftOrigin& origin = simulated.drift_origins.front();
+  RC_ASSERT(origin.kind == DriftOrigin::Kind::failure);
+  RC_ASSERT(std::abs((origin.from - truth.front().stamp) - 30.0) < 0.3);
+  RC_ASSERT(std::abs((origin.until - origin.from) - share * 30.0) < 0.3);
+  RC_ASSERT(std::abs(origin.rotation_rad - share * config.failure.yaw_deg * kRadPerDeg) < 0.01);
+  if (!turns) RC_ASSERT(std::abs(origin.translation_m - share * 1.5) < 0.02);
+  for (std::size_t k = 0; k + 1 < truth.size(); ++k) {  // elsewhere nothing is wrong, and nowhere it is known
+    RC_ASSERT(simulated.increment_covariance[k].isApprox(simulated.increment_covariance[0], 1e-9));
+    const Vector6d error = local(truth[k].pose.inverse() * truth[k + 1].pose,
+                                 simulated.odometry[k].pose.inverse() * simulated.odometry[k + 1].pose);
+    const bool failing = origin.from <= truth[k].stamp && truth[k].stamp < origin.until;
+    RC_ASSERT((error.norm() > 1e-3) == failing);
+  }
+}
+
+TEST(SimulateOdometry, OriginsOfDriftSayWhenAndHowMuch) {
+  const Trajectory truth = straight(100.0);
+  const auto around = corridor_between(truth, CorridorKind::featureless, 10.0, 40.0);
+  OdometryNoiseConfig config;
+  config.slips_per_km = 50.0;
+  int slips = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const auto simulated = simulate_odometry(truth, around, config, Rng(seed));
+    int stays = 0;
+    Timestamp last;
+    for (const DriftOrigin& origin : simulated.drift_origins) {
+      EXPECT_GE(origin.from, last);
+      last = origin.from;
+      const auto at = [&](Timestamp stamp) {
+        return static_cast<std::size_t>(std::lround((stamp - truth.front().stamp) * kRate_hz));
+      };
+      const std::size_t from = at(origin.from), until = at(origin.until);
+      const Vector6d error = local(truth[from].pose.inverse() * truth[until].pose,
+                                   simulated.odometry[from].pose.inverse() * simulated.odometry[until].pose);
+      EXPECT_NEAR(origin.translation_m, error.head<3>().norm(), 1e-9);
+      EXPECT_NEAR(origin.rotation_rad, error.tail<3>().norm(), 1e-9);
+      if (origin.kind == DriftOrigin::Kind::slip) {
+        ++slips;
+        EXPECT_EQ(until, from + 1);
+        EXPECT_GT(error.norm(), 10.0 * std::sqrt(simulated.increment_covariance[0].trace()) * 0.1);
+      } else {
+        ++stays;
+        EXPECT_EQ(origin.kind, DriftOrigin::Kind::degeneracy);
+        EXPECT_EQ(from, 80U);
+        EXPECT_EQ(until, 320U);
+      }
+    }
+    EXPECT_EQ(stays, 1);
+  }
+  EXPECT_NEAR(slips, 100, 30);  // 5 per run
+}
+
 RC_GTEST_PROP(SimulateOdometry, WithoutNoiseOnlyTheFrameDiffers, ()) {
   const auto seed = *rc::gen::arbitrary<std::uint32_t>();
   const Trajectory truth = walk(seed, 30.0);
@@ -110,7 +239,7 @@ RC_GTEST_PROP(SimulateOdometry, WithoutNoiseOnlyTheFrameDiffers, ()) {
   config.translation_m_per_sqrt_m = config.yaw_deg_per_sqrt_m = config.tilt_deg_per_sqrt_m = 0.0;
   config.floor_m = config.floor_deg = 1e-12;
   config.yaw_bias_deg_per_m = config.scale_percent = 0.0;
-  const OdometrySimulation simulated = simulate_odometry(truth, config, Rng(seed));
+  const OdometrySimulation simulated = simulate_odometry(truth, {}, config, Rng(seed));
   RC_ASSERT(simulated.odometry.size() == truth.size());
   RC_ASSERT(simulated.increment_covariance.size() + 1 == truth.size());
   const Pose3 T_odom_reference = simulated.odometry.front().pose * truth.front().pose.inverse();
@@ -122,7 +251,7 @@ RC_GTEST_PROP(SimulateOdometry, WithoutNoiseOnlyTheFrameDiffers, ()) {
 
 RC_GTEST_PROP(SimulateOdometry, CovariancesAreSymmetricAndPositiveDefinite, ()) {
   const Trajectory truth = walk(1, 20.0);
-  const auto simulated = simulate_odometry(truth, {}, Rng(*rc::gen::arbitrary<std::uint32_t>()));
+  const auto simulated = simulate_odometry(truth, {}, {}, Rng(*rc::gen::arbitrary<std::uint32_t>()));
   for (const Matrix6d& covariance : simulated.increment_covariance) {
     RC_ASSERT(covariance == covariance.transpose());
     RC_ASSERT(covariance.llt().info() == Eigen::Success);
@@ -130,28 +259,10 @@ RC_GTEST_PROP(SimulateOdometry, CovariancesAreSymmetricAndPositiveDefinite, ()) 
 }
 
 TEST(SimulateOdometry, EmptyAndSinglePose) {
-  EXPECT_TRUE(simulate_odometry({}, {}, Rng(1)).odometry.empty());
-  const auto one = simulate_odometry({StampedPose{{5}, {}}}, {}, Rng(1));
+  EXPECT_TRUE(simulate_odometry({}, {}, {}, Rng(1)).odometry.empty());
+  const auto one = simulate_odometry({StampedPose{{5}, {}}}, {}, {}, Rng(1));
   EXPECT_EQ(one.odometry.size(), 1U);
   EXPECT_TRUE(one.increment_covariance.empty());
-}
-
-TEST(SimulateRecordings, EveryRobotIsItsOwnAndDependsOnlyOnTheSeed) {
-  SimulationConfig config;
-  config.robots = 3;
-  config.walk.duration_s = 20.0;
-  const std::vector<Recording> recordings = simulate_recordings(config, {1000}, 9);
-  ASSERT_EQ(recordings.size(), 3U);
-  EXPECT_EQ(recordings[2].name, "charlie");
-  EXPECT_EQ(recordings[2].robot, RobotId{2});
-  EXPECT_NE(recordings[0].reference, recordings[1].reference);
-  config.robots = 2;
-  const std::vector<Recording> fewer = simulate_recordings(config, {1000}, 9);
-  for (std::size_t i = 0; i < fewer.size(); ++i) {  // another robot does not change the ones there
-    EXPECT_EQ(fewer[i].reference, recordings[i].reference);
-    EXPECT_EQ(fewer[i].odometry, recordings[i].odometry);
-    EXPECT_EQ(fewer[i].odometry.size(), fewer[i].increment_covariance.size() + 1);
-  }
 }
 
 }  // namespace

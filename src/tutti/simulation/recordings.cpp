@@ -2,37 +2,66 @@
 #include "tutti/simulation/recordings.hpp"
 
 #include <array>
-#include <string>
+#include <set>
 #include <utility>
 
 namespace tutti::simulation {
 namespace {
 
-std::string robot_name(std::size_t i) {
+std::string name_of(const SimulationConfig& config, std::size_t i) {
   constexpr std::array kNames = {"alpha", "bravo", "charlie", "delta", "echo", "foxtrot", "golf", "hotel"};
+  if (!config.robots[i].name.empty()) return config.robots[i].name;
   return i < kNames.size() ? kNames[i] : "robot" + std::to_string(i);
+}
+
+std::optional<std::size_t> given_start(const SimulatedRobotConfig& robot) {
+  if (!robot.start_junction) return std::nullopt;
+  return static_cast<std::size_t>(*robot.start_junction);
+}
+
+Status check_robots(const SimulationConfig& config, const CorridorWorld& network) {
+  if (config.robots.empty()) return fail(ErrorCode::configuration, "simulation.robots is empty, expected a robot");
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < config.robots.size(); ++i) {
+    const std::string name = name_of(config, i);
+    if (!names.insert(name).second)
+      return fail(ErrorCode::configuration, "simulation.robots.{}: name '{}' is taken", i, name);
+    if (auto ok = check_walk(network, config.robots[i].walk, given_start(config.robots[i])); !ok)
+      return in_context("robot " + name, ok.error());
+  }
+  return {};
+}
+
+Recording simulate_robot(const SimulatedRobotConfig& config, const CorridorWorld& network,
+                         std::optional<std::size_t> junction, Timestamp start, const Rng& rng) {
+  Recording recording;
+  recording.reference = simulate_walk(network, config.walk, start, junction, rng.fork("walk"));
+  OdometrySimulation simulated = simulate_odometry(
+      recording.reference, surroundings_along(network, recording.reference), config.odometry, rng.fork("odometry"));
+  recording.odometry = std::move(simulated.odometry);
+  recording.increment_covariance = std::move(simulated.increment_covariance);
+  recording.drift_origins = std::move(simulated.drift_origins);
+  if (config.imu.enabled) recording.imu = simulate_imu(recording.reference, config.imu, rng.fork("imu"));
+  return recording;
 }
 
 }  // namespace
 
-std::vector<Recording> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed) {
+Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed) {
   const Rng rng(seed);
-  const CorridorWorld world = make_corridor_world(config.world, rng.fork("world"));
-  const auto robots = static_cast<std::size_t>(config.robots);
-  const std::vector<std::size_t> starts = spread_starts(world, robots, rng.fork("starts"));
-  std::vector<Recording> recordings;
-  for (std::size_t i = 0; i < robots; ++i) {
-    const Rng robot_rng = rng.fork(i);
-    Recording recording;
+  SimulatedWorld world{.network = make_world(config.world, rng.fork("world")), .recordings = {}};
+  if (auto ok = check_robots(config, world.network); !ok) return tl::unexpected(ok.error());
+  const std::vector<std::size_t> starts = spread_starts(world.network, config.robots.size(), rng.fork("starts"));
+  for (std::size_t i = 0; i < config.robots.size(); ++i) {
+    const SimulatedRobotConfig& robot = config.robots[i];
+    std::optional<std::size_t> junction;
+    if (robot.walk.route.empty()) junction = given_start(robot).value_or(starts[i]);
+    Recording recording = simulate_robot(robot, world.network, junction, start + robot.start_s, rng.fork(i));
     recording.robot = RobotId{static_cast<std::uint32_t>(i)};
-    recording.name = robot_name(i);
-    recording.reference = simulate_walk(world, config.walk, start, starts[i], robot_rng.fork("walk"));
-    OdometrySimulation simulated = simulate_odometry(recording.reference, config.odometry, robot_rng.fork("odometry"));
-    recording.odometry = std::move(simulated.odometry);
-    recording.increment_covariance = std::move(simulated.increment_covariance);
-    recordings.push_back(std::move(recording));
+    recording.name = name_of(config, i);
+    world.recordings.push_back(std::move(recording));
   }
-  return recordings;
+  return world;
 }
 
 }  // namespace tutti::simulation

@@ -2,31 +2,59 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/simulation/corridor_world.hpp"
+#include "tutti/simulation/imu.hpp"
 #include "tutti/simulation/odometry.hpp"
 #include "tutti/simulation/trajectory.hpp"
+#include "tutti/simulation/world.hpp"
 
 namespace tutti::simulation {
 
-struct SimulationConfig {
-  int robots = 2;
-  CorridorWorldConfig world;
+struct SimulatedRobotConfig {
+  std::string name;  ///< Empty: "alpha", "bravo", ... by place in the list.
+  double start_s = 0.0;
+  std::optional<int> start_junction;
   WalkConfig walk;
   OdometryNoiseConfig odometry;
+  ImuConfig imu;
   template <class V>
   void describe(V& v) {
-    v.field("robots", robots, between(1, 100), "Robots in the network, each with its own start and odom frame.");
-    v.field("world", world, any(), "The corridor network.");
-    v.field("walk", walk, any(), "How the robots walk.");
-    v.field("odometry", odometry, any(), "Errors of their odometry.");
+    v.field("name", name, any(), "Unique name; empty: alpha, bravo, ... by place in the list.");
+    v.field("start_s", start_s, at_least(0.0), "Mission time at which it starts to walk.");
+    v.field("start_junction", start_junction, at_least(0.0), "Where it starts; none: far from the others.");
+    v.field("walk", walk, any(), "How it walks.");
+    v.field("odometry", odometry, any(), "Errors of its odometry.");
+    v.field("imu", imu, any(), "Its inertial sensor.");
   }
 };
 
-/// Robots 0, 1, ... named "alpha", "bravo", ..., walking at the same time through one corridor network.
-std::vector<Recording> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed);
+struct SimulationConfig {
+  std::string sensors = "none";
+  WorldConfig world;
+  std::vector<SimulatedRobotConfig> robots = std::vector<SimulatedRobotConfig>(2);
+  template <class V>
+  void describe(V& v) {
+    v.field("sensors", sensors, one_of({"none"}), "none: trajectories only.");
+    v.field("world", world, any(), "Where the robots walk.");
+    v.field("robots", robots, any(), "The robots, each with its own start and odom frame.");
+  }
+};
+
+/// What a simulated mission replays, and the world it took place in.
+struct SimulatedWorld {
+  CorridorWorld network;
+  std::vector<Recording> recordings;  ///< Robots 0, 1, ... in the order of the configuration.
+};
+
+/// Robots walking at the same time through one world; the first sample of each is at `start` + start_s. An error when
+/// the configuration asks for what the world has not (a junction, a corridor) or names two robots alike.
+Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed);
 
 }  // namespace tutti::simulation

@@ -36,9 +36,10 @@ struct Mission {
 
 Mission make_mission(std::uint64_t seed, double duration_s) {
   SimulationConfig config;
-  config.walk.duration_s = duration_s;
+  for (SimulatedRobotConfig& robot : config.robots) robot.walk.duration_s = duration_s;
   Mission mission;
-  for (const Recording& recording : simulate_recordings(config, {1'000'000'000}, seed)) {
+  const auto world = simulate_recordings(config, {1'000'000'000}, seed);
+  for (const Recording& recording : world->recordings) {
     mission.reference[recording.robot] = recording.reference;
     const auto submaps = cut_submaps(recording);
     mission.submaps.insert(mission.submaps.end(), submaps.begin(), submaps.end());

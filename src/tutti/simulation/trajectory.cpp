@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::simulation {
 namespace {
@@ -14,18 +16,40 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kIntegrationStep_s = 0.025;
 constexpr double kSpeedTime_s = 10.0;    // how fast the speed wanders
+constexpr double kSettleTime_s = 1.0;    // from full speed to standing
 constexpr double kHeightLength_m = 1.0;  // slopes are smoothed over this
+
+bool are_joined(const CorridorWorld& world, std::size_t a, std::size_t b) {
+  return std::ranges::any_of(world.corridors_at[a],
+                             [&](std::size_t corridor) { return world.other_end(corridor, a) == b; });
+}
 
 /// Endless walk from junction to junction; hands out the corners of its path.
 class Route {
  public:
-  Route(const CorridorWorld& world, std::size_t start, Rng rng)
-      : world_(world), rng_(std::move(rng)), junction_(start), visits_(world.corridors.size(), 0) {}
+  /// `junctions`: to go round in order, the first being `start`; empty = wherever was seen least.
+  Route(const CorridorWorld& world, std::size_t start, std::vector<int> junctions, Rng rng)
+      : world_(world),
+        given_(std::move(junctions)),
+        rng_(std::move(rng)),
+        junction_(start),
+        visits_(world.corridors.size(), 0) {}
 
   [[nodiscard]] Eigen::Vector3d position() const { return world_.junctions[junction_]; }
 
-  /// Goes to the next junction: a corridor seen least, not back unless there is no other.
   Eigen::Vector3d advance() {
+    if (given_.empty()) {
+      explore();
+    } else {
+      next_given_ = (next_given_ + 1) % given_.size();
+      junction_ = static_cast<std::size_t>(given_[next_given_]);
+    }
+    return position();
+  }
+
+ private:
+  /// A corridor seen least, not back unless there is no other.
+  void explore() {
     std::vector<std::size_t> choices;
     for (const std::size_t corridor : world_.corridors_at[junction_]) {
       if (corridor == last_ && world_.corridors_at[junction_].size() > 1) continue;
@@ -36,11 +60,11 @@ class Route {
     last_ = choices[rng_.index(choices.size())];
     ++visits_[last_];
     junction_ = world_.other_end(last_, junction_);
-    return position();
   }
 
- private:
   const CorridorWorld& world_;
+  std::vector<int> given_;
+  std::size_t next_given_ = 0;
   Rng rng_;
   std::size_t junction_;
   std::size_t last_ = static_cast<std::size_t>(-1);
@@ -81,9 +105,8 @@ struct Walker {
   Eigen::Vector3d position;
   double yaw = 0.0;
   double pitch = 0.0;  // nose down positive, as a rotation about body y
-  double speed = 0.0;
 
-  void step(const Carrot& carrot, double dt) {
+  void step(const Carrot& carrot, double speed, double dt) {
     const Eigen::Vector3d to_carrot = carrot.position() - position;
     const double distance = to_carrot.head<2>().norm();
     const double alpha = std::remainder(std::atan2(to_carrot.y(), to_carrot.x()) - yaw, 2.0 * kPi);
@@ -99,48 +122,101 @@ struct Walker {
   }
 };
 
-Pose3 body_pose(const Walker& walker, const WalkConfig& config, double time_s, double phase) {
+/// `gait`: 1 = walking, 0 = standing.
+Pose3 body_pose(const Walker& walker, const WalkConfig& config, double time_s, double phase, double gait) {
   const double step = 2.0 * kPi * config.step_hz * time_s + phase;
-  const double sway = config.sway_deg * kPi / 180.0;
+  const double sway = gait * config.sway_deg * kRadPerDeg;
+  const double bob = gait * config.bob_m;
   const Eigen::Quaterniond rotation =
       Eigen::AngleAxisd(walker.yaw, Eigen::Vector3d::UnitZ()) *
       Eigen::AngleAxisd(walker.pitch + sway * std::sin(2.0 * step), Eigen::Vector3d::UnitY()) *
       Eigen::AngleAxisd(sway * std::sin(step), Eigen::Vector3d::UnitX());
-  return {rotation.normalized(), walker.position + Eigen::Vector3d(0.0, 0.0, config.bob_m * std::sin(2.0 * step))};
+  return {rotation.normalized(), walker.position + Eigen::Vector3d(0.0, 0.0, bob * std::sin(2.0 * step))};
+}
+
+/// Speed at every step of a walk: wanders between the two limits, falls to 0 at a stop.
+std::vector<double> draw_speeds(const WalkConfig& config, std::size_t samples, int substeps, Rng& rng) {
+  const double dt = 1.0 / (config.rate_hz * substeps);
+  const double most_change = dt * config.max_speed_mps / kSettleTime_s;
+  double wish = rng.uniform(config.min_speed_mps, config.max_speed_mps);
+  double speed = wish;
+  double stop_s = 0.0;  // still to stand
+  std::vector<double> speeds;
+  speeds.reserve(samples * static_cast<std::size_t>(substeps));
+  for (std::size_t i = 0; i < samples; ++i) {
+    stop_s -= 1.0 / config.rate_hz;
+    if (rng.bernoulli(std::min(1.0, 1.0 / (config.rate_hz * kSpeedTime_s))))
+      wish = rng.uniform(config.min_speed_mps, config.max_speed_mps);
+    if (stop_s <= 0.0 && rng.bernoulli(std::min(1.0, config.pauses_per_min / (60.0 * config.rate_hz))))
+      stop_s = rng.uniform(0.5, 1.5) * config.pause_s;
+    for (int k = 0; k < substeps; ++k) {
+      speed += std::clamp((stop_s > 0.0 ? 0.0 : wish) - speed, -most_change, most_change);
+      speeds.push_back(speed);
+    }
+  }
+  return speeds;
 }
 
 }  // namespace
 
+Status check_walk(const CorridorWorld& world, const WalkConfig& config, std::optional<std::size_t> start_junction) {
+  if (config.max_speed_mps < config.min_speed_mps)
+    return fail(ErrorCode::configuration, "walk: max_speed_mps is {}, expected at least min_speed_mps = {}",
+                config.max_speed_mps, config.min_speed_mps);
+  const std::size_t junctions = world.junctions.size();
+  if (start_junction && *start_junction >= junctions)
+    return fail(ErrorCode::configuration, "start_junction is {}, the world has 0 .. {}", *start_junction,
+                junctions - 1);
+  if (config.route.empty()) return {};
+  if (start_junction)
+    return fail(ErrorCode::configuration,
+                "start_junction and walk.route are both given, expected one: a route starts "
+                "at its first junction");
+  const std::vector<std::size_t> route(config.route.begin(), config.route.end());
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    if (route[i] >= junctions)
+      return fail(ErrorCode::configuration, "walk.route.{} is {}, the world has 0 .. {}", i, config.route[i],
+                  junctions - 1);
+    const std::size_t next = route[(i + 1) % route.size()];
+    if (next < junctions && !are_joined(world, route[i], next))
+      return fail(ErrorCode::configuration, "walk.route: no corridor joins junctions {} and {}", route[i], next);
+    if (route[(i + 2) % route.size()] == route[i])
+      return fail(ErrorCode::configuration, "walk.route: turns back at junction {}, where there is no room", next);
+  }
+  return {};
+}
+
 Trajectory simulate_walk(const CorridorWorld& world, const WalkConfig& config, Timestamp start,
                          std::optional<std::size_t> start_junction, Rng rng) {
-  TUTTI_CHECK(config.max_speed_mps >= config.min_speed_mps, "speeds {} .. {} m/s", config.min_speed_mps,
-              config.max_speed_mps);
-  const std::size_t first = start_junction.value_or(rng.index(world.junctions.size()));
-  TUTTI_CHECK(first < world.junctions.size(), "junction {}", first);
+  const Status ok = check_walk(world, config, start_junction);
+  TUTTI_CHECK(ok.has_value(), "{}", ok.error().message);
+  std::size_t first = start_junction.value_or(rng.index(world.junctions.size()));
+  if (!config.route.empty()) first = static_cast<std::size_t>(config.route.front());
 
   const double phase = rng.uniform(0.0, 2.0 * kPi);
-  Carrot carrot(Route(world, first, rng.fork("route")), config.lookahead_m);
+  Carrot carrot(Route(world, first, config.route, rng.fork("route")), config.lookahead_m);
   Walker walker{.position = world.junctions[first]};
   const Eigen::Vector3d ahead = carrot.direction();
   walker.yaw = std::atan2(ahead.y(), ahead.x());
   walker.pitch = -std::asin(ahead.z());
-  double wish = rng.uniform(config.min_speed_mps, config.max_speed_mps);
-  walker.speed = wish;
 
   const auto samples = static_cast<std::size_t>(std::floor(config.duration_s * config.rate_hz)) + 1;
   const int substeps = std::max(1, static_cast<int>(std::ceil(1.0 / (config.rate_hz * kIntegrationStep_s))));
   const double dt = 1.0 / (config.rate_hz * substeps);
+  const std::vector<double> speeds = draw_speeds(config, samples, substeps, rng);
+  // The steps of the last sample are never taken.
+  const double natural_m = dt * std::accumulate(speeds.begin(), speeds.end() - substeps, 0.0);
+  const double pace = config.length_m > 0.0 && natural_m > 0.0 ? config.length_m / natural_m : 1.0;
   Trajectory truth;
   truth.reserve(samples);
+  std::size_t step = 0;
   for (std::size_t i = 0; i < samples; ++i) {
     const double time_s = static_cast<double>(i) / config.rate_hz;
-    truth.push_back({start + time_s, body_pose(walker, config, time_s, phase)});
-    if (rng.bernoulli(std::min(1.0, 1.0 / (config.rate_hz * kSpeedTime_s))))
-      wish = rng.uniform(config.min_speed_mps, config.max_speed_mps);
-    for (int k = 0; k < substeps; ++k) {
-      walker.speed += (wish - walker.speed) * std::min(1.0, dt);  // settles in about 1 s
+    const double gait = std::min(1.0, speeds[step] / config.min_speed_mps);
+    truth.push_back({start + time_s, body_pose(walker, config, time_s, phase, gait)});
+    for (int k = 0; k < substeps; ++k, ++step) {
       carrot.keep_ahead_of(walker.position);
-      walker.step(carrot, dt);
+      walker.step(carrot, pace * speeds[step], dt);
     }
   }
   return truth;

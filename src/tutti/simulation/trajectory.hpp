@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 
@@ -13,9 +15,13 @@ namespace tutti::simulation {
 
 struct WalkConfig {
   double duration_s = 1200.0;
+  double length_m = 0.0;
   double rate_hz = 8.0;
   double min_speed_mps = 0.6;
   double max_speed_mps = 1.0;
+  double pauses_per_min = 0.0;
+  double pause_s = 8.0;
+  std::vector<int> route;
   double lookahead_m = 2.0;
   double sway_deg = 0.8;
   double bob_m = 0.01;
@@ -23,9 +29,16 @@ struct WalkConfig {
   template <class V>
   void describe(V& v) {
     v.field("duration_s", duration_s, greater_than(0.0), "Length of the walk.");
+    v.field("length_m", length_m, at_least(0.0),
+            "Way to travel: all speeds are scaled so that the walk has this length; 0 = as far as the speeds lead.");
     v.field("rate_hz", rate_hz, greater_than(0.0), "Poses per second.");
     v.field("min_speed_mps", min_speed_mps, greater_than(0.0), "Slowest speed along the path.");
     v.field("max_speed_mps", max_speed_mps, greater_than(0.0), "Fastest speed along the path.");
+    v.field("pauses_per_min", pauses_per_min, between(0.0, 60.0), "How often the robot stops to look around.");
+    v.field("pause_s", pause_s, greater_than(0.0), "Mean length of such a stop.");
+    v.field("route", route, at_least(0.0),
+            "Junctions to walk to, in order and then again from the first; neighbours in the list, and last and first, "
+            "must be joined by a corridor, without turning back. Empty: the corridors seen least.");
     v.field("lookahead_m", lookahead_m, greater_than(0.0), "How far ahead the robot steers; wider turns with more.");
     v.field("sway_deg", sway_deg, between(0.0, 10.0), "Roll and pitch of the gait; 0 for a wheeled robot.");
     v.field("bob_m", bob_m, between(0.0, 0.2), "Up and down of the gait; 0 for a wheeled robot.");
@@ -33,11 +46,15 @@ struct WalkConfig {
   }
 };
 
-/// A walk without U-turns from junction to junction, corridors seen least being preferred: covers the network, then
-/// revisits it, now and then in the other direction. Truth T_reference_body, body x ahead, z up; the first stamp is
-/// `start`. The first junction is drawn when not given. Heading, position and attitude are continuous: the robot
-/// steers towards a point ahead on the path (Coulter 1992, "Implementation of the Pure Pursuit Path Tracking
-/// Algorithm").
+/// Is `config.route` a closed walk along corridors of this world without U-turns, and `start_junction` a junction?
+Status check_walk(const CorridorWorld& world, const WalkConfig& config, std::optional<std::size_t> start_junction);
+
+/// A walk from junction to junction. Without a route: no U-turns, corridors seen least being preferred: covers the
+/// network, then revisits it, now and then in the other direction; the first junction is drawn when not given. With a
+/// route: round and round along it, from its first junction. Truth T_reference_body, body x ahead, z up; the first
+/// stamp is `start`. Heading, position and attitude are continuous: the robot steers towards a point ahead on the path
+/// (Coulter 1992, "Implementation of the Pure Pursuit Path Tracking Algorithm"). The gait fades out when it stands.
+/// What check_walk() refuses is our own mistake here.
 Trajectory simulate_walk(const CorridorWorld& world, const WalkConfig& config, Timestamp start,
                          std::optional<std::size_t> start_junction, Rng rng);
 

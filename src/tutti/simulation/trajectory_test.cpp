@@ -108,6 +108,87 @@ TEST(SimulateWalk, KeepsItsSpeedRevisitsAndMeets) {
   EXPECT_GT(seconds_near(alpha, bravo, 0.0), 400);   // places both have seen
 }
 
+double ground_length(const Trajectory& truth) {
+  double length = 0.0;
+  for (std::size_t k = 1; k < truth.size(); ++k)
+    length += (truth[k].pose.translation - truth[k - 1].pose.translation).norm();
+  return length;
+}
+
+RC_GTEST_PROP(SimulateWalk, TravelsTheLengthAskedFor, ()) {
+  CorridorWorldConfig world_config;
+  const CorridorWorld world = any_world(world_config);
+  WalkConfig config;
+  config.duration_s = *rc::gen::element(300.0, 900.0);
+  config.length_m = *rc::gen::element(0.3, 0.6) * config.duration_s;
+  config.pauses_per_min = *rc::gen::element(0.0, 2.0);
+  config.bob_m = 0.0;  // the gait's ups and downs are no way travelled
+  const Trajectory truth = simulate_walk(world, config, {}, std::nullopt, Rng(*rc::gen::arbitrary<std::uint32_t>()));
+  RC_ASSERT(truth.size() == static_cast<std::size_t>(config.duration_s * config.rate_hz) + 1);
+  RC_ASSERT(std::abs(ground_length(truth) - config.length_m) < 0.005 * config.length_m);
+}
+
+TEST(SimulateWalk, StandsStillAsOftenAndAsLongAsAskedGaitAndAll) {
+  const CorridorWorld world = make_corridor_world({}, Rng(1));
+  WalkConfig config;
+  config.duration_s = 3600.0;
+  config.pauses_per_min = 1.0;
+  config.pause_s = 10.0;
+  const Trajectory truth = simulate_walk(world, config, {}, 0, Rng(3));
+  int stops = 0;
+  int still = 0;
+  bool moved = true;
+  for (std::size_t k = 1; k < truth.size(); ++k) {
+    const bool stands = truth[k].pose == truth[k - 1].pose;
+    if (stands) ++still;
+    if (stands && moved) ++stops;
+    moved = !stands;
+  }
+  EXPECT_NEAR(stops, 51, 20);  // a minute of walking between two stops of 10 s
+  EXPECT_NEAR(still / config.rate_hz / stops, 10.0, 2.5);
+}
+
+/// Whether the walk passes the junctions in this order, coming within `near_m` of each before the next.
+bool passes_in_order(const CorridorWorld& world, const Trajectory& truth, const std::vector<int>& order,
+                     double near_m) {
+  std::size_t next = 0;
+  for (const StampedPose& sample : truth) {
+    const Eigen::Vector3d& junction = world.junctions[static_cast<std::size_t>(order[next])];
+    if ((sample.pose.translation - junction).norm() < near_m && ++next == order.size()) return true;
+  }
+  return false;
+}
+
+TEST(SimulateWalk, FollowsItsRouteRoundAndRound) {
+  const CorridorWorld world = make_corridor_world({.missing_share = 0.0}, Rng(1));  // 4 rows of 5
+  WalkConfig config;
+  config.route = {6, 7, 12, 11};
+  const Trajectory truth = simulate_walk(world, config, {}, std::nullopt, Rng(3));
+  EXPECT_TRUE(passes_in_order(world, truth, {6, 7, 12, 11, 6, 7, 12, 11, 6}, 1.5));
+  EXPECT_FALSE(passes_in_order(world, truth, {11, 12, 7}, 1.5) && passes_in_order(world, truth, {8}, 1.5));
+  for (const StampedPose& sample : truth)  // nowhere else
+    for (const std::size_t other : {0U, 5U, 8U, 13U, 17U})
+      EXPECT_GT((sample.pose.translation - world.junctions[other]).norm(), 5.0);
+}
+
+TEST(CheckWalk, SaysWhatIsWrong) {
+  const CorridorWorld world = make_corridor_world({.missing_share = 0.0}, Rng(1));
+  const auto problem = [&](std::vector<int> route, std::optional<std::size_t> start = {}) {
+    WalkConfig config;
+    config.route = std::move(route);
+    const Status ok = check_walk(world, config, start);
+    return ok ? std::string() : ok.error().message;
+  };
+  EXPECT_EQ(problem({}), "");
+  EXPECT_EQ(problem({}, 19), "");
+  EXPECT_EQ(problem({0, 1, 6, 5}), "");
+  EXPECT_NE(problem({}, 20).find("0 .. 19"), std::string::npos);
+  EXPECT_NE(problem({0, 1, 6}).find("6 and 0"), std::string::npos);  // not closed
+  EXPECT_NE(problem({0, 1}).find("turns back at junction 1"), std::string::npos);
+  EXPECT_NE(problem({0, 99}).find("99"), std::string::npos);
+  EXPECT_NE(problem({0, 1}, 0).find("expected one"), std::string::npos);
+}
+
 TEST(SimulateWalk, SameSeedSameBits) {
   const CorridorWorld world = make_corridor_world({}, Rng(1));
   WalkConfig config;

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/simulation/recordings.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::simulation {
+namespace {
+
+SimulationConfig short_walks(std::size_t robots) {
+  SimulationConfig config;
+  config.robots.resize(robots);
+  for (SimulatedRobotConfig& robot : config.robots) robot.walk.duration_s = 20.0;
+  return config;
+}
+
+std::string problem_with(const SimulationConfig& config) {
+  const auto world = simulate_recordings(config, {}, 1);
+  return world ? "" : world.error().message;
+}
+
+TEST(SimulateRecordings, EveryRobotIsItsOwnAndDependsOnlyOnTheSeed) {
+  const auto three = simulate_recordings(short_walks(3), {1000}, 9);
+  ASSERT_TRUE(three.has_value());
+  ASSERT_EQ(three->recordings.size(), 3U);
+  EXPECT_EQ(three->recordings[2].name, "charlie");
+  EXPECT_EQ(three->recordings[2].robot, RobotId{2});
+  EXPECT_NE(three->recordings[0].reference, three->recordings[1].reference);
+  const auto two = simulate_recordings(short_walks(2), {1000}, 9);
+  for (std::size_t i = 0; i < 2; ++i) {  // another robot does not change the ones there
+    EXPECT_EQ(two->recordings[i].reference, three->recordings[i].reference);
+    EXPECT_EQ(two->recordings[i].odometry, three->recordings[i].odometry);
+    EXPECT_EQ(two->recordings[i].odometry.size(), two->recordings[i].increment_covariance.size() + 1);
+  }
+}
+
+TEST(SimulateRecordings, StartsWhereAndWhenItIsTold) {
+  SimulationConfig config = short_walks(2);
+  config.robots[1].start_s = 12.5;
+  config.robots[1].start_junction = 7;
+  config.robots[1].imu.enabled = true;
+  const auto world = simulate_recordings(config, {1000}, 3);
+  ASSERT_TRUE(world.has_value());
+  const Recording& late = world->recordings[1];
+  EXPECT_EQ(late.reference.front().stamp, Timestamp{1000} + 12.5);
+  EXPECT_LT((late.reference.front().pose.translation - world->network.junctions[7]).norm(), 0.1);
+  EXPECT_EQ(late.imu.size(), 20U * 200U + 1U);
+  EXPECT_EQ(late.imu.front().stamp, late.reference.front().stamp);
+  EXPECT_TRUE(world->recordings[0].imu.empty());
+}
+
+TEST(SimulateRecordings, WhatTheWorldHasNotIsAClearError) {
+  SimulationConfig config = short_walks(2);
+  EXPECT_EQ(problem_with(config), "");
+  config.robots[1].start_junction = 20;  // of 4 x 5: 0 .. 19
+  EXPECT_NE(problem_with(config).find("bravo"), std::string::npos);
+  EXPECT_NE(problem_with(config).find("0 .. 19"), std::string::npos);
+  config = short_walks(2);
+  config.robots[0].walk.route = {0, 19};
+  EXPECT_NE(problem_with(config).find("no corridor joins junctions 0 and 19"), std::string::npos);
+  config = short_walks(2);
+  config.robots[1].name = "alpha";
+  EXPECT_NE(problem_with(config).find("taken"), std::string::npos);
+  EXPECT_NE(problem_with(short_walks(0)).find("empty"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tutti::simulation
