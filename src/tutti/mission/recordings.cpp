@@ -151,9 +151,11 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
 Result<std::vector<MissionRecording>> load_recordings(const MissionConfig& config, const std::filesystem::path& data,
                                                       std::uint64_t seed) {
   if (config.source == "recordings") return replay_all(config, data, Rng(seed));
+  auto world = simulation::simulate_recordings(config.simulation, Timestamp{0}, seed);
+  if (!world) return tl::unexpected(world.error());
   std::vector<MissionRecording> out;
-  for (Recording& recording : simulation::simulate_recordings(config.simulation, Timestamp{0}, seed))
-    out.push_back({.recording = std::move(recording)});
+  for (std::size_t i = 0; i < world->recordings.size(); ++i)
+    out.push_back({.recording = std::move(world->recordings[i]), .start_s = config.simulation.robots[i].start_s});
   return out;
 }
 

@@ -49,8 +49,14 @@ Recording simulate_robot(const SimulatedRobotConfig& config, const CorridorWorld
 
 Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed) {
   const Rng rng(seed);
-  SimulatedWorld world{.network = make_world(config.world, rng.fork("world")), .recordings = {}};
+  SimulatedWorld world{.network = make_world(config.world, rng.fork("world")), .recordings = {}, .surface = {}};
   if (auto ok = check_robots(config, world.network); !ok) return tl::unexpected(ok.error());
+  std::shared_ptr<const Bvh> walls;
+  if (config.sensors == "lidar") {
+    world.surface =
+        std::make_shared<const TriangleMesh>(world_surface(world.network, config.surface, rng.fork("surface")));
+    walls = std::make_shared<const Bvh>(*world.surface);
+  }
   const std::vector<std::size_t> starts = spread_starts(world.network, config.robots.size(), rng.fork("starts"));
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
     const SimulatedRobotConfig& robot = config.robots[i];
@@ -59,6 +65,9 @@ Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Times
     Recording recording = simulate_robot(robot, world.network, junction, start + robot.start_s, rng.fork(i));
     recording.robot = RobotId{static_cast<std::uint32_t>(i)};
     recording.name = name_of(config, i);
+    if (walls)
+      recording.scans =
+          std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar, rng.fork(i).fork("lidar"));
     world.recordings.push_back(std::move(recording));
   }
   return world;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,7 +12,9 @@
 #include "tutti/model/recording.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 #include "tutti/simulation/imu.hpp"
+#include "tutti/simulation/lidar.hpp"
 #include "tutti/simulation/odometry.hpp"
+#include "tutti/simulation/surface.hpp"
 #include "tutti/simulation/trajectory.hpp"
 #include "tutti/simulation/world.hpp"
 
@@ -38,11 +41,15 @@ struct SimulatedRobotConfig {
 struct SimulationConfig {
   std::string sensors = "none";
   WorldConfig world;
+  SurfaceConfig surface;
+  LidarConfig lidar;
   std::vector<SimulatedRobotConfig> robots = std::vector<SimulatedRobotConfig>(2);
   template <class V>
   void describe(V& v) {
-    v.field("sensors", sensors, one_of({"none"}), "none: trajectories only.");
+    v.field("sensors", sensors, one_of({"none", "lidar"}), "none: trajectories only, which is fast.");
     v.field("world", world, any(), "Where the robots walk.");
+    v.field("surface", surface, any(), "lidar: what its walls look like.");
+    v.field("lidar", lidar, any(), "lidar: the sensor of every robot.");
     v.field("robots", robots, any(), "The robots, each with its own start and odom frame.");
   }
 };
@@ -50,7 +57,8 @@ struct SimulationConfig {
 /// What a simulated mission replays, and the world it took place in.
 struct SimulatedWorld {
   CorridorWorld network;
-  std::vector<Recording> recordings;  ///< Robots 0, 1, ... in the order of the configuration.
+  std::vector<Recording> recordings;            ///< Robots 0, 1, ... in the order of the configuration.
+  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would find; null without sensors.
 };
 
 /// Robots walking at the same time through one world; the first sample of each is at `start` + start_s. An error when

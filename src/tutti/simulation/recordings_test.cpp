@@ -48,6 +48,29 @@ TEST(SimulateRecordings, StartsWhereAndWhenItIsTold) {
   EXPECT_TRUE(world->recordings[0].imu.empty());
 }
 
+TEST(SimulateRecordings, LidarSeesTheWallsOfOneSharedWorld) {
+  SimulationConfig config = short_walks(2);
+  config.sensors = "lidar";
+  config.world.network = {.rows = 2, .columns = 2, .block_m = 15.0, .jitter_m = 1.0};
+  config.lidar.azimuth_step_deg = 3.0;
+  const auto world = simulate_recordings(config, {}, 3);
+  ASSERT_TRUE(world.has_value());
+  ASSERT_TRUE(world->surface != nullptr);
+  EXPECT_FALSE(world->surface->triangles.empty());
+  for (const Recording& recording : world->recordings) {
+    ASSERT_TRUE(recording.scans != nullptr);
+    const auto scan = recording.scans->scan(80);
+    ASSERT_TRUE(scan.has_value() && scan->has_value());
+    EXPECT_EQ((*scan)->stamp, recording.odometry[80].stamp);
+    EXPECT_GT((*scan)->cloud->points.size(), 500U);
+  }
+  config.sensors = "none";  // the sensor changes nothing else
+  const auto blind = simulate_recordings(config, {}, 3);
+  EXPECT_EQ(blind->surface, nullptr);
+  EXPECT_EQ(blind->recordings[0].scans, nullptr);
+  EXPECT_EQ(blind->recordings[1].odometry, world->recordings[1].odometry);
+}
+
 TEST(SimulateRecordings, WhatTheWorldHasNotIsAClearError) {
   SimulationConfig config = short_walks(2);
   EXPECT_EQ(problem_with(config), "");
