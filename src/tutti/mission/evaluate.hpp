@@ -22,17 +22,19 @@ struct RobotOutcome {
   std::vector<std::pair<std::string, const robot::RobotAgent*>> agents;  ///< By policy; the default one is among them.
 };
 
-/// Fills in what is measured at the end: accuracy of every estimate, the final map, transforms between robots.
-/// Accuracy: ATE after one rigid alignment (SE(3), no scale) and RPE over 1 s, at keyframes; the server's joint figure
-/// over all robots of its largest component with one alignment. Agreement: ATE of a robot's estimate with the server's
-/// in the role of the reference. Robots whose reference is not for scoring get no accuracy.
+/// Fill in what is measured at the end, in this order: accuracy of every estimate; the final map, its closures and the
+/// transforms between robots; the clouds. Accuracy: ATE after one rigid alignment (SE(3), no scale) and RPE over 1 s,
+/// at keyframes; the server's joint figure over all robots of its largest component with one alignment. Agreement: ATE
+/// of a robot's estimate with the server's in the role of the reference. Robots whose reference is not for scoring get
+/// no accuracy.
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const evaluation::AssociationConfig& association, MissionRecord& record);
+/// Calls evaluate_map() at the end.
 void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
                      const evaluation::AssociationConfig& association, MissionRecord& record);
-
-/// T_odom-of-robot <- world, from the server's and the raw poses of the robot's keyframes: the rigid motion that fits
-/// the whole trajectory best.
-std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& map);
+/// What the robots saw, put together by every estimate, thinned; and, where record.survey is there, how far it is from
+/// that.
+void evaluate_map(const server::MapServer& server, const evaluation::AssociationConfig& association,
+                  MissionRecord& record);
 
 }  // namespace tutti::mission

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "tutti/evaluation/agreement.hpp"
+#include "tutti/evaluation/ate.hpp"
+#include "tutti/evaluation/cloud_distance.hpp"
+#include "tutti/mission/evaluate.hpp"
+#include "tutti/mission/report_format.hpp"
+#include "tutti/perception/lidar/voxel_filter.hpp"
+
+namespace tutti::mission {
+namespace {
+
+/// Equal voxels: every square metre of a wall counts the same, no matter how often it was seen.
+constexpr double kMapVoxel_m = 0.1;
+
+/// Grows by whole clouds; thins itself now and then, so that a long mission's map stays small in memory.
+class ThinnedCloud {
+ public:
+  void add(const PointCloud& cloud_b, const Pose3& T_a_b) {
+    const Eigen::Isometry3d T(T_a_b.matrix());
+    for (const Eigen::Vector3f& p : cloud_b.points) cloud_.points.push_back((T * p.cast<double>()).cast<float>());
+    if (cloud_.points.size() < thin_at_) return;
+    cloud_ = lidar::voxel_downsample(cloud_, kMapVoxel_m);
+    thin_at_ = 2 * cloud_.points.size() + kAtLeast;
+  }
+  [[nodiscard]] PointCloud thinned() const { return lidar::voxel_downsample(cloud_, kMapVoxel_m); }
+
+ private:
+  static constexpr std::size_t kAtLeast = 1'000'000;
+  PointCloud cloud_;
+  std::size_t thin_at_ = kAtLeast;
+};
+
+/// One robot's submaps, put together by each of its estimates.
+struct RobotMaps {
+  ThinnedCloud onboard;    ///< T_odom
+  ThinnedCloud corrected;  ///< T_map
+  ThinnedCloud server;     ///< T_world
+};
+
+/// Where an estimate puts a submap: it hangs on the keyframe in its middle, as its closures do.
+std::optional<Pose3> place(const Submap& submap, const Trajectory& estimate) {
+  const Keyframe& first = submap.keyframes.front();
+  const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
+  const auto found = std::lower_bound(estimate.begin(), estimate.end(), middle.stamp,
+                                      [](const StampedPose& p, Timestamp t) { return p.stamp < t; });
+  if (found == estimate.end() || found->stamp != middle.stamp) return std::nullopt;
+  return found->pose * middle.T_odom_body.inverse() * first.T_odom_body;
+}
+
+/// What a submap saw, in its own frame: the only place that knows where clouds lie. Null when it saw nothing.
+std::shared_ptr<const PointCloud> cloud_of(const server::MapServer& server, SubmapId id, MissionRecord& record) {
+  if (!server.state().cloud_sizes.contains(id)) return nullptr;
+  auto cloud = server.clouds().get(id);
+  if (cloud) return *cloud;
+  record.notes.push_back("Missing in the map: " + cloud.error().message + ".");
+  return nullptr;
+}
+
+RobotMaps put_together(const server::MapServer& server, const RobotRecord& robot, MissionRecord& record) {
+  const PolicyRecord* policy = find_policy(robot, record.default_policy);
+  const bool want_corrected = record.survey && policy != nullptr;  // it is only measured
+  RobotMaps out;
+  for (const auto& [id, submap] : server.state().submaps) {
+    if (id.robot != robot.id) continue;
+    const auto cloud = cloud_of(server, id, record);
+    if (!cloud) continue;
+    const auto add = [&](ThinnedCloud& map, const Trajectory& estimate) {
+      if (const auto T = place(*submap, estimate)) map.add(*cloud, *T);
+    };
+    add(out.onboard, robot.odometry);
+    if (want_corrected) add(out.corrected, policy->corrected);
+    add(out.server, robot.server_estimate);
+  }
+  return out;
+}
+
+/// The rigid motion that ATE measures after; nothing without a reference.
+std::optional<Pose3> reference_from(const Trajectory& estimate, const RobotRecord& robot,
+                                    const evaluation::AssociationConfig& association) {
+  const auto fit = evaluation::ate(evaluation::associate(estimate, robot.reference, association));
+  return fit ? std::optional<Pose3>(fit->T_reference_estimate) : std::nullopt;
+}
+
+PointCloud moved(const Pose3& T_a_b, const PointCloud& cloud_b) {
+  PointCloud out;
+  out.points.reserve(cloud_b.points.size());
+  const Eigen::Isometry3d T(T_a_b.matrix());
+  for (const Eigen::Vector3f& p : cloud_b.points) out.points.push_back((T * p.cast<double>()).cast<float>());
+  return out;
+}
+
+void keep_onboard(const ThinnedCloud& map, const evaluation::CloudIndex* survey,
+                  const evaluation::AssociationConfig& association, RobotRecord& robot) {
+  const auto T_reference_odom = reference_from(robot.odometry, robot, association);
+  Pose3 T_shown_odom = T_reference_odom.value_or(Pose3{});
+  if (!T_reference_odom)
+    if (const auto fit = evaluation::agreement(robot.odometry, robot.server_estimate))
+      T_shown_odom = fit->T_reference_estimate;
+  robot.onboard_cloud = moved(T_shown_odom, map.thinned());
+  if (survey != nullptr && T_reference_odom)
+    robot.map_error.onboard = evaluation::summarise(survey->distances(robot.onboard_cloud));
+}
+
+void measure_corrected(const ThinnedCloud& map, const evaluation::CloudIndex& survey, const PolicyRecord* policy,
+                       const evaluation::AssociationConfig& association, RobotRecord& robot) {
+  if (policy == nullptr) return;
+  const auto T_reference_map = reference_from(policy->corrected, robot, association);
+  if (T_reference_map)
+    robot.map_error.corrected = evaluation::summarise(survey.distances(map.thinned(), *T_reference_map));
+}
+
+/// The joint map of the largest component against the survey, and the other way round.
+void measure_joint_cloud(const evaluation::CloudIndex& survey, MissionRecord& record) {
+  ServerRecord& server = record.server;
+  if (!server.T_reference_world) return;
+  std::vector<float> distances;
+  PointCloud joint;
+  for (CloudRecord& seen : server.clouds) {
+    const auto robot = std::find_if(record.robots.begin(), record.robots.end(),
+                                    [&](const RobotRecord& r) { return r.id == seen.robot; });
+    if (robot == record.robots.end() || robot->component != server.largest_component) continue;
+    seen.distance_m = survey.distances(seen.cloud, *server.T_reference_world);
+    distances.insert(distances.end(), seen.distance_m.begin(), seen.distance_m.end());
+    joint.points.insert(joint.points.end(), seen.cloud.points.begin(), seen.cloud.points.end());
+  }
+  server.map_error = evaluation::summarise(distances);
+  const auto back = evaluation::summarise(
+      evaluation::CloudIndex(joint).distances(*record.survey, server.T_reference_world->inverse()));
+  if (back) server.survey_covered = back->within_30cm;
+}
+
+}  // namespace
+
+void evaluate_map(const server::MapServer& server, const evaluation::AssociationConfig& association,
+                  MissionRecord& record) {
+  std::unique_ptr<const evaluation::CloudIndex> survey;
+  if (record.survey) survey = std::make_unique<const evaluation::CloudIndex>(*record.survey);
+  for (RobotRecord& robot : record.robots) {
+    const RobotMaps maps = put_together(server, robot, record);
+    keep_onboard(maps.onboard, survey.get(), association, robot);
+    if (survey)
+      measure_corrected(maps.corrected, *survey, find_policy(robot, record.default_policy), association, robot);
+    CloudRecord seen{.robot = robot.id, .cloud = maps.server.thinned()};
+    if (!seen.cloud.points.empty()) record.server.clouds.push_back(std::move(seen));
+  }
+  if (survey) measure_joint_cloud(*survey, record);
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "tutti/evaluation/agreement.hpp"
+#include "tutti/evaluation/ate.hpp"
+#include "tutti/evaluation/rpe.hpp"
+#include "tutti/mission/evaluate.hpp"
+
+namespace tutti::mission {
+namespace {
+
+Accuracy accuracy_of(const Trajectory& estimate, const MissionRecording& robot,
+                     const evaluation::AssociationConfig& association) {
+  Accuracy out;
+  if (!robot.score_against_reference) return out;
+  const auto pairs = evaluation::associate(estimate, robot.recording.reference, association);
+  if (const auto ate = evaluation::ate(pairs)) {
+    out.rmse_m = ate->rmse_m;
+    out.max_error_m = ate->max_m;
+  }
+  if (const auto rpe = evaluation::rpe_over_time(pairs, kRpeInterval_s)) out.rpe_m = rpe->rmse_m;
+  return out;
+}
+
+void read_server_estimate(const server::MapEstimate& map, RobotRecord& out) {
+  for (const server::MapNode& node : map.nodes) {
+    if (node.id.robot != out.id) continue;
+    if (out.server_estimate.empty()) out.component = node.component;
+    out.server_estimate.push_back({node.stamp, node.T_world_body});
+  }
+}
+
+PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& agent, const MissionRecording& robot,
+                           const Trajectory& server, const evaluation::AssociationConfig& association) {
+  PolicyRecord out{.name = name, .corrected = agent.corrected()};
+  out.accuracy = accuracy_of(out.corrected, robot, association);
+  if (const auto agreement = evaluation::agreement(out.corrected, server)) out.agreement_rmse_m = agreement->rmse_m;
+  out.constraints_added = agent.ledger().size();
+  for (const consistency::Constraint& c : agent.ledger().constraints())
+    out.constraints.push_back({c.from_stamp, c.to_stamp, c.kind});
+  return out;
+}
+
+double path_length(const Trajectory& trajectory) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i)
+    length += (trajectory[i].pose.translation - trajectory[i - 1].pose.translation).norm();
+  return length;
+}
+
+}  // namespace
+
+void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
+                     const evaluation::AssociationConfig& association, MissionRecord& record) {
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    const RobotOutcome& robot = robots[i];
+    const MissionRecording& recording = *robot.recording;
+    RobotRecord& out = record.robots[i];
+    const auto agent = std::find_if(robot.agents.begin(), robot.agents.end(),
+                                    [&](const auto& entry) { return entry.first == robot.default_policy; });
+    out.id = recording.recording.robot;
+    out.name = recording.recording.name;
+    out.distance_m = path_length(recording.recording.odometry);
+    out.duration_s = recording.recording.odometry.back().stamp - recording.recording.odometry.front().stamp;
+    out.odometry_factors = agent->second->odometry_factors();
+    out.keyframes = agent->second->keyframes().size();
+    for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
+    read_server_estimate(map, out);
+    if (recording.score_against_reference) out.reference = recording.recording.reference;
+    out.start_s = recording.start_s;
+    out.drift_origins = recording.recording.drift_origins;
+    out.onboard = accuracy_of(out.odometry, recording, association);
+    out.server = accuracy_of(out.server_estimate, recording, association);
+    for (const auto& [name, policy_agent] : robot.agents)
+      out.policies.push_back(policy_record(name, *policy_agent, recording, out.server_estimate, association));
+    for (const robot::Whereabouts& other : agent->second->whereabouts())
+      out.whereabouts.push_back({other.robot, other.stamp, other.T_map_body});
+  }
+}
+
+}  // namespace tutti::mission
