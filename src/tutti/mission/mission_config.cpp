@@ -35,8 +35,9 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
     if (config.closures.finder == "lidar" && robot.scans.empty())
       problem(path + ".scans: missing, but closures.finder is 'lidar'");
   }
-  if (config.source == "simulation" && config.closures.finder == "lidar")
-    problem("closures.finder: is 'lidar', but simulated robots have no scans yet; expected 'reference'");
+  if (config.source == "simulation" && config.closures.finder == "lidar" && config.simulation.sensors != "lidar")
+    problem(fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
+                        config.simulation.sensors));
   for (const std::string& policy : config.compare_policies)
     if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
       problem("compare_policies: " + known.error().message);

@@ -15,11 +15,14 @@
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/pcd.hpp"
 #include "tutti/formats/tum.hpp"
+#include "tutti/simulation/surface.hpp"
 
 namespace tutti::mission {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kSurveySpacing_m = 0.1;
 
 Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data) {
   const fs::path path = data / source.file;
@@ -148,15 +151,22 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
 
 }  // namespace
 
-Result<std::vector<MissionRecording>> load_recordings(const MissionConfig& config, const std::filesystem::path& data,
-                                                      std::uint64_t seed) {
-  if (config.source == "recordings") return replay_all(config, data, Rng(seed));
+Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed) {
+  if (config.source == "recordings") {
+    auto robots = replay_all(config, data, Rng(seed));
+    if (!robots) return tl::unexpected(robots.error());
+    return MissionInput{.robots = std::move(*robots), .survey = nullptr};
+  }
   auto world = simulation::simulate_recordings(config.simulation, Timestamp{0}, seed);
   if (!world) return tl::unexpected(world.error());
-  std::vector<MissionRecording> out;
+  MissionInput input;
   for (std::size_t i = 0; i < world->recordings.size(); ++i)
-    out.push_back({.recording = std::move(world->recordings[i]), .start_s = config.simulation.robots[i].start_s});
-  return out;
+    input.robots.push_back(
+        {.recording = std::move(world->recordings[i]), .start_s = config.simulation.robots[i].start_s});
+  if (world->surface)
+    input.survey = std::make_shared<const PointCloud>(
+        simulation::sample_surface(*world->surface, kSurveySpacing_m, Rng(seed).fork("survey")));
+  return input;
 }
 
 }  // namespace tutti::mission

@@ -3,12 +3,14 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "tutti/base/result.hpp"
 #include "tutti/mission/mission_config.hpp"
+#include "tutti/model/point_cloud.hpp"
 #include "tutti/model/recording.hpp"
 
 namespace tutti::mission {
@@ -24,8 +26,12 @@ struct MissionRecording {
   std::optional<Pose3> T_common_odom;
 };
 
+struct MissionInput {
+  std::vector<MissionRecording> robots;
+  std::shared_ptr<const PointCloud> survey;  ///< What the place really looks like, reference frame; null when unknown.
+};
+
 /// Replays or simulates every robot of the mission. `data` is the --data folder (may be empty for simulated robots).
-Result<std::vector<MissionRecording>> load_recordings(const MissionConfig& config, const std::filesystem::path& data,
-                                                      std::uint64_t seed);
+Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed);
 
 }  // namespace tutti::mission

@@ -31,42 +31,42 @@ class Recordings : public testing::Test {
 };
 
 TEST_F(Recordings, AreReplayedAsTheyAre) {
-  const auto robots = load_recordings(config_, folder_, 1);
-  ASSERT_TRUE(robots.has_value()) << robots.error().message;
-  EXPECT_EQ(robots->front().recording.odometry, recorded_);
-  EXPECT_EQ(robots->front().recording.increment_covariance.size(), 99U);
-  ASSERT_TRUE(robots->front().T_common_odom.has_value());
-  EXPECT_LT(local({}, *robots->front().T_common_odom).norm(), 1e-12);
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_TRUE(input.has_value()) << input.error().message;
+  EXPECT_EQ(input->robots.front().recording.odometry, recorded_);
+  EXPECT_EQ(input->robots.front().recording.increment_covariance.size(), 99U);
+  ASSERT_TRUE(input->robots.front().T_common_odom.has_value());
+  EXPECT_LT(local({}, *input->robots.front().T_common_odom).norm(), 1e-12);
 }
 
 TEST_F(Recordings, HalvesMeetAndMissNothing) {
   config_.robots.push_back(config_.robots.front());
   config_.robots[0].to_share = config_.robots[1].from_share = 0.5;
   config_.robots[1].name = std::string("b");
-  const auto robots = load_recordings(config_, folder_, 1);
-  ASSERT_TRUE(robots.has_value());
-  EXPECT_EQ((*robots)[0].recording.odometry.size() + (*robots)[1].recording.odometry.size(), 100U);
-  EXPECT_EQ((*robots)[1].recording.odometry.front(), recorded_[50]);
-  EXPECT_EQ((*robots)[1].recording.robot, RobotId{1});
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_TRUE(input.has_value());
+  EXPECT_EQ(input->robots[0].recording.odometry.size() + input->robots[1].recording.odometry.size(), 100U);
+  EXPECT_EQ(input->robots[1].recording.odometry.front(), recorded_[50]);
+  EXPECT_EQ(input->robots[1].recording.robot, RobotId{1});
 }
 
 TEST_F(Recordings, ARandomFrameMovesTheOdometryAndIsKnownToTheJudge) {
   config_.robots[0].random_frame = true;
-  const auto robots = load_recordings(config_, folder_, 1);
-  const auto again = load_recordings(config_, folder_, 1);
-  const auto other = load_recordings(config_, folder_, 2);
-  const MissionRecording& robot = robots->front();
-  EXPECT_EQ(robot.recording.odometry, again->front().recording.odometry);
-  EXPECT_NE(robot.recording.odometry, other->front().recording.odometry);
+  const auto input = load_input(config_, folder_, 1);
+  const auto again = load_input(config_, folder_, 1);
+  const auto other = load_input(config_, folder_, 2);
+  const MissionRecording& robot = input->robots.front();
+  EXPECT_EQ(robot.recording.odometry, again->robots.front().recording.odometry);
+  EXPECT_NE(robot.recording.odometry, other->robots.front().recording.odometry);
   for (std::size_t i = 0; i < recorded_.size(); ++i)
     EXPECT_LT(local(*robot.T_common_odom * robot.recording.odometry[i].pose, recorded_[i].pose).norm(), 1e-9);
 }
 
 TEST_F(Recordings, DegradedOdometryHasNoOneTrueFrame) {
   config_.robots[0].degrade.yaw_deg_per_m = 1.0;
-  const auto robots = load_recordings(config_, folder_, 1);
-  EXPECT_FALSE(robots->front().T_common_odom.has_value());
-  EXPECT_EQ(robots->front().recording.reference, recorded_);
+  const auto input = load_input(config_, folder_, 1);
+  EXPECT_FALSE(input->robots.front().T_common_odom.has_value());
+  EXPECT_EQ(input->robots.front().recording.reference, recorded_);
 }
 
 TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
@@ -74,9 +74,9 @@ TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
   config_.robots[0].from_share = 0.1;
   std::ofstream(folder_ / "scans" / "000012.pcd") << "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 "
                                                      "1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n1 2 3\n";
-  const auto robots = load_recordings(config_, folder_, 1);
-  ASSERT_TRUE(robots.has_value());
-  const Recording& recording = robots->front().recording;
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_TRUE(input.has_value());
+  const Recording& recording = input->robots.front().recording;
   const auto there = recording.scans->scan(2);
   ASSERT_TRUE(there.has_value() && there->has_value());
   EXPECT_EQ((*there)->stamp, recording.odometry[2].stamp);
@@ -85,7 +85,7 @@ TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
   ASSERT_TRUE(absent.has_value());
   EXPECT_FALSE(absent->has_value());
   config_.robots[0].scans = std::string("nowhere");
-  EXPECT_FALSE(load_recordings(config_, folder_, 1).has_value());
+  EXPECT_FALSE(load_input(config_, folder_, 1).has_value());
 }
 
 }  // namespace

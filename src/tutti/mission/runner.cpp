@@ -49,10 +49,11 @@ class Pace {
 
 class MissionRun {
  public:
-  MissionRun(const MissionConfig& config, const RunOptions& options, std::vector<MissionRecording> recordings)
+  MissionRun(const MissionConfig& config, const RunOptions& options, MissionInput input)
       : config_(config),
         options_(options),
-        recordings_(std::move(recordings)),
+        recordings_(std::move(input.robots)),
+        survey_(std::move(input.survey)),
         finder_(
             spoiled(make_closure_finder(config.closures, recordings_, options.seed), config.closures, options.seed)),
         clouds_(std::make_shared<server::MemoryCloudStore>()),
@@ -236,6 +237,7 @@ class MissionRun {
   const MissionConfig& config_;
   const RunOptions& options_;
   std::vector<MissionRecording> recordings_;
+  std::shared_ptr<const PointCloud> survey_;
   std::shared_ptr<const server::ClosureFinder> finder_;
   std::shared_ptr<server::CloudStore> clouds_;
   server::MapServer server_;
@@ -300,7 +302,8 @@ MissionRecord MissionRun::record() const {
                        .association = config_.association,
                        .rpe_interval = fmt::format("{:g} s", kRpeInterval_s),
                        .version = options_.version,
-                       .effective_config_yaml = to_yaml(dump_config(config_))};
+                       .effective_config_yaml = to_yaml(dump_config(config_)),
+                       .survey = survey_};
   std::vector<RobotOutcome> outcomes;
   for (const auto& robot : robots_) {
     outcomes.push_back(robot->outcome());
@@ -330,9 +333,9 @@ MissionRecord MissionRun::record() const {
 }  // namespace
 
 Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options) {
-  auto recordings = load_recordings(config, options.data, options.seed);
-  if (!recordings) return tl::unexpected(recordings.error());
-  MissionRun mission(config, options, std::move(*recordings));
+  auto input = load_input(config, options.data, options.seed);
+  if (!input) return tl::unexpected(input.error());
+  MissionRun mission(config, options, std::move(*input));
   mission.run();
   return mission.record();
 }
