@@ -14,12 +14,11 @@ namespace tutti::simulation {
 namespace {
 
 constexpr int kBins = 16;
-constexpr std::uint32_t kLeafSize = 2;     ///< Never split.
-constexpr std::uint32_t kMaxLeafSize = 8;  ///< Always split above, if any two centres differ.
-constexpr int kMaxDepth = 60;
-constexpr float kTraversalCost = 1.5F;  ///< In intersections of a triangle.
+constexpr int kMaxDepth = 48;  ///< Below, ranges are halved, so that a stack of kStack is enough.
+constexpr int kStack = 256;
 constexpr float kFar = std::numeric_limits<float>::infinity();
 constexpr float kSlack = 1.000002F;  ///< A few ulp: rounding may shrink a flat box's slab to less than nothing.
+constexpr float kEdge = 1e-5F;       ///< Of a triangle's size.
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 struct Box {
@@ -51,6 +50,9 @@ int bin_of(float centre, float low, float scale) {
   return std::clamp(static_cast<int>((centre - low) * scale), 0, kBins - 1);
 }
 
+/// Triangles are tested four at a time: what they cost.
+float packets(std::uint32_t count) { return static_cast<float>((count + 3) / 4); }
+
 Split best_split(const Item* items, std::uint32_t count, const Box& centres, int axis) {
   const float extent = centres.high[axis] - centres.low[axis];
   if (!(extent > 0.0F)) return {};
@@ -68,7 +70,7 @@ Split best_split(const Item* items, std::uint32_t count, const Box& centres, int
   for (std::size_t bin = kBins - 1; bin > 0; --bin) {
     right.add(boxes[bin]);
     right_count += counts[bin];
-    right_cost[bin] = right_count == 0 ? 0.0F : right.half_area() * static_cast<float>(right_count);
+    right_cost[bin] = right_count == 0 ? 0.0F : right.half_area() * packets(right_count);
   }
   Split best;
   Box left;
@@ -77,7 +79,7 @@ Split best_split(const Item* items, std::uint32_t count, const Box& centres, int
     left.add(boxes[bin]);
     left_count += counts[bin];
     if (left_count == 0 || left_count == count) continue;
-    const float cost = left.half_area() * static_cast<float>(left_count) + right_cost[bin + 1];
+    const float cost = left.half_area() * packets(left_count) + right_cost[bin + 1];
     if (cost < best.cost) best = {axis, static_cast<int>(bin), cost};
   }
   return best;
@@ -87,68 +89,93 @@ Split best_split(const Item* items, std::uint32_t count, const Box& centres, int
 
 struct Bvh::Builder {
   Bvh& bvh;
+  const TriangleMesh& mesh;
   std::vector<Item> items;
 
-  struct Child {
-    std::uint32_t index = 0;
-    std::uint32_t count = 0;
+  struct Range {
+    std::uint32_t begin = 0, end = 0;
+    Box box;
+    [[nodiscard]] std::uint32_t size() const { return end - begin; }
+    /// How much there is to gain from splitting it.
+    [[nodiscard]] float weight() const { return size() <= kWidth ? -1.0F : box.half_area(); }
   };
 
-  /// Items [begin, end) reordered so that the left child has [begin, result); nothing when a leaf is better.
-  std::optional<std::uint32_t> partition(std::uint32_t begin, std::uint32_t end, const Box& box, int depth) {
-    const std::uint32_t count = end - begin;
-    if (count <= kLeafSize || depth >= kMaxDepth) return std::nullopt;
+  Range range(std::uint32_t begin, std::uint32_t end) const {
+    Range out{begin, end, {}};
+    for (std::uint32_t i = begin; i < end; ++i) out.box.add(items[i].box);
+    return out;
+  }
+
+  /// Reorders the items of a range and says where its second part begins.
+  std::uint32_t partition(const Range& range, int depth) {
     Box centres;
-    for (std::uint32_t i = begin; i < end; ++i) centres.add({items[i].centre(), items[i].centre()});
+    for (std::uint32_t i = range.begin; i < range.end; ++i) centres.add({items[i].centre(), items[i].centre()});
     Split best;
     for (int axis = 0; axis < 3; ++axis) {
-      const Split split = best_split(items.data() + begin, count, centres, axis);
+      const Split split = best_split(items.data() + range.begin, range.size(), centres, axis);
       if (split.cost < best.cost) best = split;
     }
-    const float area = box.half_area();
-    const bool pays = best.cost + kTraversalCost * area < static_cast<float>(count) * area;
-    if (best.axis < 0 || (!pays && count <= kMaxLeafSize)) return std::nullopt;
+    if (best.axis < 0 || depth > kMaxDepth) return range.begin + range.size() / 2;
     const float low = centres.low[best.axis];
     const float scale = static_cast<float>(kBins) / (centres.high[best.axis] - low);
-    const auto middle = std::partition(items.begin() + begin, items.begin() + end, [&](const Item& item) {
+    const auto middle = std::partition(items.begin() + range.begin, items.begin() + range.end, [&](const Item& item) {
       return bin_of(item.centre()[best.axis], low, scale) <= best.bin;
     });
     return static_cast<std::uint32_t>(middle - items.begin());
   }
 
-  Box box_of(std::uint32_t begin, std::uint32_t end) const {
-    Box box;
-    for (std::uint32_t i = begin; i < end; ++i) box.add(items[i].box);
-    return box;
-  }
-
-  Child build(std::uint32_t begin, std::uint32_t end, const Box& box, int depth) {
-    const auto middle = partition(begin, end, box, depth);
-    if (!middle) return {begin, end - begin};
-    const auto at = static_cast<std::uint32_t>(bvh.nodes_.size());
+  /// Index of the node of a range.
+  std::int32_t build(const Range& whole, int depth) {
+    std::array<Range, kWidth> parts{whole};
+    std::size_t count = 1;
+    while (count < kWidth) {
+      const auto largest = std::max_element(parts.begin(), parts.begin() + count,
+                                            [](const Range& a, const Range& b) { return a.weight() < b.weight(); });
+      if (largest->size() <= kWidth) break;
+      const std::uint32_t middle = partition(*largest, depth);
+      parts[count++] = range(middle, largest->end);
+      *largest = range(largest->begin, middle);
+    }
+    const auto at = static_cast<std::int32_t>(bvh.nodes_.size());
     bvh.nodes_.emplace_back();
-    const std::uint32_t ends[] = {begin, *middle, end};
-    for (std::size_t side = 0; side < 2; ++side) {
-      const Box part = box_of(ends[side], ends[side + 1]);
-      set(at, side, part, build(ends[side], ends[side + 1], part, depth + 1));
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      const bool leaf = parts[i].size() <= kWidth;
+      const std::int32_t child = i >= count ? 0 : leaf ? pack(parts[i]) : build(parts[i], depth + 1);
+      Node& node = bvh.nodes_[static_cast<std::size_t>(at)];
+      node.children[i] = child;
+      for (int axis = 0; axis < 3; ++axis) {
+        node.bounds[0][axis][i] = parts[i].box.low[axis];
+        node.bounds[1][axis][i] = parts[i].box.high[axis];
+      }
     }
-    return {at, 0};
+    return at;
   }
 
-  void set(std::uint32_t at, std::size_t side, const Box& box, Child child) {
-    Node& node = bvh.nodes_[at];
-    for (int axis = 0; axis < 3; ++axis) {
-      node.low[side][axis] = box.low[axis];
-      node.high[side][axis] = box.high[axis];
+  /// ~index of the packet of up to kWidth triangles.
+  std::int32_t pack(const Range& range) {
+    Packet packet{};  // Lanes left over hold triangles without area, which nothing hits.
+    std::fill_n(packet.triangle, kWidth, kNone);
+    for (std::uint32_t i = 0; i < range.size(); ++i) {
+      const std::uint32_t triangle = items[range.begin + i].triangle;
+      const auto& corners = mesh.triangles[triangle];
+      const Eigen::Vector3f& a = mesh.vertices[corners[0]];
+      const Eigen::Vector3f edge1 = mesh.vertices[corners[1]] - a, edge2 = mesh.vertices[corners[2]] - a;
+      for (int axis = 0; axis < 3; ++axis) {
+        packet.corner[axis][i] = a[axis];
+        packet.edge1[axis][i] = edge1[axis];
+        packet.edge2[axis][i] = edge2[axis];
+      }
+      packet.triangle[i] = triangle;
+      bvh.place_[triangle] = static_cast<std::uint32_t>(kWidth * bvh.packets_.size()) + i;
     }
-    node.index[side] = child.index;
-    node.count[side] = child.count;
+    bvh.packets_.push_back(packet);
+    return ~static_cast<std::int32_t>(bvh.packets_.size() - 1);
   }
 };
 
-Bvh::Bvh(const TriangleMesh& mesh) {
+Bvh::Bvh(const TriangleMesh& mesh) : place_(mesh.triangles.size()) {
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
-  Builder builder{*this, std::vector<Item>(count)};
+  Builder builder{*this, mesh, std::vector<Item>(count)};
   for (std::uint32_t i = 0; i < count; ++i) {
     for (const std::uint32_t corner : mesh.triangles[i]) {
       TUTTI_CHECK(corner < mesh.vertices.size(), "corner {} of {}", corner, mesh.vertices.size());
@@ -157,107 +184,100 @@ Bvh::Bvh(const TriangleMesh& mesh) {
     }
     builder.items[i].triangle = i;
   }
-  nodes_.reserve(count / 2 + 1);
-  if (count == 0) return;
-  const Box box = builder.box_of(0, count);
-  const Builder::Child root = builder.build(0, count, box, 0);
-  if (root.count > 0) {  // A handful of triangles: cast() wants a node to begin with.
-    nodes_.emplace_back();
-    for (std::size_t side = 0; side < 2; ++side) builder.set(0, side, box, root);
-  }
-
-  triangles_.reserve(count);
-  mesh_index_.reserve(count);
-  place_.resize(count);
-  for (const Item& item : builder.items) {
-    const auto& corners = mesh.triangles[item.triangle];
-    const Eigen::Vector3f& a = mesh.vertices[corners[0]];
-    place_[item.triangle] = static_cast<std::uint32_t>(triangles_.size());
-    triangles_.push_back({a, mesh.vertices[corners[1]] - a, mesh.vertices[corners[2]] - a});
-    mesh_index_.push_back(item.triangle);
-  }
+  nodes_.reserve(count / 4 + 1);
+  packets_.reserve(count / 2 + 1);
+  builder.build(builder.range(0, count), 0);
 }
 
-/// A ray and the nearest hit so far.
+/// A ray and the nearest hit so far. Comparisons are written so that a NaN (0 * infinity, where a ray runs within the
+/// plane of a box's side) changes nothing.
 struct Bvh::Ray {
   Eigen::Vector3f origin, direction;
   float inverse[3];
+  int backwards[3];  ///< 1 where the direction is negative: the ray then enters a box at its high side.
   RayHit hit;
 
   Ray(const Eigen::Vector3f& from, const Eigen::Vector3f& towards, float max_distance)
       : origin(from), direction(towards), hit{max_distance, kNone} {
-    // The inverse of zero is infinite and 0 * infinity = NaN; with a tiny component every product stays a number.
     for (int axis = 0; axis < 3; ++axis) {
-      const float d = towards[axis];
-      inverse[axis] = 1.0F / (std::abs(d) < 1e-20F ? std::copysign(1e-20F, d) : d);
+      inverse[axis] = 1.0F / towards[axis];
+      backwards[axis] = std::signbit(towards[axis]) ? 1 : 0;
     }
   }
 
-  /// Distance at which the ray enters a child's box; infinite when it misses it or a nearer hit is known.
-  float enter(const Node& node, int side) const {
-    const float x0 = (node.low[side][0] - origin[0]) * inverse[0], x1 = (node.high[side][0] - origin[0]) * inverse[0];
-    const float y0 = (node.low[side][1] - origin[1]) * inverse[1], y1 = (node.high[side][1] - origin[1]) * inverse[1];
-    const float z0 = (node.low[side][2] - origin[2]) * inverse[2], z1 = (node.high[side][2] - origin[2]) * inverse[2];
-    const float in = std::max(std::max(std::min(x0, x1), std::min(y0, y1)), std::max(std::min(z0, z1), 0.0F));
-    const float out = std::min(std::min(std::max(x0, x1), std::max(y0, y1)), std::min(std::max(z0, z1), hit.distance));
-    return in <= out * kSlack ? in : kFar;
+  /// Distances at which the ray enters a node's boxes; infinite where it misses or a nearer hit is known.
+  [[nodiscard]] Lanes enter(const Node& node) const {
+    Lanes in = all(0.0F), out = all(hit.distance);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Lanes near = (node.bounds[backwards[axis]][axis] - origin[axis]) * inverse[axis];
+      const Lanes far = (node.bounds[1 - backwards[axis]][axis] - origin[axis]) * inverse[axis];
+      in = near > in ? near : in;
+      out = far < out ? far : out;
+    }
+    return in <= out * kSlack ? in : all(kFar);
   }
 
-  void intersect(const Triangle& triangle, std::uint32_t index) {
-    const Eigen::Vector3f p = direction.cross(triangle.edge2);
-    const float determinant = triangle.edge1.dot(p);
-    if (determinant == 0.0F) return;
-    const float scale = 1.0F / determinant;
-    const Eigen::Vector3f s = origin - triangle.corner;
-    const float u = s.dot(p) * scale;
-    if (!(u >= 0.0F && u <= 1.0F)) return;
-    const Eigen::Vector3f q = s.cross(triangle.edge1);
-    const float v = direction.dot(q) * scale;
-    if (!(v >= 0.0F && u + v <= 1.0F)) return;
-    const float distance = triangle.edge2.dot(q) * scale;
-    if (!(distance > 0.0F && distance <= hit.distance)) return;
-    if (distance == hit.distance && index >= hit.triangle) return;  // A shared edge: whatever the order of the search.
-    hit = {distance, index};
+  void intersect(const Packet& packet) {
+    const float dx = direction.x(), dy = direction.y(), dz = direction.z();
+    const auto& [bx, by, bz] = packet.edge1;
+    const auto& [cx, cy, cz] = packet.edge2;
+    const Lanes px = dy * cz - dz * cy, py = dz * cx - dx * cz, pz = dx * cy - dy * cx;
+    const Lanes scale = 1.0F / (bx * px + by * py + bz * pz);
+    const Lanes sx = origin.x() - packet.corner[0], sy = origin.y() - packet.corner[1],
+                sz = origin.z() - packet.corner[2];
+    const Lanes qx = sy * bz - sz * by, qy = sz * bx - sx * bz, qz = sx * by - sy * bx;
+    const Lanes u = (sx * px + sy * py + sz * pz) * scale;
+    const Lanes v = (dx * qx + dy * qy + dz * qz) * scale;
+    const Lanes t = (cx * qx + cy * qy + cz * qz) * scale;
+    const auto inside = (u >= -kEdge) & (v >= -kEdge) & (u + v <= 1.0F + kEdge) & (t > 0.0F) & (t <= hit.distance);
+    const Lanes distance = inside ? t : all(kFar);
+    for (int i = 0; i < kWidth; ++i) {
+      const bool nearer = distance[i] < hit.distance;
+      // Where two triangles meet, the same one whatever the order of the search.
+      const bool as_near = distance[i] == hit.distance && packet.triangle[i] < hit.triangle;
+      if (nearer || as_near) hit = {distance[i], packet.triangle[i]};
+    }
   }
+
+  static Lanes all(float value) { return Lanes{value, value, value, value}; }
 };
 
 std::optional<RayHit> Bvh::cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
                                 float max_distance) const {
-  if (nodes_.empty()) return std::nullopt;
   Ray ray(origin, direction, max_distance);
   struct Pending {
-    std::uint32_t node;
+    std::int32_t child;
     float entry;
   };
-  std::array<Pending, kMaxDepth + 2> stack;
-  std::size_t waiting = 0;
-  std::uint32_t at = 0;
-  while (true) {
-    const Node& node = nodes_[at];
-    float entry[2] = {ray.enter(node, 0), ray.enter(node, 1)};
-    for (int side = 0; side < 2; ++side) {
-      if (node.count[side] == 0 || entry[side] == kFar) continue;
-      for (std::uint32_t i = node.index[side]; i < node.index[side] + node.count[side]; ++i)
-        ray.intersect(triangles_[i], mesh_index_[i]);
-      entry[side] = kFar;
-    }
-    const int near = entry[0] <= entry[1] ? 0 : 1;
-    if (entry[near] < kFar) {
-      at = node.index[near];
-      if (entry[1 - near] < kFar) stack[waiting++] = {node.index[1 - near], entry[1 - near]};
+  Pending stack[kStack];
+  int waiting = 0;
+  stack[waiting++] = {0, 0.0F};
+  while (waiting > 0) {
+    const Pending next = stack[--waiting];
+    if (next.entry > ray.hit.distance) continue;
+    if (next.child < 0) {
+      ray.intersect(packets_[static_cast<std::size_t>(~next.child)]);
       continue;
     }
-    while (waiting > 0 && stack[waiting - 1].entry > ray.hit.distance) --waiting;
-    if (waiting == 0) break;
-    at = stack[--waiting].node;
+    const Node& node = nodes_[static_cast<std::size_t>(next.child)];
+    const Lanes entry = ray.enter(node);
+    const int first = waiting;
+    for (int i = 0; i < kWidth; ++i) {  // The nearest on top.
+      if (entry[i] == kFar) continue;
+      int at = waiting++;
+      for (; at > first && stack[at - 1].entry < entry[i]; --at) stack[at] = stack[at - 1];
+      stack[at] = {node.children[i], entry[i]};
+    }
   }
   if (ray.hit.triangle == kNone) return std::nullopt;
   return ray.hit;
 }
 
 Eigen::Vector3f Bvh::normal(std::uint32_t triangle) const {
-  const Triangle& t = triangles_[place_[triangle]];
-  const Eigen::Vector3f n = t.edge1.cross(t.edge2);
+  const Packet& packet = packets_[place_[triangle] / kWidth];
+  const std::uint32_t lane = place_[triangle] % kWidth;
+  const auto edge = [lane](const Lanes* e) { return Eigen::Vector3f(e[0][lane], e[1][lane], e[2][lane]); };
+  const Eigen::Vector3f n = edge(packet.edge1).cross(edge(packet.edge2));
   return n.squaredNorm() > 0.0F ? Eigen::Vector3f(n.normalized()) : Eigen::Vector3f(Eigen::Vector3f::Zero());
 }
 

@@ -30,27 +30,28 @@ class Bvh {
 
   /// Unit normal, to the side from which the triangle's corners run counter-clockwise; zero for a degenerate one.
   [[nodiscard]] Eigen::Vector3f normal(std::uint32_t triangle) const;
-  [[nodiscard]] std::size_t size() const { return triangles_.size(); }
+  [[nodiscard]] std::size_t size() const { return place_.size(); }  ///< Triangles.
 
  private:
-  /// Both children's boxes in one cache line. A child with count 0 is the node `index`, otherwise `count` triangles
-  /// from place `index` on.
+  static constexpr int kWidth = 4;                       ///< Boxes or triangles tested at once,
+  typedef float Lanes __attribute__((vector_size(16)));  ///< in a SIMD register (GCC's and Clang's vector extension).
+
+  /// A box is [low, high] per axis; a child that is not there has an empty one. children: index of a node, or ~index of
+  /// a packet.
   struct alignas(64) Node {
-    float low[2][3];
-    float high[2][3];
-    std::uint32_t index[2];
-    std::uint32_t count[2];
+    Lanes bounds[2][3];
+    std::int32_t children[kWidth];
   };
-  struct Triangle {
-    Eigen::Vector3f corner, edge1, edge2;
+  struct Packet {
+    Lanes corner[3], edge1[3], edge2[3];
+    std::uint32_t triangle[kWidth];  ///< Of the mesh.
   };
   struct Builder;
   struct Ray;
 
   std::vector<Node> nodes_;
-  std::vector<Triangle> triangles_;        ///< In the order of the leaves.
-  std::vector<std::uint32_t> mesh_index_;  ///< Of each of these.
-  std::vector<std::uint32_t> place_;       ///< Of each triangle of the mesh.
+  std::vector<Packet> packets_;
+  std::vector<std::uint32_t> place_;  ///< Of each triangle of the mesh: kWidth * packet + lane.
 };
 
 }  // namespace tutti::simulation

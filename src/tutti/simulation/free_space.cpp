@@ -56,11 +56,12 @@ double noise(double x, double y, double z, std::uint32_t seed) {
 double rounded_rectangle(double x, double y, double half_x, double half_y, double radius) {
   const double dx = std::abs(x) - half_x + radius;
   const double dy = std::abs(y) - half_y + radius;
-  return std::hypot(std::max(dx, 0.0), std::max(dy, 0.0)) + std::min(std::max(dx, dy), 0.0) - radius;
+  return Eigen::Vector2d(std::max(dx, 0.0), std::max(dy, 0.0)).norm() + std::min(std::max(dx, dy), 0.0) - radius;
 }
 
-bool within(const Roof& roof, const Eigen::Vector3d& p) {
-  return p.x() >= roof.low.x() && p.x() <= roof.high.x() && p.y() >= roof.low.y() && p.y() <= roof.high.y();
+bool within(const Roof& roof, const Eigen::Vector3d& p, double margin) {
+  const Eigen::Array2d xy = p.head<2>().array();
+  return (xy >= roof.low.array() + margin).all() && (xy <= roof.high.array() - margin).all();
 }
 
 }  // namespace
@@ -68,7 +69,7 @@ bool within(const Roof& roof, const Eigen::Vector3d& p) {
 FreeSpace::FreeSpace(const CorridorWorld& world, const SurfaceConfig& config, Rng rng)
     : parts_(furnish(world, config, rng.fork("furnish"))),
       block_m_(kCellsPerBlock * config.cell_m),
-      known_m_(2.0 * config.cell_m),
+      cell_m_(config.cell_m),
       roughness_length_m_(config.roughness_length_m),
       variation_length_m_(config.width_variation_length_m),
       seed_(static_cast<std::uint32_t>(rng.fork("noise").index(1ULL << 32U))) {
@@ -116,7 +117,7 @@ double FreeSpace::box(const Box& box, const Eigen::Vector3d& p) const {
 
 double FreeSpace::roof(const Eigen::Vector3d& p) const {
   const Roof& roof = *parts_.roof;
-  if (!within(roof, p)) return kSolid;
+  if (!within(roof, p, 0.0)) return kSolid;
   double value = roof.floor - p.z();
   for (const Box& solid : roof.solids) value = std::max(value, -box(solid, p));
   return value;
@@ -136,7 +137,7 @@ double FreeSpace::value(const Nearby& nearby, const Eigen::Vector3d& p) const {
 }
 
 bool FreeSpace::is_known(const Nearby& nearby, const Eigen::Vector3d& p) const {
-  return !nearby.roof || within(*parts_.roof, p) || enclosed(nearby, p) < known_m_;
+  return !nearby.roof || within(*parts_.roof, p, 0.5 * cell_m_) || enclosed(nearby, p) < 2.0 * cell_m_;
 }
 
 double FreeSpace::value(const Eigen::Vector3d& p) const {

@@ -70,7 +70,8 @@ class FreeSpace {
   [[nodiscard]] const std::map<BlockIndex, Nearby>& blocks() const { return blocks_; }
   /// As value(), for a position within or on the border of the block.
   [[nodiscard]] double value(const Nearby& nearby, const Eigen::Vector3d& position) const;
-  /// False outside the roof's edge, where open space and rock meet without a wall between them.
+  /// False where a cell of the grid around the position reaches beyond the roof's edge, where open space and rock meet
+  /// without a wall between them.
   [[nodiscard]] bool is_known(const Nearby& nearby, const Eigen::Vector3d& position) const;
   [[nodiscard]] const SpaceParts& parts() const { return parts_; }
 
@@ -84,7 +85,7 @@ class FreeSpace {
 
   SpaceParts parts_;
   double block_m_;
-  double known_m_;  ///< How far around enclosed surfaces is_known() holds.
+  double cell_m_;
   double roughness_length_m_;
   double variation_length_m_;
   std::uint32_t seed_;

@@ -13,7 +13,6 @@ namespace {
 constexpr double kAtJunction = 3.0;     ///< Nothing stands this near to a junction, where robots cut corners.
 constexpr double kClearance = 1.0;      ///< Around the lines that robots walk along (offices: 0.75).
 constexpr double kIntoWall = 0.6;       ///< How far things reach into the wall they stand at.
-constexpr double kParapetWidth = 0.3;   ///< Half of it inside the roof's edge.
 constexpr double kStairhouseIn = 2.0;   ///< The door's house, inside the roof's edge.
 constexpr double kStairhouseOut = 1.5;  ///< And beyond it, so that sky and rock never meet.
 
@@ -104,8 +103,9 @@ void furnish_office(const CorridorWorld& world, std::size_t corridor, const Aisl
 Hall hall_of(CorridorKind kind, const SurfaceConfig& config, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   if (kind == CorridorKind::office)
     return {a, b, 0.5 * config.office_width_m, config.office_height_m, 0.0, 0.0, 0.0, 0.0};
-  Hall hall{a, b, 0.5 * config.width_m, config.height_m, 1.0, 0.4, 0.0, 0.0};
+  Hall hall{a, b, 0.5 * config.width_m, config.height_m, 1.2, 0.8, 0.0, 0.0};
   if (kind == CorridorKind::rough) {
+    hall.bottom_radius = 0.4;
     hall.roughness = config.roughness_m;
     hall.variation = config.width_variation;
   }
@@ -146,13 +146,14 @@ void add_chimneys(const CorridorWorld& world, const SurfaceConfig& config, Roof&
 void add_parapet(const SurfaceConfig& config, Roof& roof) {
   const Eigen::Vector2d middle = 0.5 * (roof.low + roof.high), half = 0.5 * (roof.high - roof.low);
   const double z = roof.floor + 0.5 * config.parapet_height_m - 0.25, half_z = 0.5 * config.parapet_height_m + 0.25;
+  const double half_width = 0.1 + config.cell_m;  // The mesh ends within a cell of the roof's edge: not on this side.
   for (const double sign : {-1.0, 1.0}) {
     roof.solids.push_back({{middle.x() + sign * half.x(), middle.y(), z},
                            Eigen::Vector2d::UnitX(),
-                           {0.5 * kParapetWidth, half.y() + kParapetWidth, half_z}});
+                           {half_width, half.y() + half_width, half_z}});
     roof.solids.push_back({{middle.x(), middle.y() + sign * half.y(), z},
                            Eigen::Vector2d::UnitX(),
-                           {half.x() + kParapetWidth, 0.5 * kParapetWidth, half_z}});
+                           {half.x() + half_width, half_width, half_z}});
   }
 }
 
@@ -194,19 +195,21 @@ SpaceParts furnish(const CorridorWorld& world, const SurfaceConfig& config, Rng 
     if (corridor.kind == CorridorKind::rough) furnish_tunnel(aisle, config, parts, rng.fork(i));
     if (corridor.kind == CorridorKind::office) furnish_office(world, i, aisle, config, parts, rng.fork(i));
     for (const std::size_t end : {corridor.a, corridor.b}) {
+      const Eigen::Vector3d at = world.junctions[end] + down;
       if (is_open[end]) {
         parts.roof->solids.push_back(stairhouse(hall, *parts.roof, end == corridor.b));
-      } else if (!chambers[end] || chambers[end]->half_width < hall.half_width) {
-        const Eigen::Vector3d at = world.junctions[end] + down;
-        const bool office = corridor.kind == CorridorKind::office;
-        chambers[end] = hall_of(office ? corridor.kind : CorridorKind::rough, config, at, at);
+      } else if (corridor.kind != CorridorKind::office) {
+        chambers[end] = hall_of(CorridorKind::rough, config, at, at);
+      } else if (world.corridors_at[end].size() == 2) {  // Corners of an office are not round.
+        const Eigen::Vector3d up(0.0, 0.0, 0.5 * hall.height);
+        parts.openings.push_back({at + up, aisle.along, {hall.half_width, hall.half_width, up.z()}, 0.0});
       }
     }
   }
-  for (auto& chamber : chambers) {
-    if (!chamber) continue;
-    chamber->half_width *= 1.35;
-    parts.halls.push_back(*chamber);
+  for (std::size_t i = 0; i < chambers.size(); ++i) {
+    if (!chambers[i]) continue;
+    chambers[i]->half_width *= rng.fork("chamber").fork(i).uniform(1.2, 1.5);
+    parts.halls.push_back(*chambers[i]);
   }
   if (parts.roof) add_chimneys(world, config, *parts.roof, rng.fork("chimneys"));
   return parts;

@@ -90,7 +90,7 @@ class SurfaceNets {
     mesh_.vertices.push_back(vertex.cast<float>());
   }
 
-  /// A Newton step along the gradient, within the cell.
+  /// A Newton step along the gradient, within the cell, where it helps: at a crease it may not.
   Eigen::Vector3d settle(const Eigen::Vector3d& p, const Eigen::Vector3d& corner,
                          const FreeSpace::Nearby& nearby) const {
     const double h = 0.02 * cell_m_;
@@ -98,9 +98,10 @@ class SurfaceNets {
     Eigen::Vector3d gradient;
     for (int axis = 0; axis < 3; ++axis)
       gradient[axis] = (space_.value(nearby, p + h * Eigen::Vector3d::Unit(axis)) - value) / h;
-    const double squared = gradient.squaredNorm();
-    if (squared < 0.25 || squared > 9.0) return p;  // At a crease: the step would be meaningless.
-    return (p - value / squared * gradient).cwiseMax(corner).cwiseMin(corner + Eigen::Vector3d::Constant(cell_m_));
+    const Eigen::Vector3d step = -value / std::max(0.5, gradient.squaredNorm()) * gradient;
+    if (step.norm() > 0.3 * cell_m_) return p;
+    const Eigen::Vector3d moved = (p + step).cwiseMax(corner).cwiseMin(corner + Eigen::Vector3d::Constant(cell_m_));
+    return std::abs(space_.value(nearby, moved)) < std::abs(value) ? moved : p;
   }
 
   /// The four cells around a crossed edge, facing the free side; none where one of them is unknown.
@@ -115,10 +116,11 @@ class SurfaceNets {
       if (found == vertex_of_.end()) return;
       quad[crossing.into_rock ? 3 - i : i] = found->second;
     }
-    const auto diagonal = [&](std::size_t i) {
-      return (mesh_.vertices[quad[i]] - mesh_.vertices[quad[i + 2]]).squaredNorm();
+    const auto error = [&](std::size_t i) {  // Of the diagonal from corner i.
+      const Eigen::Vector3f middle = 0.5F * (mesh_.vertices[quad[i]] + mesh_.vertices[quad[i + 2]]);
+      return std::abs(space_.value(middle.cast<double>()));
     };
-    const std::size_t from = diagonal(0) <= diagonal(1) ? 0 : 1;
+    const std::size_t from = error(0) <= error(1) ? 0 : 1;
     mesh_.triangles.push_back({quad[from], quad[from + 1], quad[from + 2]});
     mesh_.triangles.push_back({quad[from], quad[from + 2], quad[(from + 3) % 4]});
   }

@@ -56,8 +56,8 @@ struct SurfaceConfig {
 
 /// The walls, floors and ceilings around a world's corridors: zero set of FreeSpace by naive surface nets (Gibson,
 /// "Constrained Elastic Surface Nets", MICCAI 1998; without elasticity, each vertex then moved onto the zero set), on a
-/// grid that exists near the corridors only. Closed, except around the roof of open corridors, which ends at the middle
-/// of its parapet, under an open sky.
+/// grid that exists near the corridors only. Closed, except around the roof of open corridors, which ends on its
+/// parapet, under an open sky.
 TriangleMesh world_surface(const CorridorWorld& world, const SurfaceConfig& config, Rng rng);
 TriangleMesh extract_surface(const FreeSpace& space, double cell_m);
 
