@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -22,6 +23,12 @@ struct Rgb {
 /// or has one entry per point.
 std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {});
 Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {});
+
+/// The same with faces: element `face` with one list of uchar and int, vertex_indices.
+std::string to_ply_mesh(std::span<const Eigen::Vector3f> vertices,
+                        std::span<const std::array<std::uint32_t, 3>> triangles);
+Status write_ply_mesh(const std::string& path, std::span<const Eigen::Vector3f> vertices,
+                      std::span<const std::array<std::uint32_t, 3>> triangles);
 
 /// The vertices of an ascii or binary little-endian PLY file: x, y, z float or double at any position, other scalar
 /// properties skipped, elements after `vertex` (faces) ignored, points with a non-finite coordinate dropped. List
