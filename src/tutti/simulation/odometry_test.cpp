@@ -159,7 +159,7 @@ TEST(SimulateOdometry, CovariancesStayHonestOnWalksThroughFeaturelessCorridors) 
   const auto around = surroundings_along(world, truth);
   for (const double stretch_m : {1.0, 10.0, 30.0, 100.0}) {
     double sum = 0.0, count = 0.0;
-    for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    for (std::uint64_t seed = 0; seed < 30; ++seed) {
       const auto simulated = simulate_odometry(truth, around, {}, Rng(seed));
       for (std::size_t from = 0; from + 1 < truth.size(); from += 401, count += 1.0)
         sum += normalised_error(truth, simulated, from, after_distance(truth, from, stretch_m));
@@ -219,7 +219,7 @@ TEST(SimulateOdometry, OriginsOfDriftSayWhenAndHowMuch) {
       if (origin.kind == DriftOrigin::Kind::slip) {
         ++slips;
         EXPECT_EQ(until, from + 1);
-        EXPECT_GT(error.norm(), 10.0 * std::sqrt(simulated.increment_covariance[0].trace()) * 0.1);
+        EXPECT_GT(error.norm(), 10.0 * std::sqrt(simulated.increment_covariance[0].trace()));
       } else {
         ++stays;
         EXPECT_EQ(origin.kind, DriftOrigin::Kind::degeneracy);

@@ -2,7 +2,9 @@
 #include "tutti/simulation/recordings.hpp"
 
 #include <array>
+#include <optional>
 #include <set>
+#include <string>
 #include <utility>
 
 namespace tutti::simulation {
