@@ -99,6 +99,60 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("eval", self.path / "empty.tum", self.path / "none.tum"), 1)
         self.expect(tutti("optimise", self.path / "bad.g2o", "-o", self.path / "x.g2o"), 1, "bad.g2o:1")
 
+    def write_ply(self, name, points):
+        header = "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+        (self.path / name).write_text(header % len(points) + "".join("%.4f %.4f %.4f\n" % p for p in points))
+        return self.path / name
+
+    def room(self, shift=0.0):
+        """Floor and three walls of a room, a point every 0.2 m."""
+        steps = [0.2 * i for i in range(31)]
+        points = [(x, y, 0.0) for x in steps for y in steps]
+        for u in steps:
+            for z in steps[1:12]:
+                points += [(0.0, u, z), (u, 0.0, z), (6.0, u, z)]
+        return [(x + shift, y, z) for x, y, z in points]
+
+    def test_eval_map_measures_and_refines(self):
+        survey = self.write_ply("survey.ply", self.room())
+        shifted = self.write_ply("map.ply", self.room(shift=0.3))
+        measure = lambda *more: json.loads(tutti("eval", "--map", shifted, survey, "--json", *more).stdout)
+        raw = measure()
+        self.assertEqual(raw["map"]["points"], len(self.room()))
+        self.assertGreater(raw["map_to_survey"]["mean_m"], 0.05)
+        back = measure("--transform", "-0.3 0 0 0 0 0 1")
+        self.assertLess(back["map_to_survey"]["p95_m"], 1e-3)
+        self.assertEqual(back["map_to_survey"]["within_10cm"], 1.0)
+        refined = measure("--refine")
+        self.assertAlmostEqual(refined["refinement"]["moved_m"], 0.3, delta=0.02)
+        self.assertAlmostEqual(refined["T_survey_map"]["translation_m"][0], -0.3, delta=0.02)
+        self.assertLess(refined["map_to_survey"]["mean_m"], 0.5 * raw["map_to_survey"]["mean_m"])
+        report = self.path / "report.json"
+        pose = {"translation_m": [-0.3, 0, 0], "quaternion_xyzw": [0, 0, 0, 1]}
+        report.write_text(json.dumps({"server": {"T_reference_world": pose}}))
+        self.assertEqual(measure("--report", report), back)
+        self.expect(tutti("eval", "--map", shifted, survey, "--refine"), 0, "95 %", "moved its centre by 0.3")
+
+    def test_eval_map_says_what_is_wrong(self):
+        survey = self.write_ply("survey.ply", self.room())
+        empty = self.write_ply("empty.ply", [])
+        self.expect(tutti("eval", "--map", survey, self.path / "none.ply"), 1, "none.ply")
+        self.expect(tutti("eval", "--map", empty, survey), 1, "empty.ply", "no point")
+        (self.path / "bad.ply").write_text("ply\nformat ascii 1.0\nelement vertex 1\n")
+        self.expect(tutti("eval", "--map", self.path / "bad.ply", survey), 1, "bad.ply")
+        for transform in ("1 2 3", "0 0 0 0 0 0 2", "0 0 0 0 0 nan 1", "0 0 0 0 0 0 1 8"):
+            self.expect(tutti("eval", "--map", survey, survey, "--transform", transform), 2, "--transform")
+        self.expect(tutti("eval", survey, survey, "--refine"), 2, "--map")
+        self.expect(tutti("eval", "--map", survey, survey, "--voxel", "0"), 2, "--voxel")
+        far = self.write_ply("far.ply", self.room(shift=500.0))
+        self.expect(tutti("eval", "--map", far, survey, "--refine"), 1, "does not settle")
+        report = self.path / "report.json"
+        for text, word in (("{", "report.json"), ("{}", "T_reference_world"),
+                           ('{"server": {"T_reference_world": null}}', "null"),
+                           ('{"server": {"T_reference_world": {"translation_m": [1, 2]}}}', "3 numbers")):
+            report.write_text(text)
+            self.expect(tutti("eval", "--map", survey, survey, "--report", report), 1, word)
+
     def test_missions_of_the_repository_are_valid(self):
         for mission in sorted((SOURCE / "missions").glob("*.yaml")):
             self.expect(tutti("run", mission, "--print-config"), 0, "mission: " + mission.stem)

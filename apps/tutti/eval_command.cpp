@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 
+#include "eval_map.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/formats/trajectory_file.hpp"
@@ -36,6 +37,8 @@ struct Options {
   double rpe_time_s = 1.0;
   double rpe_distance_m = 10.0;
   bool json = false;
+  bool map = false;
+  EvalMapOptions map_options;  // files and json as above
 };
 
 struct Report {
@@ -139,7 +142,13 @@ void print_json(const Options& options, const Report& report) {
   fmt::print("{}\n", out.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
-int run(const Options& options) {
+int run(Options options) {
+  if (options.map) {
+    options.map_options.map_path = options.estimate_path;
+    options.map_options.survey_path = options.reference_path;
+    options.map_options.json = options.json;
+    return eval_map(options.map_options);
+  }
   const auto report = evaluate(options);
   if (!report) {
     fmt::print(stderr, "tutti eval: {}\n", report.error().message);
@@ -163,21 +172,59 @@ CLI::Validator finite(bool zero_too) {
           ""};
 }
 
+/// The options of --map, refused without it.
+void add_map_options(CLI::App& command, EvalMapOptions& options, CLI::Option* map) {
+  const std::string group = "Map against survey";
+  map->group(group);
+  CLI::Option* transform =
+      command
+          .add_option("--transform", options.transform,
+                      "Where the map lies in the survey's frame: position in metres and unit quaternion")
+          ->check(CLI::Validator(check_transform, ""))
+          ->type_name("\"X Y Z QX QY QZ QW\"");
+  CLI::Option* report =
+      command
+          .add_option("--report", options.report_path,
+                      "Take that from server.T_reference_world of a mission's report.json: what its own map error is\n"
+                      "measured with")
+          ->type_name("FILE");
+  transform->excludes(report);
+  CLI::Option* refine =
+      command.add_flag("--refine", options.refine,
+                       "Then bring the map closer by point-to-plane registration, and say how far it "
+                       "moved; needs\na start within about 1 m. Without it the error includes how the "
+                       "map as a whole lies");
+  CLI::Option* voxel = command.add_option("--voxel", options.voxel_m, "Thin both clouds to one point per such voxel")
+                           ->check(finite(false))
+                           ->capture_default_str()
+                           ->type_name("METRES");
+  for (CLI::Option* option : {transform, report, refine, voxel}) option->needs(map)->group(group);
+}
+
 }  // namespace
 
 void add_eval_command(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("eval", "Error of a trajectory against a reference: ATE and RPE");
+  CLI::App* command =
+      app.add_subcommand("eval", "Error of a trajectory against a reference, or of a map against a survey");
   command->footer(
       "ATE, absolute trajectory error: distance between the two after the one rigid transform of EST (rotation and\n"
       "translation, no scale) that brings their positions closest together. Says how true the trajectory is as a "
       "whole.\n"
       "RPE, relative pose error: error of the motion over a fixed time or a fixed distance travelled, from every pose\n"
       "on. Says how fast EST drifts; needs no alignment.\n\n"
-      "Both files hold poses of the same body, as TUM, EuRoC csv or KITTI. Errors are in metres and degrees.\n"
+      "Both files hold poses of the same body, as TUM, EuRoC csv or KITTI. Errors are in metres and degrees.\n\n"
+      "--map: both files are point clouds (PLY). Cloud-to-cloud distance: from every point of the map to the nearest\n"
+      "point of the survey, and back (what the map lacks is far from it). It cannot be smaller than about 0.4 times "
+      "the\n"
+      "survey's point spacing, and where walls are near each other a wrong map still looks close: compare maps with "
+      "it,\n"
+      "do not read it as accuracy. For a mission's own map:\n"
+      "  tutti eval --map OUT/map.ply OUT/survey.ply --report OUT/report.json\n\n"
       "Exit code 0; 1 when a file is bad or no poses can be paired; 2 on wrong usage.");
-  command->add_option("EST", options->estimate_path, "Trajectory to judge")->required()->type_name("FILE");
-  command->add_option("REF", options->reference_path, "Ground truth, or the best there is")
+  CLI::Option* map = command->add_flag("--map", options->map, "EST and REF are point clouds: a map and a survey");
+  command->add_option("EST", options->estimate_path, "Trajectory, or map, to judge")->required()->type_name("FILE");
+  command->add_option("REF", options->reference_path, "Ground truth, or the best there is; survey")
       ->required()
       ->type_name("FILE");
   command
@@ -208,6 +255,7 @@ void add_eval_command(CLI::App& app, int& exit_code) {
       ->capture_default_str()
       ->type_name("HZ");
   command->add_flag("--json", options->json, "Print JSON instead of the table");
+  add_map_options(*command, options->map_options, map);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 

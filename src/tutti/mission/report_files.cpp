@@ -12,9 +12,11 @@
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/tum.hpp"
+#include "tutti/mission/report_colours.hpp"
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_html.hpp"
 #include "tutti/mission/report_json.hpp"
+#include "tutti/mission/report_map_pictures.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -62,13 +64,6 @@ Status write_graph(const ServerRecord& server, const fs::path& out_dir) {
   return write_text(out_dir / "graph_stamps.csv", csv);
 }
 
-/// Robots in the colours of the page (light).
-formats::Rgb robot_colour(std::size_t index) {
-  constexpr formats::Rgb kColours[] = {{15, 111, 181}, {194, 65, 12},  {11, 143, 106}, {139, 63, 168},
-                                       {166, 124, 0},  {27, 155, 184}, {194, 57, 122}, {95, 125, 42}};
-  return kColours[index % std::size(kColours)];
-}
-
 Status write_map(const MissionRecord& record, const fs::path& out_dir) {
   std::vector<Eigen::Vector3f> points;
   std::vector<formats::Rgb> colours;
@@ -76,10 +71,20 @@ Status write_map(const MissionRecord& record, const fs::path& out_dir) {
     const auto robot = std::find_if(record.robots.begin(), record.robots.end(),
                                     [&](const RobotRecord& r) { return r.id == seen.robot; });
     points.insert(points.end(), seen.cloud.points.begin(), seen.cloud.points.end());
-    colours.resize(points.size(), robot_colour(static_cast<std::size_t>(robot - record.robots.begin())));
+    colours.resize(points.size(), robot_rgb(static_cast<std::size_t>(robot - record.robots.begin())));
   }
-  if (points.empty()) return {};
-  return formats::write_ply((out_dir / "map.ply").string(), points, colours);
+  if (!points.empty())
+    if (auto status = formats::write_ply((out_dir / "map.ply").string(), points, colours); !status) return status;
+  return record.survey ? formats::write_ply((out_dir / "survey.ply").string(), record.survey->points) : Status();
+}
+
+Status write_pictures(const MissionRecord& record, const fs::path& out_dir) {
+  for (const auto& [name, picture, columns] :
+       {std::tuple<const char*, MapPicture, std::size_t>{"map_top.png", map_from_above(record), 2},
+        {"map_section.png", map_section(record), 1}})
+    if (!picture.panels.empty())
+      if (auto status = write_text(out_dir / name, encode_png(compose(picture, columns))); !status) return status;
+  return {};
 }
 
 std::string config_text(const MissionRecord& record) {
@@ -100,7 +105,8 @@ Status write_report(const MissionRecord& record, const fs::path& out_dir) {
     if (auto status = write_text(out_dir / name, text); !status) return status;
   if (auto status = write_trajectories(record, out_dir); !status) return status;
   if (auto status = write_graph(record.server, out_dir); !status) return status;
-  return write_map(record, out_dir);
+  if (auto status = write_map(record, out_dir); !status) return status;
+  return write_pictures(record, out_dir);
 }
 
 }  // namespace tutti::mission

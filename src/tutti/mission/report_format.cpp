@@ -68,6 +68,18 @@ std::string format_spread(std::span<const double> samples) {
   return s ? fmt::format("{:.1f} / {:.1f}", s->median, s->max) : "-";
 }
 
+std::string_view drift_name(DriftOrigin::Kind kind) {
+  switch (kind) {
+    case DriftOrigin::Kind::slip:
+      return "slip";
+    case DriftOrigin::Kind::degeneracy:
+      return "degeneracy";
+    case DriftOrigin::Kind::failure:
+      return "failure";
+  }
+  return "";
+}
+
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name) {
   for (const auto& policy : robot.policies)
     if (policy.name == name) return &policy;

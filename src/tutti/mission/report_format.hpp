@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "tutti/mission/record.hpp"
 
@@ -33,6 +34,9 @@ struct Spread {
 std::optional<Spread> spread(std::span<const double> samples);
 /// "12.3 / 45.0" (median / max); "-" without samples.
 std::string format_spread(std::span<const double> samples);
+
+/// "slip", "degeneracy", "failure".
+std::string_view drift_name(DriftOrigin::Kind kind);
 
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name);
 const PolicyTiming* find_timing(const MissionRecord& record, const std::string& robot, const std::string& policy);

@@ -32,9 +32,26 @@ Aligned align_to(const Trajectory& base, const Trajectory& estimate, const evalu
   return out;
 }
 
-double at(const Aligned& aligned, Timestamp stamp) {
-  const auto found = aligned.errors_m.find(stamp);
-  return found == aligned.errors_m.end() ? kNaN : found->second;
+double at(const std::unordered_map<Timestamp, double>& values, Timestamp stamp) {
+  const auto found = values.find(stamp);
+  return found == values.end() ? kNaN : found->second;
+}
+
+/// At every keyframe that has one at least kDriftWindow_s before it: error of the odometry since the last such.
+std::unordered_map<Timestamp, double> born_errors(const RobotRecord& robot,
+                                                  const evaluation::AssociationConfig& association) {
+  const auto pairs = evaluation::associate(robot.odometry, robot.reference, association);
+  std::unordered_map<Timestamp, double> out;
+  std::size_t before = 0;
+  for (const auto& now : pairs) {
+    while (now.stamp - pairs[before + 1 < pairs.size() ? before + 1 : before].stamp >= kDriftWindow_s) ++before;
+    const auto& then = pairs[before];
+    if (now.stamp - then.stamp < kDriftWindow_s) continue;
+    const Pose3 seen = then.estimate.inverse() * now.estimate;
+    const Pose3 real = then.reference.inverse() * now.reference;
+    out[now.stamp] = (real.inverse() * seen).translation.norm();
+  }
+  return out;
 }
 
 }  // namespace
@@ -57,34 +74,31 @@ RobotGeometry robot_geometry(const MissionRecord& record, const RobotRecord& rob
   if (out.has_reference)
     for (const auto& p : robot.reference) out.reference.push_back(p.pose.translation);
 
+  const auto born =
+      out.has_reference ? born_errors(robot, record.association) : std::unordered_map<Timestamp, double>{};
   double distance_m = 0.0;
   for (std::size_t k = 0; k < robot.odometry.size(); ++k) {
     const auto& [stamp, pose] = robot.odometry[k];
     if (k > 0) distance_m += (pose.translation - robot.odometry[k - 1].pose.translation).norm();
-    out.errors.push_back({distance_m, stamp - robot.odometry.front().stamp, at(onboard, stamp), at(corrected, stamp),
-                          out.has_reference ? at(server, stamp) : kNaN});
+    out.errors.push_back({distance_m, mission_time_s(robot, stamp), at(onboard.errors_m, stamp),
+                          at(corrected.errors_m, stamp), out.has_reference ? at(server.errors_m, stamp) : kNaN,
+                          at(born, stamp)});
   }
   return out;
 }
 
-std::uint32_t largest_component(const MissionRecord& record) {
-  std::map<std::uint32_t, std::size_t> sizes;
-  for (const auto& robot : record.robots) ++sizes[robot.component];
-  const auto largest =
-      std::max_element(sizes.begin(), sizes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  return largest == sizes.end() ? 0 : largest->first;
+double mission_time_s(const RobotRecord& robot, Timestamp stamp) {
+  return robot.odometry.empty() ? robot.start_s : robot.start_s + (stamp - robot.odometry.front().stamp);
 }
 
-Pose3 display_T_reference_world(const MissionRecord& record) {
-  const std::uint32_t component = largest_component(record);
-  std::vector<evaluation::PosePair> pairs;
-  for (const auto& robot : record.robots) {
-    if (robot.component != component) continue;
-    const auto more = evaluation::associate(robot.server_estimate, robot.reference, record.association);
-    pairs.insert(pairs.end(), more.begin(), more.end());
-  }
-  const auto fit = evaluation::ate(pairs);
-  return fit ? fit->T_reference_estimate : Pose3{};
+std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timestamp from, Timestamp until) {
+  const auto first = std::lower_bound(trajectory.begin(), trajectory.end(), from,
+                                      [](const StampedPose& p, Timestamp t) { return p.stamp < t; });
+  const auto last = std::upper_bound(trajectory.begin(), trajectory.end(), until,
+                                     [](Timestamp t, const StampedPose& p) { return t < p.stamp; });
+  const auto begin = static_cast<std::size_t>(first - trajectory.begin());
+  const auto end = static_cast<std::size_t>(last - trajectory.begin());
+  return {begin - std::min<std::size_t>(begin, 1), std::min(std::max(end, begin) + 1, trajectory.size())};
 }
 
 Points2d GroundPlane::operator()(const Points3d& points) const {

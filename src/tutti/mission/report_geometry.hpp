@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "tutti/mission/record.hpp"
@@ -13,11 +14,14 @@ namespace tutti::mission {
 
 using Points3d = std::vector<Eigen::Vector3d>;
 
-/// One keyframe on an error-over-distance plot; NaN = not measured.
+inline constexpr double kDriftWindow_s = 10.0;
+
+/// One keyframe on an error-over-time plot; NaN = not measured.
 struct KeyframeError {
   double distance_m;  ///< Along the odometry keyframes.
-  double time_s;      ///< Since the robot's first keyframe.
+  double time_s;      ///< Mission time.
   double onboard_m, corrected_m, server_m;
+  double born_m;  ///< What the odometry went wrong by over the last kDriftWindow_s; needs no alignment.
 };
 
 /// One robot's trajectories in one frame: the reference's, or the server's where there is no reference.
@@ -33,13 +37,6 @@ struct RobotGeometry {
 };
 RobotGeometry robot_geometry(const MissionRecord& record, const RobotRecord& robot);
 
-/// Robots of the largest component together against the reference: one alignment, the one of ServerRecord::joint.
-/// Identity when there is no reference.
-Pose3 display_T_reference_world(const MissionRecord& record);
-
-/// The component most robots belong to (the lowest numbered of several).
-std::uint32_t largest_component(const MissionRecord& record);
-
 /// Which two coordinates make the view from above: x and y, unless the mission spreads much more along z than along
 /// one of them (camera frames, y down).
 struct GroundPlane {
@@ -49,6 +46,12 @@ struct GroundPlane {
   [[nodiscard]] Points2d operator()(const Points3d& points) const;
 };
 GroundPlane ground_plane(const std::vector<Points3d>& layers);
+
+/// Mission time of a stamp of the robot's own clock.
+double mission_time_s(const RobotRecord& robot, Timestamp stamp);
+
+/// Indices [first, last) of the poses from `from` until `until`, with one more on either side: at least a short line.
+std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timestamp from, Timestamp until);
 
 /// Position of a robot's estimate at a stamp of its keyframes.
 const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp stamp);

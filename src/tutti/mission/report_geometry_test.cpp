@@ -43,21 +43,33 @@ TEST(RobotGeometry, WithoutReferenceTheServerIsTheBase) {
   EXPECT_NEAR((g.server[3] - record.robots[0].server_estimate[3].pose.translation).norm(), 0.0, 1e-9);
 }
 
-TEST(JointDisplay, UndoesTheServersFrame) {
-  MissionRecord record = test::example_record({.robots = 3, .keyframes = 40});
-  const Pose3 T_world_reference{so3_exp({0.1, 0.0, -2.0}), {7.0, 8.0, 9.0}};
-  for (auto& robot : record.robots) robot.server_estimate = test::moved(T_world_reference, robot.reference);
-  const Pose3 identity = display_T_reference_world(record) * T_world_reference;
-  EXPECT_NEAR(identity.translation.norm(), 0.0, 1e-9);
-  EXPECT_NEAR(rotation_angle(identity), 0.0, 1e-9);
+TEST(RobotGeometry, NewDriftIsWhereTheOdometryWentWrong) {
+  MissionRecord record = test::example_record({.robots = 1, .keyframes = 80});
+  RobotRecord& robot = record.robots[0];
+  robot.odometry = test::moved({so3_exp({0.0, 0.1, 2.0}), {3.0, 4.0, 5.0}}, robot.reference);
+  const Pose3 slip{Eigen::Quaterniond::Identity(), {0.7, 0.0, 0.0}};
+  for (std::size_t k = 40; k < 80; ++k)  // one slip between keyframes 39 and 40
+    robot.odometry[k].pose =
+        robot.odometry[39].pose * slip * robot.reference[39].pose.inverse() * robot.reference[k].pose;
+  const RobotGeometry g = robot_geometry(record, robot);
+  for (std::size_t k = 0; k < 80; ++k) {
+    if (k < 5)  // a keyframe every 2 s: the window of 10 s is not full before
+      EXPECT_TRUE(std::isnan(g.errors[k].born_m));
+    else
+      EXPECT_NEAR(g.errors[k].born_m, k >= 40 && k < 45 ? 0.7 : 0.0, 1e-6) << k;
+  }
 }
 
-TEST(JointDisplay, LargestComponentWins) {
-  MissionRecord record = test::example_record({.robots = 3, .keyframes = 5});
-  record.robots[0].component = 4;
-  record.robots[1].component = record.robots[2].component = 9;
-  EXPECT_EQ(largest_component(record), 9U);
-  EXPECT_EQ(largest_component(MissionRecord{}), 0U);
+TEST(Stretch, HasOnePoseMoreOnEitherSide) {
+  Trajectory trajectory;
+  for (std::int64_t t = 0; t < 100; t += 10) trajectory.push_back({Timestamp{t}, {}});
+  using P = std::pair<std::size_t, std::size_t>;
+  EXPECT_EQ(stretch(trajectory, Timestamp{30}, Timestamp{50}), P(2, 7));
+  EXPECT_EQ(stretch(trajectory, Timestamp{31}, Timestamp{32}), P(3, 5));
+  EXPECT_EQ(stretch(trajectory, Timestamp{-5}, Timestamp{500}), P(0, 10));
+  EXPECT_EQ(stretch(trajectory, Timestamp{-9}, Timestamp{-5}), P(0, 1));
+  EXPECT_EQ(stretch(trajectory, Timestamp{200}, Timestamp{300}), P(9, 10));
+  EXPECT_EQ(stretch({}, Timestamp{0}, Timestamp{1}), P(0, 0));
 }
 
 TEST(GroundPlane, LooksFromAbove) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What changes over the mission: disagreement per scale over time, error over distance.
+// What changes over the mission: disagreement per scale over time.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -134,56 +134,6 @@ std::string disagreement_figure(const MissionRecord& record, const RobotRecord& 
                 false);
 }
 
-/// Logarithmic when a linear axis would press the smaller curves onto the floor.
-bool wants_logarithm(const std::vector<RobotGeometry>& geometry) {
-  std::vector<double> corrected;
-  double largest = 0.0;
-  for (const auto& g : geometry)
-    for (const auto& e : g.errors) {
-      if (std::isfinite(e.onboard_m)) largest = std::max(largest, e.onboard_m);
-      if (std::isfinite(e.corrected_m)) corrected.push_back(e.corrected_m);
-    }
-  const auto middle = spread(corrected);
-  return middle && middle->median > 0.0 && largest > 12.0 * middle->median;
-}
-
-/// What all robots' error plots share, so that they can be compared.
-struct ErrorPlots {
-  Range error;
-  bool logarithmic = false;
-  std::size_t hover_points = 0;
-};
-
-std::string error_figure(const RobotRecord& robot, const RobotGeometry& g, const ErrorPlots& common) {
-  constexpr double kTop_px = 10.0;
-  constexpr double kBottom_px = 250.0;
-  Range distance;
-  distance.include(0.0);
-  for (const auto& e : g.errors) distance.include(e.distance_m);
-  const Axis x = Axis::linear(distance, kLeft_px, kWidth_px - kRight_px, 8, false);
-  const Axis y = common.logarithmic ? Axis::logarithmic(common.error, kBottom_px, kTop_px)
-                                    : Axis::linear(common.error, kBottom_px, kTop_px, 6, true);
-  Svg svg(kWidth_px, kBottom_px + 40.0, fmt::format("Error of {} over the distance travelled", robot.name));
-  draw_axes(svg, x, y, {kLeft_px, kTop_px}, {kWidth_px - kRight_px, kBottom_px}, "distance travelled [m]", true);
-  const auto curve = [&](double KeyframeError::*value, const std::string& css_class, const std::string& title) {
-    Points2d points;
-    for (const auto& e : g.errors) points.emplace_back(x(e.distance_m), y(e.*value));
-    svg.polyline(points, "curve " + css_class, title);
-  };
-  curve(&KeyframeError::server_m, "server", "server");
-  curve(&KeyframeError::onboard_m, "onboard", "onboard");
-  curve(&KeyframeError::corrected_m, "corrected", "corrected");
-  const std::size_t step = std::max<std::size_t>(1, g.errors.size() / common.hover_points);
-  for (std::size_t i = 0; i < g.errors.size(); i += step) {
-    const KeyframeError& e = g.errors[i];
-    svg.circle({x(e.distance_m), y(std::isfinite(e.corrected_m) ? e.corrected_m : e.onboard_m)}, 6.0, "hover",
-               fmt::format("after {} ({}): onboard {}, corrected {}, server {}", format_distance(e.distance_m),
-                           format_mission_time(e.time_s), format_metres(e.onboard_m), format_metres(e.corrected_m),
-                           format_metres(e.server_m)));
-  }
-  return figure(svg.str(), robot.name, "", false);
-}
-
 }  // namespace
 
 std::string disagreement_html(const MissionRecord& record) {
@@ -199,36 +149,6 @@ std::string disagreement_html(const MissionRecord& record) {
                   "corrects itself with policy {}. Below: the constraints it then holds.",
                   record.default_policy),
       body + "</div>\n");
-}
-
-std::string errors_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry) {
-  ErrorPlots common{.hover_points = detail_per_robot(record, 300, 20, 60)};
-  bool any_reference = false;
-  std::vector<double> small;
-  for (const auto& g : geometry) {
-    any_reference = any_reference || g.has_reference;
-    for (const auto& e : g.errors) {
-      for (const double value : {e.onboard_m, e.corrected_m, e.server_m}) common.error.include(value);
-      for (const double value : {e.corrected_m, e.server_m})
-        if (std::isfinite(value)) small.push_back(value);
-    }
-  }
-  if (common.error.empty) return "";
-  common.logarithmic = wants_logarithm(geometry);
-  if (common.logarithmic)  // single zero crossings must not stretch the axis
-    common.error.low = std::max(1e-4, 0.2 * spread(small)->median);
-  else
-    common.error.include(0.0);
-  std::vector<LegendEntry> legend{{"onboard", "onboard"}, {"corrected", "corrected"}};
-  if (any_reference) legend.push_back({"curve server", "server"});
-  std::string body = legend_html(legend) + "<div class=\"figures\">\n";
-  for (std::size_t r = 0; r < geometry.size(); ++r)
-    if (!geometry[r].errors.empty()) body += error_figure(record.robots[r], geometry[r], common);
-  return section("Error over distance",
-                 fmt::format("Distance of every keyframe to the {} after the alignment above{}.",
-                             any_reference ? "reference" : "server's estimate",
-                             common.logarithmic ? "; logarithmic, because the curves are far apart" : ""),
-                 body + "</div>\n");
 }
 
 }  // namespace tutti::mission

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <set>
-#include <unordered_map>
+#include <span>
 
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_html_parts.hpp"
+#include "tutti/mission/report_map_pictures.hpp"
 #include "tutti/mission/report_plot.hpp"
 
 namespace tutti::mission {
@@ -24,60 +24,29 @@ Points3d transformed(const Pose3& T_a_b, const Trajectory& trajectory_b) {
   return out;
 }
 
-/// Cells of the plan that hold many points, as three shades: walls are dense seen from above. At most kMaxCells.
-void draw_cloud(Svg& svg, const PlanView& view, const std::vector<Points2d>& clouds) {
-  constexpr double kCell_px = 2.0;
-  constexpr std::size_t kMaxCells = 16000;
-  const auto columns = static_cast<std::uint32_t>(view.width() / kCell_px) + 1;
-  std::unordered_map<std::uint32_t, std::uint32_t> counts;
-  for (const auto& cloud : clouds)
-    for (const auto& p : cloud) {
-      const Eigen::Vector2d pixel = view(p);
-      if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < view.width() && pixel.y() < view.height())) continue;
-      ++counts[static_cast<std::uint32_t>(pixel.y() / kCell_px) * columns +
-               static_cast<std::uint32_t>(pixel.x() / kCell_px)];
-    }
-  if (counts.empty()) return;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> cells(counts.begin(), counts.end());
-  std::sort(cells.begin(), cells.end(), [](const auto& a, const auto& b) {
-    return a.second != b.second ? a.second > b.second : a.first < b.first;
-  });
-  cells.resize(std::min(cells.size(), kMaxCells));
-  const std::uint32_t dense = std::max(3U, cells[cells.size() / 8].second);
-  const std::uint32_t middle = std::max(2U, cells[cells.size() / 3].second);
-  std::array<Points2d, 3> shades;
-  for (const auto& [cell, count] : cells)
-    shades[count >= dense    ? 2
-           : count >= middle ? 1
-                             : 0]
-        .push_back({kCell_px * (cell % columns), kCell_px * (cell / columns)});
-  for (std::size_t s = 0; s < shades.size(); ++s) svg.squares(shades[s], kCell_px, fmt::format("cloud{}", s + 1));
+/// What the robots saw, as a picture under the routes.
+void draw_clouds(Svg& svg, const PlanView& view, const GroundPlane& ground, std::vector<CloudLayer> clouds) {
+  constexpr formats::Rgb kInk{112, 122, 140};
+  if (clouds.empty()) return;
+  PointRaster raster(static_cast<std::size_t>(kPixelRatio * view.width()),
+                     static_cast<std::size_t>(kPixelRatio * view.height()));
+  const Projection project = [&](const Eigen::Vector3d& p) {
+    return std::optional<Eigen::Vector2d>(kPixelRatio * view(ground(p)));
+  };
+  for (CloudLayer& layer : clouds) {
+    layer.colour = kInk;
+    raster.add(layer, project, 2);
+  }
+  svg.image({0.0, 0.0}, {view.width(), view.height()}, data_uri(encode_png(raster.transparent())));
 }
 
-/// Two corners of the part of the clouds worth showing: all but the outermost 1 % on every side, and no farther from
-/// the routes than half their size (at least 4 m). A range sensor sees far more than where the robots were.
-Points2d cloud_corners(const std::vector<Points2d>& clouds, const std::vector<Points2d>& routes) {
-  constexpr double kLeast_m = 4.0;
-  std::array<std::vector<double>, 2> seen;
-  std::array<Range, 2> visited;
-  for (const auto& cloud : clouds)
-    for (const auto& p : cloud)
-      for (std::size_t axis = 0; p.allFinite() && axis < 2; ++axis) seen[axis].push_back(p[static_cast<int>(axis)]);
-  for (const auto& route : routes)
-    for (const auto& p : route)
-      for (std::size_t axis = 0; axis < 2; ++axis) visited[axis].include(p[static_cast<int>(axis)]);
-  if (seen[0].empty() || visited[0].empty || visited[1].empty) return {};
-  const double around =
-      std::max({kLeast_m, 0.5 * (visited[0].high - visited[0].low), 0.5 * (visited[1].high - visited[1].low)});
-  Points2d corners(2);
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    auto& values = seen[axis];
-    std::sort(values.begin(), values.end());
-    const std::size_t cut = values.size() / 100;
-    corners[0][static_cast<int>(axis)] = std::max(values[cut], visited[axis].low - around);
-    corners[1][static_cast<int>(axis)] = std::min(values[values.size() - 1 - cut], visited[axis].high + around);
+/// Wide strokes under a route where its odometry went wrong. `pixels`: one per pose of `route`.
+void draw_drift(Svg& svg, const RobotRecord& robot, const Trajectory& route, const Points2d& pixels) {
+  for (const DriftOrigin& origin : robot.drift_origins) {
+    const auto [first, last] = stretch(route, origin.from, origin.until);
+    svg.polyline(std::span(pixels).subspan(first, last - first), fmt::format("drift {}", drift_name(origin.kind)),
+                 fmt::format("{}: {}, {}", robot.name, drift_name(origin.kind), format_metres(origin.translation_m)));
   }
-  return corners;
 }
 
 std::vector<std::size_t> members(const MissionRecord& record, std::uint32_t component) {
@@ -124,29 +93,26 @@ std::vector<std::string> route_titles(const RobotRecord& robot) {
 
 std::string component_figure(const MissionRecord& record, std::uint32_t component) {
   const auto robots = members(record, component);
-  const Pose3 T_display_world = component == largest_component(record) ? display_T_reference_world(record) : Pose3{};
+  const bool laid_on = component == record.server.largest_component;
+  const Pose3 T_display_world = laid_on ? record.server.T_reference_world.value_or(Pose3{}) : Pose3{};
   std::vector<Points3d> routes;
   for (const std::size_t r : robots) routes.push_back(transformed(T_display_world, record.robots[r].server_estimate));
   const GroundPlane ground = ground_plane(routes);
 
   std::vector<Points2d> layers;
   for (const auto& route : routes) layers.push_back(ground(route));
-  std::vector<Points2d> clouds;
-  for (const auto& seen : record.server.clouds) {
-    if (!is_member(record, robots, seen.robot)) continue;
-    Points2d& cloud = clouds.emplace_back();
-    for (const auto& p : seen.cloud.points) cloud.push_back(ground(T_display_world * p.cast<double>().eval()));
-  }
+  std::vector<CloudLayer> clouds = server_layers(record, component);
   std::vector<Points2d> box = layers;
-  box.push_back(cloud_corners(clouds, layers));
+  box.push_back(cloud_corners(clouds, ground, layers));
   const PlanView view(box, kWide_px, 0.56 * kWide_px);
   Svg svg(view.width(), view.height(), "The joint map from above: every robot's way in the server's estimate");
-  draw_cloud(svg, view, clouds);
+  draw_clouds(svg, view, ground, std::move(clouds));
   draw_closures(svg, record, T_display_world, ground, view, robots);
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const RobotRecord& robot = record.robots[robots[i]];
     const std::string colour = robot_class(record, robot.id);
     const Points2d pixels = view(layers[i]);
+    draw_drift(svg, robot, robot.server_estimate, pixels);
     svg.polyline(pixels, "route " + colour, robot.name);
     draw_hover_points(svg, pixels, route_titles(robot), detail_per_robot(record, 300, 20, 60));
   }
@@ -181,6 +147,7 @@ std::string joint_map_html(const MissionRecord& record) {
   if (closures.accepted_intra > 0)
     legend.push_back({"intra", fmt::format("{} loop closures within a robot", closures.accepted_intra)});
   if (!record.server.clouds.empty()) legend.push_back({"cloudkey", "what the robots saw"});
+  for (auto& entry : drift_legend(record)) legend.push_back(std::move(entry));
   std::string body = legend_html(legend) + "<div class=\"figures\">\n";
   for (const std::uint32_t component : components) body += component_figure(record, component);
   return section("The joint map",
@@ -199,6 +166,7 @@ std::string robot_maps_html(const MissionRecord& record, const std::vector<Robot
                                   {"corrected", "corrected: robot with policy " + record.default_policy},
                                   {"server", "server"}};
   if (any_reference) legend.push_back({"reference", "reference"});
+  for (auto& entry : drift_legend(record)) legend.push_back(std::move(entry));
   std::string body = legend_html(legend) + "<div class=\"figures\">\n";
   for (std::size_t r = 0; r < record.robots.size(); ++r) {
     const RobotRecord& robot = record.robots[r];
@@ -210,6 +178,7 @@ std::string robot_maps_html(const MissionRecord& record, const std::vector<Robot
         kHalf_px, 0.85 * kHalf_px);
     Svg svg(view.width(), view.height(), fmt::format("Estimates of {} from above", robot.name));
     svg.polyline(view(ground(g.server)), "server", "server");
+    draw_drift(svg, robot, robot.odometry, view(ground(g.onboard)));
     svg.polyline(view(ground(g.onboard)), "onboard", "onboard");
     svg.polyline(view(ground(g.corrected)), "corrected", "corrected");
     svg.polyline(view(ground(g.reference)), "reference", "reference");

@@ -7,12 +7,13 @@
 
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/report_geometry.hpp"
+#include "tutti/mission/report_plot.hpp"
 
 /// The page's sections, each a function of the record that gives HTML; empty when there is nothing to show.
 namespace tutti::mission {
 
 /// The style sheet: colours for light and dark, layout.
-std::string_view report_style();
+std::string report_style();
 
 /// How much detail each robot's pictures may have: `total` shared among the robots, within [least, most].
 std::size_t detail_per_robot(const MissionRecord& record, std::size_t total, std::size_t least, std::size_t most);
@@ -25,6 +26,9 @@ std::string robot_name(const MissionRecord& record, RobotId robot);
 std::string section(std::string_view title, std::string_view lead, const std::string& body);
 /// A picture under its name and a few words (text, may be empty); `wide` ones take the whole row.
 std::string figure(const std::string& svg, std::string_view name, std::string_view words, bool wide);
+/// What a legend says about the kinds of drift there are; the CSS class is "drift" and the kind's name.
+std::vector<LegendEntry> drift_legend(const MissionRecord& record);
+
 /// Cells are HTML. The first `left` columns are left-aligned, the others right-aligned.
 struct HtmlTable {
   std::vector<std::string> head;
@@ -38,6 +42,8 @@ std::string joint_map_html(const MissionRecord& record);
 std::string robot_maps_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
 std::string proxy_graph_html(const MissionRecord& record);
 std::string disagreement_html(const MissionRecord& record);
+/// Map clouds beside the survey.
+std::string clouds_html(const MissionRecord& record);
 std::string errors_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
 std::string policies_html(const MissionRecord& record);
 std::string closures_html(const MissionRecord& record);

@@ -75,7 +75,7 @@ std::string proxy_graph_html(const MissionRecord& record) {
   for (const auto& node : graph.nodes) component.push_back(component_of(graph, node.robot));
   const std::uint32_t shown = shown_component(component);
 
-  const Pose3 T_display_world = display_T_reference_world(record);
+  const Pose3 T_display_world = record.server.T_reference_world.value_or(Pose3{});
   Points3d positions;
   for (const auto& node : graph.nodes) positions.push_back(T_display_world * node.T_world_body.translation);
   Points3d box;

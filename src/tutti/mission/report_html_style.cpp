@@ -1,25 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "tutti/mission/report_colours.hpp"
 #include "tutti/mission/report_html_parts.hpp"
 
 namespace tutti::mission {
+namespace {
 
-// Estimates: vermillion, blue, green of the Okabe-Ito palette and ink; robots: hues between those. All keep apart
-// under the common colour deficiencies and are also told apart by width and dashes.
-std::string_view report_style() {
-  return R"css(
+// Estimates: vermillion, blue, green of the Okabe-Ito palette and ink; also told apart by width and dashes.
+constexpr std::string_view kStyle = R"css(
 :root {
   color-scheme: light dark;
   --paper: #fbfaf7; --card: #ffffff; --ink: #1d2430; --soft: #5d6675; --line: #e3e1da; --grid: #eceae4;
   --onboard: #d55e00; --corrected: #0072b2; --server: #009e73; --reference: #1d2430; --cloud: #3a4454;
   --closure: #b59a00; --accent: #0072b2;
-  --r0: #0f6fb5; --r1: #c2410c; --r2: #0b8f6a; --r3: #8b3fa8; --r4: #a67c00; --r5: #1b9bb8; --r6: #c2397a; --r7: #5f7d2a;
+  --slip: #b8860b; --degeneracy: #7b68c8; --failure: #c8203c;
 }
 @media (prefers-color-scheme: dark) {
   :root {
     --paper: #12161d; --card: #191f28; --ink: #e7e9ee; --soft: #9aa4b2; --line: #2b3340; --grid: #252c37;
     --onboard: #ff8a4c; --corrected: #4fb3ff; --server: #2fd3a0; --reference: #e7e9ee; --cloud: #aab6c8;
     --closure: #e6cf4a; --accent: #4fb3ff;
-    --r0: #4fb3ff; --r1: #ff8a4c; --r2: #2fd3a0; --r3: #c58be0; --r4: #e0b541; --r5: #5fd3ea; --r6: #f47fb5; --r7: #a9c86a;
+    --slip: #e6b422; --degeneracy: #a99cf0; --failure: #ff5d75;
   }
 }
 * { box-sizing: border-box; }
@@ -84,8 +86,6 @@ svg path { fill: none; stroke-linecap: round; stroke-linejoin: round; }
 .server { stroke: var(--server); stroke-width: 5; stroke-opacity: 0.38; }
 .curve.server { stroke-width: 2.4; stroke-opacity: 0.75; }
 .reference { stroke: var(--reference); stroke-width: 1.3; stroke-dasharray: 0.5 5; stroke-opacity: 0.9; }
-path.cloud1 { fill: var(--cloud); fill-opacity: 0.10; } path.cloud2 { fill: var(--cloud); fill-opacity: 0.24; }
-path.cloud3 { fill: var(--cloud); fill-opacity: 0.42; }
 path.cloudkey { stroke: var(--cloud); stroke-width: 7; stroke-opacity: 0.35; }
 .route { stroke-width: 2; }
 .edge { stroke: var(--soft); stroke-width: 0.6; stroke-opacity: 0.35; }
@@ -99,17 +99,49 @@ path.cloudkey { stroke: var(--cloud); stroke-width: 7; stroke-opacity: 0.35; }
 .hover { fill: transparent; stroke: none; } .hover:hover { fill: var(--accent); fill-opacity: 0.45; }
 .start { fill: var(--card); stroke-width: 2; } .seen { fill: none; stroke-width: 2; }
 .cell { stroke: none; }
-.r0 { stroke: var(--r0); } .r1 { stroke: var(--r1); } .r2 { stroke: var(--r2); } .r3 { stroke: var(--r3); }
-.r4 { stroke: var(--r4); } .r5 { stroke: var(--r5); } .r6 { stroke: var(--r6); } .r7 { stroke: var(--r7); }
-.end.r0 { fill: var(--r0); } .end.r1 { fill: var(--r1); } .end.r2 { fill: var(--r2); } .end.r3 { fill: var(--r3); } 
-.end.r4 { fill: var(--r4); } .end.r5 { fill: var(--r5); } .end.r6 { fill: var(--r6); } .end.r7 { fill: var(--r7); } 
+.onpicture.scalebar { stroke: #e7e9ee; } svg text.onpicture { fill: #e7e9ee; font-size: 12.5px; paint-order: stroke; stroke: #0e121a; stroke-width: 3.5px; }
+.drift { stroke-opacity: 0.42; stroke-width: 8; } rect.drift { stroke: none; fill-opacity: 0.22; }
+.drift.slip { stroke: var(--slip); } rect.drift.slip { fill: var(--slip); fill-opacity: 0.55; }
+.drift.degeneracy { stroke: var(--degeneracy); } rect.drift.degeneracy { fill: var(--degeneracy); }
+.drift.failure { stroke: var(--failure); } rect.drift.failure { fill: var(--failure); }
+rect.suspect { fill: none; stroke: var(--failure); stroke-width: 1.6; stroke-dasharray: 5 3; }
+.suspect { stroke: var(--failure); stroke-width: 2; stroke-dasharray: 5 3; }
+.born { stroke: none; fill: var(--onboard); fill-opacity: 0.75; }
+.mark { stroke-width: 1.6; stroke-opacity: 0.8; }
+.alerts { list-style: none; padding: 0; margin: 0 0 18px; }
+.alerts li { border: 1px solid var(--failure); border-left-width: 6px; border-radius: 10px; padding: 8px 14px; margin: 6px 0;
+  background: color-mix(in srgb, var(--failure) 8%, var(--card)); }
+.robots { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 14px; margin: 0 0 14px; }
+.robots .card { padding: 18px 22px; } .robots .what { font-size: 16px; font-weight: 650; color: var(--ink); }
+.robots .value { font-size: 33px; } .robots .value small { font-size: 19px; white-space: nowrap; }
+.robots .what small { font-weight: 400; color: var(--soft); margin-left: 6px; } .robots .value .up { color: var(--onboard); }
+.robots .value .down { color: var(--corrected); } .robots .detail b { color: var(--ink); }
 .node { stroke-width: 4.4; stroke-opacity: 0.85; }
-.swatch.r0 { background: var(--r0); } .swatch.r1 { background: var(--r1); } .swatch.r2 { background: var(--r2); }
-.swatch.r3 { background: var(--r3); } .swatch.r4 { background: var(--r4); } .swatch.r5 { background: var(--r5); }
-.swatch.r6 { background: var(--r6); } .swatch.r7 { background: var(--r7); }
 @media (max-width: 1120px) { table { font-size: 13px; } th, td { padding-left: 6px; padding-right: 6px; } th { white-space: normal; } td .track { width: 60px; } }
 @media print { main { max-width: none; padding: 0; } figure, .card, .scroll { break-inside: avoid; } }
 )css";
+
+std::string hex(formats::Rgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c.red, c.green, c.blue); }
+
+/// Every robot's colour, light and dark, and what is drawn in it.
+std::string robot_colours() {
+  std::string light;
+  std::string dark;
+  std::string classes;
+  for (std::size_t r = 0; r < kRobotColours; ++r) {
+    light += fmt::format(" --r{}: {};", r, hex(robot_rgb(r)));
+    dark += fmt::format(" --r{}: {};", r, hex(robot_rgb_on_dark(r)));
+    classes += fmt::format(
+        ".r{0} {{ stroke: var(--r{0}); }} .end.r{0} {{ fill: var(--r{0}); }} .swatch.r{0} {{ background: var(--r{0}); "
+        "}}\n",
+        r);
+  }
+  return fmt::format("\n:root {{{} }}\n@media (prefers-color-scheme: dark) {{ :root {{{} }} }}\n{}", light, dark,
+                     classes);
 }
+
+}  // namespace
+
+std::string report_style() { return robot_colours() + std::string(kStyle); }
 
 }  // namespace tutti::mission

@@ -97,14 +97,39 @@ TEST(ReportHtml, IsWellFormedAndSelfContained) { expect_good_page(report_html(te
 
 TEST(ReportHtml, HasEverySection) {
   const std::string html = report_html(test::example_record());
-  for (const char* title :
-       {"The joint map", "Each robot by itself", "Error over distance", "Policies side by side",
-        "Where and when the maps disagree", "The proxy graph", "Loop closures", "How the robots&#39; frames lie",
-        "What goes over the radio", "Time", "What to keep in mind", "Effective configuration"})
+  for (const char* title : {"The joint map", "Each robot by itself", "The map: odometry alone, and joint",
+                            "Who drifted where and when", "Policies side by side", "Where and when the maps disagree",
+                            "The proxy graph", "Loop closures", "How the robots&#39; frames lie",
+                            "What goes over the radio", "Time", "What to keep in mind", "Effective configuration"})
     EXPECT_NE(html.find(title), std::string::npos) << title;
   for (const char* policy : {"every_node_2", "uniform", "random", "euclidean"})
     EXPECT_NE(html.find(policy), std::string::npos) << policy;
   EXPECT_NE(html.find("slides along one direction"), std::string::npos);
+}
+
+TEST(ReportHtml, ShowsTheMapBesideTheSurvey) {
+  const std::string html = report_html(test::example_record({.survey = true}));
+  expect_good_page(html);
+  EXPECT_NE(html.find("The map beside the survey"), std::string::npos);
+  EXPECT_NE(html.find("its map, mean distance to the survey: <b>0.410 m → 0.060 m</b>"), std::string::npos);
+  std::size_t pictures = 0;  // one under the joint map; four from above and four sections
+  for (std::size_t at = html.find("<image"); at != std::string::npos; at = html.find("<image", at + 1)) ++pictures;
+  EXPECT_EQ(pictures, 9U);
+}
+
+TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
+  MissionRecord record = test::example_record();
+  std::string html = report_html(record);
+  for (const char* kind : {"drift slip", "drift degeneracy", "drift failure"})
+    EXPECT_NE(html.find(std::string("<rect class=\"") + kind), std::string::npos) << kind;
+  EXPECT_EQ(html.find("Localisation failure suspected"), std::string::npos);
+  const auto& robot = record.robots[1];
+  record.robots[1].start_s = 300.0;
+  record.server.failed_odometry = {{robot.id, robot.odometry[6].stamp, robot.odometry[15].stamp, 2.41}};
+  html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("Localisation failure suspected:</b> bravo, 312-330 s, 2.4 m"), std::string::npos);
+  EXPECT_NE(html.find("<rect class=\"suspect\""), std::string::npos);
 }
 
 TEST(ReportHtml, IsAFunctionOfTheRecord) {
@@ -181,8 +206,10 @@ TEST(ReportHtml, GroupsThatNeverMetGetTheirOwnPicture) {
 }
 
 TEST(ReportHtml, LongMissionStaysSmall) {
-  const std::string html = report_html(test::example_record({.robots = 3, .keyframes = 1000}));
+  const std::string html = report_html(test::example_record({.robots = 3, .keyframes = 1000, .cloud = false}));
   EXPECT_LT(html.size(), 2'000'000U);
+  EXPECT_LT(report_html(test::example_record({.robots = 3, .keyframes = 1000, .survey = true})).size(),
+            html.size() + 4'000'000U);  // pictures, however many the points
 }
 
 }  // namespace

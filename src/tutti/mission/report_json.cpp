@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tutti/mission/report_format.hpp"
+#include "tutti/mission/report_geometry.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -18,6 +19,38 @@ Json number(std::optional<double> value, double per_unit = 1e6) {
   return rounded == 0.0 ? 0.0 : rounded;  // no "-0.0"
 }
 
+/// {"translation_m", "quaternion_xyzw"}
+Json pose_json(const Pose3& T) {
+  Eigen::Vector4d q = T.rotation.coeffs();
+  if (q.w() < 0.0) q = -q;  // q and -q are one rotation: always print the same
+  constexpr double kPerUnit = 1e9;
+  return {{"translation_m", {number(T.translation.x()), number(T.translation.y()), number(T.translation.z())}},
+          {"quaternion_xyzw",
+           {number(q.x(), kPerUnit), number(q.y(), kPerUnit), number(q.z(), kPerUnit), number(q.w(), kPerUnit)}}};
+}
+
+Json map_error_json(const std::optional<evaluation::CloudDistance>& distance) {
+  if (!distance) return nullptr;
+  return {{"points", distance->points},
+          {"mean_m", number(distance->mean_m)},
+          {"rms_m", number(distance->rms_m)},
+          {"p95_m", number(distance->p95_m)},
+          {"within_10cm", number(distance->within_10cm)},
+          {"within_30cm", number(distance->within_30cm)},
+          {"within_1m", number(distance->within_1m)}};
+}
+
+Json drift_json(const RobotRecord& robot) {
+  Json out = Json::array();
+  for (const DriftOrigin& drift : robot.drift_origins)
+    out.push_back({{"kind", drift_name(drift.kind)},
+                   {"from_s", number(mission_time_s(robot, drift.from))},
+                   {"until_s", number(mission_time_s(robot, drift.until))},
+                   {"translation_m", number(drift.translation_m)},
+                   {"rotation_rad", number(drift.rotation_rad)}});
+  return out;
+}
+
 Json robot_json(const RobotRecord& robot) {
   Json policies = Json::object();
   for (const auto& policy : robot.policies)
@@ -28,6 +61,7 @@ Json robot_json(const RobotRecord& robot) {
                              {"constraints", policy.constraints_added}};
   return {{"name", robot.name},
           {"distance_m", number(robot.distance_m)},
+          {"start_s", number(robot.start_s)},
           {"duration_s", number(robot.duration_s)},
           {"odometry_factors", robot.odometry_factors},
           {"keyframes", robot.keyframes},
@@ -39,6 +73,10 @@ Json robot_json(const RobotRecord& robot) {
           {"server_rmse_m", number(robot.server.rmse_m)},
           {"server_max_error_m", number(robot.server.max_error_m)},
           {"server_rpe_m", number(robot.server.rpe_m)},
+          {"map_error",
+           {{"onboard", map_error_json(robot.map_error.onboard)},
+            {"corrected", map_error_json(robot.map_error.corrected)}}},
+          {"drift_origins", drift_json(robot)},
           {"policies", std::move(policies)},
           {"bytes_up", robot.bytes_up},
           {"bytes_down", robot.bytes_down},
@@ -48,7 +86,8 @@ Json robot_json(const RobotRecord& robot) {
           {"updates", robot.updates.size()}};
 }
 
-Json server_json(const ServerRecord& server) {
+Json server_json(const MissionRecord& record) {
+  const ServerRecord& server = record.server;
   const ClosureCounts counts = count_closures(server);
   Json rejections = Json::array();
   for (const auto& rejection : server.rejections)
@@ -59,6 +98,14 @@ Json server_json(const ServerRecord& server) {
              {"wrong", server.closure_check->wrong},
              {"max_error_m", number(server.closure_check->max_error_m)},
              {"max_error_deg", number(server.closure_check->max_error_deg)}};
+  Json failed = Json::array();
+  for (const FailedOdometryRecord& stretch : server.failed_odometry)
+    for (const RobotRecord& robot : record.robots)
+      if (robot.id == stretch.robot)
+        failed.push_back({{"robot", robot.name},
+                          {"from_s", number(mission_time_s(robot, stretch.from))},
+                          {"until_s", number(mission_time_s(robot, stretch.until))},
+                          {"error_m", number(stretch.error_m)}});
   return {{"components", server.components},
           {"closures_accepted", counts.accepted()},
           {"closures_accepted_intra", counts.accepted_intra},
@@ -68,21 +115,19 @@ Json server_json(const ServerRecord& server) {
           {"closure_check", std::move(check)},
           {"rmse_m", number(server.joint.rmse_m)},
           {"max_error_m", number(server.joint.max_error_m)},
-          {"rpe_m", number(server.joint.rpe_m)}};
+          {"rpe_m", number(server.joint.rpe_m)},
+          {"T_reference_world", server.T_reference_world ? pose_json(*server.T_reference_world) : Json(nullptr)},
+          {"map_error", map_error_json(server.map_error)},
+          {"survey_covered", number(server.survey_covered)},
+          {"failed_odometry", std::move(failed)}};
 }
 
 Json transform_json(const TransformRecord& transform) {
-  const Eigen::Vector3d& t = transform.T_from_to.translation;
-  Eigen::Vector4d q = transform.T_from_to.rotation.coeffs();
-  if (q.w() < 0.0) q = -q;  // q and -q are one rotation: always print the same
-  constexpr double kPerUnit = 1e9;
-  return {{"from", transform.from},
-          {"to", transform.to},
-          {"translation_m", {number(t.x()), number(t.y()), number(t.z())}},
-          {"quaternion_xyzw",
-           {number(q.x(), kPerUnit), number(q.y(), kPerUnit), number(q.z(), kPerUnit), number(q.w(), kPerUnit)}},
-          {"error_m", number(transform.error_m)},
-          {"error_deg", number(transform.error_deg)}};
+  Json out{{"from", transform.from}, {"to", transform.to}};
+  out.update(pose_json(transform.T_from_to));
+  out["error_m"] = number(transform.error_m);
+  out["error_deg"] = number(transform.error_deg);
+  return out;
 }
 
 /// {"count", "median_ms", "max_ms"}; the two figures are null without samples.
@@ -126,7 +171,7 @@ std::string report_json(const MissionRecord& record) {
                      {"max_difference_s", number(record.association.max_difference_s)}}},
                    {"rpe_interval", record.rpe_interval},
                    {"robots", std::move(robots)},
-                   {"server", server_json(record.server)},
+                   {"server", server_json(record)},
                    {"transforms", std::move(transforms)}});
 }
 

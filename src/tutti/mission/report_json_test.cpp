@@ -58,6 +58,37 @@ TEST(ReportJson, CarriesTheRecordsFigures) {
       report["server"]["closures_accepted"].get<int>());
 }
 
+TEST(ReportJson, MapErrorWhereThereIsASurvey) {
+  MissionRecord record = test::example_record({.survey = true});
+  const json report = json::parse(report_json(record));
+  EXPECT_DOUBLE_EQ(report["server"]["map_error"]["rms_m"], 0.07);
+  EXPECT_DOUBLE_EQ(report["server"]["survey_covered"], 0.97);
+  EXPECT_DOUBLE_EQ(report["robots"][1]["map_error"]["onboard"]["mean_m"], 0.41);
+  EXPECT_DOUBLE_EQ(report["robots"][1]["map_error"]["corrected"]["p95_m"], 0.15);
+  const json& pose = report["server"]["T_reference_world"];
+  const auto t = pose["translation_m"].get<std::vector<double>>();
+  const auto q = pose["quaternion_xyzw"].get<std::vector<double>>();
+  const Pose3 T{Eigen::Quaterniond(q[3], q[0], q[1], q[2]), Eigen::Vector3d(t[0], t[1], t[2])};
+  EXPECT_LT(local(*record.server.T_reference_world, T).norm(), 1e-5);
+  EXPECT_TRUE(json::parse(report_json(test::example_record()))["server"]["map_error"].is_null());
+}
+
+TEST(ReportJson, DriftIsInMissionTime) {
+  MissionRecord record = test::example_record();
+  record.robots[0].start_s = 2400.0;
+  record.server.failed_odometry = {
+      {record.robots[0].id, record.robots[0].odometry[3].stamp, record.robots[0].odometry[4].stamp, 1.5}};
+  const json report = json::parse(report_json(record));
+  const json& origin = report["robots"][0]["drift_origins"][1];
+  EXPECT_EQ(origin["kind"], "degeneracy");
+  EXPECT_DOUBLE_EQ(origin["from_s"], 2436.0);
+  EXPECT_DOUBLE_EQ(origin["until_s"], 2448.0);
+  const json& failed = report["server"]["failed_odometry"][0];
+  EXPECT_EQ(failed["robot"], "alpha");
+  EXPECT_DOUBLE_EQ(failed["from_s"], 2406.0);
+  EXPECT_DOUBLE_EQ(failed["error_m"], 1.5);
+}
+
 TEST(ReportJson, NotMeasuredIsNull) {
   MissionRecord record = test::example_record({.reference = false});
   record.robots[0].policies[0].agreement_rmse_m = std::numeric_limits<double>::quiet_NaN();
@@ -71,6 +102,8 @@ TEST(ReportJson, NotMeasuredIsNull) {
   EXPECT_TRUE(robot["policies"]["every_node"]["agreement_rmse_m"].is_null());
   EXPECT_FALSE(robot["policies"]["spectral"]["agreement_rmse_m"].is_null());
   EXPECT_TRUE(report["server"]["rmse_m"].is_null());
+  EXPECT_TRUE(report["server"]["T_reference_world"].is_null());
+  EXPECT_TRUE(robot["map_error"]["onboard"].is_null());
 }
 
 TEST(ReportJson, IsTheSameWhateverTheClockSays) {

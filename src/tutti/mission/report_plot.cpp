@@ -88,7 +88,7 @@ void draw_axes(Svg& svg, const Axis& x, const Axis& y, const Eigen::Vector2d& to
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> grid;
   for (const double tick : x.ticks()) {
     grid.push_back({{x(tick), top_left.y()}, {x(tick), bottom_right.y()}});
-    svg.text({x(tick), bottom_right.y() + 16.0}, tick_label(tick), "tick", "middle");
+    if (!x_name.empty()) svg.text({x(tick), bottom_right.y() + 16.0}, tick_label(tick), "tick", "middle");
   }
   for (const double tick : y.ticks()) {
     grid.push_back({{top_left.x(), y(tick)}, {bottom_right.x(), y(tick)}});
@@ -129,14 +129,19 @@ Points2d PlanView::operator()(const Points2d& points) const {
   return out;
 }
 
-void PlanView::draw_scale_bar(Svg& svg) const {
+double PlanView::scale_bar_m() const {
   constexpr double kShortestBarPx = 60.0;
-  const double length_m = round_up(kShortestBarPx / scale_);
+  return round_up(kShortestBarPx / scale_);
+}
+
+void PlanView::draw_scale_bar(Svg& svg, std::string_view look) const {
+  const double length_m = scale_bar_m();
   const Eigen::Vector2d left{12.0, height_ - 10.0};
   const Eigen::Vector2d right = left + Eigen::Vector2d(length_m * scale_, 0.0);
   const Eigen::Vector2d up{0.0, -5.0};
-  svg.polyline(Points2d{left + up, left, right, right + up}, "scalebar");
-  svg.text(0.5 * (left + right) + Eigen::Vector2d(0.0, -6.0), length_label(length_m), "tick", "middle");
+  svg.polyline(Points2d{left + up, left, right, right + up}, fmt::format("scalebar {}", look));
+  svg.text(0.5 * (left + right) + Eigen::Vector2d(0.0, -6.0), length_label(length_m), fmt::format("tick {}", look),
+           "middle");
 }
 
 std::string heat_colour(double t) {

@@ -45,7 +45,7 @@ std::string tick_label(double value);
 /// A length for an axis of metres: "1 mm", "5 cm", "2 m".
 std::string length_label(double value_m);
 
-/// Grid, tick labels and axis names of a chart whose plot area the two axes span.
+/// Grid, tick labels and axis names of a chart whose plot area the two axes span. Without a name, no labels along x.
 void draw_axes(Svg& svg, const Axis& x, const Axis& y, const Eigen::Vector2d& top_left,
                const Eigen::Vector2d& bottom_right, std::string_view x_name, bool y_is_length);
 
@@ -59,8 +59,9 @@ class PlanView {
   [[nodiscard]] double pixels_per_metre() const { return scale_; }
   [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector2d& p) const;
   [[nodiscard]] Points2d operator()(const Points2d& points) const;
-  /// A bar of a round length in the lower left corner.
-  void draw_scale_bar(Svg& svg) const;
+  /// A bar of a round length in the lower left corner; `look`: one more CSS class for it.
+  void draw_scale_bar(Svg& svg, std::string_view look = {}) const;
+  [[nodiscard]] double scale_bar_m() const;
 
  private:
   double width_;

@@ -178,6 +178,11 @@ void Svg::rect(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::
   body_ += close("rect", title);
 }
 
+void Svg::image(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::string_view uri) {
+  body_ += fmt::format("<image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" href=\"{}\"/>\n", px(corner.x()),
+                       px(corner.y()), px(size.x()), px(size.y()), uri);
+}
+
 void Svg::text(const Eigen::Vector2d& position, std::string_view text, std::string_view css_class,
                std::string_view anchor) {
   if (!position.allFinite()) return;

@@ -45,6 +45,8 @@ class Svg {
   /// `fill`: a colour that overrides the class, or empty.
   void rect(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::string_view css_class,
             std::string_view title = {}, std::string_view fill = {});
+  /// A picture, stretched; `uri` holds it all ("data:...").
+  void image(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::string_view uri);
   /// `anchor`: start, middle or end.
   void text(const Eigen::Vector2d& position, std::string_view text, std::string_view css_class,
             std::string_view anchor = "start");

@@ -19,6 +19,7 @@ struct ExampleOptions {
   std::size_t keyframes = 120;  ///< Per robot, one every 2 s.
   bool reference = true;
   bool cloud = true;
+  bool survey = false;  ///< Needs reference and cloud.
 };
 
 /// A walk around a block of corridors, a different corner and length for each robot.
@@ -65,6 +66,19 @@ inline Trajectory drifting(const Trajectory& truth, double yaw_per_metre_rad) {
   return out;
 }
 
+inline Pose3 example_T_world_truth() { return {so3_exp({0.01, 0.02, 0.4}), {5.0, -3.0, 1.0}}; }
+
+/// Two walls along a way.
+inline PointCloud example_walls(const Trajectory& way, Rng rng) {
+  PointCloud out;
+  for (const auto& p : way)
+    for (int i = 0; i < 60; ++i)
+      out.points.push_back(
+          (p.pose * Eigen::Vector3d(rng.uniform(-1.5, 1.5), i % 2 == 0 ? 1.6 : -1.6, rng.uniform(-1.0, 1.5)))
+              .cast<float>());
+  return out;
+}
+
 inline UpdateRecord example_update(double time_s, std::uint64_t revision, Rng rng) {
   UpdateRecord update{.time_s = time_s, .revision = revision};
   update.synchronised_nodes = 10 * revision;
@@ -86,9 +100,8 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
     const double time_s = 2.0 * static_cast<double>(k);
     truth.push_back({Timestamp{1'700'000'000'000'000'000} + time_s, example_pose(index, 0.7 * time_s)});
   }
-  const Pose3 T_world_truth{so3_exp({0.01, 0.02, 0.4}), {5.0, -3.0, 1.0}};
   robot.odometry = drifting(truth, index % 2 == 0 ? 0.0015 : -0.002);
-  robot.server_estimate = moved(T_world_truth, noisy(truth, 0.01, rng.fork("server")));
+  robot.server_estimate = moved(example_T_world_truth(), noisy(truth, 0.01, rng.fork("server")));
   if (options.reference) robot.reference = truth;
   robot.duration_s = truth.empty() ? 0.0 : truth.back().stamp - truth.front().stamp;
   robot.distance_m = 0.7 * robot.duration_s;
@@ -132,9 +145,11 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
 
 inline ServerRecord example_server(const std::vector<RobotRecord>& robots, const ExampleOptions& options, Rng rng) {
   ServerRecord server{.components = robots.empty() ? 0U : 1U};
-  if (options.reference && !robots.empty()) server.joint = {0.0182, 0.061, 0.024};
+  if (options.reference && !robots.empty()) {
+    server.joint = {0.0182, 0.061, 0.024};
+    server.T_reference_world = example_T_world_truth().inverse();
+  }
   for (const auto& robot : robots) {
-    CloudRecord seen{robot.id, {}};
     for (std::uint32_t k = 0; k < robot.server_estimate.size(); ++k) {
       const auto& [stamp, pose] = robot.server_estimate[k];
       server.nodes.push_back({{robot.id, k}, stamp});
@@ -144,12 +159,9 @@ inline ServerRecord example_server(const std::vector<RobotRecord>& robots, const
         const std::size_t to = server.graph.poses.size() - 1;
         server.graph.edges.push_back({to - 1, to, server.graph.poses[to - 1].inverse() * pose});
       }
-      for (int i = 0; options.cloud && i < 60; ++i)  // two walls
-        seen.cloud.points.push_back(
-            (pose * Eigen::Vector3d(rng.uniform(-1.5, 1.5), i % 2 == 0 ? 1.6 : -1.6, rng.uniform(-1.0, 1.5)))
-                .cast<float>());
     }
-    if (options.cloud) server.clouds.push_back(std::move(seen));
+    if (options.cloud)
+      server.clouds.push_back({robot.id, example_walls(robot.server_estimate, rng.fork(robot.name)), {}});
     server.proxy.components.push_back({robot.id, 0});
   }
   server.proxy.revision = 24;
@@ -161,6 +173,23 @@ inline ServerRecord example_server(const std::vector<RobotRecord>& robots, const
   server.rejections = {{"too little overlap", 31, 55}, {"slides along one direction", 4, 9}, {"inconsistent", 0, 3}};
   if (options.reference) server.closure_check = {server.closures.size(), 0, 0.041, 0.4};
   return server;
+}
+
+/// The walls along the references, and made-up distances of the map to them.
+inline void add_example_survey(MissionRecord& record) {
+  auto survey = std::make_shared<PointCloud>();
+  for (auto& robot : record.robots) {
+    const PointCloud walls = example_walls(robot.reference, Rng(3));
+    survey->points.insert(survey->points.end(), walls.points.begin(), walls.points.end());
+    robot.map_error = {evaluation::CloudDistance{7200, 0.41, 0.62, 1.31, 0.21, 0.45, 0.88},
+                       evaluation::CloudDistance{7200, 0.06, 0.08, 0.15, 0.86, 0.99, 1.0}};
+  }
+  for (auto& seen : record.server.clouds)
+    for (std::size_t i = 0; i < seen.cloud.points.size(); ++i)
+      seen.distance_m.push_back(0.6F * static_cast<float>(i) / static_cast<float>(seen.cloud.points.size()));
+  record.survey = survey;
+  record.server.map_error = evaluation::CloudDistance{14400, 0.05, 0.07, 0.12, 0.9, 1.0, 1.0};
+  record.server.survey_covered = 0.97;
 }
 
 inline MissionRecord example_record(const ExampleOptions& options = {}) {
@@ -184,7 +213,16 @@ inline MissionRecord example_record(const ExampleOptions& options = {}) {
             {other.id, other.odometry.back().stamp,
              robot.policies[2].corrected.back().pose * robot.server_estimate.back().pose.inverse() *
                  other.server_estimate.back().pose});
+  for (auto& robot : record.robots) {
+    if (options.cloud) robot.onboard_cloud = example_walls(robot.odometry, rng.fork("onboard"));
+    if (robot.odometry.size() < 40) continue;
+    const auto stamp = [&](std::size_t k) { return robot.odometry[k].stamp; };
+    robot.drift_origins = {{DriftOrigin::Kind::slip, stamp(10), stamp(11), 0.21, 0.02},
+                           {DriftOrigin::Kind::degeneracy, stamp(18), stamp(24), 0.8, 0.0},
+                           {DriftOrigin::Kind::failure, stamp(30), stamp(36), 1.9, 0.3}};
+  }
   record.server = example_server(record.robots, options, rng.fork("cloud"));
+  if (options.survey) add_example_survey(record);
   for (std::size_t r = 1; r < record.robots.size(); ++r)
     record.transforms.push_back({record.robots[0].name, record.robots[r].name,
                                  Pose3{so3_exp({0.02, 0.01, 2.1}), {31.2, -17.4, 0.3}}, 0.012, 0.05});
