@@ -125,12 +125,12 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
     RC_ASSERT(near(in.nodes[i].T_world_body, out.nodes[i].T_world_body, 5e-4, 1e-4));
     const Matrix6d difference = out.nodes[i].covariance - in.nodes[i].covariance;
     const Vector6d sigma = in.nodes[i].covariance.diagonal().cwiseSqrt();
-    RC_ASSERT((difference.cwiseAbs().array() <= 0.04 * (sigma * sigma.transpose()).array() + 1e-300).all());
+    RC_ASSERT((difference.cwiseAbs().array() <= 0.08 * (sigma * sigma.transpose()).array() + 1e-300).all());
   }
   for (std::size_t i = 0; i < in.edges.size(); ++i) {
     RC_ASSERT(out.edges[i].a == in.edges[i].a);
     RC_ASSERT(out.edges[i].b == in.edges[i].b);
-    RC_ASSERT(std::abs(out.edges[i].weight - in.edges[i].weight) <= 1e-7 * in.edges[i].weight + 1e-38);
+    RC_ASSERT(std::abs(out.edges[i].weight - in.edges[i].weight) <= 2.5e-4 * in.edges[i].weight);
   }
   const auto again = decode_proxy_graph(encode(*decoded));
   RC_ASSERT(again.has_value());
@@ -154,7 +154,7 @@ TEST(Codec, BytesOnTheRadio) {
   const std::size_t without_cloud = encode(submap).size();
   std::printf("%.1f bytes per proxy node, %zu bytes per submap of 12 keyframes without cloud\n", per_node,
               without_cloud);
-  EXPECT_LT(per_node, 32.0);
+  EXPECT_LT(per_node, 14.0);
   EXPECT_LT(without_cloud, 700U);
 }
 

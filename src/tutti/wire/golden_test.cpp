@@ -38,7 +38,7 @@ TEST(Golden, Submap) {
                               {161, {1'577'836'981'199'104'651}, {kQuarterTurn, {2, 2, 3}}, false}};
   message.submap.odometry = {{{kQuarterTurn, {1, 0, 0}}, diagonal(4e-4, 1e-4)}};
   message.submap.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}});
-  const auto decoded = decode_submap(golden_bytes("submap_v1.bin", encode(message)));
+  const auto decoded = decode_submap(golden_bytes("submap_v2.bin", encode(message)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   const Submap& submap = decoded->submap;
   EXPECT_EQ(decoded->header, message.header);
@@ -71,13 +71,16 @@ TEST(Golden, ProxyGraph) {
   graph.reduced = true;
   graph.edges = {{0, 1, 0.625}};
   graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
-  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v1.bin", encode(message)));
+  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v2.bin", encode(message)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   EXPECT_EQ(decoded->header, message.header);
   EXPECT_EQ(decoded->graph.revision, 42U);
   EXPECT_EQ(decoded->graph.radius_m, 7.0);
   EXPECT_EQ(decoded->graph.components, graph.components);
-  EXPECT_EQ(decoded->graph.edges, graph.edges);
+  ASSERT_EQ(decoded->graph.edges.size(), 1U);
+  EXPECT_EQ(decoded->graph.edges[0].a, 0U);
+  EXPECT_EQ(decoded->graph.edges[0].b, 1U);
+  EXPECT_NEAR(decoded->graph.edges[0].weight, 0.625, 2e-4);
   EXPECT_EQ(decoded->graph.eliminated, graph.eliminated);
   ASSERT_EQ(decoded->graph.nodes.size(), 3U);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -87,14 +90,14 @@ TEST(Golden, ProxyGraph) {
     EXPECT_LT(local(decoded->graph.nodes[i].T_world_body, graph.nodes[i].T_world_body).norm(), 5e-4);
   }
   EXPECT_EQ(decoded->graph.nodes[0].covariance, Matrix6d::Zero().eval());
-  EXPECT_NEAR(decoded->graph.nodes[1].covariance(2, 2), 1e-4, 4e-6);
+  EXPECT_NEAR(decoded->graph.nodes[1].covariance(2, 2), 1e-4, 8e-6);
 }
 
 TEST(Golden, Verdict) {
   const ClosureVerdict verdict{
       .pair = {{RobotId{0}, 3}, {RobotId{1}, 4}},
       .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}}};
-  const auto decoded = decode_verdict(golden_bytes("verdict_v1.bin", encode(verdict)));
+  const auto decoded = decode_verdict(golden_bytes("verdict_v2.bin", encode(verdict)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   EXPECT_EQ(*decoded, verdict);
 }

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
-#include <utility>
+#include <numeric>
+#include <optional>
 #include <vector>
 
 #include "tutti/base/check.hpp"
@@ -8,119 +12,222 @@
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/columns.hpp"
+#include "tutti/wire/internal/integer_coder.hpp"
 #include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
 namespace {
 
-using Stamps = std::vector<std::array<std::int64_t, 1>>;
-using Edges = std::vector<std::array<std::int64_t, 1>>;
+constexpr double kLogWeightStep = 1.0 / 2048.0;
 
-void write_runs(const ProxyGraph& graph, v1::ProxyGraph& out) {
-  std::map<RobotId, std::pair<std::uint32_t, std::uint32_t>> counts;
-  for (const ProxyNode& node : graph.nodes) ++counts[node.robot].first;
-  for (const EliminatedNode& node : graph.eliminated) ++counts[node.robot].second;
-  for (const auto& [robot, count] : counts) {
-    v1::RobotRun& run = *out.add_run();
-    run.set_robot(robot.value);
-    run.set_nodes(count.first);
-    run.set_eliminated(count.second);
-  }
-}
-
-void write_nodes(const ProxyGraph& graph, v1::ProxyGraph& out) {
-  Stamps stamps, eliminated;
-  std::vector<PoseCode> poses;
-  std::vector<CovarianceCode> covariances;
-  for (const ProxyNode& node : graph.nodes) {
-    stamps.push_back({node.stamp.ns});
-    poses.push_back(quantise(node.T_world_body, kProxyPoseSteps));
-    covariances.push_back(quantise(node.covariance, kProxyCovarianceStep));
-    out.add_support(node.support);
-  }
-  for (const EliminatedNode& node : graph.eliminated) eliminated.push_back({node.stamp.ns});
-  write_columns(stamps, *out.mutable_stamp_ns());
-  write_columns(poses, *out.mutable_pose());
-  write_columns(covariances, *out.mutable_covariance());
-  write_columns(eliminated, *out.mutable_eliminated_stamp_ns());
-}
-
-void write_edges(const ProxyGraph& graph, v1::ProxyGraph& out) {
-  Edges a;
-  for (const ProxyEdge& edge : graph.edges) {
-    a.push_back({edge.a});
-    out.add_edge_b(std::int64_t{edge.b} - std::int64_t{edge.a});
-    out.add_edge_weight(static_cast<float>(edge.weight));
-  }
-  write_columns(a, *out.mutable_edge_a());
-}
-
-/// Robot of every node and eliminated node.
-struct Robots {
-  std::vector<RobotId> nodes;
-  std::vector<RobotId> eliminated;
+/// The stamps of one robot are multiples of a step after an offset: sensors are regular. Differences wrap around.
+struct Clock {
+  std::uint64_t offset_ns = 0;
+  std::uint64_t step_ns = 1;
 };
 
-Result<Robots> read_runs(const v1::ProxyGraph& in) {
+/// One robot's part of the graph.
+struct Run {
+  RobotId robot;
+  Clock clock;
+  std::size_t nodes = 0;
+  std::size_t eliminated = 0;
+};
+
+// One routine serves both ways, so that they cannot differ: it hands each number to code(model, number), which writes
+// and returns it, or ignores it and returns the one read.
+struct Writer {
+  RangeEncoder out;
+  std::int64_t code(IntegerModel& model, std::int64_t value) {
+    model.put(out, value);
+    return value;
+  }
+};
+struct Reader {
+  RangeDecoder in;
+  std::int64_t code(IntegerModel& model, std::int64_t) { return model.get(in); }
+};
+
+/// Stamps of one robot, each by its distance to the one before.
+class StampColumn {
+ public:
+  void start_run() { previous_ = 0; }
+  template <class Coder>
+  Timestamp code(Coder& coder, const Clock& clock, Timestamp stamp) {
+    const std::uint64_t tick = (static_cast<std::uint64_t>(stamp.ns) - clock.offset_ns) / clock.step_ns;
+    previous_ += static_cast<std::uint64_t>(coder.code(model_, static_cast<std::int64_t>(tick - previous_)));
+    return {static_cast<std::int64_t>(clock.offset_ns + previous_ * clock.step_ns)};
+  }
+
+ private:
+  IntegerModel model_;
+  std::uint64_t previous_ = 0;
+};
+
+/// Nodes of one robot along its way. A pose is coded as the motion since the node before *as the receiver knows it*, so
+/// errors do not add up.
+class NodeColumns {
+ public:
+  void start_run() {
+    stamps_.start_run();
+    T_world_previous_ = Pose3();
+  }
+  /// Nothing when a number is outside what encoding makes.
+  template <class Coder>
+  std::optional<ProxyNode> code(Coder& coder, const Run& run, const ProxyNode& node) {
+    const Timestamp stamp = stamps_.code(coder, run.clock, node.stamp);
+    PoseCode motion = quantise(T_world_previous_.inverse() * node.T_world_body, kProxyPoseSteps);
+    for (std::size_t i = 0; i < motion.size(); ++i) motion[i] = coder.code(motion_[i], motion[i]);
+    CovarianceCode covariance = quantise(node.covariance, kProxyCovarianceStep);
+    std::int64_t change = 0;  // variances grow and shrink together
+    for (std::size_t i = 0; i < covariance.size(); ++i) {
+      const std::int64_t expected = sum(previous_covariance_[i], i < 6 ? change : 0);
+      covariance[i] = sum(expected, coder.code(covariance_[i], difference(covariance[i], expected)));
+      change = difference(covariance[i], previous_covariance_[i]);
+    }
+    previous_covariance_ = covariance;
+    const std::int64_t support = sum(previous_support_, coder.code(support_, node.support - previous_support_));
+
+    const auto T_previous_body = dequantise(motion, kProxyPoseSteps);
+    const auto matrix = dequantise(covariance, kProxyCovarianceStep);
+    if (!T_previous_body || !matrix || support < 0 || support > std::numeric_limits<std::uint32_t>::max())
+      return std::nullopt;
+    previous_support_ = support;
+    T_world_previous_ = T_world_previous_ * *T_previous_body;
+    if (T_world_previous_.translation.cwiseAbs().maxCoeff() > kMaxCoordinate_m + 1.0) return std::nullopt;
+    return ProxyNode{run.robot, stamp, T_world_previous_, *matrix, static_cast<std::uint32_t>(support)};
+  }
+
+ private:
+  StampColumn stamps_;
+  std::array<IntegerModel, 6> motion_;
+  std::array<IntegerModel, 21> covariance_;
+  IntegerModel support_;
+  Pose3 T_world_previous_;
+  CovarianceCode previous_covariance_{};
+  std::int64_t previous_support_ = 0;
+};
+
+/// Edges, in few bits when sorted. The logarithm of the weight is rounded; 0 stays 0.
+class EdgeColumns {
+ public:
+  /// Nothing when an end is not one of the `nodes`.
+  template <class Coder>
+  std::optional<ProxyEdge> code(Coder& coder, std::int64_t nodes, const ProxyEdge& edge) {
+    const std::int64_t step = coder.code(a_, edge.a - a);
+    a = sum(a, step);
+    const std::int64_t from = step == 0 ? b : a;
+    b = sum(from, coder.code(step == 0 ? next_b_ : first_b_, edge.b - from));
+    if (a < 0 || a >= nodes || b < 0 || b >= nodes) return std::nullopt;
+    ProxyEdge out{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), 0.0};
+    if (coder.code(positive_, edge.weight > 0.0 ? 1 : 0) == 0) return out;
+    log_weight = sum(log_weight, coder.code(log_weight_, difference(rounded_log(edge.weight), log_weight)));
+    out.weight = std::exp(static_cast<double>(log_weight) * kLogWeightStep);
+    return out;
+  }
+  std::int64_t a = 0, b = 0, log_weight = 0;  ///< Of the last edge.
+
+ private:
+  static std::int64_t rounded_log(double weight) {
+    constexpr double kMax = 88.7;  // clear of the largest float
+    return weight > 0.0 ? std::llround(std::min(std::log(weight), kMax) / kLogWeightStep) : 0;
+  }
+  IntegerModel a_, first_b_, next_b_, positive_, log_weight_;
+};
+
+std::vector<Run> runs_of(const ProxyGraph& graph) {
+  std::map<RobotId, Run> runs;
+  const auto add = [&](const auto& nodes, std::size_t Run::*count) {
+    for (const auto& node : nodes) {
+      Run& run = runs[node.robot];
+      const auto stamp = static_cast<std::uint64_t>(node.stamp.ns);
+      run.robot = node.robot;
+      if (run.nodes + run.eliminated == 0) run.clock = {stamp, 0};
+      run.clock.step_ns = std::gcd(run.clock.step_ns, stamp - run.clock.offset_ns);
+      ++(run.*count);
+    }
+  };
+  add(graph.nodes, &Run::nodes);
+  add(graph.eliminated, &Run::eliminated);
+  std::vector<Run> out;
+  for (auto& [robot, run] : runs) {
+    run.clock.step_ns = std::max<std::uint64_t>(run.clock.step_ns, 1);
+    out.push_back(run);
+  }
+  return out;
+}
+
+Result<std::vector<Run>> read_runs(const v1::ProxyGraph& in) {
   if (static_cast<std::size_t>(in.run_size()) > kMaxRobots)
     return fail(ErrorCode::invalid, "{} robots, at most {} are accepted", in.run_size(), kMaxRobots);
-  Robots robots;
+  std::vector<Run> runs;
+  std::size_t nodes = 0;
+  std::size_t eliminated = 0;
   for (const v1::RobotRun& run : in.run()) {
-    const auto nodes = robots.nodes.size() + run.nodes();
-    const auto eliminated = robots.eliminated.size() + run.eliminated();
+    nodes += run.nodes();
+    eliminated += run.eliminated();
     if (nodes > kMaxProxyNodes || eliminated > kMaxProxyNodes)
       return fail(ErrorCode::invalid, "{} nodes and {} eliminated ones, at most {} each", nodes, eliminated,
                   kMaxProxyNodes);
-    robots.nodes.resize(nodes, RobotId{run.robot()});
-    robots.eliminated.resize(eliminated, RobotId{run.robot()});
+    if (run.stamp_step_ns() == 0)
+      return fail(ErrorCode::invalid, "robot {}: a step of 0 ns between stamps", run.robot());
+    runs.push_back({RobotId{run.robot()},
+                    {static_cast<std::uint64_t>(run.stamp_offset_ns()), run.stamp_step_ns()},
+                    run.nodes(),
+                    run.eliminated()});
   }
-  return robots;
+  return runs;
 }
 
-Status read_nodes(const v1::ProxyGraph& in, const Robots& robots, ProxyGraph& graph) {
-  const std::size_t count = robots.nodes.size();
-  const auto stamps = read_columns<1>(in.stamp_ns(), count);
-  const auto poses = read_columns<6>(in.pose(), count);
-  const auto covariances = read_columns<21>(in.covariance(), count);
-  const auto eliminated = read_columns<1>(in.eliminated_stamp_ns(), robots.eliminated.size());
-  if (!stamps || !poses || !covariances || !eliminated || static_cast<std::size_t>(in.support_size()) != count)
-    return fail(ErrorCode::parse,
-                "{} stamps, {} pose numbers, {} covariance numbers, {} supports for {} nodes; {} "
-                "stamps for {} eliminated ones",
-                in.stamp_ns_size(), in.pose_size(), in.covariance_size(), in.support_size(), count,
-                in.eliminated_stamp_ns_size(), robots.eliminated.size());
-  graph.nodes.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto T_world_body = dequantise((*poses)[i], kProxyPoseSteps);
-    const auto covariance = dequantise((*covariances)[i], kProxyCovarianceStep);
-    if (!T_world_body || !covariance) return fail(ErrorCode::invalid, "node {} is out of range", i);
-    graph.nodes.push_back(
-        {robots.nodes[i], Timestamp{(*stamps)[i][0]}, *T_world_body, *covariance, in.support(static_cast<int>(i))});
+void write_body(const ProxyGraph& graph, const std::vector<Run>& runs, v1::ProxyGraph& out) {
+  Writer writer;
+  NodeColumns nodes;
+  StampColumn eliminated;
+  auto node = graph.nodes.begin();
+  auto gone = graph.eliminated.begin();
+  for (const Run& run : runs) {
+    nodes.start_run();
+    eliminated.start_run();
+    for (std::size_t i = 0; i < run.nodes; ++i)
+      TUTTI_CHECK(nodes.code(writer, run, *node++).has_value(), "node {} of robot {}", i, run.robot.value);
+    for (std::size_t i = 0; i < run.eliminated; ++i) eliminated.code(writer, run.clock, (gone++)->stamp);
   }
-  for (std::size_t i = 0; i < robots.eliminated.size(); ++i)
-    graph.eliminated.push_back({robots.eliminated[i], Timestamp{(*eliminated)[i][0]}});
-  return {};
+  EdgeColumns edges;
+  const auto count = static_cast<std::int64_t>(graph.nodes.size());
+  for (const ProxyEdge& edge : graph.edges) edges.code(writer, count, edge);
+  out.set_edges(static_cast<std::uint32_t>(graph.edges.size()));
+  out.set_body(writer.out.finish());
 }
 
-Status read_edges(const v1::ProxyGraph& in, ProxyGraph& graph) {
-  const auto count = static_cast<std::size_t>(in.edge_b_size());
-  if (count > kMaxProxyEdges)
-    return fail(ErrorCode::invalid, "{} edges, at most {} are accepted", count, kMaxProxyEdges);
-  const auto a = read_columns<1>(in.edge_a(), count);
-  if (!a || in.edge_weight_size() != in.edge_b_size())
-    return fail(ErrorCode::parse, "edges have {} first ends, {} second ends, {} weights", in.edge_a_size(),
-                in.edge_b_size(), in.edge_weight_size());
-  graph.edges.reserve(count);
-  const auto nodes = static_cast<std::int64_t>(graph.nodes.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::int64_t from = (*a)[i][0];
-    const std::int64_t to = sum(from, in.edge_b(static_cast<int>(i)));
-    if (from < 0 || from >= nodes || to < 0 || to >= nodes)
-      return fail(ErrorCode::invalid, "edge {} joins nodes {} and {} of {}", i, from, to, nodes);
-    graph.edges.push_back({static_cast<std::uint32_t>(from), static_cast<std::uint32_t>(to),
-                           static_cast<double>(in.edge_weight(static_cast<int>(i)))});
+/// Stops as soon as it has read more than there is: what is claimed may be more than what is there.
+Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGraph& graph) {
+  if (in.edges() > kMaxProxyEdges)
+    return fail(ErrorCode::invalid, "{} edges, at most {} are accepted", in.edges(), kMaxProxyEdges);
+  Reader reader{RangeDecoder(in.body())};
+  NodeColumns nodes;
+  StampColumn eliminated;
+  for (const Run& run : runs) {
+    nodes.start_run();
+    eliminated.start_run();
+    for (std::size_t i = 0; i < run.nodes && !reader.in.overrun(); ++i) {
+      const auto node = nodes.code(reader, run, {});
+      if (!node) return fail(ErrorCode::invalid, "node {} of robot {} is out of range", i, run.robot.value);
+      graph.nodes.push_back(*node);
+    }
+    for (std::size_t i = 0; i < run.eliminated && !reader.in.overrun(); ++i)
+      graph.eliminated.push_back({run.robot, eliminated.code(reader, run.clock, {})});
   }
+  EdgeColumns edges;
+  for (std::size_t i = 0; i < in.edges() && !reader.in.overrun(); ++i) {
+    const auto edge = edges.code(reader, static_cast<std::int64_t>(graph.nodes.size()), {});
+    if (!edge)
+      return fail(ErrorCode::invalid, "edge {} joins nodes {} and {} of {}", i, edges.a, edges.b, graph.nodes.size());
+    graph.edges.push_back(*edge);
+  }
+  if (!reader.in.finished())
+    return fail(ErrorCode::parse, "body of {} bytes is {} than what it is said to hold", in.body().size(),
+                reader.in.overrun() ? "shorter" : "longer");
   return {};
 }
 
@@ -146,9 +253,16 @@ std::string encode(const ProxyGraphMessage& message) {
   out.set_radius_m(graph.radius_m);
   out.set_sigma_m(graph.sigma_m);
   out.set_reduced(graph.reduced);
-  write_runs(graph, out);
-  write_nodes(graph, out);
-  write_edges(graph, out);
+  const std::vector<Run> runs = runs_of(graph);
+  for (const Run& run : runs) {
+    v1::RobotRun& entry = *out.add_run();
+    entry.set_robot(run.robot.value);
+    entry.set_nodes(static_cast<std::uint32_t>(run.nodes));
+    entry.set_eliminated(static_cast<std::uint32_t>(run.eliminated));
+    entry.set_stamp_offset_ns(static_cast<std::int64_t>(run.clock.offset_ns));
+    entry.set_stamp_step_ns(run.clock.step_ns);
+  }
+  write_body(graph, runs, out);
   for (const RobotComponent& component : graph.components) {
     out.add_component_robot(component.robot.value);
     out.add_component(component.component);
@@ -170,10 +284,9 @@ Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes) {
   graph.sigma_m = in.sigma_m();
   graph.reduced = in.reduced();
   const std::string where = fmt::format("proxy graph {}", graph.revision);
-  const Result<Robots> robots = read_runs(in);
-  if (!robots) return in_context(where, robots.error());
-  if (auto ok = read_nodes(in, *robots, graph); !ok) return in_context(where, ok.error());
-  if (auto ok = read_edges(in, graph); !ok) return in_context(where, ok.error());
+  const auto runs = read_runs(in);
+  if (!runs) return in_context(where, runs.error());
+  if (auto ok = read_body(in, *runs, graph); !ok) return in_context(where, ok.error());
   if (auto ok = read_components(in, graph); !ok) return in_context(where, ok.error());
   if (auto ok = validate(message); !ok) return tl::unexpected(ok.error());
   return message;
