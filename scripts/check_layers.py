@@ -14,7 +14,7 @@ CONFINED = [
     (r"google/protobuf|.*\.pb\.h$", r"(wire|bus)/", "wire/ and bus/"),
     (r"ceres/", r"(estimation/.*\.cpp|.*_test\.cpp)$", "estimation/*.cpp and tests"),
     (r"Spectra/", r"spectral/.*\.cpp$", "spectral/*.cpp"),
-    (r"nanoflann", r"(perception|spectral|consistency)/.*\.cpp$", "perception/, spectral/, consistency/ *.cpp"),
+    (r"nanoflann", r"(perception|spectral|consistency|evaluation)/.*\.cpp$", "perception/, spectral/, consistency/, evaluation/ *.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),
 ]

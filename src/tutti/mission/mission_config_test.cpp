@@ -34,7 +34,7 @@ TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {
   EXPECT_NE(problem_with("mission: x\n").find("robots: none"), std::string::npos);
   EXPECT_NE(problem_with("robots: [{name: a}]\n").find("robots.0.odometry.file"), std::string::npos);
   EXPECT_NE(problem_with("robots: [{name: a, odometry: {file: a}}]\n").find("robots.0.scans"), std::string::npos);
-  EXPECT_NE(problem_with("source: simulation\n").find("have no scans"), std::string::npos);
+  EXPECT_NE(problem_with("source: simulation\n").find("simulation.sensors"), std::string::npos);
   const std::string twins =
       "robots: [{name: a, odometry: {file: a}, scans: s}, {name: a, odometry: {file: b}, scans: s}]";
   EXPECT_NE(problem_with(twins).find("'a' is there twice"), std::string::npos);
