@@ -87,7 +87,9 @@ int run_and_report(const Result<mission::MissionConfig>& config, const MissionAr
     return 1;
   }
   ProgressLine progress;
+  const std::filesystem::path clouds = arguments.out / "clouds";  // while the mission runs
   const mission::RunOptions options{.data = arguments.data,
+                                    .clouds = clouds,
                                     .seed = arguments.seed,
                                     .rate = arguments.rate,
                                     .threads = arguments.threads,
@@ -95,6 +97,7 @@ int run_and_report(const Result<mission::MissionConfig>& config, const MissionAr
                                     .progress = std::ref(progress)};
   const auto record = mission::run_mission(*config, options);
   progress.close();
+  std::filesystem::remove_all(clouds, failure);
   if (!record) {
     std::cerr << "tutti: " << record.error().message << '\n';
     if (record.error().code == ErrorCode::io && arguments.data.empty())

@@ -49,14 +49,18 @@ Recording simulate_robot(const SimulatedRobotConfig& config, const CorridorWorld
 
 }  // namespace
 
+TriangleMesh world_mesh(const SimulationConfig& config, std::uint64_t seed) {
+  const Rng rng(seed);
+  return world_surface(make_world(config.world, rng.fork("world")), config.surface, rng.fork("surface"));
+}
+
 Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed) {
   const Rng rng(seed);
   SimulatedWorld world{.network = make_world(config.world, rng.fork("world")), .recordings = {}, .surface = {}};
   if (auto ok = check_robots(config, world.network); !ok) return tl::unexpected(ok.error());
   std::shared_ptr<const Bvh> walls;
   if (config.sensors == "lidar") {
-    world.surface =
-        std::make_shared<const TriangleMesh>(world_surface(world.network, config.surface, rng.fork("surface")));
+    world.surface = std::make_shared<const TriangleMesh>(world_mesh(config, seed));
     walls = std::make_shared<const Bvh>(*world.surface);
   }
   const std::vector<std::size_t> starts = spread_starts(world.network, config.robots.size(), rng.fork("starts"));

@@ -61,6 +61,9 @@ struct SimulatedWorld {
   std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would find; null without sensors.
 };
 
+/// The walls of the world that simulate_recordings() makes of the same configuration and seed; reference frame.
+TriangleMesh world_mesh(const SimulationConfig& config, std::uint64_t seed);
+
 /// Robots walking at the same time through one world; the first sample of each is at `start` + start_s. An error when
 /// the configuration asks for what the world has not (a junction, a corridor) or names two robots alike.
 Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed);
