@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 TUTTI, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
-SMALL = [
+SMALL = [  # two minutes with LiDAR in a small tunnel
     "--set", "simulation.robots=[{walk: {duration_s: 120}}, {walk: {duration_s: 120}}]",
     "--set", "simulation.world.network={rows: 2, columns: 3, block_m: 15, jitter_m: 2}",
 ]
@@ -38,7 +38,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_of_every_command(self):
         self.expect(tutti("--help"), 0, "run", "demo", "eval", "optimise")
-        for command in ("run", "demo", "eval", "optimise"):
+        for command in ("run", "demo", "eval", "optimise", "world"):
             self.expect(tutti(command, "--help"), 0, "--help")
 
     def test_usage_errors_exit_2(self):
@@ -84,7 +84,8 @@ class CommandLine(unittest.TestCase):
         report = json.loads((out / "report.json").read_text())
         self.assertEqual(report["seed"], 7)
         self.assertEqual({robot["name"] for robot in report["robots"]}, {"alpha", "bravo"})
-        for name in ("report.html", "timing.json", "graph.g2o", "config.yaml", "alpha_corrected.tum"):
+        for name in ("report.html", "timing.json", "graph.g2o", "config.yaml", "alpha_corrected.tum", "map.ply",
+                     "survey.ply"):
             self.assertTrue((out / name).stat().st_size > 0, name)
         # The other commands read what it wrote.
         self.expect(tutti("eval", out / "alpha_corrected.tum", out / "alpha_reference.tum"), 0, "rmse")
@@ -92,6 +93,17 @@ class CommandLine(unittest.TestCase):
         # The effective configuration is a mission file that runs again with the same result.
         self.expect(tutti("run", out / "config.yaml", "--out", self.path / "again", "--seed", 7), 0)
         self.assertEqual((out / "report.json").read_text(), (self.path / "again" / "report.json").read_text())
+
+    def test_world_writes_the_walls_of_a_simulated_mission(self):
+        mission = self.mission("source: simulation\nclosures: {finder: reference}\n")
+        self.expect(tutti("world", mission, "-o", self.path / "walls.ply"), 0, "triangles")
+        header = (self.path / "walls.ply").read_bytes()[:400]
+        self.assertIn(b"element face", header)
+        self.expect(tutti("world", mission, "--points", 1, "-o", self.path / "points.ply"), 0)
+        self.assertNotIn(b"element face", (self.path / "points.ply").read_bytes()[:400])
+        replayed = self.mission("robots: [{name: a, odometry: {file: a}, scans: s}]\n")
+        self.expect(tutti("world", replayed, "-o", self.path / "x.ply"), 2, "recordings", "simulation")
+        self.expect(tutti("world", mission), 2, "--output")
 
     def test_eval_and_optimise_say_what_is_wrong(self):
         (self.path / "empty.tum").write_text("")
