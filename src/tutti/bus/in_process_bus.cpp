@@ -83,6 +83,7 @@ void InProcessBus::enqueue(Timestamp now, Delivery message) {
   TopicStatistics& statistics = statistics_of(message);
   ++statistics.published;
   statistics.published_bytes += message.bytes->size();
+  statistics.largest_message = std::max<std::uint64_t>(statistics.largest_message, message.bytes->size());
   Direction& way = direction(message.from, message.to);
   const MessageKind kind = message.kind;
   if (only_latest_counts(kind))

@@ -87,6 +87,7 @@ struct TopicStatistics {
   std::uint64_t dropped = 0;            ///< Messages dropped because the queue was full.
   std::uint64_t published_bytes = 0;    ///< Payload handed to the bus.
   std::uint64_t transmitted_bytes = 0;  ///< Payload on the radio, repetitions counted.
+  std::uint64_t largest_message = 0;    ///< Bytes, of those handed to the bus.
   friend bool operator==(const TopicStatistics&, const TopicStatistics&) = default;
 };
 

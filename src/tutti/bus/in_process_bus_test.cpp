@@ -188,6 +188,41 @@ TEST(InProcessBus, FullQueueDropsTheOldest) {
   EXPECT_EQ(bus.statistics().at({kAlpha, kServer, MessageKind::submap}).dropped, 2U);
 }
 
+TEST(InProcessBus, TenMinutesOutOfRangeCostNoSubmapAndAnotherRobotNothing) {
+  InProcessBus bus(kStart, {}, 1);
+  LinkConfig link;
+  link.bandwidth_bytes_per_s = 20e3;
+  link.outages = {{300.0, 900.0}};
+  bus.set_link(RobotId{0}, link);
+  for (int i = 0; i <= 100; ++i)  // a submap every 10 s from both, 30 kB each, and a proxy graph every 20 s
+    for (const Endpoint robot : {kAlpha, kBravo}) {
+      bus.publish(at(10.0 * i), robot, kServer, MessageKind::submap, std::to_string(i).append(30'000, '.'));
+      if (i % 2 == 0) bus.publish(at(10.0 * i), kServer, robot, MessageKind::proxy_graph, std::to_string(i));
+    }
+  std::map<Endpoint, std::vector<int>> submaps;
+  std::vector<int> graphs;
+  for (const Delivery& delivery : drain(bus, at(1000))) {
+    if (delivery.to == kAlpha) graphs.push_back(std::stoi(*delivery.bytes));
+    if (delivery.to != kServer) continue;
+    submaps[delivery.from].push_back(std::stoi(*delivery.bytes));
+    const double age_s = delivery.arrived - delivery.sent;
+    const bool away = delivery.from == kAlpha && delivery.sent >= at(300) && delivery.sent < at(900);
+    EXPECT_EQ(delivery.arrived >= at(900), away || delivery.sent >= at(900));
+    EXPECT_TRUE(delivery.from == kAlpha || age_s < 0.1);
+  }
+  for (const Endpoint robot : {kAlpha, kBravo}) {
+    EXPECT_EQ(submaps[robot].size(), 101U);
+    EXPECT_TRUE(std::ranges::is_sorted(submaps[robot]));
+    const TopicStatistics up = bus.statistics().at({robot, kServer, MessageKind::submap});
+    EXPECT_EQ(up.dropped + up.lost, 0U);
+    EXPECT_EQ(up.largest_message, 30'003U);
+  }
+  // Of the proxy graphs of the ten minutes only the last is worth sending.
+  EXPECT_EQ(graphs.size(), 51U - 29U);
+  EXPECT_TRUE(std::ranges::find(graphs, 88) != graphs.end());
+  EXPECT_EQ(bus.statistics().at({kServer, kAlpha, MessageKind::proxy_graph}).superseded, 29U);
+}
+
 TEST(InProcessBus, EveryRobotMayHaveItsOwnLink) {
   InProcessBus bus(kStart, {}, 1);
   bus.set_link(RobotId{1}, {.latency_s = 3.0});

@@ -72,6 +72,18 @@ struct MapErrorRecord {
   std::optional<evaluation::CloudDistance> corrected;  ///< Default policy.
 };
 
+/// Messages of one kind over one robot's radio, in one direction.
+struct TrafficRecord {
+  std::string from;  ///< Name of the robot, or "server".
+  std::string to;
+  std::string kind;                     ///< "submap", "proxy graph" ...
+  std::uint64_t messages = 0;           ///< Handed to the radio.
+  std::uint64_t bytes = 0;              ///< Of these messages, encoded.
+  std::uint64_t transmitted_bytes = 0;  ///< Without what was never sent, repetitions included.
+  double bytes_per_s = 0.0;             ///< bytes over the robot's duration.
+  std::uint64_t largest_message = 0;    ///< Bytes.
+};
+
 struct RobotRecord {
   RobotId id;
   std::string name;
@@ -86,6 +98,7 @@ struct RobotRecord {
   std::uint64_t bytes_down = 0;        ///< Encoded messages server -> robot.
   std::size_t messages_up = 0;
   std::size_t messages_down = 0;
+  std::vector<TrafficRecord> traffic;  ///< The same by kind of message.
   std::size_t keyframes = 0;
   std::size_t submaps = 0;
   std::size_t proxy_nodes = 0;  ///< Of this robot in the last broadcast.

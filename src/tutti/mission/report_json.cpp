@@ -51,6 +51,20 @@ Json drift_json(const RobotRecord& robot) {
   return out;
 }
 
+Json traffic_json(const std::vector<TrafficRecord>& traffic) {
+  Json rows = Json::array();
+  for (const auto& row : traffic)
+    rows.push_back({{"from", row.from},
+                    {"to", row.to},
+                    {"kind", row.kind},
+                    {"messages", row.messages},
+                    {"bytes", row.bytes},
+                    {"transmitted_bytes", row.transmitted_bytes},
+                    {"bytes_per_s", number(row.bytes_per_s)},
+                    {"largest_message", row.largest_message}});
+  return rows;
+}
+
 Json robot_json(const RobotRecord& robot) {
   Json policies = Json::object();
   for (const auto& policy : robot.policies)
@@ -82,6 +96,7 @@ Json robot_json(const RobotRecord& robot) {
           {"bytes_down", robot.bytes_down},
           {"messages_up", robot.messages_up},
           {"messages_down", robot.messages_down},
+          {"traffic", traffic_json(robot.traffic)},
           {"proxy_nodes", robot.proxy_nodes},
           {"updates", robot.updates.size()}};
 }

@@ -32,7 +32,12 @@ TEST(ReportJson, HasTheDocumentedKeys) {
   ASSERT_EQ(report["robots"].size(), 2U);
   for (const auto& robot : report["robots"]) {
     expect_keys(robot, {"name", "distance_m", "odometry_factors", "onboard_rmse_m", "server_rmse_m", "policies",
-                        "bytes_up", "bytes_down", "proxy_nodes"});
+                        "bytes_up", "bytes_down", "traffic", "proxy_nodes"});
+    ASSERT_EQ(robot["traffic"].size(), 2U);
+    for (const auto& row : robot["traffic"])
+      expect_keys(row,
+                  {"from", "to", "kind", "messages", "bytes", "transmitted_bytes", "bytes_per_s", "largest_message"});
+    EXPECT_EQ(robot["traffic"][1]["largest_message"], 9876);
     ASSERT_EQ(robot["policies"].size(), 6U);
     for (const auto& policy : robot["policies"])
       EXPECT_EQ(keys(policy),

@@ -141,17 +141,18 @@ std::string policies_table(const MissionRecord& record, std::size_t first, std::
   return table.str();
 }
 
+/// Bytes per second over each robot's own time.
 std::string radio_table(const MissionRecord& record) {
-  Table table(1);
-  table.add({"radio", "up", "total", "down", "total", "proxy nodes"});
-  table.rule();
-  const auto rate = [](std::uint64_t bytes, double seconds) {
-    return seconds > 0.0 ? format_bytes(static_cast<double>(bytes) / seconds) + "/s" : std::string("-");
-  };
-  for (const auto& robot : record.robots)
-    table.add({robot.name, rate(robot.bytes_up, robot.duration_s), format_bytes(static_cast<double>(robot.bytes_up)),
-               rate(robot.bytes_down, robot.duration_s), format_bytes(static_cast<double>(robot.bytes_down)),
-               std::to_string(robot.proxy_nodes)});
+  Table table(2);
+  table.add({"radio", "kind", "messages", "total", "mean rate", "largest"});
+  for (const auto& robot : record.robots) {
+    if (robot.traffic.empty()) continue;
+    table.rule();
+    for (const auto& row : robot.traffic)
+      table.add({fmt::format("{} to {}", row.from, row.to), row.kind, std::to_string(row.messages),
+                 format_bytes(static_cast<double>(row.bytes)), format_bytes(row.bytes_per_s) + "/s",
+                 format_bytes(static_cast<double>(row.largest_message))});
+  }
   return table.str();
 }
 

@@ -13,6 +13,7 @@
 
 #include "tutti/bus/in_process_bus.hpp"
 #include "tutti/mission/closure_finders.hpp"
+#include "tutti/mission/disk_cloud_store.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/parallel.hpp"
@@ -49,14 +50,15 @@ class Pace {
 
 class MissionRun {
  public:
-  MissionRun(const MissionConfig& config, const RunOptions& options, MissionInput input)
+  MissionRun(const MissionConfig& config, const RunOptions& options, MissionInput input,
+             std::shared_ptr<server::CloudStore> clouds)
       : config_(config),
         options_(options),
         recordings_(std::move(input.robots)),
         survey_(std::move(input.survey)),
         finder_(
             spoiled(make_closure_finder(config.closures, recordings_, options.seed), config.closures, options.seed)),
-        clouds_(std::make_shared<server::MemoryCloudStore>()),
+        clouds_(std::move(clouds)),
         server_(robot_ids(recordings_), finder_, clouds_, config.server),
         bus_(kMissionStart, config.link, options.seed),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
@@ -263,13 +265,18 @@ class MissionRun {
 void MissionRun::record_traffic(RobotRecord& robot) const {
   for (const auto& [topic, statistics] : bus_.statistics()) {
     const auto& [from, to, kind] = topic;
-    if (from.robot == robot.id) {
-      robot.bytes_up += statistics.published_bytes;
-      robot.messages_up += statistics.published;
-    } else if (to.robot == robot.id) {
-      robot.bytes_down += statistics.published_bytes;
-      robot.messages_down += statistics.published;
-    }
+    const bool up = from.robot == robot.id;
+    if (!up && to.robot != robot.id) continue;
+    (up ? robot.bytes_up : robot.bytes_down) += statistics.published_bytes;
+    (up ? robot.messages_up : robot.messages_down) += statistics.published;
+    robot.traffic.push_back({.from = up ? robot.name : "server",
+                             .to = up ? "server" : robot.name,
+                             .kind = wire::name(kind),
+                             .messages = statistics.published,
+                             .bytes = statistics.published_bytes,
+                             .transmitted_bytes = statistics.transmitted_bytes,
+                             .bytes_per_s = static_cast<double>(statistics.published_bytes) / robot.duration_s,
+                             .largest_message = statistics.largest_message});
   }
 }
 
@@ -330,12 +337,19 @@ MissionRecord MissionRun::record() const {
   return record;
 }
 
+Result<std::shared_ptr<server::CloudStore>> open_cloud_store(const MissionConfig& config, const RunOptions& options) {
+  if (options.clouds.empty()) return std::make_shared<server::MemoryCloudStore>();
+  return DiskCloudStore::open(options.clouds, {.voxel_m = config.agent.submap.voxel_m});
+}
+
 }  // namespace
 
 Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options) {
   auto input = load_input(config, options.data, options.seed);
   if (!input) return tl::unexpected(input.error());
-  MissionRun mission(config, options, std::move(*input));
+  auto clouds = open_cloud_store(config, options);
+  if (!clouds) return tl::unexpected(clouds.error());
+  MissionRun mission(config, options, std::move(*input), std::move(*clouds));
   mission.run();
   return mission.record();
 }

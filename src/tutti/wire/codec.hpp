@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -8,6 +9,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/messages.hpp"
+#include "tutti/model/point_cloud.hpp"
 #include "tutti/wire/message_kind.hpp"
 
 /// Messages as bytes and back. Every message is one frame: "TU", protocol version (2 bytes, little endian), kind (1
@@ -45,6 +47,10 @@ Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
 std::string encode(const ClosureVerdict& verdict);
 Result<ClosureVerdict> decode_verdict(std::string_view bytes);
 
+/// A cloud alone, with points within kMaxCloudRange_m; an empty one stays empty.
+std::string encode(const PointCloud& cloud, const CloudCodec& codec = {});
+Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes);
+
 /// Kind of a frame with a supported version, judged by its first bytes only.
 Result<MessageKind> peek_kind(std::string_view bytes);
 
@@ -53,5 +59,6 @@ Result<MessageKind> peek_kind(std::string_view bytes);
 Status validate(const SubmapMessage& message);
 Status validate(const ProxyGraphMessage& message);
 Status validate(const ClosureVerdict& verdict);
+Status validate(const PointCloud& cloud);
 
 }  // namespace tutti::wire

@@ -83,6 +83,16 @@ RC_GTEST_PROP(SubmapCodec, CloudKeepsEveryPointWithinItsError, ()) {
   RC_ASSERT(*decode_submap(encode(*decoded, codec))->submap.cloud == *decoded->submap.cloud);
 }
 
+RC_GTEST_PROP(CloudFile, HoldsWhatASubmapWouldCarry, ()) {
+  Rng rng = any_rng();
+  const SubmapMessage message = test::any_submap(rng, 1, *rc::gen::inRange<std::size_t>(1, 60));
+  const auto carried = decode_submap(encode(message))->submap.cloud;
+  const auto kept = decode_cloud(encode(*message.submap.cloud));
+  RC_ASSERT(kept.has_value());
+  RC_ASSERT(**kept == *carried);
+  RC_ASSERT(**decode_cloud(encode(**kept)) == **kept);
+}
+
 TEST(SubmapCodec, DefaultCloudErrorIsBelowACentimetre) {
   Rng rng(3);
   SubmapMessage message = test::any_submap(rng, 1, 1);

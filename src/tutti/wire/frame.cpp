@@ -18,6 +18,8 @@ constexpr std::size_t kHeaderBytes = 5;
 constexpr int kCompressionLevel = 9;
 static_assert(kProtocolVersion <= 0xffff);
 
+}  // namespace
+
 const char* name(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
@@ -26,11 +28,11 @@ const char* name(MessageKind kind) {
       return "proxy graph";
     case MessageKind::verdict:
       return "verdict";
+    case MessageKind::cloud:
+      return "cloud";
   }
   return "unknown";
 }
-
-}  // namespace
 
 Result<MessageKind> peek_kind(std::string_view bytes) {
   if (bytes.size() < kHeaderBytes)
@@ -41,7 +43,7 @@ Result<MessageKind> peek_kind(std::string_view bytes) {
   if (version != kProtocolVersion)
     return fail(ErrorCode::unsupported, "frame: protocol version {}, this program speaks version {}", version,
                 kProtocolVersion);
-  if (byte(4) < 1 || byte(4) > 3) return fail(ErrorCode::unsupported, "frame: unknown message kind {}", byte(4));
+  if (byte(4) < 1 || byte(4) > 4) return fail(ErrorCode::unsupported, "frame: unknown message kind {}", byte(4));
   return static_cast<MessageKind>(byte(4));
 }
 

@@ -15,11 +15,12 @@
 namespace tutti::wire {
 namespace {
 
-constexpr std::array kKinds = {MessageKind::submap, MessageKind::proxy_graph, MessageKind::verdict};
+constexpr std::array kKinds = {MessageKind::submap, MessageKind::proxy_graph, MessageKind::verdict, MessageKind::cloud};
 
 std::string sample(MessageKind kind, Rng rng) {
   if (kind == MessageKind::submap) return encode(test::any_submap(rng, 6, 30));
   if (kind == MessageKind::proxy_graph) return encode(test::any_proxy_graph(rng, 2, 8, true));
+  if (kind == MessageKind::cloud) return encode(*test::any_submap(rng, 1, 30).submap.cloud);
   return encode(test::any_verdict(rng, 2));
 }
 
@@ -38,7 +39,9 @@ std::optional<Error> outcome(const Result<Message>& result) {
 std::optional<Error> decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::submap) return outcome(decode_submap(bytes));
   if (kind == MessageKind::proxy_graph) return outcome(decode_proxy_graph(bytes));
-  return outcome(decode_verdict(bytes));
+  if (kind == MessageKind::verdict) return outcome(decode_verdict(bytes));
+  const auto cloud = decode_cloud(bytes);
+  return outcome(cloud ? Result<PointCloud>(**cloud) : tl::unexpected(cloud.error()));
 }
 
 std::string mutate(std::string bytes, Rng& rng) {

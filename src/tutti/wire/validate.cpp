@@ -70,13 +70,7 @@ Status check_submap(const Submap& submap) {
     if (auto ok = check_pose(odometry.T_a_b); !ok) return in_context("odometry to " + where(), ok.error());
     if (auto ok = check_covariance(odometry.covariance); !ok) return in_context("odometry to " + where(), ok.error());
   }
-  if (submap.cloud == nullptr) return {};
-  if (auto ok = at_most(submap.cloud->points.size(), kMaxCloudPoints, "points"); !ok) return ok;
-  for (const Eigen::Vector3f& point : submap.cloud->points)
-    if (!point.allFinite() || point.cwiseAbs().maxCoeff() > static_cast<float>(kMaxCloudRange_m))
-      return fail(ErrorCode::invalid, "point ({}, {}, {}) is not within {} m", point.x(), point.y(), point.z(),
-                  kMaxCloudRange_m);
-  return {};
+  return submap.cloud == nullptr ? Status() : validate(*submap.cloud);
 }
 
 /// Strictly ascending by (robot, stamp).
@@ -144,6 +138,15 @@ Status validate(const SubmapMessage& message) {
   if (message.header.robot != id.robot)
     return fail(ErrorCode::invalid, "{}: sent by robot {}, expected its own robot", where, message.header.robot.value);
   if (auto ok = check_submap(message.submap); !ok) return in_context(where, ok.error());
+  return {};
+}
+
+Status validate(const PointCloud& cloud) {
+  if (auto ok = at_most(cloud.points.size(), kMaxCloudPoints, "points"); !ok) return ok;
+  for (const Eigen::Vector3f& point : cloud.points)
+    if (!point.allFinite() || point.cwiseAbs().maxCoeff() > static_cast<float>(kMaxCloudRange_m))
+      return fail(ErrorCode::invalid, "point ({}, {}, {}) is not within {} m", point.x(), point.y(), point.z(),
+                  kMaxCloudRange_m);
   return {};
 }
 

@@ -111,6 +111,22 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
   robot.proxy_nodes = options.keyframes;
   robot.bytes_up = 812'345 + 1000 * index;
   robot.bytes_down = 91'234;
+  robot.traffic = {{.from = robot.name,
+                    .to = "server",
+                    .kind = "submap",
+                    .messages = 12,
+                    .bytes = robot.bytes_up,
+                    .transmitted_bytes = robot.bytes_up,
+                    .bytes_per_s = 6750.0,
+                    .largest_message = 81'234},
+                   {.from = "server",
+                    .to = robot.name,
+                    .kind = "proxy graph",
+                    .messages = 11,
+                    .bytes = 91'234,
+                    .transmitted_bytes = 90'000,
+                    .bytes_per_s = 760.0,
+                    .largest_message = 9'876}};
   robot.messages_up = robot.submaps;
   robot.messages_down = 24;
   const double quality[] = {0.055, 0.03, 0.02, 0.018, 0.04, 0.09};

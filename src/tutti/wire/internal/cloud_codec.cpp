@@ -11,6 +11,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
+#include "tutti/wire/frame.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -136,6 +137,22 @@ Result<std::shared_ptr<const PointCloud>> decode_cloud(const v1::Cloud& in) {
     cloud->points.push_back(*point);
   }
   return cloud;
+}
+
+std::string encode(const PointCloud& cloud, const CloudCodec& codec) {
+  const Status valid = validate(cloud);
+  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  v1::Cloud out;
+  encode_cloud(cloud, codec, out);
+  return pack_frame(MessageKind::cloud, out.SerializeAsString());
+}
+
+Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes) {
+  const Result<std::string> payload = unpack_frame(MessageKind::cloud, bytes);
+  if (!payload) return tl::unexpected(payload.error());
+  v1::Cloud in;
+  if (!in.ParseFromString(*payload)) return fail(ErrorCode::parse, "cloud: not the protobuf message expected");
+  return decode_cloud(in);
 }
 
 }  // namespace tutti::wire

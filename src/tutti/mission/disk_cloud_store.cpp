@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/disk_cloud_store.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <system_error>
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::mission {
+namespace fs = std::filesystem;
+
+Result<std::shared_ptr<DiskCloudStore>> DiskCloudStore::open(const fs::path& folder, const wire::CloudCodec& codec,
+                                                             std::size_t kept_in_memory) {
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure)
+    return fail(ErrorCode::io, "{}: cannot make the folder of clouds: {}", folder.string(), failure.message());
+  return std::shared_ptr<DiskCloudStore>(new DiskCloudStore(folder, codec, kept_in_memory));
+}
+
+fs::path DiskCloudStore::file_of(SubmapId id) const {
+  return folder_ / fmt::format("{}_{}.cloud", id.robot.value, id.index);
+}
+
+Status DiskCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) {
+  TUTTI_CHECK(cloud != nullptr, "submap {}/{} without a cloud", id.robot.value, id.index);
+  if (const Status valid = wire::validate(*cloud); !valid) return valid;
+  const std::string bytes = wire::encode(*cloud, codec_);
+  const fs::path file = file_of(id);
+  fs::path aside = file;
+  aside += ".part";
+  std::ofstream out(aside, std::ios::binary | std::ios::trunc);
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) return fail(ErrorCode::io, "{}: cannot write {} bytes", aside.string(), bytes.size());
+  std::error_code failure;
+  fs::rename(aside, file, failure);
+  if (failure) return fail(ErrorCode::io, "{}: cannot be renamed: {}", aside.string(), failure.message());
+  const auto rounded = wire::decode_cloud(bytes);  // what get() would read
+  TUTTI_CHECK(rounded.has_value(), "{}", rounded.error().message);
+  remember(id, *rounded);
+  return {};
+}
+
+Result<std::shared_ptr<const PointCloud>> DiskCloudStore::get(SubmapId id) const {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = std::ranges::find(recent_, id, &Entry::first);
+    if (found != recent_.end()) {
+      recent_.splice(recent_.begin(), recent_, found);
+      return found->second;
+    }
+  }
+  const fs::path file = file_of(id);
+  const std::string what = fmt::format("cloud of submap {}/{}: {}", id.robot.value, id.index, file.string());
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return fail(ErrorCode::io, "{}: cannot be opened", what);
+  std::ostringstream bytes;
+  bytes << in.rdbuf();
+  auto cloud = wire::decode_cloud(bytes.view());
+  if (!cloud) return in_context(what, cloud.error());
+  remember(id, *cloud);
+  return cloud;
+}
+
+void DiskCloudStore::remember(SubmapId id, std::shared_ptr<const PointCloud> cloud) const {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(recent_, [&](const Entry& entry) { return entry.first == id; });
+  recent_.emplace_front(id, std::move(cloud));
+  while (recent_.size() > kept_in_memory_) recent_.pop_back();
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "tutti/server/cloud_store.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::mission {
+
+/// Clouds as files of one folder, "<robot>_<index>.cloud", in the coding of the wire: a cloud that came over the wire
+/// with the same CloudCodec comes back to the bit. Files are written aside and renamed, so that what is there is whole
+/// even when the machine stops in between. Of the clouds used last a few stay in memory.
+class DiskCloudStore final : public server::CloudStore {
+ public:
+  /// Makes the folder if it is missing; clouds that are there already can be got.
+  static Result<std::shared_ptr<DiskCloudStore>> open(const std::filesystem::path& folder,
+                                                      const wire::CloudCodec& codec, std::size_t kept_in_memory = 4);
+
+  Status put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) override;
+  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override;
+
+ private:
+  using Entry = std::pair<SubmapId, std::shared_ptr<const PointCloud>>;
+
+  DiskCloudStore(std::filesystem::path folder, const wire::CloudCodec& codec, std::size_t kept_in_memory)
+      : folder_(std::move(folder)), codec_(codec), kept_in_memory_(kept_in_memory) {}
+  [[nodiscard]] std::filesystem::path file_of(SubmapId id) const;
+  void remember(SubmapId id, std::shared_ptr<const PointCloud> cloud) const;
+
+  std::filesystem::path folder_;
+  wire::CloudCodec codec_;
+  std::size_t kept_in_memory_;
+  mutable std::mutex mutex_;         // guards recent_; files are read and written without it
+  mutable std::list<Entry> recent_;  // the last used first
+};
+
+}  // namespace tutti::mission

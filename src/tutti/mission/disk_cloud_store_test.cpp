@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/disk_cloud_store.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <thread>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+#include "tutti/server/map_server.hpp"
+
+namespace tutti::mission {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr SubmapId kId{RobotId{3}, 17};
+
+std::shared_ptr<const PointCloud> some_cloud(std::uint64_t seed, std::size_t points = 50) {
+  Rng rng(seed);
+  auto cloud = std::make_shared<PointCloud>();
+  for (std::size_t i = 0; i < points; ++i)
+    cloud->points.emplace_back(rng.uniform(-40, 40), rng.uniform(-40, 40), rng.uniform(-2, 4));
+  return cloud;
+}
+
+class DiskCloudStoreTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::remove_all(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  [[nodiscard]] std::shared_ptr<DiskCloudStore> open(std::size_t kept_in_memory = 4) const {
+    auto store = DiskCloudStore::open(folder_, {}, kept_in_memory);
+    EXPECT_TRUE(store.has_value()) << store.error().message;
+    return *store;
+  }
+  fs::path folder_;
+};
+
+TEST_F(DiskCloudStoreTest, GivesBackTheSamePointsFromMemoryAndFromAnotherProcessesFiles) {
+  const auto cloud = *wire::decode_cloud(wire::encode(*some_cloud(1)));  // as it comes from a robot
+  const auto store = open();
+  ASSERT_TRUE(store->put(kId, cloud).has_value());
+  EXPECT_EQ(**store->get(kId), *cloud);
+  EXPECT_EQ(**open()->get(kId), *cloud);
+  ASSERT_TRUE(store->put(kId, some_cloud(2)).has_value());
+  EXPECT_NE(**store->get(kId), *cloud);
+  EXPECT_EQ(**store->get(kId), **open()->get(kId));  // rounded in the same way
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
+TEST_F(DiskCloudStoreTest, MissingTruncatedAndForeignFilesAreErrorsThatNameTheSubmap) {
+  const auto store = open(0);
+  const auto complains = [&] {
+    const auto cloud = store->get(kId);
+    return !cloud && cloud.error().message.find("submap 3/17") != std::string::npos;
+  };
+  EXPECT_TRUE(complains());
+  ASSERT_TRUE(store->put(kId, some_cloud(1)).has_value());
+  EXPECT_FALSE(complains());
+  const fs::path file = fs::directory_iterator(folder_)->path();
+  fs::resize_file(file, fs::file_size(file) - 1);
+  EXPECT_TRUE(complains());
+  std::ofstream(file, std::ios::trunc) << "something else";
+  EXPECT_TRUE(complains());
+  ASSERT_TRUE(store->put(kId, some_cloud(1)).has_value());
+  EXPECT_FALSE(complains());
+}
+
+TEST_F(DiskCloudStoreTest, WhatCannotBeWrittenIsRefused) {
+  const auto store = open();
+  auto far = std::make_shared<PointCloud>(PointCloud{{{1e6F, 0.0F, 0.0F}}});
+  EXPECT_FALSE(store->put(kId, far).has_value());
+  fs::remove_all(folder_);
+  EXPECT_FALSE(store->put(kId, some_cloud(1)).has_value());
+  EXPECT_FALSE(store->get(kId).has_value());
+  std::ofstream(folder_) << "a file where the folder should be";
+  EXPECT_FALSE(DiskCloudStore::open(folder_, {}).has_value());
+}
+
+TEST_F(DiskCloudStoreTest, SeveralThreadsAtOnce) {
+  const auto store = open(2);
+  for (std::uint32_t i = 0; i < 8; ++i) ASSERT_TRUE(store->put({RobotId{0}, i}, some_cloud(i, i + 1)).has_value());
+  std::vector<std::size_t> wrong(4, 0);
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t t = 0; t < wrong.size(); ++t)
+      threads.emplace_back([&, t] {
+        Rng rng(t);
+        for (int k = 0; k < 200; ++k) {
+          const auto i = static_cast<std::uint32_t>(rng.index(8));
+          const auto cloud = store->get({RobotId{0}, i});
+          wrong[t] += !cloud || (*cloud)->points.size() != i + 1 ? 1 : 0;
+        }
+      });
+  }
+  EXPECT_EQ(wrong, std::vector<std::size_t>(4, 0));
+}
+
+/// Looks at each cloud once, as a finder does that keeps features, and only at pairs of neighbours.
+class NeighbourFinder final : public server::ClosureFinder {
+ public:
+  [[nodiscard]] bool needs_clouds() const override { return true; }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return second.id.index - first.id.index == 1;
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const override {
+    const auto cloud = clouds.get(first.id);
+    if (!cloud) return tl::unexpected(cloud.error());
+    return ClosureVerdict{{first.id, second.id}, {}, fmt::format("{} points", (*cloud)->points.size())};
+  }
+};
+
+SubmapMessage submap_with_cloud(std::uint32_t index) {
+  Submap submap{.id = {RobotId{0}, index}};
+  submap.keyframes = {{index, {1'000'000'000LL * (index + 1)}, {}, true},
+                      {index + 1, {1'000'000'000LL * (index + 2)}, {}, true}};
+  submap.odometry = {RelativePose{}};
+  submap.cloud = some_cloud(index, 20);
+  return {.header = {.robot = RobotId{0}}, .submap = std::move(submap)};
+}
+
+TEST_F(DiskCloudStoreTest, AServerOf700SubmapsHoldsOnlyAFewCloudsAndGoesOnAfterARestart) {
+  constexpr std::uint32_t kSubmaps = 700;
+  constexpr std::size_t kKept = 3;
+  const auto finder = std::make_shared<const NeighbourFinder>();
+  const auto store = open(kKept);
+  const std::set<RobotId> robots{RobotId{0}};
+  auto server = std::make_unique<server::MapServer>(robots, finder, store, server::ServerConfig{});
+  std::vector<std::weak_ptr<const PointCloud>> all;
+  std::size_t most = 0;
+  for (std::uint32_t i = 0; i < kSubmaps; ++i) {
+    {
+      const SubmapMessage message = submap_with_cloud(i);
+      ASSERT_TRUE(server->receive(message).has_value());
+      all.emplace_back(message.submap.cloud);
+    }
+    all.emplace_back(*store->get({RobotId{0}, i}));
+    all.emplace_back(*store->get({RobotId{0}, i / 2}));
+    const auto jobs = i < kSubmaps / 2 ? server->take_jobs() : std::vector<server::VerificationJob>();
+    for (const auto& job : jobs) {
+      ASSERT_TRUE(server->receive(*finder->verify(*job.first, *job.second, *store)).has_value());
+    }
+    const auto alive = std::ranges::count_if(all, [](const auto& cloud) { return !cloud.expired(); });
+    most = std::max(most, static_cast<std::size_t>(alive));
+  }
+  EXPECT_LE(most, 2 * kKept);  // a cloud may be listed twice
+  EXPECT_EQ(server->state().cloud_sizes.size(), kSubmaps);
+
+  // Killed with half of the verdicts outstanding, and one cloud lost.
+  const server::MapServerState state = server->state();
+  server.reset();
+  fs::remove(folder_ / "0_500.cloud");
+  const auto reopened = open(kKept);
+  server::MapServer restored(robots, finder, reopened, {}, state);
+  std::size_t unanswered = 0;
+  for (const auto& job : restored.take_jobs()) {
+    const auto verdict = finder->verify(*job.first, *job.second, *reopened);
+    unanswered += verdict ? 0 : 1;
+    if (!verdict) continue;
+    EXPECT_TRUE(restored.receive(*verdict).has_value());
+  }
+  EXPECT_EQ(unanswered, 1U);
+  EXPECT_EQ(restored.state().verdicts.size(), kSubmaps - 2U);
+  EXPECT_EQ(restored.state().submaps.size(), kSubmaps);
+}
+
+}  // namespace
+}  // namespace tutti::mission
