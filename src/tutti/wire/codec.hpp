@@ -38,8 +38,8 @@ struct CloudCodec {
 std::string encode(const SubmapMessage& message, const CloudCodec& cloud = {});
 Result<SubmapMessage> decode_submap(std::string_view bytes);
 
-/// Exact: ids, stamps, support, radius, sigma, edges' ends. Poses: 5e-4 m, 1e-4 rad. Covariance: 8 % of the variance in
-/// every direction, 1.2 % on average. Reduced weights: relative 2.5e-4.
+/// Exact: ids, stamps, support, radius, sigma, edges' ends. Poses: 5e-4 m, 1e-4 rad. Covariance: 25 % of the variance
+/// in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4.
 std::string encode(const ProxyGraphMessage& message);
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
 

@@ -79,7 +79,7 @@ class NodeColumns {
     const Timestamp stamp = stamps_.code(coder, run.clock, node.stamp);
     PoseCode motion = quantise(T_world_previous_.inverse() * node.T_world_body, kProxyPoseSteps);
     for (std::size_t i = 0; i < motion.size(); ++i) motion[i] = coder.code(motion_[i], motion[i]);
-    CovarianceCode covariance = quantise(node.covariance, kProxyCovarianceStep);
+    CovarianceCode covariance = quantise(node.covariance, kProxyCovarianceSteps);
     std::int64_t change = 0;  // variances grow and shrink together
     for (std::size_t i = 0; i < covariance.size(); ++i) {
       const std::int64_t expected = sum(previous_covariance_[i], i < 6 ? change : 0);
@@ -90,7 +90,7 @@ class NodeColumns {
     const std::int64_t support = sum(previous_support_, coder.code(support_, node.support - previous_support_));
 
     const auto T_previous_body = dequantise(motion, kProxyPoseSteps);
-    const auto matrix = dequantise(covariance, kProxyCovarianceStep);
+    const auto matrix = dequantise(covariance, kProxyCovarianceSteps);
     if (!T_previous_body || !matrix || support < 0 || support > std::numeric_limits<std::uint32_t>::max())
       return std::nullopt;
     previous_support_ = support;

@@ -29,7 +29,7 @@ void write_odometry(const Submap& submap, v1::Submap& out) {
   std::vector<CovarianceCode> covariances;
   std::vector<PoseCode> poses;
   for (const RelativePose& odometry : submap.odometry) {
-    covariances.push_back(quantise(odometry.covariance, kKeyframeCovarianceStep));
+    covariances.push_back(quantise(odometry.covariance, kKeyframeCovarianceSteps));
     poses.push_back(quantise(odometry.T_a_b, kKeyframePoseSteps));
   }
   write_columns(covariances, *out.mutable_odometry_covariance());
@@ -66,7 +66,7 @@ Status read_odometry(const v1::Submap& in, Submap& submap) {
   for (std::size_t k = 0; k < count; ++k) {
     const std::optional<Pose3> T =
         follows ? odometry_from_poses(submap, k) : dequantise((*poses)[k], kKeyframePoseSteps);
-    const std::optional<Matrix6d> covariance = dequantise((*covariances)[k], kKeyframeCovarianceStep);
+    const std::optional<Matrix6d> covariance = dequantise((*covariances)[k], kKeyframeCovarianceSteps);
     if (!T || !covariance) return fail(ErrorCode::invalid, "odometry factor {} is out of range", k);
     submap.odometry.push_back({*T, *covariance});
   }

@@ -12,23 +12,20 @@
 /// that learns how large the numbers of one kind are. Encoder and decoder must use the same models in the same order.
 namespace tutti::wire {
 
-/// Probability that a bit is 0, learnt at two speeds.
+/// Probability that a bit is 0: learnt fast at first (a mean), then forgetting what is long ago.
 class BitModel {
  public:
-  [[nodiscard]] std::uint32_t zero() const { return (std::uint32_t{fast_} + slow_) >> 5U; }  ///< Of 4096, 1 ... 4095.
+  [[nodiscard]] std::uint32_t zero() const { return 1U + static_cast<std::uint32_t>(zero_) / 4101U; }  ///< Of 4096.
   void learn(bool bit) {
-    if (bit) {
-      fast_ = static_cast<std::uint16_t>(fast_ - (fast_ >> 4U));
-      slow_ = static_cast<std::uint16_t>(slow_ - (slow_ >> 7U));
-    } else {
-      fast_ = static_cast<std::uint16_t>(fast_ + ((0xffffU - fast_) >> 4U));
-      slow_ = static_cast<std::uint16_t>(slow_ + ((0xffffU - slow_) >> 7U));
-    }
+    zero_ += ((bit ? 0 : kOne) - zero_) / weight_;
+    if (weight_ < kMemory) ++weight_;
   }
 
  private:
-  std::uint16_t fast_ = 0x8000;
-  std::uint16_t slow_ = 0x8000;
+  static constexpr std::int32_t kOne = 1 << 24;
+  static constexpr std::int32_t kMemory = 32;
+  std::int32_t zero_ = kOne / 2;
+  std::int32_t weight_ = 2;
 };
 
 class RangeEncoder {

@@ -70,37 +70,39 @@ std::optional<Pose3> dequantise(const PoseCode& code, const PoseSteps& steps) {
 
 /// Rounds G to G' = G (I + E), E lower triangular, row by row: each entry also takes up what the rounding of the
 /// entries above it has done to its row, so |E_ij| <= step / 2 however ill-conditioned G is.
-CovarianceCode quantise(const Matrix6d& covariance, double step) {
+CovarianceCode quantise(const Matrix6d& covariance, const CovarianceSteps& steps) {
   const Matrix6d G = cholesky(covariance);
   Matrix6d E = Matrix6d::Zero();
   CovarianceCode code{};
   std::size_t lower = 6;
   for (int i = 0; i < 6; ++i) {
     const bool has_variance = G(i, i) > 0.0;
-    const std::int64_t diagonal = has_variance ? round_to(std::log(G(i, i)), step) : 0;
-    const double pivot = std::exp(static_cast<double>(diagonal) * step);
-    code[static_cast<std::size_t>(i)] = has_variance ? diagonal - first_diagonal(step) : 0;
+    const std::int64_t diagonal = has_variance ? round_to(std::log(G(i, i)), steps.log_diagonal) : 0;
+    const double pivot = std::exp(static_cast<double>(diagonal) * steps.log_diagonal);
+    code[static_cast<std::size_t>(i)] = has_variance ? diagonal - first_diagonal(steps.log_diagonal) : 0;
     for (int j = 0; j < i; ++j, ++lower) {
       if (!has_variance || G(j, j) <= 0.0) continue;
       const double wanted = G(i, j) + G.row(i).segment(j, i - j).dot(E.col(j).segment(j, i - j));
-      code[lower] = round_to(wanted / pivot, step);
-      E(i, j) = (static_cast<double>(code[lower]) * step * pivot - wanted) / G(i, i);
+      code[lower] = round_to(wanted / pivot, steps.lower);
+      E(i, j) = (static_cast<double>(code[lower]) * steps.lower * pivot - wanted) / G(i, i);
     }
     if (has_variance) E(i, i) = pivot / G(i, i) - 1.0;
   }
   return code;
 }
 
-std::optional<Matrix6d> dequantise(const CovarianceCode& code, double step) {
+std::optional<Matrix6d> dequantise(const CovarianceCode& code, const CovarianceSteps& steps) {
   Matrix6d G = Matrix6d::Zero();
-  const std::int64_t last_diagonal = round_to(std::log(kMaxPivot), step) - first_diagonal(step);
+  const std::int64_t last_diagonal =
+      round_to(std::log(kMaxPivot), steps.log_diagonal) - first_diagonal(steps.log_diagonal);
   std::size_t lower = 6;
   for (int i = 0; i < 6; ++i) {
     const std::int64_t diagonal = code[static_cast<std::size_t>(i)];
     if (diagonal < 0 || diagonal > last_diagonal) return std::nullopt;
-    if (diagonal > 0) G(i, i) = std::exp(static_cast<double>(diagonal + first_diagonal(step)) * step);
+    if (diagonal > 0)
+      G(i, i) = std::exp(static_cast<double>(diagonal + first_diagonal(steps.log_diagonal)) * steps.log_diagonal);
     for (int j = 0; j < i; ++j, ++lower) {
-      const double entry = static_cast<double>(code[lower]) * step;
+      const double entry = static_cast<double>(code[lower]) * steps.lower;
       if (std::abs(entry) > kMaxRowEntry) return std::nullopt;
       if (entry != 0.0 && (G(i, i) == 0.0 || G(j, j) == 0.0)) return std::nullopt;
       G(i, j) = entry * G(i, i);
