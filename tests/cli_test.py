@@ -90,6 +90,10 @@ class CommandLine(unittest.TestCase):
         # The other commands read what it wrote.
         self.expect(tutti("eval", out / "alpha_corrected.tum", out / "alpha_reference.tum"), 0, "rmse")
         self.expect(tutti("optimise", out / "graph.g2o", "-o", self.path / "again.g2o"), 0, "chi2")
+        map_error = json.loads(tutti("eval", "--map", out / "map.ply", out / "survey.ply", "--report",
+                                     out / "report.json", "--json").stdout)
+        for figure in ("mean_m", "p95_m", "within_10cm"):
+            self.assertAlmostEqual(map_error["map_to_survey"][figure], report["server"]["map_error"][figure], delta=1e-5)
         # The effective configuration is a mission file that runs again with the same result.
         self.expect(tutti("run", out / "config.yaml", "--out", self.path / "again", "--seed", 7), 0)
         self.assertEqual((out / "report.json").read_text(), (self.path / "again" / "report.json").read_text())

@@ -194,10 +194,13 @@ void add_map_options(CLI::App& command, EvalMapOptions& options, CLI::Option* ma
                        "Then bring the map closer by point-to-plane registration, and say how far it "
                        "moved; needs\na start within about 1 m. Without it the error includes how the "
                        "map as a whole lies");
-  CLI::Option* voxel = command.add_option("--voxel", options.voxel_m, "Thin both clouds to one point per such voxel")
-                           ->check(finite(false))
-                           ->capture_default_str()
-                           ->type_name("METRES");
+  CLI::Option* voxel =
+      command
+          .add_option("--voxel", options.voxel_m,
+                      "Thin the map to one point per such voxel, so that what was seen often counts once")
+          ->check(finite(false))
+          ->capture_default_str()
+          ->type_name("METRES");
   for (CLI::Option* option : {transform, report, refine, voxel}) option->needs(map)->group(group);
 }
 
@@ -214,12 +217,13 @@ void add_eval_command(CLI::App& app, int& exit_code) {
       "RPE, relative pose error: error of the motion over a fixed time or a fixed distance travelled, from every pose\n"
       "on. Says how fast EST drifts; needs no alignment.\n\n"
       "Both files hold poses of the same body, as TUM, EuRoC csv or KITTI. Errors are in metres and degrees.\n\n"
-      "--map: both files are point clouds (PLY). Cloud-to-cloud distance: from every point of the map to the nearest\n"
-      "point of the survey, and back (what the map lacks is far from it). It cannot be smaller than about 0.4 times "
-      "the\n"
-      "survey's point spacing, and where walls are near each other a wrong map still looks close: compare maps with "
-      "it,\n"
-      "do not read it as accuracy. For a mission's own map:\n"
+      "--map: both files are point clouds (PLY). Cloud-to-cloud distance: from every point of the map to the survey, "
+      "and\n"
+      "back (what the map lacks is far from it). Where the survey is flat, to the plane through its nearest points, "
+      "so\n"
+      "that its spacing does not matter. Where walls are near each other a wrong map still looks close: compare maps "
+      "with\n"
+      "it, do not read it as accuracy. For a mission's own map:\n"
       "  tutti eval --map OUT/map.ply OUT/survey.ply --report OUT/report.json\n\n"
       "Exit code 0; 1 when a file is bad or no poses can be paired; 2 on wrong usage.");
   CLI::Option* map = command->add_flag("--map", options->map, "EST and REF are point clouds: a map and a survey");

@@ -139,7 +139,6 @@ Result<MapReport> evaluate(const EvalMapOptions& options) {
   if (!survey) return tl::unexpected(survey.error());
   MapReport report{.map_points = map->points.size(), .survey_points = survey->points.size(), .T_survey_map = *initial};
   *map = lidar::voxel_downsample(*map, options.voxel_m);
-  *survey = lidar::voxel_downsample(*survey, options.voxel_m);
   if (options.refine) {
     const auto refined = refine(*map, *survey, *initial, report);
     if (!refined) return tl::unexpected(refined.error());
@@ -150,7 +149,7 @@ Result<MapReport> evaluate(const EvalMapOptions& options) {
       evaluation::summarise(evaluation::CloudIndex(*map).distances(*survey, report.T_survey_map.inverse()));
   if (!there || !back)
     return fail(ErrorCode::invalid, "{}: no point within 2^20 voxels of {} m of the origin, expected at least one",
-                there ? options.map_path : options.survey_path, options.voxel_m);
+                options.map_path, options.voxel_m);
   report.map_to_survey = *there;
   report.survey_to_map = *back;
   return report;
@@ -159,8 +158,8 @@ Result<MapReport> evaluate(const EvalMapOptions& options) {
 void print_table(const EvalMapOptions& options, const MapReport& report) {
   fmt::print("{:<12} {}: {} points\n", "map", options.map_path, report.map_points);
   fmt::print("{:<12} {}: {} points\n", "survey", options.survey_path, report.survey_points);
-  fmt::print("{:<12} both to one point per voxel of {} m: {} and {} points\n", "thinned", options.voxel_m,
-             report.map_to_survey.points, report.survey_to_map.points);
+  fmt::print("{:<12} the map, to one point per voxel of {} m: {} points\n", "thinned", options.voxel_m,
+             report.map_to_survey.points);
   const char* from = !options.report_path.empty() ? "server.T_reference_world of the report"
                      : !options.transform.empty() ? "as given"
                                                   : "taken as already in one frame";

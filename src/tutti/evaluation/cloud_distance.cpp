@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/evaluation/cloud_distance.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
@@ -25,6 +27,46 @@ struct PointSource {
 using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSource>, PointSource, 3,
                                                    std::uint32_t>;
 
+constexpr std::size_t kNeighbours = 8;     // the point itself included
+constexpr double kFlat = 0.05;             // smallest over middle eigenvalue of their scatter
+constexpr std::size_t kLeastOfAPlane = 4;  // any three points are flat
+
+/// What a point and its neighbours say about the surface there.
+struct Patch {
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< Zero: not flat.
+  float offset = 0.0F;                               ///< normal . x = offset on the plane.
+  float reach = 0.0F;                                ///< From the point to its farthest neighbour.
+};
+
+Patch fit_patch(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& point,
+                std::span<const std::uint32_t> neighbours) {
+  if (neighbours.size() < kLeastOfAPlane) return {};
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto i : neighbours) mean += points[i].cast<double>();
+  mean /= static_cast<double>(neighbours.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const auto i : neighbours) {
+    const Eigen::Vector3d d = points[i].cast<double>() - mean;
+    scatter += d * d.transpose();
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(scatter);
+  const Eigen::Vector3d spread = solver.eigenvalues();
+  // On one line a plane could stand any way.
+  if (!(spread[0] <= kFlat * spread[1]) || !(spread[1] >= kFlat * spread[2])) return {};
+  const Eigen::Vector3d normal = solver.eigenvectors().col(0).normalized();
+  return {normal.cast<float>(), static_cast<float>(normal.dot(mean)), (points[neighbours.back()] - point).norm()};
+}
+
+float distance(const Eigen::Vector3f& p, const Eigen::Vector3f& nearest, float squared, const Patch& patch) {
+  const float to_point = std::sqrt(squared);
+  if (patch.normal.isZero()) return to_point;
+  const float height = patch.normal.dot(p) - patch.offset;
+  const float along = patch.normal.dot(p - nearest);
+  const float sideways = std::sqrt(std::max(0.0F, squared - along * along));
+  return std::min(to_point, std::hypot(height, std::max(0.0F, sideways - patch.reach)));
+}
+
 PointSource finite_points(const PointCloud& cloud) {
   PointSource source;
   source.points.reserve(cloud.points.size());
@@ -38,9 +80,19 @@ PointSource finite_points(const PointCloud& cloud) {
 struct CloudIndex::Tree {
   static constexpr std::size_t kLeafSize = 10;
   explicit Tree(PointSource from)
-      : source(std::move(from)), kd_tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {}
+      : source(std::move(from)), kd_tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {
+    if (source.points.empty()) return;
+    patches.reserve(source.points.size());
+    std::array<std::uint32_t, kNeighbours> neighbours{};
+    std::array<float, kNeighbours> squared{};
+    for (const Eigen::Vector3f& p : source.points) {
+      const std::size_t count = kd_tree.knnSearch(p.data(), kNeighbours, neighbours.data(), squared.data());
+      patches.push_back(fit_patch(source.points, p, std::span(neighbours).first(count)));
+    }
+  }
   PointSource source;
   KdTree kd_tree;
+  std::vector<Patch> patches;  // one per point
 };
 
 CloudIndex::CloudIndex(const PointCloud& cloud_a) : tree_(std::make_unique<Tree>(finite_points(cloud_a))) {}
@@ -56,7 +108,7 @@ std::vector<float> CloudIndex::distances(const PointCloud& cloud_b, const Pose3&
     std::uint32_t nearest = 0;
     float squared = 0.0F;
     tree_->kd_tree.knnSearch(p_a.data(), 1, &nearest, &squared);
-    out[i] = std::sqrt(squared);
+    out[i] = distance(p_a, tree_->source.points[nearest], squared, tree_->patches[nearest]);
   }
   return out;
 }

@@ -12,9 +12,8 @@
 
 namespace tutti::evaluation {
 
-/// Cloud-to-cloud distance: how far the points of one cloud are from their nearest points of another. Two clouds of the
-/// very same surface are still apart by about 0.4 times the other's point spacing. Every point counts the same: thin
-/// clouds to equal voxels first, or places seen often count more.
+/// Cloud-to-cloud distance: how far the points of one cloud are from the surface that another describes. Every point
+/// counts the same: thin clouds to equal voxels first, or places seen often count more.
 struct CloudDistance {
   std::size_t points = 0;
   double mean_m = 0.0;
@@ -28,7 +27,10 @@ struct CloudDistance {
 /// Over the distances that are finite; nothing when none is.
 std::optional<CloudDistance> summarise(std::span<const float> distances_m);
 
-/// A cloud that distances are measured to. Immutable, safe to share between threads.
+/// A cloud that distances are measured to. Distances to its bare points could not be smaller than about half their
+/// spacing, whatever the map; so where the nearest point and its neighbours are flat, it is the distance to the patch
+/// of plane through them, which reaches as far as they do. Elsewhere it is the distance to the nearest point.
+/// Immutable, safe to share between threads.
 class CloudIndex {
  public:
   /// Points that are not finite are left out.
@@ -37,8 +39,8 @@ class CloudIndex {
   CloudIndex(const CloudIndex&) = delete;
   CloudIndex& operator=(const CloudIndex&) = delete;
 
-  /// Distance of every point of `cloud_b` to its nearest point, metres; NaN for points that are not finite, or when
-  /// this cloud is empty.
+  /// Distance of every point of `cloud_b`, metres, never more than to the nearest point; NaN for points that are not
+  /// finite, or when this cloud is empty.
   [[nodiscard]] std::vector<float> distances(const PointCloud& cloud_b, const Pose3& T_a_b = {}) const;
 
  private:

@@ -30,17 +30,28 @@ PointCloud wall(double step_m) {
   return cloud;
 }
 
-RC_GTEST_PROP(CloudDistance, FindsTheNearestPoint, ()) {
+float nearest_point(const PointCloud& cloud, const Eigen::Vector3f& p) {
+  float nearest = std::numeric_limits<float>::infinity();
+  for (const auto& q : cloud.points) nearest = std::min(nearest, (q - p).norm());
+  return nearest;
+}
+
+RC_GTEST_PROP(CloudDistance, IsToTheNearestPointWhereThereAreNoPlanes, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint32_t>();
+  const PointCloud a = random_cloud(1 + seed % 3, Rng(seed));
+  const PointCloud b = random_cloud(50, Rng(seed).fork("b"));
+  const auto found = CloudIndex(a).distances(b);
+  RC_ASSERT(found.size() == b.points.size());
+  for (std::size_t i = 0; i < b.points.size(); ++i)
+    RC_ASSERT(std::abs(found[i] - nearest_point(a, b.points[i])) < 1e-4F);
+}
+
+RC_GTEST_PROP(CloudDistance, IsNeverMoreThanToTheNearestPoint, ()) {
   const auto seed = *rc::gen::arbitrary<std::uint32_t>();
   const PointCloud a = random_cloud(1 + seed % 200, Rng(seed));
   const PointCloud b = random_cloud(50, Rng(seed).fork("b"));
   const auto found = CloudIndex(a).distances(b);
-  RC_ASSERT(found.size() == b.points.size());
-  for (std::size_t i = 0; i < b.points.size(); ++i) {
-    float nearest = std::numeric_limits<float>::infinity();
-    for (const auto& p : a.points) nearest = std::min(nearest, (p - b.points[i]).norm());
-    RC_ASSERT(std::abs(found[i] - nearest) < 1e-4F);
-  }
+  for (std::size_t i = 0; i < b.points.size(); ++i) RC_ASSERT(found[i] < nearest_point(a, b.points[i]) + 1e-4F);
 }
 
 TEST(CloudDistance, MovesTheCloudFirst) {
@@ -65,17 +76,29 @@ TEST(CloudDistance, AShiftedWallIsOffByTheShift) {
   EXPECT_EQ(distance->within_30cm, 1.0);
 }
 
-TEST(CloudDistance, SpacingOfTheSurveyIsItsFloor) {
+TEST(CloudDistance, SpacingOfTheSurveyDoesNotMatterOnAWall) {
   Rng rng(8);
-  PointCloud seen;  // on the very same wall, anywhere
+  PointCloud seen;  // 3 cm in front of the wall, anywhere
   for (int i = 0; i < 4000; ++i)
-    seen.points.emplace_back(static_cast<float>(rng.uniform(0.5, 9.5)), 0.0F,
+    seen.points.emplace_back(static_cast<float>(rng.uniform(0.5, 9.5)), 0.03F,
                              static_cast<float>(rng.uniform(0.5, 2.5)));
-  for (const double step_m : {0.05, 0.2}) {
-    const auto distance = summarise(CloudIndex(wall(step_m)).distances(seen));
-    ASSERT_TRUE(distance);
-    EXPECT_NEAR(distance->mean_m, 0.383 * step_m, 0.01 * step_m);  // mean distance of a unit square to its corners
-  }
+  for (const double step_m : {0.05, 0.2})
+    for (const float d : CloudIndex(wall(step_m)).distances(seen)) EXPECT_NEAR(d, 0.03F, 1e-5F);
+}
+
+TEST(CloudDistance, AWallEndsWhereItsPointsEnd) {
+  const PointCloud survey = wall(0.1);
+  const PointCloud beside{{{-3.0F, 0.0F, 1.0F}, {5.0F, 0.0F, 8.0F}}};
+  const auto distances = CloudIndex(survey).distances(beside);
+  EXPECT_NEAR(distances[0], 3.0F, 0.3F);
+  EXPECT_NEAR(distances[1], 5.1F, 0.3F);
+}
+
+TEST(CloudDistance, AnEdgeIsNotAPlane) {
+  PointCloud survey = wall(0.1);
+  for (const auto& p : wall(0.1).points) survey.points.emplace_back(0.0F, p.x(), p.z());  // the wall at a right angle
+  const PointCloud corner{{{-0.2F, -0.2F, 1.0F}}};                                        // behind both
+  EXPECT_NEAR(CloudIndex(survey).distances(corner)[0], std::hypot(0.2F, 0.2F), 0.09F);
 }
 
 TEST(CloudDistance, SummaryOfKnownDistances) {

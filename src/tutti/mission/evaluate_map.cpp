@@ -115,17 +115,16 @@ void measure_corrected(const ThinnedCloud& map, const evaluation::CloudIndex& su
 void measure_joint_cloud(const evaluation::CloudIndex& survey, MissionRecord& record) {
   ServerRecord& server = record.server;
   if (!server.T_reference_world) return;
-  std::vector<float> distances;
   PointCloud joint;
   for (CloudRecord& seen : server.clouds) {
     const auto robot = std::find_if(record.robots.begin(), record.robots.end(),
                                     [&](const RobotRecord& r) { return r.id == seen.robot; });
     if (robot == record.robots.end() || robot->component != server.largest_component) continue;
     seen.distance_m = survey.distances(seen.cloud, *server.T_reference_world);
-    distances.insert(distances.end(), seen.distance_m.begin(), seen.distance_m.end());
     joint.points.insert(joint.points.end(), seen.cloud.points.begin(), seen.cloud.points.end());
   }
-  server.map_error = evaluation::summarise(distances);
+  joint = lidar::voxel_downsample(joint, kMapVoxel_m);  // what several robots saw counts once
+  server.map_error = evaluation::summarise(survey.distances(joint, *server.T_reference_world));
   const auto back = evaluation::summarise(
       evaluation::CloudIndex(joint).distances(*record.survey, server.T_reference_world->inverse()));
   if (back) server.survey_covered = back->within_30cm;

@@ -86,7 +86,8 @@ TEST_F(EvaluateMap, EveryEstimatePlacesTheCloudsWhereItBelievesTheyWere) {
   }
   EXPECT_EQ(points, 6 * seen_.size());
   ASSERT_TRUE(record_.server.map_error);
-  EXPECT_EQ(record_.server.map_error->points, points);
+  EXPECT_LE(record_.server.map_error->points, points);  // what both robots saw counts once
+  EXPECT_GT(record_.server.map_error->points, points / 2);
   for (const RobotRecord& robot : record_.robots) {
     ASSERT_TRUE(robot.map_error.onboard && robot.map_error.corrected);
     // 2 % of 10 m, less what the alignment takes; 0.2 % is a tenth of that.
@@ -110,6 +111,7 @@ TEST_F(EvaluateMap, OnlyTheLargestComponentCounts) {
   record_.robots[1].component = 1;
   evaluate();
   EXPECT_EQ(record_.server.map_error->points, record_.server.clouds[0].cloud.points.size());
+  EXPECT_FALSE(record_.server.clouds[0].distance_m.empty());
   EXPECT_TRUE(record_.server.clouds[1].distance_m.empty());
 }
 

@@ -91,8 +91,7 @@ TEST_F(ReportFiles, WritesEverythingAndItReadsBack) {
 }
 
 TEST_F(ReportFiles, LeavesOutWhatThereIsNot) {
-  const auto status =
-      write_report(test::example_record({.robots = 1, .keyframes = 20, .reference = false, .cloud = false}), dir_);
+  const auto status = write_report(test::example_record({.robots = 1, .keyframes = 20, .reference = false}), dir_);
   ASSERT_TRUE(status) << status.error().message;
   for (const char* cloud : {"map.ply", "survey.ply", "map_top.png", "map_section.png"})
     EXPECT_FALSE(names().contains(cloud)) << cloud;

@@ -14,7 +14,7 @@ namespace tutti::mission {
 
 using Points3d = std::vector<Eigen::Vector3d>;
 
-inline constexpr double kDriftWindow_s = 10.0;
+inline constexpr double kDriftWindow_s = 20.0;
 
 /// One keyframe on an error-over-time plot; NaN = not measured.
 struct KeyframeError {

@@ -169,7 +169,7 @@ Common common_axes(const MissionRecord& record, const std::vector<RobotGeometry>
 std::string legend(const MissionRecord& record, bool any_reference) {
   std::vector<LegendEntry> entries{{"onboard", "onboard"}, {"corrected", "corrected"}};
   if (any_reference) entries.push_back({"curve server", "server"});
-  entries.push_back({"held", "ends of constraints"});
+  entries.push_back({"mark held", "ends of constraints"});
   for (auto& entry : drift_legend(record)) entries.push_back(std::move(entry));
   if (!record.server.failed_odometry.empty()) entries.push_back({"suspect", "failure suspected by the server"});
   return legend_html(entries);
@@ -185,7 +185,9 @@ std::vector<LegendEntry> drift_legend(const MissionRecord& record) {
       count += static_cast<std::size_t>(std::count_if(robot.drift_origins.begin(), robot.drift_origins.end(),
                                                       [&](const DriftOrigin& d) { return d.kind == kind; }));
     if (count > 0)
-      out.push_back({fmt::format("drift {}", drift_name(kind)), fmt::format("{} ({} times)", drift_name(kind), count)});
+      out.push_back(
+          {fmt::format("drift {}", drift_name(kind)),
+           count == 1 ? std::string(drift_name(kind)) : fmt::format("{} ({} times)", drift_name(kind), count)});
   }
   return out;
 }
@@ -200,7 +202,7 @@ std::string errors_html(const MissionRecord& record, const std::vector<RobotGeom
   std::string body = legend(record, any_reference) + "<div class=\"figures\">\n";
   for (std::size_t r = 0; r < geometry.size(); ++r)
     if (!geometry[r].errors.empty()) body += timeline(record, record.robots[r], geometry[r], common);
-  std::string lead = fmt::format("Distance of every keyframe to the {} after the alignment above{}.",
+  std::string lead = fmt::format("Distance of every keyframe to the {} after one rigid alignment{}.",
                                  any_reference ? "reference" : "server's estimate",
                                  common.logarithmic ? "; logarithmic, because the curves are far apart" : "");
   if (any_reference)

@@ -36,7 +36,7 @@ h2 { font-size: 21px; margin: 52px 0 4px; letter-spacing: -0.01em; }
 .facts { display: flex; flex-wrap: wrap; gap: 8px; margin: 0 0 24px; padding: 0; list-style: none; }
 .facts li { border: 1px solid var(--line); background: var(--card); border-radius: 999px; padding: 3px 12px; font-size: 13px; }
 .facts li.input { border-color: var(--accent); color: var(--accent); font-weight: 600; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(330px, 1fr)); gap: 14px; }
+.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(260px, 1fr)); gap: 14px; }
 .card { background: var(--card); border: 1px solid var(--line); border-radius: 14px; padding: 16px 18px; }
 .card .what { color: var(--soft); font-size: 13px; margin: 0; }
 .card .value { font-size: 28px; line-height: 1.3; font-weight: 650; letter-spacing: -0.02em; margin: 2px 0;
@@ -101,13 +101,13 @@ path.cloudkey { stroke: var(--cloud); stroke-width: 7; stroke-opacity: 0.35; }
 .cell { stroke: none; }
 .onpicture.scalebar { stroke: #e7e9ee; } svg text.onpicture { fill: #e7e9ee; font-size: 12.5px; paint-order: stroke; stroke: #0e121a; stroke-width: 3.5px; }
 .drift { stroke-opacity: 0.42; stroke-width: 8; } rect.drift { stroke: none; fill-opacity: 0.22; }
-.drift.slip { stroke: var(--slip); } rect.drift.slip { fill: var(--slip); fill-opacity: 0.55; }
-.drift.degeneracy { stroke: var(--degeneracy); } rect.drift.degeneracy { fill: var(--degeneracy); }
-.drift.failure { stroke: var(--failure); } rect.drift.failure { fill: var(--failure); }
+.drift.slip { stroke: var(--slip); } rect.drift.slip { stroke: none; fill: var(--slip); fill-opacity: 0.55; }
+.drift.degeneracy { stroke: var(--degeneracy); } rect.drift.degeneracy { stroke: none; fill: var(--degeneracy); }
+.drift.failure { stroke: var(--failure); } rect.drift.failure { stroke: none; fill: var(--failure); }
 rect.suspect { fill: none; stroke: var(--failure); stroke-width: 1.6; stroke-dasharray: 5 3; }
 .suspect { stroke: var(--failure); stroke-width: 2; stroke-dasharray: 5 3; }
 .born { stroke: none; fill: var(--onboard); fill-opacity: 0.75; }
-.mark { stroke-width: 1.6; stroke-opacity: 0.8; }
+.mark.held { stroke: var(--ink); stroke-width: 1.6; stroke-opacity: 0.8; }
 .alerts { list-style: none; padding: 0; margin: 0 0 18px; }
 .alerts li { border: 1px solid var(--failure); border-left-width: 6px; border-radius: 10px; padding: 8px 14px; margin: 6px 0;
   background: color-mix(in srgb, var(--failure) 8%, var(--card)); }

@@ -58,6 +58,23 @@ void add_policy_rows(const MissionRecord& record, const RobotRecord& robot, std:
            metres(robot.server.rpe_m), "", "", "", ""});
 }
 
+/// What the mission took of the server, as if in real time; empty when not measured.
+std::string server_load_html(const ServerLoadRecord& load) {
+  if (!(load.mission_s > 0.0)) return "";
+  HtmlTable table{{"the server in real time", ""}, {}, 1};
+  const auto share = [&](double cpu_s) { return fmt::format("{:.2f} %", 100.0 * cpu_s / load.mission_s); };
+  table.rows.push_back({"of one core: receiving, optimising, proxy graphs", share(load.map_cpu_s)});
+  table.rows.push_back({"of one core: verifying closures", share(load.verification_cpu_s)});
+  if (const double busy_s = load.map_cpu_s + load.verification_cpu_s; busy_s > 0.0)
+    table.rows.push_back({"one core would keep up with", fmt::format("{:.0f} x", load.mission_s / busy_s)});
+  if (const auto latency = spread(load.update_latency_ms))
+    table.rows.push_back(
+        {"submap in to proxy graph out, median / largest",
+         fmt::format("{} / {}", format_duration_ms(latency->median), format_duration_ms(latency->max))});
+  table.rows.push_back({"memory at most, simulator and robots included", format_bytes(1e6 * load.peak_memory_mb)});
+  return "<br>\n" + html(table);
+}
+
 }  // namespace
 
 std::string html(const HtmlTable& table) {
@@ -109,18 +126,22 @@ std::string closures_html(const MissionRecord& record) {
 
 std::string radio_html(const MissionRecord& record) {
   if (record.robots.empty()) return "";
-  HtmlTable table{
-      {"robot", "up", "total", "messages", "down", "total", "messages", "keyframes", "submaps", "proxy nodes"}, {}, 1};
-  for (const auto& robot : record.robots)
-    table.rows.push_back({robot_cell(record, robot), rate(robot.bytes_up, robot.duration_s),
-                          format_bytes(static_cast<double>(robot.bytes_up)), std::to_string(robot.messages_up),
-                          rate(robot.bytes_down, robot.duration_s), format_bytes(static_cast<double>(robot.bytes_down)),
-                          std::to_string(robot.messages_down), std::to_string(robot.keyframes),
-                          std::to_string(robot.submaps), std::to_string(robot.proxy_nodes)});
+  HtmlTable robots{{"robot", "up", "down", "keyframes", "submaps", "proxy nodes"}, {}, 1};
+  HtmlTable kinds{{"from", "to", "kind", "messages", "largest", "handed over", "on the air", "mean rate"}, {}, 3};
+  const auto bytes = [](std::uint64_t count) { return format_bytes(static_cast<double>(count)); };
+  for (const auto& robot : record.robots) {
+    robots.rows.push_back({robot_cell(record, robot), rate(robot.bytes_up, robot.duration_s),
+                           rate(robot.bytes_down, robot.duration_s), std::to_string(robot.keyframes),
+                           std::to_string(robot.submaps), std::to_string(robot.proxy_nodes)});
+    for (const TrafficRecord& row : robot.traffic)
+      kinds.rows.push_back({escape_xml(row.from), escape_xml(row.to), escape_xml(row.kind),
+                            std::to_string(row.messages), bytes(row.largest_message), bytes(row.bytes),
+                            bytes(row.transmitted_bytes), format_bytes(row.bytes_per_s) + "/s"});
+  }
   return section("What goes over the radio",
                  "Bytes of the encoded and compressed messages: submaps go up, proxy graphs come down. Rates are means "
-                 "over the robot's own run.",
-                 html(table));
+                 "over the robot's own run. On the air: without what was never sent, repetitions included.",
+                 html(robots) + (kinds.rows.empty() ? "" : "<br>\n" + html(kinds)));
 }
 
 std::string transforms_html(const MissionRecord& record) {
@@ -156,7 +177,6 @@ std::string timing_html(const MissionRecord& record) {
   }
   add("verification of one candidate closure", "server", timing.server_verification_ms);
   add("joint optimisation", "server", timing.server_optimisation_ms);
-  add("submap in to proxy graph out (mission time)", "server", timing.server_load.update_latency_ms);
   std::string body = table.rows.empty() ? "" : html(table);
   if (!timing.load.empty()) {
     HtmlTable load{{"who", "share of one core", "worst latency"}, {}, 1};
@@ -165,6 +185,7 @@ std::string timing_html(const MissionRecord& record) {
                            format_duration_ms(entry.worst_latency_ms)});
     body += "<br>\n" + html(load);
   }
+  body += server_load_html(timing.server_load);
   if (body.empty()) return "";
   std::string lead = fmt::format("Wall-clock time, {} in all", format_duration_ms(1000.0 * timing.wall_s));
   if (timing.rate) lead += fmt::format(", played at {} times real time", *timing.rate);

@@ -93,10 +93,10 @@ TEST(CheckerOfThisTest, SeesMistakes) {
   EXPECT_FALSE(has_number_that_is_not_finite("information, finance, banana"));
 }
 
-TEST(ReportHtml, IsWellFormedAndSelfContained) { expect_good_page(report_html(test::example_record())); }
+TEST(ReportHtml, IsWellFormedAndSelfContained) { expect_good_page(report_html(test::example_record({.cloud = true}))); }
 
 TEST(ReportHtml, HasEverySection) {
-  const std::string html = report_html(test::example_record());
+  const std::string html = report_html(test::example_record({.cloud = true}));
   for (const char* title : {"The joint map", "Each robot by itself", "The map: odometry alone, and joint",
                             "Who drifted where and when", "Policies side by side", "Where and when the maps disagree",
                             "The proxy graph", "Loop closures", "How the robots&#39; frames lie",
@@ -132,6 +132,17 @@ TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
   EXPECT_NE(html.find("<rect class=\"suspect\""), std::string::npos);
 }
 
+TEST(ReportHtml, ListsTrafficByKindAndTheServersLoad) {
+  MissionRecord record = test::example_record();
+  record.robots[0].traffic = {{"alpha", "server", "sub<map", 24, 812'345, 900'000, 3398.0, 41'000}};
+  record.timing.server_load = {3600.0, 30.0, 150.0, {20.0, 4000.0, 9000.0}, 512.0};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  for (const char* cell :
+       {"sub&lt;map", "812 kB", "900 kB", "3.40 kB/s", "0.83 %", "4.17 %", "20 x", "4.00 s / 9.00 s", "512 MB"})
+    EXPECT_NE(html.find(cell), std::string::npos) << cell;
+}
+
 TEST(ReportHtml, IsAFunctionOfTheRecord) {
   EXPECT_EQ(report_html(test::example_record()), report_html(test::example_record()));
 }
@@ -157,7 +168,7 @@ TEST(ReportHtml, EscapesEveryText) {
 }
 
 TEST(ReportHtml, WorksWithoutReferenceCloudOrUpdates) {
-  MissionRecord record = test::example_record({.reference = false, .cloud = false});
+  MissionRecord record = test::example_record({.reference = false});
   for (auto& robot : record.robots) robot.updates.clear();
   record.timing = {};
   const std::string html = report_html(record);
@@ -206,7 +217,7 @@ TEST(ReportHtml, GroupsThatNeverMetGetTheirOwnPicture) {
 }
 
 TEST(ReportHtml, LongMissionStaysSmall) {
-  const std::string html = report_html(test::example_record({.robots = 3, .keyframes = 1000, .cloud = false}));
+  const std::string html = report_html(test::example_record({.robots = 3, .keyframes = 1000}));
   EXPECT_LT(html.size(), 2'000'000U);
   EXPECT_LT(report_html(test::example_record({.robots = 3, .keyframes = 1000, .survey = true})).size(),
             html.size() + 4'000'000U);  // pictures, however many the points

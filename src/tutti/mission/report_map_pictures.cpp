@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "tutti/mission/report_colours.hpp"
 #include "tutti/mission/report_label.hpp"
@@ -86,6 +87,28 @@ MapPicture picture(const Shown& clouds, const PlanView& view,
   return out;
 }
 
+/// How much a slice shows: places where steps of a route cross it, each at most 1, less where they cross at an angle.
+/// Every further crossing of a place counts little.
+double crossings(const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>& steps, const Slice& slice) {
+  constexpr double kPlace_m = 3.0;
+  constexpr double kAgain = 0.01;
+  const Eigen::Vector2d across(-slice.along.y(), slice.along.x());
+  std::map<int, double> places;
+  double score = 0.0;
+  for (const auto& [from, to] : steps) {
+    const double before = across.dot(from - slice.centre);
+    const double after = across.dot(to - slice.centre);
+    if ((before < 0.0) == (after < 0.0)) continue;
+    const double u = slice.along.dot(from + before / (before - after) * (to - from) - slice.centre);
+    if (std::abs(u) > 0.5 * slice.length_m) continue;
+    const double square = std::pow((after - before) / (to - from).norm(), 2);
+    double& place = places[static_cast<int>(std::lround(u / kPlace_m))];
+    score += kAgain + std::max(0.0, square - place);
+    place = std::max(place, square);
+  }
+  return score;
+}
+
 /// Up and down from a cloud's points in the slice: all but the outermost 0.5 %.
 Range heights(const std::vector<CloudLayer>& layers,
               const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
@@ -142,32 +165,28 @@ Points2d cloud_corners(const std::vector<CloudLayer>& clouds, const GroundPlane&
 }
 
 Slice busiest_slice(const std::vector<Points2d>& routes, double length_m) {
-  constexpr std::size_t kMostPositions = 3000;
-  constexpr std::size_t kMostCentres = 300;
+  constexpr std::size_t kMostSteps = 2000;
+  constexpr std::size_t kMostCentres = 250;
   constexpr int kDirections = 12;
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> steps;
   std::size_t total = 0;
   for (const auto& route : routes) total += route.size();
-  Points2d positions;
+  const std::size_t stride = total / kMostSteps + 1;
   for (const auto& route : routes)
-    for (std::size_t i = 0; i < route.size(); i += total / kMostPositions + 1)
-      if (route[i].allFinite()) positions.push_back(route[i]);
+    for (std::size_t i = stride; i < route.size(); i += stride)
+      if (route[i].allFinite() && route[i - stride].allFinite()) steps.emplace_back(route[i - stride], route[i]);
   Slice best{.length_m = length_m};
-  std::size_t most = 0;
+  if (!steps.empty()) best.centre = steps.front().first;
+  double most = 0.0;
   for (int d = 0; d < kDirections; ++d) {
     const double angle = M_PI * d / kDirections;
     const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
-    const Eigen::Vector2d across(-along.y(), along.x());
-    for (std::size_t c = 0; c < positions.size(); c += positions.size() / kMostCentres + 1) {
-      const auto inside =
-          static_cast<std::size_t>(std::count_if(positions.begin(), positions.end(), [&](const Eigen::Vector2d& p) {
-            const Eigen::Vector2d from_centre = p - positions[c];
-            return std::abs(across.dot(from_centre)) < 0.5 * kSliceThickness_m &&
-                   std::abs(along.dot(from_centre)) < 0.5 * best.length_m;
-          }));
-      if (inside <= most) continue;
-      most = inside;
-      best.centre = positions[c];
-      best.along = along;
+    for (std::size_t c = 0; c < steps.size(); c += steps.size() / kMostCentres + 1) {
+      const Slice slice{steps[c].first, along, length_m};
+      const double found = crossings(steps, slice);
+      if (found <= most) continue;
+      most = found;
+      best = slice;
     }
   }
   return best;

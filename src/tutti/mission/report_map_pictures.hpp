@@ -28,7 +28,7 @@ inline constexpr double kPixelRatio = 2.0;
 
 /// Onboard, server and, where there is one, survey and distance to the survey, from above.
 MapPicture map_from_above(const MissionRecord& record);
-/// The same in a vertical slice, kSliceThickness_m thick, through where the robots passed most.
+/// The same in a vertical slice, kSliceThickness_m thick, across the ways of the robots.
 MapPicture map_section(const MissionRecord& record);
 inline constexpr double kSliceThickness_m = 1.0;
 
@@ -41,8 +41,8 @@ struct Slice {
   Eigen::Vector2d along = Eigen::Vector2d::UnitX();
   double length_m = 0.0;
 };
-/// The slice of this length with most positions of the routes in it: a stretch that was passed often, so a junction
-/// rather than a dead end.
+/// The slice of this length that the routes cross, as squarely as may be, at most places: a cut through several
+/// corridors or a junction shows more than one along a wall. Among equals, the one crossed most often.
 Slice busiest_slice(const std::vector<Points2d>& routes, double length_m);
 
 /// What the robots of one component saw, in the joint map.

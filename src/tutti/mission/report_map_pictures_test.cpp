@@ -91,18 +91,19 @@ TEST(DistanceColour, BlueIsNearRedIsFar) {
   EXPECT_NEAR(unknown.red, unknown.blue, 30);  // grey
 }
 
-TEST(BusiestSlice, LiesAlongTheStretchPassedMostOften) {
-  std::vector<Points2d> routes(2);
-  const Eigen::Vector2d along = Eigen::Vector2d(std::sqrt(3.0), 1.0).normalized();  // 30 degrees
-  for (double s = 0.0; s < 60.0; s += 0.5) {
-    routes[0].push_back({0.0, s});
-    for (int pass = 0; pass < 3; ++pass)
-      if (s < 20.0) routes[1].push_back(Eigen::Vector2d(100.0, 50.0) + s * along);
-  }
-  const Slice slice = busiest_slice(routes, 20.0);
-  EXPECT_EQ(slice.length_m, 20.0);
-  EXPECT_NEAR(std::abs(slice.along.dot(along)), 1.0, 1e-9);
-  EXPECT_LT((slice.centre - (Eigen::Vector2d(100.0, 50.0) + 10.0 * along)).norm(), 1.0);
+TEST(BusiestSlice, CutsMostCorridors) {
+  // Three parallel corridors 10 m apart, turned by 30 degrees, and a lone one far away that was passed ten times.
+  const Eigen::Vector2d along = Eigen::Vector2d(std::sqrt(3.0), 1.0).normalized();
+  const Eigen::Vector2d across(-along.y(), along.x());
+  std::vector<Points2d> routes(4);
+  for (std::size_t r = 0; r < 3; ++r)
+    for (double s = 0.0; s < 20.0; s += 0.5) routes[r].push_back(s * along + 10.0 * static_cast<double>(r) * across);
+  for (int pass = 0; pass < 10; ++pass)
+    for (double s = 0.0; s < 20.0; s += 0.5) routes[3].push_back({200.0 + (pass % 2 == 0 ? s : 20.0 - s), 100.0});
+  const Slice slice = busiest_slice(routes, 30.0);
+  EXPECT_EQ(slice.length_m, 30.0);
+  EXPECT_NEAR(std::abs(slice.along.dot(across)), 1.0, 1e-9);
+  EXPECT_LT(std::abs(across.dot(slice.centre) - 10.0), 6.0);  // all three within its 30 m
   EXPECT_EQ(busiest_slice({}, 5.0).length_m, 5.0);
 }
 
@@ -117,9 +118,10 @@ TEST(MapPictures, ShowWhatThereIs) {
             (Names{"onboard", "server", "survey", "distance"}));
   EXPECT_EQ(names(map_section(test::example_record({.survey = true}))),
             (Names{"onboard", "server", "survey", "distance"}));
-  EXPECT_EQ(names(map_from_above(test::example_record())), (Names{"onboard", "server"}));
-  EXPECT_EQ(names(map_from_above(test::example_record({.reference = false}))), (Names{"onboard", "server"}));
-  EXPECT_TRUE(map_from_above(test::example_record({.cloud = false})).panels.empty());
+  EXPECT_EQ(names(map_from_above(test::example_record({.cloud = true}))), (Names{"onboard", "server"}));
+  EXPECT_EQ(names(map_from_above(test::example_record({.reference = false, .cloud = true}))),
+            (Names{"onboard", "server"}));
+  EXPECT_TRUE(map_from_above(test::example_record()).panels.empty());
   EXPECT_TRUE(map_section(MissionRecord{}).panels.empty());
 }
 
