@@ -47,7 +47,8 @@ TEST(Policy, UnknownNameIsAConfigurationError) {
 }
 
 TEST(Policy, NamesMatchTheFactory) {
-  for (const char* name : {"none", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"})
+  for (const char* name :
+       {"none", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"})
     EXPECT_EQ((*make_policy(name, {}))->name(), name);
 }
 
