@@ -22,7 +22,8 @@ struct Progress {
 };
 
 struct RunOptions {
-  std::filesystem::path data;  ///< Folder the mission's files lie in.
+  std::filesystem::path data;    ///< Folder the mission's files lie in.
+  std::filesystem::path clouds;  ///< Folder for the clouds of submaps, made if missing; empty = all stay in memory.
   std::uint64_t seed = 1;
   std::optional<double> rate;  ///< Times real time; none = as fast as possible.
   int threads = 0;             ///< For verifications; 0 = all cores. Does not change the result.
