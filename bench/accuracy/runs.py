@@ -15,6 +15,15 @@ def report_of(*command):
         return json.loads((pathlib.Path(out) / "report.json").read_text())
 
 
+def outcome_of(out, *command):
+    """(report.json, timing.json) of one call, its files kept in the folder `out`; a finished one is not run again."""
+    out = pathlib.Path(out)
+    if not (out / "timing.json").exists():
+        out.mkdir(parents=True, exist_ok=True)
+        subprocess.run([str(part) for part in command] + ["--out", str(out)], check=True, capture_output=True)
+    return [json.loads((out / name).read_text()) for name in ("report.json", "timing.json")]
+
+
 def mission_file(name):
     return SOURCE / "missions" / f"{name}.yaml"
 
