@@ -16,7 +16,8 @@ struct AlignmentGuess {
 };
 
 /// At most config.candidates.max_guesses distinct alignments, best first. Levelled submaps differ by yaw and a shift:
-/// the oriented wall images are correlated over a yaw grid by FFT; height from the horizontal surfaces.
+/// main wall directions are laid on each other, the shift comes from correlating the oriented wall images by FFT, the
+/// height from the horizontal surfaces.
 std::vector<AlignmentGuess> propose_alignments(const SubmapFeatures& a, const SubmapFeatures& b,
                                                const LidarClosureConfig& config);
 

@@ -116,7 +116,7 @@ OrientedCloud orient(std::vector<Eigen::Vector3f> points, std::span<const Eigen:
     if (normal.dot(nearest_viewpoint(viewpoints, stored[i]) - stored[i]) < 0.0F) normal = -normal;
     (*normals)[i] = normal;
   }
-  return {std::move(index), std::move(normals)};
+  return {std::move(index), std::move(normals), nullptr};
 }
 
 }  // namespace tutti::lidar

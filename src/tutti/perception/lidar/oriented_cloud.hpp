@@ -38,6 +38,9 @@ class NeighbourIndex {
 struct OrientedCloud {
   std::shared_ptr<const NeighbourIndex> index;
   std::shared_ptr<const std::vector<Eigen::Vector3f>> normals;
+  /// How far each point may be off the plane of a point of another cloud of the same place, m; NaN where unknown. Null
+  /// when it was not computed.
+  std::shared_ptr<const std::vector<float>> roughness;
 
   [[nodiscard]] std::size_t size() const { return normals ? normals->size() : 0; }
   [[nodiscard]] const Eigen::Vector3f& point(std::size_t i) const { return index->points()[i]; }

@@ -4,7 +4,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "tutti/base/check.hpp"
@@ -34,11 +37,21 @@ struct NormalEquations {
   Vector6d g = Vector6d::Zero();  // sum w J^T r
   double weighted_squares = 0.0;  // sum w r^2
   double weights = 0.0;
-  double squares = 0.0;                                      // sum r^2
-  Eigen::Matrix3d normal_scatter = Eigen::Matrix3d::Zero();  // sum m m^T, source frame
-  Eigen::Vector3d point_sum = Eigen::Vector3d::Zero();       // source frame
+  double squares = 0.0;                                         // sum r^2
+  Eigen::Matrix3d normal_scatter = Eigen::Matrix3d::Zero();     // sum m m^T, source frame
+  Eigen::Matrix3d residual_scatter = Eigen::Matrix3d::Zero();   // sum r^2 m m^T, where the roughness is known
+  Eigen::Matrix3d roughness_scatter = Eigen::Matrix3d::Zero();  // sum s^2 m m^T, s the roughness
+  Eigen::Vector3d point_sum = Eigen::Vector3d::Zero();          // source frame
   std::size_t count = 0;
 };
+
+/// Mean over the two points of a correspondence, as far as known; negative when neither is.
+double squared_roughness(const OrientedCloud& target, std::size_t j, const OrientedCloud& source, std::size_t i) {
+  if (!target.roughness || !source.roughness) return -1.0;
+  const double a = (*target.roughness)[j], b = (*source.roughness)[i];
+  if (std::isnan(a)) return std::isnan(b) ? -1.0 : b * b;
+  return std::isnan(b) ? a * a : 0.5 * (a * a + b * b);
+}
 
 /// Residual of a correspondence: r = n_t . (T p_s - q_t); with the right perturbation and m = R^T n_t its Jacobian is
 /// J = [m^T, (p_s x m)^T]. Loss: Geman-McClure of the given scale.
@@ -67,7 +80,12 @@ NormalEquations linearise(const OrientedCloud& target, const OrientedCloud& sour
     sums.weighted_squares += w * r * r;
     sums.weights += w;
     sums.squares += r * r;
-    sums.normal_scatter += m * m.transpose();
+    const Eigen::Matrix3d mm = m * m.transpose();
+    sums.normal_scatter += mm;
+    if (const double rough = squared_roughness(target, j, source, i); rough >= 0.0) {
+      sums.residual_scatter += r * r * mm;
+      sums.roughness_scatter += rough * mm;
+    }
     sums.point_sum += p;
     ++sums.count;
   }
@@ -96,6 +114,15 @@ bool run_level(const OrientedCloud& target, const OrientedCloud& source, const R
   return false;
 }
 
+/// Root of the largest ratio u^T R u / u^T S u over all directions u. Directions with hardly any surface say nothing.
+double worst_ratio(const Eigen::Matrix3d& R, const Eigen::Matrix3d& S, std::size_t count) {
+  constexpr double kLeastRoughness = 0.01, kLeastShare = 0.01;  // m; of the points
+  const double least = kLeastShare * kLeastRoughness * kLeastRoughness * static_cast<double>(count);
+  const Eigen::Matrix3d regular = S + least * Eigen::Matrix3d::Identity();
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> solver(R, regular, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
+}
+
 void assess(const OrientedCloud& target, const OrientedCloud& source, const RegistrationConfig& config,
             double min_cosine, RegistrationResult& result) {
   const auto sample = sample_surface(source, static_cast<std::size_t>(config.levels.back().max_points));
@@ -109,8 +136,10 @@ void assess(const OrientedCloud& target, const OrientedCloud& source, const Regi
   result.overlap = count / static_cast<double>(sample.size());
   result.plane_rmse_m = std::sqrt(sums.squares / count);
   result.overlap_centre_source = sums.point_sum / count;
-  result.min_translation_eigenvalue =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sums.normal_scatter / count).eigenvalues()[0];
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> facing(sums.normal_scatter / count);
+  result.min_translation_eigenvalue = facing.eigenvalues()[0];
+  result.weakest_source = facing.eigenvectors().col(0);
+  result.misfit = worst_ratio(sums.residual_scatter, sums.roughness_scatter, sums.count);
   // Information of the whole overlap, however few of its points were sampled.
   const auto& normals = *source.normals;
   const auto without = std::count(normals.begin(), normals.end(), Eigen::Vector3f(Eigen::Vector3f::Zero()));
@@ -137,6 +166,26 @@ RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCl
     result.converged = run_level(target, source, level, config, min_cosine, result);
   assess(target, source, config, min_cosine, result);
   return result;
+}
+
+std::vector<float> self_residuals(const OrientedCloud& cloud, const RegistrationConfig& config) {
+  constexpr std::size_t kTried = 6;  // neighbours, the point itself included
+  const auto min_cosine = static_cast<float>(std::cos(config.max_normal_angle_deg * kRadPerDeg));
+  std::vector<float> out(cloud.size(), std::numeric_limits<float>::quiet_NaN());
+  std::array<std::int32_t, kTried> neighbours{};
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3f &p = cloud.point(i), &n = cloud.normal(i);
+    if (n == Eigen::Vector3f::Zero()) continue;
+    const std::size_t count = cloud.index->nearest_k(p, neighbours);
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto j = static_cast<std::size_t>(neighbours[k]);
+      if (j == i || cloud.normal(j).dot(n) < min_cosine) continue;
+      const Eigen::Vector3f difference = p - cloud.point(j);
+      if (difference.norm() < static_cast<float>(config.overlap_distance_m)) out[i] = cloud.normal(j).dot(difference);
+      break;
+    }
+  }
+  return out;
 }
 
 }  // namespace tutti::lidar

@@ -10,9 +10,13 @@ namespace tutti::lidar {
 struct RegistrationResult {
   Pose3 T_target_source;
   Matrix6d covariance = Matrix6d::Identity();  ///< Right perturbation of T_target_source (geometry/pose3.hpp).
-  double overlap = 0.0;                     ///< Share of the source points with a target point near and a like normal.
-  double plane_rmse_m = 0.0;                ///< Point to plane, over the overlapping points.
+  double overlap = 0.0;       ///< Share of the source points with a target point near and a like normal.
+  double plane_rmse_m = 0.0;  ///< Point to plane, over the overlapping points.
+  /// Point-to-plane residuals over what OrientedCloud::roughness expects (root of the ratio of mean squares), in the
+  /// direction in which that is largest: about 1 when both show one place. 0 without roughness.
+  double misfit = 0.0;
   double min_translation_eigenvalue = 0.0;  ///< Of sum n n^T over the overlap, trace 1: 0 = free to slide.
+  Eigen::Vector3d weakest_source = Eigen::Vector3d::UnitX();        ///< The direction of that, source frame.
   Eigen::Vector3d overlap_centre_source = Eigen::Vector3d::Zero();  ///< Mean of the overlapping points, source frame.
   int iterations = 0;
   bool converged = false;
@@ -22,5 +26,10 @@ struct RegistrationResult {
 /// Too few correspondences: converged = false, overlap what was left.
 RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCloud& source, const Pose3& T_init,
                                    const RegistrationConfig& config);
+
+/// Point-to-plane residual of every point against the nearest other point that would be a correspondence in
+/// register_clouds; NaN where there is none. Noise and rough surfaces leave as much between two clouds of one
+/// place, but no more.
+std::vector<float> self_residuals(const OrientedCloud& cloud, const RegistrationConfig& config);
 
 }  // namespace tutti::lidar

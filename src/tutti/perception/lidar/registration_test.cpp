@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <cmath>
 
 #include "tutti/perception/lidar/submap_features.hpp"
 #include "tutti/perception/lidar/testing/rooms.hpp"
@@ -40,6 +41,35 @@ TEST(RegisterClouds, recoversTheTransformFromOneMetreAndEightDegrees) {
     EXPECT_LT(result.plane_rmse_m, 0.06);
     EXPECT_GT(result.min_translation_eigenvalue, 0.1);
   }
+}
+
+TEST(RegisterClouds, misfitIsAboutOneAtTheTruthAndLargeOff) {
+  const Walk walk_a, walk_b{.from = {7, 4, 1.5}, .to = {9, 4, 1.5}, .yaw_rad = 0.6};
+  const auto a = observe_oriented(furnished_room(), walk_a, 1), b = observe_oriented(furnished_room(), walk_b, 2);
+  const Pose3 truth = true_relative(walk_a, walk_b);
+  const auto right = register_clouds(a, b, truth, {});
+  EXPECT_GT(right.misfit, 0.5);
+  EXPECT_LT(right.misfit, 1.3);
+  RegistrationConfig look;  // where it stands: one step that cannot go far
+  look.levels = {{0.01, 4000, 1}};
+  Vector6d off = Vector6d::Zero();
+  off[1] = 0.15;
+  EXPECT_GT(register_clouds(a, b, retract(truth, off), look).misfit, 2.0);
+  auto unknown = a;
+  unknown.roughness = nullptr;
+  EXPECT_EQ(register_clouds(unknown, b, truth, {}).misfit, 0.0);
+}
+
+TEST(SelfResiduals, areTheNoiseOfAFlatWall) {
+  const Walk walk;
+  const auto cloud = observe_oriented(furnished_room(), walk, 1);
+  double sum = 0.0, count = 0.0;
+  for (const float residual : self_residuals(cloud, {}))
+    if (!std::isnan(residual)) sum += residual * residual, count += 1.0;
+  EXPECT_GT(count, 0.5 * static_cast<double>(cloud.size()));
+  // Voxels average a few points of 2 cm noise; corners and the normals' errors add.
+  EXPECT_GT(std::sqrt(sum / count), 0.005);
+  EXPECT_LT(std::sqrt(sum / count), 0.05);
 }
 
 TEST(RegisterClouds, scatterOverNoiseAgreesWithTheCovariance) {

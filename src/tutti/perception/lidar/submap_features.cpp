@@ -5,20 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <map>
 #include <span>
-#include <tuple>
 
 #include "tutti/perception/lidar/levelling.hpp"
+#include "tutti/perception/lidar/registration.hpp"
+#include "tutti/perception/lidar/submap_middle.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 
 namespace tutti::lidar {
 namespace {
 
-constexpr float kMaxWallTilt = 0.35F;      // |n_z| of a wall: within 20 degrees of vertical
-constexpr float kMinFloorTilt = 0.94F;     // |n_z| of a floor or ceiling: within 20 degrees of level
-constexpr float kFloorLayer = 0.25F;       // m; floors at different heights are kept apart
 constexpr double kPriorPreference = 1.25;  // how much better the body's up must fit than the odometry's
 
 std::string why_unusable(const Submap& submap, std::size_t points, const LidarClosureConfig& config) {
@@ -51,43 +47,22 @@ Eigen::Vector3d find_up(const Submap& submap, std::span<const Pose3> poses, std:
   return by_body.support > kPriorPreference * by_odometry.support ? by_body.up : by_odometry.up;
 }
 
-/// Walls are summed per half cell, floors per cell and layer, both in a deterministic order.
-BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_level_submap, double cell_m) {
-  struct Sum {
-    Eigen::Vector3f point = Eigen::Vector3f::Zero();
-    Eigen::Vector2f normal = Eigen::Vector2f::Zero();
-    float count = 0.0F;
-    void add(const Eigen::Vector3f& p, const Eigen::Vector3f& n) {
-      point += p;
-      normal += n.head<2>();
-      count += 1.0F;
-    }
-  };
-  std::map<std::pair<int, int>, Sum> walls;
-  std::map<std::tuple<int, int, int>, Sum> floors;
-  const Eigen::Matrix3f R = R_level_submap.toRotationMatrix().cast<float>();
-  const auto wall_cell = static_cast<float>(0.5 * cell_m);
-  const auto floor_cell = static_cast<float>(cell_m);
-  const auto bin = [](float x, float size) { return static_cast<int>(std::floor(x / size)); };
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (cloud.normal(i) == Eigen::Vector3f::Zero()) continue;
-    const Eigen::Vector3f p = R * cloud.point(i), n = R * cloud.normal(i);
-    if (std::abs(n.z()) < kMaxWallTilt)
-      walls[{bin(p.x(), wall_cell), bin(p.y(), wall_cell)}].add(p, n);
-    else if (std::abs(n.z()) > kMinFloorTilt)
-      floors[{bin(p.x(), floor_cell), bin(p.y(), floor_cell), 2 * bin(p.z(), kFloorLayer) + (n.z() > 0.0F)}].add(p, n);
+/// What the points may be off by where two submaps of one place lie on each other: what they are off by within one
+/// cloud, and how far the odometry's rotation may have bent it. Not its translation: that is uncertain along corridors
+/// without features, where the few points that say how far along one is must not be excused.
+std::vector<float> expected_residuals(const OrientedCloud& cloud, const Middle& middle,
+                                      const RegistrationConfig& config) {
+  std::vector<float> out = self_residuals(cloud, config);
+  const Pose3& T_submap_middle = middle.T_submap_keyframe;
+  const Eigen::Matrix3d R = T_submap_middle.rotation.toRotationMatrix();
+  const Eigen::Matrix3d bend = R * middle.covariance.bottomRightCorner<3, 3>() * R.transpose();
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (std::isnan(out[i])) continue;
+    const Eigen::Vector3d arm = cloud.point(i).cast<double>() - T_submap_middle.translation;
+    const Eigen::Vector3d lever = arm.cross(cloud.normal(i).cast<double>());
+    out[i] = static_cast<float>(std::sqrt(double{out[i]} * out[i] + lever.dot(bend * lever)));
   }
-  BirdsEyeView view;
-  Eigen::Vector2f centre = Eigen::Vector2f::Zero();
-  for (const auto& [key, sum] : walls) centre += sum.point.head<2>() / sum.count;
-  if (!walls.empty()) centre /= static_cast<float>(walls.size());
-  view.centre = centre.cast<double>();
-  for (const auto& [key, sum] : walls)
-    view.walls.push_back({sum.point.head<2>() / sum.count - centre, sum.normal / std::sqrt(sum.count)});
-  for (const auto& [key, sum] : floors)
-    view.floors.push_back(
-        {sum.point.head<2>() / sum.count - centre, sum.point.z() / sum.count, (std::get<2>(key) & 1) != 0});
-  return view;
+  return out;
 }
 
 /// Panoramas from viewpoints evenly spread along the way.
@@ -113,10 +88,15 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
   const auto poses = poses_in_submap(submap);
   std::vector<Eigen::Vector3f> viewpoints;
   for (const auto& pose : poses) viewpoints.push_back(pose.translation.cast<float>());
+  const Middle middle = find_middle(submap);
+  features.middle = middle.T_submap_keyframe.translation;
   features.cloud = orient(std::move(points), viewpoints, config.normals);
+  features.cloud.roughness =
+      std::make_shared<const std::vector<float>>(expected_residuals(features.cloud, middle, config.registration));
   const Eigen::Vector3d up = find_up(submap, poses, *features.cloud.normals);
   features.R_level_submap = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
   features.view = make_view(features.cloud, features.R_level_submap, config.candidates.cell_m);
+  features.turned_views = std::make_shared<const std::vector<TurnedView>>(turn_views(features.view, config.candidates));
   features.panoramas = look_around(features.cloud, viewpoints, config);
   features.usable = true;
   return features;

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <numbers>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/check.hpp"
@@ -29,51 +31,99 @@ double contradiction(const SubmapFeatures& a, const SubmapFeatures& b, const Pos
 /// An alignment after the coarse levels.
 struct Contender {
   Pose3 T_a_b;
-  double quality = 0.0;  ///< Overlap that nothing contradicts.
+  double quality = 0.0;  ///< Overlap that nothing contradicts, less where it does not fit.
   double score = 0.0;
 };
 
-Eigen::Vector3d with_zero(const Eigen::Vector2d& p) { return {p.x(), p.y(), 0.0}; }
+RegistrationConfig with_levels(RegistrationConfig config, std::vector<RegistrationLevel> levels) {
+  config.levels = std::move(levels);
+  return config;
+}
+
+double viewpoint_distance(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b) {
+  return (T_a_b * b.middle - a.middle).norm();
+}
+
+/// Before the finest level, when not even the refinement can help.
+bool is_hopeless(const RegistrationResult& result, double misfit_factor, const LidarClosureConfig& config) {
+  return result.overlap < config.early_overlap * config.min_overlap ||
+         result.misfit > misfit_factor * config.max_misfit;
+}
+
+/// A rough alignment that a first look finds worth a registration, improved by it.
+std::optional<Pose3> screen(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
+                            const LidarClosureConfig& config) {
+  const double reach = config.max_viewpoint_distance_m + config.candidates.distinct_m;
+  if (viewpoint_distance(a, b, T_a_b) > reach) return std::nullopt;
+  const auto result = register_clouds(a.cloud, b.cloud, T_a_b, with_levels(config.registration, {config.screening}));
+  if (is_hopeless(result, config.screening_misfit, config)) return std::nullopt;
+  return result.T_target_source;
+}
+
+/// The coarse registration of a start, if anything comes of it.
+std::optional<Contender> contend(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, double score,
+                                 const LidarClosureConfig& config) {
+  RegistrationConfig coarse = config.registration;
+  if (coarse.levels.size() > 1) coarse.levels.pop_back();
+  const auto result = register_clouds(a.cloud, b.cloud, T_init, coarse);
+  if (is_hopeless(result, config.coarse_misfit, config)) return std::nullopt;
+  const double clear = 1.0 - contradiction(a, b, result.T_target_source, config);
+  return Contender{result.T_target_source, result.overlap * clear / std::max(1.0, result.misfit), score};
+}
+
+bool is_same(const Pose3& T, const Pose3& other, const SubmapFeatures& b, double distance_m,
+             const LidarClosureConfig& config) {
+  const Pose3 difference = other.inverse() * T;
+  return rotation_angle(difference) * kDegPerRad < config.candidates.distinct_deg &&
+         (difference * b.middle - b.middle).norm() < distance_m;
+}
 
 /// Coarsely registered guesses, best first; of those that ended in the same place, the best.
 std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
-  RegistrationConfig coarse = config.registration;
-  if (coarse.levels.size() > 1) coarse.levels.pop_back();
   std::vector<Contender> all;
-  for (const auto& guess : propose_alignments(a, b, config)) {
-    const auto result = register_clouds(a.cloud, b.cloud, guess.T_a_b, coarse);
-    const double quality = result.overlap * (1.0 - contradiction(a, b, result.T_target_source, config));
-    all.push_back({result.T_target_source, quality, guess.score});
-  }
+  for (const auto& guess : propose_alignments(a, b, config))
+    if (const auto T_init = screen(a, b, guess.T_a_b, config))
+      if (const auto contender = contend(a, b, *T_init, guess.score, config)) all.push_back(*contender);
   std::stable_sort(all.begin(), all.end(), [](const auto& p, const auto& q) { return p.quality > q.quality; });
   std::vector<Contender> distinct;
-  for (const auto& one : all) {
-    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Contender& other) {
-      const Pose3 difference = other.T_a_b.inverse() * one.T_a_b;
-      const Eigen::Vector3d centre = b.R_level_submap.conjugate() * with_zero(b.view.centre);
-      return rotation_angle(difference) * kDegPerRad < config.candidates.distinct_deg &&
-             (difference * centre - centre).norm() < config.candidates.distinct_m;
-    });
-    if (!known) distinct.push_back(one);
-  }
+  for (const auto& one : all)
+    if (std::none_of(distinct.begin(), distinct.end(), [&](const Contender& other) {
+          return is_same(one.T_a_b, other.T_a_b, b, config.candidates.distinct_m, config);
+        }))
+      distinct.push_back(one);
   return distinct;
+}
+
+/// Along a corridor that looks the same everywhere every place fits nearly as well: the best quality that is reached
+/// from a few metres off in the direction that is constrained least, and that stays off.
+double best_slid_quality(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
+                         const Eigen::Vector3d& weakest_b, const LidarClosureConfig& config) {
+  double best = 0.0;
+  for (const double steps : {-2.0, -1.0, 1.0, 2.0}) {
+    const Pose3 slid{Eigen::Quaterniond::Identity(), steps * config.candidates.distinct_m * weakest_b};
+    const auto rival = contend(a, b, T_a_b * slid, 0.0, config);
+    if (rival && !is_same(rival->T_a_b, T_a_b, b, 0.5 * config.candidates.distinct_m, config))
+      best = std::max(best, rival->quality);
+  }
+  return best;
 }
 
 /// Registers both ways from one start and takes the middle.
 void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, const LidarClosureConfig& config,
-            PairVerification& out) {
-  RegistrationConfig fine = config.registration;
-  fine.levels.erase(fine.levels.begin(), fine.levels.end() - 1);
+            PairVerification& out, Eigen::Vector3d& weakest_b) {
+  const RegistrationConfig fine = with_levels(config.registration, {config.registration.levels.back()});
   const RegistrationResult forward = register_clouds(a.cloud, b.cloud, T_init, fine);
   const RegistrationResult backward = register_clouds(b.cloud, a.cloud, T_init.inverse(), fine);
   const Pose3& T_b_a = backward.T_target_source;
   const Vector6d gap = local(forward.T_target_source, T_b_a.inverse());
+  weakest_b = forward.weakest_source;
   out.T_a_b = retract(forward.T_target_source, 0.5 * gap);
   const Matrix6d Ad = adjoint(T_b_a);  // as in inverse(); what the two ways disagree by is uncertainty, too
   out.covariance =
       0.5 * (forward.covariance + Ad * backward.covariance * Ad.transpose()) + 0.25 * gap * gap.transpose();
   out.overlap = 0.5 * (forward.overlap + backward.overlap);
   out.plane_rmse_m = std::max(forward.plane_rmse_m, backward.plane_rmse_m);
+  out.misfit = std::max(forward.misfit, backward.misfit);
   out.min_eigenvalue = std::min(forward.min_translation_eigenvalue, backward.min_translation_eigenvalue);
   out.forward_backward_m = (gap.head<3>() + gap.tail<3>().cross(forward.overlap_centre_source)).norm();
   out.forward_backward_deg = gap.tail<3>().norm() * kDegPerRad;
@@ -84,8 +134,12 @@ std::string why_refused(const PairVerification& v, const LidarClosureConfig& c) 
   if (v.overlap < c.min_overlap) return fmt::format("overlap {:.2f}, at least {} needed", v.overlap, c.min_overlap);
   if (v.plane_rmse_m > c.max_plane_rmse_m)
     return fmt::format("plane RMSE {:.3f} m, at most {} m allowed", v.plane_rmse_m, c.max_plane_rmse_m);
+  if (v.misfit > c.max_misfit) return fmt::format("misfit {:.2f}, at most {} allowed", v.misfit, c.max_misfit);
   if (v.min_eigenvalue < c.min_eigenvalue)
     return fmt::format("free to slide: eigenvalue {:.3f}, at least {} needed", v.min_eigenvalue, c.min_eigenvalue);
+  if (v.viewpoint_distance_m > c.max_viewpoint_distance_m)
+    return fmt::format("viewpoints {:.1f} m apart, at most {} m allowed", v.viewpoint_distance_m,
+                       c.max_viewpoint_distance_m);
   if (v.forward_backward_m > c.max_forward_backward_m || v.forward_backward_deg > c.max_forward_backward_deg)
     return fmt::format("both ways differ by {:.3f} m and {:.2f} deg, at most {} m and {} deg allowed",
                        v.forward_backward_m, v.forward_backward_deg, c.max_forward_backward_m,
@@ -96,6 +150,9 @@ std::string why_refused(const PairVerification& v, const LidarClosureConfig& c) 
   if (v.rival_ratio > c.max_rival_ratio)
     return fmt::format("ambiguous: another alignment is {:.2f} as good, at most {} allowed", v.rival_ratio,
                        c.max_rival_ratio);
+  if (v.slid_ratio > c.max_slid_ratio)
+    return fmt::format("ambiguous: slid along it is {:.2f} as good, at most {} allowed", v.slid_ratio,
+                       c.max_slid_ratio);
   return {};
 }
 
@@ -119,20 +176,23 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   if (b.id < a.id) return inverse(verify_pair(b, a, config));
   const auto ranked = contenders(a, b, config);
   if (ranked.empty()) {
-    out.reason = "the walls do not correlate";
+    out.reason = "no alignment comes near";
     return out;
   }
   out.correlation_score = ranked.front().score;
   out.overlap = ranked.front().quality;
   out.T_a_b = ranked.front().T_a_b;
   if (ranked.size() > 1 && ranked[0].quality > 0.0) out.rival_ratio = ranked[1].quality / ranked[0].quality;
-  if (ranked.front().quality < config.early_refusal * config.min_overlap) {
-    out.reason = fmt::format("overlap {:.2f} after the coarse registration", out.overlap);
-    return out;
-  }
-  refine(a, b, ranked.front().T_a_b, config, out);
+  Eigen::Vector3d weakest_b;
+  refine(a, b, ranked.front().T_a_b, config, out, weakest_b);
+  out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
   out.contradiction = contradiction(a, b, out.T_a_b, config);
   out.reason = why_refused(out, config);
+  if (out.reason.empty()) {  // worth another look
+    const double slid = best_slid_quality(a, b, out.T_a_b, weakest_b, config);
+    out.slid_ratio = slid / ranked.front().quality;
+    out.reason = why_refused(out, config);
+  }
   out.accepted = out.reason.empty();
   return out;
 }

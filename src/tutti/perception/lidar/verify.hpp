@@ -18,11 +18,14 @@ struct PairVerification {
   Matrix6d covariance = Matrix6d::Identity();  ///< Right perturbation of T_a_b.
   double overlap = 0.0;                        ///< Mean of both directions.
   double plane_rmse_m = 0.0;                   ///< The larger of both directions.
+  double misfit = 0.0;                         ///< The larger of both directions (registration.hpp).
   double min_eigenvalue = 0.0;                 ///< The smaller of both directions.
+  double viewpoint_distance_m = 0.0;           ///< Between the middles of the two ways.
   double forward_backward_m = 0.0;             ///< At the centre of the overlap.
   double forward_backward_deg = 0.0;
   double contradiction = 0.0;  ///< Share of points in view that stand where the other submap looked through.
   double rival_ratio = 0.0;    ///< Quality of the second best alignment over that of the best.
+  double slid_ratio = 0.0;     ///< The same, a few metres along the direction that is constrained least.
   double correlation_score = 0.0;
 };
 

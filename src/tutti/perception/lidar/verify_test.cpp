@@ -96,6 +96,27 @@ TEST(VerifyPair, refusesAnEmptyRectangleAsAmbiguous) {
   EXPECT_GT(v.rival_ratio, kConfig.max_rival_ratio);
 }
 
+TEST(VerifyPair, refusesViewpointsFartherApartThanAskedFor) {
+  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1), b = see({{1}, 0}, furnished_room(), kWalkB, 2);
+  LidarClosureConfig config;
+  const double apart = verify_pair(a.features, b.features, config).viewpoint_distance_m;
+  EXPECT_NEAR(apart, (pose_on(kWalkA, 5).translation - pose_on(kWalkB, 5).translation).norm(), 0.05);
+  config.max_viewpoint_distance_m = apart + 0.1;
+  EXPECT_TRUE(verify_pair(a.features, b.features, config).accepted);
+  config.max_viewpoint_distance_m = apart - 0.1;
+  EXPECT_FALSE(verify_pair(a.features, b.features, config).accepted);
+}
+
+TEST(VerifyPair, refusesACorridorWithNothingButAFarEndAsAmbiguous) {
+  World world = corridor();
+  world.push_back({{80, 0, 0}, {0, 2.6, 0}, {0, 0, 2.5}});  // the end wall
+  LidarClosureConfig config;
+  config.min_eigenvalue = 0.0;  // only sliding may refuse
+  const Side a = see({{0}, 0}, world, {.from = {20, 1.3, 1.2}, .to = {24, 1.3, 1.2}}, 1);
+  const Side b = see({{1}, 0}, world, {.from = {40, 1.3, 1.2}, .to = {44, 1.3, 1.2}}, 2);
+  EXPECT_FALSE(verify_pair(a.features, b.features, config).accepted);
+}
+
 TEST(VerifyPair, refusesUnusableSubmapsWithTheirReason) {
   const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1);
   Side b = see({{1}, 7}, furnished_room(), {.keyframes = 3}, 1);

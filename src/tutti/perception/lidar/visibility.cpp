@@ -27,11 +27,12 @@ Direction direction_of(const Eigen::Vector3f& ray) {
 }  // namespace
 
 DepthPanorama::DepthPanorama(const OrientedCloud& cloud, const Eigen::Vector3f& viewpoint, float spacing_m)
-    : viewpoint_(viewpoint), depth_(kColumns * kRows, 0.0F) {
+    : viewpoint_(viewpoint), depth_cm_(kColumns * kRows, 0) {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Eigen::Vector3f ray = cloud.point(i) - viewpoint;
     const float depth = ray.norm();
     if (depth < kMinDepth) continue;
+    const auto depth_cm = static_cast<std::uint16_t>(std::min(100.0F * depth, 65535.0F));
     const Direction d = direction_of(ray);
     const float reach = 0.5F + 0.7F * spacing_m / depth * kBinsPerRad;
     const float flat = std::max(0.1F, std::hypot(ray.x(), ray.y()) / depth);  // a column is narrower near the poles
@@ -41,8 +42,8 @@ DepthPanorama::DepthPanorama(const OrientedCloud& cloud, const Eigen::Vector3f& 
               column_end = static_cast<int>(std::floor(d.column + reach / flat));
     for (int row = row_begin; row <= row_end; ++row)
       for (int column = column_begin; column <= column_end; ++column) {
-        float& bin = depth_[row * kColumns + ((column % kColumns + kColumns) % kColumns)];
-        if (bin == 0.0F || depth < bin) bin = depth;
+        std::uint16_t& bin = depth_cm_[row * kColumns + ((column % kColumns + kColumns) % kColumns)];
+        if (bin == 0 || depth_cm < bin) bin = depth_cm;
       }
   }
 }
@@ -50,7 +51,7 @@ DepthPanorama::DepthPanorama(const OrientedCloud& cloud, const Eigen::Vector3f& 
 float DepthPanorama::depth_towards(const Eigen::Vector3f& point) const {
   const Direction d = direction_of(point - viewpoint_);
   const int row = std::clamp(static_cast<int>(d.row), 0, kRows - 1);
-  return depth_[row * kColumns + static_cast<int>(d.column) % kColumns];
+  return 0.01F * static_cast<float>(depth_cm_[row * kColumns + static_cast<int>(d.column) % kColumns]);
 }
 
 VisibilityCount count_visible(const std::vector<DepthPanorama>& target_views, const OrientedCloud& source,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "tutti/geometry/pose3.hpp"
@@ -20,7 +21,7 @@ class DepthPanorama {
 
  private:
   Eigen::Vector3f viewpoint_;
-  std::vector<float> depth_;  // rows of equal elevation
+  std::vector<std::uint16_t> depth_cm_;  // rows of equal elevation; 0 = nothing seen
 };
 
 /// Points of one submap against what another submap's viewpoints saw.

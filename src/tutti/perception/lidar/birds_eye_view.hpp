@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <tuple>
+#include <vector>
+
+#include "tutti/perception/lidar/closure_config.hpp"
+#include "tutti/perception/lidar/fft.hpp"
+#include "tutti/perception/lidar/oriented_cloud.hpp"
+
+namespace tutti::lidar {
+
+/// A piece of wall seen from above; level frame, relative to BirdsEyeView::centre.
+struct WallCell {
+  Eigen::Vector2f position;  ///< m
+  Eigen::Vector2f normal;    ///< Mean horizontal normal of its points times the root of their number.
+};
+
+/// A piece of floor (its normal points up) or ceiling.
+struct FloorCell {
+  Eigen::Vector2f position;  ///< m, level frame, relative to BirdsEyeView::centre.
+  float height;              ///< m, level frame.
+  bool faces_up;
+};
+
+/// Where floors are looked up: patches of two by two cells, floors and ceilings apart.
+using FloorPatch = std::tuple<int, int, bool>;
+FloorPatch floor_patch(const Eigen::Vector2f& position, bool faces_up, double cell_m);
+
+/// A submap from above.
+struct BirdsEyeView {
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Of the walls, level frame.
+  std::vector<WallCell> walls;
+  std::vector<FloorCell> floors;  ///< In the order of their patches.
+};
+
+BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_level_submap, double cell_m);
+
+/// At most `count` directions, in [0, pi), in which most of the walls face (or face away), most first. They turn with
+/// the submap and hardly depend on which of the walls were seen, so two submaps of one place are turned by the
+/// difference of a direction of each, or half a turn more.
+std::vector<double> wall_directions(const BirdsEyeView& view, int count);
+
+/// A view turned so that one of its wall directions became the x axis, ready to be correlated.
+struct TurnedView {
+  double direction = 0.0;  ///< rad, level frame.
+  ComplexImage spectrum;   ///< Of the wall normals (x + i y), whitened; the sum of its squares is 1.
+};
+
+/// One per wall direction; none when the view is empty. Whitening (all wavelengths count alike, down to about four
+/// cells) makes what is special about a place, corners and niches, outweigh the long walls that all corridors share
+/// [Kuglin & Hines 1975, phase correlation].
+std::vector<TurnedView> turn_views(const BirdsEyeView& view, const CandidateConfig& config);
+
+}  // namespace tutti::lidar
