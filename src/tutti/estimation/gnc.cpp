@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/chi_square.hpp"
+#include "tutti/estimation/internal/chain_reduction.hpp"
 #include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
 
@@ -33,11 +35,8 @@ double squared_error(const PoseGraphEdge& edge, const std::vector<Pose3>& poses)
 
 bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
 
-}  // namespace
-
-GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles) {
-  TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
-              graph.edges.size());
+/// The re-weighting itself. Without anything to reject, the plain optimum.
+GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles) {
   const std::size_t edges = graph.edges.size();
   GncResult out;
   out.inlier_weight.assign(edges, 1.0);
@@ -74,6 +73,38 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
     mu *= config.control_step;
   }
   out.solution.weights = out.inlier_weight;
+  return out;
+}
+
+}  // namespace
+
+GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles) {
+  TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
+              graph.edges.size());
+  if (!internal::is_finite(graph)) return reweight(graph, config, roles);  // says so
+  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles);
+  if (reduced.runs.empty()) return reweight(graph, config, roles);
+
+  // The runs bend little, so the reduced graph decides the same, at a fraction of the cost; then the full one is solved
+  // with the decided weights from where the reduced one ended.
+  GncResult out = reweight(reduced.graph, config, reduced.roles);
+  const std::vector<double> reduced_weight =
+      std::exchange(out.inlier_weight, std::vector<double>(graph.edges.size(), 1.0));
+  const std::vector<Pose3> reduced_poses = std::exchange(out.solution.poses, graph.poses);
+  out.solution.weights = out.inlier_weight;
+  if (!is_usable(out.solution.summary.termination)) return out;
+  std::vector<double> scale(graph.edges.size(), 1.0);
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    if (!reduced.edge[e]) continue;
+    out.inlier_weight[e] = reduced_weight[*reduced.edge[e]];
+    scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
+  }
+  out.solution.weights = out.inlier_weight;
+  internal::expand_chains(graph, reduced, reduced_poses, out.solution.poses);
+  const auto structure = internal::analyse_blocks(graph);
+  internal::GaussNewton gauss_newton(graph, structure);
+  out.solution.summary =
+      gauss_newton.minimise(out.solution.poses, {.loss = {}, .roles = roles, .scale = scale}, config.solver);
   return out;
 }
 

@@ -23,6 +23,31 @@ std::map<RobotId, std::vector<std::size_t>> choose_nodes(const MapEstimate& map)
   return chosen;
 }
 
+/// Ranks among a robot's chosen nodes between which its odometry failed: the closures tell where `last` is seen from
+/// `first`, but little of what lies between.
+struct Repair {
+  std::size_t first = 0;
+  std::size_t last = 0;
+};
+
+std::vector<Repair> repairs(const MapEstimate& map, RobotId robot, const std::vector<std::size_t>& chosen) {
+  const auto index_of = [&](std::size_t node) { return map.nodes[node].id.index; };
+  std::vector<Repair> out;
+  for (const FailedOdometry& failed : map.failed_odometry) {
+    if (failed.robot != robot) continue;
+    const auto after = std::ranges::upper_bound(chosen, failed.from, {}, index_of);
+    const auto last = std::ranges::lower_bound(chosen, failed.to, {}, index_of);
+    if (after == chosen.begin() || last == chosen.end()) continue;
+    const Repair repair{static_cast<std::size_t>(after - chosen.begin()) - 1,
+                        static_cast<std::size_t>(last - chosen.begin())};
+    if (!out.empty() && repair.first < out.back().last)
+      out.back().last = std::max(out.back().last, repair.last);
+    else
+      out.push_back(repair);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::vector<std::size_t>& chosen) {
@@ -67,8 +92,10 @@ std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::ve
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config) {
   const auto chosen = choose_nodes(map);
   std::vector<std::pair<std::size_t, std::size_t>> stretches;
-  for (const auto& [robot, nodes] : chosen)
+  for (const auto& [robot, nodes] : chosen) {
     for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
+    for (const auto& [first, last] : repairs(map, robot, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
+  }
   const std::vector<Matrix6d> covariances = estimation::relative_covariances(map.graph, map.graph.poses, stretches);
 
   std::vector<consistency::ServerNode> nodes;
@@ -78,6 +105,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     if (indices.empty()) continue;
     components.push_back({robot, map.nodes[indices.front()].component});
     const std::vector<std::uint32_t> support = closure_support(map, indices);
+    const std::size_t first_node = nodes.size();
     for (std::size_t k = 0; k < indices.size(); ++k) {
       const MapNode& node = map.nodes[indices[k]];
       nodes.push_back({.robot = robot,
@@ -85,6 +113,17 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
                        .T_world_body = node.T_world_body,
                        .covariance = k == 0 ? Matrix6d::Zero() : covariances[stretch++],
                        .support = support[k]});
+    }
+    // Where odometry failed, the steps' errors are large but must add up to what the closures say, so they undo each
+    // other, which a covariance per step cannot express. Equal shares of the whole stretch's add up to the right sum.
+    for (const auto& [first, last] : repairs(map, robot, indices)) {
+      const Matrix6d share = covariances[stretch++] / static_cast<double>(last - first);
+      const Pose3& T_world_last = nodes[first_node + last].T_world_body;
+      for (std::size_t k = first + 1; k <= last; ++k) {
+        const Matrix6d to_node = adjoint(nodes[first_node + k].T_world_body.inverse() * T_world_last);
+        const Matrix6d moved = to_node * share * to_node.transpose();
+        nodes[first_node + k].covariance = 0.5 * (moved + moved.transpose());
+      }
     }
   }
   return consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);

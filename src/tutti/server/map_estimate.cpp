@@ -45,35 +45,22 @@ NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
   return index;
 }
 
-/// Each robot's odometry as the consistency check wants it. Chains with a gap are cut there: the longest piece counts.
+/// The robots' odometry as the trial wants it: one chain per piece without a gap.
 std::vector<estimation::OdometryChain> odometry_chains(const SubmapSet& submaps, const MapEstimate& map) {
-  std::map<KeyframeId, Matrix6d> step_covariance;  // of the step that starts at this keyframe
+  std::unordered_map<KeyframeId, const Matrix6d*> step_covariance;  // of the step that ends at this keyframe
   for (const auto& [id, submap] : submaps)
     for (std::size_t k = 0; k < submap->odometry.size(); ++k)
-      step_covariance[{id.robot, submap->keyframes[k].index}] = submap->odometry[k].covariance;
+      step_covariance[{id.robot, submap->keyframes[k + 1].index}] = &submap->odometry[k].covariance;
 
-  std::map<RobotId, estimation::OdometryChain> longest;
-  estimation::OdometryChain piece;
-  const auto close_piece = [&] {
-    auto& best = longest[piece.robot];
-    if (piece.T_odom_body.size() > best.T_odom_body.size()) best = piece;
-  };
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    const MapNode& node = map.nodes[i];
-    const KeyframeId before{node.id.robot, node.id.index - 1};
-    const auto step = node.id.index == 0 ? step_covariance.end() : step_covariance.find(before);
-    const bool continues = !piece.T_odom_body.empty() && piece.robot == node.id.robot && step != step_covariance.end();
-    if (!continues) {
-      if (!piece.T_odom_body.empty()) close_piece();
-      piece = {.robot = node.id.robot, .first_index = node.id.index};
-    } else {
-      piece.step_covariance.push_back(step->second);
-    }
-    piece.T_odom_body.push_back(node.T_odom_body);
-  }
-  if (!piece.T_odom_body.empty()) close_piece();
   std::vector<estimation::OdometryChain> chains;
-  for (auto& [robot, chain] : longest) chains.push_back(std::move(chain));
+  for (const MapNode& node : map.nodes) {
+    const auto step = step_covariance.find(node.id);
+    if (step == step_covariance.end())
+      chains.push_back({.robot = node.id.robot, .first_index = node.id.index});
+    else
+      chains.back().step_covariance.push_back(*step->second);
+    chains.back().T_odom_body.push_back(node.T_odom_body);
+  }
   return chains;
 }
 
@@ -89,17 +76,47 @@ std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const Node
   return closures;
 }
 
-/// Pairwise consistency per pair of robots; two robots are joined only by enough closures that agree.
-std::vector<bool> consistent_closures(const std::vector<estimation::OdometryChain>& chains,
-                                      const std::vector<LoopClosure>& closures, const MapConfig& config) {
-  auto result = estimation::pairwise_consistency(chains, closures, config.consistency);
-  for (const estimation::ConsistencyGroup& group : result.groups) {
-    const bool joins = group.first != group.second;
-    const auto least = static_cast<std::size_t>(joins ? config.min_inter_robot_closures : 1);
-    if (group.accepted.size() < least)
-      for (const std::size_t i : group.accepted) result.accepted[i] = false;
+/// What failed odometry is let go by over its whole stretch: enough for any jump, and the map stays in one piece.
+constexpr double kFreeTranslation = 100.0;
+constexpr double kFreeRotation = 3.0;
+
+/// Chi-square (6 dof, 0.999) below which the odometry of a stretch agrees with the map after all.
+constexpr double kRightAfterAll = 22.46;
+
+/// Adds a variance (m, rad) to failed odometry, in equal shares to the steps of the stretch.
+void weaken(PoseGraph& graph, const MapEstimate& map, std::size_t from, std::size_t to, double sigma_m,
+            double sigma_rad) {
+  for (std::size_t e = 0; e < map.odometry_edges; ++e) {
+    PoseGraphEdge& edge = graph.edges[e];
+    if (edge.from < from || edge.to > to) continue;
+    Matrix6d covariance = edge.information.inverse();
+    const double steps = static_cast<double>(to - from);
+    covariance.diagonal().head<3>().array() += sigma_m * sigma_m / steps;
+    covariance.diagonal().tail<3>().array() += sigma_rad * sigma_rad / steps;
+    edge.information = information_of(covariance);
   }
-  return result.accepted;
+}
+
+/// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A stretch that
+/// turns out to have been right, nearly or within its own doubt, is no failure.
+void record_failure(RobotId robot, std::size_t a, std::size_t b, double min_jump_m, MapEstimate& map) {
+  const auto raw = [&](std::size_t i, std::size_t j) {
+    return map.nodes[i].T_odom_body.inverse() * map.nodes[j].T_odom_body;
+  };
+  Matrix6d covariance = Matrix6d::Zero();
+  for (std::size_t e = 0; e < map.odometry_edges; ++e) {
+    const PoseGraphEdge& edge = map.graph.edges[e];
+    if (edge.from < a || edge.to > b) continue;
+    const Matrix6d to_end = adjoint(raw(b, edge.to));
+    covariance += to_end * edge.information.inverse() * to_end.transpose();
+  }
+  const Vector6d jump = local(raw(a, b), map.nodes[a].T_world_body.inverse() * map.nodes[b].T_world_body);
+  const double jump_m = jump.head<3>().norm();
+  const double jump_rad = jump.tail<3>().norm();
+  if (estimation::failure_size(jump_m, jump_rad) < 0.5 * min_jump_m) return;
+  if (jump.dot(covariance.llt().solve(jump)) < kRightAfterAll) return;
+  map.failed_odometry.push_back({robot, map.nodes[a].id.index, map.nodes[b].id.index, jump_m, jump_rad});
+  weaken(map.graph, map, a, b, jump_m, jump_rad);
 }
 
 void label_components(MapEstimate& map) {
@@ -125,13 +142,17 @@ MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, c
   MapEstimate map;
   const NodeIndex index = attach_submaps(submaps, map);
   const std::vector<LoopClosure> closures = collect_closures(verdicts, index);
-  const std::vector<bool> consistent = consistent_closures(odometry_chains(submaps, map), closures, config);
+  const estimation::OdometryVerdict verdict =
+      estimation::try_odometry(odometry_chains(submaps, map), closures, config.trial);
 
   PoseGraph graph = map.graph;
+  for (const estimation::OdometryStretch& failed : verdict.failed)
+    weaken(graph, map, index.at({failed.robot, failed.from}), index.at({failed.robot, failed.to}), kFreeTranslation,
+           kFreeRotation);
   std::vector<std::size_t> closure_of_edge;
   for (std::size_t i = 0; i < closures.size(); ++i) {
     map.closures.push_back({closures[i], false});
-    if (!consistent[i]) continue;
+    if (!verdict.accepted[i]) continue;
     graph.edges.push_back({.from = index.at(closures[i].from),
                            .to = index.at(closures[i].to),
                            .T_from_to = closures[i].measurement.T_a_b,
@@ -151,6 +172,8 @@ MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, c
   map.graph.poses = robust.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
   map.converged = estimation::is_usable(robust.solution.summary.termination);
+  for (const auto& [robot, from, to] : verdict.failed)
+    record_failure(robot, index.at({robot, from}), index.at({robot, to}), config.trial.min_jump_m, map);
   label_components(map);
   return map;
 }

@@ -8,7 +8,7 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/gnc.hpp"
-#include "tutti/estimation/pairwise_consistency.hpp"
+#include "tutti/estimation/odometry_trial.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
@@ -34,31 +34,39 @@ struct JudgedClosure {
   bool accepted = false;
 };
 
+/// Odometry that the closures convicted: between these two keyframes of one robot it is not believed.
+struct FailedOdometry {
+  RobotId robot;
+  std::uint32_t from = 0;  ///< KeyframeId::index
+  std::uint32_t to = 0;
+  double jump_m = 0.0;  ///< By how much the map differs from the odometry between the two.
+  double jump_rad = 0.0;
+  friend bool operator==(const FailedOdometry&, const FailedOdometry&) = default;
+};
+
 /// One joint map.
 struct MapEstimate {
-  std::vector<MapNode> nodes;           ///< Sorted by id.
-  PoseGraph graph;                      ///< Same order as nodes: odometry, then the accepted closures.
-  std::size_t odometry_edges = 0;       ///< graph.edges[0 .. odometry_edges) are odometry.
-  std::vector<JudgedClosure> closures;  ///< Sorted by (from, to).
-  std::uint32_t components = 0;         ///< Connected components that contain a node.
+  std::vector<MapNode> nodes;                   ///< Sorted by id.
+  PoseGraph graph;                              ///< Same order as nodes: odometry, then the accepted closures.
+  std::size_t odometry_edges = 0;               ///< graph.edges[0 .. odometry_edges) are odometry.
+  std::vector<JudgedClosure> closures;          ///< Sorted by (from, to).
+  std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (robot, from).
+  std::uint32_t components = 0;                 ///< Connected components that contain a node.
   bool converged = false;
 };
 
 struct MapConfig {
-  estimation::PairwiseConsistencyConfig consistency;
+  estimation::OdometryTrialConfig trial;
   estimation::GncConfig gnc;
-  int min_inter_robot_closures = 2;  ///< Fewer consistent closures than this do not join two robots.
   template <class V>
   void describe(V& v) {
-    v.field("consistency", consistency);
+    v.field("trial", trial);
     v.field("gnc", gnc);
-    v.field("min_inter_robot_closures", min_inter_robot_closures, at_least(1.0),
-            "Fewer mutually consistent closures than this do not join two robots.");
   }
 };
 
-/// The map of a set of submaps and verdicts: attaches submaps by their shared keyframes, rejects outliers, optimises.
-/// Pure: the same sets give the same map, whatever the order they came in.
+/// The map of a set of submaps and verdicts: attaches submaps by their shared keyframes, judges closures and odometry,
+/// optimises. Pure: the same sets give the same map, whatever the order they came in.
 MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config);
 
 }  // namespace tutti::server

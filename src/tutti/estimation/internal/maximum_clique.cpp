@@ -12,6 +12,7 @@ using Bits = std::vector<std::uint64_t>;
 
 void set(Bits& bits, int v) { bits[v / 64] |= std::uint64_t{1} << (v % 64); }
 void reset(Bits& bits, int v) { bits[v / 64] &= ~(std::uint64_t{1} << (v % 64)); }
+bool contains(const Bits& bits, int v) { return ((bits[v / 64] >> (v % 64)) & 1U) != 0; }
 int first(const Bits& bits) {
   for (std::size_t w = 0; w < bits.size(); ++w)
     if (bits[w] != 0) return static_cast<int>(64 * w) + std::countr_zero(bits[w]);
@@ -23,9 +24,16 @@ void intersect(Bits& bits, const std::uint64_t* row) {
 void subtract(Bits& bits, const std::uint64_t* row) {
   for (std::size_t w = 0; w < bits.size(); ++w) bits[w] &= ~row[w];
 }
+/// std::popcount is a call into the compiler's library when the target has no instruction for it.
+int count(std::uint64_t word) {
+  word -= (word >> 1U) & 0x5555555555555555ULL;
+  word = (word & 0x3333333333333333ULL) + ((word >> 2U) & 0x3333333333333333ULL);
+  word = (word + (word >> 4U)) & 0x0f0f0f0f0f0f0f0fULL;
+  return static_cast<int>((word * 0x0101010101010101ULL) >> 56U);
+}
 int common(const Bits& bits, const std::uint64_t* row) {
   int sum = 0;
-  for (std::size_t w = 0; w < bits.size(); ++w) sum += std::popcount(bits[w] & row[w]);
+  for (std::size_t w = 0; w < bits.size(); ++w) sum += count(bits[w] & row[w]);
   return sum;
 }
 
@@ -43,21 +51,29 @@ class Search {
   }
 
  private:
-  /// Adds the candidate with most candidates as neighbours until none is left.
+  /// Adds the candidate with most candidates as neighbours until none is left. Degrees are kept up to date: every
+  /// vertex that drops out takes one from its neighbours'.
   void grow(std::vector<int>& clique, Bits candidates) const {
+    std::vector<int> degree(static_cast<std::size_t>(graph_.vertices()), 0);
+    for (int v = first(candidates); v >= 0; v = next(candidates, v)) degree[v] = common(candidates, graph_.row(v));
     while (true) {
       int chosen = -1;
       int most = -1;
       for (int v = first(candidates); v >= 0; v = next(candidates, v)) {
-        const int degree = common(candidates, graph_.row(v));
-        if (degree > most) {
-          most = degree;
-          chosen = v;
-        }
+        if (degree[v] <= most) continue;
+        most = degree[v];
+        chosen = v;
       }
       if (chosen < 0) return;
       clique.push_back(chosen);
+      Bits gone = candidates;
+      subtract(gone, graph_.row(chosen));
       intersect(candidates, graph_.row(chosen));
+      for (int v = first(gone); v >= 0; v = next(gone, v)) {
+        Bits neighbours = candidates;
+        intersect(neighbours, graph_.row(v));
+        for (int u = first(neighbours); u >= 0; u = next(neighbours, u)) --degree[u];
+      }
     }
   }
 
@@ -95,15 +111,21 @@ class Search {
 
   /// Drops one member when at least two vertices miss only that one and fit each other. True if the clique grew.
   bool exchange(std::vector<int>& clique, const Bits& all) const {
+    Bits members(all.size(), 0);
+    for (const int member : clique) set(members, member);
+    std::vector<Bits> missing_only(clique.size());  // per member
+    for (int v = first(all); v >= 0; v = next(all, v)) {
+      if (contains(members, v) || common(members, graph_.row(v)) + 1 != static_cast<int>(clique.size())) continue;
+      const auto missed = std::ranges::find_if(clique, [&](int member) { return !graph_.connected(v, member); });
+      Bits& candidates = missing_only[static_cast<std::size_t>(missed - clique.begin())];
+      candidates.resize(all.size(), 0);
+      set(candidates, v);
+    }
     for (std::size_t k = 0; k < clique.size(); ++k) {
-      Bits candidates = all;
-      for (std::size_t other = 0; other < clique.size(); ++other)
-        if (other != k) intersect(candidates, graph_.row(clique[other]));
+      if (missing_only[k].empty()) continue;
       std::vector<int> grown = clique;
       grown.erase(grown.begin() + static_cast<std::ptrdiff_t>(k));
-      for (int member : grown) reset(candidates, member);
-      reset(candidates, clique[k]);
-      grow(grown, candidates);
+      grow(grown, missing_only[k]);
       if (grown.size() > clique.size()) {
         clique = grown;
         return true;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/estimation/pairwise_consistency.hpp"
+#include "tutti/estimation/odometry_trial.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "tutti/estimation/testing/random_graphs.hpp"
@@ -86,37 +87,35 @@ Score score(const Scene& scene, const std::vector<bool>& accepted) {
   return s;
 }
 
-TEST(PairwiseConsistency, FindsThePlantedClosuresAmongFiftyPercentWrongOnes) {
+TEST(OdometryTrial, FindsThePlantedClosuresAmongFiftyPercentWrongOnes) {
   for (const bool intra : {false, true}) {
     for (std::uint64_t seed = 0; seed < 5; ++seed) {
       const Scene s = scene(seed, 40, 40, 0.01, 0.002, intra);
-      const auto result = pairwise_consistency(s.chains, s.closures);
+      const auto result = try_odometry(s.chains, s.closures, {});
       const Score score_ = score(s, result.accepted);
       EXPECT_EQ(score_.wrong_kept, 0U) << seed;
       EXPECT_GE(10 * score_.kept, 9 * score_.right) << seed << ": " << score_.kept << " of " << score_.right;
-      ASSERT_EQ(result.groups.size(), 1U);
-      EXPECT_EQ(result.groups[0].first, kAlpha);
-      EXPECT_EQ(result.groups[0].second, intra ? kAlpha : kBravo);
+      EXPECT_TRUE(result.failed.empty()) << seed;
     }
   }
 }
 
-TEST(PairwiseConsistency, KeepsTrueClosuresUnderDriftThatNoRigidTransformFits) {
+TEST(OdometryTrial, KeepsTrueClosuresUnderDriftThatNoRigidTransformFits) {
   Scene s = scene(3, 60, 20, 0.03, 0.01, false);
-  const auto result = pairwise_consistency(s.chains, s.closures);
+  const auto result = try_odometry(s.chains, s.closures, {});
   const Score path_dependent = score(s, result.accepted);
   EXPECT_GE(10 * path_dependent.kept, 9 * path_dependent.right)
       << path_dependent.kept << " of " << path_dependent.right;
   // The same with odometry believed perfect, which asks for one rigid transform, loses most of them.
   for (auto& chain : s.chains)
     for (auto& covariance : chain.step_covariance) covariance *= 1e-9;
-  const Score rigid = score(s, pairwise_consistency(s.chains, s.closures).accepted);
+  const Score rigid = score(s, try_odometry(s.chains, s.closures, {}).accepted);
   EXPECT_LT(2 * rigid.kept, path_dependent.kept);
 }
 
-TEST(PairwiseConsistency, DoesNotDependOnTheOrderOfTheInput) {
+TEST(OdometryTrial, DoesNotDependOnTheOrderOfTheInput) {
   const Scene s = scene(4, 30, 30, 0.01, 0.005, false);
-  const auto before = pairwise_consistency(s.chains, s.closures);
+  const auto before = try_odometry(s.chains, s.closures, {});
   Rng rng(9);
   for (int repetition = 0; repetition < 5; ++repetition) {
     std::vector<std::size_t> order(s.closures.size());
@@ -125,12 +124,12 @@ TEST(PairwiseConsistency, DoesNotDependOnTheOrderOfTheInput) {
     std::vector<LoopClosure> permuted;
     for (const std::size_t k : order) permuted.push_back(s.closures[k]);
     std::vector<OdometryChain> chains(s.chains.rbegin(), s.chains.rend());
-    const auto after = pairwise_consistency(chains, permuted);
+    const auto after = try_odometry(chains, permuted, {});
     for (std::size_t k = 0; k < order.size(); ++k) EXPECT_EQ(after.accepted[k], before.accepted[order[k]]);
   }
 }
 
-TEST(PairwiseConsistency, AgreementOfTrueClosuresHasTheChosenConfidence) {
+TEST(OdometryTrial, AgreementOfTrueClosuresHasTheChosenConfidence) {
   // Pairs of two: both accepted when they agree, one when not.
   int agreed = 0;
   constexpr int kPairs = 2000;
@@ -141,13 +140,13 @@ TEST(PairwiseConsistency, AgreementOfTrueClosuresHasTheChosenConfidence) {
     const std::vector<OdometryChain> chains{a.chain, b.chain};
     const std::vector<LoopClosure> pair{closure(rng, a, rng.index(12), b, rng.index(12)),
                                         closure(rng, b, rng.index(12), a, rng.index(12))};
-    const auto result = pairwise_consistency(chains, pair, {.confidence = 0.9});
+    const auto result = try_odometry(chains, pair, {.confidence = 0.9, .min_joining_closures = 1});
     agreed += result.accepted[0] && result.accepted[1] ? 1 : 0;
   }
   EXPECT_NEAR(static_cast<double>(agreed) / kPairs, 0.9, 0.025);
 }
 
-TEST(PairwiseConsistency, LeavesOutWhatItCannotUse) {
+TEST(OdometryTrial, LeavesOutWhatItCannotUse) {
   Rng rng(12);
   const RobotRun a = drifting_run(rng, kAlpha, 20, 0.01, 0.001);
   const RobotRun b = drifting_run(rng, kBravo, 20, 0.01, 0.001);
@@ -158,11 +157,85 @@ TEST(PairwiseConsistency, LeavesOutWhatItCannotUse) {
   closures[4].measurement.covariance(2, 2) = -1.0;
   closures[5].from.index = 2;  // below first_index
   const std::vector<OdometryChain> chains{a.chain, b.chain};
-  const auto result = pairwise_consistency(chains, closures);
+  const auto result = try_odometry(chains, closures, {.min_joining_closures = 1});
   EXPECT_EQ(result.accepted, (std::vector<bool>{true, false, false, false, false, false}));
-  ASSERT_EQ(result.groups.size(), 1U);
-  EXPECT_EQ(result.groups[0].closures, std::vector<std::size_t>{0});
-  EXPECT_TRUE(pairwise_consistency({}, {}).groups.empty());
+  EXPECT_TRUE(try_odometry({}, {}, {}).accepted.empty());
+}
+
+/// One robot walks 20 m squares; from step 100 on its odometry is off by 2 m and 20 degrees and does not know.
+RobotRun failing_run(Rng& rng) {
+  RobotRun run{.truth = {}, .chain = {.robot = kAlpha, .first_index = 10}};
+  const Matrix6d covariance = random_covariance(rng, 0.01, 0.001);
+  for (int k = 0; k <= 200; ++k) {
+    const double s = std::fmod(k, 80.0);
+    const int side = static_cast<int>(s) / 20;
+    const double along = s - 20.0 * side;
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(side * M_PI / 2, Eigen::Vector3d::UnitZ()));
+    const Pose3 corner[] = {{turn, {0, 0, 0}}, {turn, {20, 0, 0}}, {turn, {20, 20, 0}}, {turn, {0, 20, 0}}};
+    run.truth.push_back(corner[side] * Pose3{Eigen::Quaterniond::Identity(), {along, 0, 0}});
+  }
+  run.chain.T_odom_body.push_back(random_pose(rng));
+  for (int k = 0; k < 200; ++k) {
+    Pose3 step = retract(run.truth[k].inverse() * run.truth[k + 1], sample(rng, covariance));
+    if (k == 100) step = step * Pose3{Eigen::Quaterniond(Eigen::AngleAxisd(0.35, Eigen::Vector3d::UnitZ())), {2, 0, 0}};
+    run.chain.T_odom_body.push_back(run.chain.T_odom_body.back() * step);
+    run.chain.step_covariance.push_back(covariance);
+  }
+  return run;
+}
+
+/// Closures over the failure, one every 5 m of way from step 105 on, with where the robot was 80 steps before.
+std::vector<LoopClosure> closures_over(Rng& rng, const RobotRun& run, std::size_t count) {
+  std::vector<LoopClosure> out;
+  for (std::size_t k = 0; k < count; ++k) out.push_back(closure(rng, run, 25 + 5 * k, run, 105 + 5 * k));
+  return out;
+}
+
+TEST(OdometryTrial, ALoneClosureConvictsItselfManyConvictTheOdometry) {
+  Rng rng(21);
+  const RobotRun run = failing_run(rng);
+  const std::vector<OdometryChain> chains{run.chain};
+  const auto few = try_odometry(chains, closures_over(rng, run, 3), {});
+  EXPECT_TRUE(few.failed.empty());
+  EXPECT_EQ(few.accepted, std::vector<bool>(3, false));
+
+  const auto many = try_odometry(chains, closures_over(rng, run, 12), {});
+  ASSERT_EQ(many.failed.size(), 1U);
+  EXPECT_EQ(many.failed[0].robot, kAlpha);
+  EXPECT_LE(many.failed[0].from, 10U + 100U);
+  EXPECT_GE(many.failed[0].to, 10U + 101U);
+  EXPECT_LE(many.failed[0].to - many.failed[0].from, 30U);
+  EXPECT_EQ(many.accepted, std::vector<bool>(12, true));
+}
+
+TEST(OdometryTrial, ManyClosuresAtOnePairOfPlacesConvictNothing) {
+  Rng rng(22);
+  const RobotRun run = failing_run(rng);
+  std::vector<LoopClosure> closures;
+  for (std::size_t i = 0; i < 5; ++i)
+    for (std::size_t j = 0; j < 5; ++j) closures.push_back(closure(rng, run, 25 + i, run, 105 + j));
+  EXPECT_TRUE(try_odometry(std::vector{run.chain}, closures, {}).failed.empty());
+}
+
+TEST(OdometryTrial, WitnessesAcquit) {
+  // The same look-alikes over a stretch that did not fail, and what was seen before and after it.
+  Rng rng(23);
+  RobotRun run = failing_run(rng);
+  for (int k = 0; k < 200; ++k)
+    run.chain.T_odom_body[k + 1] = run.chain.T_odom_body[k] * (run.truth[k].inverse() * run.truth[k + 1]);
+  std::vector<LoopClosure> wrong;
+  const Pose3 off{Eigen::Quaterniond::Identity(), {1.5, 0.0, 0.0}};
+  for (std::size_t k = 0; k < 8; ++k) {
+    const Pose3& at = run.truth[85 + 5 * k];
+    wrong.push_back(closure(rng, run, 5 + 5 * k, run, 85 + 5 * k, at.inverse() * off * at));
+  }
+  const std::vector<OdometryChain> chains{run.chain};
+  EXPECT_EQ(try_odometry(chains, wrong, {}).failed.size(), 1U);  // nothing speaks for the odometry
+  std::vector<LoopClosure> all = wrong;
+  for (std::size_t k = 0; k < 8; ++k) all.push_back(closure(rng, run, 2 + 4 * k, run, 162 + 4 * k));
+  const auto verdict = try_odometry(chains, all, {});
+  EXPECT_TRUE(verdict.failed.empty());
+  for (std::size_t k = 0; k < all.size(); ++k) EXPECT_EQ(verdict.accepted[k], k >= wrong.size());
 }
 
 }  // namespace

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/internal/chain_reduction.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "tutti/estimation/internal/chain_run.hpp"
+
+namespace tutti::estimation::internal {
+namespace {
+
+constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+/// Edges of a node: what matters is whether it is exactly one trusted step in and one out.
+struct Passage {
+  std::size_t in = kNone;
+  std::size_t out = kNone;
+  bool other = false;
+  [[nodiscard]] bool only_passes() const { return in != kNone && out != kNone && !other; }
+};
+
+std::vector<Passage> passages(const PoseGraph& graph, std::span<const EdgeRole> roles) {
+  std::vector<Passage> nodes(graph.poses.size());
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const auto& [from, to, T, information] = graph.edges[e];
+    const bool step = !roles.empty() && roles[e] == EdgeRole::trusted && from < to;
+    if (step && nodes[from].out == kNone)
+      nodes[from].out = e;
+    else
+      nodes[from].other = true;
+    if (step && nodes[to].in == kNone)
+      nodes[to].in = e;
+    else
+      nodes[to].other = true;
+  }
+  return nodes;
+}
+
+Matrix6d inverse(const Matrix6d& m) { return m.llt().solve(Matrix6d::Identity()); }
+
+RelativePose step_of(const PoseGraphEdge& edge) { return {edge.T_from_to, inverse(edge.information)}; }
+
+}  // namespace
+
+ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles) {
+  const std::vector<Passage> nodes = passages(graph, roles);
+  ReducedGraph out;
+  std::vector<std::size_t> position(nodes.size(), kNone);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (nodes[i].only_passes()) continue;
+    position[i] = out.nodes.size();
+    out.nodes.push_back(i);
+    out.graph.poses.push_back(graph.poses[i]);
+  }
+  out.edge.resize(graph.edges.size());
+  std::vector<RelativePose> steps;
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const auto& edge = graph.edges[e];
+    if (position[edge.from] == kNone) continue;  // within a run, or its end: taken from the run's begin
+    if (position[edge.to] != kNone) {
+      out.edge[e] = out.graph.edges.size();
+      out.graph.edges.push_back({position[edge.from], position[edge.to], edge.T_from_to, edge.information});
+      out.roles.push_back(roles.empty() ? EdgeRole::robust : roles[e]);
+      continue;
+    }
+    ReducedGraph::Run run{.edge = out.graph.edges.size(), .steps = {e}};
+    steps.assign(1, step_of(edge));
+    std::size_t end = edge.to;
+    for (; position[end] == kNone; end = graph.edges[run.steps.back()].to) {
+      run.steps.push_back(nodes[end].out);
+      steps.push_back(step_of(graph.edges[run.steps.back()]));
+    }
+    const RunSum sum = sum_odometry(steps);
+    const Matrix6d to_end = adjoint(sum.T_a_b.inverse());
+    const Matrix6d information = inverse(to_end * sum.covariance * to_end.transpose());
+    out.graph.edges.push_back(
+        {position[edge.from], position[end], sum.T_a_b, 0.5 * (information + information.transpose())});
+    out.roles.push_back(EdgeRole::trusted);
+    out.runs.push_back(std::move(run));
+  }
+  return out;
+}
+
+void expand_chains(const PoseGraph& graph, const ReducedGraph& reduced, std::span<const Pose3> reduced_poses,
+                   std::vector<Pose3>& poses) {
+  for (std::size_t k = 0; k < reduced.nodes.size(); ++k) poses[reduced.nodes[k]] = reduced_poses[k];
+  std::vector<RelativePose> steps;
+  std::vector<Pose3> run_poses;
+  for (const auto& run : reduced.runs) {
+    const PoseGraphEdge& compound = reduced.graph.edges[run.edge];
+    const Pose3& begin = reduced_poses[compound.from];
+    const Vector6d closing = local(begin * compound.T_from_to, reduced_poses[compound.to]);
+    const Vector6d lambda = adjoint(compound.T_from_to.inverse()).transpose() * (compound.information * closing);
+    steps.clear();
+    for (const std::size_t e : run.steps) steps.push_back(step_of(graph.edges[e]));
+    run_poses.assign(steps.size() + 1, begin);
+    distribute_odometry(steps, run_poses, lambda);
+    for (std::size_t k = 1; k < steps.size(); ++k) poses[graph.edges[run.steps[k]].from] = run_poses[k];
+  }
+}
+
+}  // namespace tutti::estimation::internal

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// "Who is wrong?": wrong closures and failed odometry, told apart with one setting.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tutti/server/graph_monitor.hpp"
+#include "tutti/server/map_estimate.hpp"
+#include "tutti/server/testing/corridor_run.hpp"
+
+namespace tutti::server {
+namespace {
+
+using test::corridor_run;
+using test::CorridorRun;
+using test::CorridorRunConfig;
+using test::failure;
+using test::rmse;
+
+MapEstimate judge(const CorridorRun& run) { return estimate_map(run.submaps, run.verdicts, {}); }
+
+/// What the map would be if odometry could do no wrong.
+MapEstimate judge_closures_only(const CorridorRun& run) {
+  return estimate_map(run.submaps, run.verdicts, {.trial = {.max_failures_per_chain = 0}});
+}
+
+std::size_t accepted_wrong(const CorridorRun& run, const MapEstimate& map) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      map.closures, [&](const JudgedClosure& c) { return c.accepted && test::is_wrong(run, c.closure); }));
+}
+
+double seconds_of(const MapEstimate& map, RobotId robot, std::uint32_t index) {
+  const auto at = std::ranges::lower_bound(map.nodes, KeyframeId{robot, index}, {}, &MapNode::id);
+  return at->stamp - Timestamp{1'000'000'000};
+}
+
+TEST(WhoIsWrong, ThirtyPercentWrongClosuresCostLittle) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    CorridorRunConfig config;
+    const CorridorRun right = corridor_run(config, seed);
+    config.closures.wrong_share = 0.3;
+    const CorridorRun run = corridor_run(config, seed);
+    const MapEstimate map = judge(run);
+    EXPECT_LT(rmse(run, map), 1.2 * rmse(right, judge(right))) << seed;
+    EXPECT_EQ(accepted_wrong(run, map), 0U) << seed;
+    EXPECT_TRUE(map.failed_odometry.empty()) << seed;
+  }
+}
+
+TEST(WhoIsWrong, FailedOdometryIsRepairedAmongWrongClosures) {
+  for (const double wrong_share : {0.0, 0.1, 0.3})
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+      CorridorRunConfig config;
+      config.closures.wrong_share = wrong_share;
+      config.failures = {failure(0, 170, 190, 1.5, 1.5, 20)};
+      const CorridorRun run = corridor_run(config, seed);
+      const MapEstimate map = judge(run);
+      EXPECT_LT(rmse(run, map), 0.2) << seed;
+      EXPECT_EQ(accepted_wrong(run, map), 0U) << seed;
+      double turn = 0.0;  // a slow failure may be found in parts
+      for (const FailedOdometry& failed : map.failed_odometry) {
+        EXPECT_EQ(failed.robot, RobotId{0});
+        EXPECT_LT(seconds_of(map, {0}, failed.from), 190.0);
+        EXPECT_GT(seconds_of(map, {0}, failed.to), 170.0);
+        turn += failed.jump_rad;
+      }
+      EXPECT_NEAR(turn, 20 * kRadPerDeg, 3 * kRadPerDeg) << seed;
+      EXPECT_GT(rmse(run, judge_closures_only(run)), 2.0 * rmse(run, map)) << seed;
+    }
+}
+
+TEST(WhoIsWrong, FailedOdometryWithoutClosuresAroundIsRepaired) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    CorridorRunConfig config;
+    config.closures.wrong_share = 0.1;
+    config.failures = {failure(0, 165, 195, -1.5, 1.0, -15)};
+    config.blind = {failure(0, 150, 210, 0, 0, 0)};
+    const CorridorRun run = corridor_run(config, seed);
+    EXPECT_LT(rmse(run, judge(run)), 0.2) << seed;
+  }
+}
+
+TEST(WhoIsWrong, SeveralFailuresAreRepaired) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    CorridorRunConfig config;
+    config.closures.wrong_share = 0.1;
+    config.failures = {failure(0, 130, 150, 2, 0, -20), failure(1, 250, 270, 0, 2, 25)};
+    const CorridorRun different = corridor_run(config, seed);
+    EXPECT_LT(rmse(different, judge(different)), 0.2) << seed;
+    config.failures[1].robot = {0};
+    const CorridorRun same = corridor_run(config, seed);
+    EXPECT_LT(rmse(same, judge(same)), 0.2) << seed;
+    config.failures = {failure(0, 150, 150, 1, 0, 10), failure(1, 230, 230, 0, 1, -10)};
+    const CorridorRun slips = corridor_run(config, seed);
+    EXPECT_LT(rmse(slips, judge(slips)), 0.1) << seed;
+  }
+}
+
+TEST(WhoIsWrong, AFailureThatNothingContradictsDoesNoHarm) {
+  CorridorRunConfig config;
+  config.closures.wrong_share = 0.1;
+  const CorridorRun intact = corridor_run(config, 2);
+  config.failures = {failure(0, 385, 400, 2, 0, -20)};
+  config.blind = {failure(0, 380, 400, 0, 0, 0)};
+  const CorridorRun run = corridor_run(config, 2);
+  const MapEstimate map = judge(run);
+  EXPECT_TRUE(map.failed_odometry.empty());
+  EXPECT_LT(rmse(run, map, RobotId{1}), 1.1 * rmse(intact, judge(intact), RobotId{1}));
+}
+
+TEST(WhoIsWrong, CorridorsThatLookAlikeConvictNothing) {
+  for (const double length_s : {30.0, 60.0})
+    for (const double second_from_s : {230.0, 400.0 - length_s})
+      for (const std::uint32_t robots : {1U, 2U}) {
+        CorridorRunConfig config{.robots = robots, .world = {.rows = 3, .columns = 4}};
+        config.closures = {.radius_m = 2.0, .max_heading_deg = 60.0, .wrong_share = 0.0};
+        const CorridorRun right = corridor_run(config, 2);
+        config.look_alikes = {{RobotId{0}, 30.0, RobotId{robots - 1}, second_from_s, length_s}};
+        const CorridorRun run = corridor_run(config, 2);
+        const MapEstimate map = judge(run);
+        EXPECT_GT(map.closures.size(), judge(right).closures.size());
+        EXPECT_EQ(accepted_wrong(run, map), 0U) << length_s << " s, " << second_from_s << " s, " << robots;
+        EXPECT_TRUE(map.failed_odometry.empty());
+        EXPECT_LT(rmse(run, map), 1.2 * rmse(right, judge(right)));
+      }
+}
+
+TEST(WhoIsWrong, BothSidesOfAMissingSubmapAreJudged) {
+  CorridorRunConfig config;
+  config.closures.wrong_share = 0.3;
+  CorridorRun run = corridor_run(config, 3);
+  std::erase_if(run.verdicts, [](const auto& verdict) {
+    const auto& [first, second] = verdict.first;
+    return first == SubmapId{{0}, 10} || second == SubmapId{{0}, 10};
+  });
+  run.submaps.erase({{0}, 10});
+  const MapEstimate map = judge(run);
+  EXPECT_EQ(map.components, 1U);
+  std::size_t before = 0;
+  std::size_t after = 0;
+  const std::uint32_t gap = run.submaps.at({{0}, 9})->keyframes.back().index;
+  for (const JudgedClosure& c : map.closures)
+    if (c.accepted && c.closure.from.robot == RobotId{0}) ++(c.closure.from.index <= gap ? before : after);
+  EXPECT_GT(before, 20U);
+  EXPECT_GT(after, 20U);
+  EXPECT_EQ(accepted_wrong(run, map), 0U);
+}
+
+TEST(WhoIsWrong, TheProxyGraphIsAsSureOfARepairAsTheClosures) {
+  CorridorRunConfig config;
+  config.failures = {failure(0, 165, 195, -1.5, 1.0, -15)};
+  config.blind = {failure(0, 150, 210, 0, 0, 0)};
+  const CorridorRun run = corridor_run(config, 1);
+  const MapEstimate map = judge(run);
+  ASSERT_EQ(map.failed_odometry.size(), 1U);
+  const FailedOdometry& failed = map.failed_odometry.front();
+  const ProxyGraph graph = monitor_graph(map, 1, {});
+  Matrix6d sum = Matrix6d::Zero();
+  std::uint32_t least_support = 1000;
+  for (const ProxyNode& node : graph.nodes) {
+    const double s = node.stamp - Timestamp{1'000'000'000};
+    if (node.robot != RobotId{0} || s < seconds_of(map, {0}, failed.from) || s > seconds_of(map, {0}, failed.to))
+      continue;
+    const Matrix6d to_world = adjoint(node.T_world_body);
+    sum += to_world * node.covariance * to_world.transpose();
+    least_support = std::min(least_support, node.support);
+  }
+  EXPECT_GT(least_support, 3U);
+  // The closures know the turn far better than the 15 degrees the odometry missed.
+  EXPECT_LT(std::sqrt(sum(5, 5)), 1.0 * kRadPerDeg);
+  EXPECT_GT(std::sqrt(sum(5, 5)), 0.01 * kRadPerDeg);
+}
+
+}  // namespace
+}  // namespace tutti::server
