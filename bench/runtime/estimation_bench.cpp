@@ -13,8 +13,8 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/marginals.hpp"
-#include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/estimation/odometry_trial.hpp"
+#include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/formats/g2o.hpp"
 

@@ -60,7 +60,7 @@ struct PolicyConfig {
   int nearest_submaps = 4;
   double euclidean_threshold_m = 0.1;
   int default_budget = 25;
-  double skeleton_tolerance_m = 0.02;
+  double skeleton_tolerance_m = 0.01;
   ConstraintConfig constraint;
 
   template <class V>
