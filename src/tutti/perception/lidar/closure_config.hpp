@@ -92,17 +92,18 @@ struct LidarClosureConfig {
   RegistrationLevel screening{1.0, 200, 8};
   double early_overlap =
       0.6;  ///< Of min_overlap: with less after a look or the coarse levels, an alignment is given up.
-  double screening_misfit = 2.0;     ///< Of max_misfit: with more after the first look, an alignment is given up.
-  double coarse_misfit = 1.5;        ///< Of max_misfit: with more after the coarse levels, an alignment is given up.
-  double max_misfit = 1.4;           ///< Residuals over what noise, roughness and odometry explain.
-  double max_plane_rmse_m = 0.085;   ///< Point to plane, over the overlap.
-  double min_eigenvalue = 0.03;      ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
-  double max_contradiction = 0.15;   ///< Share of the points in view that stand where the other looked through.
-  double visibility_margin_m = 0.5;  ///< A point this much nearer than the surface seen behind it contradicts.
-  int visibility_views = 5;          ///< Viewpoints of each submap, evenly spread along its way.
-  int visibility_points = 2000;      ///< Of each submap, evenly spread.
-  double max_rival_ratio = 0.9;      ///< A second, different alignment nearly as good: the place is ambiguous.
-  double max_slid_ratio = 0.65;      ///< The same for one a few metres along the direction constrained least.
+  double screening_misfit = 2.0;    ///< Of max_misfit: with more after the first look, an alignment is given up.
+  double coarse_misfit = 1.5;       ///< Of max_misfit: with more after the coarse levels, an alignment is given up.
+  double max_misfit = 1.4;          ///< Residuals over what noise, roughness and odometry explain.
+  double max_plane_rmse_m = 0.085;  ///< Point to plane, over the overlap.
+  double min_eigenvalue = 0.03;     ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
+  double sure_eigenvalue = 0.1;  ///< With less, max_misfit shrinks towards 1: little evidence must fit all the better.
+  double max_contradiction = 0.15;       ///< Share of the points in view that stand where the other looked through.
+  double visibility_margin_m = 0.5;      ///< A point this much nearer than the surface seen behind it contradicts.
+  int visibility_views = 5;              ///< Viewpoints of each submap, evenly spread along its way.
+  int visibility_points = 2000;          ///< Of each submap, evenly spread.
+  double max_rival_ratio = 0.75;         ///< A second, different alignment nearly as good: the place is ambiguous.
+  double max_slid_ratio = 0.65;          ///< The same for one a few metres along the direction constrained least.
   double max_forward_backward_m = 0.05;  ///< Between a-to-b and b-to-a, at the centre of the overlap.
   double max_forward_backward_deg = 0.5;
   template <class V>
@@ -116,7 +117,8 @@ struct LidarClosureConfig {
     v.field("registration", registration, any(), "Point-to-plane registration.");
     v.field("min_overlap", min_overlap, between(0.0, 1.0), "Mean overlap of both directions.");
     v.field("max_viewpoint_distance_m", max_viewpoint_distance_m, greater_than(0.0),
-            "Between the middles of the two ways; closures from farther apart are not looked for.");
+            "Between the middles of the two ways; closures from farther apart are not looked for. In a network that is "
+            "walked for an hour a few metres leave more than enough closures.");
     v.field("screening", screening, any(), "First look at every rough alignment, with few points.");
     v.field("early_overlap", early_overlap, between(0.0, 1.0),
             "Share of min_overlap below which an alignment is given up after the first look or the coarse levels.");
@@ -129,6 +131,9 @@ struct LidarClosureConfig {
     v.field("max_plane_rmse_m", max_plane_rmse_m, greater_than(0.0), "Point-to-plane residual over the overlap.");
     v.field("min_eigenvalue", min_eigenvalue, between(0.0, 0.34),
             "Smallest eigenvalue of the normalised translation Hessian; below it the clouds can slide.");
+    v.field(
+        "sure_eigenvalue", sure_eigenvalue, between(0.0, 0.34),
+        "Below this eigenvalue max_misfit shrinks in proportion towards 1: little evidence must fit all the better.");
     v.field("max_contradiction", max_contradiction, between(0.0, 1.0),
             "Share of the points in view that stand where the other submap looked through.");
     v.field("visibility_margin_m", visibility_margin_m, greater_than(0.0),

@@ -19,12 +19,12 @@ constexpr double kPriorPreference = 1.25;  // how much better the body's up must
 
 std::string why_unusable(const Submap& submap, std::size_t points, const LidarClosureConfig& config) {
   if (points < static_cast<std::size_t>(config.min_points))
-    return fmt::format("{} points, at least {} needed", points, config.min_points);
+    return fmt::format("too small: {} points, at least {} needed", points, config.min_points);
   if (submap.keyframes.size() < static_cast<std::size_t>(config.min_keyframes))
-    return fmt::format("{} keyframes, at least {} needed", submap.keyframes.size(), config.min_keyframes);
+    return fmt::format("too short: {} keyframes, at least {} needed", submap.keyframes.size(), config.min_keyframes);
   const double duration = submap.keyframes.back().stamp - submap.keyframes.front().stamp;
   if (duration < config.min_duration_s)
-    return fmt::format("lasts {:.1f} s, at least {:.1f} s needed", duration, config.min_duration_s);
+    return fmt::format("too short: {:.1f} s, at least {:.1f} s needed", duration, config.min_duration_s);
   return {};
 }
 

@@ -77,16 +77,17 @@ TEST(ExtractFeatures, saysWhyASubmapIsNotUsable) {
   const Submap good = make_submap(kId, furnished_room(), {}, Rng(1));
   Submap bad = good;
   bad.cloud = nullptr;
-  EXPECT_EQ(reason(bad), "0 points, at least 500 needed");
+  EXPECT_EQ(reason(bad), "too small: 0 points, at least 500 needed");
   bad.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 3}}});
-  EXPECT_EQ(reason(bad), "1 points, at least 500 needed");
+  EXPECT_EQ(reason(bad), "too small: 1 points, at least 500 needed");
   const float nan = std::numeric_limits<float>::quiet_NaN();
   bad.cloud = std::make_shared<PointCloud>(PointCloud{std::vector<Eigen::Vector3f>(1000, {nan, 0, 0})});
-  EXPECT_EQ(reason(bad), "0 points, at least 500 needed");
-  EXPECT_EQ(reason(make_submap(kId, furnished_room(), {.keyframes = 4}, Rng(1))), "4 keyframes, at least 6 needed");
+  EXPECT_EQ(reason(bad), "too small: 0 points, at least 500 needed");
+  EXPECT_EQ(reason(make_submap(kId, furnished_room(), {.keyframes = 4}, Rng(1))),
+            "too short: 4 keyframes, at least 6 needed");
   bad = good;
   for (auto& keyframe : bad.keyframes) keyframe.stamp.ns /= 4;
-  EXPECT_EQ(reason(bad), "lasts 2.5 s, at least 5.0 s needed");
+  EXPECT_EQ(reason(bad), "too short: 2.5 s, at least 5.0 s needed");
 }
 
 }  // namespace

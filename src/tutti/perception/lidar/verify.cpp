@@ -53,8 +53,6 @@ bool is_hopeless(const RegistrationResult& result, double misfit_factor, const L
 /// A rough alignment that a first look finds worth a registration, improved by it.
 std::optional<Pose3> screen(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
                             const LidarClosureConfig& config) {
-  const double reach = config.max_viewpoint_distance_m + config.candidates.distinct_m;
-  if (viewpoint_distance(a, b, T_a_b) > reach) return std::nullopt;
   const auto result = register_clouds(a.cloud, b.cloud, T_a_b, with_levels(config.registration, {config.screening}));
   if (is_hopeless(result, config.screening_misfit, config)) return std::nullopt;
   return result.T_target_source;
@@ -80,10 +78,17 @@ bool is_same(const Pose3& T, const Pose3& other, const SubmapFeatures& b, double
 
 /// Coarsely registered guesses, best first; of those that ended in the same place, the best.
 std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
+  // One within reach is worth nothing without knowing what the others are worth; without one neither are they.
+  const auto guesses = propose_alignments(a, b, config);
+  const double reach = config.max_viewpoint_distance_m + config.candidates.distinct_m;
   std::vector<Contender> all;
-  for (const auto& guess : propose_alignments(a, b, config))
-    if (const auto T_init = screen(a, b, guess.T_a_b, config))
-      if (const auto contender = contend(a, b, *T_init, guess.score, config)) all.push_back(*contender);
+  for (const bool near : {true, false}) {
+    for (const auto& guess : guesses)
+      if ((viewpoint_distance(a, b, guess.T_a_b) <= reach) == near)
+        if (const auto T_init = screen(a, b, guess.T_a_b, config))
+          if (const auto contender = contend(a, b, *T_init, guess.score, config)) all.push_back(*contender);
+    if (all.empty()) return {};
+  }
   std::stable_sort(all.begin(), all.end(), [](const auto& p, const auto& q) { return p.quality > q.quality; });
   std::vector<Contender> distinct;
   for (const auto& one : all)
@@ -129,19 +134,26 @@ void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_ini
   out.forward_backward_deg = gap.tail<3>().norm() * kDegPerRad;
 }
 
+/// At most max_misfit; about 1, what noise explains, where hardly anything faces the weakest direction.
+double allowed_misfit(double min_eigenvalue, const LidarClosureConfig& c) {
+  if (c.max_misfit <= 1.0 || min_eigenvalue >= c.sure_eigenvalue) return c.max_misfit;
+  return 1.0 + (c.max_misfit - 1.0) * min_eigenvalue / c.sure_eigenvalue;
+}
+
 /// Empty when every gate is passed.
 std::string why_refused(const PairVerification& v, const LidarClosureConfig& c) {
   if (v.overlap < c.min_overlap) return fmt::format("overlap {:.2f}, at least {} needed", v.overlap, c.min_overlap);
   if (v.plane_rmse_m > c.max_plane_rmse_m)
     return fmt::format("plane RMSE {:.3f} m, at most {} m allowed", v.plane_rmse_m, c.max_plane_rmse_m);
-  if (v.misfit > c.max_misfit) return fmt::format("misfit {:.2f}, at most {} allowed", v.misfit, c.max_misfit);
+  const double max_misfit = allowed_misfit(v.min_eigenvalue, c);
+  if (v.misfit > max_misfit) return fmt::format("misfit {:.2f}, at most {:.2f} allowed", v.misfit, max_misfit);
   if (v.min_eigenvalue < c.min_eigenvalue)
     return fmt::format("free to slide: eigenvalue {:.3f}, at least {} needed", v.min_eigenvalue, c.min_eigenvalue);
   if (v.viewpoint_distance_m > c.max_viewpoint_distance_m)
     return fmt::format("viewpoints {:.1f} m apart, at most {} m allowed", v.viewpoint_distance_m,
                        c.max_viewpoint_distance_m);
   if (v.forward_backward_m > c.max_forward_backward_m || v.forward_backward_deg > c.max_forward_backward_deg)
-    return fmt::format("both ways differ by {:.3f} m and {:.2f} deg, at most {} m and {} deg allowed",
+    return fmt::format("registered both ways: {:.3f} m and {:.2f} deg apart, at most {} m and {} deg allowed",
                        v.forward_backward_m, v.forward_backward_deg, c.max_forward_backward_m,
                        c.max_forward_backward_deg);
   if (v.contradiction > c.max_contradiction)

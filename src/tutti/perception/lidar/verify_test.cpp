@@ -121,7 +121,7 @@ TEST(VerifyPair, refusesUnusableSubmapsWithTheirReason) {
   const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1);
   Side b = see({{1}, 7}, furnished_room(), {.keyframes = 3}, 1);
   EXPECT_EQ(verify_pair(a.features, b.features, kConfig).reason,
-            "submap 1/7 is not usable: 3 keyframes, at least 6 needed");
+            "submap 1/7 is not usable: too short: 3 keyframes, at least 6 needed");
 }
 
 TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {

@@ -30,10 +30,11 @@ inline void add_box(World& world, const Eigen::Vector3d& low, const Eigen::Vecto
   }
 }
 
-/// 14 x 9 x 3 m with furniture that leaves no symmetry.
+/// 14 x 9 x 3 m with an annex and furniture that leave no symmetry.
 inline World furnished_room() {
   World world;
   add_box(world, {0, 0, 0}, {14, 9, 3});
+  add_box(world, {9, 9, 0}, {13, 15, 3});
   add_box(world, {3, 2, 0}, {4.5, 3, 2});
   add_box(world, {9, 6, 0}, {10, 8, 2.5});
   add_box(world, {11, 0, 0}, {14, 1.5, 1.5});
