@@ -160,7 +160,7 @@ Json load_json(const ServerLoadRecord& load) {
           {"verification_cpu_s", number(load.verification_cpu_s)},
           {"share_of_one_core", load.mission_s > 0.0 ? number(busy_s / load.mission_s) : Json(nullptr)},
           {"update_latency", spread_json(load.update_latency_ms)},
-          {"peak_memory_mb", number(load.peak_memory_mb)}};
+          {"peak_memory_mb", load.peak_memory_mb > 0.0 ? number(load.peak_memory_mb) : Json(nullptr)}};
 }
 
 /// Foreign text with broken UTF-8 must not make the writer throw.
