@@ -104,7 +104,7 @@ def bandwidth_table(runs_by_title):
                  "server RMSE m", "corrected RMSE m (default)", "(spectral)"), row(*["---"] * 9)]
     for title, (report, _), full in runs_by_title:
         for k, robot in enumerate(report["robots"]):
-            largest = max(t["largest_message"] for t in robot["traffic"] if t["kind"] == "proxy_graph")
+            largest = max(t["largest_message"] for t in robot["traffic"] if t["kind"] == "proxy graph")
             before = full["robots"][k]["proxy_nodes"]
             lines.append(row(title, robot["name"], f"{robot['bytes_up'] / report['duration_s'] / 1000:.2f}",
                              f"{robot['bytes_down'] / report['duration_s'] / 1000:.2f}", f"{largest / 1000:.1f}",
