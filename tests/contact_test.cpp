@@ -27,8 +27,8 @@ MissionConfig an_hour(std::size_t robots) {
     robot.odometry.yaw_bias_deg_per_m = 0.03;
   }
   config.agent.submap.duration_s = 60.0;
-  config.agent.submap.keyframe_time_s = 3.0;
-  config.agent.submap.keyframe_distance_m = 1.0;
+  config.agent.submap.keyframe_time_s = 6.0;
+  config.agent.submap.keyframe_distance_m = 1.5;
   config.server.update_period_s = 2.0 * kMinute_s;
   config.closures.finder = "reference";
   config.closures.reference.wrong_share = 0.1;
