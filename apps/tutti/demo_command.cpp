@@ -13,9 +13,10 @@ void add_demo_command(CLI::App& app, int& exit_code) {
   arguments->out = std::filesystem::path("out") / "demo";
   CLI::App* command = app.add_subcommand(
       "demo",
-      "See it work without any data: two simulated robots walk a corridor network for 20 minutes with realistic\n"
-      "odometry drift; closures at revisits are noisy and every tenth is wrong. Takes less than a minute and ends\n"
-      "with a table and a report to look at.");
+      "See it work without any data: two simulated legged robots with LiDAR map a piece of tunnel for six minutes, "
+      "with\n"
+      "drifting odometry; loop closures are found from their scans. Takes about a minute and ends with a table and a\n"
+      "report to look at.");
   add_mission_options(*command, *arguments);
   command->callback([arguments, &exit_code] {
     exit_code = run_and_report(mission::demo_mission(arguments->assignments), *arguments);
