@@ -115,9 +115,9 @@ def main():
         "",
         *drift_sweep(arguments),
         "",
-        "Read: at 0.5 degrees/m the server is still at 5 cm. Beyond, submaps bend so much that some closures attach",
-        "the right place with a pose more than 2 degrees or 0.5 m off; from 1.5 degrees/m the few that are left agree",
-        "with each other by chance and the map is wrong without anything saying so. What would help: submaps that may",
+        "Read: at 0.5 degrees/m the server is still at 6 cm. Beyond, submaps bend so much that some closures attach",
+        "the right place with a pose more than 2 degrees or 0.5 m off; from 1 degree/m on a robot, from 2 the joint map,",
+        "is metres off without anything saying so. What would help: submaps that may",
         "bend, or shorter ones for a front end that says it is bad.",
         "",
     ]
