@@ -102,6 +102,22 @@ TEST(Mission, ALoneRobotIsAMissionToo) {
   EXPECT_LT(*policy(record.robots[0], record.default_policy).accuracy.rmse_m, *record.robots[0].onboard.rmse_m);
 }
 
+TEST(Mission, TheReportNamesTheStretchWhereOdometryFailed) {
+  const auto config = load_mission(TUTTI_SOURCE_DIR "/missions/terrace.yaml",
+                                   {"simulation.sensors=none", "closures.finder=reference", "compare_policies=[]"});
+  ASSERT_TRUE(config.has_value()) << config.error().message;
+  const MissionRecord record = run(*config);
+  const RobotRecord& alpha = record.robots[0];
+  const auto origin = std::ranges::find(alpha.drift_origins, DriftOrigin::Kind::failure, &DriftOrigin::kind);
+  ASSERT_NE(origin, alpha.drift_origins.end());
+  ASSERT_EQ(record.server.failed_odometry.size(), 1U);
+  const FailedOdometryRecord& failed = record.server.failed_odometry.front();
+  EXPECT_EQ(failed.robot, alpha.id);
+  EXPECT_LT(failed.from, origin->until);
+  EXPECT_GT(failed.until, origin->from);
+  EXPECT_GT(failed.error_m, 0.3);
+}
+
 TEST(Mission, AMissingFileIsAClearError) {
   MissionConfig config = small_mission();
   config.source = "recordings";

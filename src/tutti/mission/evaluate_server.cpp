@@ -68,6 +68,17 @@ void judge_closures(const server::MapServer& server, MissionRecord& record) {
   for (auto& [reason, entry] : refused) record.server.rejections.push_back(std::move(entry));
 }
 
+/// Stretches of odometry that the server convicted, with the times the report wants.
+void name_failures(const server::MapEstimate& map, ServerRecord& out) {
+  std::map<KeyframeId, Timestamp> stamp;
+  for (const server::MapNode& node : map.nodes) stamp[node.id] = node.stamp;
+  for (const server::FailedOdometry& failed : map.failed_odometry)
+    out.failed_odometry.push_back({.robot = failed.robot,
+                                   .from = stamp.at({failed.robot, failed.from}),
+                                   .until = stamp.at({failed.robot, failed.to}),
+                                   .error_m = failed.jump_m});
+}
+
 /// How far accepted closures are from the reference, where there is one.
 void check_closures(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
                     const evaluation::AssociationConfig& association, MissionRecord& record) {
@@ -148,6 +159,7 @@ void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapS
                      const evaluation::AssociationConfig& association, MissionRecord& record) {
   measure_joint_map(robots, server.map(), association, record.server);
   judge_closures(server, record);
+  name_failures(server.map(), record.server);
   check_closures(robots, server, association, record);
   record.server.graph = server.map().graph;
   for (const server::MapNode& node : server.map().nodes) record.server.nodes.push_back({node.id, node.stamp});
