@@ -39,6 +39,8 @@ class ConstraintPolicy {
  public:
   virtual ~ConstraintPolicy() = default;
   [[nodiscard]] virtual std::string name() const = 0;
+  /// Spends whatever it is given; the others know when to stop.
+  [[nodiscard]] virtual bool needs_budget() const { return false; }
   [[nodiscard]] virtual Selection choose(const PolicyInput& input) const = 0;
 };
 

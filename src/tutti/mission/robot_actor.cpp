@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <limits>
-#include <string_view>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -17,7 +15,6 @@ namespace tutti::mission {
 namespace {
 
 constexpr const char* kBudgetPolicy = "spectral";
-constexpr std::array<std::string_view, 3> kBudgeted{"uniform", "random", "euclidean"};  // the others know when to stop
 
 Trajectory broadcast_trajectory(const ProxyGraph& graph, RobotId robot) {
   Trajectory out;
@@ -80,8 +77,7 @@ void RobotActor::feed_scan(std::size_t sample) {
 void RobotActor::receive(const ProxyGraphMessage& message, double time_s) {
   std::optional<std::size_t> budget;
   for (Member& member : members_) {
-    const bool budgeted = std::ranges::find(kBudgeted, member.policy) != kBudgeted.end();
-    update(member, message, budgeted ? budget : std::nullopt, time_s);
+    update(member, message, member.agent.policy().needs_budget() ? budget : std::nullopt, time_s);
     if (member.policy == kBudgetPolicy) budget = member.agent.ledger().size();
   }
 }

@@ -86,6 +86,7 @@ class RobotAgent {
   [[nodiscard]] RobotId robot() const { return robot_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] const consistency::Ledger& ledger() const { return ledger_; }
+  [[nodiscard]] const consistency::ConstraintPolicy& policy() const { return *policy_; }
   [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - 1; }
   /// T_map_body at the keyframes; `map` starts where `odom` does.
   [[nodiscard]] Trajectory corrected() const;

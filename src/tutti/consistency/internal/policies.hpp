@@ -46,6 +46,7 @@ class UniformPolicy final : public ConstraintPolicy {
  public:
   explicit UniformPolicy(const PolicyConfig& config) : config_(config) {}
   [[nodiscard]] std::string name() const override { return "uniform"; }
+  [[nodiscard]] bool needs_budget() const override { return true; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
  private:
@@ -58,6 +59,7 @@ class RandomPolicy final : public ConstraintPolicy {
  public:
   explicit RandomPolicy(const PolicyConfig& config) : config_(config) {}
   [[nodiscard]] std::string name() const override { return "random"; }
+  [[nodiscard]] bool needs_budget() const override { return true; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
  private:
@@ -70,6 +72,7 @@ class EuclideanPolicy final : public ConstraintPolicy {
  public:
   explicit EuclideanPolicy(const PolicyConfig& config) : config_(config) {}
   [[nodiscard]] std::string name() const override { return "euclidean"; }
+  [[nodiscard]] bool needs_budget() const override { return true; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
  private:
