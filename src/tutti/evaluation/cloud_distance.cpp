@@ -8,23 +8,12 @@
 #include <limits>
 #include <nanoflann.hpp>
 
+#include "tutti/model/kdtree_points.hpp"
+
 namespace tutti::evaluation {
 namespace {
 
-/// nanoflann's view of the points.
-struct PointSource {
-  std::vector<Eigen::Vector3f> points;
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points[i][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSource>, PointSource, 3,
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, KdTreePoints>, KdTreePoints, 3,
                                                    std::uint32_t>;
 
 constexpr std::size_t kNeighbours = 8;     // the point itself included
@@ -67,8 +56,8 @@ float distance(const Eigen::Vector3f& p, const Eigen::Vector3f& nearest, float s
   return std::min(to_point, std::hypot(height, std::max(0.0F, sideways - patch.reach)));
 }
 
-PointSource finite_points(const PointCloud& cloud) {
-  PointSource source;
+KdTreePoints finite_points(const PointCloud& cloud) {
+  KdTreePoints source;
   source.points.reserve(cloud.points.size());
   std::copy_if(cloud.points.begin(), cloud.points.end(), std::back_inserter(source.points),
                [](const Eigen::Vector3f& p) { return p.allFinite(); });
@@ -79,7 +68,7 @@ PointSource finite_points(const PointCloud& cloud) {
 
 struct CloudIndex::Tree {
   static constexpr std::size_t kLeafSize = 10;
-  explicit Tree(PointSource from)
+  explicit Tree(KdTreePoints from)
       : source(std::move(from)), kd_tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {
     if (source.points.empty()) return;
     patches.reserve(source.points.size());
@@ -90,7 +79,7 @@ struct CloudIndex::Tree {
       patches.push_back(fit_patch(source.points, p, std::span(neighbours).first(count)));
     }
   }
-  PointSource source;
+  KdTreePoints source;
   KdTree kd_tree;
   std::vector<Patch> patches;  // one per point
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/closure_finders.hpp"
 
+#include <utility>
+
 #include "tutti/base/check.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/verify.hpp"
@@ -44,15 +46,27 @@ Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::feature
   return features_.try_emplace(submap.id, std::move(features)).first->second;
 }
 
-std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
-                                                                 const std::vector<MissionRecording>& recordings,
-                                                                 std::uint64_t seed) {
+namespace {
+
+std::shared_ptr<const server::ClosureFinder> make_honest_finder(const ClosureConfig& config,
+                                                                const std::vector<MissionRecording>& recordings,
+                                                                std::uint64_t seed) {
   if (config.finder == "lidar") return std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap);
   TUTTI_CHECK(config.finder == "reference", "finder {}", config.finder);
   std::map<RobotId, Trajectory> reference;
   for (const MissionRecording& robot : recordings) reference[robot.recording.robot] = robot.recording.reference;
   return std::make_shared<ReferenceClosureFinder>(
       simulation::ReferenceClosures(std::move(reference), config.reference, seed));
+}
+
+}  // namespace
+
+std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
+                                                                 const std::vector<MissionRecording>& recordings,
+                                                                 std::uint64_t seed) {
+  auto finder = make_honest_finder(config, recordings, seed);
+  if (config.wrong_share == 0.0) return finder;
+  return std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
 }
 
 }  // namespace tutti::mission

@@ -14,12 +14,16 @@ namespace {
 /// Equal voxels: every square metre of a wall counts the same, no matter how often it was seen.
 constexpr double kMapVoxel_m = 0.1;
 
+void append_moved(const Pose3& T_a_b, const PointCloud& cloud_b, PointCloud& cloud_a) {
+  const Eigen::Isometry3d T(T_a_b.matrix());
+  for (const Eigen::Vector3f& p : cloud_b.points) cloud_a.points.push_back((T * p.cast<double>()).cast<float>());
+}
+
 /// Grows by whole clouds; thins itself now and then, so that a long mission's map stays small in memory.
 class ThinnedCloud {
  public:
   void add(const PointCloud& cloud_b, const Pose3& T_a_b) {
-    const Eigen::Isometry3d T(T_a_b.matrix());
-    for (const Eigen::Vector3f& p : cloud_b.points) cloud_.points.push_back((T * p.cast<double>()).cast<float>());
+    append_moved(T_a_b, cloud_b, cloud_);
     if (cloud_.points.size() < thin_at_) return;
     cloud_ = lidar::voxel_downsample(cloud_, kMapVoxel_m);
     thin_at_ = 2 * cloud_.points.size() + kAtLeast;
@@ -83,14 +87,6 @@ std::optional<Pose3> reference_from(const Trajectory& estimate, const RobotRecor
   return fit ? std::optional<Pose3>(fit->T_reference_estimate) : std::nullopt;
 }
 
-PointCloud moved(const Pose3& T_a_b, const PointCloud& cloud_b) {
-  PointCloud out;
-  out.points.reserve(cloud_b.points.size());
-  const Eigen::Isometry3d T(T_a_b.matrix());
-  for (const Eigen::Vector3f& p : cloud_b.points) out.points.push_back((T * p.cast<double>()).cast<float>());
-  return out;
-}
-
 void keep_onboard(const ThinnedCloud& map, const evaluation::CloudIndex* survey,
                   const evaluation::AssociationConfig& association, RobotRecord& robot) {
   const auto T_reference_odom = reference_from(robot.odometry, robot, association);
@@ -98,7 +94,7 @@ void keep_onboard(const ThinnedCloud& map, const evaluation::CloudIndex* survey,
   if (!T_reference_odom)
     if (const auto fit = evaluation::agreement(robot.odometry, robot.server_estimate))
       T_shown_odom = fit->T_reference_estimate;
-  robot.onboard_cloud = moved(T_shown_odom, map.thinned());
+  append_moved(T_shown_odom, map.thinned(), robot.onboard_cloud);
   if (survey != nullptr && T_reference_odom)
     robot.map_error.onboard = evaluation::summarise(survey->distances(robot.onboard_cloud));
 }

@@ -19,7 +19,6 @@
 #include "tutti/mission/parallel.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
-#include "tutti/mission/spoiled_closures.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mission {
@@ -56,8 +55,7 @@ class MissionRun {
         options_(options),
         recordings_(std::move(input.robots)),
         survey_(std::move(input.survey)),
-        finder_(
-            spoiled(make_closure_finder(config.closures, recordings_, options.seed), config.closures, options.seed)),
+        finder_(make_closure_finder(config.closures, recordings_, options.seed)),
         clouds_(std::move(clouds)),
         server_(robot_ids(recordings_), finder_, clouds_, config.server),
         bus_(kMissionStart, config.link, options.seed),
@@ -104,11 +102,6 @@ class MissionRun {
   MissionRecord record() const;
 
  private:
-  static std::shared_ptr<const server::ClosureFinder> spoiled(std::shared_ptr<const server::ClosureFinder> finder,
-                                                              const ClosureConfig& config, std::uint64_t seed) {
-    if (config.wrong_share == 0.0) return finder;
-    return std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
-  }
   static std::set<RobotId> robot_ids(const std::vector<MissionRecording>& recordings) {
     std::set<RobotId> ids;
     for (const MissionRecording& recording : recordings) ids.insert(recording.recording.robot);

@@ -7,24 +7,13 @@
 #include <limits>
 #include <nanoflann.hpp>
 
+#include "tutti/model/kdtree_points.hpp"
+
 namespace tutti::lidar {
 namespace {
 
-/// nanoflann's view of the points.
-struct PointSource {
-  std::vector<Eigen::Vector3f> points;
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
-  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points[i][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using KdTree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSource>, PointSource, 3, std::int32_t>;
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, KdTreePoints>, KdTreePoints, 3,
+                                                   std::int32_t>;
 
 /// nanoflann result set: the nearest point within a radius. The bound prunes the search from its first step.
 class NearestWithin {
@@ -76,7 +65,7 @@ struct NeighbourIndex::Tree {
   static constexpr std::size_t kLeafSize = 10;
   explicit Tree(std::vector<Eigen::Vector3f> points)
       : source{std::move(points)}, kd_tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize)) {}
-  PointSource source;
+  KdTreePoints source;
   KdTree kd_tree;
 };
 
