@@ -98,6 +98,14 @@ TEST(Contact, TenMinutesOutOfRangeLoseNothing) {
   for (const RobotRecord& robot : record.robots) expect_as_good_as_the_server(robot);
 }
 
+TEST(Contact, ALinkOfAnUnknownRobotIsAnError) {
+  MissionConfig config = an_hour(1);
+  config.robot_links = {{.robot = std::string("zulu"), .link = {}}};
+  const auto record = run_mission(config, {.seed = 3, .threads = 1});
+  ASSERT_FALSE(record.has_value());
+  EXPECT_NE(record.error().message.find("zulu"), std::string::npos) << record.error().message;
+}
+
 TEST(Contact, RobotsThatNeverMeetKeepTwoGoodMaps) {
   MissionConfig config = an_hour(2);
   config.simulation.world.network.columns = 6;

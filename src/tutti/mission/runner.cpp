@@ -335,11 +335,20 @@ Result<std::shared_ptr<server::CloudStore>> open_cloud_store(const MissionConfig
   return DiskCloudStore::open(options.clouds, {.voxel_m = config.agent.submap.voxel_m});
 }
 
+/// A radio for a robot that is not there would silently do nothing.
+Status check_links(const MissionConfig& config, const std::vector<MissionRecording>& robots) {
+  for (const RobotLinkConfig& own : config.robot_links)
+    if (std::ranges::none_of(robots, [&](const MissionRecording& r) { return r.recording.name == own.robot; }))
+      return fail(ErrorCode::configuration, "robot_links: no robot is called '{}'", own.robot);
+  return {};
+}
+
 }  // namespace
 
 Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options) {
   auto input = load_input(config, options.data, options.seed);
   if (!input) return tl::unexpected(input.error());
+  if (const auto ok = check_links(config, input->robots); !ok) return tl::unexpected(ok.error());
   auto clouds = open_cloud_store(config, options);
   if (!clouds) return tl::unexpected(clouds.error());
   MissionRun mission(config, options, std::move(*input), std::move(*clouds));
