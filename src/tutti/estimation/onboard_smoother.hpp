@@ -43,6 +43,7 @@ struct ChainConstraint {
   std::size_t from = 0;
   std::size_t to = 0;
   RelativePose measurement;
+  bool doubtful = false;  ///< Subject to the robust loss.
   friend bool operator==(const ChainConstraint&, const ChainConstraint&) = default;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -44,6 +45,27 @@ struct RobotComponent {
   friend bool operator==(const RobotComponent&, const RobotComponent&) = default;
 };
 
+/// Standard deviations in the direction that is worst.
+struct ShapeSigma {
+  double position_m = 0.0;
+  double rotation_rad = 0.0;
+  friend bool operator==(const ShapeSigma&, const ShapeSigma&) = default;
+};
+
+/// How sure the server is of the shape of one robot's trajectory, stretch by stretch and over all. Let x_k be what the
+/// estimate of the robot's k-th proxy node is off by: its position after one rigid alignment of all the robot's nodes,
+/// its rotation (rotation vector) less the mean over all of them; both in the axes of `world`.
+struct ShapeUncertainty {
+  static constexpr std::size_t kShortest = 4;  ///< Half the length, in nodes, of the shortest stretches.
+  RobotId robot;
+  ShapeSigma whole;  ///< Root mean square of |x_k| over all nodes: the RMSE of the ATE that the server expects.
+  /// sag[j][i]: of x_m - (x_a + x_b) / 2, what the middle of a stretch is off by when its ends are held, for the i-th
+  /// stretch of 2 L nodes, L = kShortest 2^j: a = 2 L i, m = a + L, b = a + 2 L, counted along the robot's nodes in the
+  /// graph. As many j as fit; sag[j].size() = (nodes - 1) / (2 L).
+  std::vector<std::vector<ShapeSigma>> sag;
+  friend bool operator==(const ShapeUncertainty&, const ShapeUncertainty&) = default;
+};
+
 /// The server's map in kilobytes. Unreduced, edges follow from the positions by one rule (radius, sigma; eqs. 1, 2) and
 /// are not carried; reduced, `edges` and `eliminated` are.
 struct ProxyGraph {
@@ -55,6 +77,7 @@ struct ProxyGraph {
   bool reduced = false;
   std::vector<ProxyEdge> edges;
   std::vector<EliminatedNode> eliminated;  ///< Sorted by (robot, stamp).
+  std::vector<ShapeUncertainty> shapes;    ///< Sorted by robot; a robot may be missing: nothing is known.
   friend bool operator==(const ProxyGraph&, const ProxyGraph&) = default;
 };
 
