@@ -26,6 +26,7 @@ struct ProxyGraphConfig {
   int node_budget = 0;
   std::string reducer = "budget";
   double sparsify_threshold = 1e-3;
+  int shape_samples = 32;
 
   template <class V>
   void describe(V& v) {
@@ -40,6 +41,8 @@ struct ProxyGraphConfig {
         "3) once the graph exceeds node_budget.");
     v.field("sparsify_threshold", sparsify_threshold, between(0.0, 1.0),
             "Drop a reduced edge whose weight is below this fraction of the largest; 0 = keep all.");
+    v.field("shape_samples", shape_samples, between(0.0, 10'000.0),
+            "Samples from which the server learns how sure it is of each trajectory's shape; 0 = do not send it.");
   }
 };
 

@@ -5,28 +5,47 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/estimation/internal/posterior_samples.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
 
 namespace tutti::estimation {
 namespace {
 
-Matrix6d unknown() { return Matrix6d(Vector6d::Constant(std::numeric_limits<double>::infinity()).asDiagonal()); }
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-std::vector<Matrix6d> relative_covariances(const PoseGraph& graph, std::span<const Pose3> poses,
-                                           std::span<const std::pair<std::size_t, std::size_t>> pairs,
-                                           std::span<const double> weights) {
+struct JointPosterior::Factorised {
+  internal::BlockStructure structure;
+  std::vector<Pose3> poses;
+  std::vector<Pair> pairs;
+  bool determined = false;
+  internal::BlockCholesky::Columns factor;  ///< L, in elimination order.
+};
+
+JointPosterior::JointPosterior(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const Pair> pairs,
+                               std::span<const double> weights) {
   TUTTI_CHECK(poses.size() == graph.poses.size(), "{} poses, {} nodes", poses.size(), graph.poses.size());
   TUTTI_CHECK(weights.empty() || weights.size() == graph.edges.size(), "{} weights, {} edges", weights.size(),
               graph.edges.size());
-  std::vector<Matrix6d> out(pairs.size(), unknown());
-  const auto structure = internal::analyse_blocks(graph, pairs);
-  internal::GaussNewton gauss_newton(graph, structure);
+  auto made = std::make_unique<Factorised>();
+  made->structure = internal::analyse_blocks(graph, pairs);
+  made->poses.assign(poses.begin(), poses.end());
+  made->pairs.assign(pairs.begin(), pairs.end());
+  internal::GaussNewton gauss_newton(graph, made->structure);
   gauss_newton.linearise(poses, {.loss = {}, .roles = {}, .scale = weights}, true);
-  if (!gauss_newton.hessian().factorise()) return out;
-  const internal::SelectedInverse inverse(gauss_newton.hessian().take_factor());
+  if (gauss_newton.hessian().factorise()) made->factor = gauss_newton.hessian().take_factor();
+  made->determined = made->factor.start.size() == static_cast<std::size_t>(6 * made->structure.variables + 1);
+  factorised_ = std::move(made);
+}
 
+JointPosterior::~JointPosterior() = default;
+
+std::vector<Matrix6d> JointPosterior::relative_covariances() const {
+  const auto& [structure, poses, pairs, determined, factor] = *factorised_;
+  std::vector<Matrix6d> out(pairs.size(), Matrix6d(Vector6d::Constant(kInfinity).asDiagonal()));
+  if (!determined) return out;
+  const internal::SelectedInverse inverse(factor);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const auto [a, b] = pairs[k];
     if (structure.component[a] != structure.component[b]) continue;
@@ -48,6 +67,25 @@ std::vector<Matrix6d> relative_covariances(const PoseGraph& graph, std::span<con
     out[k] = 0.5 * (covariance + covariance.transpose());
   }
   return out;
+}
+
+Eigen::MatrixXd JointPosterior::samples(std::span<const std::size_t> nodes, std::size_t count, Rng rng) const {
+  const auto& structure = factorised_->structure;
+  std::vector<int> variables;
+  for (const std::size_t node : nodes) {
+    TUTTI_CHECK(node < structure.variable.size(), "node {} of {}", node, structure.variable.size());
+    variables.push_back(structure.variable[node]);
+  }
+  if (!factorised_->determined)
+    return Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(count),
+                                     kInfinity);
+  return internal::posterior_samples(factorised_->factor, variables, count, rng);
+}
+
+std::vector<Matrix6d> relative_covariances(const PoseGraph& graph, std::span<const Pose3> poses,
+                                           std::span<const std::pair<std::size_t, std::size_t>> pairs,
+                                           std::span<const double> weights) {
+  return JointPosterior(graph, poses, pairs, weights).relative_covariances();
 }
 
 }  // namespace tutti::estimation

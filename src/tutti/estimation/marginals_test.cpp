@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <limits>
 
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/testing/random_graphs.hpp"
@@ -77,6 +78,52 @@ TEST(Marginals, DescribeTheScatterOfTheSolution) {
   for (std::size_t k = 0; k < pairs.size(); ++k) EXPECT_LT(tied[k].trace(), open[k].trace());
 }
 
+TEST(Marginals, SamplesHaveTheJointCovariance) {
+  constexpr std::size_t kSamples = 20'000;
+  Rng rng(6);
+  PoseGraph graph = random_graph(rng, 12, 5, 1.0).graph;
+  const std::size_t alone = graph.poses.size();  // a second component, with a gauge of its own
+  graph.poses.insert(graph.poses.end(), {random_pose(rng), random_pose(rng)});
+  graph.edges.push_back({alone, alone + 1, graph.poses[alone].inverse() * graph.poses[alone + 1],
+                         random_covariance(rng, 0.1, 0.1).inverse()});
+  const std::vector<double> weights(graph.edges.size(), 0.7);
+  const Pairs pairs{{4, 9}};
+  const JointPosterior posterior(graph, graph.poses, pairs, weights);
+  std::vector<std::size_t> nodes(graph.poses.size());
+  for (std::size_t k = 0; k < nodes.size(); ++k) nodes[k] = k;
+  const Eigen::MatrixXd samples = posterior.samples(nodes, kSamples, Rng(7));
+
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(samples.rows(), samples.rows());
+  PoseGraph first = graph;
+  first.poses.resize(alone);
+  first.edges.pop_back();
+  expected.topLeftCorner(6 * 12, 6 * 12) = dense_covariance(first, weights);
+  expected.bottomRightCorner<6, 6>() = relative_covariances(graph, graph.poses, Pairs{{alone, alone + 1}}, weights)[0];
+  const Eigen::MatrixXd covariance = samples * samples.transpose() / static_cast<double>(kSamples);
+  for (const std::size_t anchor : {std::size_t{0}, alone})
+    EXPECT_TRUE(samples.middleRows<6>(static_cast<Eigen::Index>(6 * anchor)).isZero(0.0));
+  for (Eigen::Index a = 6; a < expected.rows(); ++a)
+    for (Eigen::Index b = 6; b <= a; ++b)
+      EXPECT_NEAR(covariance(a, b), expected(a, b),
+                  5.0 / std::sqrt(kSamples) * std::sqrt(expected(a, a) * expected(b, b)) + 1e-12);
+  // Both answers come from one factor.
+  EXPECT_EQ(posterior.relative_covariances()[0], relative_covariances(graph, graph.poses, pairs, weights)[0]);
+}
+
+TEST(Marginals, ASampleDoesNotDependOnWhatElseIsAsked) {
+  Rng rng(8);
+  const PoseGraph graph = random_graph(rng, 60, 20, 1.0).graph;
+  const JointPosterior posterior(graph, graph.poses);
+  std::vector<std::size_t> all(graph.poses.size());
+  for (std::size_t k = 0; k < all.size(); ++k) all[k] = k;
+  const std::vector<std::size_t> some{41, 3, 17, 0};
+  const Eigen::MatrixXd of_all = posterior.samples(all, 37, Rng(9));
+  const Eigen::MatrixXd of_some = posterior.samples(some, 37, Rng(9));
+  for (std::size_t k = 0; k < some.size(); ++k)
+    EXPECT_EQ(of_some.middleRows<6>(static_cast<Eigen::Index>(6 * k)),
+              of_all.middleRows<6>(static_cast<Eigen::Index>(6 * some[k])));
+}
+
 TEST(Marginals, SayWhatIsNotDetermined) {
   Rng rng(5);
   PoseGraph graph = random_graph(rng, 10, 0, 0.0).graph;
@@ -87,7 +134,12 @@ TEST(Marginals, SayWhatIsNotDetermined) {
   EXPECT_TRUE(covariances[2].allFinite());
   graph.edges[0].information.setZero();
   EXPECT_TRUE(std::isinf(relative_covariances(graph, graph.poses, Pairs{{0, 1}})[0](5, 5)));
+  const std::vector<std::size_t> nodes{1, 7};
+  const Eigen::MatrixXd samples = JointPosterior(graph, graph.poses).samples(nodes, 3, Rng(1));
+  EXPECT_EQ(samples.rows(), 12);
+  EXPECT_TRUE((samples.array() == std::numeric_limits<double>::infinity()).all());
   EXPECT_TRUE(relative_covariances({}, {}, {}).empty());
+  EXPECT_EQ(JointPosterior({}, {}).samples({}, 3, Rng(1)).rows(), 0);
 }
 
 }  // namespace

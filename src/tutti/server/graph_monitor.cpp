@@ -6,7 +6,10 @@
 #include <span>
 #include <utility>
 
+#include "tutti/base/check.hpp"
+#include "tutti/base/random.hpp"
 #include "tutti/estimation/marginals.hpp"
+#include "tutti/server/shape_uncertainty.hpp"
 
 namespace tutti::server {
 namespace {
@@ -44,6 +47,31 @@ std::vector<Repair> repairs(const MapEstimate& map, RobotId robot, const std::ve
       out.back().last = std::max(out.back().last, repair.last);
     else
       out.push_back(repair);
+  }
+  return out;
+}
+
+/// Of every robot's nodes in the graph. The random numbers are always the same: the result is a function of the map.
+std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& graph,
+                                     const std::map<RobotId, std::vector<std::size_t>>& chosen,
+                                     const estimation::JointPosterior& posterior, std::size_t count) {
+  std::vector<std::size_t> kept;  // indices into map.nodes of graph.nodes
+  for (const auto& [robot, nodes] : chosen)
+    for (const std::size_t i : nodes)
+      if (kept.size() < graph.nodes.size() && graph.nodes[kept.size()].robot == robot &&
+          graph.nodes[kept.size()].stamp == map.nodes[i].stamp)
+        kept.push_back(i);
+  TUTTI_CHECK(kept.size() == graph.nodes.size(), "{} of {} nodes found", kept.size(), graph.nodes.size());
+  const Eigen::MatrixXd samples = posterior.samples(kept, count, Rng(0).fork("shape"));
+  std::vector<ShapeUncertainty> out;
+  if (!samples.allFinite()) return out;
+  for (std::size_t begin = 0, end = 0; begin < kept.size(); begin = end) {
+    const RobotId robot = graph.nodes[begin].robot;
+    std::vector<Pose3> poses;
+    for (; end < kept.size() && graph.nodes[end].robot == robot; ++end) poses.push_back(graph.nodes[end].T_world_body);
+    out.push_back(shape_uncertainty(
+        robot, poses,
+        samples.middleRows(static_cast<Eigen::Index>(6 * begin), static_cast<Eigen::Index>(6 * (end - begin)))));
   }
   return out;
 }
@@ -96,7 +124,8 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
     for (const auto& [first, last] : repairs(map, robot, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
   }
-  const std::vector<Matrix6d> covariances = estimation::relative_covariances(map.graph, map.graph.poses, stretches);
+  const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches);
+  const std::vector<Matrix6d> covariances = posterior.relative_covariances();
 
   std::vector<consistency::ServerNode> nodes;
   std::vector<RobotComponent> components;
@@ -126,7 +155,10 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
       }
     }
   }
-  return consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
+  ProxyGraph graph = consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
+  if (config.shape_samples > 0)
+    graph.shapes = shapes(map, graph, chosen, posterior, static_cast<std::size_t>(config.shape_samples));
+  return graph;
 }
 
 }  // namespace tutti::server

@@ -13,7 +13,7 @@ namespace tutti::server {
 /// Reads the latest estimate of the representative nodes into a proxy graph, with each node's uncertainty relative to
 /// the robot's previous one and its support. A robot's nodes that hang together with nothing (a submap before them is
 /// missing) are left out until they do. Over failed odometry the covariances are equal shares of what the closures make
-/// of the whole stretch.
+/// of the whole stretch. Says how sure it is of each robot's shape, unless the map does not determine its poses.
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config);
 
 /// How many independent closures support the stretch between consecutive chosen nodes of one robot: the closures of the

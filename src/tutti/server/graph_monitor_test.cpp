@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "tutti/geometry/alignment.hpp"
+#include "tutti/geometry/so3.hpp"
 #include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
@@ -72,6 +76,95 @@ TEST(MonitorGraph, SaysLessWhereClosuresHelp) {
     EXPECT_LT(with.nodes[k].covariance.trace(), without.nodes[k].covariance.trace());
   }
   EXPECT_GT(supported, 20U);
+}
+
+/// Two robots around a circle with closures.
+MapEstimate circle_map(std::uint64_t seed) {
+  const test::TestFinder finder(seed);
+  SubmapSet submaps;
+  for (std::uint32_t r = 0; r < 2; ++r)
+    for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(seed).fork(r)))
+      submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
+  VerdictSet verdicts;
+  for (auto a = submaps.begin(); a != submaps.end(); ++a)
+    for (auto b = std::next(a); b != submaps.end(); ++b)
+      if (finder.is_candidate(*a->second, *b->second))
+        verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+  return estimate_map(submaps, verdicts, {});
+}
+
+TEST(MonitorGraph, ShapesAreThoseOfTheNodesSent) {
+  const MapEstimate map = circle_map(1);
+  const ProxyGraph whole = monitor_graph(map, 1, {});
+  EXPECT_EQ(monitor_graph(map, 1, {}), whole);
+  ASSERT_EQ(whole.shapes.size(), 2U);
+  const ProxyGraph reduced = monitor_graph(map, 1, {.node_budget = 40});
+  ASSERT_TRUE(reduced.reduced);
+  ASSERT_EQ(reduced.shapes.size(), 2U);
+  for (std::uint32_t r = 0; r < 2; ++r) {
+    EXPECT_EQ(whole.shapes[r].robot, RobotId{r});
+    ASSERT_EQ(whole.shapes[r].sag.size(), 3U);  // 46 nodes
+    EXPECT_EQ(whole.shapes[r].sag[0].size(), 5U);
+    EXPECT_EQ(reduced.shapes[r].robot, RobotId{r});
+    EXPECT_EQ(reduced.shapes[r].sag.size(), 2U);  // 20 nodes
+    // The same trajectory, seen at fewer places.
+    EXPECT_NEAR(reduced.shapes[r].whole.position_m, whole.shapes[r].whole.position_m,
+                0.2 * whole.shapes[r].whole.position_m);
+    EXPECT_GT(reduced.shapes[r].sag[0][0].position_m, whole.shapes[r].sag[0][0].position_m);
+  }
+  EXPECT_TRUE(monitor_graph(map, 1, {.shape_samples = 0}).shapes.empty());
+}
+
+TEST(MonitorGraph, DoesNotClaimAShapeThatTheMapLeavesOpen) {
+  MapEstimate map;
+  for (std::uint32_t k = 0; k < 2; ++k)
+    map.nodes.push_back({.id = {RobotId{0}, k}, .stamp = {k + 1}, .representative = true});
+  map.graph.poses.resize(2);
+  map.graph.edges.push_back({0, 1, {}, Matrix6d::Zero()});
+  EXPECT_EQ(monitor_graph(map, 1, {}).nodes.size(), 2U);
+  EXPECT_TRUE(monitor_graph(map, 1, {}).shapes.empty());
+  EXPECT_TRUE(monitor_graph({}, 1, {}).shapes.empty());
+}
+
+TEST(MonitorGraph, TheExpectedErrorIsTheTrueOne) {
+  double position = 0.0;  // true over expected, squared, mean
+  double rotation = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const MapEstimate map = circle_map(seed);
+    const ProxyGraph graph = monitor_graph(map, 1, {});
+    for (const ShapeUncertainty& shape : graph.shapes) {
+      std::vector<Pose3> truth;
+      std::vector<Pose3> estimate;
+      std::vector<Eigen::Vector3d> true_points;
+      std::vector<Eigen::Vector3d> points;
+      for (const MapNode& node : map.nodes) {
+        if (node.id.robot != shape.robot || !node.representative) continue;
+        truth.push_back(test::true_pose(shape.robot, node.id.index));
+        estimate.push_back(node.T_world_body);
+        true_points.push_back(truth.back().translation);
+        points.push_back(estimate.back().translation);
+      }
+      const Pose3 T = align_points(true_points, points);
+      const auto n = static_cast<double>(truth.size());
+      double squared_m = 0.0;
+      std::vector<Eigen::Vector3d> turns;
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (std::size_t k = 0; k < truth.size(); ++k) {
+        squared_m += (T * points[k] - true_points[k]).squaredNorm() / n;
+        turns.push_back(so3_log(T.rotation * estimate[k].rotation * truth[k].rotation.conjugate()));
+        mean += turns.back() / n;
+      }
+      double squared_rad = 0.0;
+      for (const Eigen::Vector3d& turn : turns) squared_rad += (turn - mean).squaredNorm() / n;
+      position += squared_m / (shape.whole.position_m * shape.whole.position_m);
+      rotation += squared_rad / (shape.whole.rotation_rad * shape.whole.rotation_rad);
+      ++count;
+    }
+  }
+  ASSERT_EQ(count, 40);
+  EXPECT_NEAR(std::sqrt(position / count), 1.0, 0.2);
+  EXPECT_NEAR(std::sqrt(rotation / count), 1.0, 0.2);
 }
 
 }  // namespace
