@@ -36,8 +36,7 @@ class JointPosterior {
   /// `count` joint samples of the nodes' errors: (6 nodes) x count, rows [6 k, 6 k + 6) what node k of `nodes` is off
   /// by. Zero mean and the covariance of the posterior; not normal: L^-T z with random signs z, because second moments
   /// estimated with signs scatter less than with normal numbers (Hutchinson 1990). A node's sample does not depend on
-  /// which others are asked for. A graph that does not
-  /// determine its poses: infinity.
+  /// which others are asked for. A graph that does not determine its poses: infinity.
   [[nodiscard]] Eigen::MatrixXd samples(std::span<const std::size_t> nodes, std::size_t count, Rng rng) const;
 
  private:
