@@ -99,7 +99,8 @@ std::vector<Visit> draw_visits(const Trajectory& truth, std::span<const Surround
       way += std::abs(way_along(truth, surroundings[k], k));
     visit.until = k;
     if (surroundings[visit.from].kind != CorridorKind::featureless) continue;
-    visit.slide = rng.normal(0.01 * config.slide_percent);
+    const double drawn = rng.normal(0.01 * config.slide_percent);
+    visit.slide = std::copysign(std::max(std::abs(drawn), 0.01 * config.least_slide_percent), drawn);
     visit.variance_per_m = square(0.01 * config.slide_percent) * way + square(config.along_m_per_sqrt_m);
     visits.push_back(visit);
   }
@@ -143,6 +144,66 @@ std::optional<Failure> draw_failure(const Trajectory& truth, std::span<const Sur
   return failure;
 }
 
+/// A scripted error that does happen: increments [from, until).
+struct ScriptedError {
+  std::size_t from = 0;
+  std::size_t until = 0;
+  double length_m = 0.0;  // 0 = all in one increment
+  Eigen::Vector3d move = Eigen::Vector3d::Zero();
+  double yaw = 0.0;
+
+  [[nodiscard]] bool contains(std::size_t increment) const { return from <= increment && increment < until; }
+  /// Moves are level, turns are about gravity, wherever the gait tilts the body.
+  [[nodiscard]] Vector6d error(const Pose3& from_pose, const Pose3& to_pose, double distance) const {
+    const double share = length_m > 0.0 ? distance / length_m : 1.0;
+    const Eigen::Vector3d x = from_pose.rotation * Eigen::Vector3d::UnitX();
+    const Eigen::AngleAxisd heading(std::atan2(x.y(), x.x()), Eigen::Vector3d::UnitZ());
+    Vector6d error;
+    error << from_pose.rotation.conjugate() * (heading * (share * move)),
+        to_pose.rotation.conjugate() * Eigen::Vector3d(0.0, 0.0, share * yaw);
+    return error;
+  }
+};
+
+/// The increment that ends nearest to where the robot started, on its next pass; nothing when it does not come back.
+std::optional<std::size_t> next_pass_of_start(const Trajectory& truth, std::size_t increment) {
+  constexpr double kNear_m = 2.0;
+  const auto distance = [&](std::size_t k) {
+    return (truth[k + 1].pose.translation - truth[0].pose.translation).norm();
+  };
+  std::optional<std::size_t> nearest;
+  for (std::size_t k = increment; k + 1 < truth.size(); ++k) {
+    if (distance(k) > kNear_m) {
+      if (nearest) break;
+    } else if (!nearest || distance(k) < distance(*nearest)) {
+      nearest = k;
+    }
+  }
+  return nearest;
+}
+
+std::vector<ScriptedError> place_scripted(const Trajectory& truth, std::span<const ScriptedErrorConfig> scripted) {
+  std::vector<double> way = {0.0};  // at every pose
+  for (std::size_t k = 0; k + 1 < truth.size(); ++k)
+    way.push_back(way[k] + (truth[k + 1].pose.translation - truth[k].pose.translation).norm());
+  const auto reached = [&](double metres) {
+    return static_cast<std::size_t>(std::ranges::lower_bound(way, metres) - way.begin());
+  };
+  std::vector<ScriptedError> out;
+  for (const ScriptedErrorConfig& config : scripted) {
+    std::optional<std::size_t> from = reached(config.after_m);
+    if (config.at_start) from = next_pass_of_start(truth, *from);
+    if (!from || *from + 1 >= truth.size()) continue;
+    const std::size_t end = config.length_m > 0.0 ? reached(way[*from] + config.length_m) : *from + 1;
+    out.push_back({.from = *from,
+                   .until = std::min(end, truth.size() - 1),
+                   .length_m = config.length_m,
+                   .move = {config.ahead_m, config.left_m, config.up_m},
+                   .yaw = config.yaw_deg * kRadPerDeg});
+  }
+  return out;
+}
+
 /// What is wrong with an increment, and what the robot thinks of it; translations in the frame of its start.
 struct IncrementError {
   Vector6d error;
@@ -163,7 +224,8 @@ class RunErrors {
         slide_rng_(rng.fork("slides")),
         slow_(config, slow_rng_),
         visits_(draw_visits(truth, surroundings, config.degeneracy, slide_rng_)),
-        failure_(draw_failure(truth, surroundings, config.failure, rng.fork("failure"))) {}
+        failure_(draw_failure(truth, surroundings, config.failure, rng.fork("failure"))),
+        scripted_(place_scripted(truth, config.scripted)) {}
 
   /// Of increment k; call in order.
   IncrementError next(std::size_t k, const Eigen::Vector3d& translation) {
@@ -175,8 +237,11 @@ class RunErrors {
     if (!slip.isZero(0.0)) slips_.push_back(k);
     out.error += slip;
     if (failure_ && failure_->contains(k)) out.error += failure_->error(truth_[k].pose, distance);
+    for (const ScriptedError& scripted : scripted_)
+      if (scripted.contains(k)) out.error += scripted.error(truth_[k].pose, truth_[k + 1].pose, distance);
     while (visit_ < visits_.size() && visits_[visit_].until <= k) ++visit_;
     if (visit_ < visits_.size() && visits_[visit_].from <= k) slide(visits_[visit_], k, out);
+    out.covariance *= square(config_.stated_sigma_factor);
     return out;
   }
 
@@ -191,6 +256,8 @@ class RunErrors {
     for (const std::size_t k : slips_) add(DriftOrigin::Kind::slip, k, k + 1);
     for (const Visit& visit : visits_) add(DriftOrigin::Kind::degeneracy, visit.from, visit.until);
     if (failure_) add(DriftOrigin::Kind::failure, failure_->from, failure_->until);
+    for (const ScriptedError& s : scripted_)
+      add(s.length_m > 0.0 ? DriftOrigin::Kind::failure : DriftOrigin::Kind::slip, s.from, s.until);
     std::ranges::stable_sort(out, {}, &DriftOrigin::from);
     return out;
   }
@@ -212,6 +279,7 @@ class RunErrors {
   std::vector<Visit> visits_;
   std::size_t visit_ = 0;
   std::optional<Failure> failure_;
+  std::vector<ScriptedError> scripted_;
   std::vector<std::size_t> slips_;
 };
 

@@ -19,11 +19,14 @@ namespace tutti::simulation {
 /// covariance is inflated along the corridor's axis.
 struct DegeneracyConfig {
   double slide_percent = 3.0;
+  double least_slide_percent = 0.0;
   double along_m_per_sqrt_m = 0.05;
   template <class V>
   void describe(V& v) {
     v.field("slide_percent", slide_percent, between(0.0, 50.0),
             "Error of the speed along the axis, drawn anew at every visit.");
+    v.field("least_slide_percent", least_slide_percent, between(0.0, 50.0),
+            "What is drawn smaller becomes this large, with its sign.");
     v.field("along_m_per_sqrt_m", along_m_per_sqrt_m, at_least(0.0), "Random walk along the axis.");
   }
 };
@@ -40,6 +43,29 @@ struct FailureConfig {
     v.field("length_m", length_m, greater_than(0.0), "Lasts this long, or until the robot is back inside.");
     v.field("yaw_deg", yaw_deg, between(0.0, 180.0), "Yaw error it ends with, to either side.");
     v.field("drift_m", drift_m, at_least(0.0), "Position error it ends with, in one drawn horizontal direction.");
+  }
+};
+
+/// One error at a given place of the run, that the covariance does not know: the odometry reports this move and turn
+/// beside the true ones. In the level frame of the robot; all at once, or evenly over a length of way. An error whose
+/// place is never reached does not happen.
+struct ScriptedErrorConfig {
+  double after_m = 0.0;
+  bool at_start = false;
+  double length_m = 0.0;
+  double yaw_deg = 0.0;
+  double ahead_m = 0.0;
+  double left_m = 0.0;
+  double up_m = 0.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("after_m", after_m, at_least(0.0), "After this way of the run.");
+    v.field("at_start", at_start, any(), "... waits until the robot next passes where it started.");
+    v.field("length_m", length_m, at_least(0.0), "Way over which the error grows; 0 = all at once.");
+    v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "Size it ends with: a turn to the left");
+    v.field("ahead_m", ahead_m, any(), "... and a move ahead,");
+    v.field("left_m", left_m, any(), "... to the left,");
+    v.field("up_m", up_m, any(), "... up.");
   }
 };
 
@@ -61,6 +87,8 @@ struct OdometryNoiseConfig {
   double slip_deg = 10.0;
   DegeneracyConfig degeneracy;
   FailureConfig failure;
+  std::vector<ScriptedErrorConfig> scripted;
+  double stated_sigma_factor = 1.0;
   double start_tilt_deg = 3.0;
   double start_shift_m = 50.0;
   template <class V>
@@ -82,6 +110,9 @@ struct OdometryNoiseConfig {
     v.field("slip_deg", slip_deg, at_least(0.0), "Yaw of a slip.");
     v.field("degeneracy", degeneracy, any(), "Along featureless corridors.");
     v.field("failure", failure, any(), "In the open.");
+    v.field("scripted", scripted, any(), "Errors of given size at given places.");
+    v.field("stated_sigma_factor", stated_sigma_factor, greater_than(0.0),
+            "Stated standard deviations over the honest ones: above 1 the odometry is better than it says.");
     v.field("start_tilt_deg", start_tilt_deg, between(0.0, 30.0), "Largest tilt of the odom frame.");
     v.field("start_shift_m", start_shift_m, at_least(0.0), "Largest distance of the odom origin, per axis.");
   }
@@ -100,7 +131,7 @@ std::vector<Surroundings> surroundings_along(const CorridorWorld& world, const T
 struct OdometrySimulation {
   Trajectory odometry;                         ///< T_odom_body at the stamps of the truth, in an odom frame of its own.
   std::vector<Matrix6d> increment_covariance;  ///< Of k -> k + 1, right tangent; one fewer than odometry.
-  std::vector<DriftOrigin> drift_origins;      ///< Slips, visits of featureless corridors, the failure; in time order.
+  std::vector<DriftOrigin> drift_origins;      ///< Slips, featureless corridors, failures; in time order.
 };
 
 /// Measures the increments of a true trajectory with noise. `surroundings`: one per pose, or empty = rough everywhere.

@@ -57,6 +57,7 @@ TriangleMesh world_mesh(const SimulationConfig& config, std::uint64_t seed) {
 Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed) {
   const Rng rng(seed);
   SimulatedWorld world{.network = make_world(config.world, rng.fork("world")), .recordings = {}, .surface = {}};
+  if (auto ok = check_world(world.network, config.world); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_robots(config, world.network); !ok) return tl::unexpected(ok.error());
   std::shared_ptr<const Bvh> walls;
   if (config.sensors == "lidar") {

@@ -43,6 +43,13 @@ void close_loop(CorridorWorld& world, std::size_t first, CorridorKind kind) {
   join(world, first, world.junctions.size() - 1, kind);
 }
 
+std::optional<std::size_t> corridor_between(const CorridorWorld& world, int a, int b) {
+  const auto [low, high] = std::minmax({static_cast<std::size_t>(a), static_cast<std::size_t>(b)});
+  for (std::size_t i = 0; i < world.corridors.size(); ++i)
+    if (world.corridors[i].a == low && world.corridors[i].b == high) return i;
+  return std::nullopt;
+}
+
 CorridorWorld make_tunnel(const WorldConfig& config, Rng& rng) {
   CorridorWorld world = make_corridor_world(config.network, rng.fork("network"));
   std::vector<std::size_t> order(world.corridors.size());
@@ -51,6 +58,9 @@ CorridorWorld make_tunnel(const WorldConfig& config, Rng& rng) {
   const auto count =
       static_cast<std::size_t>(std::lround(config.featureless_share * static_cast<double>(order.size())));
   for (std::size_t i = 0; i < count; ++i) world.corridors[order[i]].kind = CorridorKind::featureless;
+  for (std::size_t i = 0; i + 1 < config.featureless.size(); i += 2)
+    if (const auto named = corridor_between(world, config.featureless[i], config.featureless[i + 1]))
+      world.corridors[*named].kind = CorridorKind::featureless;
   return world;
 }
 
@@ -84,6 +94,17 @@ CorridorWorld make_world(const WorldConfig& config, Rng rng) {
   if (config.kind == "tunnel") return make_tunnel(config, rng);
   TUTTI_CHECK(config.kind == "terrace", "kind is {}", config.kind);
   return make_terrace(config, rng);
+}
+
+Status check_world(const CorridorWorld& world, const WorldConfig& config) {
+  const std::vector<int>& named = config.featureless;
+  if (named.size() % 2 != 0)
+    return fail(ErrorCode::configuration, "world.featureless: {} junctions, expected an even number", named.size());
+  for (std::size_t i = 0; i < named.size(); i += 2)
+    if (!corridor_between(world, named[i], named[i + 1]))
+      return fail(ErrorCode::configuration, "world.featureless: no corridor joins junctions {} and {}", named[i],
+                  named[i + 1]);
+  return {};
 }
 
 std::optional<std::size_t> corridor_at(const CorridorWorld& world, const Eigen::Vector3d& position,

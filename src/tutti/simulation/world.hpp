@@ -5,9 +5,11 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
@@ -17,6 +19,7 @@ struct WorldConfig {
   std::string kind = "tunnel";
   CorridorWorldConfig network;      ///< tunnel
   double featureless_share = 0.15;  ///< tunnel: of the corridors
+  std::vector<int> featureless;     ///< tunnel: and these, as pairs of junctions
   double office_length_m = 30.0;    ///< terrace
   double office_width_m = 18.0;
   double roof_length_m = 45.0;
@@ -29,7 +32,9 @@ struct WorldConfig {
             "tunnel: a network of rough corridors; terrace: an office loop and a rooftop with almost nothing to see.");
     v.field("network", network, any(), "tunnel: the corridors.");
     v.field("featureless_share", featureless_share, between(0.0, 1.0),
-            "tunnel: share of the corridors that are straight, smooth and empty.");
+            "tunnel: share of the corridors that are straight, smooth and empty: the longest.");
+    v.field("featureless", featureless, at_least(0.0),
+            "tunnel: also the corridors between these junctions, two by two.");
     v.field("office_length_m", office_length_m, greater_than(0.0), "terrace: the office loop, x.");
     v.field("office_width_m", office_width_m, greater_than(0.0), "terrace: the office loop, y.");
     v.field("roof_length_m", roof_length_m, greater_than(0.0), "terrace: the loop on the roof, x.");
@@ -40,11 +45,14 @@ struct WorldConfig {
 };
 
 /// The network robots walk on, every corridor with its kind (Corridor::kind); no dead ends.
-/// tunnel: make_corridor_world; the longest corridors are featureless, the others rough.
+/// tunnel: make_corridor_world; the longest corridors and the named ones are featureless, the others
+/// rough.
 /// terrace: junctions about every 10 m, counter-clockwise on both loops. Office first, from the corner at the origin
 /// (for the default size 0 to 9: corners 0, 3, 5, 8), with a cross-corridor (1 to 7); then the roof, level, from the
 /// end of the ramp on (10 to 24; the ramp is 4 to 10). Corridors of the roof are open, all others office.
 CorridorWorld make_world(const WorldConfig& config, Rng rng);
+/// Has the world that make_world() made every corridor that the configuration names?
+Status check_world(const CorridorWorld& world, const WorldConfig& config);
 
 /// The corridor nearest to a position, which lies on it or within `max_distance_m` of its centre line.
 std::optional<std::size_t> corridor_at(const CorridorWorld& world, const Eigen::Vector3d& position,
