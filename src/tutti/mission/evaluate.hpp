@@ -14,6 +14,7 @@
 namespace tutti::mission {
 
 inline constexpr double kRpeInterval_s = 1.0;
+inline constexpr double kRpeWay_m = 10.0;  ///< Along the reference.
 
 /// One robot after a mission: the agent that talked to the server and the shadow agents that only listened.
 struct RobotOutcome {
@@ -23,10 +24,10 @@ struct RobotOutcome {
 };
 
 /// Fill in what is measured at the end, in this order: accuracy of every estimate; the final map, its closures and the
-/// transforms between robots; the clouds. Accuracy: ATE after one rigid alignment (SE(3), no scale) and RPE over 1 s,
-/// at keyframes; the server's joint figure over all robots of its largest component with one alignment. Agreement: ATE
-/// of a robot's estimate with the server's in the role of the reference. Robots whose reference is not for scoring get
-/// no accuracy.
+/// transforms between robots; the clouds. Accuracy: ATE after one rigid alignment (SE(3), no scale), RPE over 1 s and
+/// over 10 m, at keyframes; kink of every correction; the server's joint figure over all robots of its largest
+/// component with one alignment. Agreement: ATE of a robot's estimate with the server's in the role of the reference.
+/// Robots whose reference is not for scoring get no accuracy.
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const evaluation::AssociationConfig& association, MissionRecord& record);
 /// Calls evaluate_map() at the end.

@@ -3,6 +3,7 @@
 
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/evaluation/ate.hpp"
+#include "tutti/evaluation/kink.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/mission/evaluate.hpp"
 
@@ -18,7 +19,14 @@ Accuracy accuracy_of(const Trajectory& estimate, const MissionRecording& robot,
     out.rmse_m = ate->rmse_m;
     out.max_error_m = ate->max_m;
   }
-  if (const auto rpe = evaluation::rpe_over_time(pairs, kRpeInterval_s)) out.rpe_m = rpe->rmse_m;
+  if (const auto rpe = evaluation::rpe_over_time(pairs, kRpeInterval_s)) {
+    out.rpe_m = rpe->rmse_m;
+    out.rpe_deg = rpe->rmse_deg;
+  }
+  if (const auto rpe = evaluation::rpe_over_distance(pairs, kRpeWay_m)) {
+    out.rpe_10m_m = rpe->rmse_m;
+    out.rpe_10m_deg = rpe->rmse_deg;
+  }
   return out;
 }
 
@@ -31,10 +39,12 @@ void read_server_estimate(const server::MapEstimate& map, RobotRecord& out) {
 }
 
 PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& agent, const MissionRecording& robot,
-                           const Trajectory& server, const evaluation::AssociationConfig& association) {
+                           const Trajectory& raw, const Trajectory& server,
+                           const evaluation::AssociationConfig& association) {
   PolicyRecord out{.name = name, .corrected = agent.corrected()};
   out.accuracy = accuracy_of(out.corrected, robot, association);
   if (const auto agreement = evaluation::agreement(out.corrected, server)) out.agreement_rmse_m = agreement->rmse_m;
+  out.kink = evaluation::kink(raw, out.corrected, kRpeInterval_s);
   out.constraints_added = agent.ledger().size();
   for (const consistency::Constraint& c : agent.ledger().constraints())
     out.constraints.push_back({c.from_stamp, c.to_stamp, c.kind});
@@ -72,7 +82,8 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.onboard = accuracy_of(out.odometry, recording, association);
     out.server = accuracy_of(out.server_estimate, recording, association);
     for (const auto& [name, policy_agent] : robot.agents)
-      out.policies.push_back(policy_record(name, *policy_agent, recording, out.server_estimate, association));
+      out.policies.push_back(
+          policy_record(name, *policy_agent, recording, out.odometry, out.server_estimate, association));
     for (const robot::Whereabouts& other : agent->second->whereabouts())
       out.whereabouts.push_back({other.robot, other.stamp, other.T_map_body});
   }

@@ -11,8 +11,10 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/consistency/constraint.hpp"
+#include "tutti/consistency/explanation.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/evaluation/cloud_distance.hpp"
+#include "tutti/evaluation/kink.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
@@ -27,7 +29,10 @@ namespace tutti::mission {
 struct Accuracy {
   std::optional<double> rmse_m;       ///< ATE, root mean square.
   std::optional<double> max_error_m;  ///< ATE, largest.
-  std::optional<double> rpe_m;        ///< RPE, root mean square of the translation.
+  std::optional<double> rpe_m;        ///< RPE over MissionRecord::rpe_interval, root mean square of the translation.
+  std::optional<double> rpe_deg;      ///< The same, of the rotation.
+  std::optional<double> rpe_10m_m;    ///< RPE over a way of 10 m.
+  std::optional<double> rpe_10m_deg;
 };
 
 /// A constraint that a robot holds at the end of the mission, between two of its own keyframes.
@@ -42,6 +47,7 @@ struct PolicyRecord {
   std::string name;
   Accuracy accuracy;
   std::optional<double> agreement_rmse_m;  ///< ATE of the corrected estimate with the server's as the reference.
+  std::optional<evaluation::Kink> kink;    ///< What the correction does to short motions of the raw odometry.
   std::size_t constraints_added = 0;       ///< Held at the end of the mission.
   Trajectory corrected;                    ///< T_map_body at keyframes.
   std::vector<ConstraintRecord> constraints;
@@ -56,6 +62,16 @@ struct UpdateRecord {
   Eigen::VectorXd mean_disagreement_m;     ///< Per scale (0 = largest), over the synchronised nodes; before correcting.
   Eigen::VectorXd max_disagreement_m;      ///< Same shape.
   std::optional<double> agreement_rmse_m;  ///< Corrected against the broadcast, after correcting.
+  std::vector<consistency::SuspectedOrigin> origins;  ///< Where the raw odometry was then thought to part from the map.
+};
+
+/// A suspected localisation failure, followed over the updates: what two updates suspect is one when they overlap.
+struct AlertRecord {
+  consistency::SuspectedOrigin origin;  ///< As last seen.
+  double known_since_s = 0.0;           ///< Mission time of the first update that raised it.
+  std::uint64_t known_since_revision = 0;
+  /// Mission time of the first update that no longer raised it; none = it stands.
+  std::optional<double> withdrawn_s;
 };
 
 /// Where a robot believes another one to be at the end of the mission.
@@ -107,6 +123,8 @@ struct RobotRecord {
   Trajectory server_estimate;   ///< T_world_body at keyframes.
   Trajectory reference;         ///< T_reference_body, one frame for all robots; empty when there is none.
   std::vector<UpdateRecord> updates;
+  std::vector<AlertRecord> alerts;                      ///< By start; see follow_alerts().
+  std::optional<consistency::Explanation> explanation;  ///< Raw odometry against the map, at the last update.
   std::vector<WhereaboutsRecord> whereabouts;
   std::vector<DriftOrigin> drift_origins;  ///< Where its odometry really went wrong; empty when unknown.
   /// What it saw, put together by raw odometry and laid rigidly on the reference (without one: on the server's

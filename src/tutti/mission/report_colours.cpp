@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/report_colours.hpp"
 
+#include <fmt/format.h>
+
 namespace tutti::mission {
 
 // Hues that keep apart under the common colour deficiencies, and from the estimates' colours in report_html_style.cpp.
@@ -16,6 +18,10 @@ formats::Rgb robot_rgb_on_dark(std::size_t index) {
                                                            {197, 139, 224}, {224, 181, 65}, {95, 211, 234},
                                                            {244, 127, 181}, {169, 200, 106}};
   return kColours[index % kRobotColours];
+}
+
+std::string hex(formats::Rgb colour) {
+  return fmt::format("#{:02x}{:02x}{:02x}", colour.red, colour.green, colour.blue);
 }
 
 }  // namespace tutti::mission

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include "tutti/formats/ply.hpp"
 
@@ -11,5 +12,8 @@ namespace tutti::mission {
 inline constexpr std::size_t kRobotColours = 8;
 formats::Rgb robot_rgb(std::size_t index);
 formats::Rgb robot_rgb_on_dark(std::size_t index);
+
+/// "#0f6fb5"
+std::string hex(formats::Rgb colour);
 
 }  // namespace tutti::mission

@@ -55,6 +55,7 @@ std::string report_html(const MissionRecord& record) {
   body += joint_map_html(record);
   body += clouds_html(record);
   body += errors_html(record, geometry);
+  body += explanation_html(record);
   body += robot_maps_html(record, geometry);
   body += policies_html(record);
   body += disagreement_html(record);

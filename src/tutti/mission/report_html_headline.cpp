@@ -73,19 +73,6 @@ std::string robots_html(const MissionRecord& record) {
          cards_html(cards, "robots");
 }
 
-/// Stretches of odometry that the server convicted.
-std::string alerts_html(const MissionRecord& record) {
-  if (record.server.failed_odometry.empty()) return "";
-  std::string out = "<ul class=\"alerts\">\n";
-  for (const FailedOdometryRecord& failed : record.server.failed_odometry)
-    for (const RobotRecord& robot : record.robots)
-      if (robot.id == failed.robot)
-        out += fmt::format("<li><b>Localisation failure suspected:</b> {}, {:.0f}-{:.0f} s, {:.1f} m</li>\n",
-                           escape_xml(robot.name), mission_time_s(robot, failed.from),
-                           mission_time_s(robot, failed.until), failed.error_m);
-  return out + "</ul>\n";
-}
-
 std::vector<Card> map_cards(const MissionRecord& record) {
   const ServerRecord& server = record.server;
   std::vector<Card> cards;

@@ -38,6 +38,9 @@ struct HtmlTable {
 std::string html(const HtmlTable& table);
 
 std::string headline_html(const MissionRecord& record);
+/// Suspected failures of localisation, by the robots and by the server; part of the headline.
+std::string alerts_html(const MissionRecord& record);
+std::string explanation_html(const MissionRecord& record);
 std::string joint_map_html(const MissionRecord& record);
 std::string robot_maps_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
 std::string proxy_graph_html(const MissionRecord& record);

@@ -106,11 +106,19 @@ path.cloudkey { stroke: var(--cloud); stroke-width: 7; stroke-opacity: 0.35; }
 .drift.failure { stroke: var(--failure); } rect.drift.failure { stroke: none; fill: var(--failure); }
 rect.suspect { fill: none; stroke: var(--failure); stroke-width: 1.6; stroke-dasharray: 5 3; }
 .suspect { stroke: var(--failure); stroke-width: 2; stroke-dasharray: 5 3; }
+.origin { stroke: var(--accent); stroke-width: 8; } rect.origin { stroke: none; fill: var(--accent); }
+.origin.alert { stroke: var(--failure); } rect.origin.alert { stroke: none; fill: var(--failure); }
+.origin.along { stroke-opacity: 0.4; stroke-width: 11; }
+rect.originbox { fill: none; stroke: #ffffff; stroke-width: 1.6; pointer-events: none; }
+.figures + .scroll { margin: 8px 0 26px; }
+.rowline { stroke: #ffffff; stroke-width: 0.5; stroke-opacity: 0.28; }
+rect.truth.slip { fill: var(--slip); } rect.truth.degeneracy { fill: var(--degeneracy); } rect.truth.failure { fill: var(--failure); }
 .born { stroke: none; fill: var(--onboard); fill-opacity: 0.75; }
 .mark.held { stroke: var(--ink); stroke-width: 1.6; stroke-opacity: 0.8; }
 .alerts { list-style: none; padding: 0; margin: 0 0 18px; }
 .alerts li { border: 1px solid var(--failure); border-left-width: 6px; border-radius: 10px; padding: 8px 14px; margin: 6px 0;
   background: color-mix(in srgb, var(--failure) 8%, var(--card)); }
+.alerts li.withdrawn { border-color: var(--line); background: var(--card); color: var(--soft); }
 .robots { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 14px; margin: 0 0 14px; }
 .robots .card { padding: 18px 22px; } .robots .what { font-size: 16px; font-weight: 650; color: var(--ink); }
 .robots .value { font-size: 33px; } .robots .value small { font-size: 19px; white-space: nowrap; }
@@ -120,8 +128,6 @@ rect.suspect { fill: none; stroke: var(--failure); stroke-width: 1.6; stroke-das
 @media (max-width: 1120px) { table { font-size: 13px; } th, td { padding-left: 6px; padding-right: 6px; } th { white-space: normal; } td .track { width: 60px; } }
 @media print { main { max-width: none; padding: 0; } figure, .card, .scroll { break-inside: avoid; } }
 )css";
-
-std::string hex(formats::Rgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c.red, c.green, c.blue); }
 
 /// Every robot's colour, light and dark, and what is drawn in it.
 std::string robot_colours() {

@@ -40,22 +40,25 @@ void add_policy_rows(const MissionRecord& record, const RobotRecord& robot, std:
       body += fmt::format("<td{}>{}</td>", c == 0 ? " class=\"left\"" : "", cells[c]);
     body += "</tr>\n";
   };
-  body += fmt::format("<tr class=\"group\"><td class=\"left\" colspan=\"8\">{}</td></tr>\n", robot_cell(record, robot));
-  row("", {"onboard (raw odometry)", with_bar(robot.onboard.rmse_m, largest, "onboard"),
-           metres(robot.onboard.max_error_m), metres(robot.onboard.rpe_m), "", "", "", ""});
+  body +=
+      fmt::format("<tr class=\"group\"><td class=\"left\" colspan=\"10\">{}</td></tr>\n", robot_cell(record, robot));
+  row("",
+      {"onboard (raw odometry)", with_bar(robot.onboard.rmse_m, largest, "onboard"), metres(robot.onboard.max_error_m),
+       metres(robot.onboard.rpe_m), metres(robot.onboard.rpe_10m_m), "", "", "", "", ""});
   for (const auto& policy : robot.policies) {
     const bool chosen = policy.name == record.default_policy;
     const std::string_view bar = chosen ? "" : "other";
     const PolicyTiming* timing = find_timing(record, robot.name, policy.name);
     row(chosen ? "chosen" : "",
         {escape_xml(policy.name), referenced ? with_bar(policy.accuracy.rmse_m, largest, bar) : "-",
-         metres(policy.accuracy.max_error_m), metres(policy.accuracy.rpe_m),
+         metres(policy.accuracy.max_error_m), metres(policy.accuracy.rpe_m), metres(policy.accuracy.rpe_10m_m),
+         policy.kink ? metres(policy.kink->translation_m) : "-",
          referenced ? metres(policy.agreement_rmse_m) : with_bar(policy.agreement_rmse_m, largest, bar),
          std::to_string(policy.constraints_added), format_share(policy.constraints_added, robot.odometry_factors),
          timing != nullptr ? format_spread(timing->update_ms) : "-"});
   }
   row("", {"server", with_bar(robot.server.rmse_m, largest, "server"), metres(robot.server.max_error_m),
-           metres(robot.server.rpe_m), "", "", "", ""});
+           metres(robot.server.rpe_m), metres(robot.server.rpe_10m_m), "", "", "", "", ""});
 }
 
 /// What the mission took of the server, as if in real time; empty when not measured.
@@ -93,14 +96,17 @@ std::string policies_html(const MissionRecord& record) {
   if (record.robots.empty()) return "";
   std::string body =
       "<div class=\"scroll\"><table>\n<thead><tr><th class=\"left\">estimate or policy</th><th>RMSE</th><th>largest "
-      "error</th><th>RPE</th><th>RMSE to server</th><th>constraints</th><th>of odometry</th><th>update, median / "
+      "error</th><th>RPE</th><th>RPE, 10 m</th><th>kink</th><th>RMSE to server</th><th>constraints</th><th>of "
+      "odometry</th><th>update, median / "
       "max, ms</th></tr></thead>\n<tbody>\n";
   for (const auto& robot : record.robots) add_policy_rows(record, robot, body);
   return section(
       "Policies side by side",
-      fmt::format("Every policy answers the very same broadcasts; {} is the one the robot follows. RMSE and "
-                  "largest error at keyframes after one rigid alignment, without scale{}.",
-                  record.default_policy, record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
+      fmt::format(
+          "Every policy answers the very same broadcasts; {} is the one the robot follows. RMSE and "
+          "largest error at keyframes after one rigid alignment, without scale{}. Kink: the most that correcting "
+          "changed any motion over 1 s.",
+          record.default_policy, record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
       body + "</tbody></table></div>\n");
 }
 

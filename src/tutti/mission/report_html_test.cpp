@@ -112,9 +112,9 @@ TEST(ReportHtml, ShowsTheMapBesideTheSurvey) {
   expect_good_page(html);
   EXPECT_NE(html.find("The map beside the survey"), std::string::npos);
   EXPECT_NE(html.find("its map, mean distance to the survey: <b>0.410 m → 0.060 m</b>"), std::string::npos);
-  std::size_t pictures = 0;  // one under the joint map; four from above and four sections
+  std::size_t pictures = 0;  // one under the joint map; four from above and four sections; two disagreement maps
   for (std::size_t at = html.find("<image"); at != std::string::npos; at = html.find("<image", at + 1)) ++pictures;
-  EXPECT_EQ(pictures, 9U);
+  EXPECT_EQ(pictures, 11U);
 }
 
 TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
@@ -122,14 +122,44 @@ TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
   std::string html = report_html(record);
   for (const char* kind : {"drift slip", "drift degeneracy", "drift failure"})
     EXPECT_NE(html.find(std::string("<rect class=\"") + kind), std::string::npos) << kind;
-  EXPECT_EQ(html.find("Localisation failure suspected"), std::string::npos);
+  EXPECT_EQ(html.find("suspected by the server"), std::string::npos);
   const auto& robot = record.robots[1];
   record.robots[1].start_s = 300.0;
   record.server.failed_odometry = {{robot.id, robot.odometry[6].stamp, robot.odometry[15].stamp, 2.41}};
   html = report_html(record);
   expect_good_page(html);
-  EXPECT_NE(html.find("Localisation failure suspected:</b> bravo, 312-330 s, 2.4 m"), std::string::npos);
+  EXPECT_NE(html.find("suspected by the server:</b> bravo, 312.0 s - 330.0 s: 2.4 m"), std::string::npos);
   EXPECT_NE(html.find("<rect class=\"suspect\""), std::string::npos);
+}
+
+TEST(ReportHtml, ExplainsWhereOdometryAndMapPart) {
+  MissionRecord record = test::example_record();
+  record.robots[0].start_s = 600.0;
+  for (auto& alert : record.robots[0].alerts) alert.known_since_s += 600.0;
+  std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("Where odometry and map part"), std::string::npos);
+  EXPECT_NE(html.find("Localisation failure suspected:</b> alpha, 662.0 s - 672.0 s: 1.87 m, 17.8 deg over 7.00 m (scale 8.0 m), "
+                      "noticed by the robot at 720.0 s"),
+            std::string::npos);
+  EXPECT_NE(html.find("<td>failure, 660.0 s - 672.0 s: 1.900 m</td>"), std::string::npos) << "the true one";
+  for (const char* shape : {"<rect class=\"origin alert\"", "<rect class=\"origin\"", "<rect class=\"truth failure\"",
+                            "<rect class=\"originbox\""})
+    EXPECT_NE(html.find(shape), std::string::npos) << shape;
+  record.robots[0].alerts[0].withdrawn_s = 770.0;
+  EXPECT_NE(report_html(record).find("Localisation failure no longer suspected:</b> alpha"), std::string::npos);
+}
+
+TEST(ReportHtml, SaysWhenNothingHadToBeAdded) {
+  MissionRecord record = test::example_record({.robots = 1});
+  auto& robot = record.robots[0];
+  robot.explanation = test::example_explanation(robot.server_estimate, {});
+  robot.policies[2].constraints_added = 0;
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("odometry and map agree within what the server is sure of"), std::string::npos);
+  EXPECT_NE(html.find("nothing was added"), std::string::npos);
+  EXPECT_EQ(html.find("<rect class=\"origin"), std::string::npos);
 }
 
 TEST(ReportHtml, ListsTrafficByKindAndTheServersLoad) {
@@ -197,6 +227,11 @@ TEST(ReportHtml, SurvivesNumbersThatAreNotFinite) {
   record.robots[0].updates[0].mean_disagreement_m[2] = kNaN;
   record.robots[0].updates[0].max_disagreement_m.resize(3);
   record.robots[0].onboard.rmse_m = kNaN;
+  record.robots[0].explanation->significance(4, 2) = kNaN;
+  record.robots[0].explanation->significance(9, 1) = std::numeric_limits<double>::infinity();
+  record.robots[0].explanation->origins[0].translation_m = kNaN;
+  record.robots[0].explanation->origins[1].significance = std::numeric_limits<double>::infinity();
+  record.robots[0].explanation->scale_length_m[3] = kNaN;
   record.server.proxy.nodes[5].T_world_body.translation.z() = kNaN;
   record.transforms[0].T_from_to.translation.x() = kNaN;
   expect_good_page(report_html(record));

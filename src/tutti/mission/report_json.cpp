@@ -51,6 +51,72 @@ Json drift_json(const RobotRecord& robot) {
   return out;
 }
 
+/// Keys of one estimate's figures, each behind `prefix`.
+void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy) {
+  out[prefix + "rmse_m"] = number(accuracy.rmse_m);
+  out[prefix + "max_error_m"] = number(accuracy.max_error_m);
+  out[prefix + "rpe_m"] = number(accuracy.rpe_m);
+  out[prefix + "rpe_deg"] = number(accuracy.rpe_deg);
+  out[prefix + "rpe_10m_m"] = number(accuracy.rpe_10m_m);
+  out[prefix + "rpe_10m_deg"] = number(accuracy.rpe_10m_deg);
+}
+
+Json policy_json(const PolicyRecord& policy) {
+  Json out = Json::object();
+  add_accuracy(out, "", policy.accuracy);
+  out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
+  out["kink_deg"] = policy.kink ? number(policy.kink->rotation_deg) : Json(nullptr);
+  out["agreement_rmse_m"] = number(policy.agreement_rmse_m);
+  out["constraints"] = policy.constraints_added;
+  return out;
+}
+
+Json origin_json(const RobotRecord& robot, const consistency::SuspectedOrigin& origin) {
+  const auto& lengths_m = robot.explanation ? robot.explanation->scale_length_m : std::vector<double>{};
+  const auto scale = static_cast<std::size_t>(std::max(origin.scale, 0));
+  return {{"from_s", number(mission_time_s(robot, origin.from))},
+          {"until_s", number(mission_time_s(robot, origin.until))},
+          {"scale", origin.scale},
+          {"scale_length_m", scale < lengths_m.size() ? number(lengths_m[scale]) : Json(nullptr)},
+          {"length_m", number(origin.length_m)},
+          {"translation_m", number(origin.translation_m)},
+          {"rotation_rad", number(origin.rotation_rad)},
+          {"significance", number(origin.significance)},
+          {"alert", origin.alert}};
+}
+
+/// The last update's; null when there was none.
+Json explanation_json(const RobotRecord& robot) {
+  if (!robot.explanation) return nullptr;
+  const consistency::Explanation& e = *robot.explanation;
+  Json lengths = Json::array();
+  for (const double length_m : e.scale_length_m) lengths.push_back(number(length_m));
+  Json largest = Json::array();
+  for (Eigen::Index s = 0; s < e.significance.cols() && e.significance.rows() > 0; ++s)
+    largest.push_back(number(e.significance.col(s).maxCoeff()));
+  Json origins = Json::array();
+  for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
+  return {{"disagrees", e.disagrees()},
+          {"nodes", e.stamps.size()},
+          {"aligned_rmse_m", number(e.aligned_rmse_m)},
+          {"expected_rmse_m", e.expected_rmse_m > 0.0 ? number(e.expected_rmse_m) : Json(nullptr)},
+          {"scale_length_m", std::move(lengths)},
+          {"largest_significance", std::move(largest)},
+          {"suspected_origins", std::move(origins)}};
+}
+
+Json alerts_json(const RobotRecord& robot) {
+  Json out = Json::array();
+  for (const AlertRecord& alert : robot.alerts) {
+    Json row = origin_json(robot, alert.origin);
+    row["known_since_s"] = number(alert.known_since_s);
+    row["known_since_broadcast"] = alert.known_since_revision;
+    row["withdrawn_s"] = number(alert.withdrawn_s);
+    out.push_back(std::move(row));
+  }
+  return out;
+}
+
 Json traffic_json(const std::vector<TrafficRecord>& traffic) {
   Json rows = Json::array();
   for (const auto& row : traffic)
@@ -67,38 +133,32 @@ Json traffic_json(const std::vector<TrafficRecord>& traffic) {
 
 Json robot_json(const RobotRecord& robot) {
   Json policies = Json::object();
-  for (const auto& policy : robot.policies)
-    policies[policy.name] = {{"rmse_m", number(policy.accuracy.rmse_m)},
-                             {"max_error_m", number(policy.accuracy.max_error_m)},
-                             {"rpe_m", number(policy.accuracy.rpe_m)},
-                             {"agreement_rmse_m", number(policy.agreement_rmse_m)},
-                             {"constraints", policy.constraints_added}};
-  return {{"name", robot.name},
-          {"distance_m", number(robot.distance_m)},
-          {"start_s", number(robot.start_s)},
-          {"duration_s", number(robot.duration_s)},
-          {"odometry_factors", robot.odometry_factors},
-          {"keyframes", robot.keyframes},
-          {"submaps", robot.submaps},
-          {"component", robot.component},
-          {"onboard_rmse_m", number(robot.onboard.rmse_m)},
-          {"onboard_max_error_m", number(robot.onboard.max_error_m)},
-          {"onboard_rpe_m", number(robot.onboard.rpe_m)},
-          {"server_rmse_m", number(robot.server.rmse_m)},
-          {"server_max_error_m", number(robot.server.max_error_m)},
-          {"server_rpe_m", number(robot.server.rpe_m)},
-          {"map_error",
-           {{"onboard", map_error_json(robot.map_error.onboard)},
-            {"corrected", map_error_json(robot.map_error.corrected)}}},
-          {"drift_origins", drift_json(robot)},
-          {"policies", std::move(policies)},
-          {"bytes_up", robot.bytes_up},
-          {"bytes_down", robot.bytes_down},
-          {"messages_up", robot.messages_up},
-          {"messages_down", robot.messages_down},
-          {"traffic", traffic_json(robot.traffic)},
-          {"proxy_nodes", robot.proxy_nodes},
-          {"updates", robot.updates.size()}};
+  for (const auto& policy : robot.policies) policies[policy.name] = policy_json(policy);
+  Json out{{"name", robot.name},
+           {"distance_m", number(robot.distance_m)},
+           {"start_s", number(robot.start_s)},
+           {"duration_s", number(robot.duration_s)},
+           {"odometry_factors", robot.odometry_factors},
+           {"keyframes", robot.keyframes},
+           {"submaps", robot.submaps},
+           {"component", robot.component}};
+  add_accuracy(out, "onboard_", robot.onboard);
+  add_accuracy(out, "server_", robot.server);
+  out.update({{"map_error",
+               {{"onboard", map_error_json(robot.map_error.onboard)},
+                {"corrected", map_error_json(robot.map_error.corrected)}}},
+              {"drift_origins", drift_json(robot)},
+              {"explanation", explanation_json(robot)},
+              {"alerts", alerts_json(robot)},
+              {"policies", std::move(policies)},
+              {"bytes_up", robot.bytes_up},
+              {"bytes_down", robot.bytes_down},
+              {"messages_up", robot.messages_up},
+              {"messages_down", robot.messages_down},
+              {"traffic", traffic_json(robot.traffic)},
+              {"proxy_nodes", robot.proxy_nodes},
+              {"updates", robot.updates.size()}});
+  return out;
 }
 
 Json server_json(const MissionRecord& record) {

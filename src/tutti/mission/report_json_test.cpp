@@ -41,7 +41,8 @@ TEST(ReportJson, HasTheDocumentedKeys) {
     ASSERT_EQ(robot["policies"].size(), 6U);
     for (const auto& policy : robot["policies"])
       EXPECT_EQ(keys(policy),
-                (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "agreement_rmse_m", "constraints"}));
+                (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg",
+                                       "kink_m", "kink_deg", "agreement_rmse_m", "constraints"}));
   }
   expect_keys(report["server"], {"components", "closures_accepted", "closures_rejected", "rmse_m"});
   for (const auto& transform : report["transforms"])
@@ -61,6 +62,34 @@ TEST(ReportJson, CarriesTheRecordsFigures) {
   EXPECT_EQ(
       report["server"]["closures_accepted_intra"].get<int>() + report["server"]["closures_accepted_inter"].get<int>(),
       report["server"]["closures_accepted"].get<int>());
+}
+
+TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
+  MissionRecord record = test::example_record();
+  record.robots[1].start_s = 300.0;
+  record.robots[0].explanation.reset();
+  record.robots[0].alerts.clear();
+  const json report = json::parse(report_json(record));
+  EXPECT_TRUE(report["robots"][0]["explanation"].is_null());
+  EXPECT_TRUE(report["robots"][0]["alerts"].empty());
+  const json& explanation = report["robots"][1]["explanation"];
+  EXPECT_TRUE(explanation["disagrees"]);
+  EXPECT_EQ(explanation["nodes"], record.robots[1].explanation->stamps.size());
+  ASSERT_EQ(explanation["largest_significance"].size(), explanation["scale_length_m"].size());
+  EXPECT_NEAR(explanation["largest_significance"][4], 8.7, 1.0);
+  ASSERT_EQ(explanation["suspected_origins"].size(), 2U);
+  const json& failure = explanation["suspected_origins"][1];
+  EXPECT_DOUBLE_EQ(failure["from_s"], 362.0);
+  EXPECT_DOUBLE_EQ(failure["until_s"], 372.0);
+  EXPECT_DOUBLE_EQ(failure["scale_length_m"], 8.0);
+  EXPECT_TRUE(failure["alert"]);
+  ASSERT_EQ(report["robots"][1]["alerts"].size(), 1U);
+  const json& alert = report["robots"][1]["alerts"][0];
+  EXPECT_DOUBLE_EQ(alert["from_s"], 362.0);
+  EXPECT_EQ(alert["known_since_broadcast"], record.robots[1].alerts[0].known_since_revision);
+  EXPECT_TRUE(alert["withdrawn_s"].is_null());
+  EXPECT_DOUBLE_EQ(report["robots"][1]["onboard_rpe_10m_m"], 0.095);
+  EXPECT_DOUBLE_EQ(report["robots"][1]["policies"]["spectral"]["kink_m"], 0.01);
 }
 
 TEST(ReportJson, MapErrorWhereThereIsASurvey) {

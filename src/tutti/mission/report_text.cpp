@@ -8,7 +8,9 @@
 #include <cmath>
 #include <sstream>
 
+#include "tutti/mission/report_explanation.hpp"
 #include "tutti/mission/report_format.hpp"
+#include "tutti/mission/report_geometry.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -82,13 +84,17 @@ std::string plural(std::size_t count, const std::string& noun) {
 
 std::string robots_table(const MissionRecord& record) {
   Table table(2);
-  table.add({"robot", "estimate", "RMSE", "max", "RPE", "to server", "constraints", "update ms"});
+  table.add({"robot", "estimate", "RMSE", "max", "RPE", "RPE 10 m", "to server", "constraints", "update ms"});
   for (const auto& robot : record.robots) {
     table.rule();
     const auto row = [&](const std::string& left, const std::string& estimate, const Accuracy& accuracy,
                          std::vector<std::string> rest) {
-      std::vector<std::string> cells{left, estimate, format_metres(accuracy.rmse_m),
-                                     format_metres(accuracy.max_error_m), format_metres(accuracy.rpe_m)};
+      std::vector<std::string> cells{left,
+                                     estimate,
+                                     format_metres(accuracy.rmse_m),
+                                     format_metres(accuracy.max_error_m),
+                                     format_metres(accuracy.rpe_m),
+                                     format_metres(accuracy.rpe_10m_m)};
       cells.insert(cells.end(), rest.begin(), rest.end());
       table.add(std::move(cells));
     };
@@ -187,6 +193,39 @@ std::string server_lines(const MissionRecord& record) {
   return out;
 }
 
+std::string between(const RobotRecord& robot, const consistency::SuspectedOrigin& origin) {
+  return fmt::format("{} - {}", format_moment(mission_time_s(robot, origin.from)),
+                     format_moment(mission_time_s(robot, origin.until)));
+}
+
+/// Where odometry and map part, what the robots warned of, and how gently they were corrected.
+std::string explanation_lines(const MissionRecord& record) {
+  std::string out;
+  for (const RobotRecord& robot : record.robots) {
+    for (const AlertRecord& alert : robot.alerts)
+      out += wrap(fmt::format("{}: localisation failure {}, {}: {}; noticed at {}.", robot.name,
+                              alert.withdrawn_s ? "no longer suspected" : "suspected", between(robot, alert.origin),
+                              format_origin_size(alert.origin), format_moment(alert.known_since_s)),
+                  "  alert    ");
+    const PolicyRecord* policy = find_policy(robot, record.default_policy);
+    if (robot.explanation && !robot.explanation->stamps.empty()) {
+      const consistency::Explanation& e = *robot.explanation;
+      const auto drift = std::count_if(e.origins.begin(), e.origins.end(), [](const auto& o) { return !o.alert; });
+      std::string text = e.disagrees() ? fmt::format("{}: odometry and map part by up to {} the threshold; {} of drift",
+                                                     robot.name, format_significance(e.significance.maxCoeff()),
+                                                     plural(static_cast<std::size_t>(drift), "suspected origin"))
+                                       : robot.name + ": odometry and map agree within what the server is sure of";
+      if (policy != nullptr && policy->constraints_added == 0) text += "; nothing was added";
+      out += wrap(text + ".", "  compare  ");
+    }
+    if (policy != nullptr && policy->kink && policy->constraints_added > 0)
+      out += wrap(fmt::format("{}: correcting changed no motion over 1 s by more than {} and {:.3f} deg.", robot.name,
+                              format_metres(policy->kink->translation_m), policy->kink->rotation_deg),
+                  "  kink     ");
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string report_text(const MissionRecord& record, const std::string& report_html_path) {
@@ -201,14 +240,19 @@ std::string report_text(const MissionRecord& record, const std::string& report_h
                                         [](const RobotRecord& robot) { return robot.onboard.rmse_m.has_value(); });
     out += "\n";
     out += robots_table(record);
-    out += referenced ? "  RMSE, max, RPE: against the reference, after one rigid alignment per robot.\n"
-                      : "  No reference: only the distance of corrected to server could be measured.\n";
+    out +=
+        referenced
+            ? fmt::format(
+                  "  RMSE, max: against the reference, after one rigid alignment per robot. RPE: over {} and 10 m.\n",
+                  record.rpe_interval)
+            : std::string("  No reference: only the distance of corrected to server could be measured.\n");
     out += "  to server: RMSE of corrected against server. update ms: median / max, wall clock.\n";
     out += "\n  Policies side by side, on the same broadcasts (* = corrected above)\n";
     for (std::size_t first = 0; first < record.robots.size(); first += kRobotsPerPolicyTable)
       out += policies_table(record, first, std::min(first + kRobotsPerPolicyTable, record.robots.size())) + "\n";
     out += radio_table(record) + "\n";
   }
+  out += explanation_lines(record);
   out += server_lines(record);
   for (const auto& note : record.notes) out += wrap(note, "  note     ");
   if (record.timing.wall_s > 0.0)

@@ -46,6 +46,27 @@ TEST(ReportText, ShowsTheFigures) {
   EXPECT_NE(text.find("kB/s"), std::string::npos);
 }
 
+TEST(ReportText, TellsOfAlertsAndKinks) {
+  MissionRecord record = test::example_record();
+  const std::string text = report_text(record, "x");
+  expect_readable(text);
+  EXPECT_NE(text.find("alert    alpha: localisation failure suspected, 62.0 s - 72.0 s: 1.87 m, 17.8 deg"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("compare  bravo: odometry and map part by up to"), std::string::npos) << text;
+  EXPECT_NE(text.find("kink     alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
+            std::string::npos)
+      << text;
+  record.robots.resize(1);
+  record.robots[0].explanation = test::example_explanation(record.robots[0].server_estimate, {});
+  record.robots[0].alerts.clear();
+  record.robots[0].policies[2].constraints_added = 0;
+  const std::string quiet = report_text(record, "x");
+  EXPECT_EQ(quiet.find("localisation failure"), std::string::npos);
+  EXPECT_NE(quiet.find("agree within what the server is sure of; nothing was added"), std::string::npos) << quiet;
+  EXPECT_EQ(quiet.find("kink  "), std::string::npos);
+}
+
 TEST(ReportText, SaysWhenThereIsNoReference) {
   const std::string text = report_text(test::example_record({.reference = false}), "x");
   EXPECT_NE(text.find("No reference"), std::string::npos);

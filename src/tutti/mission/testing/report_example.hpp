@@ -9,7 +9,9 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/mission/follow_alerts.hpp"
 #include "tutti/mission/record.hpp"
+#include "tutti/mission/testing/explanation_example.hpp"
 
 /// For tests of the report only: a made-up mission record with plausible shapes. Its figures mean nothing.
 namespace tutti::mission::test {
@@ -136,7 +138,9 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
     const Pose3 T_map_truth = robot.odometry.front().pose * truth.front().pose.inverse();
     policy.corrected = moved(T_map_truth, noisy(truth, quality[p], rng.fork(p)));
     policy.constraints_added = p == 0 ? options.keyframes - 1 : p == 1 ? 2 * options.keyframes - 3 : 24;
-    if (options.reference) policy.accuracy = {quality[p] * 1.7, quality[p] * 4.0, quality[p] * 0.8};
+    if (options.reference)
+      policy.accuracy = {quality[p] * 1.7, quality[p] * 4.0, quality[p] * 0.8, 0.11, quality[p] * 1.1, 0.3};
+    policy.kink = evaluation::Kink{0.5 * quality[p], 20.0 * quality[p], {}, {}};
     policy.agreement_rmse_m = quality[p];
     if (p == 2)
       for (std::size_t k = 0; k + 12 < options.keyframes; k += 6)
@@ -151,8 +155,8 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
     robot.policies.push_back(std::move(policy));
   }
   if (options.reference) {
-    robot.onboard = {0.712 + 0.1 * static_cast<double>(index), 1.4, 0.021};
-    robot.server = {0.0173, 0.05, 0.024};
+    robot.onboard = {0.712 + 0.1 * static_cast<double>(index), 1.4, 0.021, 0.12, 0.095, 0.41};
+    robot.server = {0.0173, 0.05, 0.024, 0.13, 0.026, 0.14};
   }
   for (std::uint64_t u = 1; 20.0 * static_cast<double>(u) <= robot.duration_s; ++u)
     robot.updates.push_back(example_update(20.0 * static_cast<double>(u), u, rng.fork(100 + u)));
@@ -208,6 +212,10 @@ inline void add_example_survey(MissionRecord& record) {
   record.server.survey_covered = 0.97;
 }
 
+inline double mission_time_of(const RobotRecord& robot, Timestamp stamp) {
+  return robot.start_s + (stamp - robot.odometry.front().stamp);
+}
+
 inline MissionRecord example_record(ExampleOptions options = {}) {
   options.cloud = options.cloud || options.survey;
   const Rng rng(7);
@@ -237,6 +245,25 @@ inline MissionRecord example_record(ExampleOptions options = {}) {
     robot.drift_origins = {{DriftOrigin::Kind::slip, stamp(10), stamp(11), 0.21, 0.02},
                            {DriftOrigin::Kind::degeneracy, stamp(18), stamp(24), 0.8, 0.0},
                            {DriftOrigin::Kind::failure, stamp(30), stamp(36), 1.9, 0.3}};
+    robot.explanation = example_explanation(robot.server_estimate, {{.from = stamp(17),
+                                                                     .until = stamp(25),
+                                                                     .scale = 3,
+                                                                     .length_m = 11.2,
+                                                                     .translation_m = 0.78,
+                                                                     .rotation_rad = 0.01,
+                                                                     .significance = 2.4},
+                                                                    {.from = stamp(31),
+                                                                     .until = stamp(36),
+                                                                     .scale = 4,
+                                                                     .length_m = 7.0,
+                                                                     .translation_m = 1.87,
+                                                                     .rotation_rad = 0.31,
+                                                                     .significance = 8.7,
+                                                                     .alert = true}});
+    for (auto& update : robot.updates)
+      for (const auto& origin : robot.explanation->origins)
+        if (mission_time_of(robot, origin.until) + 30.0 < update.time_s) update.origins.push_back(origin);
+    robot.alerts = follow_alerts(robot.updates);
   }
   record.server = example_server(record.robots, options, rng.fork("cloud"));
   if (options.survey) add_example_survey(record);

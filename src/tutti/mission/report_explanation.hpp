@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tutti/consistency/explanation.hpp"
+#include "tutti/formats/ply.hpp"
+#include "tutti/mission/png.hpp"
+#include "tutti/mission/report_geometry.hpp"
+#include "tutti/mission/report_plot.hpp"
+#include "tutti/model/recording.hpp"
+
+/// An explanation as pictures and words; the same for a mission's report and for `tutti compare`.
+namespace tutti::mission {
+
+/// Colour of a disagreement in units of its threshold: dark blue to slate below 1, red to yellow above, lightness
+/// increasing with a jump at 1; from kMostShown on all look the same.
+formats::Rgb significance_colour(double significance);
+inline constexpr double kMostShown = 10.0;
+
+/// Clock of a picture: `at_start_s` is shown where `start` is.
+struct PictureClock {
+  Timestamp start;
+  double at_start_s = 0.0;
+  [[nodiscard]] double operator()(Timestamp stamp) const { return at_start_s + (stamp - start); }
+};
+
+/// The disagreement map, `row_height` rows of pixels per scale (0 on top), the time axis over `width` columns: in each
+/// the largest significance of the nodes there; a node speaks for the time half-way to its neighbours. Transparent
+/// where no node is.
+Image significance_image(const consistency::Explanation& explanation, const PictureClock& clock, const Range& time_s,
+                         std::size_t width, std::size_t row_height);
+
+struct ExplanationPicture {
+  const consistency::Explanation* explanation = nullptr;
+  std::string label;
+  PictureClock clock;
+  Range time_s;
+  std::string time_axis;               ///< "mission time [s]"
+  std::span<const DriftOrigin> truth;  ///< Beside the suspected origins; empty = unknown.
+  std::size_t hover_columns = 60;      ///< With words for those who point at them.
+};
+
+/// Time x scale with a bar for every suspected origin, and one for every true one under it.
+std::string explanation_svg(const ExplanationPicture& picture, double width_px);
+/// HTML: what the colours of significance_image() mean.
+std::string significance_scale_html();
+/// What the bars and strokes mean.
+std::vector<LegendEntry> origin_legend(std::span<const consistency::SuspectedOrigin> origins);
+
+/// Strokes along a way where odometry is suspected; `pixels`: one per pose of `route`.
+void draw_origins(Svg& svg, std::span<const consistency::SuspectedOrigin> origins, const Trajectory& route,
+                  const Points2d& pixels, const PictureClock& clock);
+
+/// Seconds, as on the pictures' axes: "712.3 s".
+std::string format_moment(double value_s);
+/// "0.41 m, 1.30 deg over 12.0 m".
+std::string format_origin_size(const consistency::SuspectedOrigin& origin);
+/// The scale an origin stands out at, as a length: "16 m"; "-" when the explanation does not have it.
+std::string format_scale(const consistency::Explanation& explanation, int scale);
+/// "3.1 x"
+std::string format_significance(double significance);
+
+/// The true origin that a suspected one overlaps most in time; nothing when none.
+std::optional<DriftOrigin> overlapping(const consistency::SuspectedOrigin& origin, std::span<const DriftOrigin> truth);
+
+}  // namespace tutti::mission
