@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/formats/graph_stamps.hpp"
+
+#include <limits>
+
+#include "tutti/formats/internal/text.hpp"
+
+namespace tutti::formats {
+namespace {
+
+constexpr std::string_view kLayout = "id,robot,keyframe,stamp_ns";
+
+Result<std::uint32_t> small_number(const internal::LineReader& line, std::size_t column, std::string_view what) {
+  const auto value = line.integer(column, what);
+  if (!value) return tl::unexpected(value.error());
+  if (*value < 0 || *value > std::numeric_limits<std::uint32_t>::max())
+    return line.fail(ErrorCode::invalid, "{} is {}, expected 0 to 2^32 - 1", what, *value);
+  return static_cast<std::uint32_t>(*value);
+}
+
+}  // namespace
+
+Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name) {
+  internal::LineReader line(text, name, internal::Separator::comma);
+  std::vector<VertexStamp> out;
+  for (bool first = true; line.next(); first = false) {
+    if (auto ok = line.expect_columns(4, kLayout); !ok) return tl::unexpected(ok.error());
+    if (first && line.columns()[0] == "id") continue;
+    const auto id = line.integer(0, "id");
+    const auto robot = small_number(line, 1, "robot");
+    const auto keyframe = small_number(line, 2, "keyframe");
+    const auto stamp_ns = line.integer(3, "stamp_ns");
+    if (!id) return tl::unexpected(id.error());
+    if (!robot) return tl::unexpected(robot.error());
+    if (!keyframe) return tl::unexpected(keyframe.error());
+    if (!stamp_ns) return tl::unexpected(stamp_ns.error());
+    if (!internal::is_in_range({*stamp_ns}))
+      return line.fail(ErrorCode::invalid, "stamp_ns {} is out of range", *stamp_ns);
+    out.push_back({*id, {{*robot}, *keyframe}, {*stamp_ns}});
+  }
+  return out;
+}
+
+Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path) {
+  return internal::read_file(path).and_then([&](const std::string& text) { return parse_graph_stamps(text, path); });
+}
+
+}  // namespace tutti::formats

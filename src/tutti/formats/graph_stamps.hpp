@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/base/timestamp.hpp"
+
+/// Which robot and moment each vertex of a pose graph is: the csv that a mission writes beside graph.g2o, with the
+/// header `id,robot,keyframe,stamp_ns` (docs/report.md).
+namespace tutti::formats {
+
+struct VertexStamp {
+  std::int64_t vertex_id = 0;
+  KeyframeId keyframe;
+  Timestamp stamp;
+  friend bool operator==(const VertexStamp&, const VertexStamp&) = default;
+};
+
+/// In file order. Errors name file and line.
+Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name);
+Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path);
+
+}  // namespace tutti::formats
