@@ -39,7 +39,7 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud = {});
 Result<SubmapMessage> decode_submap(std::string_view bytes);
 
 /// Exact: ids, stamps, support, radius, sigma, edges' ends. Poses: 5e-4 m, 1e-4 rad. Covariance: 25 % of the variance
-/// in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4.
+/// in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4. Shape: 5 %.
 std::string encode(const ProxyGraphMessage& message);
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
 
@@ -55,7 +55,8 @@ Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes);
 Result<MessageKind> peek_kind(std::string_view bytes);
 
 /// What every message must fulfil, whoever made it: finite values, unit quaternions, consecutive indices, increasing
-/// stamps, symmetric positive semidefinite covariances, sorted nodes, indices in range, counts within limits.
+/// stamps, symmetric positive semidefinite covariances, sorted nodes, indices in range, counts within limits, shapes of
+/// robots with nodes and of the size that those nodes give.
 Status validate(const SubmapMessage& message);
 Status validate(const ProxyGraphMessage& message);
 Status validate(const ClosureVerdict& verdict);

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "tutti/wire/internal/shape.hpp"
 #include "tutti/wire/limits.hpp"
 #include "tutti/wire/testing/messages.hpp"
 
@@ -142,9 +143,39 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
     RC_ASSERT(out.edges[i].b == in.edges[i].b);
     RC_ASSERT(std::abs(out.edges[i].weight - in.edges[i].weight) <= 2.5e-4 * in.edges[i].weight);
   }
+  RC_ASSERT(out.shapes.size() == in.shapes.size());
+  const auto close = [](const ShapeSigma& a, const ShapeSigma& b) {
+    return std::abs(a.position_m - b.position_m) <= 0.05 * a.position_m &&
+           std::abs(a.rotation_rad - b.rotation_rad) <= 0.05 * a.rotation_rad;
+  };
+  for (std::size_t s = 0; s < in.shapes.size(); ++s) {
+    RC_ASSERT(out.shapes[s].robot == in.shapes[s].robot);
+    RC_ASSERT(close(in.shapes[s].whole, out.shapes[s].whole));
+    RC_ASSERT(out.shapes[s].sag.size() == in.shapes[s].sag.size());
+    for (std::size_t j = 0; j < in.shapes[s].sag.size(); ++j)
+      RC_ASSERT(std::ranges::equal(in.shapes[s].sag[j], out.shapes[s].sag[j], close));
+  }
   const auto again = decode_proxy_graph(encode(*decoded));
   RC_ASSERT(again.has_value());
   RC_ASSERT(again->graph == out);
+}
+
+RC_GTEST_PROP(ProxyGraphCodec, SigmasKeepFivePercentAndChangeOnlyOnce, ()) {
+  const double sigma = std::exp(any_rng().uniform(std::log(1.1e-6), std::log(3e4)));
+  const auto code = quantise_sigma(sigma);
+  const auto back = dequantise_sigma(code);
+  RC_ASSERT(back.has_value());
+  RC_ASSERT(std::abs(*back - sigma) <= 0.05 * sigma);
+  RC_ASSERT(quantise_sigma(*back) == code);
+}
+
+TEST(ProxyGraphCodec, SigmasAtTheirLimits) {
+  EXPECT_EQ(*dequantise_sigma(quantise_sigma(0.0)), 0.0);
+  EXPECT_NEAR(*dequantise_sigma(quantise_sigma(1e-300)), 1e-6, 1e-15);
+  EXPECT_GT(*dequantise_sigma(quantise_sigma(1e300)), 3e4);
+  EXPECT_EQ(quantise_sigma(*dequantise_sigma(kLastSigmaCode)), kLastSigmaCode);
+  EXPECT_FALSE(dequantise_sigma(-1).has_value());
+  EXPECT_FALSE(dequantise_sigma(kLastSigmaCode + 1).has_value());
 }
 
 RC_GTEST_PROP(VerdictCodec, IsExact, ()) {
@@ -159,11 +190,16 @@ TEST(Codec, BytesOnTheRadio) {
   Rng rng(5);
   const ProxyGraphMessage graph = test::any_proxy_graph(rng, 1, 1295, false);
   const double per_node = static_cast<double>(encode(graph).size()) / static_cast<double>(graph.graph.nodes.size());
+  ProxyGraphMessage shapeless = graph;
+  shapeless.graph.shapes.clear();
+  const double without_shapes = static_cast<double>(encode(shapeless).size());
   SubmapMessage submap = test::any_submap(rng, 12, 0);
   for (RelativePose& odometry : submap.submap.odometry) odometry.covariance = test::odometry_covariance(1.0, 0.1);
   const std::size_t without_cloud = encode(submap).size();
-  std::printf("%.1f bytes per proxy node, %zu bytes per submap of 12 keyframes without cloud\n", per_node,
-              without_cloud);
+  const double share = static_cast<double>(encode(graph).size()) / without_shapes - 1.0;
+  std::printf("%.1f bytes per proxy node, shapes add %.1f %%; %zu bytes per submap of 12 keyframes without cloud\n",
+              per_node, 100.0 * share, without_cloud);
+  EXPECT_LT(share, 0.04);
   EXPECT_LT(per_node, 14.0);
   EXPECT_LT(without_cloud, 700U);
 }
@@ -236,6 +272,31 @@ TEST(Validate, ProxyGraph) {
                            {"weight", [](M& m) { m.graph.edges[0].weight = -1.0; }},
                            {"weight", [](M& m) { m.graph.edges[0].weight = 1e300; }},
                            {"unreduced", [](M& m) { m.graph.reduced = false; }}});
+}
+
+TEST(Validate, Shapes) {
+  Rng rng(9);
+  ProxyGraphMessage good = test::any_proxy_graph(rng, 3, 40, false);
+  ASSERT_EQ(good.graph.shapes.size(), 2U);
+  ASSERT_EQ(good.graph.shapes[0].sag.size(), 3U);
+  using M = ProxyGraphMessage;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  expect_refused<M>(good, {{"come after", [](M& m) { std::swap(m.graph.shapes[0], m.graph.shapes[1]); }},
+                           {"come after", [](M& m) { m.graph.shapes[1] = m.graph.shapes[0]; }},
+                           {"robot has no nodes", [](M& m) { m.graph.shapes[1].robot.value += 1; }},
+                           {"finite", [](M& m) { m.graph.shapes[0].whole.position_m = kNan; }},
+                           {"finite", [](M& m) { m.graph.shapes[0].whole.rotation_rad = -1e-9; }},
+                           {"finite", [](M& m) { m.graph.shapes[1].sag[2][0].position_m = kInfinity; }},
+                           {"finite", [](M& m) { m.graph.shapes[1].sag[0][3].rotation_rad = kNan; }},
+                           {"2 scales, expected 3", [](M& m) { m.graph.shapes[0].sag.pop_back(); }},
+                           {"4 scales, expected 3", [](M& m) { m.graph.shapes[0].sag.emplace_back(); }},
+                           {"3 stretches of scale 0, expected 4", [](M& m) { m.graph.shapes[0].sag[0].pop_back(); }},
+                           {"of 41 nodes", [](M& m) {
+                              ProxyNode node = m.graph.nodes.back();
+                              node.stamp.ns += 1;
+                              m.graph.nodes.push_back(node);
+                              m.graph.shapes.back().sag[0].pop_back();
+                            }}});
 }
 
 TEST(Validate, Verdict) {

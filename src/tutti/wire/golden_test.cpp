@@ -38,7 +38,7 @@ TEST(Golden, Submap) {
                               {161, {1'577'836'981'199'104'651}, {kQuarterTurn, {2, 2, 3}}, false}};
   message.submap.odometry = {{{kQuarterTurn, {1, 0, 0}}, diagonal(4e-4, 1e-4)}};
   message.submap.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}});
-  const auto decoded = decode_submap(golden_bytes("submap_v2.bin", encode(message)));
+  const auto decoded = decode_submap(golden_bytes("submap_v3.bin", encode(message)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   const Submap& submap = decoded->submap;
   EXPECT_EQ(decoded->header, message.header);
@@ -67,11 +67,14 @@ TEST(Golden, ProxyGraph) {
   graph.nodes = {{RobotId{0}, {1'000'000'001}, {Eigen::Quaterniond::Identity(), {0, 0, 0}}, Matrix6d::Zero(), 0},
                  {RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}, diagonal(1e-4, 1e-6), 5},
                  {RobotId{7}, {2'000'000'000}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1}};
+  for (std::int64_t k = 1; k < 9; ++k)
+    graph.nodes.push_back({RobotId{7}, {2'000'000'000 + k}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1});
   graph.components = {{RobotId{0}, 0}, {RobotId{7}, 1}};
   graph.reduced = true;
   graph.edges = {{0, 1, 0.625}};
   graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
-  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v2.bin", encode(message)));
+  graph.shapes = {{RobotId{0}, {0.25, 0.0}, {}}, {RobotId{7}, {0.5, 0.01}, {{{0.03, 0.002}}}}};
+  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v3.bin", encode(message)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   EXPECT_EQ(decoded->header, message.header);
   EXPECT_EQ(decoded->graph.revision, 42U);
@@ -82,8 +85,18 @@ TEST(Golden, ProxyGraph) {
   EXPECT_EQ(decoded->graph.edges[0].b, 1U);
   EXPECT_NEAR(decoded->graph.edges[0].weight, 0.625, 2e-4);
   EXPECT_EQ(decoded->graph.eliminated, graph.eliminated);
-  ASSERT_EQ(decoded->graph.nodes.size(), 3U);
-  for (std::size_t i = 0; i < 3; ++i) {
+  ASSERT_EQ(decoded->graph.shapes.size(), 2U);
+  EXPECT_EQ(decoded->graph.shapes[0].robot, RobotId{0});
+  EXPECT_NEAR(decoded->graph.shapes[0].whole.position_m, 0.25, 0.0125);
+  EXPECT_EQ(decoded->graph.shapes[0].whole.rotation_rad, 0.0);
+  EXPECT_TRUE(decoded->graph.shapes[0].sag.empty());
+  EXPECT_EQ(decoded->graph.shapes[1].robot, RobotId{7});
+  ASSERT_EQ(decoded->graph.shapes[1].sag.size(), 1U);
+  ASSERT_EQ(decoded->graph.shapes[1].sag[0].size(), 1U);
+  EXPECT_NEAR(decoded->graph.shapes[1].sag[0][0].position_m, 0.03, 0.0015);
+  EXPECT_NEAR(decoded->graph.shapes[1].sag[0][0].rotation_rad, 0.002, 0.0001);
+  ASSERT_EQ(decoded->graph.nodes.size(), graph.nodes.size());
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     EXPECT_EQ(decoded->graph.nodes[i].robot, graph.nodes[i].robot);
     EXPECT_EQ(decoded->graph.nodes[i].stamp, graph.nodes[i].stamp);
     EXPECT_EQ(decoded->graph.nodes[i].support, graph.nodes[i].support);
@@ -97,7 +110,7 @@ TEST(Golden, Verdict) {
   const ClosureVerdict verdict{
       .pair = {{RobotId{0}, 3}, {RobotId{1}, 4}},
       .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}}};
-  const auto decoded = decode_verdict(golden_bytes("verdict_v2.bin", encode(verdict)));
+  const auto decoded = decode_verdict(golden_bytes("verdict_v3.bin", encode(verdict)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   EXPECT_EQ(*decoded, verdict);
 }

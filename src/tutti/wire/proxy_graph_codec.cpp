@@ -14,6 +14,7 @@
 #include "tutti/wire/internal/columns.hpp"
 #include "tutti/wire/internal/integer_coder.hpp"
 #include "tutti/wire/internal/quantise.hpp"
+#include "tutti/wire/internal/shape.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -33,6 +34,7 @@ struct Run {
   Clock clock;
   std::size_t nodes = 0;
   std::size_t eliminated = 0;
+  bool has_shape = false;
 };
 
 // One routine serves both ways, so that they cannot differ: it hands each number to code(model, number), which writes
@@ -136,6 +138,49 @@ class EdgeColumns {
   IntegerModel a_, first_b_, next_b_, positive_, log_weight_;
 };
 
+/// Shapes: `whole`, then the sags of scale after scale, each by its difference to the one before it along the way; the
+/// first of a scale to the first of the scale before.
+class ShapeColumns {
+ public:
+  /// Nothing when a number is outside what encoding makes.
+  template <class Coder>
+  std::optional<ShapeUncertainty> code(Coder& coder, const Run& run, const ShapeUncertainty& shape) {
+    ShapeUncertainty out{.robot = run.robot};
+    SigmaCode first{};
+    const auto whole = code(coder, whole_, shape.whole, first);
+    if (!whole) return std::nullopt;
+    out.whole = *whole;
+    for (std::size_t j = 0; const std::size_t count = stretches(run.nodes, j); ++j) {
+      SigmaCode previous = first;
+      auto& scale = out.sag.emplace_back();
+      for (std::size_t i = 0; i < count; ++i) {
+        const ShapeSigma& sag = shape.sag.empty() ? ShapeSigma{} : shape.sag[j][i];
+        const auto sigma = code(coder, i == 0 ? first_ : next_, sag, previous);
+        if (!sigma) return std::nullopt;
+        scale.push_back(*sigma);
+        if (i == 0) first = previous;
+      }
+    }
+    return out;
+  }
+
+ private:
+  using SigmaCode = std::array<std::int64_t, 2>;
+  using Models = std::array<IntegerModel, 2>;
+  /// `previous` becomes this one's code.
+  template <class Coder>
+  static std::optional<ShapeSigma> code(Coder& coder, Models& models, const ShapeSigma& sigma, SigmaCode& previous) {
+    const SigmaCode wanted{quantise_sigma(sigma.position_m), quantise_sigma(sigma.rotation_rad)};
+    for (std::size_t k = 0; k < 2; ++k)
+      previous[k] = sum(previous[k], coder.code(models[k], difference(wanted[k], previous[k])));
+    const auto position_m = dequantise_sigma(previous[0]);
+    const auto rotation_rad = dequantise_sigma(previous[1]);
+    if (!position_m || !rotation_rad) return std::nullopt;
+    return ShapeSigma{*position_m, *rotation_rad};
+  }
+  Models whole_, first_, next_;
+};
+
 std::vector<Run> runs_of(const ProxyGraph& graph) {
   std::map<RobotId, Run> runs;
   const auto add = [&](const auto& nodes, std::size_t Run::*count) {
@@ -150,6 +195,7 @@ std::vector<Run> runs_of(const ProxyGraph& graph) {
   };
   add(graph.nodes, &Run::nodes);
   add(graph.eliminated, &Run::eliminated);
+  for (const ShapeUncertainty& shape : graph.shapes) runs[shape.robot].has_shape = true;
   std::vector<Run> out;
   for (auto& [robot, run] : runs) {
     run.clock.step_ns = std::max<std::uint64_t>(run.clock.step_ns, 1);
@@ -175,7 +221,8 @@ Result<std::vector<Run>> read_runs(const v1::ProxyGraph& in) {
     runs.push_back({RobotId{run.robot()},
                     {static_cast<std::uint64_t>(run.stamp_offset_ns()), run.stamp_step_ns()},
                     run.nodes(),
-                    run.eliminated()});
+                    run.eliminated(),
+                    run.shape()});
   }
   return runs;
 }
@@ -184,14 +231,17 @@ void write_body(const ProxyGraph& graph, const std::vector<Run>& runs, v1::Proxy
   Writer writer;
   NodeColumns nodes;
   StampColumn eliminated;
+  ShapeColumns shapes;
   auto node = graph.nodes.begin();
   auto gone = graph.eliminated.begin();
+  auto shape = graph.shapes.begin();
   for (const Run& run : runs) {
     nodes.start_run();
     eliminated.start_run();
     for (std::size_t i = 0; i < run.nodes; ++i)
       TUTTI_CHECK(nodes.code(writer, run, *node++).has_value(), "node {} of robot {}", i, run.robot.value);
     for (std::size_t i = 0; i < run.eliminated; ++i) eliminated.code(writer, run.clock, (gone++)->stamp);
+    if (run.has_shape) shapes.code(writer, run, *shape++);
   }
   EdgeColumns edges;
   const auto count = static_cast<std::int64_t>(graph.nodes.size());
@@ -207,6 +257,7 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
   Reader reader{RangeDecoder(in.body())};
   NodeColumns nodes;
   StampColumn eliminated;
+  ShapeColumns shapes;
   for (const Run& run : runs) {
     nodes.start_run();
     eliminated.start_run();
@@ -217,6 +268,10 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
     }
     for (std::size_t i = 0; i < run.eliminated && !reader.in.overrun(); ++i)
       graph.eliminated.push_back({run.robot, eliminated.code(reader, run.clock, {})});
+    if (!run.has_shape || reader.in.overrun()) continue;
+    auto shape = shapes.code(reader, run, {});
+    if (!shape) return fail(ErrorCode::invalid, "the shape of robot {} is out of range", run.robot.value);
+    graph.shapes.push_back(std::move(*shape));
   }
   EdgeColumns edges;
   for (std::size_t i = 0; i < in.edges() && !reader.in.overrun(); ++i) {
@@ -261,6 +316,7 @@ std::string encode(const ProxyGraphMessage& message) {
     entry.set_eliminated(static_cast<std::uint32_t>(run.eliminated));
     entry.set_stamp_offset_ns(static_cast<std::int64_t>(run.clock.offset_ns));
     entry.set_stamp_step_ns(run.clock.step_ns);
+    entry.set_shape(run.has_shape);
   }
   write_body(graph, runs, out);
   for (const RobotComponent& component : graph.components) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
 
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/internal/shape.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -112,6 +114,42 @@ Status check_nodes(const ProxyGraph& graph) {
   return check_order(graph.nodes, "node");
 }
 
+Status check_shape(const ShapeUncertainty& shape, std::size_t nodes) {
+  if (nodes == 0) return fail(ErrorCode::invalid, "the robot has no nodes");
+  std::size_t scales = 0;
+  while (stretches(nodes, scales) > 0) ++scales;
+  if (shape.sag.size() != scales)
+    return fail(ErrorCode::invalid, "{} scales, expected {} of {} nodes", shape.sag.size(), scales, nodes);
+  const auto is_sigma = [](double value) { return std::isfinite(value) && value >= 0.0; };
+  const auto check = [&](const ShapeSigma& sigma) -> Status {
+    if (is_sigma(sigma.position_m) && is_sigma(sigma.rotation_rad)) return {};
+    return fail(ErrorCode::invalid, "a sigma of {} m, {} rad, expected finite ones >= 0", sigma.position_m,
+                sigma.rotation_rad);
+  };
+  if (auto ok = check(shape.whole); !ok) return ok;
+  for (std::size_t j = 0; j < scales; ++j) {
+    if (shape.sag[j].size() != stretches(nodes, j))
+      return fail(ErrorCode::invalid, "{} stretches of scale {}, expected {} of {} nodes", shape.sag[j].size(), j,
+                  stretches(nodes, j), nodes);
+    for (const ShapeSigma& sigma : shape.sag[j])
+      if (auto ok = check(sigma); !ok) return ok;
+  }
+  return {};
+}
+
+Status check_shapes(const ProxyGraph& graph) {
+  for (std::size_t i = 0; i < graph.shapes.size(); ++i) {
+    const RobotId robot = graph.shapes[i].robot;
+    if (i > 0 && robot <= graph.shapes[i - 1].robot)
+      return fail(ErrorCode::invalid, "the shape of robot {} does not come after robot {}'s", robot.value,
+                  graph.shapes[i - 1].robot.value);
+    const auto nodes = std::ranges::equal_range(graph.nodes, robot, {}, &ProxyNode::robot);
+    if (auto ok = check_shape(graph.shapes[i], nodes.size()); !ok)
+      return in_context(fmt::format("shape of robot {}", robot.value), ok.error());
+  }
+  return {};
+}
+
 Status check_graph(const ProxyGraph& graph) {
   for (const auto& ok : {at_most(graph.nodes.size(), kMaxProxyNodes, "nodes"),
                          at_most(graph.eliminated.size(), kMaxProxyNodes, "eliminated nodes"),
@@ -127,6 +165,7 @@ Status check_graph(const ProxyGraph& graph) {
       return fail(ErrorCode::invalid, "robot {} has two components", component.robot.value);
   if (auto ok = check_nodes(graph); !ok) return ok;
   if (auto ok = check_order(graph.eliminated, "eliminated node"); !ok) return ok;
+  if (auto ok = check_shapes(graph); !ok) return ok;
   return check_edges(graph);
 }
 

@@ -70,7 +70,21 @@ inline SubmapMessage any_submap(Rng& rng, std::size_t keyframes, std::size_t poi
   return message;
 }
 
-/// Nodes about every metre along each robot's way.
+/// As estimated from 32 samples of a drifting trajectory with as many nodes.
+inline ShapeUncertainty any_shape(Rng& rng, RobotId robot, std::size_t nodes) {
+  const auto sigma = [&](double length) {
+    return ShapeSigma{0.002 * std::pow(length, 1.3) * std::exp(rng.normal(0.12)),
+                      0.001 * std::sqrt(length) * std::exp(rng.normal(0.12))};
+  };
+  ShapeUncertainty shape{.robot = robot, .whole = sigma(static_cast<double>(nodes))};
+  for (std::size_t L = ShapeUncertainty::kShortest; 2 * L < nodes; L *= 2) {
+    auto& stretches = shape.sag.emplace_back();
+    for (std::size_t i = 0; i < (nodes - 1) / (2 * L); ++i) stretches.push_back(sigma(static_cast<double>(L)));
+  }
+  return shape;
+}
+
+/// Nodes about every metre along each robot's way; of every other robot, beginning with the first, the shape is known.
 inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t robots, std::size_t nodes_each, bool reduced) {
   ProxyGraphMessage message;
   message.header.session = rng.index(1'000'000'000'000);
@@ -95,6 +109,7 @@ inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t robots, std::size
       const Matrix6d covariance = k == 0 ? Matrix6d::Zero() : odometry_covariance(rng.uniform(0.9, 1.2), turn);
       graph.nodes.push_back({robot, stamp, T, covariance, static_cast<std::uint32_t>(rng.index(20))});
     }
+    if (r % 2 == 0) graph.shapes.push_back(any_shape(rng, robot, graph.nodes.size() - first));
     if (!reduced) continue;
     for (std::size_t a = first; a < graph.nodes.size(); ++a)
       for (std::size_t b = a + 1; b < std::min(a + 5, graph.nodes.size()); ++b)
