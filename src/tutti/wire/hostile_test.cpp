@@ -19,7 +19,7 @@ constexpr std::array kKinds = {MessageKind::submap, MessageKind::proxy_graph, Me
 
 std::string sample(MessageKind kind, Rng rng) {
   if (kind == MessageKind::submap) return encode(test::any_submap(rng, 6, 30));
-  if (kind == MessageKind::proxy_graph) return encode(test::any_proxy_graph(rng, 2, 8, true));
+  if (kind == MessageKind::proxy_graph) return encode(test::any_proxy_graph(rng, 2, 30, true));
   if (kind == MessageKind::cloud) return encode(*test::any_submap(rng, 1, 30).submap.cloud);
   return encode(test::any_verdict(rng, 2));
 }
@@ -140,6 +140,16 @@ TEST(Hostile, ClaimedCountsAreBoundedBeforeMemoryIsTaken) {
   const auto error = decode(MessageKind::proxy_graph, pack_frame(MessageKind::proxy_graph, payload));
   ASSERT_TRUE(error.has_value());
   EXPECT_NE(error->message.find("4294967295 nodes"), std::string::npos) << error->message;
+}
+
+TEST(Hostile, AShapeNeedsNodes) {
+  // radius 1 m, sigma 1 m, a run { robot: 0, stamp_step_ns: 1, shape: true } and the two zeros of `whole`.
+  const std::string one("\x00\x00\x00\x00\x00\x00\xf0\x3f", 8);
+  const std::string payload = "\x19" + one + "\x21" + one + std::string("\x2a\x06\x08\x00\x28\x01\x30\x01", 8) +
+                              std::string("\x92\x01\x04\x00\x00\x00\x00", 7);
+  const auto error = decode(MessageKind::proxy_graph, pack_frame(MessageKind::proxy_graph, payload));
+  ASSERT_TRUE(error.has_value());
+  EXPECT_NE(error->message.find("no nodes"), std::string::npos) << error->message;
 }
 
 }  // namespace
