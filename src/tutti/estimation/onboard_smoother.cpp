@@ -1,48 +1,53 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/onboard_smoother.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <span>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
-#include "tutti/estimation/internal/chain_run.hpp"
-#include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/estimation/internal/doubt.hpp"
+#include "tutti/estimation/internal/full_step.hpp"
+#include "tutti/estimation/internal/odometry_runs.hpp"
+#include "tutti/estimation/internal/reduced_problem.hpp"
 
 namespace tutti::estimation {
 namespace {
 
-Matrix6d inverse(const Matrix6d& covariance) { return covariance.llt().solve(Matrix6d::Identity()); }
+/// Every solve ends with a step that moves no pose by more (m, rad), so that where it started does not show.
+constexpr double kStepTolerance = 1e-5;
+/// Of an edge's rotation: nearer than this to all measurements but the doubtful, the last poses lead to the minimum
+/// that raw odometry leads to.
+constexpr double kNearby_rad = 0.3;
 
-/// Positions in the chain of the reduced graph's nodes: the first pose and every constrained one.
-std::vector<std::size_t> reduced_nodes(const std::vector<ChainConstraint>& constraints) {
-  std::vector<std::size_t> nodes{0};
-  nodes.reserve(2 * constraints.size() + 1);
-  for (const auto& constraint : constraints) {
-    if (constraint.from == constraint.to) continue;
-    nodes.push_back(constraint.from);
-    nodes.push_back(constraint.to);
+bool is_nearby(const PoseGraph& graph, std::span<const EdgeRole> roles, const std::vector<Pose3>& poses) {
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    const PoseGraphEdge& edge = graph.edges[e];
+    if (!roles.empty() && roles[e] == EdgeRole::robust) continue;
+    if (!(between_residual(poses[edge.from], poses[edge.to], edge.T_from_to).tail<3>().norm() < kNearby_rad))
+      return false;
   }
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-  return nodes;
-}
-
-std::size_t position_of(const std::vector<std::size_t>& nodes, std::size_t node) {
-  return static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
+  return true;
 }
 
 }  // namespace
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, const Pose3& first)
-    : config_(config), state_{.first = first}, poses_{first} {}
+    : config_(config), state_{.first = first}, poses_{first}, runs_(std::make_unique<internal::OdometryRuns>()) {}
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state)
     : OnboardSmoother(config, state.first) {
+  state_.odometry.reserve(state.odometry.size());
+  poses_.reserve(state.odometry.size() + 1);
   for (const auto& step : state.odometry) append(step);
   set_constraints(std::move(state.constraints));
 }
+
+OnboardSmoother::~OnboardSmoother() = default;
+OnboardSmoother::OnboardSmoother(OnboardSmoother&&) noexcept = default;
+OnboardSmoother& OnboardSmoother::operator=(OnboardSmoother&&) noexcept = default;
+
+std::size_t OnboardSmoother::stored_runs() const { return runs_->all().size(); }
 
 std::size_t OnboardSmoother::append(const RelativePose& odometry) {
   state_.odometry.push_back(odometry);
@@ -64,132 +69,78 @@ void OnboardSmoother::set_first_pose(const Pose3& T_map_first) {
   poses_.front() = state_.first = T_map_first;
 }
 
-/// The reduced graph about raw odometry: nodes[k] is node k, edge k the run from nodes[k] to nodes[k + 1], then the
-/// constraints. `constraint_edges`: position of each constraint's edge.
-PoseGraph OnboardSmoother::reduce(const std::vector<std::size_t>& nodes, std::vector<std::size_t>& constraint_edges) {
-  PoseGraph graph;
-  graph.poses.reserve(nodes.size());
-  graph.poses.push_back(state_.first);
-  std::map<std::pair<std::size_t, std::size_t>, RelativePose> compounds;
-  const std::span<const RelativePose> odometry(state_.odometry);
-  for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    const std::pair run{nodes[k], nodes[k + 1]};
-    auto node = compounds_.extract(run);
-    if (node.empty()) {
-      const auto sum = internal::sum_odometry(odometry.subspan(run.first, run.second - run.first));
-      const Matrix6d to_end = adjoint(sum.T_a_b.inverse());
-      compounds.emplace_hint(compounds.end(), run,
-                             RelativePose{sum.T_a_b, to_end * sum.covariance * to_end.transpose()});
-    } else {
-      compounds.insert(compounds.end(), std::move(node));
-    }
-    const RelativePose& compound = std::prev(compounds.end())->second;
-    graph.poses.push_back(graph.poses.back() * compound.T_a_b);
-    graph.edges.push_back({k, k + 1, compound.T_a_b, inverse(compound.covariance)});
-  }
-  compounds_ = std::move(compounds);
-  for (const auto& constraint : state_.constraints) {
-    constraint_edges.push_back(graph.edges.size());
-    if (constraint.from == constraint.to) continue;
-    graph.edges.push_back({position_of(nodes, constraint.from), position_of(nodes, constraint.to),
-                           constraint.measurement.T_a_b, inverse(constraint.measurement.covariance)});
-  }
-  return graph;
-}
-
 SmootherSummary OnboardSmoother::solve() {
   SmootherSummary summary;
-  const auto nodes = reduced_nodes(state_.constraints);
-  std::vector<std::size_t> constraint_edges;
-  const PoseGraph graph = reduce(nodes, constraint_edges);
-  summary.reduced_nodes = graph.poses.size();
-  summary.reduced_edges = graph.edges.size();
-  if (!internal::is_finite(graph)) {
+  auto nodes = internal::reduced_nodes(state_.constraints);
+  summary.compounded_steps = runs_->update(nodes, state_.odometry);
+  auto graph = internal::reduce(std::move(nodes), runs_->all(), state_.constraints, state_.first);
+  summary.reduced_nodes = graph.graph.poses.size();
+  summary.reduced_edges = graph.graph.edges.size();
+  if (!internal::is_finite(graph.graph)) {
     summary.termination = Termination::invalid_input;
     return summary;
   }
-  std::vector<EdgeRole> roles(graph.edges.size(), EdgeRole::robust);
-  std::fill_n(roles.begin(), nodes.size() - 1, EdgeRole::trusted);
-  const internal::EdgeCosts costs{.loss = {loss_kind(config_.loss), config_.loss_scale}, .roles = roles, .scale = {}};
-  const auto structure = internal::analyse_blocks(graph);
-  internal::GaussNewton gauss_newton(graph, structure);
-  std::vector<Pose3> reduced = graph.poses;
-  const SolverConfig solver{.max_iterations = config_.max_iterations,
-                            .relative_cost_tolerance = config_.relative_cost_tolerance};
-  const SolveSummary solved = gauss_newton.minimise(reduced, costs, solver);
-  summary.termination = solved.termination;
-  summary.iterations = solved.iterations;
-  summary.initial_cost = solved.initial_cost;
-  summary.final_cost = solved.final_cost;
-  if (!is_usable(solved.termination)) return summary;
+  summary.analysed = problem_ == nullptr || !problem_->assign(graph);
+  if (summary.analysed) problem_ = std::make_unique<internal::ReducedProblem>(std::move(graph));
 
-  distribute(nodes, graph, reduced);
-  for (int k = 0; k < config_.polishing_steps; ++k)
-    if (!polish(nodes, graph, costs, gauss_newton)) break;
-  compose_tail(nodes.back());
-  for (std::size_t c = 0; c < state_.constraints.size(); ++c) {
-    const auto& constraint = state_.constraints[c];
-    if (constraint.from == constraint.to) continue;
-    const auto& edge = graph.edges[constraint_edges[c]];
-    const Vector6d r = between_residual(poses_[constraint.from], poses_[constraint.to], edge.T_from_to);
-    constraint_weights_[c] = costs.weight(constraint_edges[c], r.dot(edge.information * r));
-  }
+  std::vector<Pose3> reduced;
+  const auto result = minimise(reduced);
+  summary.termination = result.solve.termination;
+  summary.iterations = result.solve.iterations;
+  summary.initial_cost = result.solve.initial_cost;
+  summary.final_cost = result.solve.final_cost;
+  summary.loss_applied = result.loss_applied;
+  if (is_usable(summary.termination)) place(reduced, result.loss_applied, summary);
   return summary;
 }
 
-/// Inner poses of every run from its ends: the raw odometry, set at the run's begin, bent to meet its end.
-void OnboardSmoother::distribute(const std::vector<std::size_t>& nodes, const PoseGraph& graph,
-                                 const std::vector<Pose3>& reduced) {
-  const std::span<const RelativePose> odometry(state_.odometry);
-  for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    const auto& run = graph.edges[k];
-    const Vector6d closing = local(reduced[k] * run.T_from_to, reduced[k + 1]);
-    const Vector6d lambda = adjoint(run.T_from_to.inverse()).transpose() * (run.information * closing);
-    const std::size_t steps = nodes[k + 1] - nodes[k];
-    poses_[nodes[k]] = reduced[k];
-    internal::distribute_odometry(odometry.subspan(nodes[k], steps), std::span(poses_).subspan(nodes[k], steps + 1),
-                                  lambda);
-  }
-  poses_[nodes.back()] = reduced.back();
+/// From the last poses, or, when these are far off or lead nowhere, from raw odometry.
+internal::DoubtingSummary OnboardSmoother::minimise(std::vector<Pose3>& reduced) {
+  const auto& [nodes, graph, all_roles, edges] = problem_->reduced();
+  const RobustLoss loss{loss_kind(config_.loss), config_.loss_scale};
+  std::span<const EdgeRole> roles;
+  if (loss.kind != LossKind::none) roles = all_roles;
+  const auto minimise = [&] {
+    const SolverConfig solver{.max_iterations = config_.max_iterations,
+                              .relative_cost_tolerance = config_.relative_cost_tolerance};
+    return internal::minimise_doubting(problem_->gauss_newton(), roles, loss, solver,
+                                       {.step_tolerance = kStepTolerance}, reduced);
+  };
+  for (const std::size_t node : nodes) reduced.push_back(poses_[node]);
+  if (is_nearby(graph, roles, reduced))
+    if (const auto result = minimise(); result.solve.termination == Termination::converged) return result;
+  reduced = graph.poses;
+  return minimise();
 }
 
-/// One Gauss-Newton step on the full graph, by eliminating the runs' inner poses about the current poses.
-bool OnboardSmoother::polish(const std::vector<std::size_t>& nodes, const PoseGraph& graph,
-                             const internal::EdgeCosts& costs, internal::GaussNewton& gauss_newton) {
-  const std::span<const RelativePose> odometry(state_.odometry);
-  const auto steps_of = [&](std::size_t k) { return odometry.subspan(nodes[k], nodes[k + 1] - nodes[k]); };
-  const auto poses_of = [&](std::size_t k) { return std::span(poses_).subspan(nodes[k], nodes[k + 1] - nodes[k] + 1); };
-  std::vector<internal::RunSum> sums;
-  std::vector<Eigen::LLT<Matrix6d>> factors;
-  gauss_newton.start_linearisation();
-  for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    sums.push_back(internal::sum_about(steps_of(k), poses_of(k)));
-    factors.emplace_back(sums[k].covariance);
-    // Ad(T_a_b) delta_b - delta_a - offset ~ N(0, covariance)
-    gauss_newton.add_factor(k, {-sums[k].offset, -Matrix6d::Identity(), adjoint(sums[k].T_a_b)},
-                            factors[k].solve(Matrix6d::Identity()));
+/// Makes every pose of the chain follow the reduced nodes.
+void OnboardSmoother::place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary) {
+  const auto& [nodes, graph, roles, edges] = problem_->reduced();
+  const internal::EdgeCosts costs{
+      .loss = loss_applied ? RobustLoss{loss_kind(config_.loss), config_.loss_scale} : RobustLoss{},
+      .roles = roles,
+      .scale = {}};
+  const std::size_t last = nodes.back();
+  const Pose3 last_before = poses_[last];
+  summary.bent_poses = runs_->place(reduced, state_.odometry, poses_);
+  for (int k = 0; k < config_.polishing_steps; ++k) {
+    runs_->forget_bends();
+    if (!internal::full_step(*problem_, costs, state_.odometry, poses_)) break;
   }
-  for (std::size_t e = nodes.size() - 1; e < graph.edges.size(); ++e) {
-    const auto& edge = graph.edges[e];
-    const auto factor = linearise_between(poses_[nodes[edge.from]], poses_[nodes[edge.to]], edge.T_from_to);
-    const double weight = costs.weight(e, factor.residual.dot(edge.information * factor.residual));
-    gauss_newton.add_factor(e, factor, weight * edge.information);
+  if (composed_from_ <= last) {
+    const Pose3 motion = poses_[last] * last_before.inverse();
+    for (std::size_t k = last + 1; k < poses_.size(); ++k) poses_[k] = motion * poses_[k];
+  } else {
+    for (std::size_t k = last; k < state_.odometry.size(); ++k) poses_[k + 1] = poses_[k] * state_.odometry[k].T_a_b;
   }
-  Eigen::VectorXd step;
-  if (!gauss_newton.solve_step(step)) return false;
-
-  std::vector<Vector6d> delta(nodes.size());
-  for (std::size_t k = 0; k < nodes.size(); ++k) delta[k] = gauss_newton.step_of(step, k);
-  for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    const Vector6d gap = adjoint(sums[k].T_a_b) * delta[k + 1] - delta[k] - sums[k].offset;
-    internal::distribute_about(steps_of(k), poses_of(k), delta[k], factors[k].solve(gap));
+  composed_from_ = last;
+  for (std::size_t c = 0; c < state_.constraints.size(); ++c) {
+    const auto& constraint = state_.constraints[c];
+    if (!loss_applied || constraint.from == constraint.to) continue;
+    const auto& edge = graph.edges[edges[c]];
+    const Vector6d r = between_residual(poses_[constraint.from], poses_[constraint.to], edge.T_from_to);
+    constraint_weights_[c] = costs.weight(edges[c], r.dot(edge.information * r));
   }
-  for (std::size_t k = 0; k < nodes.size(); ++k) poses_[nodes[k]] = retract(poses_[nodes[k]], delta[k]);
-  return true;
-}
-
-void OnboardSmoother::compose_tail(std::size_t last) {
-  for (std::size_t k = last; k < state_.odometry.size(); ++k) poses_[k + 1] = poses_[k] * state_.odometry[k].T_a_b;
 }
 
 }  // namespace tutti::estimation

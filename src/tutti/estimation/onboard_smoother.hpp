@@ -2,36 +2,37 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
+#include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/termination.hpp"
-#include "tutti/model/pose_graph.hpp"
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti::estimation {
 
 namespace internal {
-struct EdgeCosts;
-class GaussNewton;
+class OdometryRuns;
+class ReducedProblem;
+struct ChainGraph;
+struct DoubtingSummary;
 }  // namespace internal
 
 struct OnboardSmootherConfig {
   int max_iterations = 20;
   double relative_cost_tolerance = 1e-6;
-  std::string loss = "none";
+  std::string loss = "cauchy";
   double loss_scale = 3.0;
   int polishing_steps = 0;
 
   template <class V>
   void describe(V& v) {
-    v.field("max_iterations", max_iterations, at_least(1), "Gauss-Newton steps on the reduced graph at most.");
+    v.field("max_iterations", max_iterations, at_least(1),
+            "Gauss-Newton steps on the reduced graph at most, per phase.");
     v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
             "Converged when a step can lower the cost by less than this share of it.");
-    v.field("loss", loss, one_of({"none", "huber", "cauchy"}), "Robust loss on the constraints.");
+    v.field("loss", loss, one_of({"none", "huber", "cauchy"}), "Robust loss on the doubtful constraints.");
     v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
     v.field("polishing_steps", polishing_steps, between(0, 10),
             "Gauss-Newton steps on the full graph after the reduced one.");
@@ -49,11 +50,17 @@ struct ChainConstraint {
 
 struct SmootherSummary {
   Termination termination = Termination::not_run;
-  int iterations = 0;          ///< On the reduced graph.
-  double initial_cost = -1.0;  ///< Of the reduced graph: compounded odometry and constraints (with the loss).
-  double final_cost = -1.0;
+  int iterations = 0;          ///< On the reduced graph, of all phases.
+  double initial_cost = -1.0;  ///< Of the reduced graph, compounded odometry and constraints, every one trusted.
+  double final_cost = -1.0;    ///< With the loss, when it took part.
+  bool loss_applied = false;   ///< A doubtful constraint contradicts the rest noticeably.
   std::size_t reduced_nodes = 0;
   std::size_t reduced_edges = 0;
+  /// What had to be done again since the last solve: odometry steps compounded, inner poses bent (the others moved
+  /// rigidly), the sparsity analysed.
+  std::size_t compounded_steps = 0;
+  std::size_t bent_poses = 0;
+  bool analysed = false;
 };
 
 /// All that determines the estimate; enough to restore the smoother.
@@ -69,11 +76,19 @@ struct SmootherState {
 /// of constrained nodes; each run's inner poses follow exactly in closed form (the smoother of a linear-Gaussian chain
 /// with fixed ends); what comes after the last constrained node is composed. A polishing step does the same about the
 /// current poses instead of the raw odometry, which makes it a Gauss-Newton step on the full graph. docs/math.md
-/// derives it. The estimate is a function of state() alone, not of the history of calls.
+/// derives it.
+///
+/// Only doubtful constraints have a robust loss; the others hold, whatever their residual. A solve starts from the last
+/// one's poses and keeps what did not change: compounds, sparsity, the shape of runs. The estimate is still a function
+/// of state(), to a tolerance: the same calls give the same bits; another history of calls, or a restored state, the
+/// same poses to 0.1 mm (docs/math.md).
 class OnboardSmoother {
  public:
   explicit OnboardSmoother(const OnboardSmootherConfig& config = {}, const Pose3& first = {});
   OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state);
+  ~OnboardSmoother();
+  OnboardSmoother(OnboardSmoother&&) noexcept;
+  OnboardSmoother& operator=(OnboardSmoother&&) noexcept;
 
   /// Adds a node by odometry from the last one and returns its position; its pose is composed until solve().
   /// Its covariance must be positive definite.
@@ -89,24 +104,23 @@ class OnboardSmoother {
 
   [[nodiscard]] const Pose3& pose(std::size_t node) const { return poses_[node]; }
   [[nodiscard]] const std::vector<Pose3>& poses() const { return poses_; }  ///< T_map_body per node.
-  /// Per constraint as set: robust weight at the last solve; 1 without a loss.
+  /// Per constraint as set: robust weight at the last solve; 1 where the loss did not apply.
   [[nodiscard]] const std::vector<double>& constraint_weights() const { return constraint_weights_; }
   [[nodiscard]] const SmootherState& state() const { return state_; }
+  /// Compounded runs kept, all there is besides a pose per node, state() and the reduced graph of the last solve.
+  [[nodiscard]] std::size_t stored_runs() const;
 
  private:
-  using Nodes = std::vector<std::size_t>;
-  PoseGraph reduce(const Nodes& nodes, Nodes& constraint_edges);
-  void distribute(const Nodes& nodes, const PoseGraph& graph, const std::vector<Pose3>& reduced);
-  bool polish(const Nodes& nodes, const PoseGraph& graph, const internal::EdgeCosts& costs,
-              internal::GaussNewton& gauss_newton);
-  void compose_tail(std::size_t last);
+  internal::DoubtingSummary minimise(std::vector<Pose3>& reduced);
+  void place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary);
 
   OnboardSmootherConfig config_;
   SmootherState state_;
   std::vector<Pose3> poses_;
   std::vector<double> constraint_weights_;
-  /// Compounded raw odometry of a run [begin, end]; odometry never changes, so runs are computed once.
-  std::map<std::pair<std::size_t, std::size_t>, RelativePose> compounds_;
+  std::unique_ptr<internal::OdometryRuns> runs_;
+  std::unique_ptr<internal::ReducedProblem> problem_;  ///< Of the last solve; null before.
+  std::size_t composed_from_ = 0;                      ///< From here on, poses are raw odometry composed.
 };
 
 }  // namespace tutti::estimation

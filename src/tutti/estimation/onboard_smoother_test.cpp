@@ -5,58 +5,12 @@
 
 #include <limits>
 
-#include "tutti/estimation/pose_graph_solver.hpp"
-#include "tutti/estimation/testing/random_graphs.hpp"
+#include "tutti/estimation/testing/chain_mission.hpp"
 
 namespace tutti::estimation {
 namespace {
 
 using namespace testing;
-
-struct Mission {
-  std::vector<Pose3> truth;
-  std::vector<RelativePose> odometry;
-  std::vector<ChainConstraint> constraints;
-};
-
-/// A long walk at 4 cm a step with correlated odometry noise, and constraints between some of its nodes.
-Mission mission(Rng& rng, std::size_t steps, std::size_t constraints, double sigma_m = 1e-3, double sigma_rad = 3e-4) {
-  Mission out{.truth = {random_pose(rng)}, .odometry = {}, .constraints = {}};
-  for (std::size_t k = 0; k < steps; ++k) {
-    Vector6d u;
-    u << 0.04, 0.0, 0.0, rng.normal(0.002), rng.normal(0.002), rng.normal(0.01);
-    const Matrix6d covariance = random_covariance(rng, sigma_m, sigma_rad);
-    out.truth.push_back(retract(out.truth.back(), u));
-    const Pose3 exact = out.truth[k].inverse() * out.truth[k + 1];
-    out.odometry.push_back({retract(exact, sample(rng, covariance)), covariance});
-  }
-  for (std::size_t k = 0; k < constraints; ++k) {
-    const auto a = static_cast<std::size_t>(rng.index(steps * 9 / 10));
-    const auto b = static_cast<std::size_t>(rng.index(steps * 9 / 10));
-    const Matrix6d covariance = random_covariance(rng, 2e-3, 1e-3);
-    const Pose3 exact = out.truth[a].inverse() * out.truth[b];
-    if (a != b) out.constraints.push_back({a, b, {retract(exact, sample(rng, covariance)), covariance}});
-  }
-  return out;
-}
-
-OnboardSmoother smoother_of(const Mission& mission, const OnboardSmootherConfig& config = {}) {
-  OnboardSmoother smoother(config, mission.truth.front());
-  for (const auto& step : mission.odometry) smoother.append(step);
-  smoother.set_constraints(mission.constraints);
-  return smoother;
-}
-
-std::vector<Pose3> full_optimum(const Mission& mission, const std::vector<Pose3>& start) {
-  PoseGraph graph{.poses = start, .edges = {}};
-  for (std::size_t k = 0; k < mission.odometry.size(); ++k)
-    graph.edges.push_back({k, k + 1, mission.odometry[k].T_a_b, mission.odometry[k].covariance.inverse()});
-  for (const auto& c : mission.constraints)
-    graph.edges.push_back({c.from, c.to, c.measurement.T_a_b, c.measurement.covariance.inverse()});
-  const auto solution = solve_pose_graph(graph, {.relative_cost_tolerance = 1e-14, .initialisation = "given"});
-  EXPECT_EQ(solution.summary.termination, Termination::converged);
-  return solution.poses;
-}
 
 TEST(OnboardSmoother, ComposesOdometryBeforeAnyConstraint) {
   Rng rng(1);
@@ -103,27 +57,6 @@ TEST(OnboardSmoother, TailFollowsTheLastConstrainedNode) {
     EXPECT_LT(local(smoother.pose(k) * m.odometry[k].T_a_b, smoother.pose(k + 1)).norm(), 1e-12);
 }
 
-TEST(OnboardSmoother, EstimateIsAFunctionOfItsState) {
-  Rng rng(3);
-  const auto m = mission(rng, 800, 20);
-  auto gradual = OnboardSmoother({}, m.truth.front());
-  for (std::size_t k = 0; k < 800; ++k) {
-    gradual.append(m.odometry[k]);
-    if (k == 300 || k == 600) {
-      std::vector<ChainConstraint> some;
-      for (const auto& c : m.constraints)
-        if (std::max(c.from, c.to) <= k) some.push_back(c);
-      gradual.set_constraints(some);
-      gradual.solve();
-    }
-  }
-  gradual.set_constraints(m.constraints);
-  gradual.solve();
-  OnboardSmoother restored({}, gradual.state());
-  restored.solve();
-  EXPECT_EQ(gradual.poses(), restored.poses());
-}
-
 TEST(OnboardSmoother, FirstPoseMovesEverything) {
   Rng rng(4);
   const auto m = mission(rng, 300, 12);
@@ -138,19 +71,6 @@ TEST(OnboardSmoother, FirstPoseMovesEverything) {
   EXPECT_LT(largest_position_difference(smoother.poses(), expected), 1e-9);
   smoother.solve();
   EXPECT_LT(largest_position_difference(smoother.poses(), expected), 1e-6);
-}
-
-TEST(OnboardSmoother, RobustLossDistrustsAWrongConstraint) {
-  Rng rng(5);
-  auto m = mission(rng, 1000, 30);
-  m.constraints.push_back({50, 800, {random_pose(rng, 3.0, 1.0), 1e-6 * Matrix6d::Identity()}});
-  auto robust = smoother_of(m, {.loss = "cauchy"});
-  ASSERT_TRUE(is_usable(robust.solve().termination));
-  auto naive = smoother_of(m);
-  naive.solve();
-  EXPECT_LT(largest_position_difference(robust.poses(), m.truth),
-            0.2 * largest_position_difference(naive.poses(), m.truth));
-  EXPECT_LT(robust.constraint_weights().back(), 1e-3);
 }
 
 TEST(OnboardSmoother, BadNumbersLeaveThePosesAlone) {

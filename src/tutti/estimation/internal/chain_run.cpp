@@ -43,6 +43,20 @@ struct StepMap {
   }
 };
 
+/// One Newton step towards unit norm: enough for products of unit quaternions, and much cheaper than a root.
+Eigen::Quaterniond nearly_unit(const Eigen::Quaterniond& q) {
+  return Eigen::Quaterniond(q.coeffs() * (1.5 - 0.5 * q.squaredNorm()));
+}
+
+/// so3_exp, by its series where that has all digits: what a run is bent by is mostly less than a degree.
+Eigen::Quaterniond small_exp(const Vector3d& theta) {
+  const double x = 0.25 * theta.squaredNorm();  // (angle / 2)^2
+  if (x > 1e-4) return so3_exp(theta);
+  const double w = 1.0 - x * (1.0 / 2.0 - x * (1.0 / 24.0 - x / 720.0));
+  const double k = 0.5 * (1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0 - x / 5040.0)));
+  return {w, k * theta.x(), k * theta.y(), k * theta.z()};
+}
+
 /// Ad(C^-1) zeta.
 Vector6d to_node(const Matrix3d& R, const Vector3d& t, const Vector6d& zeta) {
   Vector6d delta;
@@ -115,14 +129,27 @@ void distribute_about(std::span<const RelativePose> steps, std::span<Pose3> pose
 
 void distribute_odometry(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& lambda) {
   const Pose3 T_w_a = poses.front();
-  Pose3 T_a_k;
-  Vector6d zeta = Vector6d::Zero();
+  const Matrix3d R_w_a = T_w_a.rotation.toRotationMatrix();
+  const Vector3d lambda_t = lambda.head<3>();
+  const Vector3d lambda_r = lambda.tail<3>();
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  // T_a_k
+  Vector3d t = Vector3d::Zero();
+  Vector3d zeta_t = Vector3d::Zero();
+  Vector3d zeta_r = Vector3d::Zero();
   for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
-    T_a_k = T_a_k * steps[k].T_a_b;
-    const Matrix3d R = T_a_k.rotation.toRotationMatrix();
-    const StepMap map{R, R, T_a_k.translation};
-    zeta += map.apply(steps[k].covariance * map.apply_transposed(lambda));
-    poses[k + 1] = retract(T_w_a * T_a_k, to_node(R, T_a_k.translation, zeta));
+    const RelativePose& step = steps[k];
+    t += q * step.T_a_b.translation;
+    q = nearly_unit(q * step.T_a_b.rotation);
+    const Matrix3d R = q.toRotationMatrix();
+    Vector6d w;
+    w << R.transpose() * lambda_t, R.transpose() * (lambda_r - t.cross(lambda_t));
+    w = (step.covariance * w).eval();
+    const Vector3d turned = R * w.tail<3>();
+    zeta_t += R * w.head<3>() + t.cross(turned);
+    zeta_r += turned;
+    // retract(T_w_a T_a_k, Ad(T_a_k^-1) zeta), with R Exp(R^T v) = Exp(v) R
+    poses[k + 1].rotation = (T_w_a.rotation * (small_exp(zeta_r) * q)).normalized();
+    poses[k + 1].translation = T_w_a.translation + R_w_a * (t + zeta_t - t.cross(zeta_r));
   }
 }
 

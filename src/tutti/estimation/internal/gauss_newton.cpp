@@ -14,6 +14,18 @@ constexpr double kCostFloor = 1e-6;
 constexpr double kReuseBelow = 1e-2;
 /// ...as long as every such step still shrinks the promised decrease by this factor.
 constexpr double kReuseContraction = 0.1;
+/// Where the poses' steps count, they too must shrink, and the step before the first reuse be no longer than this (m,
+/// rad): weak directions, which hardly show in the cost, are where an old factor is wrong first.
+constexpr double kReuseStepContraction = 0.3;
+constexpr double kReuseStepBelow = 1e-2;
+/// Of a cost, as a share of it.
+constexpr double kRounding = 1e-11;
+
+/// How far a sequence of steps goes on after one of this size, if they keep shrinking as they just did. Nothing is
+/// known of the first one's shrinking.
+double still_to_go(double size, double previous) {
+  return size < 0.5 * previous ? size * size / (previous - size) : size;
+}
 
 }  // namespace
 
@@ -81,13 +93,27 @@ void GaussNewton::linearise(std::span<const Pose3> poses, const EdgeCosts& costs
   }
 }
 
-SolveSummary GaussNewton::minimise(std::vector<Pose3>& poses, const EdgeCosts& costs, const SolverConfig& config) {
+GaussNewton::Tried GaussNewton::search_line(const std::vector<Pose3>& poses, const Eigen::VectorXd& step,
+                                            const EdgeCosts& costs, double most, int max_halvings,
+                                            std::vector<Pose3>& candidate) const {
+  for (Tried tried{.scale = 1.0, .cost = 0.0};; tried.scale *= 0.5) {
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      if (const int v = structure_.variable[i]; v >= 0)
+        candidate[i] = retract(poses[i], tried.scale * step.segment<6>(6 * v));
+    tried.cost = cost(candidate, costs);
+    if (tried.cost <= most || max_halvings-- == 0) return tried;
+  }
+}
+
+SolveSummary GaussNewton::minimise(std::vector<Pose3>& poses, const EdgeCosts& costs, const SolverConfig& config,
+                                   const Continuation& how) {
   SolveSummary summary{.components = structure_.components};
   summary.initial_cost = summary.final_cost = cost(poses, costs);
   summary.termination = Termination::max_iterations;
   std::vector<Pose3> candidate = poses;
-  Eigen::MatrixXd step;
+  Eigen::VectorXd step;
   double previous_decrease = 0.0;
+  double previous_size = 0.0;
   bool reuse_factor = false;
   while (summary.iterations < config.max_iterations) {
     linearise(poses, costs, !reuse_factor);
@@ -97,13 +123,15 @@ SolveSummary GaussNewton::minimise(std::vector<Pose3>& poses, const EdgeCosts& c
     }
     step = -gradient_;
     hessian_.solve(step);
-    const double decrease = -step.col(0).dot(gradient_);  // of the cost, predicted by the linear model
+    const double decrease = -step.dot(gradient_);  // of the cost, predicted by the linear model
     if (!std::isfinite(decrease)) {
       summary.termination = Termination::singular;
       break;
     }
     const double relative = decrease / (summary.final_cost + kCostFloor);
-    if (reuse_factor && decrease > kReuseContraction * previous_decrease) {
+    const double size = step.size() > 0 ? step.lpNorm<Eigen::Infinity>() : 0.0;
+    if (reuse_factor && (decrease > kReuseContraction * previous_decrease ||
+                         (how.limits_step() && size > kReuseStepContraction * previous_size))) {
       reuse_factor = false;
       continue;
     }
@@ -111,28 +139,24 @@ SolveSummary GaussNewton::minimise(std::vector<Pose3>& poses, const EdgeCosts& c
     ++summary.iterations;
     summary.gradient_norm = gradient_.size() > 0 ? gradient_.lpNorm<Eigen::Infinity>() : 0.0;
 
-    double scale = 1.0;
-    double new_cost = 0.0;
-    for (int halvings = 0;; ++halvings, scale *= 0.5) {
-      for (std::size_t i = 0; i < poses.size(); ++i)
-        if (const int v = structure_.variable[i]; v >= 0)
-          candidate[i] = retract(poses[i], scale * step.col(0).segment<6>(6 * v));
-      new_cost = cost(candidate, costs);
-      if (new_cost <= summary.final_cost || halvings == config.max_step_halvings) break;
-    }
-    const bool converged = relative <= config.relative_cost_tolerance;
-    if (!(new_cost <= summary.final_cost)) {  // not by more than rounding, when converged
+    const bool converged =
+        relative <= config.relative_cost_tolerance && still_to_go(size, previous_size) <= how.step_tolerance;
+    previous_size = size;
+    // A step that is asked for by its size may promise less than the cost's rounding.
+    const double most = summary.final_cost * (relative <= kRounding && how.limits_step() ? 1.0 + kRounding : 1.0);
+    const auto [scale, new_cost] = search_line(poses, step, costs, most, config.max_step_halvings, candidate);
+    if (!(new_cost <= most)) {  // not by more than rounding, when converged
       summary.termination = converged ? Termination::converged : Termination::stalled;
       break;
     }
     poses.swap(candidate);
     summary.final_cost = new_cost;
-    summary.step_norm = step.size() > 0 ? scale * step.lpNorm<Eigen::Infinity>() : 0.0;
+    summary.step_norm = scale * size;
     if (converged) {
       summary.termination = Termination::converged;
       break;
     }
-    reuse_factor = scale == 1.0 && relative < kReuseBelow;
+    reuse_factor = scale == 1.0 && relative < kReuseBelow && !(how.limits_step() && size > kReuseStepBelow);
   }
   return summary;
 }

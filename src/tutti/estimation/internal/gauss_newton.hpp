@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,15 @@ struct EdgeCosts {
   }
 };
 
+/// How one minimisation follows another.
+struct Continuation {
+  /// Converged only when, beside the cost, no pose has farther to go than this (m, rad), by the rate at which the steps
+  /// shrink.
+  double step_tolerance = std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] bool limits_step() const { return step_tolerance < std::numeric_limits<double>::infinity(); }
+};
+
 /// Gauss-Newton over one graph; the symbolic factorisation is shared by all calls.
 class GaussNewton {
  public:
@@ -36,7 +46,8 @@ class GaussNewton {
   GaussNewton(const PoseGraph& graph, const BlockStructure& structure);
 
   /// Moves `poses` to a minimum. Uses of config: iterations, tolerance, halvings.
-  SolveSummary minimise(std::vector<Pose3>& poses, const EdgeCosts& costs, const SolverConfig& config);
+  SolveSummary minimise(std::vector<Pose3>& poses, const EdgeCosts& costs, const SolverConfig& config,
+                        const Continuation& how = {});
 
   /// One linear system, factor by factor: start_linearisation, add_factor (position of its edge, residual and
   /// Jacobians, weighted information), solve_step (the minimiser, in elimination order; false = singular), step_of (of
@@ -52,6 +63,13 @@ class GaussNewton {
   [[nodiscard]] BlockCholesky& hessian() { return hessian_; }
 
  private:
+  struct Tried {
+    double scale;
+    double cost;
+  };
+  /// Halves the step until it costs at most `most`, or for the last time; `candidate`: the poses after it.
+  Tried search_line(const std::vector<Pose3>& poses, const Eigen::VectorXd& step, const EdgeCosts& costs, double most,
+                    int max_halvings, std::vector<Pose3>& candidate) const;
   void add_gradient(const EdgeSlot& slot, const BetweenLinearisation& factor, const Vector6d& weighted_residual);
 
   const PoseGraph& graph_;

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+
+#include "tutti/estimation/internal/reduced_problem.hpp"
+
+namespace tutti::estimation::internal {
+
+/// One Gauss-Newton step on the full graph of a chain, by eliminating the runs' inner poses about the current `poses`
+/// (one per node of the chain; those after the last reduced node stay). False when singular: nothing changed.
+bool full_step(ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
+               std::span<Pose3> poses);
+
+}  // namespace tutti::estimation::internal

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One update after another: what is kept, what is done again, and that the history of calls does not show.
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+
+#include "tutti/estimation/testing/chain_mission.hpp"
+
+namespace tutti::estimation {
+namespace {
+
+using namespace testing;
+
+ChainConstraint any_constraint(Rng& rng, const Mission& m, std::size_t nodes) {
+  const auto a = static_cast<std::size_t>(rng.index(nodes));
+  const auto b = static_cast<std::size_t>(rng.index(nodes));
+  const Matrix6d covariance = random_covariance(rng, 2e-3, 1e-3);
+  Pose3 T = retract(m.truth[a].inverse() * m.truth[b], sample(rng, covariance));
+  const bool doubtful = rng.bernoulli(0.3);
+  if (doubtful && rng.bernoulli(0.3)) T = retract(T, random_tangent(rng, 5.0, 0.5));
+  return {a, b, {T, covariance}, doubtful};
+}
+
+/// Appends, adds, withdraws, replaces and moves at random, and solves after each change.
+OnboardSmoother live(Rng rng, const Mission& m, const OnboardSmootherConfig& config, int updates) {
+  OnboardSmoother smoother(config, m.truth.front());
+  std::vector<ChainConstraint> constraints;
+  for (int update = 0; update < updates; ++update) {
+    const std::size_t steps = m.odometry.size() * static_cast<std::size_t>(update + 1) / updates;
+    while (smoother.size() <= steps) smoother.append(m.odometry[smoother.size() - 1]);
+    for (std::size_t k = rng.index(4); k > 0; --k) constraints.push_back(any_constraint(rng, m, smoother.size()));
+    if (!constraints.empty() && rng.bernoulli(0.4))
+      constraints.erase(constraints.begin() + static_cast<std::ptrdiff_t>(rng.index(constraints.size())));
+    if (!constraints.empty() && rng.bernoulli(0.4)) {
+      auto& T = constraints[rng.index(constraints.size())].measurement.T_a_b;
+      T = retract(T, random_tangent(rng, 2e-3, 1e-3));
+    }
+    if (rng.bernoulli(0.2)) smoother.set_first_pose(random_pose(rng, 20.0, 2.0));
+    smoother.set_constraints(constraints);
+    EXPECT_TRUE(is_usable(smoother.solve().termination));
+  }
+  return smoother;
+}
+
+RC_GTEST_PROP(OnboardSmootherUpdate, HistoryDoesNotShow, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  const auto m = mission(rng, 600, 0);
+  const OnboardSmootherConfig config{.polishing_steps = rng.bernoulli(0.2) ? 1 : 0};
+  const auto smoother = live(rng.fork("updates"), m, config, 12);
+  OnboardSmoother restored(config, smoother.state());
+  restored.solve();
+  RC_ASSERT(largest_position_difference(smoother.poses(), restored.poses()) < 1e-4);
+  RC_ASSERT(largest_rotation_difference(smoother.poses(), restored.poses()) < 1e-4);
+  for (std::size_t c = 0; c < smoother.constraint_weights().size(); ++c)
+    RC_ASSERT(std::abs(smoother.constraint_weights()[c] - restored.constraint_weights()[c]) < 1e-3);
+}
+
+TEST(OnboardSmootherUpdate, SameCallsSameBits) {
+  Rng rng(2);
+  const auto m = mission(rng, 500, 0);
+  EXPECT_EQ(live(Rng(3), m, {}, 10).poses(), live(Rng(3), m, {}, 10).poses());
+}
+
+TEST(OnboardSmootherUpdate, DoesAgainOnlyWhatChanged) {
+  Rng rng(5);
+  auto m = mission(rng, 4000, 0);
+  const auto link = [&](std::size_t a, std::size_t b) {
+    const Matrix6d covariance = random_covariance(rng, 2e-3, 1e-3);
+    m.constraints.push_back({a, b, {retract(m.truth[a].inverse() * m.truth[b], sample(rng, covariance)), covariance}});
+  };
+  for (std::size_t k = 0; k < 3600; k += 100) link(k, k + 100);
+  auto smoother = smoother_of(m);
+  const auto first = smoother.solve();
+  EXPECT_TRUE(first.analysed);
+  EXPECT_EQ(first.compounded_steps, 3600U);
+  EXPECT_EQ(first.bent_poses, 3600U - 36U);
+
+  const auto again = smoother.solve();
+  EXPECT_FALSE(again.analysed);
+  EXPECT_EQ(again.compounded_steps, 0U);
+  EXPECT_EQ(again.bent_poses, 0U);
+  EXPECT_EQ(again.iterations, 1);
+
+  // A measurement changes: a chain of links is bent there alone, all behind follows rigidly.
+  auto& T = m.constraints[17].measurement.T_a_b;
+  T = retract(T, random_tangent(rng, 2e-3, 1e-3));
+  smoother.set_constraints(m.constraints);
+  const auto replaced = smoother.solve();
+  EXPECT_FALSE(replaced.analysed);
+  EXPECT_EQ(replaced.compounded_steps, 0U);
+  EXPECT_EQ(replaced.bent_poses, 99U);
+
+  link(1010, 1950);  // splits two runs
+  smoother.set_constraints(m.constraints);
+  const auto added = smoother.solve();
+  EXPECT_TRUE(added.analysed);
+  EXPECT_EQ(added.compounded_steps, 200U);
+  EXPECT_LE(added.bent_poses, 1000U);
+
+  OnboardSmoother restored({}, smoother.state());
+  restored.solve();
+  EXPECT_LT(largest_position_difference(smoother.poses(), restored.poses()), 1e-4);
+}
+
+/// A robot drives on for months: what is kept is bounded by the constraints that stand now.
+TEST(OnboardSmootherUpdate, NothingGrowsWithTheNumberOfUpdates) {
+  Rng rng(6);
+  const auto m = mission(rng, 800, 0);
+  auto smoother = smoother_of(m);
+  for (int update = 0; update < 200; ++update) {
+    std::vector<ChainConstraint> constraints;
+    for (std::size_t k = rng.index(12); k > 0; --k) constraints.push_back(any_constraint(rng, m, smoother.size()));
+    smoother.set_constraints(constraints);
+    const auto summary = smoother.solve();
+    ASSERT_TRUE(is_usable(summary.termination));
+    EXPECT_LE(summary.reduced_nodes, 2 * constraints.size() + 1);
+    EXPECT_EQ(smoother.stored_runs(), summary.reduced_nodes - 1);
+    EXPECT_LE(summary.reduced_edges, smoother.stored_runs() + constraints.size());
+  }
+  EXPECT_EQ(smoother.state().odometry.size(), 800U);
+  EXPECT_EQ(smoother.poses().size(), 801U);
+  smoother.set_constraints({});
+  smoother.solve();
+  EXPECT_EQ(smoother.stored_runs(), 0U);
+}
+
+/// From a map bent by nonsense, withdrawing it must lead back to where a fresh start leads.
+TEST(OnboardSmootherUpdate, ForgetsWhatWasWithdrawn) {
+  Rng rng(7);
+  auto m = mission(rng, 600, 8);
+  auto smoother = smoother_of(m);
+  auto nonsense = m.constraints;
+  nonsense.push_back({50, 500, {random_pose(rng, 30.0, 2.5), 1e-8 * Matrix6d::Identity()}});
+  smoother.set_constraints(nonsense);
+  smoother.solve();
+  smoother.set_constraints(m.constraints);
+  smoother.solve();
+  OnboardSmoother restored({}, smoother.state());
+  restored.solve();
+  EXPECT_LT(largest_position_difference(smoother.poses(), restored.poses()), 1e-4);
+}
+
+}  // namespace
+}  // namespace tutti::estimation
