@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/closure_finders.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 
@@ -48,15 +50,38 @@ Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::feature
 
 namespace {
 
-std::shared_ptr<const server::ClosureFinder> make_honest_finder(const ClosureConfig& config,
-                                                                const std::vector<MissionRecording>& recordings,
-                                                                std::uint64_t seed) {
-  if (config.finder == "lidar") return std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap);
-  TUTTI_CHECK(config.finder == "reference", "finder {}", config.finder);
+std::vector<PlantedClosure> planted_closures(const std::vector<PlantedClosureConfig>& configs,
+                                             const std::vector<MissionRecording>& recordings) {
+  const auto moment = [&](const std::string& name, double time_s) {
+    const auto found = std::ranges::find(recordings, name, [](const MissionRecording& r) { return r.recording.name; });
+    TUTTI_CHECK(found != recordings.end(), "no robot is called '{}'", name);
+    return std::pair(found->recording.robot, found->recording.odometry.front().stamp + (time_s - found->start_s));
+  };
+  std::vector<PlantedClosure> out;
+  for (const PlantedClosureConfig& config : configs) {
+    const auto [robot, stamp] = moment(config.robot, config.at_s);
+    const auto [other, other_stamp] = moment(config.other.empty() ? config.robot : config.other, config.other_at_s);
+    const Pose3 error{so3_exp(config.yaw_deg * kRadPerDeg * Eigen::Vector3d::UnitZ()),
+                      {config.ahead_m, config.left_m, 0.0}};
+    out.push_back({robot, stamp, other, other_stamp, error});
+  }
+  return out;
+}
+
+std::shared_ptr<const server::ClosureFinder> make_reference_finder(const ClosureConfig& config,
+                                                                   const std::vector<MissionRecording>& recordings,
+                                                                   std::uint64_t seed) {
   std::map<RobotId, Trajectory> reference;
   for (const MissionRecording& robot : recordings) reference[robot.recording.robot] = robot.recording.reference;
-  return std::make_shared<ReferenceClosureFinder>(
-      simulation::ReferenceClosures(std::move(reference), config.reference, seed));
+  const auto truth =
+      std::make_shared<const simulation::ReferenceClosures>(std::move(reference), config.reference, seed);
+  auto finder = std::make_shared<ReferenceClosureFinder>(truth);
+  if (config.planted.empty()) return finder;
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(config.reference.sigma_m),
+      Eigen::Vector3d::Constant(config.reference.sigma_deg * kRadPerDeg);
+  return std::make_shared<PlantedClosureFinder>(std::move(finder), truth, planted_closures(config.planted, recordings),
+                                                Matrix6d(sigma.cwiseAbs2().asDiagonal()));
 }
 
 }  // namespace
@@ -64,7 +89,11 @@ std::shared_ptr<const server::ClosureFinder> make_honest_finder(const ClosureCon
 std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
                                                                  const std::vector<MissionRecording>& recordings,
                                                                  std::uint64_t seed) {
-  auto finder = make_honest_finder(config, recordings, seed);
+  std::shared_ptr<const server::ClosureFinder> finder;
+  if (config.finder == "lidar")
+    finder = std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap);
+  else
+    finder = make_reference_finder(config, recordings, seed);
   if (config.wrong_share == 0.0) return finder;
   return std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
 }

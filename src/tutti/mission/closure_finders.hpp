@@ -34,20 +34,22 @@ class LidarClosureFinder final : public server::ClosureFinder {
 /// For recordings without sensor data: true relative poses plus noise and a share of wrong ones.
 class ReferenceClosureFinder final : public server::ClosureFinder {
  public:
-  explicit ReferenceClosureFinder(simulation::ReferenceClosures closures) : closures_(std::move(closures)) {}
+  explicit ReferenceClosureFinder(std::shared_ptr<const simulation::ReferenceClosures> closures)
+      : closures_(std::move(closures)) {}
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
-    return closures_.is_candidate(first, second);
+    return closures_->is_candidate(first, second);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::CloudStore&) const override {
-    return closures_.verify(first, second);
+    return closures_->verify(first, second);
   }
 
  private:
-  simulation::ReferenceClosures closures_;
+  std::shared_ptr<const simulation::ReferenceClosures> closures_;
 };
 
+/// What load_input() accepts is complete: planted closures name robots of the mission.
 std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
                                                                  const std::vector<MissionRecording>& recordings,
                                                                  std::uint64_t seed);

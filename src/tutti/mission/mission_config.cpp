@@ -38,6 +38,9 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
   if (config.source == "simulation" && config.closures.finder == "lidar" && config.simulation.sensors != "lidar")
     problem(fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
                         config.simulation.sensors));
+  if (config.closures.finder != "reference" && !config.closures.planted.empty())
+    problem(fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'",
+                        config.closures.finder));
   for (const std::string& policy : config.compare_policies)
     if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
       problem("compare_policies: " + known.error().message);

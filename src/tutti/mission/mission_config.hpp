@@ -78,6 +78,7 @@ struct ClosureConfig {
   simulation::ReferenceClosureConfig reference;
   double wrong_share = 0.0;
   SpoiledClosureConfig wrong;
+  std::vector<PlantedClosureConfig> planted;
   template <class V>
   void describe(V& v) {
     v.field("finder", finder, one_of({"lidar", "reference"}),
@@ -89,6 +90,7 @@ struct ClosureConfig {
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the closures found that are made wrong on purpose.");
     v.field("wrong", wrong, any(), "How wrong these are.");
+    v.field("planted", planted, any(), "reference: wrong closures at given places and times.");
   }
 };
 

@@ -47,6 +47,10 @@ TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
             std::string::npos);
   EXPECT_NE(problem_with(kGood, {"compare_policies=[oracle]"}).find("oracle"), std::string::npos);
   EXPECT_NE(problem_with(kGood, {"robots.0.reference_offset_m=[1, 2]"}).find("expected 3"), std::string::npos);
+  EXPECT_EQ(problem_with(kGood, {"closures.planted=[{robot: a, at_s: 9}]"}), "");
+  EXPECT_NE(problem_with(kGood, {"closures.planted=[{robot: a}]", "closures.finder=lidar", "robots.0.scans=s"})
+                .find("closures.planted"),
+            std::string::npos);
 }
 
 }  // namespace

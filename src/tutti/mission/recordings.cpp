@@ -149,14 +149,7 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
   return out;
 }
 
-}  // namespace
-
-Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed) {
-  if (config.source == "recordings") {
-    auto robots = replay_all(config, data, Rng(seed));
-    if (!robots) return tl::unexpected(robots.error());
-    return MissionInput{.robots = std::move(*robots), .survey = nullptr};
-  }
+Result<MissionInput> simulate(const MissionConfig& config, std::uint64_t seed) {
   auto world = simulation::simulate_recordings(config.simulation, Timestamp{0}, seed);
   if (!world) return tl::unexpected(world.error());
   MissionInput input;
@@ -166,6 +159,31 @@ Result<MissionInput> load_input(const MissionConfig& config, const std::filesyst
   if (world->surface)
     input.survey = std::make_shared<const PointCloud>(
         simulation::sample_surface(*world->surface, kSurveySpacing_m, Rng(seed).fork("survey")));
+  return input;
+}
+
+Result<MissionInput> replay_or_simulate(const MissionConfig& config, const fs::path& data, std::uint64_t seed) {
+  if (config.source != "recordings") return simulate(config, seed);
+  auto robots = replay_all(config, data, Rng(seed));
+  if (!robots) return tl::unexpected(robots.error());
+  return MissionInput{.robots = std::move(*robots), .survey = nullptr};
+}
+
+/// A closure planted on a robot that is not there would silently do nothing.
+Status check_planted(const MissionConfig& config, const std::vector<MissionRecording>& robots) {
+  for (const PlantedClosureConfig& planted : config.closures.planted)
+    for (const std::string& name : {planted.robot, planted.other.empty() ? planted.robot : planted.other})
+      if (std::ranges::none_of(robots, [&](const MissionRecording& r) { return r.recording.name == name; }))
+        return fail(ErrorCode::configuration, "closures.planted: no robot is called '{}'", name);
+  return {};
+}
+
+}  // namespace
+
+Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed) {
+  auto input = replay_or_simulate(config, data, seed);
+  if (!input) return input;
+  if (auto ok = check_planted(config, input->robots); !ok) return tl::unexpected(ok.error());
   return input;
 }
 

@@ -30,6 +30,14 @@ class Recordings : public testing::Test {
   MissionConfig config_;
 };
 
+TEST_F(Recordings, AClosurePlantedOnAnUnknownRobotIsAnError) {
+  config_.closures.planted = {{.robot = std::string("a"), .other = std::string("zulu")}};
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_FALSE(input.has_value());
+  EXPECT_EQ(input.error().code, ErrorCode::configuration);
+  EXPECT_NE(input.error().message.find("zulu"), std::string::npos) << input.error().message;
+}
+
 TEST_F(Recordings, AreReplayedAsTheyAre) {
   const auto input = load_input(config_, folder_, 1);
   ASSERT_TRUE(input.has_value()) << input.error().message;

@@ -3,9 +3,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/server/closure_finder.hpp"
+#include "tutti/simulation/reference_closures.hpp"
 
 namespace tutti::mission {
 
@@ -41,6 +45,57 @@ class SpoiledClosureFinder final : public server::ClosureFinder {
   double wrong_share_;
   SpoiledClosureConfig config_;
   std::uint64_t seed_;
+};
+
+/// One wrong closure at a given place and time.
+struct PlantedClosureConfig {
+  std::string robot;
+  double at_s = 0.0;
+  std::string other;
+  double other_at_s = 0.0;
+  double ahead_m = 0.0;
+  double left_m = 0.0;
+  double yaw_deg = 0.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("robot", robot, any(), "Name of the robot whose submap is claimed to be somewhere else than it is.");
+    v.field("at_s", at_s, at_least(0.0), "Mission time of a moment in this submap.");
+    v.field("other", other, any(), "Robot whose submap it is joined to; empty: the same.");
+    v.field("other_at_s", other_at_s, at_least(0.0), "Mission time of a moment in that submap.");
+    v.field("ahead_m", ahead_m, any(), "The claim's error as seen by the other robot at that moment: ahead,");
+    v.field("left_m", left_m, any(), "... to the left,");
+    v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "... and turned about the other robot.");
+  }
+};
+
+/// A planted closure in terms of robots and stamps.
+struct PlantedClosure {
+  RobotId robot;
+  Timestamp stamp;
+  RobotId other;
+  Timestamp other_stamp;
+  Pose3 T_claimed_true;  ///< Error of where the robot is claimed to be, in the other's body frame.
+};
+
+/// Puts one closure in place of the verdict of another finder on the two submaps that contain the given moments:
+/// between the keyframes next to them, the true relative pose but for the error, as confident as the covariance says.
+class PlantedClosureFinder final : public server::ClosureFinder {
+ public:
+  PlantedClosureFinder(std::shared_ptr<const server::ClosureFinder> inner,
+                       std::shared_ptr<const simulation::ReferenceClosures> truth, std::vector<PlantedClosure> planted,
+                       const Matrix6d& covariance);
+  [[nodiscard]] bool needs_clouds() const override { return inner_->needs_clouds(); }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const override;
+
+ private:
+  [[nodiscard]] std::optional<LoopClosure> planted_in(const Submap& first, const Submap& second) const;
+
+  std::shared_ptr<const server::ClosureFinder> inner_;
+  std::shared_ptr<const simulation::ReferenceClosures> truth_;
+  std::vector<PlantedClosure> planted_;
+  Matrix6d covariance_;
 };
 
 }  // namespace tutti::mission

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "tutti/geometry/so3.hpp"
+
 namespace tutti::mission {
 namespace {
 
@@ -83,6 +85,62 @@ TEST_F(Spoiled, WhichOnesDependsOnTheSeedAlone) {
   int differ = 0;
   for (std::uint32_t i = 0; i < 40; ++i) differ += error(i, i, 1) == error(i, i, 2) ? 0 : 1;
   EXPECT_GT(differ, 5);
+}
+
+/// Two robots 2 m apart, whose odometry is the truth; a wrong closure between robot 1 at 21.2 s and robot 0 at 4.9 s.
+class Planted : public testing::Test {
+ protected:
+  Planted() {
+    std::map<RobotId, Trajectory> reference;
+    for (std::uint32_t robot = 0; robot < 2; ++robot)
+      for (std::uint32_t index = 0; index < 20; ++index)
+        for (const Keyframe& keyframe : submap(robot, index).keyframes)
+          if (reference[RobotId{robot}].empty() || reference[RobotId{robot}].back().stamp < keyframe.stamp)
+            reference[RobotId{robot}].push_back({keyframe.stamp, keyframe.T_odom_body});
+    finder_ = std::make_shared<PlantedClosureFinder>(
+        std::make_shared<Nothing>(),
+        std::make_shared<const simulation::ReferenceClosures>(reference, simulation::ReferenceClosureConfig{}, 1),
+        std::vector<PlantedClosure>{{RobotId{1}, Timestamp{} + 21.2, RobotId{0}, Timestamp{} + 4.9, error_}},
+        Matrix6d::Identity());
+  }
+  class Nothing final : public server::ClosureFinder {
+   public:
+    [[nodiscard]] bool needs_clouds() const override { return false; }
+    [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return false; }
+    [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                                const server::CloudStore&) const override {
+      return ClosureVerdict{{first.id, second.id}, {}, std::string("nothing there")};
+    }
+  };
+  const Pose3 error_{so3_exp({0.0, 0.0, 0.1}), {1.5, -0.5, 0.0}};
+  server::MemoryCloudStore clouds_;
+  std::shared_ptr<PlantedClosureFinder> finder_;
+};
+
+TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
+  int found = 0;
+  for (std::uint32_t i = 0; i < 20; ++i)
+    for (std::uint32_t j = 0; j < 20; ++j) {
+      const auto verdict = finder_->verify(submap(0, i), submap(1, j), clouds_);
+      EXPECT_EQ(finder_->is_candidate(submap(0, i), submap(1, j)), !verdict->closures.empty());
+      EXPECT_EQ(verdict->reason.empty(), !verdict->closures.empty());
+      if (verdict->closures.empty()) continue;
+      ++found;
+      const LoopClosure& closure = verdict->closures.front();
+      EXPECT_EQ(closure.from, (KeyframeId{RobotId{0}, 5}));
+      EXPECT_EQ(closure.to, (KeyframeId{RobotId{1}, 21}));
+      const Pose3 T_true{Eigen::Quaterniond::Identity(), {16.0, 2.0, 0.0}};
+      EXPECT_LT(local(error_ * T_true, closure.measurement.T_a_b).norm(), 1e-9);
+    }
+  EXPECT_EQ(found, 1);
+}
+
+TEST_F(Planted, TheOrderOfThePairOnlyInvertsTheClosure) {
+  const LoopClosure forth = finder_->verify(submap(0, 2), submap(1, 10), clouds_)->closures.at(0);
+  const LoopClosure back = finder_->verify(submap(1, 10), submap(0, 2), clouds_)->closures.at(0);
+  EXPECT_EQ(back.from, forth.to);
+  EXPECT_EQ(back.to, forth.from);
+  EXPECT_LT(local(back.measurement.T_a_b, forth.measurement.T_a_b.inverse()).norm(), 1e-9);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "tutti/geometry/so3.hpp"
@@ -232,13 +233,102 @@ TEST(SimulateOdometry, OriginsOfDriftSayWhenAndHowMuch) {
   EXPECT_NEAR(slips, 100, 30);  // 5 per run
 }
 
+OdometryNoiseConfig no_noise() {
+  OdometryNoiseConfig config = white_noise();
+  config.translation_m_per_sqrt_m = config.yaw_deg_per_sqrt_m = config.tilt_deg_per_sqrt_m = 0.0;
+  config.floor_m = config.floor_deg = 1e-12;
+  return config;
+}
+
+TEST(SimulateOdometry, SlidesAreNoSmallerThanAskedForAndToBothSides) {
+  const Trajectory truth = straight(50.0);
+  const auto around = corridor_between(truth, CorridorKind::featureless, 10.0, 40.0);
+  OdometryNoiseConfig config = no_noise();
+  config.degeneracy = {.slide_percent = 4.0, .least_slide_percent = 3.0, .along_m_per_sqrt_m = 0.0};
+  int at_least = 0, ahead = 0;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    const auto simulated = simulate_odometry(truth, around, config, Rng(seed));
+    const Vector6d error = local(truth.front().pose.inverse() * truth.back().pose,
+                                 simulated.odometry.front().pose.inverse() * simulated.odometry.back().pose);
+    ASSERT_GE(std::abs(error.x()), 0.03 * 30.0 - 1e-6);
+    at_least += std::abs(error.x()) < 0.03 * 30.0 + 1e-6 ? 1 : 0;
+    ahead += error.x() > 0.0 ? 1 : 0;
+  }
+  EXPECT_NEAR(at_least, 55, 15);  // |normal| < 0.75
+  EXPECT_NEAR(ahead, 50, 15);
+}
+
+TEST(SimulateOdometry, AnOverstatedCovarianceIsLargerThanTheErrorsByItsFactor) {
+  OdometryNoiseConfig config = white_noise();
+  config.stated_sigma_factor = 3.0;
+  EXPECT_NEAR(mean_normalised_error(config, 0.0, 100), 1.0 / 9.0, 0.012);
+  EXPECT_NEAR(mean_normalised_error(config, 50.0, 300), 1.0 / 9.0, 0.02);
+}
+
+/// Error of the odometry from the first pose on, in the frame of the first pose.
+Pose3 error_since_start(const Trajectory& truth, const OdometrySimulation& simulated, std::size_t k) {
+  const Pose3 T_start_true = truth.front().pose.inverse() * truth[k].pose;
+  return simulated.odometry.front().pose.inverse() * simulated.odometry[k].pose * T_start_true.inverse();
+}
+
+RC_GTEST_PROP(SimulateOdometry, AScriptedErrorIsWhereAndWhatItWasAskedToBe, ()) {
+  const Trajectory truth = straight(100.0);
+  OdometryNoiseConfig config = no_noise();
+  const bool sudden = *rc::gen::arbitrary<bool>();
+  const double yaw_deg = *rc::gen::inRange(-90, 91);
+  const Eigen::Vector3d move(*rc::gen::inRange(-3, 4), *rc::gen::inRange(-3, 4), *rc::gen::inRange(1, 4));
+  config.scripted = {{.after_m = 30.0, .length_m = sudden ? 0.0 : 20.0, .ahead_m = move.x(), .left_m = move.y()},
+                     {.after_m = 60.0, .length_m = sudden ? 0.0 : 20.0, .yaw_deg = yaw_deg, .up_m = move.z()},
+                     {.after_m = 200.0, .yaw_deg = 90.0}};  // never reached
+  const auto simulated = simulate_odometry(truth, {}, config, Rng(*rc::gen::arbitrary<std::uint32_t>()));
+  const auto known = simulate_odometry(truth, {}, no_noise(), Rng(1));
+  RC_ASSERT(simulated.increment_covariance == known.increment_covariance);  // it does not know
+  const std::size_t between = after_distance(truth, 0, 55.0);
+  const Pose3 first = error_since_start(truth, simulated, between);
+  RC_ASSERT((first.translation - Eigen::Vector3d(move.x(), move.y(), 0.0)).norm() < 1e-6);
+  RC_ASSERT(rotation_angle(first) < 1e-6);
+  const Pose3 at_end = error_since_start(truth, simulated, truth.size() - 1);
+  RC_ASSERT(std::abs(rotation_angle(at_end) - std::abs(yaw_deg) * kRadPerDeg) < 1e-6);
+  RC_ASSERT(std::abs(at_end.translation.z() - move.z()) < 1e-6);
+  RC_ASSERT(simulated.drift_origins.size() == 2U);
+  const DriftOrigin& origin = simulated.drift_origins[1];
+  RC_ASSERT(origin.kind == (sudden ? DriftOrigin::Kind::slip : DriftOrigin::Kind::failure));
+  RC_ASSERT(std::abs((origin.from - truth.front().stamp) - 60.0) < 0.3);
+  RC_ASSERT(std::abs((origin.until - origin.from) - (sudden ? 1.0 / kRate_hz : 20.0)) < 0.3);
+  RC_ASSERT(std::abs(origin.rotation_rad - std::abs(yaw_deg) * kRadPerDeg) < 1e-6);
+}
+
+RC_GTEST_PROP(SimulateOdometry, AnErrorAtTheStartTurnsTheRestAboutIt, ()) {
+  const Trajectory truth = [] {  // twice round a circle of 20 m through the origin
+    Trajectory out;
+    for (int k = 0; k <= 2000; ++k) {
+      const double angle = k * 4.0 * std::numbers::pi / 2000.0;
+      const Eigen::Quaterniond heading(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()));
+      out.push_back(
+          {Timestamp{} + k / kRate_hz, {heading, {20.0 * std::sin(angle), 20.0 * (1.0 - std::cos(angle)), 0.0}}});
+    }
+    return out;
+  }();
+  OdometryNoiseConfig config = no_noise();
+  const double yaw_deg = *rc::gen::inRange(5, 90);
+  config.scripted = {{.after_m = 50.0, .at_start = true, .yaw_deg = yaw_deg}};
+  const auto simulated = simulate_odometry(truth, {}, config, Rng(1));
+  RC_ASSERT(simulated.drift_origins.size() == 1U);
+  RC_ASSERT(std::abs((simulated.drift_origins.front().from - truth.front().stamp) - 1000.0 / kRate_hz) < 0.3);
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    const Pose3 T_start_true = truth.front().pose.inverse() * truth[k].pose;
+    const Pose3 T_start_odometry = simulated.odometry.front().pose.inverse() * simulated.odometry[k].pose;
+    RC_ASSERT(std::abs(T_start_true.translation.norm() - T_start_odometry.translation.norm()) < 1e-6);
+    const double turned = k < 1000 ? 0.0 : 2.0 * std::sin(0.5 * yaw_deg * kRadPerDeg);
+    const double moved = (T_start_true.translation - T_start_odometry.translation).norm();
+    RC_ASSERT(std::abs(moved - turned * T_start_true.translation.norm()) < 1e-6);
+  }
+}
+
 RC_GTEST_PROP(SimulateOdometry, WithoutNoiseOnlyTheFrameDiffers, ()) {
   const auto seed = *rc::gen::arbitrary<std::uint32_t>();
   const Trajectory truth = walk(seed, 30.0);
-  OdometryNoiseConfig config;
-  config.translation_m_per_sqrt_m = config.yaw_deg_per_sqrt_m = config.tilt_deg_per_sqrt_m = 0.0;
-  config.floor_m = config.floor_deg = 1e-12;
-  config.yaw_bias_deg_per_m = config.scale_percent = 0.0;
+  const OdometryNoiseConfig config = no_noise();
   const OdometrySimulation simulated = simulate_odometry(truth, {}, config, Rng(seed));
   RC_ASSERT(simulated.odometry.size() == truth.size());
   RC_ASSERT(simulated.increment_covariance.size() + 1 == truth.size());

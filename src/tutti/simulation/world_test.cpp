@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace tutti::simulation {
 namespace {
@@ -35,6 +36,23 @@ RC_GTEST_PROP(World, FeaturelessAreTheLongestCorridors, (std::uint32_t seed)) {
   RC_ASSERT(longest_rough <= shortest_featureless);
   const double share = static_cast<double>(featureless) / static_cast<double>(world.corridors.size());
   RC_ASSERT(std::abs(share - config.featureless_share) <= 0.5 / static_cast<double>(world.corridors.size()) + 1e-12);
+}
+
+TEST(World, NamedCorridorsAreFeatureless) {
+  WorldConfig config;
+  config.network = {.rows = 2, .columns = 3, .missing_share = 0.0};
+  config.featureless_share = 0.0;
+  config.featureless = {1, 0, 2, 5};
+  const CorridorWorld world = make_world(config, Rng(1));
+  EXPECT_TRUE(check_world(world, config).has_value());
+  for (const Corridor& corridor : world.corridors) {
+    const bool named = (corridor.a == 0 && corridor.b == 1) || (corridor.a == 2 && corridor.b == 5);
+    EXPECT_EQ(corridor.kind == CorridorKind::featureless, named) << corridor.a << " to " << corridor.b;
+  }
+  for (const std::vector<int>& bad : {std::vector<int>{0, 5}, {0, 99}, {0, 1, 2}}) {
+    config.featureless = bad;
+    EXPECT_FALSE(check_world(make_world(config, Rng(1)), config).has_value());
+  }
 }
 
 TEST(World, TerraceIsNumberedAsDocumented) {
