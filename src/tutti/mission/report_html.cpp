@@ -48,6 +48,14 @@ std::string figure(const std::string& svg, std::string_view name, std::string_vi
   return fmt::format("<figure{}>\n{}{}</figure>\n", wide ? " class=\"wide\"" : "", caption, svg);
 }
 
+std::string page(std::string_view title, const std::string& body) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
+      escape_xml(title), report_style(), body);
+}
+
 std::string report_html(const MissionRecord& record) {
   std::vector<RobotGeometry> geometry;
   for (const auto& robot : record.robots) geometry.push_back(robot_geometry(record, robot));
@@ -70,11 +78,7 @@ std::string report_html(const MissionRecord& record) {
             "</pre></details>\n";
   body += fmt::format("<footer>Made by Tutti {}. Every figure is defined in docs/report.md.</footer>\n",
                       escape_xml(record.version));
-  return fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{} - Tutti</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
-      escape_xml(record.mission), report_style(), body);
+  return page(record.mission + " - Tutti", body);
 }
 
 }  // namespace tutti::mission

@@ -117,8 +117,8 @@ std::string alerts_html(const MissionRecord& record) {
     for (const RobotRecord& robot : record.robots)
       if (robot.id == failed.robot)
         list +=
-            fmt::format("<li><b>Localisation failure suspected by the server:</b> {}, {}: {:.1f} m</li>\n", escape_xml(robot.name),
-                        between(clock_of(robot), failed.from, failed.until), failed.error_m);
+            fmt::format("<li><b>Localisation failure suspected by the server:</b> {}, {}: {:.1f} m</li>\n",
+                        escape_xml(robot.name), between(clock_of(robot), failed.from, failed.until), failed.error_m);
   return list.empty() ? "" : "<ul class=\"alerts\">\n" + list + "</ul>\n";
 }
 

@@ -22,6 +22,8 @@ std::size_t detail_per_robot(const MissionRecord& record, std::size_t total, std
 std::string robot_class(const MissionRecord& record, RobotId robot);
 std::string robot_name(const MissionRecord& record, RobotId robot);
 
+/// The whole page around `body` (HTML); `title` is text.
+std::string page(std::string_view title, const std::string& body);
 /// A titled part of the page. `lead`: one or two plain sentences (text, escaped here). `body`: HTML.
 std::string section(std::string_view title, std::string_view lead, const std::string& body);
 /// A picture under its name and a few words (text, may be empty); `wide` ones take the whole row.

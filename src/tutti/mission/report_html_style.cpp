@@ -30,6 +30,7 @@ body { margin: 0; background: var(--paper); color: var(--ink); line-height: 1.5;
 main { max-width: 1240px; margin: 0 auto; padding: 40px 28px 64px; }
 h1 { font-size: 34px; line-height: 1.15; margin: 4px 0 8px; letter-spacing: -0.02em; overflow-wrap: anywhere; }
 h2 { font-size: 21px; margin: 52px 0 4px; letter-spacing: -0.01em; }
+h3 { font-size: 16px; margin: 30px 0 8px; }
 .brand { color: var(--accent); font-weight: 650; letter-spacing: 0.14em; text-transform: uppercase; font-size: 12px; margin: 0; }
 .lead, .description { color: var(--soft); max-width: 78ch; margin: 0 0 16px; }
 .description { font-size: 17px; }

@@ -2,88 +2,26 @@
 #include "tutti/mission/report_text.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "tutti/mission/report_explanation.hpp"
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_geometry.hpp"
+#include "tutti/mission/report_table.hpp"
 
 namespace tutti::mission {
 namespace {
 
-constexpr std::size_t kColumns = 100;
 constexpr std::size_t kRobotsPerPolicyTable = 2;
-
-/// Rows of cells, aligned: the first `left` columns to the left, the others to the right. An empty row is a gap.
-class Table {
- public:
-  explicit Table(std::size_t left) : left_(left) {}
-  void add(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
-  /// A line under everything so far.
-  void rule() { rules_.push_back(rows_.size()); }
-
-  [[nodiscard]] std::string str() const {
-    std::vector<std::size_t> widths;
-    for (const auto& row : rows_)
-      for (std::size_t c = 0; c < row.size(); ++c) {
-        if (c == widths.size()) widths.push_back(0);
-        widths[c] = std::max(widths[c], row[c].size());
-      }
-    std::size_t total = 0;
-    for (const std::size_t width : widths) total += width + kGap;
-    std::string out;
-    for (std::size_t r = 0; r < rows_.size(); ++r) {
-      if (std::find(rules_.begin(), rules_.end(), r) != rules_.end())
-        out += fmt::format("  {:-<{}}\n", "", total - kGap);
-      std::string line = "  ";
-      for (std::size_t c = 0; c < rows_[r].size(); ++c) {
-        line +=
-            c < left_ ? fmt::format("{:<{}}", rows_[r][c], widths[c]) : fmt::format("{:>{}}", rows_[r][c], widths[c]);
-        line += std::string(kGap, ' ');
-      }
-      line.erase(line.find_last_not_of(' ') + 1);
-      out += line + "\n";
-    }
-    return out;
-  }
-
- private:
-  static constexpr std::size_t kGap = 2;
-  std::size_t left_;
-  std::vector<std::vector<std::string>> rows_;
-  std::vector<std::size_t> rules_;
-};
-
-/// Breaks at spaces; continuation lines start under the text of the first.
-std::string wrap(const std::string& text, const std::string& prefix) {
-  std::string out = prefix;
-  std::size_t column = prefix.size();
-  std::istringstream words(text);
-  for (std::string word; words >> word;) {
-    if (column > prefix.size() && column + 1 + word.size() > kColumns) {
-      out.append("\n").append(prefix.size(), ' ');
-      column = prefix.size();
-    }
-    if (column > prefix.size()) {
-      out += ' ';
-      ++column;
-    }
-    out += word;
-    column += word.size();
-  }
-  return out + "\n";
-}
 
 std::string plural(std::size_t count, const std::string& noun) {
   return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
 }
 
 std::string robots_table(const MissionRecord& record) {
-  Table table(2);
+  TextTable table(2);
   table.add({"robot", "estimate", "RMSE", "max", "RPE", "RPE 10 m", "to server", "constraints", "update ms"});
   for (const auto& robot : record.robots) {
     table.rule();
@@ -119,7 +57,7 @@ std::string policies_table(const MissionRecord& record, std::size_t first, std::
       if (std::find(names.begin(), names.end(), policy.name) == names.end()) names.push_back(policy.name);
   if (names.empty()) return "";
 
-  Table table(1);
+  TextTable table(1);
   std::vector<std::string> robots{""};
   std::vector<std::string> head{"policy"};
   for (std::size_t r = first; r < last; ++r) {
@@ -149,7 +87,7 @@ std::string policies_table(const MissionRecord& record, std::size_t first, std::
 
 /// Bytes per second over each robot's own time.
 std::string radio_table(const MissionRecord& record) {
-  Table table(2);
+  TextTable table(2);
   table.add({"radio", "kind", "messages", "total", "mean rate", "largest"});
   for (const auto& robot : record.robots) {
     if (robot.traffic.empty()) continue;
