@@ -51,9 +51,9 @@ struct ChainConstraint {
 struct SmootherSummary {
   Termination termination = Termination::not_run;
   int iterations = 0;          ///< On the reduced graph, of all phases.
-  double initial_cost = -1.0;  ///< Of the reduced graph, compounded odometry and constraints, every one trusted.
-  double final_cost = -1.0;    ///< With the loss, when it took part.
-  bool loss_applied = false;   ///< A doubtful constraint contradicts the rest noticeably.
+  double initial_cost = -1.0;  ///< Of the reduced graph: compounded odometry and the constraints not doubtful.
+  double final_cost = -1.0;    ///< Of the reduced graph, the doubtful constraints by their loss.
+  bool loss_applied = false;   ///< There are doubtful constraints, and a loss for them.
   std::size_t reduced_nodes = 0;
   std::size_t reduced_edges = 0;
   /// What had to be done again since the last solve: odometry steps compounded, inner poses bent (the others moved

@@ -39,6 +39,15 @@ double RobustLoss::weight(double s) const {
   return 1.0;
 }
 
+double RobustLoss::curvature(double s) const {
+  constexpr double kConvex = 0.1;
+  const double c2 = scale * scale;
+  double share = 1.0;
+  if (kind == LossKind::cauchy) share = (c2 - s) / (c2 + s);
+  if (kind == LossKind::geman_mcclure) share = (c2 - 3.0 * s) / (c2 + s);
+  return share > kConvex ? share : 1.0;  // Huber's is 1 or 0
+}
+
 LossKind loss_kind(const std::string& name) {
   if (name == "none") return LossKind::none;
   if (name == "huber") return LossKind::huber;

@@ -23,6 +23,19 @@ TEST(RobustLoss, WeightIsTheDerivative) {
       }
 }
 
+TEST(RobustLoss, CurvatureIsTheSecondDerivativeWhereConvex) {
+  for (const LossKind kind : {LossKind::none, LossKind::cauchy, LossKind::geman_mcclure})
+    for (const double scale : {0.5, 1.0, 3.0})
+      for (const double share : {1e-3, 0.1, 0.25, 0.6, 2.0, 10.0}) {
+        const RobustLoss loss{kind, scale};
+        const double r = scale * std::sqrt(share);
+        const double h = 1e-4 * r;
+        const auto half = [&](double x) { return 0.5 * loss.rho(x * x); };
+        const double numeric = (half(r + h) - 2.0 * half(r) + half(r - h)) / (h * h) / loss.weight(r * r);
+        EXPECT_NEAR(loss.curvature(r * r), numeric > 0.1 ? numeric : 1.0, 1e-5) << static_cast<int>(kind) << " " << r;
+      }
+}
+
 TEST(RobustLoss, LeavesInliersAloneAndGrowsSlower) {
   for (const LossKind kind : kKinds) {
     const RobustLoss loss{kind, 2.0};

@@ -3,16 +3,28 @@
 
 #include <algorithm>
 
+#include "tutti/estimation/between_factor.hpp"
+
 namespace tutti::estimation::internal {
 namespace {
 
-/// A doubtful edge that raises the cost by at most this share of the loss's squared scale weighs at least 0.99.
-constexpr double kUnnoticed = 0.01;
+/// An edge that weighs less is let go.
+constexpr double kLetGo = 0.5;
 
 struct Candidate {
   std::vector<Pose3> poses;
   SolveSummary solve;
 };
+
+bool lets_go(const PoseGraph& graph, const std::vector<Pose3>& poses, const EdgeCosts& costs) {
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    if (!costs.is_robust(e)) continue;
+    const PoseGraphEdge& edge = graph.edges[e];
+    const Vector6d r = between_residual(poses[edge.from], poses[edge.to], edge.T_from_to);
+    if (costs.weight(e, r.dot(edge.information * r)) < kLetGo) return true;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -29,27 +41,22 @@ DoubtingSummary minimise_doubting(GaussNewton& gauss_newton, std::span<const Edg
   std::vector<double> without(doubt ? roles.size() : 0, 1.0);
   for (std::size_t e = 0; e < without.size(); ++e)
     if (roles[e] == EdgeRole::robust) without[e] = 0.0;
-  const Candidate trusted = minimise(poses, {.loss = {}, .roles = {}, .scale = without});
-  Candidate best = trusted;
-  bool applied = false;
-  if (doubt && is_usable(trusted.solve.termination)) {
-    const double scale2 = loss.scale * loss.scale;
-    best = minimise(trusted.poses, {});
-    if (best.solve.final_cost - trusted.solve.final_cost > kUnnoticed * scale2) {
-      applied = true;
-      const EdgeCosts robust{.loss = loss, .roles = roles, .scale = {}};
-      best = minimise(std::move(best.poses), robust);
-      // Where one edge weighs less than half, the cost is at least this; the other start cannot lead below.
-      const double letting_go = trusted.solve.final_cost + loss.rho(scale2);
-      if (best.solve.final_cost > letting_go)
-        if (Candidate other = minimise(trusted.poses, robust); other.solve.final_cost < best.solve.final_cost)
-          best = std::move(other);
+  Candidate best = minimise(poses, {.loss = {}, .roles = {}, .scale = without});
+  const double initial_cost = best.solve.initial_cost;
+  if (doubt && is_usable(best.solve.termination)) {
+    const EdgeCosts robust{.loss = loss, .roles = roles, .scale = {}};
+    std::vector<Pose3> trusted = best.poses;
+    best = minimise(std::move(best.poses), robust);
+    if (lets_go(gauss_newton.graph(), best.poses, robust)) {
+      Candidate all = minimise(std::move(trusted), {});
+      all = minimise(std::move(all.poses), robust);
+      if (all.solve.final_cost < best.solve.final_cost) best = std::move(all);
     }
   }
   poses = std::move(best.poses);
-  best.solve.initial_cost = trusted.solve.initial_cost;
+  best.solve.initial_cost = initial_cost;
   best.solve.iterations = iterations;
-  return {.solve = best.solve, .loss_applied = applied};
+  return {.solve = best.solve, .loss_applied = doubt};
 }
 
 }  // namespace tutti::estimation::internal

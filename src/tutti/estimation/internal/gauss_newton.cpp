@@ -17,7 +17,7 @@ constexpr double kReuseContraction = 0.1;
 /// Where the poses' steps count, they too must shrink, and the step before the first reuse be no longer than this (m,
 /// rad): weak directions, which hardly show in the cost, are where an old factor is wrong first.
 constexpr double kReuseStepContraction = 0.3;
-constexpr double kReuseStepBelow = 1e-2;
+constexpr double kReuseStepBelow = 3e-3;
 /// Of a cost, as a share of it.
 constexpr double kRounding = 1e-11;
 
@@ -54,8 +54,11 @@ void GaussNewton::add_gradient(const EdgeSlot& slot, const BetweenLinearisation&
 }
 
 void GaussNewton::add_factor(std::size_t edge, const BetweenLinearisation& factor, const Matrix6d& information) {
-  const EdgeSlot& slot = structure_.edges[edge];
-  add_gradient(slot, factor, information * factor.residual);
+  add_gradient(structure_.edges[edge], factor, information * factor.residual);
+  add_hessian(structure_.edges[edge], factor, information);
+}
+
+void GaussNewton::add_hessian(const EdgeSlot& slot, const BetweenLinearisation& factor, const Matrix6d& information) {
   const Matrix6d WJ_j = information * factor.J_j;
   if (slot.to >= 0) hessian_.add_diagonal(slot.to, Matrix6d(factor.J_j.transpose() * WJ_j));
   if (slot.from >= 0) {
@@ -85,11 +88,14 @@ void GaussNewton::linearise(std::span<const Pose3> poses, const EdgeCosts& costs
     if (edge.from == edge.to) continue;
     const auto factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
     const Vector6d weighted = edge.information * factor.residual;
-    const double weight = costs.weight(e, factor.residual.dot(weighted));
-    if (with_hessian)
-      add_factor(e, factor, weight * edge.information);
-    else
-      add_gradient(structure_.edges[e], factor, weight * weighted);
+    const double s = factor.residual.dot(weighted);
+    const double weight = costs.weight(e, s);
+    add_gradient(structure_.edges[e], factor, weight * weighted);
+    if (!with_hessian) continue;
+    Matrix6d information = weight * edge.information;
+    if (const double flatter = 1.0 - costs.curvature(e, s); flatter > 0.0)
+      information -= (flatter * weight / s) * weighted * weighted.transpose();
+    add_hessian(structure_.edges[e], factor, information);
   }
 }
 

@@ -28,6 +28,7 @@ struct EdgeCosts {
   [[nodiscard]] double weight(std::size_t e, double s) const {
     return scale_of(e) * (is_robust(e) ? loss.weight(s) : 1.0);
   }
+  [[nodiscard]] double curvature(std::size_t e, double s) const { return is_robust(e) ? loss.curvature(s) : 1.0; }
 };
 
 /// How one minimisation follows another.
@@ -39,7 +40,8 @@ struct Continuation {
   [[nodiscard]] bool limits_step() const { return step_tolerance < std::numeric_limits<double>::infinity(); }
 };
 
-/// Gauss-Newton over one graph; the symbolic factorisation is shared by all calls.
+/// Gauss-Newton over one graph, with the loss's own curvature as far as it is positive; the symbolic factorisation is
+/// shared by all calls.
 class GaussNewton {
  public:
   /// Both must outlive this.
@@ -61,6 +63,7 @@ class GaussNewton {
   /// Fills the Hessian J^T W J and, in elimination order, the gradient J^T W r.
   void linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian);
   [[nodiscard]] BlockCholesky& hessian() { return hessian_; }
+  [[nodiscard]] const PoseGraph& graph() const { return graph_; }
 
  private:
   struct Tried {
@@ -71,6 +74,7 @@ class GaussNewton {
   Tried search_line(const std::vector<Pose3>& poses, const Eigen::VectorXd& step, const EdgeCosts& costs, double most,
                     int max_halvings, std::vector<Pose3>& candidate) const;
   void add_gradient(const EdgeSlot& slot, const BetweenLinearisation& factor, const Vector6d& weighted_residual);
+  void add_hessian(const EdgeSlot& slot, const BetweenLinearisation& factor, const Matrix6d& information);
 
   const PoseGraph& graph_;
   const BlockStructure& structure_;
