@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pose graphs from scratch, the onboard update, pairwise consistency, marginals. What was computed is printed beside
-// the time: chi2, or the error against the full optimum. CPU time on one thread; run with OPENBLAS_NUM_THREADS=1.
+// Pose graphs from scratch, pairwise consistency, marginals. What was computed is printed beside the time. CPU time on
+// one thread; run with OPENBLAS_NUM_THREADS=1. The onboard update has its own: onboard_speed.cpp.
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>
 
@@ -14,7 +14,6 @@
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/estimation/odometry_trial.hpp"
-#include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/formats/g2o.hpp"
 
@@ -57,108 +56,6 @@ BENCHMARK_CAPTURE(public_set, torus3D, "torus3D.g2o", {})->Unit(benchmark::kMill
 BENCHMARK_CAPTURE(public_set, parking_garage, "parking-garage.g2o", {})->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(public_set, intel, "intel.g2o", {})->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(public_set, manhattan, "manhattan.g2o", {})->Unit(benchmark::kMillisecond);
-
-/// The paper's tunnel mission in size: 29,152 odometry steps of 4 cm, up and down a winding corridor, and relative
-/// poses (1 mm, 1 mrad) between neighbouring constrained nodes and between passes at the same place.
-struct Mission {
-  std::vector<Pose3> truth{Pose3{}};
-  std::vector<RelativePose> odometry;
-  std::vector<ChainConstraint> constraints;
-};
-
-Mission tunnel_mission(std::size_t constraints, std::size_t nodes) {
-  constexpr std::size_t kSteps = 29'152;
-  Rng rng(7);
-  Mission m;
-  for (std::size_t k = 0; k < kSteps; ++k) {
-    const double turn =
-        k == kSteps / 2 ? M_PI : (k < kSteps / 2 ? 1.0 : -1.0) * 0.003 * std::sin(0.002 * static_cast<double>(k));
-    Vector6d step;
-    step << 0.041, 0.0, 0.0, rng.normal(1e-4), rng.normal(1e-4), turn;
-    m.truth.push_back(retract(m.truth.back(), step));
-    const Pose3 exact = m.truth[k].inverse() * m.truth[k + 1];
-    m.odometry.push_back({retract(exact, noise(rng, 1e-3, 2e-4)), covariance(1e-3, 2e-4)});
-  }
-  const auto node = [&](std::size_t k) { return k * kSteps / nodes; };
-  const auto link = [&](std::size_t a, std::size_t b) {
-    const Pose3 exact = m.truth[a].inverse() * m.truth[b];
-    m.constraints.push_back({a, b, {retract(exact, noise(rng, 1e-3, 1e-3)), covariance(1e-3, 1e-3)}});
-  };
-  for (std::size_t k = 0; k + 1 < nodes && m.constraints.size() < constraints; ++k) link(node(k), node(k + 1));
-  for (std::size_t k = 0; m.constraints.size() < constraints; k = (k + 7) % (nodes / 2 - 2))
-    link(node(k), node(nodes - 1 - k));
-  return m;
-}
-
-OnboardSmoother smoother_of(const Mission& mission, int polishing_steps) {
-  OnboardSmoother smoother(OnboardSmootherConfig{.polishing_steps = polishing_steps});
-  for (const auto& step : mission.odometry) smoother.append(step);
-  smoother.set_constraints(mission.constraints);
-  return smoother;
-}
-
-void report_difference_from_optimum(benchmark::State& state, const Mission& mission, const std::vector<Pose3>& poses) {
-  PoseGraph graph{.poses = poses, .edges = {}};
-  for (std::size_t k = 0; k < mission.odometry.size(); ++k)
-    graph.edges.push_back({k, k + 1, mission.odometry[k].T_a_b, mission.odometry[k].covariance.inverse()});
-  for (const auto& c : mission.constraints)
-    graph.edges.push_back({c.from, c.to, c.measurement.T_a_b, c.measurement.covariance.inverse()});
-  const auto full = solve_pose_graph(graph, {.relative_cost_tolerance = 1e-14, .initialisation = "given"});
-  double largest = 0.0;
-  double sum = 0.0;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    const double distance = (full.poses[k].translation - poses[k].translation).norm();
-    largest = std::max(largest, distance);
-    sum += distance * distance;
-  }
-  state.counters["max_mm"] = 1e3 * largest;
-  state.counters["rms_mm"] = 1e3 * std::sqrt(sum / static_cast<double>(poses.size()));
-}
-
-/// One update with constraints never seen before: arguments constraints, constrained nodes, polishing steps.
-void onboard_update(benchmark::State& state) {
-  const auto mission =
-      tunnel_mission(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)));
-  auto smoother = smoother_of(mission, static_cast<int>(state.range(2)));
-  for (auto _ : state) {
-    state.PauseTiming();
-    auto fresh =
-        OnboardSmoother(OnboardSmootherConfig{.polishing_steps = static_cast<int>(state.range(2))}, smoother.state());
-    state.ResumeTiming();
-    benchmark::DoNotOptimize(fresh.solve());
-  }
-  smoother.solve();
-  report_difference_from_optimum(state, mission, smoother.poses());
-}
-BENCHMARK(onboard_update)
-    ->ArgNames({"constraints", "nodes", "polish"})
-    ->Args({746, 673, 0})
-    ->Args({746, 673, 1})
-    ->Args({2584, 1370, 0})
-    ->Args({2584, 1370, 1})
-    ->Unit(benchmark::kMillisecond);
-
-/// The same when the runs between constrained nodes did not change.
-void onboard_update_cached(benchmark::State& state) {
-  const auto mission =
-      tunnel_mission(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)));
-  auto smoother = smoother_of(mission, 0);
-  smoother.solve();
-  for (auto _ : state) benchmark::DoNotOptimize(smoother.solve());
-  report_difference_from_optimum(state, mission, smoother.poses());
-}
-BENCHMARK(onboard_update_cached)
-    ->ArgNames({"constraints", "nodes"})
-    ->Args({746, 673})
-    ->Args({2584, 1370})
-    ->Unit(benchmark::kMillisecond);
-
-void onboard_append(benchmark::State& state) {
-  const RelativePose step{retract({}, Vector6d::Constant(0.01)), covariance(1e-3, 1e-3)};
-  OnboardSmoother smoother;
-  for (auto _ : state) benchmark::DoNotOptimize(smoother.append(step));
-}
-BENCHMARK(onboard_append)->Iterations(200'000);
 
 /// Two robots on circles of 8 m with drift; half of the closures wrong by metres.
 void odometry_trial(benchmark::State& state) {

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the onboard update costs, against full solves of the same factors, with how right each is; Markdown, the tables
+// of docs/results/speed.md. Times are CPU time of one thread. Usage, one core:
+//   OPENBLAS_NUM_THREADS=1 taskset -c 0 bench_onboard_speed [repetitions=25]
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+#include <string>
+
+#include "tunnel_chain.hpp"
+#include "tutti/estimation/internal/odometry_runs.hpp"
+#include "tutti/estimation/internal/reduced_problem.hpp"
+#include "tutti/estimation/pose_graph_solver.hpp"
+#ifdef TUTTI_HAVE_CERES
+#include "ceres_solve.hpp"
+#endif
+
+namespace {
+
+using namespace tutti;
+using namespace tutti::estimation;
+using bench::TunnelChain;
+
+double thread_ms() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) * 1e3 + static_cast<double>(t.tv_nsec) * 1e-6;
+}
+
+struct Times {
+  double best = 0.0;
+  double median = 0.0;
+};
+
+/// `prepare` before each run is not counted.
+Times measure(int repetitions, const std::function<void()>& prepare, const std::function<void()>& run) {
+  std::vector<double> all;
+  for (int k = 0; k < repetitions; ++k) {
+    prepare();
+    const double start = thread_ms();
+    run();
+    all.push_back(thread_ms() - start);
+  }
+  std::sort(all.begin(), all.end());
+  return {all.front(), all[all.size() / 2]};
+}
+
+struct Difference {
+  double max_mm = 0.0;
+  double rms_mm = 0.0;
+};
+
+Difference difference(const std::vector<Pose3>& a, const std::vector<Pose3>& b) {
+  Difference out;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const double mm = 1e3 * (a[k].translation - b[k].translation).norm();
+    out.max_mm = std::max(out.max_mm, mm);
+    out.rms_mm += mm * mm / static_cast<double>(a.size());
+  }
+  out.rms_mm = std::sqrt(out.rms_mm);
+  return out;
+}
+
+PoseGraph full_graph(const TunnelChain& chain) {
+  PoseGraph graph;
+  graph.poses.push_back(chain.truth.front());
+  const auto information = [](const Matrix6d& C) -> Matrix6d { return C.llt().solve(Matrix6d::Identity()); };
+  for (std::size_t k = 0; k < chain.odometry.size(); ++k) {
+    graph.poses.push_back(graph.poses.back() * chain.odometry[k].T_a_b);
+    graph.edges.push_back({k, k + 1, chain.odometry[k].T_a_b, information(chain.odometry[k].covariance)});
+  }
+  for (const auto& c : chain.constraints)
+    graph.edges.push_back({c.from, c.to, c.measurement.T_a_b, information(c.measurement.covariance)});
+  return graph;
+}
+
+void update_from_scratch(const TunnelChain& chain, int repetitions) {
+  const PoseGraph graph = full_graph(chain);
+  PoseGraph near = graph;
+  {
+    OnboardSmoother smoother({.polishing_steps = 2}, chain.state());
+    smoother.solve();
+    near.poses = smoother.poses();
+  }
+  const std::vector<Pose3> optimum =
+      solve_pose_graph(near, {.relative_cost_tolerance = 1e-14, .initialisation = "given"}).poses;
+
+  std::vector<Pose3> poses;
+  const Times full = measure(
+      3, [] {},
+      [&] { poses = solve_pose_graph(graph, {.relative_cost_tolerance = 1e-6, .initialisation = "given"}).poses; });
+  const auto row = [&](const std::string& what, const Times& times) {
+    const Difference off = difference(poses, optimum);
+    fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.0f} | {:.3f} | {:.3f} |\n", chain.constraints.size(), what, times.best,
+               times.median, full.best / times.best, off.max_mm, off.rms_mm);
+    std::fflush(stdout);
+  };
+#ifdef TUTTI_HAVE_CERES
+  const std::vector<Pose3> own = poses;
+  const Times ceres = measure(
+      2, [] {}, [&] { poses = bench::solve_with_ceres(graph); });
+  row("full graph, Ceres", ceres);
+  poses = own;
+#endif
+  row("full graph, own Gauss-Newton on CHOLMOD", full);
+  for (const int polishing : {1, 0}) {
+    OnboardSmoother smoother;
+    const Times times = measure(
+        repetitions, [&] { smoother = OnboardSmoother({.polishing_steps = polishing}, chain.state()); },
+        [&] { smoother.solve(); });
+    poses = smoother.poses();
+    row(polishing == 0 ? "onboard smoother" : "onboard smoother, one polishing step", times);
+  }
+  TunnelChain doubting = chain;
+  for (std::size_t k = 3; k < doubting.constraints.size(); k += 10) doubting.constraints[k].doubtful = true;
+  OnboardSmoother smoother;
+  const Times times = measure(
+      repetitions, [&] { smoother = OnboardSmoother({}, doubting.state()); }, [&] { smoother.solve(); });
+  fmt::print("| {} | onboard smoother, every tenth constraint doubtful | {:.2f} | {:.2f} | {:.0f} | | |\n",
+             chain.constraints.size(), times.best, times.median, full.best / times.best);
+}
+
+enum class Batch { add, replace };
+
+std::vector<ChainConstraint> with_batch(const TunnelChain& chain, Batch batch, int count, Rng& rng) {
+  auto out = chain.constraints;
+  for (int k = 0; k < count; ++k) {
+    if (batch == Batch::add) {
+      const auto a = static_cast<std::size_t>(rng.index(bench::kTunnelSteps - 500));
+      out.push_back(chain.measured(rng, a, a + 50 + static_cast<std::size_t>(rng.index(400))));
+    } else {
+      ChainConstraint& c = out[rng.index(out.size())];
+      c = chain.measured(rng, c.from, c.to);
+    }
+  }
+  return out;
+}
+
+/// set_constraints() and solve() of a smoother that has solved the rest.
+void batches(const TunnelChain& chain, int repetitions) {
+  for (const Batch batch : {Batch::add, Batch::replace}) {
+    for (const int count : {1, 5, 25, 100}) {
+      const Rng seed(11);
+      OnboardSmoother smoother;
+      SmootherSummary summary;
+      int k = 0;
+      std::vector<ChainConstraint> constraints;
+      double bent = 0.0;
+      const auto draw = [&] {
+        Rng rng = seed.fork(static_cast<std::uint64_t>(k++));
+        constraints = with_batch(chain, batch, count, rng);
+      };
+      const Times times = measure(
+          repetitions,
+          [&] {
+            smoother = OnboardSmoother({}, chain.state());
+            smoother.solve();
+            draw();
+          },
+          [&] {
+            smoother.set_constraints(constraints);
+            summary = smoother.solve();
+            bent += static_cast<double>(summary.bent_poses) / repetitions;
+          });
+      OnboardSmoother fresh;
+      const Times scratch = measure(
+          repetitions, [&] { fresh = OnboardSmoother({}, smoother.state()); }, [&] { fresh.solve(); });
+      const double off = difference(smoother.poses(), fresh.poses()).max_mm;
+      fmt::print("| {} | {} {} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.0f} | {:.4f} |\n", chain.constraints.size(),
+                 batch == Batch::add ? "add" : "replace", count, times.best, times.median, scratch.best,
+                 scratch.best / times.best, bent, off);
+      std::fflush(stdout);
+    }
+  }
+}
+
+/// The parts of one update from scratch, each alone.
+void parts(const TunnelChain& chain, int repetitions) {
+  using namespace estimation::internal;
+  const auto row = [&](const std::string& what, const std::function<void()>& run) {
+    const Times times = measure(
+        repetitions, [] {}, run);
+    fmt::print("| {} | {} | {:.2f} |\n", chain.constraints.size(), what, times.best);
+  };
+  const auto nodes = reduced_nodes(chain.constraints);
+  OdometryRuns runs;
+  row("compound all odometry", [&] {
+    runs = {};
+    runs.update(nodes, chain.odometry);
+  });
+  ChainGraph graph;
+  row("build the reduced graph", [&] { graph = reduce(nodes, runs.all(), chain.constraints, chain.truth.front()); });
+  row("analyse its sparsity", [&] { ReducedProblem{graph}; });
+  ReducedProblem problem(graph);
+  GaussNewton& gauss_newton = problem.gauss_newton();
+  std::vector<Pose3> reduced = graph.graph.poses;
+  gauss_newton.minimise(reduced, {}, {});
+  row("residuals and Hessian", [&] { gauss_newton.linearise(reduced, {}, true); });
+  row("residuals alone", [&] { gauss_newton.linearise(reduced, {}, false); });
+  row("Cholesky factor", [&] { gauss_newton.linearise(reduced, {}, true), (void)gauss_newton.hessian().factorise(); });
+  Eigen::VectorXd b = Eigen::VectorXd::Ones(6 * static_cast<Eigen::Index>(nodes.size() - 1));
+  row("solve with it", [&] { gauss_newton.hessian().solve(b); });
+  std::vector<Pose3> poses(chain.truth.size());
+  row("bend all inner poses", [&] {
+    runs.forget_bends();
+    runs.place(reduced, chain.odometry, poses);
+  });
+  row("move all inner poses rigidly", [&] { runs.place(reduced, chain.odometry, poses); });
+}
+
+void append_and_memory(int repetitions) {
+  const RelativePose step{retract({}, Vector6d::Constant(0.01)), bench::covariance(1e-3, 1e-3)};
+  constexpr int kSamples = 200'000;
+  OnboardSmoother smoother;
+  const Times append = measure(
+      std::max(3, repetitions / 5), [&] { smoother = OnboardSmoother(); },
+      [&] {
+        for (int k = 0; k < kSamples; ++k) smoother.append(step);
+      });
+  fmt::print("- Appending an odometry sample, memory from the system included: {:.0f} ns best, {:.0f} ns median.\n",
+             append.best * 1e6 / kSamples, append.median * 1e6 / kSamples);
+  fmt::print("- Memory per odometry sample: {} bytes (pose {}, factor {}).\n", sizeof(Pose3) + sizeof(RelativePose),
+             sizeof(Pose3), sizeof(RelativePose));
+  const TunnelChain chain = bench::tunnel_chain(746, 673);
+  OnboardSmoother live({}, chain.state());
+  Rng rng(13);
+  std::size_t before = 0;
+  std::size_t most = 0;
+  for (int update = 0; update < 200; ++update) {
+    live.set_constraints(with_batch(chain, update % 2 == 0 ? Batch::add : Batch::replace, 25, rng));
+    live.solve();
+    if (update == 9) before = mallinfo2().uordblks;
+    if (update >= 9) most = std::max(most, mallinfo2().uordblks);
+  }
+  fmt::print(
+      "- 200 updates, 25 of 746 constraints other each time: heap {:.2f} MB after the 10th, {:.2f} MB at most "
+      "after any later one.\n",
+      static_cast<double>(before) * 1e-6, static_cast<double>(most) * 1e-6);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int repetitions = argc > 1 ? std::atoi(argv[1]) : 25;
+  if (repetitions < 1) return 2;
+  const TunnelChain few = bench::tunnel_chain(12, 13);
+  const TunnelChain paper = bench::tunnel_chain(746, 673);
+  const TunnelChain every_node = bench::tunnel_chain(2584, 1370);
+  fmt::print(
+      "| constraints | {} odometry factors, all poses returned | best ms | median ms | full / this | max mm | "
+      "rms mm |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+      bench::kTunnelSteps);
+  for (const auto* chain : {&few, &paper, &every_node}) update_from_scratch(*chain, repetitions);
+  fmt::print(
+      "\n| constraints | batch | best ms | median ms | from scratch, best ms | ratio | poses bent | off from "
+      "scratch, mm |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  for (const auto* chain : {&few, &paper, &every_node}) batches(*chain, repetitions);
+  fmt::print("\n| constraints | part of an update | best ms |\n| --- | --- | --- |\n");
+  for (const auto* chain : {&paper, &every_node}) parts(*chain, repetitions);
+  fmt::print("\n");
+  append_and_memory(repetitions);
+  return 0;
+}
