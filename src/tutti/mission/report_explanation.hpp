@@ -51,7 +51,8 @@ std::string significance_scale_html();
 /// What the bars and strokes mean.
 std::vector<LegendEntry> origin_legend(std::span<const consistency::SuspectedOrigin> origins);
 
-/// Strokes along a way where odometry is suspected; `pixels`: one per pose of `route`.
+/// Strokes along a way where odometry is suspected, with the time they begin (of many, alerts only); `pixels`: one per
+/// pose of `route`.
 void draw_origins(Svg& svg, std::span<const consistency::SuspectedOrigin> origins, const Trajectory& route,
                   const Points2d& pixels, const PictureClock& clock);
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <span>
 
+#include "tutti/mission/report_explanation.hpp"
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_html_parts.hpp"
 #include "tutti/mission/report_map_pictures.hpp"
@@ -166,6 +167,11 @@ std::string robot_maps_html(const MissionRecord& record, const std::vector<Robot
                                   {"corrected", "corrected: robot with policy " + record.default_policy},
                                   {"server", "server"}};
   if (any_reference) legend.push_back({"reference", "reference"});
+  std::vector<consistency::SuspectedOrigin> origins;
+  for (const RobotRecord& robot : record.robots)
+    if (robot.explanation)
+      origins.insert(origins.end(), robot.explanation->origins.begin(), robot.explanation->origins.end());
+  for (auto& entry : origin_legend(origins)) legend.push_back(std::move(entry));
   for (auto& entry : drift_legend(record)) legend.push_back(std::move(entry));
   std::string body = legend_html(legend) + "<div class=\"figures\">\n";
   for (std::size_t r = 0; r < record.robots.size(); ++r) {
@@ -179,6 +185,9 @@ std::string robot_maps_html(const MissionRecord& record, const std::vector<Robot
     Svg svg(view.width(), view.height(), fmt::format("Estimates of {} from above", robot.name));
     svg.polyline(view(ground(g.server)), "server", "server");
     draw_drift(svg, robot, robot.odometry, view(ground(g.onboard)));
+    if (robot.explanation)
+      draw_origins(svg, robot.explanation->origins, robot.odometry, view(ground(g.onboard)),
+                   {robot.odometry.front().stamp, robot.start_s});
     svg.polyline(view(ground(g.onboard)), "onboard", "onboard");
     svg.polyline(view(ground(g.corrected)), "corrected", "corrected");
     svg.polyline(view(ground(g.reference)), "reference", "reference");
