@@ -29,7 +29,7 @@ std::string top_view(const TrajectoryComparison& c, const PictureClock& clock) {
   const Points2d pixels_b = view(ground(b));
   Svg svg(view.width(), view.height(), "Both trajectories from above, B aligned to A");
   svg.polyline(pixels_a, "server", "A");
-  draw_origins(svg, c.explanation.origins, c.judged, pixels_b, clock);
+  draw_origins(svg, c.explanation.origins, c.judged, pixels_b, clock, view.width());
   svg.polyline(pixels_b, "onboard", "B");
   if (!c.constraints.empty()) svg.polyline(view(ground(fixed)), "corrected", "B with the constraints");
   Points2d ends;

@@ -234,7 +234,8 @@ std::vector<LegendEntry> origin_legend(std::span<const SuspectedOrigin> origins)
 }
 
 void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Trajectory& route, const Points2d& pixels,
-                  const PictureClock& clock) {
+                  const PictureClock& clock, double width_px) {
+  constexpr double kName_px = 70.0;
   constexpr std::size_t kFewOrigins = 8;  // more names would lie over each other
   for (const SuspectedOrigin& origin : origins) {
     const auto [first, last] = stretch(route, origin.from, origin.until);
@@ -243,8 +244,11 @@ void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Traj
     const std::string title = fmt::format("{} to {}: {}", format_moment(clock(origin.from)),
                                           format_moment(clock(origin.until)), format_origin_size(origin));
     svg.polyline(way, origin_class(origin) + " along", title);
-    if (origin.alert || origins.size() <= kFewOrigins)
-      svg.text(way[way.size() / 2] + Eigen::Vector2d(9.0, -9.0), format_moment(clock(origin.from)), "name");
+    if (!origin.alert && origins.size() > kFewOrigins) continue;
+    const Eigen::Vector2d middle = way[way.size() / 2];
+    const bool at_edge = middle.x() > width_px - kName_px;
+    svg.text(middle + Eigen::Vector2d(at_edge ? -9.0 : 9.0, -9.0), format_moment(clock(origin.from)), "name",
+             at_edge ? "end" : "start");
   }
 }
 

@@ -52,9 +52,9 @@ std::string significance_scale_html();
 std::vector<LegendEntry> origin_legend(std::span<const consistency::SuspectedOrigin> origins);
 
 /// Strokes along a way where odometry is suspected, with the time they begin (of many, alerts only); `pixels`: one per
-/// pose of `route`.
+/// pose of `route`, in a picture `width_px` wide.
 void draw_origins(Svg& svg, std::span<const consistency::SuspectedOrigin> origins, const Trajectory& route,
-                  const Points2d& pixels, const PictureClock& clock);
+                  const Points2d& pixels, const PictureClock& clock, double width_px);
 
 /// Seconds, as on the pictures' axes: "712.3 s".
 std::string format_moment(double value_s);

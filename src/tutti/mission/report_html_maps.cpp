@@ -187,7 +187,7 @@ std::string robot_maps_html(const MissionRecord& record, const std::vector<Robot
     draw_drift(svg, robot, robot.odometry, view(ground(g.onboard)));
     if (robot.explanation)
       draw_origins(svg, robot.explanation->origins, robot.odometry, view(ground(g.onboard)),
-                   {robot.odometry.front().stamp, robot.start_s});
+                   {robot.odometry.front().stamp, robot.start_s}, view.width());
     svg.polyline(view(ground(g.onboard)), "onboard", "onboard");
     svg.polyline(view(ground(g.corrected)), "corrected", "corrected");
     svg.polyline(view(ground(g.reference)), "reference", "reference");

@@ -63,7 +63,7 @@ td { text-align: right; padding: 6px 10px; border-top: 1px solid var(--line); wh
 th.left, td.left { text-align: left; }
 tr.group td { border-top: 2px solid var(--line); font-weight: 650; padding-top: 12px; }
 tr.chosen td { background: color-mix(in srgb, var(--accent) 9%, transparent); font-weight: 600; }
-td .track { display: inline-block; width: 130px; height: 8px; border-radius: 4px; background: var(--grid); vertical-align: middle;
+td .track { display: inline-block; width: 64px; height: 8px; border-radius: 4px; background: var(--grid); vertical-align: middle;
   margin-right: 12px; overflow: hidden; text-align: left; }
 td .bar { display: block; height: 8px; border-radius: 4px; background: var(--accent); min-width: 2px; }
 td .bar.onboard { background: var(--onboard); } td .bar.server { background: var(--server); }
@@ -126,7 +126,7 @@ rect.truth.slip { fill: var(--slip); } rect.truth.degeneracy { fill: var(--degen
 .robots .what small { font-weight: 400; color: var(--soft); margin-left: 6px; } .robots .value .up { color: var(--onboard); }
 .robots .value .down { color: var(--corrected); } .robots .detail b { color: var(--ink); }
 .node { stroke-width: 4.4; stroke-opacity: 0.85; }
-@media (max-width: 1120px) { table { font-size: 13px; } th, td { padding-left: 6px; padding-right: 6px; } th { white-space: normal; } td .track { width: 60px; } }
+@media (max-width: 1120px) { table { font-size: 13px; } th, td { padding-left: 6px; padding-right: 6px; } th { white-space: normal; } td .track { width: 40px; } }
 @media print { main { max-width: none; padding: 0; } figure, .card, .scroll { break-inside: avoid; } }
 )css";
 

@@ -97,15 +97,15 @@ std::string policies_html(const MissionRecord& record) {
   std::string body =
       "<div class=\"scroll\"><table>\n<thead><tr><th class=\"left\">estimate or policy</th><th>RMSE</th><th>largest "
       "error</th><th>RPE</th><th>RPE, 10 m</th><th>kink</th><th>RMSE to server</th><th>constraints</th><th>of "
-      "odometry</th><th>update, median / "
-      "max, ms</th></tr></thead>\n<tbody>\n";
+      "odometry</th><th>update, ms</th>"
+      "</tr></thead>\n<tbody>\n";
   for (const auto& robot : record.robots) add_policy_rows(record, robot, body);
   return section(
       "Policies side by side",
       fmt::format(
           "Every policy answers the very same broadcasts; {} is the one the robot follows. RMSE and "
           "largest error at keyframes after one rigid alignment, without scale{}. Kink: the most that correcting "
-          "changed any motion over 1 s.",
+          "changed any motion over 1 s. Update: median / largest.",
           record.default_policy, record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
       body + "</tbody></table></div>\n");
 }
