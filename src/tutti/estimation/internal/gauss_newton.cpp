@@ -141,12 +141,13 @@ SolveSummary GaussNewton::minimise(std::vector<Pose3>& poses, const EdgeCosts& c
       reuse_factor = false;
       continue;
     }
-    previous_decrease = decrease;
     ++summary.iterations;
     summary.gradient_norm = gradient_.size() > 0 ? gradient_.lpNorm<Eigen::Infinity>() : 0.0;
 
-    const bool converged =
-        relative <= config.relative_cost_tolerance && still_to_go(size, previous_size) <= how.step_tolerance;
+    const double cost_to_go = how.limits_step() ? still_to_go(decrease, previous_decrease) : decrease;
+    const bool converged = cost_to_go <= config.relative_cost_tolerance * (summary.final_cost + kCostFloor) &&
+                           still_to_go(size, previous_size) <= how.step_tolerance;
+    previous_decrease = decrease;
     previous_size = size;
     // A step that is asked for by its size may promise less than the cost's rounding.
     const double most = summary.final_cost * (relative <= kRounding && how.limits_step() ? 1.0 + kRounding : 1.0);
