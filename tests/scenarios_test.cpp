@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What makes each scenario of missions/ the scenario it is, by the truth: where the error is and how large, what the
+// server's map does over time. How well robots correct themselves is measured elsewhere.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "support/shared_data.hpp"
+#include "tutti/evaluation/association.hpp"
+#include "tutti/evaluation/ate.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/mission/runner.hpp"
+
+namespace tutti::mission {
+namespace {
+
+MissionConfig scenario(const std::string& name, std::vector<std::string> assignments = {}) {
+  assignments.emplace_back("compare_policies=[]");
+  auto config = load_mission(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions" / (name + ".yaml"), assignments);
+  EXPECT_TRUE(config.has_value()) << config.error().message;
+  return config ? *config : MissionConfig{};
+}
+
+MissionRecord run(const MissionConfig& config, std::uint64_t seed = 1) {
+  auto record = run_mission(config, {.data = test::shared_path("data"), .seed = seed, .threads = 1});
+  EXPECT_TRUE(record.has_value()) << record.error().message;
+  return record ? *record : MissionRecord{};
+}
+
+/// The robot's recording, as the mission will replay it.
+Recording recording(const MissionConfig& config, std::size_t robot = 0, std::uint64_t seed = 1) {
+  auto input = load_input(config, {}, seed);
+  EXPECT_TRUE(input.has_value()) << input.error().message;
+  return input ? input->robots.at(robot).recording : Recording{};
+}
+
+std::size_t sample_at(const Trajectory& trajectory, Timestamp stamp) {
+  return static_cast<std::size_t>(std::ranges::lower_bound(trajectory, stamp, {}, &StampedPose::stamp) -
+                                  trajectory.begin());
+}
+
+/// What both say of a pose, seen from the first one.
+struct FromStart {
+  Eigen::Vector3d odometry;
+  Eigen::Vector3d truth;
+};
+std::vector<FromStart> from_start(const Recording& recording) {
+  std::vector<FromStart> out;
+  for (std::size_t k = 0; k < recording.odometry.size(); ++k)
+    out.push_back({(recording.odometry[0].pose.inverse() * recording.odometry[k].pose).translation,
+                   (recording.reference[0].pose.inverse() * recording.reference[k].pose).translation});
+  return out;
+}
+
+/// What odometry makes of a stretch, seen at its end: right tangent.
+Vector6d error_over(const Recording& recording, std::size_t from, std::size_t until) {
+  const auto increment = [&](const Trajectory& t) { return t[from].pose.inverse() * t[until].pose; };
+  return local(increment(recording.reference), increment(recording.odometry));
+}
+
+/// The robot's raw odometry against the server's map at the proxy nodes of the last broadcast, in units of what the
+/// server says it does not know.
+struct Difference {
+  double whole = 0.0;  ///< Root mean square after one alignment.
+  double worst = 0.0;  ///< Of all stretches, in the middle when the ends are held.
+};
+
+Difference difference_over_uncertainty(const MissionRecord& record, const RobotRecord& robot) {
+  Trajectory server;
+  for (const ProxyNode& node : record.server.proxy.nodes)
+    if (node.robot == robot.id) server.push_back({node.stamp, node.T_world_body});
+  const auto shape = std::ranges::find(record.server.proxy.shapes, robot.id, &ShapeUncertainty::robot);
+  const auto pairs = evaluation::associate(server, robot.odometry);
+  const auto aligned = evaluation::ate(pairs);
+  if (shape == record.server.proxy.shapes.end() || !aligned || pairs.size() != server.size()) {
+    ADD_FAILURE() << "no shape of " << robot.name;
+    return {};
+  }
+  std::vector<Eigen::Vector3d> differs;
+  for (const auto& [stamp, estimate, reference] : pairs)
+    differs.push_back((aligned->T_reference_estimate * estimate).translation - reference.translation);
+  Difference out{.whole = aligned->rmse_m / shape->whole.position_m};
+  for (std::size_t j = 0; j < shape->sag.size(); ++j)
+    for (std::size_t i = 0; i < shape->sag[j].size(); ++i) {
+      const std::size_t half = ShapeUncertainty::kShortest << j;
+      const std::size_t a = 2 * half * i;
+      const Eigen::Vector3d sag = differs[a + half] - 0.5 * (differs[a] + differs[a + 2 * half]);
+      out.worst = std::max(out.worst, sag.norm() / shape->sag[j][i].position_m);
+    }
+  return out;
+}
+
+/// Chi-square (3 dof) of one in ten thousand; the stated sigma is that of the worst of three directions.
+constexpr double kExplained = 4.6;
+
+TEST(Scenarios, EveryMissionFileLoads) {
+  int files = 0;
+  for (const auto& file : std::filesystem::directory_iterator(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions")) {
+    if (file.path().extension() != ".yaml") continue;
+    const auto config = load_mission(file.path(), {});
+    ASSERT_TRUE(config.has_value()) << config.error().message;
+    EXPECT_EQ(config->mission, file.path().stem());
+    ++files;
+  }
+  EXPECT_GE(files, 18);
+}
+
+TEST(Scenarios, InAgreeTheServersUncertaintyExplainsTheWholeDifference) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const MissionRecord record = run(scenario("agree", {"server.update_period_s=40"}), seed);
+    EXPECT_EQ(record.server.components, 1U);
+    for (const RobotRecord& robot : record.robots) {
+      EXPECT_LT(*robot.onboard.rmse_m, 0.7 * *robot.server.rmse_m) << robot.name;  // nothing to gain
+      const Difference difference = difference_over_uncertainty(record, robot);
+      EXPECT_LT(difference.whole, 1.5) << robot.name << ", seed " << seed;
+      EXPECT_LT(difference.worst, kExplained) << robot.name << ", seed " << seed;
+    }
+  }
+}
+
+TEST(Scenarios, SpinTurnsHalfOfTheWayAboutTheStartAndDistancesToItCannotSeeIt) {
+  const MissionConfig config = scenario("spin", {"server.update_period_s=40"});
+  const Recording alpha = recording(config);
+  ASSERT_EQ(alpha.drift_origins.size(), 1U);
+  const DriftOrigin& origin = alpha.drift_origins.front();
+  EXPECT_EQ(origin.kind, DriftOrigin::Kind::slip);
+  EXPECT_NEAR(origin.rotation_rad, 20.0 * kRadPerDeg, 0.1 * kRadPerDeg);
+  EXPECT_LT(origin.translation_m, 0.05);
+  const Timestamp start = alpha.odometry.front().stamp;
+  EXPECT_NEAR((origin.from - start) / (alpha.odometry.back().stamp - start), 0.5, 0.06);
+
+  const std::vector<FromStart> poses = from_start(alpha);
+  EXPECT_LT(poses[sample_at(alpha.odometry, origin.until)].truth.norm(), 0.1);  // turned about where it started
+  double error = 0.0;
+  double seen = 0.0;  // by distances to node 0
+  for (const FromStart& pose : poses) {
+    error = std::max(error, (pose.odometry - pose.truth).norm());
+    seen = std::max(seen, std::abs(pose.odometry.norm() - pose.truth.norm()));
+  }
+  EXPECT_NEAR(error, 11.8, 1.5);
+  EXPECT_LT(seen, 0.06 * error);
+  // What distances do see is the ordinary drift: without the spin it is as large.
+  MissionConfig straight = config;
+  straight.simulation.robots[0].odometry.scripted.clear();
+  double ordinary = 0.0;
+  for (const FromStart& pose : from_start(recording(straight)))
+    ordinary = std::max(ordinary, std::abs(pose.odometry.norm() - pose.truth.norm()));
+  EXPECT_LT(seen, ordinary + 0.15);
+
+  const MissionRecord record = run(config);
+  EXPECT_LT(*record.server.joint.rmse_m, 0.15);  // the server knows
+  EXPECT_GT(difference_over_uncertainty(record, record.robots[0]).worst, 3.0 * kExplained);
+}
+
+TEST(Scenarios, HeightGrowsByThreeMetresWhileTheRobotClimbsTheRamp) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Recording alpha = recording(scenario("height"), 0, seed);
+    ASSERT_EQ(alpha.drift_origins.size(), 1U);
+    const DriftOrigin& origin = alpha.drift_origins.front();
+    EXPECT_EQ(origin.kind, DriftOrigin::Kind::failure);
+    const std::size_t from = sample_at(alpha.reference, origin.from);
+    const std::size_t until = sample_at(alpha.reference, origin.until);
+    const auto height = [&](std::size_t k) { return alpha.reference[k].pose.translation.z(); };
+    EXPECT_NEAR(height(from), 0.8, 0.4) << seed;  // of the ramp's 3 m
+    EXPECT_NEAR(height(until), 2.4, 0.4) << seed;
+    EXPECT_NEAR(origin.translation_m, 3.0, 0.4);
+    EXPECT_NEAR(error_over(alpha, from, until).z(), 3.0, 0.4);
+    EXPECT_NEAR(error_over(alpha, from, (from + until) / 2).z(), 1.5, 0.4);  // gradually
+  }
+  const MissionRecord record = run(scenario("height", {"server.update_period_s=60"}));
+  EXPECT_LT(*record.server.joint.rmse_m, 0.25);
+  EXPECT_GT(*record.robots[0].onboard.rmse_m, 1.0);
+  EXPECT_GT(difference_over_uncertainty(record, record.robots[0]).worst, 3.0 * kExplained);
+}
+
+TEST(Scenarios, DegenerateSlidesAlongOneCorridorForAMinuteAndSaysSo) {
+  const MissionConfig config = scenario("degenerate", {"server.update_period_s=60"});
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Recording alpha = recording(config, 0, seed);
+    ASSERT_EQ(alpha.drift_origins.size(), 1U) << "visited once";
+    const DriftOrigin& origin = alpha.drift_origins.front();
+    EXPECT_EQ(origin.kind, DriftOrigin::Kind::degeneracy);
+    EXPECT_NEAR(origin.until - origin.from, 60.0, 12.0);
+    const std::size_t from = sample_at(alpha.odometry, origin.from);
+    const std::size_t until = sample_at(alpha.odometry, origin.until);
+    // The visit begins and ends in the turns; in between the corridor's axis is the robot's.
+    const std::size_t margin = (until - from) / 8;
+    const Vector6d error = error_over(alpha, from + margin, until - margin);
+    EXPECT_GT(std::abs(error.x()), 0.5) << seed;
+    EXPECT_GT(std::abs(error.x()), 2.0 * error.segment<2>(1).norm()) << seed;
+    const Matrix6d& inside = alpha.increment_covariance[(from + until) / 2];
+    const Matrix6d& outside = alpha.increment_covariance[from / 2];
+    EXPECT_GT(inside(0, 0), 20.0 * outside(0, 0));
+    EXPECT_LT(inside(1, 1), 2.0 * outside(1, 1));
+  }
+  const MissionRecord record = run(config);
+  EXPECT_LT(*record.server.joint.rmse_m, 0.25);
+  EXPECT_GT(*record.robots[0].onboard.rmse_m, 0.5);
+  EXPECT_GT(difference_over_uncertainty(record, record.robots[0]).worst, 1.5 * kExplained);
+}
+
+/// The revision mission, cut off at different times: what server and robot know at each of them.
+class Revision : public testing::Test {
+ protected:
+  static MissionRecord at(double time_s) {
+    return run(scenario("revision", {"server.update_period_s=60", fmt::format("duration_s={}", time_s)}));
+  }
+  static double server_error(const MissionRecord& record) { return *record.robots[0].server.max_error_m; }
+  static std::size_t wrong(const MissionRecord& record) {
+    return record.server.closure_check ? record.server.closure_check->wrong : 0U;
+  }
+};
+
+TEST_F(Revision, ALargeClosureMakesTheMapJumpByTwoMetres) {
+  const MissionRecord before = at(300.0);
+  const MissionRecord after = at(360.0);
+  EXPECT_EQ(before.server.closures.size(), 0U);
+  EXPECT_GT(after.server.closures.size(), 0U);
+  EXPECT_EQ(wrong(after), 0U);
+  EXPECT_LT(server_error(after), 0.5);
+  const Trajectory& old_map = before.robots[0].server_estimate;
+  double jump = 0.0;  // seen from the first node
+  const Pose3 T_new_old = after.robots[0].server_estimate[0].pose * old_map[0].pose.inverse();
+  for (const auto& [stamp, jumped, stayed] : evaluation::associate(old_map, after.robots[0].server_estimate))
+    jump = std::max(jump, ((T_new_old * jumped).translation - stayed.translation).norm());
+  EXPECT_NEAR(jump, 2.0, 0.5);
+}
+
+TEST_F(Revision, AWrongClosureStandsForFiveMinutesAndIsGone) {
+  const MissionRecord before = at(540.0);
+  EXPECT_EQ(wrong(before), 0U);
+  EXPECT_LT(server_error(before), 0.8);
+  for (const double time_s : {600.0, 840.0}) {
+    const MissionRecord standing = at(time_s);
+    EXPECT_EQ(wrong(standing), 1U) << time_s;
+    EXPECT_NEAR(standing.server.closure_check->max_error_m, 2.5, 0.3);
+    EXPECT_NEAR(server_error(standing), 2.0, 1.0) << time_s;
+  }
+  const MissionRecord after = at(900.0);
+  EXPECT_EQ(wrong(after), 0U);
+  EXPECT_LT(server_error(after), 0.5);
+  EXPECT_LT(*after.robots[1].server.max_error_m, 0.3);
+}
+
+TEST(Scenarios, LateJoinsLoseContactAndReturn) {
+  const MissionConfig config = scenario("late", {"server.update_period_s=30", "agent.submap.duration_s=20"});
+  const MissionRecord record = run(config);
+  const RobotRecord& bravo = record.robots[1];
+  ASSERT_EQ(bravo.name, "bravo");
+  const auto heard = [](const RobotRecord& robot, double from_s, double until_s) {
+    return std::ranges::count_if(
+        robot.updates, [&](const UpdateRecord& update) { return update.time_s >= from_s && update.time_s < until_s; });
+  };
+  EXPECT_EQ(heard(bravo, 0.0, 300.0), 0);
+  EXPECT_GE(heard(bravo, 300.0, 601.0), 7);
+  EXPECT_EQ(heard(bravo, 601.0, 900.0), 0);
+  EXPECT_GE(heard(record.robots[0], 601.0, 900.0), 9);
+  EXPECT_GE(heard(bravo, 900.0, 960.0), 1);
+  EXPECT_EQ(bravo.submaps, 45U);  // none is lost
+  EXPECT_EQ(record.server.components, 1U);
+  EXPECT_EQ(bravo.component, record.robots[0].component);
+  EXPECT_LT(*record.server.joint.rmse_m, 0.3);
+}
+
+TEST(Scenarios, ParametersNeverUsedForTuningAreSettings) {
+  const auto same = [](const Recording& a, const Recording& b) {
+    return a.reference == b.reference && a.odometry == b.odometry;
+  };
+  const std::string robot = "simulation.robots.0.";
+  const Recording as_it_is = recording(scenario("degenerate"));
+  for (const std::string& assignment : std::vector<std::string>{
+           "simulation.world.network.block_m=30", "simulation.world.network.max_slope=0.15",
+           robot + "walk.min_speed_mps=0.3", robot + "walk.length_m=400", robot + "odometry.yaw_drift_deg_per_m=0.05",
+           robot + "odometry.scale_percent=2", robot + "odometry.degeneracy.slide_percent=8",
+           robot + "odometry.slips_per_km=10", robot + "odometry.scripted=[{after_m: 100, length_m: 20, yaw_deg: 8}]"})
+    EXPECT_FALSE(same(recording(scenario("degenerate", {assignment})), as_it_is)) << assignment;
+}
+
+TEST(Scenarios, KittiHalvesBecomeOneMap) {
+  TUTTI_REQUIRE_SHARED("data/kitti");
+  for (const std::string name : {"kitti_05_halves", "kitti_07_halves"}) {
+    const MissionRecord record = run(scenario(name));
+    EXPECT_EQ(record.server.components, 1U) << name;
+    EXPECT_EQ(record.server.closure_check->wrong, 0U) << name;
+    EXPECT_LT(*record.server.joint.rmse_m, 1.0) << name;
+  }
+}
+
+}  // namespace
+}  // namespace tutti::mission
