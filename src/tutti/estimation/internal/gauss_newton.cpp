@@ -17,7 +17,7 @@ constexpr double kReuseContraction = 0.1;
 /// Where the poses' steps count, they too must shrink, and the step before the first reuse be no longer than this (m,
 /// rad): weak directions, which hardly show in the cost, are where an old factor is wrong first.
 constexpr double kReuseStepContraction = 0.3;
-constexpr double kReuseStepBelow = 3e-3;
+constexpr double kReuseStepBelow = 1e-4;
 /// Of a cost, as a share of it.
 constexpr double kRounding = 1e-11;
 
