@@ -97,7 +97,7 @@ void update_from_scratch(const TunnelChain& chain, int repetitions) {
       [&] { poses = solve_pose_graph(graph, {.relative_cost_tolerance = 1e-6, .initialisation = "given"}).poses; });
   const auto row = [&](const std::string& what, const Times& times) {
     const Difference off = difference(poses, optimum);
-    fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.0f} | {:.3f} | {:.3f} |\n", chain.constraints.size(), what, times.best,
+    fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.1f} | {:.3f} | {:.3f} |\n", chain.constraints.size(), what, times.best,
                times.median, full.best / times.best, off.max_mm, off.rms_mm);
     std::fflush(stdout);
   };
@@ -122,7 +122,7 @@ void update_from_scratch(const TunnelChain& chain, int repetitions) {
   OnboardSmoother smoother;
   const Times times = measure(
       repetitions, [&] { smoother = OnboardSmoother({}, doubting.state()); }, [&] { smoother.solve(); });
-  fmt::print("| {} | onboard smoother, every tenth constraint doubtful | {:.2f} | {:.2f} | {:.0f} | | |\n",
+  fmt::print("| {} | onboard smoother, every tenth constraint doubtful | {:.2f} | {:.2f} | {:.1f} | | |\n",
              chain.constraints.size(), times.best, times.median, full.best / times.best);
 }
 
@@ -180,6 +180,33 @@ void batches(const TunnelChain& chain, int repetitions) {
   }
 }
 
+/// From no constraint to all of them, one update per batch, each returning all poses.
+void arriving(const TunnelChain& chain) {
+  for (const std::size_t batch : {1, 5, 25, 100}) {
+    OnboardSmoother smoother({}, {chain.truth.front(), chain.odometry, {}});
+    double total = 0.0;
+    double worst = 0.0;
+    std::size_t updates = 0;
+    for (std::size_t known = batch; known < chain.constraints.size() + batch; known += batch, ++updates) {
+      const auto end =
+          chain.constraints.begin() + static_cast<std::ptrdiff_t>(std::min(known, chain.constraints.size()));
+      std::vector<ChainConstraint> constraints(chain.constraints.begin(), end);
+      const double start = thread_ms();
+      smoother.set_constraints(std::move(constraints));
+      smoother.solve();
+      const double ms = thread_ms() - start;
+      total += ms;
+      worst = std::max(worst, ms);
+    }
+    OnboardSmoother fresh({}, smoother.state());
+    fresh.solve();
+    fmt::print("| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.4f} |\n", chain.constraints.size(), batch, updates,
+               total * 1e-3, total / static_cast<double>(updates), worst,
+               difference(smoother.poses(), fresh.poses()).max_mm);
+    std::fflush(stdout);
+  }
+}
+
 /// The parts of one update from scratch, each alone.
 void parts(const TunnelChain& chain, int repetitions) {
   using namespace estimation::internal;
@@ -203,7 +230,8 @@ void parts(const TunnelChain& chain, int repetitions) {
   gauss_newton.minimise(reduced, {}, {});
   row("residuals and Hessian", [&] { gauss_newton.linearise(reduced, {}, true); });
   row("residuals alone", [&] { gauss_newton.linearise(reduced, {}, false); });
-  row("Cholesky factor", [&] { gauss_newton.linearise(reduced, {}, true), (void)gauss_newton.hessian().factorise(); });
+  row("residuals, Hessian and its Cholesky factor",
+      [&] { gauss_newton.linearise(reduced, {}, true), (void)gauss_newton.hessian().factorise(); });
   Eigen::VectorXd b = Eigen::VectorXd::Ones(6 * static_cast<Eigen::Index>(nodes.size() - 1));
   row("solve with it", [&] { gauss_newton.hessian().solve(b); });
   std::vector<Pose3> poses(chain.truth.size());
@@ -261,6 +289,10 @@ int main(int argc, char** argv) {
       "\n| constraints | batch | best ms | median ms | from scratch, best ms | ratio | poses bent | off from "
       "scratch, mm |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n");
   for (const auto* chain : {&few, &paper, &every_node}) batches(*chain, repetitions);
+  fmt::print(
+      "\n| constraints | arriving by | updates | all s | mean ms | worst ms | off from scratch, mm |\n| --- | --- | "
+      "--- | --- | --- | --- | --- |\n");
+  for (const auto* chain : {&paper, &every_node}) arriving(*chain);
   fmt::print("\n| constraints | part of an update | best ms |\n| --- | --- | --- |\n");
   for (const auto* chain : {&paper, &every_node}) parts(*chain, repetitions);
   fmt::print("\n");
