@@ -33,7 +33,7 @@ std::vector<std::size_t> reduced_nodes(std::span<const ChainConstraint> constrai
 }
 
 ChainGraph reduce(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs,
-                    std::span<const ChainConstraint> constraints, const Pose3& first) {
+                  std::span<const ChainConstraint> constraints, const Pose3& first) {
   ChainGraph out{.nodes = std::move(nodes), .graph = {}, .roles = {}, .edges = {}};
   PoseGraph& graph = out.graph;
   graph.poses.reserve(out.nodes.size());

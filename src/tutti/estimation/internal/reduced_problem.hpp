@@ -22,7 +22,7 @@ struct ChainGraph {
   std::vector<std::size_t> edges;  ///< Of each constraint; of one with from == to: meaningless.
 };
 ChainGraph reduce(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs,
-                    std::span<const ChainConstraint> constraints, const Pose3& first);
+                  std::span<const ChainConstraint> constraints, const Pose3& first);
 
 /// A reduced graph with the analysis of its normal equations, kept from one update to the next.
 class ReducedProblem {
