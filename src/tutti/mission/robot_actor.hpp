@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,8 @@ class RobotActor {
   [[nodiscard]] RobotId id() const { return recording_.recording.robot; }
   [[nodiscard]] RobotOutcome outcome() const;
   [[nodiscard]] const std::vector<UpdateRecord>& updates() const { return updates_; }
+  /// Of the default agent's last update: its raw odometry against the map.
+  [[nodiscard]] const std::optional<consistency::Explanation>& explanation() const { return explanation_; }
   [[nodiscard]] std::vector<PolicyTiming> timing() const;
   [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< Of the default agent.
   /// What was refused (bad samples or scans), one line per kind with a count and the first case.
@@ -63,6 +66,7 @@ class RobotActor {
   std::size_t default_ = 0;
   std::size_t next_ = 0;
   std::vector<UpdateRecord> updates_;
+  std::optional<consistency::Explanation> explanation_;
   double cpu_s_ = 0.0;
   Refusal refused_odometry_;
   Refusal refused_scans_;

@@ -15,6 +15,7 @@
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/disk_cloud_store.hpp"
 #include "tutti/mission/evaluate.hpp"
+#include "tutti/mission/follow_alerts.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/parallel.hpp"
 #include "tutti/mission/recordings.hpp"
@@ -319,6 +320,8 @@ MissionRecord MissionRun::record() const {
   for (RobotRecord& robot : record.robots) {
     record_traffic(robot);
     robot.updates = robots_[robot.id.value]->updates();
+    robot.alerts = follow_alerts(robot.updates);
+    robot.explanation = robots_[robot.id.value]->explanation();
     robot.proxy_nodes =
         static_cast<std::size_t>(std::count_if(proxy_graph_.nodes.begin(), proxy_graph_.nodes.end(),
                                                [&](const ProxyNode& node) { return node.robot == robot.id; }));
