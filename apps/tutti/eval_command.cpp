@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -13,6 +12,7 @@
 #include <string>
 
 #include "eval_map.hpp"
+#include "finite_number.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/formats/trajectory_file.hpp"
@@ -159,17 +159,6 @@ int run(Options options) {
   else
     print_table(options, *report);
   return 0;
-}
-
-/// CLI11's own PositiveNumber and NonNegativeNumber let NaN through.
-CLI::Validator finite(bool zero_too) {
-  return {[zero_too](const std::string& input) {
-            double value = 0.0;
-            const bool is_finite = CLI::detail::lexical_cast(input, value) && std::isfinite(value);
-            if (is_finite && (value > 0.0 || (zero_too && value == 0.0))) return std::string();
-            return fmt::format("is '{}', expected a finite number {} 0", input, zero_too ? ">=" : ">");
-          },
-          ""};
 }
 
 /// The options of --map, refused without it.
