@@ -45,9 +45,9 @@ OnboardSmoother live(Rng rng, const Mission& m, const OnboardSmootherConfig& con
 
 RC_GTEST_PROP(OnboardSmootherUpdate, HistoryDoesNotShow, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
-  const auto m = mission(rng, 600, 0);
+  const auto m = mission(rng, 300, 0);
   const OnboardSmootherConfig config{.polishing_steps = rng.bernoulli(0.2) ? 1 : 0};
-  const auto smoother = live(rng.fork("updates"), m, config, 12);
+  const auto smoother = live(rng.fork("updates"), m, config, 8);
   OnboardSmoother restored(config, smoother.state());
   restored.solve();
   RC_ASSERT(largest_position_difference(smoother.poses(), restored.poses()) < 1e-4);
