@@ -23,11 +23,12 @@ std::string more(std::size_t rows, const char* what) {
 
 std::string scales_table(const TrajectoryComparison& c, const PictureClock& clock) {
   TextTable table(0);
-  table.add({"scale", "over threshold", "worst at", "position", "rotation", "above since"});
+  table.add({"scale", "all along", "over threshold", "worst at", "position", "rotation", "above since"});
   table.rule();
   for (const ScaleSummary& s : scale_summaries(c.explanation))
-    table.add({fmt::format("{:.1f} m", s.length_m), format_significance(s.significance), format_moment(clock(s.worst)),
-               format_metres(s.position_m), degrees(s.rotation_rad), s.since ? format_moment(clock(*s.since)) : "-"});
+    table.add({fmt::format("{:.1f} m", s.length_m), format_significance(s.whole), format_significance(s.significance),
+               format_moment(clock(s.worst)), format_metres(s.position_m), degrees(s.rotation_rad),
+               s.since ? format_moment(clock(*s.since)) : "-"});
   return table.str();
 }
 
@@ -76,10 +77,9 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
                        format_metres(c.before.rmse_m), format_metres(c.before.max_m), c.before.rmse_deg,
                        report.config.tolerance_m, report.config.tolerance_deg),
            "  ");
-  if (!e.disagrees())
+  if (!disagrees(e))
     return out + "\n  They agree: nothing stands out of that at any scale.\n\n" + scales_table(c, clock);
-  out +=
-      fmt::format("\n  They disagree, by up to {} the threshold.\n\n", format_significance(e.significance.maxCoeff()));
+  out += fmt::format("\n  They disagree, by up to {} the threshold.\n\n", format_significance(largest_significance(e)));
   out += scales_table(c, clock);
   out += "\n  Where it was born (relative motion of B against A's over the stretch)\n\n" + origins_table(c, clock);
   out += fmt::format("\n  Relative poses of A that would fix B: {}\n\n", c.constraints.size());
@@ -98,10 +98,12 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
 
 std::vector<ScaleSummary> scale_summaries(const consistency::Explanation& e) {
   std::vector<ScaleSummary> out;
+  const std::vector<double> whole = whole_scales(e);
   for (Eigen::Index s = 0; s < e.significance.cols() && e.significance.rows() > 0; ++s) {
     Eigen::Index worst = 0;
     const double largest = e.significance.col(s).maxCoeff(&worst);
     ScaleSummary row{.length_m = e.scale_length_m[static_cast<std::size_t>(s)],
+                     .whole = whole[static_cast<std::size_t>(s)],
                      .significance = largest,
                      .worst = e.stamps[static_cast<std::size_t>(worst)],
                      .position_m = e.position_m(worst, s),

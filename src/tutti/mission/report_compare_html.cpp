@@ -43,9 +43,10 @@ std::string top_view(const TrajectoryComparison& c, const PictureClock& clock) {
 }
 
 std::string scales_html(const TrajectoryComparison& c, const PictureClock& clock) {
-  HtmlTable table{{"scale", "over threshold", "worst at", "position there", "rotation there", "above since"}, {}, 1};
+  HtmlTable table{
+      {"scale", "all along", "over threshold", "worst at", "position there", "rotation there", "above since"}, {}, 1};
   for (const ScaleSummary& s : scale_summaries(c.explanation))
-    table.rows.push_back({fmt::format("{:.1f} m", s.length_m),
+    table.rows.push_back({fmt::format("{:.1f} m", s.length_m), format_significance(s.whole),
                           s.significance > 1.0 ? "<b>" + format_significance(s.significance) + "</b>"
                                                : format_significance(s.significance),
                           format_moment(clock(s.worst)), format_metres(s.position_m),
@@ -96,10 +97,10 @@ std::string robot_html(const TrajectoryComparison& c) {
   }
   for (auto& entry : origin_legend(e.origins)) legend.push_back(std::move(entry));
   std::string lead =
-      e.disagrees() ? fmt::format("They disagree, by up to {} the threshold: {} RMSE after one rigid alignment.",
-                                  format_significance(e.significance.maxCoeff()), format_metres(c.before.rmse_m))
-                    : fmt::format("They agree: {} RMSE after one rigid alignment, and nothing stands out at any scale.",
-                                  format_metres(c.before.rmse_m));
+      disagrees(e) ? fmt::format("They disagree, by up to {} the threshold: {} RMSE after one rigid alignment.",
+                                 format_significance(largest_significance(e)), format_metres(c.before.rmse_m))
+                   : fmt::format("They agree: {} RMSE after one rigid alignment, and nothing stands out at any scale.",
+                                 format_metres(c.before.rmse_m));
   if (!c.constraints.empty())
     lead += fmt::format(" {} relative poses of A would bring B to {}.", c.constraints.size(),
                         format_metres(c.after.rmse_m));

@@ -4,6 +4,7 @@
 
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/report_compare.hpp"
+#include "tutti/mission/report_explanation.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -34,7 +35,9 @@ void add_moment(Json& out, const std::string& name, Timestamp stamp, const Traje
 Json scales_json(const TrajectoryComparison& c) {
   Json out = Json::array();
   for (const ScaleSummary& s : scale_summaries(c.explanation)) {
-    Json row{{"length_m", number(s.length_m)}, {"significance", number(s.significance)}};
+    Json row{{"length_m", number(s.length_m)},
+             {"significance", number(s.significance)},
+             {"scale_significance", number(s.whole)}};
     add_moment(row, "worst", s.worst, c);
     row["position_m"] = number(s.position_m);
     row["rotation_rad"] = number(s.rotation_rad);
@@ -104,7 +107,7 @@ Json robot_json(const TrajectoryComparison& c) {
           {"spacing_m", number(c.spacing_m)},
           {"way_m", number(c.way_m)},
           {"duration_s", number(c.judged.back().stamp - c.judged.front().stamp)},
-          {"disagrees", c.explanation.disagrees()},
+          {"disagrees", disagrees(c.explanation)},
           {"aligned", ate_json(c.before)},
           {"T_a_b", pose_json(c.before.T_reference_estimate)},
           {"scales", scales_json(c)},
@@ -122,7 +125,7 @@ std::string compare_json(const CompareReport& report) {
   bool disagree = false;
   Json robots = Json::array();
   for (const TrajectoryComparison& c : report.robots) {
-    disagree = disagree || c.explanation.disagrees();
+    disagree = disagree || disagrees(c.explanation);
     robots.push_back(robot_json(c));
   }
   const Json out{{"a", report.a},

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "tutti/mission/report_explanation.hpp"
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_geometry.hpp"
 
@@ -92,16 +93,19 @@ Json explanation_json(const RobotRecord& robot) {
   Json lengths = Json::array();
   for (const double length_m : e.scale_length_m) lengths.push_back(number(length_m));
   Json largest = Json::array();
+  Json whole = Json::array();
   for (Eigen::Index s = 0; s < e.significance.cols() && e.significance.rows() > 0; ++s)
     largest.push_back(number(e.significance.col(s).maxCoeff()));
+  for (const double significance : whole_scales(e)) whole.push_back(number(significance));
   Json origins = Json::array();
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
-  return {{"disagrees", e.disagrees()},
+  return {{"disagrees", disagrees(e)},
           {"nodes", e.stamps.size()},
           {"aligned_rmse_m", number(e.aligned_rmse_m)},
           {"expected_rmse_m", e.expected_rmse_m > 0.0 ? number(e.expected_rmse_m) : Json(nullptr)},
           {"scale_length_m", std::move(lengths)},
           {"largest_significance", std::move(largest)},
+          {"scale_significance", std::move(whole)},
           {"suspected_origins", std::move(origins)}};
 }
 

@@ -11,6 +11,17 @@
 /// For tests of what people are shown: a made-up explanation with plausible shapes.
 namespace tutti::mission::test {
 
+/// Fills in what follows from the significance.
+template <class E>
+void judge(E& e) {
+  if constexpr (requires { e.disagrees = true; }) {
+    e.scale_significance.clear();
+    for (Eigen::Index s = 0; s < e.significance.cols(); ++s)
+      e.scale_significance.push_back(e.significance.col(s).maxCoeff());
+    e.disagrees = e.significance.maxCoeff() > 1.0;
+  }
+}
+
 /// Nodes are the poses of `way`. Around every origin the disagreement stands out, wider at larger scales; elsewhere it
 /// is a third of its threshold.
 inline consistency::Explanation example_explanation(const Trajectory& way,
@@ -43,6 +54,7 @@ inline consistency::Explanation example_explanation(const Trajectory& way,
   e.aligned_rmse_m = 0.71;
   e.expected_rmse_m = 0.02;
   e.origins = std::move(origins);
+  judge(e);
   return e;
 }
 
