@@ -77,7 +77,7 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
                        format_metres(c.before.rmse_m), format_metres(c.before.max_m), c.before.rmse_deg,
                        report.config.tolerance_m, report.config.tolerance_deg),
            "  ");
-  if (!disagrees(e))
+  if (!e.disagrees())
     return out + "\n  They agree: nothing stands out of that at any scale.\n\n" + scales_table(c, clock);
   out += fmt::format("\n  They disagree, by up to {} the threshold.\n\n", format_significance(largest_significance(e)));
   out += scales_table(c, clock);

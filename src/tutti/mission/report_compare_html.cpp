@@ -97,10 +97,10 @@ std::string robot_html(const TrajectoryComparison& c) {
   }
   for (auto& entry : origin_legend(e.origins)) legend.push_back(std::move(entry));
   std::string lead =
-      disagrees(e) ? fmt::format("They disagree, by up to {} the threshold: {} RMSE after one rigid alignment.",
-                                 format_significance(largest_significance(e)), format_metres(c.before.rmse_m))
-                   : fmt::format("They agree: {} RMSE after one rigid alignment, and nothing stands out at any scale.",
-                                 format_metres(c.before.rmse_m));
+      e.disagrees() ? fmt::format("They disagree, by up to {} the threshold: {} RMSE after one rigid alignment.",
+                                  format_significance(largest_significance(e)), format_metres(c.before.rmse_m))
+                    : fmt::format("They agree: {} RMSE after one rigid alignment, and nothing stands out at any scale.",
+                                  format_metres(c.before.rmse_m));
   if (!c.constraints.empty())
     lead += fmt::format(" {} relative poses of A would bring B to {}.", c.constraints.size(),
                         format_metres(c.after.rmse_m));

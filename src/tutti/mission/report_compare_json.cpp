@@ -4,7 +4,6 @@
 
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/report_compare.hpp"
-#include "tutti/mission/report_explanation.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -107,7 +106,7 @@ Json robot_json(const TrajectoryComparison& c) {
           {"spacing_m", number(c.spacing_m)},
           {"way_m", number(c.way_m)},
           {"duration_s", number(c.judged.back().stamp - c.judged.front().stamp)},
-          {"disagrees", disagrees(c.explanation)},
+          {"disagrees", c.explanation.disagrees()},
           {"aligned", ate_json(c.before)},
           {"T_a_b", pose_json(c.before.T_reference_estimate)},
           {"scales", scales_json(c)},
@@ -125,7 +124,7 @@ std::string compare_json(const CompareReport& report) {
   bool disagree = false;
   Json robots = Json::array();
   for (const TrajectoryComparison& c : report.robots) {
-    disagree = disagree || disagrees(c.explanation);
+    disagree = disagree || c.explanation.disagrees();
     robots.push_back(robot_json(c));
   }
   const Json out{{"a", report.a},

@@ -260,15 +260,6 @@ void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Traj
   }
 }
 
-bool disagrees(const Explanation& explanation) {
-  return [](const auto& e) {
-    if constexpr (requires { e.disagrees(); })
-      return e.disagrees();
-    else
-      return e.disagrees;
-  }(explanation);
-}
-
 std::vector<double> whole_scales(const Explanation& explanation) {
   return [](const auto& e) {
     if constexpr (requires { e.scale_significance; }) {

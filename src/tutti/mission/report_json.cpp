@@ -99,7 +99,7 @@ Json explanation_json(const RobotRecord& robot) {
   for (const double significance : whole_scales(e)) whole.push_back(number(significance));
   Json origins = Json::array();
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
-  return {{"disagrees", disagrees(e)},
+  return {{"disagrees", e.disagrees()},
           {"nodes", e.stamps.size()},
           {"aligned_rmse_m", number(e.aligned_rmse_m)},
           {"expected_rmse_m", e.expected_rmse_m > 0.0 ? number(e.expected_rmse_m) : Json(nullptr)},

@@ -14,11 +14,10 @@ namespace tutti::mission::test {
 /// Fills in what follows from the significance.
 template <class E>
 void judge(E& e) {
-  if constexpr (requires { e.disagrees = true; }) {
+  if constexpr (requires { e.scale_significance; }) {
     e.scale_significance.clear();
     for (Eigen::Index s = 0; s < e.significance.cols(); ++s)
       e.scale_significance.push_back(e.significance.col(s).maxCoeff());
-    e.disagrees = e.significance.maxCoeff() > 1.0;
   }
 }
 
