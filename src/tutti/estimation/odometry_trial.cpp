@@ -70,10 +70,13 @@ struct Charge {
   [[nodiscard]] int net() const { return gained - lost; }
 };
 
-class Trial {
+}  // namespace
+
+class OdometryTrial::Implementation {
  public:
-  Trial(std::span<const OdometryChain> chains, std::span<const LoopClosure> closures, const OdometryTrialConfig& config)
-      : config_(config), chains_(chains), cells_(chains, closures, config) {}
+  Implementation(std::span<const OdometryChain> chains, std::span<const LoopClosure> closures,
+                 const OdometryTrialConfig& config)
+      : config_(config), chains_(chains), closures_(closures.size()), cells_(chains, closures, config) {}
 
   void run() {
     convict_all();
@@ -82,7 +85,29 @@ class Trial {
       if (!cells_.cuts(chain).empty()) cells_.set_cuts(chain, widened(chain));
   }
 
-  [[nodiscard]] const std::vector<Cut>& cuts(std::size_t chain) const { return cells_.cuts(chain); }
+  void assume(std::span<const OdometryStretch> failed) {
+    for (std::size_t c = 0; c < chains_.size(); ++c) {
+      const OdometryChain& chain = chains_[c];
+      std::vector<Cut> cuts;
+      for (const auto& [robot, from, to] : failed)
+        if (robot == chain.robot && from >= chain.first_index && from - chain.first_index < chain.T_odom_body.size())
+          cuts.push_back({from - chain.first_index, to - chain.first_index});
+      std::ranges::sort(cuts);
+      if (cuts != cells_.cuts(c)) cells_.set_cuts(c, std::move(cuts));
+    }
+  }
+  [[nodiscard]] OdometryVerdict verdict() const {
+    OdometryVerdict verdict{.accepted = std::vector<bool>(closures_, false), .failed = {}};
+    for (const std::size_t position : accepted()) verdict.accepted[position] = true;
+    for (std::size_t c = 0; c < chains_.size(); ++c)
+      for (const Cut& cut : cells_.cuts(c))
+        verdict.failed.push_back({chains_[c].robot, chains_[c].first_index + static_cast<std::uint32_t>(cut.from),
+                                  chains_[c].first_index + static_cast<std::uint32_t>(cut.to)});
+    std::ranges::sort(verdict.failed);
+    return verdict;
+  }
+
+ private:
   /// Positions of the accepted closures.
   [[nodiscard]] std::vector<std::size_t> accepted() const {
     std::vector<std::size_t> out;
@@ -93,8 +118,6 @@ class Trial {
     }
     return out;
   }
-
- private:
   void convict_all() {
     while (const auto charge = strongest_charge()) convict(*charge);
   }
@@ -365,23 +388,30 @@ class Trial {
 
   OdometryTrialConfig config_;
   std::span<const OdometryChain> chains_;
+  std::size_t closures_;
   ConsistencyCells cells_;
 };
 
-}  // namespace
+OdometryTrial::OdometryTrial(std::span<const OdometryChain> chains, std::span<const LoopClosure> closures,
+                             const OdometryTrialConfig& config)
+    : implementation_(std::make_unique<Implementation>(chains, closures, config)) {}
+
+OdometryTrial::~OdometryTrial() = default;
+
+OdometryVerdict OdometryTrial::decide() {
+  implementation_->assume({});
+  implementation_->run();
+  return implementation_->verdict();
+}
+
+OdometryVerdict OdometryTrial::assume(std::span<const OdometryStretch> failed) {
+  implementation_->assume(failed);
+  return implementation_->verdict();
+}
 
 OdometryVerdict try_odometry(std::span<const OdometryChain> chains, std::span<const LoopClosure> closures,
                              const OdometryTrialConfig& config) {
-  Trial trial(chains, closures, config);
-  trial.run();
-  OdometryVerdict verdict{.accepted = std::vector<bool>(closures.size(), false), .failed = {}};
-  for (const std::size_t position : trial.accepted()) verdict.accepted[position] = true;
-  for (std::size_t c = 0; c < chains.size(); ++c)
-    for (const Cut& cut : trial.cuts(c))
-      verdict.failed.push_back({chains[c].robot, chains[c].first_index + static_cast<std::uint32_t>(cut.from),
-                                chains[c].first_index + static_cast<std::uint32_t>(cut.to)});
-  std::ranges::sort(verdict.failed);
-  return verdict;
+  return OdometryTrial(chains, closures, config).decide();
 }
 
 }  // namespace tutti::estimation

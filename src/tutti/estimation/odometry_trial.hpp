@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -81,6 +82,26 @@ struct OdometryVerdict {
 /// the other, the one that explains most first.
 /// Does not depend on the order of the input. Closures that name an unknown robot or keyframe, or carry NaN or a
 /// covariance that is not positive definite, are never accepted.
+class OdometryTrial {
+ public:
+  /// All must outlive this.
+  OdometryTrial(std::span<const OdometryChain> chains, std::span<const LoopClosure> closures,
+                const OdometryTrialConfig& config);
+  ~OdometryTrial();
+  OdometryTrial(const OdometryTrial&) = delete;
+  OdometryTrial& operator=(const OdometryTrial&) = delete;
+
+  [[nodiscard]] OdometryVerdict decide();
+  /// The closures' verdict if these stretches, and no others, have failed. They must be stretches of the chains and not
+  /// overlap. Cheap: which closures agree is known.
+  [[nodiscard]] OdometryVerdict assume(std::span<const OdometryStretch> failed);
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// OdometryTrial(chains, closures, config).decide()
 OdometryVerdict try_odometry(std::span<const OdometryChain> chains, std::span<const LoopClosure> closures,
                              const OdometryTrialConfig& config);
 

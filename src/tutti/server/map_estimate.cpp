@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <numeric>
+#include <ranges>
 #include <tuple>
 #include <unordered_map>
+
+#include "tutti/server/relocate_failures.hpp"
 
 namespace tutti::server {
 namespace {
@@ -80,6 +83,11 @@ std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const Node
 constexpr double kFreeTranslation = 100.0;
 constexpr double kFreeRotation = 3.0;
 
+/// How often the convicted stretches are looked for again in the map they made.
+constexpr int kRelocations = 2;
+/// ... which must fit as many closures, or this share of them when what is convicted is half as long or less.
+constexpr double kAlmostAll = 0.95;
+
 /// Chi-square (6 dof, 0.999) below which the odometry of a stretch agrees with the map after all.
 constexpr double kRightAfterAll = 22.46;
 
@@ -136,44 +144,113 @@ void label_components(MapEstimate& map) {
   map.components = static_cast<std::uint32_t>(label.size());
 }
 
+/// What a verdict on closures and odometry makes of the map.
+struct Optimum {
+  std::vector<DoubtedStretch> failed;
+  PoseGraph graph;                           ///< Odometry, let go where it failed, and the closures not rejected.
+  std::vector<std::size_t> closure_of_edge;  ///< Of the edges beyond odometry.
+  estimation::GncResult robust;
+  std::vector<std::size_t> fitting;  ///< Edges of closures that fit the map.
+
+  [[nodiscard]] std::size_t convicted() const {  ///< Steps of odometry.
+    std::size_t steps = 0;
+    for (const auto& [robot, from, to] : failed | std::views::transform(&DoubtedStretch::stretch)) steps += to - from;
+    return steps;
+  }
+  [[nodiscard]] bool explains_better_than(const Optimum& other) const {
+    if (fitting.size() >= other.fitting.size()) return true;
+    return 2 * convicted() <= other.convicted() &&
+           static_cast<double>(fitting.size()) >= kAlmostAll * static_cast<double>(other.fitting.size());
+  }
+};
+
+class Judgement {
+ public:
+  /// All must outlive this.
+  Judgement(const MapEstimate& map, const NodeIndex& index, const std::vector<LoopClosure>& closures,
+            const std::vector<estimation::OdometryChain>& chains, const MapConfig& config)
+      : map_(map),
+        index_(index),
+        closures_(closures),
+        chains_(chains),
+        config_(config),
+        trial_(chains, closures, config.trial) {}
+
+  /// The map with the failures where the trial puts them, then where the maps so made put them, as long as that
+  /// explains the closures better.
+  Optimum decide() {
+    const estimation::OdometryVerdict first = trial_.decide();
+    std::vector<DoubtedStretch> failed;
+    for (const auto& stretch : first.failed) failed.push_back({stretch, kFreeTranslation, kFreeRotation});
+    Optimum best = optimise(first.accepted, std::move(failed));
+    for (int round = 0; round < kRelocations && !best.failed.empty(); ++round) {
+      Optimum next = relocated(best);
+      if (!next.explains_better_than(best)) break;
+      best = std::move(next);
+    }
+    return best;
+  }
+
+ private:
+  [[nodiscard]] Optimum optimise(const std::vector<bool>& accepted, std::vector<DoubtedStretch> failed) const {
+    Optimum out{.failed = std::move(failed), .graph = map_.graph, .closure_of_edge = {}, .robust = {}, .fitting = {}};
+    for (const auto& [stretch, sigma_m, sigma_rad] : out.failed)
+      weaken(out.graph, map_, index_.at({stretch.robot, stretch.from}), index_.at({stretch.robot, stretch.to}), sigma_m,
+             sigma_rad);
+    for (std::size_t i = 0; i < closures_.size(); ++i) {
+      if (!accepted[i]) continue;
+      out.graph.edges.push_back({.from = index_.at(closures_[i].from),
+                                 .to = index_.at(closures_[i].to),
+                                 .T_from_to = closures_[i].measurement.T_a_b,
+                                 .information = information_of(closures_[i].measurement.covariance)});
+      out.closure_of_edge.push_back(i);
+    }
+    std::vector<estimation::EdgeRole> roles(out.graph.edges.size(), estimation::EdgeRole::robust);
+    std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
+    out.robust = estimation::solve_pose_graph_gnc(out.graph, config_.gnc, roles);
+    for (std::size_t e = map_.odometry_edges; e < out.graph.edges.size(); ++e)
+      if (out.robust.inlier_weight[e] >= 0.5) out.fitting.push_back(e);
+    return out;
+  }
+
+  /// The map with the failures of another one moved to where that says they are.
+  [[nodiscard]] Optimum relocated(const Optimum& other) {
+    const auto pose_of = [&](KeyframeId id) { return other.robust.solution.poses[index_.at(id)]; };
+    auto moved = relocate_failures(other.failed, chains_, closures_, pose_of);
+    std::vector<estimation::OdometryStretch> stretches;
+    for (const DoubtedStretch& doubted : moved) stretches.push_back(doubted.stretch);
+    const auto accepted = trial_.assume(stretches).accepted;
+    return optimise(accepted, std::move(moved));
+  }
+
+  const MapEstimate& map_;
+  const NodeIndex& index_;
+  const std::vector<LoopClosure>& closures_;
+  const std::vector<estimation::OdometryChain>& chains_;
+  const MapConfig& config_;
+  estimation::OdometryTrial trial_;
+};
+
 }  // namespace
 
 MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config) {
   MapEstimate map;
   const NodeIndex index = attach_submaps(submaps, map);
   const std::vector<LoopClosure> closures = collect_closures(verdicts, index);
-  const estimation::OdometryVerdict verdict =
-      estimation::try_odometry(odometry_chains(submaps, map), closures, config.trial);
-
-  PoseGraph graph = map.graph;
-  for (const estimation::OdometryStretch& failed : verdict.failed)
-    weaken(graph, map, index.at({failed.robot, failed.from}), index.at({failed.robot, failed.to}), kFreeTranslation,
-           kFreeRotation);
-  std::vector<std::size_t> closure_of_edge;
-  for (std::size_t i = 0; i < closures.size(); ++i) {
-    map.closures.push_back({closures[i], false});
-    if (!verdict.accepted[i]) continue;
-    graph.edges.push_back({.from = index.at(closures[i].from),
-                           .to = index.at(closures[i].to),
-                           .T_from_to = closures[i].measurement.T_a_b,
-                           .information = information_of(closures[i].measurement.covariance)});
-    closure_of_edge.push_back(i);
+  const std::vector<estimation::OdometryChain> chains = odometry_chains(submaps, map);
+  const Optimum optimum = Judgement(map, index, closures, chains, config).decide();
+  for (const LoopClosure& closure : closures) map.closures.push_back({closure, false});
+  for (const std::size_t edge : optimum.fitting) {
+    map.graph.edges.push_back(optimum.graph.edges[edge]);
+    map.closures[optimum.closure_of_edge[edge - map.odometry_edges]].accepted = true;
   }
-  std::vector<estimation::EdgeRole> roles(graph.edges.size(), estimation::EdgeRole::trusted);
-  std::fill(roles.begin() + static_cast<std::ptrdiff_t>(map.odometry_edges), roles.end(), estimation::EdgeRole::robust);
-  const estimation::GncResult robust = estimation::solve_pose_graph_gnc(graph, config.gnc, roles);
-
-  for (std::size_t k = 0; k < closure_of_edge.size(); ++k) {
-    const std::size_t edge = map.odometry_edges + k;
-    if (robust.inlier_weight[edge] < 0.5) continue;
-    map.graph.edges.push_back(graph.edges[edge]);
-    map.closures[closure_of_edge[k]].accepted = true;
-  }
-  map.graph.poses = robust.solution.poses;
+  map.graph.poses = optimum.robust.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
-  map.converged = estimation::is_usable(robust.solution.summary.termination);
-  for (const auto& [robot, from, to] : verdict.failed)
+  map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
+  for (const DoubtedStretch& doubted : optimum.failed) {
+    const auto& [robot, from, to] = doubted.stretch;
     record_failure(robot, index.at({robot, from}), index.at({robot, to}), config.trial.min_jump_m, map);
+  }
   label_components(map);
   return map;
 }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 #include "tutti/server/graph_monitor.hpp"
 #include "tutti/server/map_estimate.hpp"
@@ -14,6 +16,7 @@ namespace {
 using test::corridor_run;
 using test::CorridorRun;
 using test::CorridorRunConfig;
+using test::Failure;
 using test::failure;
 using test::rmse;
 
@@ -94,6 +97,55 @@ TEST(WhoIsWrong, SeveralFailuresAreRepaired) {
     const CorridorRun slips = corridor_run(config, seed);
     EXPECT_LT(rmse(slips, judge(slips)), 0.1) << seed;
   }
+}
+
+/// Odometry that climbs, little by little, three metres that are not there.
+Failure climb(double from_s, double until_s) {
+  Failure out = failure(0, from_s, until_s, 0, 0, 0);
+  out.jump(2) = 3.0;
+  return out;
+}
+
+TEST(WhoIsWrong, AFailureLittleByLittleIsConvictedWhereItHappened) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    CorridorRunConfig config;
+    config.closures.wrong_share = 0.1;
+    config.failures = {climb(230, 270)};
+    const CorridorRun run = corridor_run(config, seed);
+    const MapEstimate map = judge(run);
+    ASSERT_FALSE(map.failed_odometry.empty()) << seed;
+    double climbed = 0.0;  // in parts, maybe, one after the other
+    for (const FailedOdometry& failed : map.failed_odometry) {
+      EXPECT_EQ(failed.robot, RobotId{0});
+      climbed += failed.jump_m;
+    }
+    EXPECT_NEAR(seconds_of(map, {0}, map.failed_odometry.front().from), 230.0, 8.0) << seed;
+    EXPECT_NEAR(seconds_of(map, {0}, map.failed_odometry.back().to), 270.0, 8.0) << seed;
+    EXPECT_NEAR(climbed, 3.0, 0.5) << seed;
+    EXPECT_EQ(accepted_wrong(run, map), 0U) << seed;
+    EXPECT_LT(rmse(run, map), 0.1) << seed;
+  }
+}
+
+TEST(WhoIsWrong, AFailureWhereNoClosureWasIsConvictedWhereItMustHaveBeen) {
+  std::vector<double> off_s;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    CorridorRunConfig config;
+    config.closures.wrong_share = 0.1;
+    config.failures = {failure(0, 200, 230, 0, 0, 10)};
+    config.blind = {failure(0, 160, 270, 0, 0, 0)};
+    const CorridorRun run = corridor_run(config, seed);
+    const MapEstimate map = judge(run);
+    ASSERT_EQ(map.failed_odometry.size(), 1U) << seed;
+    const FailedOdometry& failed = map.failed_odometry.front();
+    EXPECT_LT(seconds_of(map, {0}, failed.from), 230.0) << seed;
+    EXPECT_GT(seconds_of(map, {0}, failed.to), 200.0) << seed;
+    off_s.push_back(std::abs(seconds_of(map, {0}, failed.from) - 200.0));
+    off_s.push_back(std::abs(seconds_of(map, {0}, failed.to) - 230.0));
+  }
+  std::ranges::sort(off_s);
+  EXPECT_LT(off_s[off_s.size() / 2], 4.0);
+  EXPECT_LT(off_s.back(), 12.0);
 }
 
 TEST(WhoIsWrong, AFailureThatNothingContradictsDoesNoHarm) {

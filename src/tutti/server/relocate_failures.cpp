@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/relocate_failures.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "tutti/base/check.hpp"
+#include "tutti/estimation/failure_interval.hpp"
+
+namespace tutti::server {
+namespace {
+
+using estimation::OdometryChain;
+using estimation::OdometryStretch;
+using estimation::PoseSighting;
+
+/// A convicted stretch is looked for this far (m) around.
+constexpr double kSearchAround = 40.0;
+/// How well a pose of the map is known beside another (m, rad).
+constexpr double kMapTranslation = 0.05;
+constexpr double kMapRotation = 0.005;
+/// What was missed is measured; that it was this much more is as likely as not.
+constexpr double kDoubt = 2.0;
+
+/// Part of a chain, by keyframe index.
+struct Window {
+  const OdometryChain* chain = nullptr;
+  std::uint32_t from = 0;
+  std::uint32_t to = 0;
+
+  [[nodiscard]] bool contains(const KeyframeId& id) const {
+    return id.robot == chain->robot && id.index >= from && id.index <= to;
+  }
+  [[nodiscard]] std::size_t poses() const { return to - from + 1; }
+  [[nodiscard]] std::size_t position(std::uint32_t index) const { return index - chain->first_index; }
+};
+
+std::uint32_t last_index(const OdometryChain& chain) {
+  return chain.first_index + static_cast<std::uint32_t>(chain.T_odom_body.size() - 1);
+}
+
+/// As far around the stretch as is searched, within its chain and not beyond `least` and `most`.
+Window window_around(const OdometryStretch& stretch, std::span<const OdometryChain> chains, std::uint32_t least,
+                     std::uint32_t most) {
+  const auto chain = std::ranges::find_if(chains, [&](const OdometryChain& c) {
+    return c.robot == stretch.robot && stretch.from >= c.first_index && stretch.to <= last_index(c);
+  });
+  TUTTI_CHECK(chain != chains.end(), "no chain from {} to {}", stretch.from, stretch.to);
+  Window window{&*chain, stretch.from, stretch.to};
+  const auto step_m = [&](std::uint32_t index) {
+    const std::size_t k = window.position(index);
+    return (chain->T_odom_body[k + 1].translation - chain->T_odom_body[k].translation).norm();
+  };
+  least = std::max(least, chain->first_index);
+  most = std::min(most, last_index(*chain));
+  for (double way = 0.0; window.from > least && way < kSearchAround; --window.from) way += step_m(window.from - 1);
+  for (double way = 0.0; window.to < most && way < kSearchAround; ++window.to) way += step_m(window.to);
+  return window;
+}
+
+Matrix6d seen_from_map(Matrix6d covariance) {
+  covariance.diagonal().head<3>().array() += kMapTranslation * kMapTranslation;
+  covariance.diagonal().tail<3>().array() += kMapRotation * kMapRotation;
+  return covariance;
+}
+
+/// By pose; between those of the window's ends, which the map knows.
+std::vector<PoseSighting> sightings_of(const Window& window, std::span<const DoubtedStretch> failed,
+                                       std::span<const LoopClosure> closures,
+                                       const std::function<Pose3(KeyframeId)>& T_world_body) {
+  const auto is_known = [&](const KeyframeId& id) {
+    return !window.contains(id) && std::ranges::none_of(failed, [&](const DoubtedStretch& f) {
+      return f.stretch.robot == id.robot && id.index > f.stretch.from && id.index < f.stretch.to;
+    });
+  };
+  const auto end = [&](std::uint32_t index) {
+    return PoseSighting{index - window.from, T_world_body({window.chain->robot, index}),
+                        seen_from_map(Matrix6d::Zero())};
+  };
+  std::vector<PoseSighting> out{end(window.from)};
+  for (const LoopClosure& closure : closures) {
+    const auto& [T, covariance] = closure.measurement;
+    if (window.contains(closure.to) && is_known(closure.from)) {
+      out.push_back({closure.to.index - window.from, T_world_body(closure.from) * T, seen_from_map(covariance)});
+    } else if (window.contains(closure.from) && is_known(closure.to)) {
+      const Matrix6d back = adjoint(T);
+      out.push_back({closure.from.index - window.from, T_world_body(closure.to) * T.inverse(),
+                     seen_from_map(back * covariance * back.transpose())});
+    }
+  }
+  out.push_back(end(window.to));
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
+  return out;
+}
+
+}  // namespace
+
+std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> failed,
+                                              std::span<const OdometryChain> chains,
+                                              std::span<const LoopClosure> closures,
+                                              const std::function<Pose3(KeyframeId)>& T_world_body) {
+  std::vector<DoubtedStretch> out;
+  for (std::size_t f = 0; f < failed.size(); ++f) {
+    const OdometryStretch& stretch = failed[f].stretch;
+    const bool follows = f > 0 && failed[f - 1].stretch.robot == stretch.robot;
+    const bool is_followed = f + 1 < failed.size() && failed[f + 1].stretch.robot == stretch.robot;
+    const Window window = window_around(stretch, chains, follows ? out.back().stretch.to : 0,
+                                        is_followed ? failed[f + 1].stretch.from : UINT32_MAX);
+    const std::size_t first = window.position(window.from);
+    const auto found =
+        estimation::locate_failure(std::span(window.chain->T_odom_body).subspan(first, window.poses()),
+                                   std::span(window.chain->step_covariance).subspan(first, window.poses() - 1),
+                                   sightings_of(window, failed, closures, T_world_body));
+    out.push_back(failed[f]);
+    if (!found) continue;
+    out.back() = {{stretch.robot, window.from + static_cast<std::uint32_t>(found->from),
+                   window.from + static_cast<std::uint32_t>(found->to)},
+                  kDoubt * found->missed_m,
+                  kDoubt * found->missed_rad};
+  }
+  return out;
+}
+
+}  // namespace tutti::server
