@@ -90,6 +90,7 @@ Comparison compare(const ProxyGraph& graph, RobotId robot, std::span<const Robot
                  .unmatched_robot = sync.unmatched_robot,
                  .missing_eliminated = sync.missing_eliminated};
   out.disagreement = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sync.pairs.size()), config.scales);
+  out.rotation_disagreement = out.disagreement;
   if (sync.pairs.size() < 2) return out;
 
   std::vector<Pose3> poses_server, poses_robot;
@@ -112,8 +113,17 @@ Comparison compare(const ProxyGraph& graph, RobotId robot, std::span<const Robot
   }
   out.lambda_max = std::max(spectral::largest_eigenvalue(L_server, kLambdaTolerance),
                             spectral::largest_eigenvalue(L_robot, kLambdaTolerance));
-  out.disagreement = disagreement(L_server, (*signal)->evaluate(poses_server), L_robot,
-                                  (*signal)->evaluate(poses_robot), out.lambda_max, config, out.order);
+  const Eigen::MatrixXd f_server = (*signal)->evaluate(poses_server);
+  const Eigen::MatrixXd f_robot = (*signal)->evaluate(poses_robot);
+  const Eigen::Index metres = (*signal)->metres();
+  const Eigen::Index radians = f_server.cols() - metres;
+  out.disagreement = disagreement(L_server, f_server.leftCols(metres), L_robot, f_robot.leftCols(metres),
+                                  out.lambda_max, config, out.order);
+  if (radians == 0) return out;
+  int order = 0;
+  out.rotation_disagreement = disagreement(L_server, f_server.rightCols(radians), L_robot, f_robot.rightCols(radians),
+                                           out.lambda_max, config, order);
+  out.order = std::max(out.order, order);
   return out;
 }
 

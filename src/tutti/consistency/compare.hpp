@@ -24,8 +24,9 @@ struct CompareConfig {
   template <class V>
   void describe(V& v) {
     v.field("scales", scales, at_least(2.0), "Filters of the Meyer bank, the low-pass included.");
-    v.field("signal", signal, one_of({"distance", "relative_motion"}),
-            "What is compared: 'distance' to the first node (the paper) or 'relative_motion' from node to node.");
+    v.field("signal", signal, one_of({"distance", "pose", "relative_motion"}),
+            "What is compared: 'distance' to the first node (the paper), 'pose' seen from the first node, or "
+            "'relative_motion' from node to node.");
     v.field("tolerance_m", tolerance_m, greater_than(0.0),
             "Largest error of a disagreement against the exact transform.");
     v.field("exact", exact, any(),
@@ -36,9 +37,10 @@ struct CompareConfig {
 /// Where, and at which scale, the robot's estimate disagrees with the server's.
 struct Comparison {
   std::vector<NodePair> pairs;   ///< The synchronised nodes in time order: row r of `disagreement` is pairs[r].
-  Eigen::MatrixXd disagreement;  ///< pairs x scales, d^s of eq. (8), in the signal's unit; scale 0 = largest.
-  double lambda_max = 0.0;       ///< Common to both filter banks: the larger of the two graphs'. 0 = no edges.
-  int order = 0;                 ///< Of the Chebyshev polynomials (the larger of the two); 0 = exact.
+  Eigen::MatrixXd disagreement;  ///< pairs x scales, d^s of eq. (8) over the columns in metres; scale 0 = largest.
+  Eigen::MatrixXd rotation_disagreement;  ///< The same over the columns in radians; zero if the signal has none.
+  double lambda_max = 0.0;                ///< Common to both filter banks: the larger of the two graphs'. 0 = no edges.
+  int order = 0;                          ///< Of the Chebyshev polynomials (the larger of the two); 0 = exact.
   std::size_t unmatched_proxy = 0, unmatched_robot = 0, missing_eliminated = 0;  ///< See Synchronisation.
 };
 

@@ -18,14 +18,15 @@ TEST(Signal, UnknownNameIsAConfigurationError) {
 }
 
 TEST(Signal, ShapesOfNothingAndOne) {
-  for (const char* name : {"distance", "relative_motion"}) {
+  for (const char* name : {"distance", "pose", "relative_motion"}) {
     const auto signal = *make_signal(name);
     EXPECT_EQ(signal->name(), name);
     EXPECT_EQ(signal->evaluate({}).rows(), 0);
+    EXPECT_EQ(signal->difference({}, {}).rows(), 0);
     const std::vector<Pose3> one{test::corridor(1)};
-    const auto f = signal->evaluate(one);
-    EXPECT_EQ(f.rows(), 1);
-    EXPECT_TRUE(f.isZero());
+    EXPECT_EQ(signal->evaluate(one).rows(), 1);
+    EXPECT_TRUE(signal->evaluate(one).leftCols(signal->metres()).isZero());
+    EXPECT_TRUE(signal->difference(one, one).isZero());
   }
 }
 
@@ -38,7 +39,7 @@ RC_GTEST_PROP(Signal, NoneDependsOnTheFrame, (std::uint64_t seed)) {
   Rng rng(seed);
   const auto poses = test::corridor(80);
   const auto elsewhere = test::moved(test::random_pose(rng, 50.0), poses);
-  for (const char* name : {"distance", "relative_motion"}) {
+  for (const char* name : {"distance", "pose", "relative_motion"}) {
     const auto signal = *make_signal(name);
     RC_ASSERT((signal->evaluate(poses) - signal->evaluate(elsewhere)).cwiseAbs().maxCoeff() < 1e-10);
   }
