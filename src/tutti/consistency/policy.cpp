@@ -14,9 +14,10 @@ Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, c
   if (name == "random") return std::make_unique<internal::RandomPolicy>(config);
   if (name == "euclidean") return std::make_unique<internal::EuclideanPolicy>(config);
   if (name == "skeleton") return std::make_unique<internal::SkeletonPolicy>(config);
+  if (name == "adaptive") return std::make_unique<internal::AdaptivePolicy>(config);
   return fail(ErrorCode::configuration,
               "policy '{}' is unknown, expected none, every_node, every_node_2, spectral, uniform, random, "
-              "euclidean or skeleton",
+              "euclidean, skeleton or adaptive",
               name);
 }
 

@@ -10,6 +10,7 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/consistency/chain_agreement.hpp"
 #include "tutti/consistency/compare.hpp"
 #include "tutti/consistency/constraint.hpp"
 #include "tutti/consistency/ledger.hpp"
@@ -27,6 +28,7 @@ struct PolicyInput {
   std::optional<std::size_t> budget;
   Rng rng;
   const Ledger& ledger;
+  std::uint64_t update = 1;  ///< How many proxy graphs this robot has compared, this one included.
 };
 
 struct Selection {
@@ -50,8 +52,34 @@ class ConstraintPolicy {
 /// 0.04-0.07 m. The large group does the work (alone, at 0.1: 1300 links and 0.02 m; at 0.3: 540 and 0.06 m); the small
 /// group repairs bends within a submap (60 m with 0.3 degrees of yaw drift per metre: 0.7 m -> 0.010-0.016 m); the mid
 /// group hardly speaks unless something is badly wrong.
+struct AdaptiveConfig {
+  AgreementConfig agreement;
+  double least_gain = 30.0;
+  double tolerance_m = 0.02;
+  double trust = 0.02;
+  std::string detection = "wavelets";
+  std::string placement = "optimal";
+
+  template <class V>
+  void describe(V& v) {
+    v.field("agreement", agreement, any(), "When robot and server are said to disagree.");
+    v.field("least_gain", least_gain, greater_than(0.0),
+            "Once they do, every link has to lower the disagreement, squared and summed over the nodes, by this many "
+            "times the square of what the server says its own error is (RMSE).");
+    v.field("tolerance_m", tolerance_m, greater_than(0.0),
+            "Taken for the server's error with absolute thresholds, and when the server does not say.");
+    v.field("trust", trust, between(1e-3, 1.0),
+            "Instead of constraint.trust: a few links have to hold where many would help each other.");
+    v.field("detection", detection, one_of({"wavelets", "rmse", "always"}),
+            "How disagreement is noticed; 'rmse' (aligned, above 3x what the server says) and 'always' are there to "
+            "compare with.");
+    v.field("placement", placement, one_of({"optimal", "uniform"}),
+            "Where links begin and end; 'uniform' is there to compare with.");
+  }
+};
+
 struct PolicyConfig {
-  std::string name = "skeleton";
+  std::string name = "adaptive";
   std::string classifier = "thresholds";
   double threshold_large_m = 0.25;
   double threshold_mid_m = 0.5;
@@ -63,13 +91,15 @@ struct PolicyConfig {
   double euclidean_threshold_m = 0.1;
   int default_budget = 25;
   double skeleton_tolerance_m = 0.01;
+  AdaptiveConfig adaptive;
   ConstraintConfig constraint;
 
   template <class V>
   void describe(V& v) {
     v.field("name", name,
-            one_of({"none", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"}),
-            "How a robot chooses constraints; 'spectral' is the paper's, 'skeleton' the product's default, "
+            one_of({"none", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton",
+                    "adaptive"}),
+            "How a robot chooses constraints; 'spectral' is the paper's, 'adaptive' the product's default, "
             "'none' leaves it alone.");
     v.field("classifier", classifier, one_of({"thresholds", "top"}),
             "spectral: label nodes above a threshold per group (the paper) or the largest ones (the authors' code).");
@@ -89,6 +119,7 @@ struct PolicyConfig {
             "uniform and random: constraints held when no budget is given.");
     v.field("skeleton_tolerance_m", skeleton_tolerance_m, greater_than(0.0),
             "skeleton: links are split until every node is this close to the server's map.");
+    v.field("adaptive", adaptive, any(), "adaptive: when to add, and how much.");
     v.field("constraint", constraint);
   }
 };

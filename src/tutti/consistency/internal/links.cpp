@@ -91,6 +91,12 @@ void LinkCollector::add(Link link, ConstraintKind kind) {
   ++added_;
 }
 
+void LinkCollector::add(Link link, ConstraintKind kind, const Pose3& T_a_b) {
+  const std::size_t before = added_;
+  add(link, kind);
+  if (added_ > before) selection_.constraints.back().measurement.T_a_b = T_a_b;
+}
+
 void LinkCollector::add(const std::vector<Link>& links, ConstraintKind kind) {
   for (const Link& link : links) add(link, kind);
 }

@@ -51,6 +51,8 @@ class LinkCollector {
   [[nodiscard]] bool full() const { return input_.budget && held_ + added_ >= *input_.budget; }
   /// Ignored when full, or when the two nodes are linked already (here, or in the ledger unless from scratch).
   void add(Link link, ConstraintKind kind);
+  /// The same with a relative pose T_a_b of the caller's, a before b.
+  void add(Link link, ConstraintKind kind, const Pose3& T_a_b);
   void add(const std::vector<Link>& links, ConstraintKind kind);
   /// The new constraints; unless from scratch, before them every held constraint whose nodes are synchronised, measured
   /// again in the newest map: the ledger then decides whether it differs enough.

@@ -93,4 +93,31 @@ class SkeletonPolicy final : public ConstraintPolicy {
   PolicyConfig config_;
 };
 
+struct TimeChain;
+struct JointPlan;
+class OdometryError;
+
+/// Nothing while the robot's estimate differs from the server's only within the server's uncertainty (ChainAgreement).
+/// Once it has been told otherwise: the links that pay, bending raw odometry to the server's map (plan_joints: each
+/// lowers the summed squared disagreement by `least_gain` nodes' worth of the server's own variance), so that their
+/// lengths follow the scale of the disagreement and their ends lie where drift was born; and more where what is left
+/// stands out at any scale. Planned afresh at every update; held links stay, measured anew in the newest map, unless
+/// the new plan is better by a link's worth. None at all when raw odometry has come to agree, as after a wrong closure
+/// is gone.
+class AdaptivePolicy final : public ConstraintPolicy {
+ public:
+  explicit AdaptivePolicy(const PolicyConfig& config) : config_(config) {}
+  [[nodiscard]] std::string name() const override { return "adaptive"; }
+  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
+
+ private:
+  static constexpr double kLeastRmse_m = 2e-3;  ///< Poses on the wire are rounded to a quarter of it.
+  static constexpr double kRmseFactor = 3.0;
+  static constexpr double kLever_m = 0.3;  ///< What a radian of rotation counts: positions decide.
+  [[nodiscard]] bool disagree(const ChainAgreement& test, const TimeChain& chain, double expected_rmse_m) const;
+  [[nodiscard]] JointPlan plan(const TimeChain& chain, const OdometryError& error, const ChainAgreement& test,
+                               std::size_t most, double least_gain) const;
+  PolicyConfig config_;
+};
+
 }  // namespace tutti::consistency::internal

@@ -4,36 +4,15 @@
 
 #include "tutti/consistency/internal/links.hpp"
 #include "tutti/consistency/internal/policies.hpp"
+#include "tutti/consistency/internal/time_chain.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/geometry/alignment.hpp"
 
 namespace tutti::consistency::internal {
 namespace {
 
-/// Where the server wants the synchronised nodes, and the raw odometry between them.
-struct Chain {
-  std::vector<Pose3> T_start_server;   // seen from node 0
-  std::vector<RelativePose> odometry;  // node k - 1 -> k; [0] unused
-};
-
-Chain make_chain(const PolicyInput& input) {
-  Chain chain;
-  const auto& pairs = input.comparison.pairs;
-  const Pose3 T_start_world = input.graph.nodes[pairs.front().proxy].T_world_body.inverse();
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    chain.T_start_server.push_back(T_start_world * input.graph.nodes[pairs[k].proxy].T_world_body);
-    RelativePose step{.covariance = Matrix6d::Zero()};
-    for (std::size_t n = k == 0 ? pairs[k].robot : pairs[k - 1].robot; n < pairs[k].robot; ++n) {
-      const RelativePose& next = input.nodes[n + 1].odometry;  // nodes between two pairs are passed over
-      step = {step.T_a_b * next.T_a_b, compound_covariance(next.T_a_b, step.covariance, next.covariance)};
-    }
-    chain.odometry.push_back(step);
-  }
-  return chain;
-}
-
 /// The robot's raw chain as a smoother; each run of odometry is compounded once, however often the joints change.
-estimation::OnboardSmoother make_smoother(const Chain& chain) {
+estimation::OnboardSmoother make_smoother(const TimeChain& chain) {
   estimation::OnboardSmoother smoother;
   for (std::size_t k = 1; k < chain.odometry.size(); ++k) smoother.append(chain.odometry[k]);
   return smoother;
@@ -41,31 +20,30 @@ estimation::OnboardSmoother make_smoother(const Chain& chain) {
 
 /// The robot's own chain with every joint held where the server has it: between two joints the smoother spreads the
 /// end error along the odometry by its covariance.
-const std::vector<Pose3>& spread(estimation::OnboardSmoother& smoother, const Chain& chain,
+const std::vector<Pose3>& spread(estimation::OnboardSmoother& smoother, const TimeChain& chain,
                                  const std::vector<std::size_t>& joints) {
   constexpr double kHeld = 1e-10;  // variance, m^2 and rad^2: as good as exact
   std::vector<estimation::ChainConstraint> links;
   for (std::size_t j = 1; j < joints.size(); ++j)
     links.push_back({joints[j - 1],
                      joints[j],
-                     {chain.T_start_server[joints[j - 1]].inverse() * chain.T_start_server[joints[j]],
-                      Matrix6d::Identity() * kHeld}});
+                     {chain.server[joints[j - 1]].inverse() * chain.server[joints[j]], Matrix6d::Identity() * kHeld}});
   smoother.set_constraints(std::move(links));
   smoother.solve();
   return smoother.poses();
 }
 
 /// Distance of every node from where the server has it. Without joints the frames are free: best rigid alignment.
-std::vector<double> disagreements(const Chain& chain, const std::vector<Pose3>& predicted, bool aligned) {
-  std::vector<Eigen::Vector3d> server;
+std::vector<double> disagreements(const TimeChain& chain, const std::vector<Pose3>& predicted, bool aligned) {
+  std::vector<Eigen::Vector3d> wanted;
   std::vector<Eigen::Vector3d> own;
   for (std::size_t k = 0; k < predicted.size(); ++k) {
-    server.push_back(chain.T_start_server[k].translation);
+    wanted.push_back(chain.server[k].translation);
     own.push_back(predicted[k].translation);
   }
-  const Pose3 T = aligned ? Pose3{} : align_points(server, own);
+  const Pose3 T = aligned ? Pose3{} : align_points(wanted, own);
   std::vector<double> out;
-  for (std::size_t k = 0; k < own.size(); ++k) out.push_back((server[k] - T * own[k]).norm());
+  for (std::size_t k = 0; k < own.size(); ++k) out.push_back((wanted[k] - T * own[k]).norm());
   return out;
 }
 
@@ -91,7 +69,7 @@ Selection SkeletonPolicy::choose(const PolicyInput& input) const {
   LinkCollector collector(input, config_.constraint, true);
   const std::size_t nodes = input.comparison.pairs.size();
   if (nodes < 2) return std::move(collector).take();
-  const Chain chain = make_chain(input);
+  const TimeChain chain = time_chain(input.graph, input.robot, input.nodes, input.comparison.pairs);
   estimation::OnboardSmoother smoother = make_smoother(chain);
   std::vector<std::size_t> joints{0};
   const std::vector<double> raw = disagreements(chain, spread(smoother, chain, joints), false);

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/internal/time_chain.hpp"
+
+#include <algorithm>
+
+namespace tutti::consistency::internal {
+
+TimeChain time_chain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+                     std::span<const NodePair> pairs) {
+  TimeChain chain;
+  if (pairs.empty()) return chain;
+  const auto first = std::ranges::find(graph.nodes, robot, &ProxyNode::robot) - graph.nodes.begin();
+  const Pose3 T_start_world = graph.nodes[pairs.front().proxy].T_world_body.inverse();
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    chain.server.push_back(T_start_world * graph.nodes[pairs[k].proxy].T_world_body);
+    chain.robot.push_back(nodes[pairs[k].robot].T_map_body);
+    chain.ranks.push_back(pairs[k].proxy - static_cast<std::size_t>(first));
+    RelativePose step{.covariance = Matrix6d::Zero()};
+    for (std::size_t n = k == 0 ? pairs[k].robot : pairs[k - 1].robot; n < pairs[k].robot; ++n) {
+      const RelativePose& next = nodes[n + 1].odometry;
+      step = {step.T_a_b * next.T_a_b, compound_covariance(next.T_a_b, step.covariance, next.covariance)};
+    }
+    chain.odometry.push_back(step);
+  }
+  return chain;
+}
+
+const ShapeUncertainty* shape_of(const ProxyGraph& graph, RobotId robot) {
+  const auto found = std::ranges::find(graph.shapes, robot, &ShapeUncertainty::robot);
+  return found == graph.shapes.end() ? nullptr : &*found;
+}
+
+}  // namespace tutti::consistency::internal

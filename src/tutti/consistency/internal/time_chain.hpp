@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "tutti/consistency/policy.hpp"
+#include "tutti/model/relative_pose.hpp"
+
+namespace tutti::consistency::internal {
+
+/// One robot's synchronised nodes in time order: where both sides have them, and the raw odometry between them.
+struct TimeChain {
+  std::vector<Pose3> server;           ///< Seen from the first of them.
+  std::vector<Pose3> robot;            ///< T_map_body, as corrected so far.
+  std::vector<RelativePose> odometry;  ///< k - 1 -> k; entry 0 unused. Robot nodes between two pairs are passed over.
+  std::vector<std::size_t> ranks;      ///< Among the robot's proxy nodes.
+};
+
+TimeChain time_chain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+                     std::span<const NodePair> pairs);
+
+/// What the server says about this robot; null: nothing.
+const ShapeUncertainty* shape_of(const ProxyGraph& graph, RobotId robot);
+
+}  // namespace tutti::consistency::internal
