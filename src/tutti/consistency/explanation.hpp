@@ -2,11 +2,16 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
+#include <algorithm>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "tutti/base/timestamp.hpp"
-#include "tutti/consistency/constraint.hpp"
+#include "tutti/consistency/chain_agreement.hpp"
+#include "tutti/consistency/robot_node.hpp"
+#include "tutti/consistency/synchronise.hpp"
+#include "tutti/model/proxy_graph.hpp"
 
 namespace tutti::consistency {
 
@@ -33,11 +38,20 @@ struct Explanation {
   Eigen::MatrixXd position_m;  ///< Disagreement, nodes x scales.
   Eigen::MatrixXd rotation_rad;
   Eigen::MatrixXd significance;  ///< Disagreement over its threshold, the larger of position and rotation; 1 = at it.
-  double aligned_rmse_m = 0.0;   ///< Of the two estimates after one rigid alignment.
-  double expected_rmse_m = 0.0;  ///< What the server says its own error is; 0 = it does not say.
-  std::vector<SuspectedOrigin> origins;  ///< In time order, none overlapping.
+  std::vector<double> scale_significance;  ///< The same for all of a scale together (ChainDisagreement).
+  double aligned_rmse_m = 0.0;             ///< Of the two estimates after one rigid alignment.
+  double expected_rmse_m = 0.0;            ///< What the server says its own error is; 0 = it does not say.
+  std::vector<SuspectedOrigin> origins;    ///< In time order, none overlapping.
   /// Something stands out of the server's uncertainty: the two do not agree.
-  [[nodiscard]] bool disagrees() const { return significance.size() > 0 && significance.maxCoeff() > 1.0; }
+  [[nodiscard]] bool disagrees() const {
+    return significance.size() > 0 &&
+           (significance.maxCoeff() > 1.0 || std::ranges::any_of(scale_significance, [](double s) { return s > 1.0; }));
+  }
 };
+
+/// Compares raw odometry with the server's map along the synchronised nodes `pairs` (ChainAgreement) and looks for
+/// where the difference was born. `update` counts from 1. Fewer than 2 pairs: empty.
+Explanation explain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+                    std::span<const NodePair> pairs, std::uint64_t update, const AgreementConfig& config);
 
 }  // namespace tutti::consistency

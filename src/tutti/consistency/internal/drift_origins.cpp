@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/internal/drift_origins.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tutti/consistency/chain_agreement.hpp"
+
+namespace tutti::consistency::internal {
+namespace {
+
+constexpr double kDegrees = 6.0;
+/// Stretches within this share of the largest statistic stand out "nearly alike".
+constexpr double kAlike = 0.93;
+constexpr std::size_t kMostStretches = 20;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Clips the variances (eigenvalues) of a 3 x 3 block.
+void clip(Eigen::Ref<Eigen::Matrix3d> block, double largest) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(Eigen::Matrix3d(block));
+  const Eigen::Vector3d kept = eigen.eigenvalues().cwiseMin(largest).cwiseMax(0.0);
+  block = eigen.eigenvectors() * kept.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+/// Odometry with no step less sure, per metre, than usual.
+std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
+  constexpr double kLeastStep_m = 0.1;
+  constexpr double kUsual = 2.0;  // times the median
+  std::vector<double> metres, radians;
+  const auto length = [&](std::size_t k) {
+    return std::max(kLeastStep_m, (chain.server[k].translation - chain.server[k - 1].translation).norm());
+  };
+  for (std::size_t k = 1; k < chain.odometry.size(); ++k) {
+    const Matrix6d& C = chain.odometry[k].covariance;
+    metres.push_back(C.topLeftCorner<3, 3>().selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff() / length(k));
+    radians.push_back(C.bottomRightCorner<3, 3>().selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff() / length(k));
+  }
+  std::vector<RelativePose> out = chain.odometry;
+  if (metres.empty()) return out;
+  const double usual_m = kUsual * median(metres);
+  const double usual_rad = kUsual * median(radians);
+  for (std::size_t k = 1; k < out.size(); ++k) {
+    if (metres[k - 1] <= usual_m && radians[k - 1] <= usual_rad) continue;
+    Matrix6d& C = out[k].covariance;
+    clip(C.topLeftCorner<3, 3>(), usual_m * length(k));
+    clip(C.bottomRightCorner<3, 3>(), usual_rad * length(k));
+    C.topRightCorner<3, 3>().setZero();
+    C.bottomLeftCorner<3, 3>().setZero();
+  }
+  return out;
+}
+
+/// The server's variance of a relative pose over `length` nodes where it knows its map as well as usual (median): a
+/// relative position is two sags of half the length apart, or less. Not as it knows it there: where odometry failed the
+/// server is unsure of what lies inside the stretch, but not of how its ends lie to each other.
+ShapeSigma server_variance(const ShapeUncertainty* shape, std::size_t length) {
+  if (shape == nullptr || shape->sag.empty()) return {};
+  const double octave =
+      std::log2(std::max(1.0, static_cast<double>(length) / 2.0 / static_cast<double>(ShapeUncertainty::kShortest)));
+  const auto& stretches = shape->sag[std::min(shape->sag.size() - 1, static_cast<std::size_t>(std::lround(octave)))];
+  std::vector<double> metres, radians;
+  for (const ShapeSigma& sigma : stretches) {
+    metres.push_back(sigma.position_m);
+    radians.push_back(sigma.rotation_rad);
+  }
+  return {2.0 * std::pow(median(metres), 2), 2.0 * std::pow(median(radians), 2)};
+}
+
+class Scan {
+ public:
+  Scan(const TimeChain& chain, const ShapeUncertainty* shape)
+      : usual_(chain.server, usual_odometry(chain), 1.0), stated_(chain.server, chain.odometry, 1.0) {
+    for (std::size_t length = 0; length < chain.server.size(); ++length)
+      server_.push_back(server_variance(shape, length));
+  }
+
+  [[nodiscard]] double statistic(std::size_t a, std::size_t b) const { return statistic(usual_, a, b); }
+  [[nodiscard]] double stated_statistic(std::size_t a, std::size_t b) const { return statistic(stated_, a, b); }
+
+ private:
+  [[nodiscard]] double statistic(const OdometryError& error, std::size_t a, std::size_t b) const {
+    const Vector6d missed = error.missed(a, b);
+    Matrix6d C = error.missed_covariance(a, b);
+    C.diagonal().head<3>().array() += server_[b - a].position_m + 1e-6;
+    C.diagonal().tail<3>().array() += server_[b - a].rotation_rad + 1e-7;
+    return missed.dot(C.llt().solve(missed));
+  }
+  OdometryError usual_, stated_;
+  std::vector<ShapeSigma> server_;  // variances by length
+};
+
+struct Stretch {
+  std::size_t a = 0, b = 0;
+  double statistic = 0.0;
+};
+
+/// All places, lengths in steps of half an octave.
+std::vector<Stretch> candidates(const Scan& scan, std::size_t nodes, double threshold) {
+  std::vector<Stretch> out;
+  for (double length = 2.0; length < static_cast<double>(nodes); length *= std::sqrt(2.0)) {
+    const auto l = static_cast<std::size_t>(std::lround(length));
+    const std::size_t stride = std::max<std::size_t>(1, l / 8);
+    for (std::size_t a = 0; a + l < nodes; a += stride)
+      if (const double z = scan.statistic(a, a + l); z > threshold) out.push_back({a, a + l, z});
+  }
+  return out;
+}
+
+/// Moves the ends where the statistic grows, then inwards as long as it stays nearly as large.
+void settle(const Scan& scan, Stretch& s, std::size_t low, std::size_t high) {
+  for (std::size_t step = std::max<std::size_t>(1, (s.b - s.a) / 4); step > 0; step /= 2)
+    for (bool moved = true; moved;) {
+      moved = false;
+      const auto consider = [&](std::size_t a, std::size_t b) {
+        if (const double z = scan.statistic(a, b); z > s.statistic * (1.0 + 1e-9)) {
+          s = {a, b, z};
+          moved = true;
+        }
+      };
+      if (s.a >= low + step) consider(s.a - step, s.b);
+      if (s.b + step <= high) consider(s.a, s.b + step);
+      if (s.a + step < s.b) consider(s.a + step, s.b);
+      if (s.b > s.a + step) consider(s.a, s.b - step);
+    }
+  const double enough = kAlike * s.statistic;
+  while (s.a + 1 < s.b) {
+    const double from_left = scan.statistic(s.a + 1, s.b);
+    const double from_right = scan.statistic(s.a, s.b - 1);
+    if (std::max(from_left, from_right) < enough) break;
+    (from_left >= from_right) ? ++s.a : --s.b;
+  }
+  s.statistic = scan.statistic(s.a, s.b);
+}
+
+}  // namespace
+
+std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const ShapeUncertainty* shape, double probability) {
+  const std::size_t nodes = chain.server.size();
+  std::vector<DriftStretch> out;
+  if (nodes < 4) return out;
+  const Scan scan(chain, shape);
+  // About 8 places per length along the run, 2 log2(n) lengths, of which the longer overlap: n log2(n) stretches.
+  const double n = static_cast<double>(nodes);
+  const double threshold = chi_square_exceeded_with(probability / (n * std::log2(n)), kDegrees);
+  std::vector<Stretch> found = candidates(scan, nodes, threshold);
+  while (!found.empty() && out.size() < kMostStretches) {
+    Stretch best = *std::ranges::max_element(found, {}, &Stretch::statistic);
+    std::size_t low = 0, high = nodes - 1;
+    for (const DriftStretch& other : out) {
+      if (other.last <= best.a) low = std::max(low, other.last);
+      if (other.first >= best.b) high = std::min(high, other.first);
+    }
+    settle(scan, best, low, high);
+    out.push_back(
+        {best.a, best.b, std::sqrt(best.statistic / threshold), scan.stated_statistic(best.a, best.b) > threshold});
+    std::erase_if(found, [&](const Stretch& s) { return s.a < best.b && best.a < s.b; });
+  }
+  std::ranges::sort(out, {}, &DriftStretch::first);
+  return out;
+}
+
+}  // namespace tutti::consistency::internal
