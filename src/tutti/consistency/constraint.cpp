@@ -18,7 +18,9 @@ Matrix6d moved(const Pose3& T_a_b, const Matrix6d& covariance_b) {
 
 double distrust(std::uint32_t support, const ConstraintConfig& config) {
   if (support == 0) return 1.0;
-  return std::min(1.0, config.trust * std::max(1.0, config.full_support / static_cast<double>(support)));
+  if (static_cast<int>(support) >= config.full_support) return config.trust;
+  const double earned = (support - 1.0) / (config.full_support - 1.0);
+  return std::pow(config.doubt, 1.0 - earned) * std::pow(config.trust, earned);
 }
 
 ConstraintMaker::ConstraintMaker(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,

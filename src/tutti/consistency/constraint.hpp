@@ -32,6 +32,7 @@ struct ConstraintConfig {
   double floor_translation_m = 1e-3;
   double floor_rotation_rad = 1e-3;
   double trust = 0.1;
+  double doubt = 2.0;
   int full_support = 3;
 
   template <class V>
@@ -44,16 +45,23 @@ struct ConstraintConfig {
         "trust", trust, between(1e-3, 1.0),
         "Standard deviation of a well supported constraint as a fraction of the server's own: the server's estimate "
         "already contains the robot's odometry, so the constraint has to outweigh it.");
+    v.field("doubt", doubt, between(1e-3, 10.0), "The same for a stretch that a single closure supports.");
     v.field("full_support", full_support, at_least(1.0),
-            "Closures over a stretch that earn full trust; with fewer, trust falls in proportion.");
+            "Closures over a stretch that earn full trust. A constraint with fewer is doubtful: it also gets the "
+            "smoother's robust loss.");
   }
 };
 
-/// Standard deviation of a stretch with `support` closures, as a factor on the one the server sent:
-///   min(1, trust * max(1, full_support / support)),  1 without any support.
-/// At 1 the server weighs no more than the robot's own odometry (of which its estimate is then made), at `trust` it
-/// overrules it (DESIGN.md, "Who is wrong?").
+/// Standard deviation of a stretch with `support` closures, as a factor on the one the server sent: from `doubt` for a
+/// single closure down to `trust` for `full_support` of them and more, evenly in the logarithm; 1 without any. At 1 the
+/// server weighs no more than the robot's own odometry (of which its estimate is then made), at `trust` it overrules it
+/// (DESIGN.md, "Who is wrong?"); a lone closure moves the robot by 1 / (1 + doubt^2) of what it asks for.
 double distrust(std::uint32_t support, const ConstraintConfig& config);
+
+/// Fewer closures than earn full trust stand behind it somewhere on the way.
+inline bool is_doubtful(const Constraint& constraint, const ConstraintConfig& config) {
+  return static_cast<int>(constraint.support) < config.full_support;
+}
 
 /// Makes constraints between synchronised nodes of one robot from the server's poses.
 ///   T_from_to = T_world_from^-1 T_world_to,

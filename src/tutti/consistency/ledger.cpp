@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "tutti/geometry/so3.hpp"
@@ -54,6 +55,11 @@ LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& 
         next.push_back(std::move(held));
       continue;
     }
+    if (found->second.support == 0 && held.support > 0) {
+      ++counts.withdrawn;
+      fresh.erase(found);
+      continue;
+    }
     const bool replace = differs(held, found->second, config);
     ++(replace ? counts.replaced : counts.unchanged);
     next.push_back(std::move(replace ? found->second : held));
@@ -64,6 +70,16 @@ LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& 
   std::sort(next.begin(), next.end(), [](const Constraint& a, const Constraint& b) { return key(a) < key(b); });
   constraints_ = std::move(next);
   return counts;
+}
+
+std::size_t Ledger::withdraw_unknown(const ProxyGraph& graph, RobotId robot) {
+  std::set<Timestamp> known;
+  for (const ProxyNode& node : graph.nodes)
+    if (node.robot == robot) known.insert(node.stamp);
+  for (const EliminatedNode& node : graph.eliminated)
+    if (node.robot == robot) known.insert(node.stamp);
+  return std::erase_if(
+      constraints_, [&](const Constraint& c) { return !known.contains(c.from_stamp) || !known.contains(c.to_stamp); });
 }
 
 }  // namespace tutti::consistency

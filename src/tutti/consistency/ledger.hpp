@@ -26,6 +26,7 @@ struct LedgerUpdate {
   std::size_t replaced = 0;
   std::size_t unchanged = 0;  ///< Chosen again, but not different enough.
   std::size_t removed = 0;    ///< Only when the choice replaces all.
+  std::size_t withdrawn = 0;  ///< No longer supported by the server's map.
 };
 
 /// The constraints a robot holds, at most one per pair of nodes. A value.
@@ -41,8 +42,13 @@ class Ledger {
 
   /// Takes `chosen` in. A constraint between the same two nodes, either way round, is replaced only when the new one
   /// differs beyond either threshold; otherwise it stays untouched. With `replaces_all`, constraints whose nodes are
-  /// not in `chosen` go. The same pair twice in `chosen`: the last counts.
+  /// not in `chosen` go. The same pair twice in `chosen`: the last counts. A held constraint that is chosen again with
+  /// support 0 is withdrawn: the closures that it came from are gone, and the server knows no better than odometry.
   LedgerUpdate update(std::vector<Constraint> chosen, const LedgerConfig& config, bool replaces_all);
+
+  /// Withdraws every constraint with an end that this proxy graph does not know of (any more): neither among its nodes
+  /// nor among those that its reduction removed. Returns how many.
+  std::size_t withdraw_unknown(const ProxyGraph& graph, RobotId robot);
 
   friend bool operator==(const Ledger&, const Ledger&) = default;
 
