@@ -33,6 +33,7 @@ RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConf
   for (const std::string& policy : ordered) {
     robot::AgentConfig own = config;
     own.policy.name = policy;
+    own.explain = config.explain && policy == config.policy.name;  // shadows are not shown
     members_.push_back({policy,
                         robot::RobotAgent(recording.recording.robot, 1, own, rng.fork(policy)),
                         {.robot = recording.recording.name, .policy = policy}});
@@ -104,7 +105,9 @@ void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::o
                       .synchronised_nodes = summary.synchronised,
                       .constraints_total = summary.constraints,
                       .mean_disagreement_m = summary.mean_disagreement,
-                      .max_disagreement_m = summary.max_disagreement};
+                      .max_disagreement_m = summary.max_disagreement,
+                      .origins = summary.explanation.origins};
+  explanation_ = std::move(summary.explanation);
   if (const auto agreement = evaluation::agreement(member.agent.corrected(), broadcast_trajectory(message.graph, id())))
     record.agreement_rmse_m = agreement->rmse_m;
   updates_.push_back(std::move(record));

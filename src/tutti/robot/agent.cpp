@@ -17,13 +17,17 @@ std::unique_ptr<consistency::ConstraintPolicy> known_policy(const consistency::P
 }  // namespace
 
 RobotAgent::RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng)
+    : RobotAgent(robot, config, std::move(rng), AgentState{.session = session}) {}
+RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentState state)
     : robot_(robot),
-      session_(session),
       config_(config),
       rng_(std::move(rng)),
-      submaps_(robot, config.submap),
-      smoother_(config.smoother),
-      policy_(known_policy(config.policy)) {}
+      policy_(known_policy(config.policy)),
+      submaps_(robot, config.submap, std::move(state.submaps)),
+      smoother_(config.smoother, std::move(state.smoother)),
+      state_(std::move(state)) {
+  if (!smoother_.state().constraints.empty()) smoother_.solve();
+}
 RobotAgent::~RobotAgent() = default;
 RobotAgent::RobotAgent(RobotAgent&&) noexcept = default;
 RobotAgent& RobotAgent::operator=(RobotAgent&&) noexcept = default;
@@ -32,20 +36,21 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const
   const std::uint32_t submap = submaps_.current_submap();
   const auto keyframe = submaps_.add_odometry(stamp, T_odom_body, increment_covariance);
   if (!keyframe) return tl::unexpected(keyframe.error());
-  if (last_odometry_) {
-    const Pose3 step = last_odometry_->inverse() * T_odom_body;
+  if (state_.last_odometry) {
+    const Pose3 step = state_.last_odometry->inverse() * T_odom_body;
     smoother_.append({step, increment_covariance});
-    since_node_ = {since_node_.T_a_b * step, compound_covariance(step, since_node_.covariance, increment_covariance)};
+    state_.since_node = {state_.since_node.T_a_b * step,
+                         compound_covariance(step, state_.since_node.covariance, increment_covariance)};
   } else {
     smoother_.set_first_pose(T_odom_body);
   }
-  last_odometry_ = T_odom_body;
+  state_.last_odometry = T_odom_body;
   if (*keyframe) {
-    keyframes_.push_back(**keyframe);
-    chain_index_.push_back(smoother_.size() - 1);
-    submap_of_.push_back(submap);
+    state_.keyframes.push_back(**keyframe);
+    state_.chain_index.push_back(smoother_.size() - 1);
+    state_.submap_of.push_back(submap);
     if ((*keyframe)->representative)
-      node_odometry_.push_back(std::exchange(since_node_, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
+      state_.node_odometry.push_back(std::exchange(state_.since_node, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
   }
   if (auto submap_done = submaps_.take_submap()) send(std::move(*submap_done));
   return {};
@@ -58,21 +63,21 @@ void RobotAgent::finish() {
 }
 
 void RobotAgent::send(Submap submap) {
-  outgoing_.push_back(
-      {.header = {.robot = robot_, .session = session_, .sequence = sequence_++}, .submap = std::move(submap)});
+  state_.outgoing.push_back({.header = {.robot = robot_, .session = state_.session, .sequence = state_.sequence++},
+                             .submap = std::move(submap)});
 }
 
-std::vector<SubmapMessage> RobotAgent::take_outgoing() { return std::exchange(outgoing_, {}); }
+std::vector<SubmapMessage> RobotAgent::take_outgoing() { return std::exchange(state_.outgoing, {}); }
 
 std::vector<consistency::RobotNode> RobotAgent::nodes() const {
   std::vector<consistency::RobotNode> nodes;
-  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    if (!keyframes_[k].representative) continue;
-    nodes.push_back({.stamp = keyframes_[k].stamp,
-                     .T_map_body = smoother_.pose(chain_index_[k]),
-                     .chain_index = chain_index_[k],
-                     .odometry = node_odometry_[nodes.size()],
-                     .submap = submap_of_[k]});
+  for (std::size_t k = 0; k < state_.keyframes.size(); ++k) {
+    if (!state_.keyframes[k].representative) continue;
+    nodes.push_back({.stamp = state_.keyframes[k].stamp,
+                     .T_map_body = smoother_.pose(state_.chain_index[k]),
+                     .chain_index = state_.chain_index[k],
+                     .odometry = state_.node_odometry[nodes.size()],
+                     .submap = state_.submap_of[k]});
   }
   return nodes;
 }
@@ -80,9 +85,9 @@ std::vector<consistency::RobotNode> RobotAgent::nodes() const {
 // The method of the paper, one step a line (DESIGN 2, steps 4 to 7).
 UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget,
                                   const StageObserver& stage_ended) {
-  UpdateSummary summary{.revision = message.graph.revision, .constraints = ledger_.size()};
-  if (message.graph.revision <= revision_) return summary;  // late or repeated
-  revision_ = message.graph.revision;
+  UpdateSummary summary{.revision = message.graph.revision, .constraints = state_.ledger.size()};
+  if (message.graph.revision <= state_.revision) return summary;  // late or repeated
+  state_.revision = message.graph.revision;
   const auto ended = [&](UpdateStage stage) {
     if (stage_ended) stage_ended(stage);
   };
@@ -91,23 +96,29 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   const auto comparison = consistency::compare(message.graph, robot_, own, config_.compare);
   ended(UpdateStage::compare);
 
+  const std::size_t withdrawn = state_.ledger.withdraw_unknown(message.graph, robot_);
   const auto selection = policy_->choose({.graph = message.graph,
                                           .robot = robot_,
                                           .nodes = own,
                                           .comparison = comparison,
                                           .budget = budget,
-                                          .rng = rng_.fork(revision_),
-                                          .ledger = ledger_});
-  ledger_.update(selection.constraints, config_.ledger, selection.replaces_all);
+                                          .rng = rng_.fork(state_.revision),
+                                          .ledger = state_.ledger,
+                                          .update = ++state_.comparisons});
+  summary.ledger = state_.ledger.update(selection.constraints, config_.ledger, selection.replaces_all);
+  summary.ledger.withdrawn += withdrawn;
   ended(UpdateStage::choose);
 
   optimise();
   locate_others(message.graph, own, comparison.pairs);
   ended(UpdateStage::optimise);
 
+  if (config_.explain)
+    summary.explanation = consistency::explain(message.graph, robot_, own, comparison.pairs, state_.comparisons,
+                                               config_.policy.adaptive.agreement);
   summary.synchronised = comparison.pairs.size();
   summary.proposed = selection.constraints.size();
-  summary.constraints = ledger_.size();
+  summary.constraints = state_.ledger.size();
   summary.order = comparison.order;
   if (comparison.disagreement.rows() > 0) {
     summary.mean_disagreement = comparison.disagreement.colwise().mean().transpose();
@@ -118,8 +129,11 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
 
 void RobotAgent::optimise() {
   std::vector<estimation::ChainConstraint> constraints;
-  for (const consistency::Constraint& c : ledger_.constraints())
-    constraints.push_back({.from = c.from, .to = c.to, .measurement = c.measurement});
+  for (const consistency::Constraint& c : state_.ledger.constraints())
+    constraints.push_back({.from = c.from,
+                           .to = c.to,
+                           .measurement = c.measurement,
+                           .doubtful = consistency::is_doubtful(c, config_.policy.constraint)});
   smoother_.set_constraints(std::move(constraints));
   smoother_.solve();
 }
@@ -127,7 +141,7 @@ void RobotAgent::optimise() {
 // Frames differ by an unknown transform; the newest common node ties them together where this robot is now.
 void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                                std::span<const consistency::NodePair> pairs) {
-  whereabouts_.clear();
+  state_.whereabouts.clear();
   if (pairs.empty()) return;
   const Pose3& T_map_newest = smoother_.pose(own[pairs.back().robot].chain_index);  // as corrected now
   const Pose3 T_map_world = T_map_newest * graph.nodes[pairs.back().proxy].T_world_body.inverse();
@@ -140,14 +154,21 @@ void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consiste
     const ProxyNode& node = graph.nodes[i];
     const bool last = i + 1 == graph.nodes.size() || graph.nodes[i + 1].robot != node.robot;
     if (!last || node.robot == robot_ || component_of(node.robot) != component_of(robot_)) continue;
-    whereabouts_.push_back({node.robot, node.stamp, T_map_world * node.T_world_body});
+    state_.whereabouts.push_back({node.robot, node.stamp, T_map_world * node.T_world_body});
   }
+}
+
+AgentState RobotAgent::state() const {
+  AgentState out = state_;
+  out.submaps = submaps_.state();
+  out.smoother = smoother_.state();
+  return out;
 }
 
 Trajectory RobotAgent::corrected() const {
   Trajectory out;
-  for (std::size_t k = 0; k < keyframes_.size(); ++k)
-    out.push_back({keyframes_[k].stamp, smoother_.pose(chain_index_[k])});
+  for (std::size_t k = 0; k < state_.keyframes.size(); ++k)
+    out.push_back({state_.keyframes[k].stamp, smoother_.pose(state_.chain_index[k])});
   return out;
 }
 

@@ -10,6 +10,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/consistency/compare.hpp"
+#include "tutti/consistency/explanation.hpp"
 #include "tutti/consistency/ledger.hpp"
 #include "tutti/consistency/policy.hpp"
 #include "tutti/consistency/robot_node.hpp"
@@ -25,7 +26,9 @@ struct AgentConfig {
   consistency::CompareConfig compare;
   consistency::PolicyConfig policy;
   consistency::LedgerConfig ledger;
-  estimation::OnboardSmootherConfig smoother;
+  estimation::OnboardSmootherConfig smoother{.polishing_steps =
+                                                 1};  ///< Few links, long runs: one step gives them back millimetres.
+  bool explain = true;
   template <class V>
   void describe(V& v) {
     v.field("submap", submap);
@@ -33,6 +36,7 @@ struct AgentConfig {
     v.field("policy", policy);
     v.field("ledger", ledger);
     v.field("smoother", smoother);
+    v.field("explain", explain, any(), "Say after every comparison where and when odometry and map part.");
   }
 };
 
@@ -51,12 +55,33 @@ struct UpdateSummary {
   std::size_t constraints = 0;        ///< In the ledger afterwards.
   Eigen::VectorXd mean_disagreement;  ///< Per scale, before the correction, in the signal's unit.
   Eigen::VectorXd max_disagreement;
-  int order = 0;  ///< Of the Chebyshev transform; 0 = exact.
+  int order = 0;                         ///< Of the Chebyshev transform; 0 = exact.
+  consistency::LedgerUpdate ledger;      ///< What became of the constraints.
+  consistency::Explanation explanation;  ///< Of raw odometry against the server's map.
 };
 
 /// The steps of an update, in order. An observer is told when each ends, so that whoever owns a clock can time them.
 enum class UpdateStage { compare, choose, optimise };
 using StageObserver = std::function<void(UpdateStage)>;
+
+/// An agent's whole state, by value: restart it from this and it goes on as if nothing had happened.
+struct AgentState {
+  std::uint64_t session = 0;
+  std::uint64_t sequence = 0;     ///< Of the next message.
+  std::uint64_t revision = 0;     ///< Of the newest proxy graph seen.
+  std::uint64_t comparisons = 0;  ///< Proxy graphs compared.
+  SubmapBuilderState submaps;
+  estimation::SmootherState smoother;
+  consistency::Ledger ledger;
+  std::vector<Keyframe> keyframes;
+  std::vector<std::size_t> chain_index;     ///< Of each keyframe in the odometry chain.
+  std::vector<std::uint32_t> submap_of;     ///< Of each keyframe: the submap it was first in.
+  std::vector<RelativePose> node_odometry;  ///< Raw, between representative keyframes; [k] ends at the k-th.
+  RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  std::optional<Pose3> last_odometry;
+  std::vector<SubmapMessage> outgoing;
+  std::vector<Whereabouts> whereabouts;
+};
 
 /// One robot: odometry and scans in, submaps out; proxy graphs in, corrected trajectory out. No threads, sockets or
 /// clocks inside; works the same whether or not a server is ever heard.
@@ -64,6 +89,8 @@ class RobotAgent {
  public:
   /// `config.policy.name` must be a known policy (checked: throws on our own mistake; validate user input before).
   RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng);
+  /// Goes on from a saved state, with the same configuration and randomness as then.
+  RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentState state);
   ~RobotAgent();
   RobotAgent(RobotAgent&&) noexcept;
   RobotAgent& operator=(RobotAgent&&) noexcept;
@@ -83,14 +110,15 @@ class RobotAgent {
   UpdateSummary receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget = std::nullopt,
                         const StageObserver& stage_ended = {});
 
+  [[nodiscard]] AgentState state() const;
   [[nodiscard]] RobotId robot() const { return robot_; }
-  [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
-  [[nodiscard]] const consistency::Ledger& ledger() const { return ledger_; }
+  [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return state_.keyframes; }
+  [[nodiscard]] const consistency::Ledger& ledger() const { return state_.ledger; }
   [[nodiscard]] const consistency::ConstraintPolicy& policy() const { return *policy_; }
   [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - 1; }
   /// T_map_body at the keyframes; `map` starts where `odom` does.
   [[nodiscard]] Trajectory corrected() const;
-  [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return whereabouts_; }
+  [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:
   void send(Submap submap);
@@ -100,23 +128,12 @@ class RobotAgent {
                      std::span<const consistency::NodePair> pairs);
 
   RobotId robot_;
-  std::uint64_t session_;
   AgentConfig config_;
   Rng rng_;
+  std::unique_ptr<consistency::ConstraintPolicy> policy_;
   SubmapBuilder submaps_;
   estimation::OnboardSmoother smoother_;
-  std::unique_ptr<consistency::ConstraintPolicy> policy_;
-  consistency::Ledger ledger_;
-  std::vector<Keyframe> keyframes_;
-  std::vector<std::size_t> chain_index_;     // of each keyframe in the odometry chain
-  std::vector<std::uint32_t> submap_of_;     // of each keyframe: the submap it was first in
-  std::vector<RelativePose> node_odometry_;  // raw, between representative keyframes; [k] ends at the k-th
-  RelativePose since_node_{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  std::optional<Pose3> last_odometry_;
-  std::vector<SubmapMessage> outgoing_;
-  std::uint64_t sequence_ = 0;
-  std::uint64_t revision_ = 0;
-  std::vector<Whereabouts> whereabouts_;
+  AgentState state_;  // but for what submaps_ and smoother_ hold
 };
 
 }  // namespace tutti::robot

@@ -36,11 +36,24 @@ struct SubmapConfig {
   }
 };
 
+/// All that a builder knows.
+struct SubmapBuilderState {
+  std::uint32_t next_submap = 0;
+  std::vector<Keyframe> keyframes;     ///< Of the open submap.
+  std::vector<RelativePose> odometry;  ///< Between them.
+  std::vector<lidar::PosedCloud> scans;
+  std::optional<Submap> finished;
+  RelativePose since_keyframe{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  Trajectory recent;                       ///< Raw odometry that covers the longest sweep ending now.
+  double distance_m = 0.0;                 ///< Travelled so far.
+  double representative_distance_m = 0.0;  ///< At the last representative keyframe.
+};
+
 /// Turns raw odometry and scans into keyframes and overlapping submaps. Only raw odometry goes in, so a submap never
 /// carries what the server said before.
 class SubmapBuilder {
  public:
-  SubmapBuilder(RobotId robot, const SubmapConfig& config);
+  SubmapBuilder(RobotId robot, const SubmapConfig& config, SubmapBuilderState state = {});
 
   /// Raw pose with the covariance of the increment since the previous one (ignored for the first). Stamps must
   /// increase; poses must be finite with unit quaternions: otherwise an error, and nothing changes. Returns the
@@ -52,7 +65,7 @@ class SubmapBuilder {
   Status add_scan(const Scan& scan);
   /// The latest odometry sample became a keyframe: a scan there shows something new. Others are accepted, too.
   [[nodiscard]] bool wants_scan() const {
-    return !keyframes_.empty() && keyframes_.back().stamp == recent_.back().stamp;
+    return !state_.keyframes.empty() && state_.keyframes.back().stamp == state_.recent.back().stamp;
   }
 
   /// The submap that the last keyframe completed, once.
@@ -62,7 +75,8 @@ class SubmapBuilder {
 
   static constexpr double kSweepHistoryS = 0.5;  ///< Longest sweep that can be undistorted.
 
-  [[nodiscard]] std::uint32_t current_submap() const { return next_submap_; }
+  [[nodiscard]] std::uint32_t current_submap() const { return state_.next_submap; }
+  [[nodiscard]] const SubmapBuilderState& state() const { return state_; }
 
  private:
   void remember(Timestamp stamp, const Pose3& T_odom_body);
@@ -72,15 +86,7 @@ class SubmapBuilder {
 
   RobotId robot_;
   SubmapConfig config_;
-  std::uint32_t next_submap_ = 0;
-  std::vector<Keyframe> keyframes_;     // of the open submap
-  std::vector<RelativePose> odometry_;  // between them
-  std::vector<lidar::PosedCloud> scans_;
-  std::optional<Submap> finished_;
-  RelativePose since_keyframe_{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  Trajectory recent_;                     // raw odometry that covers the longest sweep ending now
-  double distance_ = 0.0;                 // travelled so far
-  double representative_distance_ = 0.0;  // at the last representative keyframe
+  SubmapBuilderState state_;
 };
 
 }  // namespace tutti::robot
