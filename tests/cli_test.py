@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a person meets at the command line: exit codes and messages. Usage: cli_test.py TUTTI_PROGRAM SOURCE_DIR"""
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -37,8 +38,8 @@ class CommandLine(unittest.TestCase):
         return file
 
     def test_help_of_every_command(self):
-        self.expect(tutti("--help"), 0, "run", "demo", "eval", "optimise")
-        for command in ("run", "demo", "eval", "optimise", "world"):
+        self.expect(tutti("--help"), 0, "run", "demo", "eval", "optimise", "compare")
+        for command in ("run", "demo", "eval", "optimise", "world", "compare"):
             self.expect(tutti(command, "--help"), 0, "--help")
 
     def test_usage_errors_exit_2(self):
@@ -47,6 +48,10 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("run"), 2, "mission")
         self.expect(tutti("demo", "--rate", "-1"), 2, "rate")
         self.expect(tutti("eval", "one"), 2)
+        self.expect(tutti("compare", "one"), 2)
+        for wrong in (("--tolerance", "nan"), ("--tolerance", "0"), ("--false-alarms", "1"), ("--a-estimate", "best"),
+                      ("--spacing", "-1"), ("--odometry-sigma", "inf")):
+            self.expect(tutti("compare", "one", "two", *wrong), 2, wrong[0])
 
     def test_configuration_errors_exit_2_and_name_the_place(self):
         self.expect(tutti("run", self.path / "none.yaml"), 2, "none.yaml")
@@ -94,6 +99,15 @@ class CommandLine(unittest.TestCase):
                                      out / "report.json", "--json").stdout)
         for figure in ("mean_m", "p95_m", "within_10cm"):
             self.assertAlmostEqual(map_error["map_to_survey"][figure], report["server"]["map_error"][figure], delta=1e-5)
+        # What the server's map says about the robots' odometry, from the files alone.
+        self.expect(tutti("compare", out, out, "--out", out / "compare"), 0, "alpha", "bravo", "compare.html")
+        compared = json.loads((out / "compare" / "compare.json").read_text())
+        self.assertEqual([robot["name"] for robot in compared["robots"]], ["alpha", "bravo"])
+        same = json.loads(tutti("compare", out, out, "--b-estimate", "server", "--json").stdout)
+        self.assertFalse(same["disagree"])
+        graph = json.loads(tutti("compare", out / "graph.g2o", out / "graph.g2o", "--json").stdout)
+        self.assertFalse(graph["disagree"])
+        self.assertEqual([robot["nodes"] for robot in graph["robots"]], [robot["nodes"] for robot in same["robots"]])
         # The effective configuration is a mission file that runs again with the same result.
         self.expect(tutti("run", out / "config.yaml", "--out", self.path / "again", "--seed", 7), 0)
         self.assertEqual((out / "report.json").read_text(), (self.path / "again" / "report.json").read_text())
@@ -114,6 +128,85 @@ class CommandLine(unittest.TestCase):
         (self.path / "bad.g2o").write_text("VERTEX_SE3:QUAT 0 1 2\n")
         self.expect(tutti("eval", self.path / "empty.tum", self.path / "none.tum"), 1)
         self.expect(tutti("optimise", self.path / "bad.g2o", "-o", self.path / "x.g2o"), 1, "bad.g2o:1")
+
+    def write_way(self, name, bend_at=None, seconds=100, start=10.0):
+        """A pose every 0.2 s along a way of 1 m/s; from `bend_at` seconds on it runs off to the left."""
+        lines, x, y, heading = [], 0.0, 0.0, 0.0
+        for i in range(5 * seconds + 1):
+            lines.append("%.1f %.6f %.6f 0 0 0 %.9f %.9f" % (start + 0.2 * i, x, y, math.sin(heading / 2),
+                                                             math.cos(heading / 2)))
+            if bend_at is not None and i == 5 * bend_at:
+                heading += 0.3
+            heading += 0.01 * math.sin(0.05 * i)
+            x, y = x + 0.2 * math.cos(heading), y + 0.2 * math.sin(heading)
+        (self.path / name).write_text("\n".join(lines) + "\n")
+        return self.path / name
+
+    def test_compare_finds_where_a_trajectory_went_wrong(self):
+        truth, bent = self.write_way("truth.tum"), self.write_way("bent.tum", bend_at=60)
+        out = self.path / "compared"
+        self.expect(tutti("compare", truth, bent, "--out", out), 0, "They disagree", "failure suspected",
+                    "would fix B", "compare.html")
+        report = json.loads(tutti("compare", truth, bent, "--json").stdout)
+        self.assertEqual(report, json.loads((out / "compare.json").read_text()))
+        self.assertTrue(report["disagree"])
+        robot = report["robots"][0]
+        origin, = robot["origins"]
+        self.assertLessEqual(origin["from_s"], 60.2)
+        self.assertGreaterEqual(origin["until_s"], 60.0)
+        self.assertLess(origin["until_s"] - origin["from_s"], 6.0)
+        self.assertTrue(origin["alert"])
+        self.assertAlmostEqual(origin["rotation_rad"], 0.3, delta=0.05)
+        self.assertEqual(origin["from_stamp_ns"], round((10.0 + origin["from_s"]) * 1e9))
+        self.assertLess(robot["fixed"]["rmse_m"], 0.1 * robot["aligned"]["rmse_m"])
+        page = (out / "compare.html").read_text()
+        self.assertIn("<svg", page)
+        self.assertNotIn("http", page)
+
+    def test_compare_says_when_two_trajectories_agree(self):
+        truth = self.write_way("truth.tum")
+        self.expect(tutti("compare", truth, truth), 0, "They agree")
+        bent = self.write_way("bent.tum", bend_at=60)
+        loose = json.loads(tutti("compare", truth, bent, "--tolerance", 100, "--json").stdout)
+        self.assertFalse(loose["disagree"])
+        self.assertEqual(loose["robots"][0]["constraints"], [])
+
+    def test_compare_reads_graphs_with_and_without_stamps(self):
+        def graph(name, heading):
+            steps = 80
+            text = "".join("VERTEX_SE3:QUAT %d %d %.3f 0 0 0 0 1\n" % (i, i, heading * max(0, i - 40)) for i in
+                           range(steps))
+            information = "1e4 0 0 0 0 0 1e4 0 0 0 0 1e4 0 0 0 1e4 0 0 1e4 0 1e4"
+            text += "".join("EDGE_SE3:QUAT %d %d 1 %.3f 0 0 0 0 1 %s\n" % (i, i + 1, heading * (i >= 40), information)
+                            for i in range(steps - 1))
+            (self.path / name).write_text(text)
+            return self.path / name
+        a, b = graph("a.g2o", 0.0), graph("b.g2o", 0.5)
+        report = json.loads(tutti("compare", a, b, "--json").stdout)
+        self.assertTrue(report["disagree"])
+        self.assertEqual(report["notes"], [])  # every pose has an edge to the next
+        self.assertEqual(report["robots"][0]["duration_s"], 79)
+        (self.path / "b_stamps.csv").write_text("id,robot,keyframe,stamp_ns\n" + "".join(
+            "%d,3,%d,%d\n" % (i, i, 5_000_000_000 * i) for i in range(80)))
+        self.expect(tutti("compare", b, b), 0, "They agree")
+        self.assertEqual(json.loads(tutti("compare", b, b, "--json").stdout)["robots"][0]["duration_s"], 395)
+        (self.path / "b_stamps.csv").write_text("id,robot,keyframe,stamp_ns\n0,3,0,0\n")
+        self.expect(tutti("compare", b, b), 1, "b_stamps.csv", "vertex 1")
+
+    def test_compare_says_what_is_wrong(self):
+        truth = self.write_way("truth.tum")
+        self.expect(tutti("compare", truth, self.path / "none.tum"), 1, "none.tum")
+        (self.path / "empty.tum").write_text("# nothing\n")
+        self.expect(tutti("compare", truth, self.path / "empty.tum"), 1, "empty.tum", "no pose")
+        (self.path / "nan.tum").write_text("1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n")
+        self.expect(tutti("compare", truth, self.path / "nan.tum"), 1, "nan.tum:2")
+        (self.path / "one.tum").write_text("11 0 0 0 0 0 0 1\n")
+        self.expect(tutti("compare", truth, self.path / "one.tum"), 1, "one.tum", "at least 2")
+        later = self.write_way("later.tum", start=1000.0)
+        self.expect(tutti("compare", truth, later), 1, "later.tum", "1000.000", "110.000")
+        self.expect(tutti("compare", self.path, truth), 1, "_server.tum")
+        (self.path / "file").write_text("")
+        self.expect(tutti("compare", truth, truth, "--out", self.path / "file" / "x"), 1, "--out")
 
     def write_ply(self, name, points):
         header = "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\nend_header\n"

@@ -4,6 +4,7 @@
 #include <exception>
 #include <iostream>
 
+#include "compare_command.hpp"
 #include "demo_command.hpp"
 #include "eval_command.hpp"
 #include "optimise_command.hpp"
@@ -30,6 +31,7 @@ int main(int argc, char** argv) {
   tutti::app::add_demo_command(app, exit_code);
   tutti::app::add_run_command(app, exit_code);
   tutti::app::add_eval_command(app, exit_code);
+  tutti::app::add_compare_command(app, exit_code);
   tutti::app::add_optimise_command(app, exit_code);
   tutti::app::add_world_command(app, exit_code);
   try {

@@ -34,7 +34,7 @@ std::string scales_table(const TrajectoryComparison& c, const PictureClock& cloc
 
 std::string origins_table(const TrajectoryComparison& c, const PictureClock& clock) {
   const auto& origins = c.explanation.origins;
-  if (origins.empty()) return "  nowhere\n";
+  if (origins.empty()) return "  No stretch stands out from the rest of the way: B drifts all along.\n";
   TextTable table(0);
   table.add({"from", "until", "way", "translation", "rotation", "scale", "over threshold", ""});
   table.rule();
@@ -98,12 +98,11 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
 
 std::vector<ScaleSummary> scale_summaries(const consistency::Explanation& e) {
   std::vector<ScaleSummary> out;
-  const std::vector<double> whole = whole_scales(e);
   for (Eigen::Index s = 0; s < e.significance.cols() && e.significance.rows() > 0; ++s) {
     Eigen::Index worst = 0;
     const double largest = e.significance.col(s).maxCoeff(&worst);
     ScaleSummary row{.length_m = e.scale_length_m[static_cast<std::size_t>(s)],
-                     .whole = whole[static_cast<std::size_t>(s)],
+                     .whole = e.scale_significance[static_cast<std::size_t>(s)],
                      .significance = largest,
                      .worst = e.stamps[static_cast<std::size_t>(worst)],
                      .position_m = e.position_m(worst, s),

@@ -179,7 +179,7 @@ std::string explanation_svg(const ExplanationPicture& picture, double width_px) 
     svg.text({kLeft_px - 8.0, top + 0.5 * row + 4.0}, format_scale(e, static_cast<int>(s)), "tick", "end");
   }
   svg.segments(rows, "rowline");
-  const std::vector<double> whole = whole_scales(e);
+  const std::vector<double>& whole = e.scale_significance;
   for (std::size_t s = 0; s < std::min(whole.size(), static_cast<std::size_t>(scales)); ++s)
     svg.rect({right + 10.0, kTop_px + row * static_cast<double>(s)}, {kWhole_px, row - 1.0}, "cell",
              fmt::format("scale {}, all along the way: {} the threshold", format_scale(e, static_cast<int>(s)),
@@ -260,22 +260,9 @@ void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Traj
   }
 }
 
-std::vector<double> whole_scales(const Explanation& explanation) {
-  return [](const auto& e) {
-    if constexpr (requires { e.scale_significance; }) {
-      return e.scale_significance;
-    } else {
-      std::vector<double> out;
-      for (Eigen::Index s = 0; s < e.significance.cols(); ++s)
-        out.push_back(e.significance.rows() > 0 ? e.significance.col(s).maxCoeff() : 0.0);
-      return out;
-    }
-  }(explanation);
-}
-
 double largest_significance(const Explanation& e) {
   double largest = e.significance.size() > 0 ? e.significance.maxCoeff() : 0.0;
-  for (const double whole : whole_scales(e)) largest = std::max(largest, whole);
+  for (const double whole : e.scale_significance) largest = std::max(largest, whole);
   return largest;
 }
 

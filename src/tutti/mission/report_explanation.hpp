@@ -56,8 +56,6 @@ std::vector<LegendEntry> origin_legend(std::span<const consistency::SuspectedOri
 void draw_origins(Svg& svg, std::span<const consistency::SuspectedOrigin> origins, const Trajectory& route,
                   const Points2d& pixels, const PictureClock& clock, double width_px);
 
-/// Per scale, of the scale as a whole: drift that stands out nowhere may still add up.
-std::vector<double> whole_scales(const consistency::Explanation& explanation);
 /// Of any node or scale, over its threshold; 0 without nodes.
 double largest_significance(const consistency::Explanation& explanation);
 

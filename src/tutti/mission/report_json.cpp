@@ -96,7 +96,7 @@ Json explanation_json(const RobotRecord& robot) {
   Json whole = Json::array();
   for (Eigen::Index s = 0; s < e.significance.cols() && e.significance.rows() > 0; ++s)
     largest.push_back(number(e.significance.col(s).maxCoeff()));
-  for (const double significance : whole_scales(e)) whole.push_back(number(significance));
+  for (const double significance : e.scale_significance) whole.push_back(number(significance));
   Json origins = Json::array();
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
   return {{"disagrees", e.disagrees()},

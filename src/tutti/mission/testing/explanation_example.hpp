@@ -11,14 +11,11 @@
 /// For tests of what people are shown: a made-up explanation with plausible shapes.
 namespace tutti::mission::test {
 
-/// Fills in what follows from the significance.
-template <class E>
-void judge(E& e) {
-  if constexpr (requires { e.scale_significance; }) {
-    e.scale_significance.clear();
-    for (Eigen::Index s = 0; s < e.significance.cols(); ++s)
-      e.scale_significance.push_back(e.significance.col(s).maxCoeff());
-  }
+/// Fills in what follows from the significance of the nodes.
+inline void judge(consistency::Explanation& e) {
+  e.scale_significance.clear();
+  for (Eigen::Index s = 0; s < e.significance.cols(); ++s)
+    e.scale_significance.push_back(e.significance.col(s).maxCoeff());
 }
 
 /// Nodes are the poses of `way`. Around every origin the disagreement stands out, wider at larger scales; elsewhere it

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "compare_command.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "compare_input.hpp"
+#include "finite_number.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/mission/report_compare.hpp"
+
+namespace tutti::app {
+namespace {
+
+constexpr double kArm_m = 5.0;  // a rotation counts by how far it moves a point this far away
+
+struct Options {
+  std::string a, b;
+  std::string a_estimate = "server";
+  std::string b_estimate = "onboard";
+  std::filesystem::path out;
+  std::optional<double> tolerance_deg;
+  std::optional<double> max_difference_s;  // set: nearest stamp instead of interpolation
+  mission::CompareTrajectoriesConfig config;
+  bool json = false;
+};
+
+Result<mission::CompareReport> compare(const Options& options) {
+  const auto a = load_side(options.a, options.a_estimate);
+  if (!a) return tl::unexpected(a.error());
+  const auto b = load_side(options.b, options.b_estimate);
+  if (!b) return tl::unexpected(b.error());
+  mission::CompareReport report{.a = options.a, .b = options.b, .config = options.config, .version = TUTTI_VERSION};
+  report.config.tolerance_deg =
+      options.tolerance_deg.value_or(std::atan(options.config.tolerance_m / kArm_m) / kRadPerDeg);
+  if (options.max_difference_s)
+    report.config.association = {.interpolate = false, .max_difference_s = *options.max_difference_s};
+  if (std::filesystem::is_directory(options.a)) report.a += " (" + options.a_estimate + ")";
+  if (std::filesystem::is_directory(options.b)) report.b += " (" + options.b_estimate + ")";
+  report.notes = b->notes;
+  const auto pairs = pair_robots(*a, *b, report.notes);
+  if (!pairs) return tl::unexpected(pairs.error());
+  for (const ComparePair& pair : *pairs) {
+    auto comparison = mission::compare_trajectories(*pair.a, *pair.b, report.config);
+    if (!comparison)
+      return in_context(pair.b->name.empty() ? options.b : options.b + ", " + pair.b->name, comparison.error());
+    report.robots.push_back(std::move(*comparison));
+  }
+  return report;
+}
+
+Status write_files(const mission::CompareReport& report, const std::filesystem::path& folder) {
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure) return fail(ErrorCode::io, "--out {}: cannot make the folder: {}", folder.string(), failure.message());
+  for (const auto& [name, text] : {std::pair<const char*, std::string>{"compare.html", mission::compare_html(report)},
+                                   {"compare.json", mission::compare_json(report)}}) {
+    const auto path = folder / name;
+    std::ofstream file(path, std::ios::binary | std::ios::trunc);
+    file << text;
+    file.flush();
+    if (!file) return fail(ErrorCode::io, "{}: cannot write: {}", path.string(), std::strerror(errno));
+  }
+  return {};
+}
+
+int run(const Options& options) {
+  const auto report = compare(options);
+  const Status written = !report               ? tl::unexpected(report.error())
+                         : options.out.empty() ? Status()
+                                               : write_files(*report, options.out);
+  if (!written) {
+    fmt::print(stderr, "tutti compare: {}\n", written.error().message);
+    return 1;
+  }
+  fmt::print("{}", options.json ? mission::compare_json(*report) : mission::compare_text(*report));
+  if (!options.out.empty() && !options.json) fmt::print("\nPictures: {}\n", (options.out / "compare.html").string());
+  return 0;
+}
+
+/// What is known of either side's errors.
+void add_noise_options(CLI::App& command, Options& options) {
+  command
+      .add_option("--tolerance", options.config.tolerance_m,
+                  "How sure A is of its positions, over stretches of any length: standard deviation")
+      ->check(finite(false))
+      ->capture_default_str()
+      ->type_name("METRES");
+  command
+      .add_option(
+          "--tolerance-deg", options.tolerance_deg,
+          fmt::format("The same of its rotations; default: what moves a point {:g} m away by --tolerance", kArm_m))
+      ->check(finite(false))
+      ->type_name("DEGREES");
+  command
+      .add_option("--odometry-sigma", options.config.odometry_m,
+                  "Standard deviation of B's motion over 1 m, growing with the square root of the way; says where\n"
+                  "B failed rather than drifted, and how constraints bend it. A .g2o file brings its own")
+      ->check(finite(false))
+      ->capture_default_str()
+      ->type_name("METRES");
+  command.add_option("--odometry-sigma-deg", options.config.odometry_deg, "The same of its rotation")
+      ->check(finite(false))
+      ->capture_default_str()
+      ->type_name("DEGREES");
+  command
+      .add_option("--false-alarms", options.config.false_alarm_rate,
+                  "Chance of calling it disagreement when B differs from A within the tolerance only")
+      ->check(CLI::Range(1e-9, 0.5))
+      ->capture_default_str()
+      ->type_name("RATE");
+}
+
+}  // namespace
+
+void add_compare_command(CLI::App& app, int& exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("compare", "Where, at which scale and since when two trajectories disagree");
+  command->footer(
+      "A judges, B is judged, as a robot judges its odometry by the server's map. Both are cut into nodes along A;\n"
+      "wavelets along the way separate scales, and what stands out of A's tolerance at a node and scale is a\n"
+      "disagreement. Told are the stretches where it was born, and the fewest relative poses of A that would bring B\n"
+      "into agreement. B need not be aligned.\n\n"
+      "Files: TUM, EuRoC csv, KITTI, or g2o (times and robots from x_stamps.csv beside x.g2o; without it vertex n is "
+      "at\n"
+      "n seconds). Folders: what `tutti run --out` wrote; every robot that both have is compared. How a mission's\n"
+      "robots drifted from the server's map:\n"
+      "  tutti compare OUT OUT --out OUT/compare\n\n"
+      "Exit code 0, whether they agree or not (--json says \"disagree\"); 1 when a file is bad or no times are "
+      "common;\n"
+      "2 on wrong usage. docs/compare.md has a worked example.");
+  command->add_option("A", options->a, "What is true, or the best there is")->required()->type_name("FILE|FOLDER");
+  command->add_option("B", options->b, "What is judged")->required()->type_name("FILE|FOLDER");
+  command
+      ->add_option("--out", options->out,
+                   "Write pictures (compare.html) and figures (compare.json) here, made if missing")
+      ->type_name("FOLDER");
+  command->add_flag("--json", options->json, "Print JSON instead of tables; with the whole disagreement map");
+  add_noise_options(*command, *options);
+  command
+      ->add_option("--spacing", options->config.spacing_m,
+                   "Way between two nodes; default: a 500th of the way, at least 0.1 m")
+      ->check(finite(false))
+      ->type_name("METRES");
+  command
+      ->add_option("--max-gap", options->config.association.max_gap_s,
+                   "Interpolate A only between poses at most this far apart")
+      ->check(finite(true))
+      ->capture_default_str()
+      ->type_name("SECONDS");
+  command
+      ->add_option("--max-difference", options->max_difference_s,
+                   "Pair each pose of B with A's nearest in time, at most this far away, instead of interpolating")
+      ->check(finite(true))
+      ->type_name("SECONDS");
+  const auto estimates = CLI::IsMember({"onboard", "corrected", "server", "reference"});
+  command->add_option("--a-estimate", options->a_estimate, "Which of a folder's estimates A is")
+      ->check(estimates)
+      ->capture_default_str()
+      ->type_name("");
+  command->add_option("--b-estimate", options->b_estimate, "Which of a folder's estimates B is")
+      ->check(estimates)
+      ->capture_default_str()
+      ->type_name("");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace tutti::app

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "compare_input.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <optional>
+
+#include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/trajectory_file.hpp"
+
+namespace tutti::app {
+namespace {
+
+namespace fs = std::filesystem;
+using mission::NamedTrajectory;
+
+Result<CompareSide> load_folder(const fs::path& folder, const std::string& estimate) {
+  const std::string ending = "_" + estimate + ".tum";
+  std::map<std::string, fs::path> files;  // by robot
+  std::error_code failure;
+  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end; entry.increment(failure))
+    if (const std::string name = entry->path().filename().string();
+        name.size() > ending.size() && name.ends_with(ending))
+      files[name.substr(0, name.size() - ending.size())] = entry->path();
+  if (failure) return fail(ErrorCode::io, "{}: cannot list the folder: {}", folder.string(), failure.message());
+  if (files.empty())
+    return fail(ErrorCode::io, "{}: holds no *{}, expected the folder that `tutti run --out` wrote", folder.string(),
+                ending);
+  CompareSide out;
+  for (const auto& [robot, path] : files) {
+    auto poses = formats::read_trajectory(path.string());
+    if (!poses) return tl::unexpected(poses.error());
+    if (poses->empty()) return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path.string());
+    out.robots.push_back({robot, std::move(*poses), {}});
+  }
+  return out;
+}
+
+/// Of every vertex of the graph: which robot, and when.
+Result<std::vector<formats::VertexStamp>> vertex_stamps(const std::string& path, const formats::G2oFile& file) {
+  constexpr double kLatest_s = 4e9;  // as stamps have to fit
+  fs::path beside(path);
+  beside.replace_filename(beside.stem().string() + "_stamps.csv");
+  if (!fs::exists(beside)) {
+    std::vector<formats::VertexStamp> out;
+    for (const std::int64_t id : file.vertex_ids) {
+      if (std::abs(static_cast<double>(id)) > kLatest_s)
+        return fail(ErrorCode::unsupported, "{}: vertex {} cannot stand for a time in seconds, expected {} beside it",
+                    path, id, beside.string());
+      out.push_back({id, {}, Timestamp{} + static_cast<double>(id)});
+    }
+    return out;
+  }
+  auto stamps = formats::read_graph_stamps(beside.string());
+  if (!stamps) return tl::unexpected(stamps.error());
+  std::map<std::int64_t, formats::VertexStamp> by_id;
+  for (const auto& stamp : *stamps) by_id[stamp.vertex_id] = stamp;
+  std::vector<formats::VertexStamp> out;
+  for (const std::int64_t id : file.vertex_ids) {
+    const auto found = by_id.find(id);
+    if (found == by_id.end())
+      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", beside.string(), id, path);
+    out.push_back(found->second);
+  }
+  return out;
+}
+
+/// Covariance of the motion from one vertex to another as an edge between them, either way round, states it.
+std::optional<Matrix6d> motion_covariance(const std::map<std::pair<std::size_t, std::size_t>, std::size_t>& edge_of,
+                                          const PoseGraph& graph, std::size_t from, std::size_t to) {
+  for (const bool forward : {true, false}) {
+    const auto found = edge_of.find(forward ? std::pair(from, to) : std::pair(to, from));
+    if (found == edge_of.end()) continue;
+    const PoseGraphEdge& edge = graph.edges[found->second];
+    const Eigen::LLT<Matrix6d> information(edge.information);
+    if (information.info() != Eigen::Success) continue;
+    const Matrix6d covariance = information.solve(Matrix6d::Identity());
+    if (forward) return covariance;
+    const Matrix6d Ad = adjoint(edge.T_from_to);  // the inverse's right perturbation
+    return Matrix6d(Ad * covariance * Ad.transpose());
+  }
+  return std::nullopt;
+}
+
+Result<CompareSide> load_g2o(const std::string& path) {
+  const auto file = formats::read_g2o(path);
+  if (!file) return tl::unexpected(file.error());
+  const auto stamps = vertex_stamps(path, *file);
+  if (!stamps) return tl::unexpected(stamps.error());
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> edge_of;
+  for (std::size_t e = 0; e < file->graph.edges.size(); ++e)
+    edge_of.try_emplace({file->graph.edges[e].from, file->graph.edges[e].to}, e);
+  std::map<RobotId, std::map<Timestamp, std::size_t>> robots;  // vertex by stamp
+  for (std::size_t v = 0; v < stamps->size(); ++v)
+    if (!robots[(*stamps)[v].keyframe.robot].try_emplace((*stamps)[v].stamp, v).second)
+      return fail(ErrorCode::invalid, "{}: vertex {} has the stamp of another one of its robot", path,
+                  file->vertex_ids[v]);
+  if (robots.empty()) return fail(ErrorCode::invalid, "{}: holds no vertex, expected at least one", path);
+  CompareSide out;
+  for (const auto& [robot, vertices] : robots) {
+    NamedTrajectory trajectory{robots.size() == 1 ? std::string() : fmt::format("robot {}", robot.value), {}, {}};
+    std::optional<std::size_t> before;
+    bool complete = true;
+    for (const auto& [stamp, v] : vertices) {
+      trajectory.poses.push_back({stamp, file->graph.poses[v]});
+      if (before) {
+        const auto covariance = motion_covariance(edge_of, file->graph, *before, v);
+        complete = complete && covariance.has_value();
+        trajectory.step_covariance.push_back(covariance.value_or(Matrix6d::Identity()));
+      }
+      before = v;
+    }
+    if (!complete) {
+      trajectory.step_covariance.clear();
+      out.notes.push_back(fmt::format(
+          "{}{}: not every pose has an edge of full rank to the next one; as judged trajectory its odometry counts as "
+          "--odometry-sigma says.",
+          path, trajectory.name.empty() ? "" : ", " + trajectory.name));
+    }
+    out.robots.push_back(std::move(trajectory));
+  }
+  return out;
+}
+
+std::vector<std::string> names(const CompareSide& side) {
+  std::vector<std::string> out;
+  for (const auto& robot : side.robots) out.push_back(robot.name.empty() ? "one without a name" : robot.name);
+  return out;
+}
+
+}  // namespace
+
+Result<CompareSide> load_side(const std::string& path, const std::string& estimate) {
+  if (fs::is_directory(path)) return load_folder(path, estimate);
+  if (fs::path(path).extension() == ".g2o") return load_g2o(path);
+  auto poses = formats::read_trajectory(path);
+  if (!poses) return tl::unexpected(poses.error());
+  if (poses->empty()) return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
+  return CompareSide{{NamedTrajectory{"", std::move(*poses), {}}}, {}};
+}
+
+Result<std::vector<ComparePair>> pair_robots(const CompareSide& a, const CompareSide& b,
+                                             std::vector<std::string>& notes) {
+  if (a.robots.size() == 1 && b.robots.size() == 1) return std::vector<ComparePair>{{&a.robots[0], &b.robots[0]}};
+  std::vector<ComparePair> out;
+  const auto find = [](const CompareSide& side, const std::string& name) {
+    return std::find_if(side.robots.begin(), side.robots.end(), [&](const auto& robot) { return robot.name == name; });
+  };
+  for (const NamedTrajectory& robot : b.robots) {
+    const auto judge = find(a, robot.name);
+    if (judge == a.robots.end())
+      notes.push_back(fmt::format("A has no robot {}: left out.", robot.name));
+    else
+      out.push_back({&*judge, &robot});
+  }
+  for (const NamedTrajectory& robot : a.robots)
+    if (find(b, robot.name) == b.robots.end()) notes.push_back(fmt::format("B has no robot {}: left out.", robot.name));
+  if (out.empty())
+    return fail(ErrorCode::invalid, "no robot is in both: A has {}; B has {}", fmt::join(names(a), ", "),
+                fmt::join(names(b), ", "));
+  return out;
+}
+
+}  // namespace tutti::app

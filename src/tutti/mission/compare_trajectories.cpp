@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/compare_trajectories.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/base/check.hpp"
+#include "tutti/consistency/explanation.hpp"
+#include "tutti/consistency/policy.hpp"
+#include "tutti/consistency/synchronise.hpp"
+#include "tutti/estimation/onboard_smoother.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr RobotId kRobot{};
+constexpr std::uint32_t kFullySupported = 1'000'000;  // A is what B is judged by: never doubted
+constexpr double kNodesPerWay = 500.0;
+constexpr double kLeastSpacing_m = 0.1;
+constexpr double kWholeStep = 1.0 - 1e-6;  // poses that are just the spacing apart, but for rounding
+constexpr double kLeastStep_m = 0.01;      // of way, for the covariance of a motion: standing still is not exact
+
+/// A moment that both sides know.
+struct Node {
+  std::size_t index = 0;  ///< Of B's pose.
+  evaluation::PosePair pair;
+  double way_m = 0.0;  ///< Along A, from the first pair.
+};
+
+/// B's poses that have a partner, thinned: the first, the last, and one every `spacing_m` along A.
+std::vector<Node> thin(const std::vector<Node>& all, double spacing_m) {
+  std::vector<Node> out{all.front()};
+  for (std::size_t i = 1; i + 1 < all.size(); ++i)
+    if (all[i].way_m - out.back().way_m >= kWholeStep * spacing_m && all.back().way_m - all[i].way_m >= 0.5 * spacing_m)
+      out.push_back(all[i]);
+  out.push_back(all.back());
+  return out;
+}
+
+std::vector<Node> pair_up(const Trajectory& a, const Trajectory& b, const evaluation::AssociationConfig& config) {
+  std::vector<Node> out;
+  std::size_t index = 0;
+  for (const evaluation::PosePair& pair : evaluation::associate(b, a, config)) {
+    while (b[index].stamp != pair.stamp) ++index;
+    const double step_m =
+        out.empty() ? 0.0 : (pair.reference.translation - out.back().pair.reference.translation).norm();
+    out.push_back({index, pair, out.empty() ? 0.0 : out.back().way_m + step_m});
+  }
+  return out;
+}
+
+/// B's own motion from one node to a later one.
+RelativePose motion(const NamedTrajectory& b, const Node& from, const Node& to,
+                    const CompareTrajectoriesConfig& config) {
+  RelativePose out{from.pair.estimate.inverse() * to.pair.estimate, Matrix6d::Zero()};
+  if (b.step_covariance.empty()) {
+    const double way_m = std::max(to.way_m - from.way_m, kLeastStep_m);
+    const double rotation_rad = config.odometry_deg * kRadPerDeg;
+    out.covariance.diagonal().head<3>().setConstant(config.odometry_m * config.odometry_m * way_m);
+    out.covariance.diagonal().tail<3>().setConstant(rotation_rad * rotation_rad * way_m);
+    return out;
+  }
+  for (std::size_t k = from.index; k < to.index; ++k)
+    out.covariance =
+        compound_covariance(b.poses[k].pose.inverse() * b.poses[k + 1].pose, out.covariance, b.step_covariance[k]);
+  return out;
+}
+
+std::vector<consistency::RobotNode> robot_nodes(const NamedTrajectory& b, const std::vector<Node>& nodes,
+                                                const CompareTrajectoriesConfig& config) {
+  std::vector<consistency::RobotNode> out;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    out.push_back({.stamp = nodes[i].pair.stamp, .T_map_body = nodes[i].pair.estimate, .chain_index = i});
+    if (i > 0) out.back().odometry = motion(b, nodes[i - 1], nodes[i], config);
+  }
+  return out;
+}
+
+/// A as a server would send it: sure of its shape to the tolerance at every length.
+ProxyGraph proxy_graph(const std::vector<Node>& nodes, const CompareTrajectoriesConfig& config) {
+  const ShapeSigma sigma{config.tolerance_m, config.tolerance_deg * kRadPerDeg};
+  // Over the whole run, the steps' covariances compound to the tolerance.
+  const double share = 1.0 / static_cast<double>(nodes.size() - 1);
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal().head<3>().setConstant(share * sigma.position_m * sigma.position_m);
+  covariance.diagonal().tail<3>().setConstant(share * sigma.rotation_rad * sigma.rotation_rad);
+  ProxyGraph graph{.revision = 1};
+  for (const Node& node : nodes)
+    graph.nodes.push_back({.robot = kRobot,
+                           .stamp = node.pair.stamp,
+                           .T_world_body = node.pair.reference,
+                           .covariance = graph.nodes.empty() ? Matrix6d(Matrix6d::Zero()) : covariance,
+                           .support = kFullySupported});
+  graph.components = {{kRobot, 0}};
+  ShapeUncertainty shape{.robot = kRobot, .whole = sigma, .sag = {}};
+  for (std::size_t length = 2 * ShapeUncertainty::kShortest; length < nodes.size(); length *= 2)
+    shape.sag.emplace_back((nodes.size() - 1) / length, sigma);
+  graph.shapes = {shape};
+  return graph;
+}
+
+/// B at the nodes, its own motion bent by the constraints.
+Trajectory corrected(const std::vector<consistency::RobotNode>& nodes,
+                     const std::vector<consistency::Constraint>& constraints) {
+  estimation::OnboardSmoother smoother({}, nodes.front().T_map_body);
+  for (std::size_t i = 1; i < nodes.size(); ++i) smoother.append(nodes[i].odometry);
+  std::vector<estimation::ChainConstraint> links;
+  for (const auto& c : constraints) links.push_back({.from = c.from, .to = c.to, .measurement = c.measurement});
+  smoother.set_constraints(std::move(links));
+  smoother.solve();
+  Trajectory out;
+  for (std::size_t i = 0; i < nodes.size(); ++i) out.push_back({nodes[i].stamp, smoother.pose(i)});
+  return out;
+}
+
+evaluation::AteResult lay_on(const Trajectory& judge, Trajectory& trajectory) {
+  const auto fit =
+      evaluation::ate(evaluation::associate(trajectory, judge, {.interpolate = false, .max_difference_s = 0.0}));
+  TUTTI_CHECK(fit.has_value());
+  for (StampedPose& p : trajectory) p.pose = fit->T_reference_estimate * p.pose;
+  return *fit;
+}
+
+Status check_covariances(const NamedTrajectory& b) {
+  TUTTI_CHECK(b.step_covariance.empty() || b.step_covariance.size() + 1 == b.poses.size());
+  for (std::size_t k = 0; k < b.step_covariance.size(); ++k)
+    if (!b.step_covariance[k].allFinite() || b.step_covariance[k].llt().info() != Eigen::Success)
+      return fail(ErrorCode::invalid, "covariance of the motion from pose {} to {} is not positive definite", k, k + 1);
+  return {};
+}
+
+double seconds(Timestamp stamp) { return static_cast<double>(stamp.ns) * 1e-9; }
+
+std::string span(const Trajectory& trajectory) {
+  return trajectory.empty() ? std::string("no pose")
+                            : fmt::format("{} poses, {:.3f} to {:.3f} s", trajectory.size(),
+                                          seconds(trajectory.front().stamp), seconds(trajectory.back().stamp));
+}
+
+}  // namespace
+
+Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, const NamedTrajectory& b,
+                                                  const CompareTrajectoriesConfig& config) {
+  if (auto ok = check_covariances(b); !ok) return tl::unexpected(ok.error());
+  const std::vector<Node> all = pair_up(a.poses, b.poses, config.association);
+  if (all.size() < 2)
+    return fail(ErrorCode::invalid,
+                "{} of B's poses ha{} one of A at the same time, expected at least 2: A has {}; B has {}", all.size(),
+                all.size() == 1 ? "s" : "ve", span(a.poses), span(b.poses));
+  TrajectoryComparison out{.name = b.name, .poses = b.poses.size(), .paired = all.size()};
+  out.way_m = all.back().way_m;
+  out.spacing_m = config.spacing_m > 0.0 ? config.spacing_m : std::max(out.way_m / kNodesPerWay, kLeastSpacing_m);
+  const std::vector<Node> nodes = thin(all, out.spacing_m);
+  for (const Node& node : nodes) {
+    out.judge.push_back({node.pair.stamp, node.pair.reference});
+    out.judged.push_back({node.pair.stamp, node.pair.estimate});
+  }
+  const ProxyGraph graph = proxy_graph(nodes, config);
+  const auto robot = robot_nodes(b, nodes, config);
+  consistency::Comparison comparison;
+  comparison.pairs = consistency::synchronise(graph, kRobot, robot).pairs;
+
+  consistency::PolicyConfig policy;
+  policy.adaptive.agreement.false_alarm_rate = config.false_alarm_rate;
+  out.explanation = consistency::explain(graph, kRobot, robot, comparison.pairs, 1, policy.adaptive.agreement);
+  const auto chooser = consistency::make_policy("adaptive", policy);
+  TUTTI_CHECK(chooser.has_value());
+  const consistency::Ledger nothing_held;
+  out.constraints =
+      (*chooser)->choose({graph, kRobot, robot, comparison, std::nullopt, Rng(0), nothing_held}).constraints;
+
+  const Trajectory raw = out.judged;
+  out.corrected = out.constraints.empty() ? raw : corrected(robot, out.constraints);
+  if (const auto kink = evaluation::kink(raw, out.corrected)) out.kink = *kink;
+  out.before = lay_on(out.judge, out.judged);
+  out.after = lay_on(out.judge, out.corrected);
+  return out;
+}
+
+}  // namespace tutti::mission
