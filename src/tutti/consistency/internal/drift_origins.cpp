@@ -14,13 +14,13 @@ namespace {
 
 constexpr double kDegrees = 6.0;
 /// Stretches within this share of the largest statistic stand out "nearly alike".
-constexpr double kAlike = 0.93;
+constexpr double kAlike = 0.98;
 constexpr std::size_t kMostStretches = 20;
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+double quantile(std::vector<double> values, double share) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
 /// Clips the variances (eigenvalues) of a 3 x 3 block.
@@ -46,8 +46,8 @@ std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
   }
   std::vector<RelativePose> out = chain.odometry;
   if (metres.empty()) return out;
-  const double usual_m = kUsual * median(metres);
-  const double usual_rad = kUsual * median(radians);
+  const double usual_m = kUsual * quantile(metres, 0.5);
+  const double usual_rad = kUsual * quantile(radians, 0.5);
   for (std::size_t k = 1; k < out.size(); ++k) {
     if (metres[k - 1] <= usual_m && radians[k - 1] <= usual_rad) continue;
     Matrix6d& C = out[k].covariance;
@@ -59,7 +59,7 @@ std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
   return out;
 }
 
-/// The server's variance of a relative pose over `length` nodes where it knows its map as well as usual (median): a
+/// The server's variance of a relative pose over `length` nodes where it knows its map well (lower quartile): a
 /// relative position is two sags of half the length apart, or less. Not as it knows it there: where odometry failed the
 /// server is unsure of what lies inside the stretch, but not of how its ends lie to each other.
 ShapeSigma server_variance(const ShapeUncertainty* shape, std::size_t length) {
@@ -72,7 +72,7 @@ ShapeSigma server_variance(const ShapeUncertainty* shape, std::size_t length) {
     metres.push_back(sigma.position_m);
     radians.push_back(sigma.rotation_rad);
   }
-  return {2.0 * std::pow(median(metres), 2), 2.0 * std::pow(median(radians), 2)};
+  return {2.0 * std::pow(quantile(metres, 0.25), 2), 2.0 * std::pow(quantile(radians, 0.25), 2)};
 }
 
 class Scan {
