@@ -1,0 +1,407 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parts of docs/results/selection.md, its table of all figures and its plots, from the results of Runs."""
+import collections
+import csv
+import math
+
+import svg_plot
+from runs import row
+from selection_runs import ABLATION, DEFAULT, HELD_OUT, HELD_OUT_BUDGETS, POLICIES, SIMULATED
+
+
+def quantile(values, share):
+    """Linear between order statistics; infinities stay."""
+    values = sorted(v for v in values if v is not None)
+    if not values:
+        return None
+    at = share * (len(values) - 1)
+    low, high = values[math.floor(at)], values[math.ceil(at)]
+    return low if low == high else low + (at - math.floor(at)) * (high - low)
+
+
+def median(values):
+    return quantile(list(values), 0.5)
+
+
+def number(value, digits=3):
+    return "-" if value is None else "never" if math.isinf(value) else f"{value:.{digits}f}"
+
+
+def spread(values, digits=3):
+    values = list(values)
+    return f"{number(median(values), digits)} ({number(quantile(values, 0.25), digits)} - " \
+           f"{number(quantile(values, 0.75), digits)})"
+
+
+def heading(*cells):
+    return [row(*cells), row(*["---"] * len(cells))]
+
+
+def rmse(line):
+    """Against the truth; for recordings that have none, against the server's map."""
+    return line["corrected"]["rmse_m"] if line["corrected"] else line.get("agreement_m")
+
+
+def ratio(line):
+    return line["corrected"]["rmse_m"] / line["server"]["rmse_m"] if line["corrected"] else None
+
+
+def by_case(runs_of_seeds):
+    """robot -> (policy, budget) -> lines of all seeds."""
+    out = collections.defaultdict(lambda: collections.defaultdict(list))
+    for lines in runs_of_seeds.values():
+        for line in lines:
+            out[line["robot"]][line["policy"], line["budget"]].append(line)
+    return out
+
+
+def own_lines(runs_of_seeds, robot=None):
+    """The default's, by its own rule."""
+    return [line for lines in runs_of_seeds.values() for line in lines
+            if line["policy"] == DEFAULT and line["budget"] == 0 and robot in (None, line["robot"])]
+
+
+# ---- one comparison at the end -------------------------------------------------------------------------------------
+
+def curve_table(cases, budgets):
+    lines = heading("policy", *budgets, "own rule (constraints)")
+    for policy in POLICIES:
+        cells = []
+        for budget in budgets:
+            found = cases.get((policy, budget))
+            if not found:
+                cells.append("")
+            else:
+                cells.append((spread if policy == DEFAULT else lambda v: number(median(v)))([rmse(l) for l in found]))
+        own = cases[policy, 0]
+        cells.append(f"{number(median(map(rmse, own)))} ({number(median(l['constraints'] for l in own), 0)})")
+        lines.append(row(f"`{policy}`", *cells))
+    return lines
+
+
+METRICS = ["max_m", "rpe_1s_m", "rpe_10m_m"]
+
+
+def metric_table(cases, budget):
+    lines = heading("policy", "constraints", "RMSE m", "of the server's", "largest error m", "RPE 1 s mm",
+                    "RPE 10 m mm", "kink mm", "to the server mm")
+    sample = next(iter(cases.values()))
+    for title in ("onboard", "server"):
+        if sample[0][title]:
+            own = {key: median(line[title][key] for line in sample) for key in ["rmse_m"] + METRICS}
+            lines.append(row(title, "", number(own["rmse_m"]),
+                             number(median(l[title]["rmse_m"] / l["server"]["rmse_m"] for l in sample), 2),
+                             number(own["max_m"]), number(1e3 * own["rpe_1s_m"], 1), number(1e3 * own["rpe_10m_m"], 1),
+                             "", ""))
+    for policy in POLICIES:
+        found = cases[policy, 0 if policy == "every_node" else budget]
+
+        def of(key):
+            return median(l["corrected"][key] if l["corrected"] else None for l in found)
+
+        def mm(value):
+            return number(None if value is None else 1e3 * value, 1)
+        lines.append(row(f"`{policy}`", number(median(l["constraints"] for l in found), 0), number(of("rmse_m")),
+                         number(median(map(ratio, found)), 2), number(of("max_m")), mm(of("rpe_1s_m")),
+                         mm(of("rpe_10m_m")), mm(median(l.get("kink_m") for l in found)),
+                         mm(median(l.get("agreement_m") for l in found))))
+    return lines
+
+
+def write_csv(path, results, names):
+    errors = ["rmse_m"] + METRICS
+    columns = ["constraints", "ratio_to_server", "kink_m", "to_server_m"] + errors
+
+    def values(lines):
+        return [[l["constraints"] for l in lines], [ratio(l) for l in lines], [l.get("kink_m") for l in lines],
+                [l.get("agreement_m") for l in lines]] + [
+                    [l["corrected"][key] if l["corrected"] else None for l in lines] for key in errors]
+
+    with path.open("w", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(["scenario", "robot", "policy", "budget", "seeds"]
+                     + [f"{column}{end}" for column in columns for end in ("", "_quartile_1", "_quartile_3")])
+        for name in names:
+            for robot, cases in by_case(results[f"curves_{name}"]).items():
+                for (policy, budget), lines in cases.items():
+                    quantiles = [quantile(found, share) for found in values(lines) for share in (0.5, 0.25, 0.75)]
+                    out.writerow([name, robot, policy, budget, len(lines)]
+                                 + ["" if q is None else f"{q:.4g}" for q in quantiles])
+
+
+def curve_plot(path, results, names, budgets):
+    panels = {}
+    for name in names:
+        for robot, cases in by_case(results[f"curves_{name}"]).items():
+            lines = {}
+            for policy in [DEFAULT] + [p for p in POLICIES if p not in (DEFAULT, "every_node")]:
+                points = []
+                for budget in budgets:
+                    values = [rmse(l) for l in cases[policy, budget]]
+                    points.append((budget, median(values)) + (
+                        (quantile(values, 0.25), quantile(values, 0.75)) if policy == DEFAULT else ()))
+                lines[policy] = points
+            every = cases["every_node", 0]
+            ends = (budgets[0], budgets[-1])
+            lines["every_node"] = [(b, median(map(rmse, every))) for b in ends]
+            if every[0]["server"]:
+                lines["server"] = [(b, median(l["server"]["rmse_m"] for l in every)) for b in ends]
+            panels[f"{name}, {robot}"] = lines
+    svg_plot.write(path, panels, "constraints allowed", "median RMSE in m (band: quartiles of the default)")
+
+
+def curves_section(runs, results):
+    text = ["## One comparison at the end of the mission", "",
+            "The server makes its map of the whole mission; every policy answers this one map from raw odometry, with "
+            "every budget. RMSE",
+            "in metres after one rigid alignment, at keyframes; medians over seeds, for the default with quartiles. "
+            f"{len(runs.seeds)} seeds; real recordings {len(runs.real_seeds)}",
+            "(of the closures' errors and drawn frames: the recordings do not change). `every_node` takes no budget and "
+            "has one figure,",
+            "by its own rule: a link to every proxy node. `uniform` and `random` by their own rule hold 25. All figures "
+            "with quartiles, and",
+            "the largest error, RPE, kink and constraints of each: `selection.csv`. Where there is no truth "
+            "(hku_two_sessions) errors are",
+            "against the server's map. hku_degraded is scored against its own odometry before it was degraded.", "",
+            "![Budget curves, simulated](images/selection_simulated.svg)", ""]
+    if runs.real:
+        text += ["![Budget curves, real recordings](images/selection_real.svg)", ""]
+    middle = 25
+    for name in SIMULATED + runs.real:
+        for robot, cases in by_case(results[f"curves_{name}"]).items():
+            text += [f"### {name}, {robot}", ""] + curve_table(cases, runs.budgets_of(name))
+            text += ["", f"With {middle} constraints allowed:", ""] + metric_table(cases, middle) + [""]
+    return text
+
+
+# ---- closed loop -----------------------------------------------------------------------------------------------------
+
+def loop_section(runs, results):
+    text = ["## The whole mission in closed loop", "",
+            "`tutti run`: the map grows, every update is answered, the radio is modelled; figures at the mission's end, "
+            "medians over seeds.",
+            "*full* are the LiDAR missions, closures found from scans (one seed). RPE and kink: raw -> corrected, mm.",
+            ""]
+    text += heading("mission", "seeds", "robot", "onboard RMSE m", "server", "policy", "constraints", "RMSE m",
+                    "of the server's", "largest error m", "RPE 1 s mm", "RPE 10 m mm", "kink mm", "to the server mm")
+    for key, title in [(f"full_{n}", f"{n} *full*") for n in runs.full] + [(f"loop_{n}", n)
+                                                                          for n in SIMULATED + runs.real]:
+        reports = list(results[key].values())
+        for k, robot in enumerate(reports[0]["robots"]):
+            robots = [report["robots"][k] for report in reports]
+            for policy in [DEFAULT, "spectral", "every_node"]:
+                own = [r["policies"][policy] for r in robots]
+
+                def med(name, entries=own, factor=1.0, digits=3):
+                    value = median(e.get(name) for e in entries)
+                    return number(None if value is None else factor * value, digits)
+                ratios = [o["rmse_m"] / r["server_rmse_m"] for o, r in zip(own, robots)
+                          if o["rmse_m"] is not None and r["server_rmse_m"]]
+
+                def change(name):
+                    return f"{med('onboard_' + name, robots, 1e3, 1)} -> {med(name, own, 1e3, 1)}"
+                text.append(row(title, len(reports), robot["name"], med("onboard_rmse_m", robots),
+                                med("server_rmse_m", robots), f"`{policy}`", med("constraints", digits=0),
+                                med("rmse_m"), number(median(ratios), 2), med("max_error_m"), change("rpe_m"),
+                                change("rpe_10m_m"), med("kink_m", factor=1e3, digits=1),
+                                med("agreement_rmse_m", factor=1e3, digits=1)))
+    return text + [""]
+
+
+def standing(lines, policy=DEFAULT):
+    """(seed, robot) -> updates of the map while it holds a wrong closure."""
+    out = collections.defaultdict(list)
+    for line in lines:
+        if line["policy"] == policy and line["wrong_closures"] > 0 and line["onboard"]:
+            out[line["seed"], line["robot"]].append(line)
+    return out
+
+
+def excess(line, key="rmse_m"):
+    return line["corrected"][key] / min(line["onboard"][key], line["server"][key])
+
+
+def revision_section(runs, results):
+    every = [line for lines in results["loops_revision"].values() for line in lines]
+    text = ["## While a wrong closure stands (*revision*)", "",
+            "Every update of the map replayed without a radio. As long as the map holds a closure that is wrong by more "
+            "than 0.5 m or",
+            "2 degrees: the robot's RMSE over the better of raw odometry's and the server's, all three over the part of "
+            "the run that the map",
+            "knows. To hold: never above 1.5.", ""]
+    text += heading("policy", "robot", "seeds with a wrong closure", "updates", "ratio, median",
+                    "largest of each seed, median (quartiles)", "largest of all", "seeds above 1.5",
+                    "there: corrected / raw / server m", "largest ratio of the largest errors")
+    for policy in [DEFAULT, "spectral", "every_node"]:
+        found = standing(every, policy)
+        for robot in sorted({robot for _, robot in found}):
+            seeds = [lines for (_, name), lines in found.items() if name == robot]
+            worst = [max(map(excess, lines)) for lines in seeds]
+            updates = [line for lines in seeds for line in lines]
+            there = max(updates, key=excess)
+            text.append(row(f"`{policy}`", robot, f"{len(seeds)} of {len(runs.seeds)}", len(updates),
+                            number(median(map(excess, updates)), 2), spread(worst, 2), number(max(worst), 2),
+                            sum(w > 1.5 for w in worst),
+                            " / ".join(number(there[key]["rmse_m"]) for key in ("corrected", "onboard", "server")),
+                            number(max(excess(u, "max_m") for u in updates), 2)))
+    return text + ["", "![Errors over time](images/selection_revision.svg)", ""]
+
+
+def revision_plot(path, results):
+    panels = {}
+    for seed, lines in sorted(results["loops_revision"].items())[:3]:
+        mine = [line for line in lines if line["robot"] == "alpha" and line["policy"] == DEFAULT and line["onboard"]]
+        panels[f"revision, seed {seed}, alpha"] = {
+            title: [(line["time_s"], line[key]["rmse_m"]) for line in mine]
+            for title, key in ((DEFAULT, "corrected"), ("raw odometry", "onboard"), ("server", "server"))}
+    svg_plot.write(path, panels, "mission time in s", "RMSE in m so far", x_log=False, y_log=False)
+
+
+# ---- many seeds ------------------------------------------------------------------------------------------------------
+
+def nothing_added(runs_of_seeds):
+    return sum(all(line["constraints"] == 0 for line in lines) for lines in runs_of_seeds.values())
+
+
+def detected(runs_of_seeds):
+    return sum(any(line["disagrees"] and line["constraints"] > 0 for line in lines)
+               for lines in runs_of_seeds.values())
+
+
+def overlap(a, b):
+    return min(a["until_s"], b["until_s"]) - max(a["from_s"], b["from_s"])
+
+
+def origin_of(line):
+    """(hit, error of the start in s, lengths in s of the true one and the mark, false marks); None without an origin."""
+    true = [o for o in line["true_origins"] if o["until_s"] - o["from_s"] >= 1.0 or o["kind"] == "slip"]
+    if not true:
+        return None
+    largest = max(true, key=lambda o: o["translation_m"])
+    marks = line["origins"]
+    false = sum(all(overlap(mark, o) < 0.0 for o in true) for mark in marks)
+    hits = [mark for mark in marks if overlap(mark, largest) >= 0.0]
+    if not hits:
+        return False, math.inf, None, false
+    mark = max(hits, key=lambda m: overlap(m, largest))
+    return True, abs(mark["from_s"] - largest["from_s"]), mark["until_s"] - mark["from_s"], false
+
+
+def origins_found(results, name):
+    return [found for line in own_lines(results[f"many_{name}"], "alpha") if (found := origin_of(line))]
+
+
+def many_section(runs, results):
+    count = len(runs.many_seeds)
+    text = [f"## {count} seeds", "", "One comparison at the end, by the default's own rule.", ""]
+    text += heading("scenario", "seeds", "nothing added", "detected (disagreement, and links added)")
+    for name in ("agree", "spin", "height"):
+        text.append(row(name, count, nothing_added(results[f"many_{name}"]), detected(results[f"many_{name}"])))
+    text.append(row("agree, closed loop (no update of any robot adds anything)", count,
+                    nothing_added(results["loops_agree"]), detected(results["loops_agree"])))
+    text += ["", "Where drift was born: the true origin with the largest shift (of alpha; those shorter than 1 s only if "
+             "they are slips) against",
+             "the marked stretch that overlaps it most. A seed without such a mark counts as a start error without "
+             "bound. False marks overlap",
+             "no true origin; ordinary drift, which is born everywhere, is not among the true ones.", ""]
+    text += heading("scenario", "seeds", "marked", "start error s, median (quartiles)", "length of the mark s, median",
+                    "seeds with false marks", "false marks")
+    for name in ("terrace", "degenerate"):
+        found = origins_found(results, name)
+        text.append(row(name, len(found), sum(f[0] for f in found), spread([f[1] for f in found], 1),
+                        number(median(f[2] for f in found), 1), sum(f[3] > 0 for f in found), sum(f[3] for f in found)))
+    return text + [""]
+
+
+# ---- held out --------------------------------------------------------------------------------------------------------
+
+def held_cases(results, name):
+    """robot -> title of the variant or policy -> budget -> lines."""
+    out = collections.defaultdict(lambda: collections.defaultdict(dict))
+    for robot, cases in by_case(results[f"held_{name}"]).items():
+        for (policy, budget), lines in cases.items():
+            out[robot][policy][budget] = lines
+    for variant in ABLATION:
+        for robot, cases in by_case(results[f"held_{variant}_{name}"]).items():
+            for (_, budget), lines in cases.items():
+                out[robot][variant][budget] = lines
+    return out
+
+
+def verdict_on_variant(results, variant, title):
+    """One sentence from the medians over all held-out cases and budgets."""
+    counts, added = collections.defaultdict(int), [0, 0, 0]
+    worse, better = collections.Counter(), collections.Counter()
+    for name in HELD_OUT:
+        if name == "agree":
+            cases = held_cases(results, name)
+            for robot in cases.values():
+                added[0] += sum(l["constraints"] > 0 for l in robot[variant][0])
+                added[1] += sum(l["constraints"] > 0 for l in robot[DEFAULT][0])
+                added[2] += len(robot[variant][0])
+            continue
+        for robot in held_cases(results, name).values():
+            for budget in HELD_OUT_BUDGETS:
+                own, other = (median(map(rmse, robot[p][budget])) for p in (DEFAULT, variant))
+                kind = "same" if abs(other - own) <= max(0.03 * own, 0.001) else "worse" if other > own else "better"
+                counts[kind] += 1
+                if kind != "same":
+                    (worse if kind == "worse" else better)[name] += 1
+    total = sum(counts.values())
+    where = [f"{words} in {', '.join(sorted(found))}" for words, found in (("worse", worse), ("better", better)) if found]
+    judged = "changes nothing" if counts["same"] == total else \
+        f"same {counts['same']}, worse {counts['worse']}, better {counts['better']} of {total}" + \
+        (f" ({'; '.join(where)})" if where else "")
+    return (f"- **{title}**: median RMSE against the default's (same: within 3 % or 1 mm): {judged}. In *agree* it adds "
+            f"links in {added[0]} of {added[2]} robots, the default in {added[1]}.")
+
+
+def wavelets_sentence(results):
+    """What wavelets add to accuracy, and to knowing when to be silent."""
+    same, total, silent = collections.Counter(), 0, collections.Counter()
+    for name in HELD_OUT:
+        for robot in held_cases(results, name).values():
+            if name == "agree":
+                for key in (DEFAULT, "rmse", "always"):
+                    silent[key] += sum(l["constraints"] == 0 for l in robot[key][0])
+                silent["robots"] += len(robot[DEFAULT][0])
+                continue
+            for budget in HELD_OUT_BUDGETS:
+                own = median(map(rmse, robot[DEFAULT][budget]))
+                for key in ("rmse", "always"):
+                    same[key] += median(map(rmse, robot[key][budget])) <= max(1.03 * own, own + 0.001)
+                total += 1
+    return (f"Where there is something to repair, wavelets add nothing to the accuracy in {same['always']} of {total} "
+            "cases (scenario, robot, budget): the same placement without any detection is as good there or better; with "
+            f"a threshold on the aligned RMSE instead, in {same['rmse']} of {total}. Where there is nothing to repair "
+            f"(*agree*), robots that stay silent: {silent[DEFAULT]} of {silent['robots']} with wavelets, "
+            f"{silent['rmse']} with the RMSE, {silent['always']} without detection. "
+            + ("**Wavelets add nothing that a threshold on the RMSE does not do as well here.**"
+               if same["rmse"] == total and silent["rmse"] >= silent[DEFAULT] else
+               "A threshold on the RMSE does not do as well in all of them."))
+
+
+def held_out_section(runs, results):
+    seeds = runs.held_out_seeds
+    text = ["## Never used for tuning", "",
+            f"Seeds {seeds[0]} to {seeds[-1]} and other parameters of the scenarios (docs/simulation.md), run after the "
+            "settings were frozen. Median RMSE in",
+            "metres. `every_node` and the policies' own rules as above; `uniform` uses the reduced solver like all.", "",
+            wavelets_sentence(results), ""]
+    text += [verdict_on_variant(results, variant, title) for variant, (title, _) in ABLATION.items()]
+    text += [verdict_on_variant(results, "uniform", "`uniform` with the reduced solver"), ""]
+    for name in HELD_OUT:
+        for robot, cases in held_cases(results, name).items():
+            sample = cases[DEFAULT][0]
+            text += [f"### {name}, {robot}", "",
+                     f"Onboard {number(median(l['onboard']['rmse_m'] for l in sample))} m, server "
+                     f"{number(median(l['server']['rmse_m'] for l in sample))} m.", ""]
+            text += heading("policy", *HELD_OUT_BUDGETS, "own rule (constraints)")
+            titles = {**{p: f"`{p}`" for p in POLICIES}, **{v: f"`{DEFAULT}`, {t}" for v, (t, _) in ABLATION.items()}}
+            for key, title in titles.items():
+                own = cases[key][0]
+                text.append(row(title, *(number(median(map(rmse, cases[key][b]))) if b in cases[key] else ""
+                                         for b in HELD_OUT_BUDGETS),
+                                f"{number(median(map(rmse, own)))} ({number(median(l['constraints'] for l in own), 0)})"))
+            text.append("")
+    return text
