@@ -84,6 +84,7 @@ Propagation propagate(const spectral::MeyerFilterBank& bank, const Signal& signa
   for (int c = 0; c < columns; ++c)
     if (sag_energy(c) > 0.0) out.octaves.col(c) /= sag_energy(c);
   if (beyond > 0.0) out.whole /= 2.0 * beyond;  // there are about two directions of one variance
+  out.rounding = out.rounding.cwiseMax(1e-6);   // runs of a few nodes have scales without a mode: no threshold of zero
   out.modes = out.modes.cwiseProduct(out.modes).cwiseQuotient(fourth.cwiseMax(1e-300)).cwiseMax(1.0);
   return out;
 }

@@ -33,7 +33,7 @@ class OdometryError {
   [[nodiscard]] double hanging(std::size_t held, std::size_t first, std::size_t last) const;
   struct Fit {
     std::vector<Vector6d> offsets;  ///< From the server's pose, one per held node.
-    double squared_error = 0.0;     ///< m^2, over all nodes.
+    double squared_error = 0.0;     ///< m^2, over all nodes, the held ones twice.
   };
   /// Where to hold these nodes (sorted, not empty) so that all nodes together come as near as they can to where the
   /// server has them: linear least squares, block tridiagonal, in time proportional to the number of held nodes.
