@@ -62,29 +62,37 @@ class Segmentation {
   std::vector<std::vector<Eigen::Index>> from_;  // [links - 1][i]: the joint before
 };
 
-/// Moves every joint to the best node between its neighbours, at most `reach` away, joints held exactly.
+/// Moves the joints, held exactly, to where they are best together, at most `reach` nodes each, until none moves: over
+/// the nodes around each, by dynamic programming. (One at a time, the ends of a short link over a jump stay apart.)
 void refine(const OdometryError& error, Joints& joints, std::size_t reach) {
   constexpr int kRounds = 4;
-  const auto local_error = [&](std::size_t j, std::size_t node) {
-    return (j == 0 ? error.hanging(node, 0, node) : error.bridged(joints[j - 1], node)) +
-           (j + 1 == joints.size() ? error.hanging(node, node, error.size() - 1) : error.bridged(node, joints[j + 1]));
+  struct Place {
+    std::size_t node = 0;
+    double least = std::numeric_limits<double>::infinity();  // error of the nodes up to here
+    std::size_t before = 0;                                  // place of the joint before
   };
-  bool moved = true;
-  for (int round = 0; moved && round < kRounds; ++round) {
-    moved = false;
+  const std::size_t end = error.size() - 1;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::vector<Place>> places;
     for (std::size_t j = 0; j < joints.size(); ++j) {
-      const std::size_t low = j == 0 ? 0 : joints[j - 1] + 1;
-      const std::size_t high = j + 1 == joints.size() ? error.size() - 1 : joints[j + 1] - 1;
-      const std::size_t first = std::max(low, joints[j] > reach ? joints[j] - reach : 0);
-      const std::size_t last = std::min(high, joints[j] + reach);
-      double least = local_error(j, joints[j]) * (1.0 - 1e-9);
-      for (std::size_t node = first; node <= last; ++node)
-        if (const double left = local_error(j, node); left < least) {
-          least = left;
-          joints[j] = node;
-          moved = true;
-        }
+      std::vector<Place>& here = places.emplace_back();
+      for (std::size_t node = joints[j] - std::min(joints[j], reach); node <= std::min(end, joints[j] + reach);
+           ++node) {
+        Place best{.node = node};
+        if (j == 0) best.least = error.hanging(node, 0, node);
+        for (std::size_t b = 0; j > 0 && b < places[j - 1].size() && places[j - 1][b].node < node; ++b)
+          if (const double sum = places[j - 1][b].least + error.bridged(places[j - 1][b].node, node); sum < best.least)
+            best = {node, sum, b};
+        here.push_back(best);
+      }
     }
+    for (Place& place : places.back()) place.least += error.hanging(place.node, place.node, end);
+    const auto best = std::ranges::min_element(places.back(), {}, &Place::least) - places.back().begin();
+    Joints moved(joints.size());
+    auto at = static_cast<std::size_t>(best);
+    for (std::size_t j = joints.size(); j-- > 0; at = places[j][at].before) moved[j] = places[j][at].node;
+    if (moved == joints) return;
+    joints = moved;
   }
 }
 
