@@ -157,7 +157,8 @@ Selection AdaptivePolicy::choose(const PolicyInput& input) const {
   const auto cost = [&](const JointPlan& p) {
     return p.squared_error + static_cast<double>(p.joints.size()) * least_gain;
   };
-  if (const auto held = held_joints(input); held && held->size() <= most + 1) {
+  // (No link at all is better at once: it takes a new disagreement to add some again.)
+  if (const auto held = held_joints(input); held && held->size() <= most + 1 && best.joints.size() > 1) {
     JointPlan kept = fit_joints(error, *held);
     if (cost(kept) <= cost(best) + least_gain) best = std::move(kept);
   }

@@ -102,8 +102,8 @@ class OdometryError;
 /// lowers the summed squared disagreement by `least_gain` nodes' worth of the server's own variance), so that their
 /// lengths follow the scale of the disagreement and their ends lie where drift was born; and more where what is left
 /// stands out at any scale. Planned afresh at every update; held links stay, measured anew in the newest map, unless
-/// the new plan is better by a link's worth. None at all when raw odometry has come to agree, as after a wrong closure
-/// is gone.
+/// the new plan is better by a link's worth, or does without any, as after a wrong closure is gone and the map has come
+/// back to raw odometry.
 class AdaptivePolicy final : public ConstraintPolicy {
  public:
   explicit AdaptivePolicy(const PolicyConfig& config) : config_(config) {}
