@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
+
 #include "tutti/consistency/testing/runs.hpp"
 
 namespace tutti::consistency {
@@ -82,6 +84,58 @@ TEST(Ledger, ReplacingAllRemovesWhatIsNotChosenAndKeepsWhatIs) {
   EXPECT_EQ(ledger.constraints()[0].revision, 1U);
 }
 
+/// A graph of this robot's nodes, these stamps only, some of them eliminated by the reduction.
+ProxyGraph graph_of(const std::vector<std::size_t>& kept, const std::vector<std::size_t>& eliminated,
+                    RobotId robot = test::kAlpha) {
+  ProxyGraph graph;
+  for (const std::size_t n : kept) graph.nodes.push_back({.robot = robot, .stamp = test::stamp_of(n)});
+  for (const std::size_t n : eliminated) graph.eliminated.push_back({robot, test::stamp_of(n)});
+  return graph;
+}
+
+TEST(Withdraw, OnlyWhatTheGraphDoesNotKnowOfAnyMore) {
+  const Ledger all({link(0, 1), link(0, 5), link(1, 2), link(4, 5)});
+  Ledger ledger = all;
+  EXPECT_EQ(ledger.withdraw_unknown(graph_of({0, 1, 2, 4, 5}, {}), test::kAlpha), 0U);
+  EXPECT_EQ(ledger, all);
+  EXPECT_EQ(ledger.withdraw_unknown(graph_of({0, 5}, {1, 2, 4}), test::kAlpha), 0U);  // reduced away, still known
+  EXPECT_EQ(ledger, all);
+  EXPECT_EQ(ledger.withdraw_unknown(graph_of({0, 2, 5}, {4}), test::kAlpha), 2U);  // node 1 is gone
+  EXPECT_EQ(ledger, Ledger({link(0, 5), link(4, 5)}));
+}
+
+TEST(Withdraw, AnotherRobotsNodesDoNotCount) {
+  Ledger ledger({link(0, 1)});
+  EXPECT_EQ(ledger.withdraw_unknown(graph_of({0, 1}, {}, test::kBravo), test::kAlpha), 1U);
+  EXPECT_EQ(ledger.size(), 0U);
+}
+
+Constraint supported(Constraint constraint, std::uint32_t support) {
+  constraint.support = support;
+  return constraint;
+}
+
+TEST(Withdraw, WhatIsChosenAgainWithoutSupport) {
+  for (const bool replaces_all : {false, true}) {
+    Ledger ledger({supported(link(0, 1), 3), supported(link(1, 2), 3)});
+    const auto update = ledger.update({supported(link(0, 1, 7.0), 0), supported(link(1, 2), 2)}, kConfig, replaces_all);
+    EXPECT_EQ(update.withdrawn, 1U);
+    EXPECT_EQ(update.unchanged, 1U);
+    EXPECT_EQ(update.removed + update.added + update.replaced, 0U);
+    ASSERT_EQ(ledger.size(), 1U);
+    EXPECT_EQ(ledger.constraints()[0].from, 1U);
+  }
+}
+
+// A link over odometry that nothing supports is taken as it comes (it says no more than odometry) and may be held on.
+TEST(Withdraw, NotWhatNeverHadSupport) {
+  Ledger ledger;
+  EXPECT_EQ(ledger.update({supported(link(0, 1), 0)}, kConfig, false).added, 1U);
+  const auto update = ledger.update({supported(link(0, 1), 0)}, kConfig, false);
+  EXPECT_EQ(update.withdrawn, 0U);
+  EXPECT_EQ(update.unchanged, 1U);
+}
+
 RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
   Ledger ledger;
   for (int round = 0; round < 4; ++round) {
@@ -90,6 +144,7 @@ RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
       const auto from = *rc::gen::inRange<std::size_t>(0, 6);
       const auto to = from + *rc::gen::inRange<std::size_t>(1, 4);
       chosen.push_back(link(from, to, *rc::gen::inRange(0, 5) * 0.04));
+      chosen.back().support = *rc::gen::inRange(0U, 3U);
       if (*rc::gen::arbitrary<bool>()) {
         std::swap(chosen.back().from, chosen.back().to);
         std::swap(chosen.back().from_stamp, chosen.back().to_stamp);
@@ -98,7 +153,8 @@ RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
     const std::size_t before = ledger.size();
     const bool replaces_all = *rc::gen::arbitrary<bool>();
     const auto update = ledger.update(chosen, kConfig, replaces_all);
-    RC_ASSERT(ledger.size() == before + update.added - update.removed);
+    RC_ASSERT(ledger.size() == before + update.added - update.removed - update.withdrawn);
+    RC_ASSERT(before == update.replaced + update.unchanged + update.removed + update.withdrawn || !replaces_all);
     RC_ASSERT(replaces_all || update.removed == 0U);
     const auto& held = ledger.constraints();
     for (std::size_t i = 0; i < held.size(); ++i) {
@@ -112,6 +168,14 @@ RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
     Ledger again = ledger;
     RC_ASSERT(again.update(held, kConfig, true).unchanged == held.size());
     RC_ASSERT(again == ledger);
+    std::vector<std::size_t> known;
+    for (std::size_t n = 0; n < 10; ++n)
+      if (*rc::gen::arbitrary<bool>()) known.push_back(n);
+    const std::size_t all = ledger.size();
+    const std::size_t gone = ledger.withdraw_unknown(graph_of(known, {}), test::kAlpha);
+    RC_ASSERT(ledger.size() + gone == all);
+    for (const Constraint& c : ledger.constraints())
+      RC_ASSERT(std::ranges::count(known, c.from) == 1 && std::ranges::count(known, c.to) == 1);
   }
 }
 

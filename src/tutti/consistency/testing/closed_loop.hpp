@@ -8,7 +8,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/policy.hpp"
-#include "tutti/consistency/testing/runs.hpp"
+#include "tutti/consistency/testing/uncertainty.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/geometry/alignment.hpp"
 
@@ -20,6 +20,7 @@ struct Mission {
   std::vector<Pose3> increments;  ///< Raw odometry, node to node.
   std::vector<Pose3> server;      ///< The joint map once all closures are found.
   OdometryNoise noise;
+  ServerNoise server_noise;
   /// False: the server knows its final map from the start. True: what lies after the latest revisit is odometry to the
   /// server, too, with support 0.
   bool late_closures = false;
@@ -30,7 +31,7 @@ struct Mission {
 inline Mission corridor_mission(std::size_t length, const OdometryNoise& noise, std::uint64_t seed,
                                 const ServerNoise& server = {}) {
   const Rng rng(seed);
-  Mission out{.truth = corridor(length), .noise = noise};
+  Mission out{.truth = corridor(length), .noise = noise, .server_noise = server};
   out.increments = odometry_increments(out.truth, noise, rng.fork("odometry"));
   out.server = moved({so3_exp(Eigen::Vector3d(0, 0, 2.0)), {30, -20, 1}},
                      server_estimate(out.truth, server, rng.fork("server")));
@@ -118,13 +119,15 @@ inline LoopResult run_closed_loop(const Mission& mission, const LoopConfig& conf
       }
     }
     if (count % config.nodes_per_update != 0 && count != length) continue;
-    const auto graph =
-        build_proxy_graph(++out.updates, server_after(mission, count), {{kAlpha, 0}}, config.proxy_graph);
+    auto graph = build_proxy_graph(++out.updates, server_after(mission, count), {{kAlpha, 0}}, config.proxy_graph);
+    if (!mission.settling && !mission.late_closures && !graph.reduced)
+      graph.shapes = {shape_of(kAlpha, mission.server_noise, count)};
     const auto nodes = robot_nodes(estimate(count), mission.increments);
     const auto comparison = compare(graph, kAlpha, nodes, config.compare);
     std::optional<std::size_t> budget;
     if (!config.budgets.empty()) budget = config.budgets[out.updates - 1];
-    const auto selection = (*policy)->choose({graph, kAlpha, nodes, comparison, budget, Rng(out.updates), ledger});
+    const auto selection =
+        (*policy)->choose({graph, kAlpha, nodes, comparison, budget, Rng(out.updates), ledger, out.updates});
     out.replaced += ledger.update(selection.constraints, config.ledger, selection.replaces_all).replaced;
     std::vector<estimation::ChainConstraint> constraints;
     for (const Constraint& c : ledger.constraints()) constraints.push_back({c.from, c.to, c.measurement});

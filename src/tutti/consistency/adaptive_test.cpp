@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The policy `adaptive`: nothing while the two agree, few links where drift was born, and no churn.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "tutti/consistency/testing/closed_loop.hpp"
+
+namespace tutti::consistency {
+namespace {
+
+using namespace test;
+
+/// One robot with a server that knows its map as well as `map` says.
+struct Scene {
+  std::vector<Pose3> server;
+  std::vector<Pose3> increments;
+  ShapeUncertainty shape;
+  std::optional<std::size_t> budget;
+  PolicyConfig config;
+  Ledger ledger;
+  std::uint64_t update = 0;
+
+  /// The next proxy graph: compares, chooses, books.
+  LedgerUpdate receive() {
+    auto graph = build_proxy_graph(++update, server_nodes(kAlpha, server), {{kAlpha, 0}}, {});
+    graph.shapes = {shape};
+    const auto nodes = robot_nodes(integrate({}, increments), increments);
+    const Comparison comparison{.pairs = synchronise(graph, kAlpha, nodes).pairs};  // all that it looks at
+    const auto policy = *make_policy("adaptive", config);
+    const auto selection = policy->choose({graph, kAlpha, nodes, comparison, budget, Rng(update), ledger, update});
+    return ledger.update(selection.constraints, {}, selection.replaces_all);
+  }
+};
+
+std::vector<Pose3> steps_of(const std::vector<Pose3>& poses) {
+  std::vector<Pose3> out;
+  for (std::size_t n = 1; n < poses.size(); ++n) out.push_back(poses[n - 1].inverse() * poses[n]);
+  return out;
+}
+
+constexpr std::size_t kNodes = 200;
+const WalkWithClosures& usual_map() {
+  static const WalkWithClosures map(kNodes, 25, {0.005, 3e-4}, {0.01, 1e-3});
+  return map;
+}
+
+/// The robot differs from the server by what the server allows for.
+Scene agreeing(std::uint64_t seed) {
+  const auto truth = corridor(kNodes);
+  return {.server = moved({so3_exp(Eigen::Vector3d(0, 0, 2.0)), {30, -20, 1}}, truth),
+          .increments = steps_of(usual_map().displace(truth, Rng(seed))),
+          .shape = usual_map().shape(kAlpha)};
+}
+
+/// And drifts on top of it, honestly.
+Scene drifting(std::uint64_t seed) {
+  Scene out = agreeing(seed);
+  out.increments = odometry_increments(integrate({}, out.increments), {.rotation_rad = 0.003}, Rng(seed));
+  return out;
+}
+
+TEST(Adaptive, AddsNothingWhileTheTwoAgree) {
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    Scene scene = agreeing(seed);
+    for (int i = 0; i < 3; ++i) scene.receive();
+    EXPECT_EQ(scene.ledger.size(), 0U) << "seed " << seed;
+  }
+}
+
+TEST(Adaptive, AddsAFewOnceItDrifts) {
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    Scene scene = drifting(seed);
+    EXPECT_GT(scene.receive().added, 0U) << "seed " << seed;
+    EXPECT_LE(scene.ledger.size(), kNodes / 5) << "seed " << seed;
+  }
+}
+
+TEST(Adaptive, LinksAreAChainFromEarlierToLater) {
+  Scene scene = drifting(1);
+  scene.receive();
+  const auto& held = scene.ledger.constraints();
+  for (std::size_t i = 1; i < held.size(); ++i) EXPECT_EQ(held[i - 1].to_stamp, held[i].from_stamp);
+}
+
+TEST(Adaptive, HoldsOnWhileNothingChanges) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Scene scene = drifting(seed);
+    const std::size_t links = scene.receive().added;
+    ASSERT_GT(links, 0U);
+    const Ledger first = scene.ledger;
+    for (int i = 0; i < 20; ++i) {
+      const LedgerUpdate update = scene.receive();
+      EXPECT_EQ(update.unchanged, links);
+      EXPECT_EQ(update.added + update.replaced + update.removed + update.withdrawn, 0U);
+    }
+    EXPECT_EQ(scene.ledger, first);
+  }
+}
+
+// A wrong closure bends the map, the robot follows; then it is gone, and all the server has is odometry again.
+TEST(Adaptive, WithdrawsAllWhenTheMapComesBackToOdometry) {
+  Scene scene = agreeing(3);
+  scene.server = moved(scene.server.front(), integrate({}, scene.increments));
+  const auto right = scene.server;
+  for (std::size_t n = 80; n < kNodes; ++n) scene.server[n].translation.y() += 2.0;
+  EXPECT_GT(scene.receive().added, 0U);
+  scene.receive();
+  const std::size_t held = scene.ledger.size();
+  scene.server = right;
+  EXPECT_EQ(scene.receive().removed, held);
+  EXPECT_EQ(scene.ledger.size(), 0U);
+  scene.receive();
+  EXPECT_EQ(scene.ledger.size(), 0U);
+}
+
+TEST(Adaptive, RespectsTheBudgetAlsoWhenItFalls) {
+  for (const std::size_t budget : {0U, 1U, 3U, 7U}) {
+    Scene scene = drifting(2);
+    scene.receive();
+    ASSERT_GT(scene.ledger.size(), 7U);
+    scene.budget = budget;
+    scene.receive();
+    EXPECT_LE(scene.ledger.size(), budget);
+    Scene fresh = drifting(2);
+    fresh.budget = budget;
+    fresh.receive();
+    EXPECT_LE(fresh.ledger.size(), budget);
+  }
+}
+
+TEST(Adaptive, SameInputSameLinks) {
+  Scene a = drifting(4), b = drifting(4);
+  for (int i = 0; i < 3; ++i) {
+    a.receive();
+    b.receive();
+  }
+  EXPECT_EQ(a.ledger, b.ledger);
+}
+
+// One bad step, all else within the server's uncertainty: the links end where it happened.
+TEST(Adaptive, PutsALinkAroundASingleJump) {
+  Scene scene = agreeing(5);
+  scene.increments[119] = scene.increments[119] * Pose3{so3_exp(Eigen::Vector3d(0, 0, 0.1)), {0.5, 0.5, 0.0}};
+  scene.receive();
+  bool around = false;
+  for (const Constraint& c : scene.ledger.constraints())
+    around |= c.from / 3 <= 119 && c.to / 3 >= 120 && (c.to - c.from) / 3 <= 3;
+  EXPECT_TRUE(around);
+  EXPECT_LE(scene.ledger.size(), 8U);
+}
+
+TEST(AdaptiveLoop, EndsNearTheServerWithAHandfulOfLinks) {
+  LoopConfig config;
+  config.policy.name = "adaptive";
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const auto result = run_closed_loop(
+        corridor_mission(200, {.rotation_rad = 0.003}, seed, {.smooth_m = 0.03, .local_m = 0.01, .local_rad = 0.002}),
+        config);
+    std::printf("[ MEASURED ] onboard %.3f m, corrected %.3f m, off the server's map %.3f m, %zu links, %zu replaced\n",
+                result.onboard_m, result.corrected_m, result.agreement_m, result.constraints, result.replaced);
+    EXPECT_GT(result.onboard_m, 0.15);
+    EXPECT_LT(result.agreement_m, 0.036) << "seed " << seed;  // the server's own error
+    EXPECT_LE(result.constraints, 25U) << "seed " << seed;
+  }
+}
+
+TEST(AdaptiveLoop, AServerThatKnowsNothingChangesNothing) {
+  auto mission = corridor_mission(150, {}, 5);
+  mission.late_closures = true;  // the corridor first comes back after 320 m
+  LoopConfig config;
+  config.policy.name = "adaptive";
+  const auto result = run_closed_loop(mission, config);
+  EXPECT_EQ(result.constraints, 0U);
+  EXPECT_LT(result.worst_agreement_m, 1e-6);
+}
+
+}  // namespace
+}  // namespace tutti::consistency
