@@ -75,8 +75,16 @@ OdometryError::Sums OdometryError::sums_over(std::size_t first, std::size_t last
 // All errors are E_k - C_k G - h.
 double OdometryError::bridged(std::size_t a, std::size_t b) const {
   if (b < a + 2) return 0.0;
-  const Sums over = sums_over(a + 1, b - 1);
   const Vector6d G = (nodes_[b].C - nodes_[a].C).ldlt().solve(nodes_[b].E - nodes_[a].E);
+  if (b - a <= kNodeByNode) {
+    double sum = 0.0;
+    for (std::size_t k = a + 1; k < b; ++k) {
+      const Vector6d rho = nodes_[k].E - nodes_[a].E - (nodes_[k].C - nodes_[a].C) * G;
+      sum += (lever(nodes_[k].x) * rho).squaredNorm() + lever_m_ * lever_m_ * rho.tail<3>().squaredNorm();
+    }
+    return sum;
+  }
+  const Sums over = sums_over(a + 1, b - 1);
   const Vector6d h = nodes_[a].E - nodes_[a].C * G;
   const double sum = over.EME + G.dot(over.CMC * G) + h.dot(over.M * h) - 2.0 * G.dot(over.CME) - 2.0 * h.dot(over.ME) +
                      2.0 * G.dot(over.CM * h);
@@ -89,26 +97,26 @@ double OdometryError::hanging(std::size_t held, std::size_t first, std::size_t l
   return std::max(0.0, over.EME + h.dot(over.M * h) - 2.0 * h.dot(over.ME));
 }
 
-// With offsets a, b of the ends: G = G_0 + L (a - b), h = h_0 - a - C_a L (a - b), L = (C_b - C_a)^-1.
+// With E, C counted from node a and offsets a, b of the ends: rho_k = a + E_k - C_k L (E_b - b + a), L = C_b^-1.
 OdometryError::Quadratic OdometryError::between(std::size_t a, std::size_t b) const {
-  using Matrix12d = Eigen::Matrix<double, 12, 12>;
-  using Vector12d = Eigen::Matrix<double, 12, 1>;
-  const Sums over = sums_over(a + 1, b);
+  using Matrix6x12d = Eigen::Matrix<double, 6, 12>;
   const Matrix6d L = (nodes_[b].C - nodes_[a].C).ldlt().solve(Matrix6d::Identity());
-  Vector12d Gh;
-  Gh.head<6>() = L * (nodes_[b].E - nodes_[a].E);
-  Gh.tail<6>() = nodes_[a].E - nodes_[a].C * Gh.head<6>();
-  Matrix12d to_Gh;  // d(G, h) / d(a, b)
-  const Matrix6d CL = nodes_[a].C * L;
-  to_Gh << L, -L, -Matrix6d::Identity() - CL, CL;
-  Matrix12d H;
-  H << over.CMC, over.CM, over.CM.transpose(), over.M;
-  Vector12d r;
-  r << over.CME, over.ME;
-  const Matrix12d Q = to_Gh.transpose() * H * to_Gh;
-  const Vector12d q = to_Gh.transpose() * (r - H * Gh);
+  const Vector6d G = L * (nodes_[b].E - nodes_[a].E);
+  Eigen::Matrix<double, 12, 12> Q = Eigen::Matrix<double, 12, 12>::Zero();
+  Eigen::Matrix<double, 12, 1> q = Eigen::Matrix<double, 12, 1>::Zero();
   Quadratic out;
-  out.constant = over.EME + Gh.dot(H * Gh) - 2.0 * r.dot(Gh);
+  for (std::size_t k = a + 1; k <= b; ++k) {
+    const Matrix6d C = nodes_[k].C - nodes_[a].C;
+    const Vector6d rho = nodes_[k].E - nodes_[a].E - C * G;
+    const Matrix6d by_b = C * L;
+    Matrix6x12d by;  // d rho / d(a, b)
+    by << Matrix6d::Identity() - by_b, by_b;
+    const Matrix6d M = metric_of(k);
+    const Vector6d M_rho = M * rho;
+    out.constant += rho.dot(M_rho);
+    q -= by.transpose() * M_rho;
+    Q += by.transpose() * (M * by);
+  }
   out.right_a = q.head<6>();
   out.right_b = q.tail<6>();
   out.aa = Q.topLeftCorner<6, 6>();

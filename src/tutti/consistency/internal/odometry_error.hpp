@@ -18,8 +18,8 @@ namespace tutti::consistency::internal {
 /// When nodes a < b are held where the server has them, the most likely error of a node between them is
 ///   rho_k = (E_k - E_a) - (C_k - C_a) G,   G = (C_b - C_a)^-1 (E_b - E_a),
 /// (the linear-Gaussian bridge, the onboard smoother's first step), and of a node beyond the last held one E_k - E_a.
-/// How bad an error is: |position|^2 + (lever |rotation|)^2, m^2. Its sum over any stretch comes from prefix sums in
-/// constant time, with the ends held where the server has them or at an offset from there.
+/// How bad an error is: |position|^2 + (lever |rotation|)^2, m^2. Its sum over a stretch with the ends held where the
+/// server has them comes from prefix sums in constant time.
 class OdometryError {
  public:
   /// Poses as the server has them, and raw odometry k - 1 -> k (entry 0 unused), one per node. `lever_m` > 0: what a
@@ -36,7 +36,7 @@ class OdometryError {
     double squared_error = 0.0;     ///< m^2, over all nodes, the held ones twice.
   };
   /// Where to hold these nodes (sorted, not empty) so that all nodes together come as near as they can to where the
-  /// server has them: linear least squares, block tridiagonal, in time proportional to the number of held nodes.
+  /// server has them: linear least squares, block tridiagonal, in time proportional to the number of nodes.
   [[nodiscard]] Fit fit(std::span<const std::size_t> held) const;
   /// Per node [position m; rotation rad] in the axes of the server's frame, with these nodes held at these offsets
   /// (empty: exactly where the server has them).
@@ -61,6 +61,9 @@ class OdometryError {
     Matrix6d C = Matrix6d::Zero();
     Sums sums;
   };
+  /// Shorter runs are summed node by node: differences of prefix sums lose as many digits twice over as the covariance
+  /// up to here exceeds that of the run.
+  static constexpr std::size_t kNodeByNode = 64;
   [[nodiscard]] Matrix6d metric_of(std::size_t k) const;  ///< M of Sums.
   [[nodiscard]] Sums sums_over(std::size_t first, std::size_t last) const;
   /// A stretch's squared error as a function of its ends' offsets:
