@@ -170,8 +170,12 @@ ChainDisagreement ChainAgreement::compare(std::span<const Pose3> server, std::sp
 
 ChainDisagreement ChainAgreement::compare(const Eigen::MatrixXd& difference) const {
   TUTTI_CHECK(difference.rows() == nodes(), "{} rows, {} nodes", difference.rows(), nodes());
-  const Eigen::MatrixXd W = spectral::chain_transform(bank_, difference);
+  if (nodes() == 0) return {};
   const Eigen::Index d = difference.cols();
+  Eigen::MatrixXd f(spectral::fast_chain_length(nodes()), d);
+  f.topRows(nodes()) = difference;
+  f.bottomRows(f.rows() - nodes()).rowwise() = difference.row(nodes() - 1);
+  const Eigen::MatrixXd W = spectral::chain_transform(bank_, f).topRows(nodes());
   const Eigen::Index metres = std::min(signal_->metres(), d);
   ChainDisagreement out;
   out.position_m.resize(nodes(), scales());

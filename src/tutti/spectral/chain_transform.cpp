@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/spectral/chain_transform.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -25,6 +26,15 @@ void mirrored_spectrum(Eigen::FFT<double>& fft, const Eigen::VectorXd& f, std::v
 
 double chain_eigenvalue(Eigen::Index k, Eigen::Index n) {
   return 2.0 - 2.0 * std::cos(std::numbers::pi * static_cast<double>(k) / static_cast<double>(n));
+}
+
+Eigen::Index fast_chain_length(Eigen::Index n) {
+  for (Eigen::Index length = std::max<Eigen::Index>(1, n);; ++length) {
+    Eigen::Index rest = length;
+    for (const Eigen::Index factor : {2, 3, 5})
+      while (rest % factor == 0) rest /= factor;
+    if (rest == 1) return length;
+  }
 }
 
 Eigen::MatrixXd chain_transform(const MeyerFilterBank& bank, const Eigen::MatrixXd& signals) {

@@ -37,6 +37,18 @@ TEST(ChainTransform, KeepsTheEnergy) {  // Meyer's bank is a tight frame
   EXPECT_NEAR(W.squaredNorm(), f.squaredNorm(), 1e-9 * f.squaredNorm());
 }
 
+TEST(ChainTransform, FastLengthsHaveSmallFactorsOnly) {
+  for (Eigen::Index n = 1; n < 3000; ++n) {
+    const Eigen::Index length = fast_chain_length(n);
+    EXPECT_GE(length, n);
+    EXPECT_LE(length, n + n / 8 + 1);
+    Eigen::Index rest = length;
+    for (const Eigen::Index factor : {2, 3, 5})
+      while (rest % factor == 0) rest /= factor;
+    EXPECT_EQ(rest, 1);
+  }
+}
+
 TEST(ChainTransform, AConstantStaysInTheLargestScale) {
   const Eigen::MatrixXd W = chain_transform(MeyerFilterBank(5, kChainLambdaMax), Eigen::MatrixXd::Constant(30, 1, 7.0));
   EXPECT_LT((W.col(0).array() - 7.0).abs().maxCoeff(), 1e-12);
