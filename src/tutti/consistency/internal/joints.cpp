@@ -62,38 +62,44 @@ class Segmentation {
   std::vector<std::vector<Eigen::Index>> from_;  // [links - 1][i]: the joint before
 };
 
-/// Moves the joints, held exactly, to where they are best together, at most `reach` nodes each, until none moves: over
-/// the nodes around each, by dynamic programming. (One at a time, the ends of a short link over a jump stay apart.)
-void refine(const OdometryError& error, Joints& joints, std::size_t reach) {
-  constexpr int kRounds = 4;
+/// Best places of the joints, held exactly, out of `step` times -2 .. 2 nodes from where they are, all together, by
+/// dynamic programming. (One at a time, the ends of a short link over a jump stay apart.) False: they are there.
+bool move_joints(const OdometryError& error, Joints& joints, std::size_t step) {
   struct Place {
     std::size_t node = 0;
     double least = std::numeric_limits<double>::infinity();  // error of the nodes up to here
     std::size_t before = 0;                                  // place of the joint before
   };
   const std::size_t end = error.size() - 1;
-  for (int round = 0; round < kRounds; ++round) {
-    std::vector<std::vector<Place>> places;
-    for (std::size_t j = 0; j < joints.size(); ++j) {
-      std::vector<Place>& here = places.emplace_back();
-      for (std::size_t node = joints[j] - std::min(joints[j], reach); node <= std::min(end, joints[j] + reach);
-           ++node) {
-        Place best{.node = node};
-        if (j == 0) best.least = error.hanging(node, 0, node);
-        for (std::size_t b = 0; j > 0 && b < places[j - 1].size() && places[j - 1][b].node < node; ++b)
-          if (const double sum = places[j - 1][b].least + error.bridged(places[j - 1][b].node, node); sum < best.least)
-            best = {node, sum, b};
-        here.push_back(best);
-      }
+  std::vector<std::vector<Place>> places;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    std::vector<Place>& here = places.emplace_back();
+    const std::size_t first = joints[j] - std::min(2 * step, joints[j] / step * step);
+    for (std::size_t node = first; node <= std::min(end, joints[j] + 2 * step); node += step) {
+      Place best{.node = node};
+      if (j == 0) best.least = error.hanging(node, 0, node);
+      for (std::size_t b = 0; j > 0 && b < places[j - 1].size() && places[j - 1][b].node < node; ++b)
+        if (const double sum = places[j - 1][b].least + error.bridged(places[j - 1][b].node, node); sum < best.least)
+          best = {node, sum, b};
+      here.push_back(best);
     }
-    for (Place& place : places.back()) place.least += error.hanging(place.node, place.node, end);
-    const auto best = std::ranges::min_element(places.back(), {}, &Place::least) - places.back().begin();
-    Joints moved(joints.size());
-    auto at = static_cast<std::size_t>(best);
-    for (std::size_t j = joints.size(); j-- > 0; at = places[j][at].before) moved[j] = places[j][at].node;
-    if (moved == joints) return;
-    joints = moved;
   }
+  for (Place& place : places.back()) place.least += error.hanging(place.node, place.node, end);
+  const auto best = std::ranges::min_element(places.back(), {}, &Place::least) - places.back().begin();
+  Joints moved(joints.size());
+  auto at = static_cast<std::size_t>(best);
+  for (std::size_t j = joints.size(); j-- > 0; at = places[j][at].before) moved[j] = places[j][at].node;
+  if (moved == joints) return false;
+  joints = moved;
+  return true;
+}
+
+/// In steps from about half the distance of the candidates down to one node.
+void refine(const OdometryError& error, Joints& joints, std::size_t reach) {
+  constexpr int kRounds = 4;
+  for (std::size_t step = std::max<std::size_t>(1, reach / 2); step > 0; step /= 2)
+    for (int round = 0; round < kRounds && move_joints(error, joints, step); ++round) {
+    }
 }
 
 }  // namespace

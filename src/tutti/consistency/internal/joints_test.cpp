@@ -114,6 +114,14 @@ TEST(PlanJoints, OneLinkTightAroundASingleJump) {
   }
 }
 
+// On runs with many more nodes than candidates, too.
+TEST(PlanJoints, FindsTheNodeBetweenTheCandidates) {
+  for (const std::size_t step : {101U, 1013U, 2222U, 2900U}) {
+    const auto plan = plan_joints(one_jump(3000, step, test::at(0.3, -0.4, 0.1)), 20, 0.01, 100);
+    EXPECT_EQ(plan.joints, (std::vector<std::size_t>{step - 1, step}));
+  }
+}
+
 // Two failures that undo each other: the first link pays little without the second.
 TEST(PlanJoints, LooksAheadOverALinkThatHardlyPays) {
   const auto server = test::corridor(200);
