@@ -150,8 +150,8 @@ TEST(Adaptive, PutsALinkAroundASingleJump) {
   EXPECT_LE(scene.ledger.size(), 8U);
 }
 
-// How many links depends on what a radian counts (AdaptivePolicy::kLever_m): 2 m, 54 and 55; 0.3 m, 16 and 18 with
-// three times the rotation noise.
+// How many links depends on what a radian counts (AdaptivePolicy::kLever_m, 2 m): with rotation noise of 3 mrad and a
+// server sure to 2 mrad a node, 54 and 48; with 0.3 m, on the same missions, 16 and 18.
 TEST(AdaptiveLoop, EndsNearTheServerWithFarFewerLinksThanNodes) {
   LoopConfig config;
   config.policy.name = "adaptive";
