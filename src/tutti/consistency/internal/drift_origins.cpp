@@ -34,7 +34,7 @@ void clip(Eigen::Ref<Eigen::Matrix3d> block, double largest) {
 /// Odometry with no step less sure, per metre, than usual.
 std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
   constexpr double kLeastStep_m = 0.1;
-  constexpr double kUsual = 2.0;  // times the median
+  constexpr double kUnusual = 2.0;  // times the median; brought back to the median
   std::vector<double> metres, radians;
   const auto length = [&](std::size_t k) {
     return std::max(kLeastStep_m, (chain.server[k].translation - chain.server[k - 1].translation).norm());
@@ -46,10 +46,10 @@ std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
   }
   std::vector<RelativePose> out = chain.odometry;
   if (metres.empty()) return out;
-  const double usual_m = kUsual * quantile(metres, 0.5);
-  const double usual_rad = kUsual * quantile(radians, 0.5);
+  const double usual_m = quantile(metres, 0.5);
+  const double usual_rad = quantile(radians, 0.5);
   for (std::size_t k = 1; k < out.size(); ++k) {
-    if (metres[k - 1] <= usual_m && radians[k - 1] <= usual_rad) continue;
+    if (metres[k - 1] <= kUnusual * usual_m && radians[k - 1] <= kUnusual * usual_rad) continue;
     Matrix6d& C = out[k].covariance;
     clip(C.topLeftCorner<3, 3>(), usual_m * length(k));
     clip(C.bottomRightCorner<3, 3>(), usual_rad * length(k));
@@ -148,9 +148,8 @@ std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const ShapeUnc
   std::vector<DriftStretch> out;
   if (nodes < 4) return out;
   const Scan scan(chain, shape);
-  // About 8 places per length along the run, 2 log2(n) lengths, of which the longer overlap: n log2(n) stretches.
-  const double n = static_cast<double>(nodes);
-  const double threshold = chi_square_exceeded_with(probability / (n * std::log2(n)), kDegrees);
+  // Stretches that overlap tell much the same: about as many independent ones as nodes.
+  const double threshold = chi_square_exceeded_with(probability / static_cast<double>(nodes), kDegrees);
   std::vector<Stretch> found = candidates(scan, nodes, threshold);
   while (!found.empty() && out.size() < kMostStretches) {
     Stretch best = *std::ranges::max_element(found, {}, &Stretch::statistic);
