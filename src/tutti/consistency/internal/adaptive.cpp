@@ -80,6 +80,9 @@ bool split_run(const OdometryError& error, Joints& joints, std::size_t node) {
   return best.has_value();
 }
 
+/// What is left in position, m^2 summed over the nodes: what links are paid for.
+double position_error(const JointPlan& plan) { return plan.residual.leftCols<3>().squaredNorm(); }
+
 /// As many equally long links as pay.
 JointPlan uniform_plan(const OdometryError& error, std::size_t most, double least_gain) {
   JointPlan best = fit_joints(error, {0});
@@ -88,8 +91,8 @@ JointPlan uniform_plan(const OdometryError& error, std::size_t most, double leas
     for (std::size_t i = 0; i <= links; ++i) joints.push_back(i * (error.size() - 1) / links);
     JointPlan plan = fit_joints(error, std::move(joints));
     const auto paid = static_cast<double>(links + 1 - best.joints.size()) * least_gain;
-    if (plan.squared_error + paid < best.squared_error) best = std::move(plan);
-    if (static_cast<double>(links + 1 - best.joints.size()) * least_gain > best.squared_error) break;
+    if (position_error(plan) + paid < position_error(best)) best = std::move(plan);
+    if (static_cast<double>(links + 1 - best.joints.size()) * least_gain > position_error(best)) break;
   }
   return best;
 }
@@ -120,18 +123,19 @@ bool AdaptivePolicy::disagree(const ChainAgreement& test, const TimeChain& chain
   return test.compare(chain.server, chain.robot).disagrees();
 }
 
-JointPlan AdaptivePolicy::plan(const TimeChain& chain, const OdometryError& error, const ChainAgreement& test,
+JointPlan AdaptivePolicy::plan(const TimeChain& chain, const OdometryError& fitting, const ChainAgreement& test,
                                std::size_t most, double least_gain) const {
-  if (config_.adaptive.placement == "uniform") return uniform_plan(error, most, least_gain);
-  JointPlan plan = plan_joints(error, most, least_gain);
+  if (config_.adaptive.placement == "uniform") return uniform_plan(fitting, most, least_gain);
+  const OdometryError placing(chain.server, chain.odometry, kPlacingLever_m);
+  JointPlan plan = fit_joints(fitting, plan_joints(placing, most, least_gain).joints);
   if (config_.adaptive.detection != "wavelets") return plan;
   // The sum of squares says little of what is large in one place or at one scale only; the wavelets do.
   while (plan.joints.size() <= most) {
     Eigen::Index node = 0, scale = 0;
     const auto left = test.compare(chain.server, predicted(chain, plan));
     if (left.significance.maxCoeff(&node, &scale) <= 1.0) break;
-    if (!split_run(error, plan.joints, static_cast<std::size_t>(node))) break;
-    plan = fit_joints(error, std::move(plan.joints));
+    if (!split_run(placing, plan.joints, static_cast<std::size_t>(node))) break;
+    plan = fit_joints(fitting, std::move(plan.joints));
   }
   return plan;
 }
@@ -150,12 +154,12 @@ Selection AdaptivePolicy::choose(const PolicyInput& input) const {
   if (input.ledger.size() == 0 && !disagree(test, chain, expected))
     return std::move(collector).take();  // nothing tells the two apart
 
-  const OdometryError error(chain.server, chain.odometry, kLever_m);
+  const OdometryError error(chain.server, chain.odometry, kFittingLever_m);
   const double least_gain = config_.adaptive.least_gain * expected * expected;
   const std::size_t most = std::min(input.budget.value_or(nodes - 1), nodes - 1);
   JointPlan best = plan(chain, error, test, most, least_gain);
   const auto cost = [&](const JointPlan& p) {
-    return p.squared_error + static_cast<double>(p.joints.size()) * least_gain;
+    return position_error(p) + static_cast<double>(p.joints.size()) * least_gain;
   };
   // (No link at all is better at once: it takes a new disagreement to add some again.)
   if (const auto held = held_joints(input); held && held->size() <= most + 1 && best.joints.size() > 1) {

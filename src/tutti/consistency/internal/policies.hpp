@@ -113,9 +113,11 @@ class AdaptivePolicy final : public ConstraintPolicy {
  private:
   static constexpr double kLeastRmse_m = 2e-3;  ///< Poses on the wire are rounded to a quarter of it.
   static constexpr double kRmseFactor = 3.0;
-  static constexpr double kLever_m = 2.0;  ///< What a radian of rotation counts: positions decide.
+  // What a radian counts: where links go, positions decide; how joints are turned, what that does to 10 m around them.
+  static constexpr double kPlacingLever_m = 0.3;
+  static constexpr double kFittingLever_m = 2.0;
   [[nodiscard]] bool disagree(const ChainAgreement& test, const TimeChain& chain, double expected_rmse_m) const;
-  [[nodiscard]] JointPlan plan(const TimeChain& chain, const OdometryError& error, const ChainAgreement& test,
+  [[nodiscard]] JointPlan plan(const TimeChain& chain, const OdometryError& fitting, const ChainAgreement& test,
                                std::size_t most, double least_gain) const;
   PolicyConfig config_;
 };
