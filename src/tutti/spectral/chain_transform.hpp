@@ -15,9 +15,9 @@ inline constexpr double kChainLambdaMax = 4.0;  ///< No path graph's largest eig
 /// lambda_k of the path graph of n nodes, k in [0, n).
 [[nodiscard]] double chain_eigenvalue(Eigen::Index k, Eigen::Index n);
 
-/// The least length >= n that has no prime factor above 5. The transform of a length with large prime factors costs n^2;
-/// a chain may be made longer by nodes that repeat its last value (7 % longer at worst from 1,000 nodes on, 11 % from
-/// 50 on), which an even reflection at the end hardly notices.
+/// The least length >= n that has no prime factor above 5. The transform of a length with large prime factors costs
+/// n^2; a chain may be made longer by nodes that repeat its last value (7 % longer at worst from 1,000 nodes on, 11 %
+/// from 50 on), which an even reflection at the end hardly notices.
 [[nodiscard]] Eigen::Index fast_chain_length(Eigen::Index n);
 
 /// Coefficients of the signals (columns, n x d), laid out as by exact_transform(): n x (scales * d), column s * d + c.
