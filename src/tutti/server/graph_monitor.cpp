@@ -9,6 +9,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/marginals.hpp"
+#include "tutti/server/odometry_honesty.hpp"
 #include "tutti/server/shape_uncertainty.hpp"
 
 namespace tutti::server {
@@ -76,6 +77,15 @@ std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& g
   return out;
 }
 
+/// Per edge: odometry counts as much as its closures show that it is worth.
+std::vector<double> honest_weights(const MapEstimate& map) {
+  const std::map<RobotId, double> factors = odometry_variance_factors(map);
+  std::vector<double> out(map.graph.edges.size(), 1.0);
+  for (std::size_t e = 0; e < map.odometry_edges; ++e)
+    out[e] = 1.0 / factors.at(map.nodes[map.graph.edges[e].from].id.robot);
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::vector<std::size_t>& chosen) {
@@ -124,7 +134,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
     for (const auto& [first, last] : repairs(map, robot, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
   }
-  const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches);
+  const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches, honest_weights(map));
   const std::vector<Matrix6d> covariances = posterior.relative_covariances();
 
   std::vector<consistency::ServerNode> nodes;

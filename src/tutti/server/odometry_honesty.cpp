@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/odometry_honesty.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace tutti::server {
+namespace {
+
+constexpr double kMedianChiSquare6 = 5.348;
+constexpr double kLeast = 0.04;
+constexpr std::size_t kEnough = 8;
+
+/// Odometry's covariance up to each of a robot's nodes, in the frame of the first; pieces without odometry between them
+/// are told apart.
+struct Chain {
+  struct Node {
+    Pose3 T_first_body;
+    Matrix6d covariance;
+    std::size_t piece = 0;
+  };
+  std::map<std::uint32_t, Node> nodes;  // by KeyframeId::index
+};
+
+Chain odometry_chain(const MapEstimate& map, RobotId robot) {
+  std::map<std::size_t, const PoseGraphEdge*> edge_to;  // by the node it ends at
+  for (std::size_t e = 0; e < map.odometry_edges; ++e) edge_to[map.graph.edges[e].to] = &map.graph.edges[e];
+  Chain chain;
+  Pose3 T_first_odom;
+  Matrix6d sum = Matrix6d::Zero();
+  std::size_t piece = 0;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const MapNode& node = map.nodes[i];
+    if (node.id.robot != robot) continue;
+    if (chain.nodes.empty()) T_first_odom = node.T_odom_body.inverse();
+    const Pose3 T_first_body = T_first_odom * node.T_odom_body;
+    if (const auto edge = edge_to.find(i); edge != edge_to.end()) {
+      const Matrix6d Ad = adjoint(T_first_body);
+      sum += Ad * edge->second->information.ldlt().solve(Matrix6d::Identity()) * Ad.transpose();
+    } else {
+      ++piece;
+    }
+    chain.nodes[node.id.index] = {T_first_body, sum, piece};
+  }
+  return chain;
+}
+
+/// T_a_b by odometry alone, with covariance (right tangent); nothing across a gap.
+std::optional<RelativePose> between(const Chain& chain, std::uint32_t from, std::uint32_t to) {
+  const auto a = chain.nodes.find(from);
+  const auto b = chain.nodes.find(to);
+  if (a == chain.nodes.end() || b == chain.nodes.end() || a->second.piece != b->second.piece) return std::nullopt;
+  const Matrix6d to_b = adjoint(b->second.T_first_body.inverse());
+  const double sign = from < to ? 1.0 : -1.0;
+  return RelativePose{a->second.T_first_body.inverse() * b->second.T_first_body,
+                      sign * to_b * (b->second.covariance - a->second.covariance) * to_b.transpose()};
+}
+
+RelativePose operator*(const RelativePose& a_b, const RelativePose& b_c) {
+  return {a_b.T_a_b * b_c.T_a_b, compound_covariance(b_c.T_a_b, a_b.covariance, b_c.covariance)};
+}
+
+/// Squared Mahalanobis distance of two ways to know one relative pose.
+double squared_distance(const RelativePose& one, const RelativePose& other) {
+  const Vector6d missed = local(one.T_a_b, other.T_a_b);
+  return missed.dot((one.covariance + other.covariance).ldlt().solve(missed));
+}
+
+/// The loop is about odometry more than about the closure.
+bool tells_of(const RelativePose& odometry, const RelativePose& closure) {
+  return odometry.covariance.topLeftCorner<3, 3>().trace() > closure.covariance.topLeftCorner<3, 3>().trace();
+}
+
+/// Closures between two robots, the end of `robot` first, in its order.
+std::vector<LoopClosure> closures_with(const MapEstimate& map, RobotId robot, RobotId other) {
+  std::vector<LoopClosure> out;
+  for (const JudgedClosure& judged : map.closures) {
+    LoopClosure closure = judged.closure;
+    if (!judged.accepted) continue;
+    if (closure.from.robot == other && closure.to.robot == robot) {
+      const Matrix6d Ad = adjoint(closure.measurement.T_a_b);
+      closure.measurement = {closure.measurement.T_a_b.inverse(), Ad * closure.measurement.covariance * Ad.transpose()};
+      std::swap(closure.from, closure.to);
+    }
+    if (closure.from.robot == robot && closure.to.robot == other) out.push_back(closure);
+  }
+  std::ranges::stable_sort(out, {}, [](const LoopClosure& c) { return c.from.index; });
+  return out;
+}
+
+}  // namespace
+
+std::map<RobotId, double> odometry_variance_factors(const MapEstimate& map) {
+  std::map<RobotId, Chain> chains;
+  for (const MapNode& node : map.nodes)
+    if (!chains.contains(node.id.robot)) chains.emplace(node.id.robot, odometry_chain(map, node.id.robot));
+  std::map<RobotId, std::vector<double>> squares;
+  for (const JudgedClosure& judged : map.closures) {
+    const auto& [from, to, measurement] = judged.closure;
+    if (!judged.accepted || from.robot != to.robot) continue;
+    const auto odometry = between(chains.at(from.robot), from.index, to.index);
+    if (odometry && tells_of(*odometry, measurement))
+      squares[from.robot].push_back(squared_distance(measurement, *odometry));
+  }
+  for (auto one = chains.begin(); one != chains.end(); ++one)
+    for (auto two = std::next(one); two != chains.end(); ++two) {
+      const std::vector<LoopClosure> closures = closures_with(map, one->first, two->first);
+      const std::size_t apart = closures.size() / 2;  // far apart: odometry, not the closures, is to be judged
+      for (std::size_t c = apart; c < closures.size(); ++c) {
+        const LoopClosure& first = closures[c - apart];
+        const auto of_one = between(one->second, first.from.index, closures[c].from.index);
+        const auto of_two = between(two->second, first.to.index, closures[c].to.index);
+        if (!of_one || !of_two || !tells_of(*of_one, first.measurement)) continue;
+        const double square = squared_distance(first.measurement * *of_two, *of_one * closures[c].measurement);
+        squares[one->first].push_back(square);
+        squares[two->first].push_back(square);
+      }
+    }
+  std::map<RobotId, double> factors;
+  for (const auto& [robot, chain] : chains) {
+    std::vector<double>& z = squares[robot];
+    factors[robot] = 1.0;
+    if (z.size() < kEnough) continue;
+    const auto middle = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2);
+    std::nth_element(z.begin(), middle, z.end());
+    factors[robot] = std::clamp(*middle / kMedianChiSquare6, kLeast, 1.0);
+  }
+  return factors;
+}
+
+}  // namespace tutti::server
