@@ -161,7 +161,7 @@ TEST(AdaptiveLoop, EndsNearTheServerWithFarFewerLinksThanNodes) {
                 result.onboard_m, result.corrected_m, result.agreement_m, result.constraints, result.replaced);
     EXPECT_GT(result.onboard_m, 0.3);
     EXPECT_LT(result.agreement_m, 0.036) << "seed " << seed;  // the server's own error
-    EXPECT_LE(result.constraints, 25U) << "seed " << seed;
+    EXPECT_LE(result.constraints, 40U) << "seed " << seed;
   }
 }
 

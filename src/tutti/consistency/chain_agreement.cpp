@@ -148,8 +148,8 @@ ChainAgreement::ChainAgreement(std::span<const std::size_t> ranks, const ShapeUn
   const double share = 0.5 * config.false_alarm_rate / ((doublings + 1.0) * (doublings + 2.0)) / (2.0 * bank_.scales());
   const double factor = chi_3_exceeded_with(share / static_cast<double>(n));
   for (int s = 0; s < bank_.scales(); ++s)
-    mean_square_(s) =
-        std::pow(kCalibration / factor, 2) * chi_square_exceeded_with(share, 3.0 * through.modes(s)) / through.modes(s);
+    mean_square_(s) = std::pow((shape->sag.empty() ? 1.0 : kCalibration) / factor, 2) *
+                      chi_square_exceeded_with(share, 3.0 * through.modes(s)) / through.modes(s);
   for (Eigen::Index k = 0; k < n; ++k) {
     Eigen::VectorXd position = through.whole * std::pow(shape->whole.position_m, 2);
     Eigen::VectorXd rotation = through.whole * std::pow(shape->whole.rotation_rad, 2);
