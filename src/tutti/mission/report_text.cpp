@@ -149,10 +149,12 @@ std::string explanation_lines(const MissionRecord& record) {
     if (robot.explanation && !robot.explanation->stamps.empty()) {
       const consistency::Explanation& e = *robot.explanation;
       const auto drift = std::count_if(e.origins.begin(), e.origins.end(), [](const auto& o) { return !o.alert; });
-      std::string text = e.disagrees() ? fmt::format("{}: odometry and map part by up to {} the threshold; {} of drift",
-                                                     robot.name, format_significance(largest_significance(e)),
-                                                     plural(static_cast<std::size_t>(drift), "suspected origin"))
+      std::string text = e.disagrees() ? fmt::format("{}: odometry and map part by up to {} the threshold", robot.name,
+                                                     format_significance(largest_significance(e)))
                                        : robot.name + ": odometry and map agree within what the server is sure of";
+      if (drift > 0)
+        text += fmt::format("; {} of drift that odometry's covariance allows for",
+                            plural(static_cast<std::size_t>(drift), "suspected origin"));
       if (policy != nullptr && policy->constraints_added == 0) text += "; nothing was added";
       out += wrap(text + ".", "  compare  ");
     }
