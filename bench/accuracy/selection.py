@@ -158,6 +158,8 @@ def main():
     parser.add_argument("--data")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="2 seeds, 3 budgets, no full missions: tests the script")
+    parser.add_argument("--seeds", type=int, default=10, help="of the budget curves and of what is held out")
+    parser.add_argument("--many", type=int, default=100, help="seeds where a rate is measured")
     parser.add_argument("--keep", metavar="FOLDER")
     arguments = parser.parse_args()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"

@@ -50,11 +50,11 @@ class Runs:
         self.arguments, self.folder = arguments, pathlib.Path(folder) / ("quick" if arguments.quick else "full")
         self.jobs = {}
         quick = arguments.quick
-        self.seeds = range(1, 3 if quick else 11)
-        self.real_seeds = range(1, 2 if quick else 4)
+        self.seeds = range(1, 3 if quick else arguments.seeds + 1)
+        self.real_seeds = range(1, 2 if quick else 1 + min(3, arguments.seeds))
         self.loop_seeds = {name: range(1, 2 if quick else 6 if name in SETS else 4) for name in SIMULATED}
-        self.many_seeds = range(1, 3 if quick else 101)
-        self.held_out_seeds = range(1001, 1003 if quick else 1011)
+        self.many_seeds = range(1, 3 if quick else arguments.many + 1)
+        self.held_out_seeds = range(1001, 1003 if quick else 1001 + arguments.seeds)
         self.budgets = [5, 25, 400] if quick else BUDGETS
         self.real = (["euroc_mh", "hku_two_sessions"] if quick else REAL) if arguments.data else []
         self.full = [] if quick else ["terrace", "tunnel"]
