@@ -95,8 +95,8 @@ ProxyGraph proxy_graph(const std::vector<Node>& nodes, const CompareTrajectories
                            .support = kFullySupported});
   graph.components = {{kRobot, 0}};
   ShapeUncertainty shape{.robot = kRobot, .whole = sigma, .sag = {}};
-  for (std::size_t length = 2 * ShapeUncertainty::kShortest; length < nodes.size(); length *= 2)
-    shape.sag.emplace_back((nodes.size() - 1) / length, sigma);
+  while (const std::size_t count = ShapeUncertainty::stretches(nodes.size(), shape.sag.size()))
+    shape.sag.emplace_back(count, sigma);
   graph.shapes = {shape};
   return graph;
 }

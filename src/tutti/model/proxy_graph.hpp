@@ -57,11 +57,15 @@ struct ShapeSigma {
 /// its rotation (rotation vector) less the mean over all of them; both in the axes of `world`.
 struct ShapeUncertainty {
   static constexpr std::size_t kShortest = 4;  ///< Half the length, in nodes, of the shortest stretches.
+  /// How many stretches of scale j fit into a robot's nodes: sag[j].size(); 0 = sag ends before j.
+  static constexpr std::size_t stretches(std::size_t nodes, std::size_t j) {
+    return nodes == 0 || j >= 32 ? 0 : (nodes - 1) / (2 * kShortest << j);
+  }
   RobotId robot;
   ShapeSigma whole;  ///< Root mean square of |x_k| over all nodes: the RMSE of the ATE that the server expects.
   /// sag[j][i]: of x_m - (x_a + x_b) / 2, what the middle of a stretch is off by when its ends are held, for the i-th
   /// stretch of 2 L nodes, L = kShortest 2^j: a = 2 L i, m = a + L, b = a + 2 L, counted along the robot's nodes in the
-  /// graph. As many j as fit; sag[j].size() = (nodes - 1) / (2 L).
+  /// graph. As many j as fit; sag[j].size() = (nodes - 1) / (2 L), see stretches().
   std::vector<std::vector<ShapeSigma>> sag;
   friend bool operator==(const ShapeUncertainty&, const ShapeUncertainty&) = default;
 };

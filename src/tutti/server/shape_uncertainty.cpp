@@ -45,8 +45,8 @@ struct Scatter {
   std::vector<std::vector<Eigen::Matrix3d>> of;  ///< As ShapeUncertainty::sag.
 
   explicit Scatter(std::size_t nodes) {
-    for (std::size_t L = ShapeUncertainty::kShortest; 2 * L < nodes; L *= 2)
-      of.emplace_back((nodes - 1) / (2 * L), Eigen::Matrix3d::Zero());
+    while (const std::size_t count = ShapeUncertainty::stretches(nodes, of.size()))
+      of.emplace_back(count, Eigen::Matrix3d::Zero());
   }
   void add(const Eigen::Matrix3Xd& x) {
     auto L = static_cast<Eigen::Index>(ShapeUncertainty::kShortest);

@@ -150,7 +150,7 @@ class ShapeColumns {
     const auto whole = code(coder, whole_, shape.whole, first);
     if (!whole) return std::nullopt;
     out.whole = *whole;
-    for (std::size_t j = 0; const std::size_t count = stretches(run.nodes, j); ++j) {
+    for (std::size_t j = 0; const std::size_t count = ShapeUncertainty::stretches(run.nodes, j); ++j) {
       SigmaCode previous = first;
       auto& scale = out.sag.emplace_back();
       for (std::size_t i = 0; i < count; ++i) {

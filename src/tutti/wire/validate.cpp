@@ -117,7 +117,7 @@ Status check_nodes(const ProxyGraph& graph) {
 Status check_shape(const ShapeUncertainty& shape, std::size_t nodes) {
   if (nodes == 0) return fail(ErrorCode::invalid, "the robot has no nodes");
   std::size_t scales = 0;
-  while (stretches(nodes, scales) > 0) ++scales;
+  while (ShapeUncertainty::stretches(nodes, scales) > 0) ++scales;
   if (shape.sag.size() != scales)
     return fail(ErrorCode::invalid, "{} scales, expected {} of {} nodes", shape.sag.size(), scales, nodes);
   const auto is_sigma = [](double value) { return std::isfinite(value) && value >= 0.0; };
@@ -128,9 +128,9 @@ Status check_shape(const ShapeUncertainty& shape, std::size_t nodes) {
   };
   if (auto ok = check(shape.whole); !ok) return ok;
   for (std::size_t j = 0; j < scales; ++j) {
-    if (shape.sag[j].size() != stretches(nodes, j))
+    if (shape.sag[j].size() != ShapeUncertainty::stretches(nodes, j))
       return fail(ErrorCode::invalid, "{} stretches of scale {}, expected {} of {} nodes", shape.sag[j].size(), j,
-                  stretches(nodes, j), nodes);
+                  ShapeUncertainty::stretches(nodes, j), nodes);
     for (const ShapeSigma& sigma : shape.sag[j])
       if (auto ok = check(sigma); !ok) return ok;
   }

@@ -9,13 +9,8 @@
 
 #include "tutti/model/proxy_graph.hpp"
 
-/// Sizes of a ShapeUncertainty, and its sigmas as one byte each.
+/// The sigmas of a ShapeUncertainty as one byte each.
 namespace tutti::wire {
-
-/// How many stretches of scale j fit into a robot's nodes: sag[j].size(); 0 = sag ends before j.
-inline std::size_t stretches(std::size_t nodes, std::size_t j) {
-  return nodes == 0 || j >= 32 ? 0 : (nodes - 1) / (2 * ShapeUncertainty::kShortest << j);
-}
 
 inline constexpr double kSmallestSigma = 1e-6;       ///< m or rad; smaller ones, but for 0, become this.
 inline constexpr double kSigmaRatio = 1.1;           ///< Of neighbouring codes: an error of at most 4.9 %.
