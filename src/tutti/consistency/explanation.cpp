@@ -47,8 +47,7 @@ Explanation explain(const ProxyGraph& graph, RobotId robot, std::span<const Robo
   out.position_m = std::move(raw.position_m);
   out.rotation_rad = std::move(raw.rotation_rad);
   out.significance = std::move(raw.significance);
-  const Eigen::MatrixXd off = PoseSignal().difference(chain.server, odometry);
-  out.aligned_rmse_m = std::sqrt(off.leftCols<3>().squaredNorm() / static_cast<double>(pairs.size()));
+  out.aligned_rmse_m = internal::aligned_rmse(chain.server, odometry);
   if (shape != nullptr) out.expected_rmse_m = shape->whole.position_m;
   if (!out.disagrees()) return out;  // nothing was born anywhere
   for (const internal::DriftStretch& stretch : internal::drift_stretches(chain, shape, config.false_alarm_rate)) {

@@ -26,10 +26,7 @@ Constraint in_time_order(Constraint constraint) {
   if (constraint.from_stamp <= constraint.to_stamp) return constraint;
   std::swap(constraint.from_stamp, constraint.to_stamp);
   std::swap(constraint.from, constraint.to);
-  auto& [T_a_b, covariance] = constraint.measurement;
-  const Matrix6d Ad = adjoint(T_a_b);  // the perturbation moves from frame b to frame a
-  covariance = Ad * covariance * Ad.transpose();
-  T_a_b = T_a_b.inverse();
+  constraint.measurement = inverse(constraint.measurement);
   return constraint;
 }
 

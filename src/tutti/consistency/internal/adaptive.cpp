@@ -8,7 +8,6 @@
 #include "tutti/consistency/internal/odometry_error.hpp"
 #include "tutti/consistency/internal/policies.hpp"
 #include "tutti/consistency/internal/time_chain.hpp"
-#include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::consistency::internal {
@@ -29,29 +28,11 @@ std::vector<Pose3> predicted(const TimeChain& chain, const JointPlan& plan) {
   return out;
 }
 
-/// Aligned RMSE, m.
-double rmse(const std::vector<Pose3>& server, const std::vector<Pose3>& robot) {
-  std::vector<Eigen::Vector3d> a, b;
-  for (const Pose3& T : server) a.push_back(T.translation);
-  for (const Pose3& T : robot) b.push_back(T.translation);
-  const Pose3 T = align_points(a, b);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - T * b[k]).squaredNorm();
-  return std::sqrt(sum / static_cast<double>(a.size()));
-}
-
 /// The joints of the links held, if these are a chain from one synchronised node to a later one.
 std::optional<Joints> held_joints(const PolicyInput& input) {
-  const auto& pairs = input.comparison.pairs;
   Joints joints;
-  const auto position = [&](Timestamp stamp) -> std::optional<std::size_t> {
-    const auto at =
-        std::ranges::lower_bound(pairs, stamp, {}, [&](const NodePair& p) { return input.nodes[p.robot].stamp; });
-    if (at == pairs.end() || input.nodes[at->robot].stamp != stamp) return std::nullopt;
-    return static_cast<std::size_t>(at - pairs.begin());
-  };
   for (const Constraint& held : input.ledger.constraints()) {
-    const auto a = position(held.from_stamp), b = position(held.to_stamp);
+    const auto a = node_at(input, held.from_stamp), b = node_at(input, held.to_stamp);
     if (!a || !b || (!joints.empty() && joints.back() != *a)) return std::nullopt;
     if (joints.empty()) joints.push_back(*a);
     joints.push_back(*b);
@@ -119,7 +100,8 @@ double typical_rmse(const ShapeUncertainty& shape) {
 
 bool AdaptivePolicy::disagree(const ChainAgreement& test, const TimeChain& chain, double expected_rmse_m) const {
   if (config_.adaptive.detection == "always") return true;
-  if (config_.adaptive.detection == "rmse") return rmse(chain.server, chain.robot) > kRmseFactor * expected_rmse_m;
+  if (config_.adaptive.detection == "rmse")
+    return aligned_rmse(chain.server, chain.robot) > kRmseFactor * expected_rmse_m;
   return test.compare(chain.server, chain.robot).disagrees();
 }
 
@@ -127,7 +109,7 @@ JointPlan AdaptivePolicy::plan(const TimeChain& chain, const OdometryError& fitt
                                std::size_t most, double least_gain) const {
   if (config_.adaptive.placement == "uniform") return uniform_plan(fitting, most, least_gain);
   const OdometryError placing(chain.server, chain.odometry, kPlacingLever_m);
-  JointPlan plan = fit_joints(fitting, plan_joints(placing, most, least_gain).joints);
+  JointPlan plan = fit_joints(fitting, place_joints(placing, most, least_gain));
   if (config_.adaptive.detection != "wavelets") return plan;
   // The sum of squares says little of what is large in one place or at one scale only; the wavelets do.
   while (plan.joints.size() <= most) {

@@ -113,7 +113,8 @@ JointPlan fit_joints(const OdometryError& error, std::vector<std::size_t> joints
   return out;
 }
 
-JointPlan plan_joints(const OdometryError& error, std::size_t max_links, double least_gain, std::size_t candidates) {
+std::vector<std::size_t> place_joints(const OdometryError& error, std::size_t max_links, double least_gain,
+                                      std::size_t candidates) {
   constexpr std::size_t kLookAhead = 3;  // one link may gain little where the next gains much
   if (error.size() == 0) return {};
   const std::vector<std::size_t> nodes = spread_evenly(error.size(), candidates);
@@ -131,7 +132,7 @@ JointPlan plan_joints(const OdometryError& error, std::size_t max_links, double 
     joints = segmentation.joints();
   }
   refine(error, joints, reach);
-  return fit_joints(error, std::move(joints));
+  return joints;
 }
 
 }  // namespace tutti::consistency::internal

@@ -35,6 +35,12 @@ OdometryError one_jump(std::size_t nodes, std::size_t step, const Pose3& jump) {
   return {server, odometry, kLever_m};
 }
 
+/// Placed and fitted by the same measure.
+JointPlan plan_joints(const OdometryError& error, std::size_t max_links, double least_gain,
+                      std::size_t candidates = 200) {
+  return fit_joints(error, place_joints(error, max_links, least_gain, candidates));
+}
+
 /// Summed squared error with these nodes held exactly where the server has them.
 double held_exactly(const OdometryError& error, const std::vector<std::size_t>& joints) {
   double sum = error.hanging(joints.front(), 0, joints.front());

@@ -3,9 +3,16 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 
 namespace tutti::consistency::internal {
+
+std::optional<std::size_t> node_at(const PolicyInput& input, Timestamp stamp) {
+  const auto& pairs = input.comparison.pairs;
+  const auto at =
+      std::ranges::lower_bound(pairs, stamp, {}, [&](const NodePair& pair) { return input.nodes[pair.robot].stamp; });
+  if (at == pairs.end() || input.nodes[at->robot].stamp != stamp) return std::nullopt;
+  return static_cast<std::size_t>(at - pairs.begin());
+}
 
 Neighbourhood::Neighbourhood(const PolicyInput& input, const PolicyConfig& config)
     : mid_hops_(static_cast<std::size_t>(config.mid_hops)),
@@ -68,16 +75,8 @@ LinkCollector::LinkCollector(const PolicyInput& input, const ConstraintConfig& c
   selection_.replaces_all = from_scratch && maker_.size() >= 2;
   if (from_scratch) return;
   held_ = input.ledger.size();
-  const auto& pairs = input.comparison.pairs;
-  const auto find = [&](Timestamp stamp) -> std::optional<std::size_t> {
-    const auto at = std::lower_bound(pairs.begin(), pairs.end(), stamp, [&](const NodePair& pair, Timestamp t) {
-      return input.nodes[pair.robot].stamp < t;
-    });
-    if (at == pairs.end() || input.nodes[at->robot].stamp != stamp) return std::nullopt;
-    return static_cast<std::size_t>(at - pairs.begin());
-  };
   for (const Constraint& held : input.ledger.constraints()) {
-    const auto a = find(held.from_stamp), b = find(held.to_stamp);
+    const auto a = node_at(input, held.from_stamp), b = node_at(input, held.to_stamp);
     if (!a || !b) continue;
     linked_.emplace(std::min(*a, *b), std::max(*a, *b));
     selection_.constraints.push_back(maker_.make(*a, *b, held.kind));

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -16,6 +17,9 @@ struct Link {
   std::size_t a = 0;
   std::size_t b = 0;
 };
+
+/// The synchronised node with this stamp.
+std::optional<std::size_t> node_at(const PolicyInput& input, Timestamp stamp);
 
 /// Which nodes a node is linked to, per kind (step 6 of the method).
 class Neighbourhood {

@@ -196,12 +196,7 @@ Vector6d OdometryError::at_node(std::size_t node, const Vector6d& offset) const 
   return out;
 }
 
-Vector6d OdometryError::missed(std::size_t a, std::size_t b) const {
-  const Vector6d rho = nodes_[b].E - nodes_[a].E;
-  Vector6d out;
-  out << lever(nodes_[b].x) * rho, rho.tail<3>();
-  return out;
-}
+Vector6d OdometryError::missed(std::size_t a, std::size_t b) const { return at_node(b, nodes_[b].E - nodes_[a].E); }
 
 Matrix6d OdometryError::missed_covariance(std::size_t a, std::size_t b) const {
   Matrix6d A = Matrix6d::Identity();

@@ -98,7 +98,7 @@ struct JointPlan;
 class OdometryError;
 
 /// Nothing while the robot's estimate differs from the server's only within the server's uncertainty (ChainAgreement).
-/// Once it has been told otherwise: the links that pay, bending raw odometry to the server's map (plan_joints: each
+/// Once it has been told otherwise: the links that pay, bending raw odometry to the server's map (place_joints: each
 /// lowers the summed squared disagreement by `least_gain` nodes' worth of the server's own variance), so that their
 /// lengths follow the scale of the disagreement and their ends lie where drift was born; and more where what is left
 /// stands out at any scale. Planned afresh at every update; held links stay, measured anew in the newest map, unless

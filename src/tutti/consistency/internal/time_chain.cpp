@@ -2,6 +2,9 @@
 #include "tutti/consistency/internal/time_chain.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "tutti/consistency/signal.hpp"
 
 namespace tutti::consistency::internal {
 
@@ -16,13 +19,16 @@ TimeChain time_chain(const ProxyGraph& graph, RobotId robot, std::span<const Rob
     chain.robot.push_back(nodes[pairs[k].robot].T_map_body);
     chain.ranks.push_back(pairs[k].proxy - static_cast<std::size_t>(first));
     RelativePose step{.covariance = Matrix6d::Zero()};
-    for (std::size_t n = k == 0 ? pairs[k].robot : pairs[k - 1].robot; n < pairs[k].robot; ++n) {
-      const RelativePose& next = nodes[n + 1].odometry;
-      step = {step.T_a_b * next.T_a_b, compound_covariance(next.T_a_b, step.covariance, next.covariance)};
-    }
+    for (std::size_t n = k == 0 ? pairs[k].robot : pairs[k - 1].robot; n < pairs[k].robot; ++n)
+      step = compound(step, nodes[n + 1].odometry);
     chain.odometry.push_back(step);
   }
   return chain;
+}
+
+double aligned_rmse(std::span<const Pose3> server, std::span<const Pose3> robot) {
+  const Eigen::MatrixXd off = PoseSignal().difference(server, robot);
+  return std::sqrt(off.leftCols<3>().squaredNorm() / static_cast<double>(server.size()));
 }
 
 const ShapeUncertainty* shape_of(const ProxyGraph& graph, RobotId robot) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "tutti/consistency/policy.hpp"
@@ -18,6 +19,9 @@ struct TimeChain {
 
 TimeChain time_chain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
                      std::span<const NodePair> pairs);
+
+/// Root mean square distance of the nodes after one rigid alignment, m; not empty.
+double aligned_rmse(std::span<const Pose3> server, std::span<const Pose3> robot);
 
 /// What the server says about this robot; null: nothing.
 const ShapeUncertainty* shape_of(const ProxyGraph& graph, RobotId robot);
