@@ -80,10 +80,8 @@ std::optional<Matrix6d> motion_covariance(const std::map<std::pair<std::size_t, 
     const PoseGraphEdge& edge = graph.edges[found->second];
     const Eigen::LLT<Matrix6d> information(edge.information);
     if (information.info() != Eigen::Success) continue;
-    const Matrix6d covariance = information.solve(Matrix6d::Identity());
-    if (forward) return covariance;
-    const Matrix6d Ad = adjoint(edge.T_from_to);  // the inverse's right perturbation
-    return Matrix6d(Ad * covariance * Ad.transpose());
+    const RelativePose motion{edge.T_from_to, information.solve(Matrix6d::Identity())};
+    return (forward ? motion : inverse(motion)).covariance;
   }
   return std::nullopt;
 }

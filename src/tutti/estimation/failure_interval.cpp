@@ -112,10 +112,8 @@ class Window {
     place_stations(T_odom_body, sightings);
     for (std::size_t s = 1; s < stations_.size(); ++s) {
       RelativePose step{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-      for (std::size_t k = stations_[s - 1].at; k < stations_[s].at; ++k) {
-        const Pose3 next = T_odom_body[k].inverse() * T_odom_body[k + 1];
-        step = {step.T_a_b * next, compound_covariance(next, step.covariance, step_covariance[k])};
-      }
+      for (std::size_t k = stations_[s - 1].at; k < stations_[s].at; ++k)
+        step = compound(step, {T_odom_body[k].inverse() * T_odom_body[k + 1], step_covariance[k]});
       steps_.push_back(step);
     }
     send_messages();

@@ -19,10 +19,7 @@ Rng any_rng() { return Rng(*rc::gen::arbitrary<std::uint32_t>()); }
 /// What odometry says of node `to` seen from node `from`.
 RelativePose odometry_between(const Mission& m, std::size_t from, std::size_t to) {
   RelativePose sum{.covariance = Matrix6d::Zero()};
-  for (std::size_t k = from; k < to; ++k) {
-    const RelativePose& step = m.odometry[k];
-    sum = {sum.T_a_b * step.T_a_b, compound_covariance(step.T_a_b, sum.covariance, step.covariance)};
-  }
+  for (std::size_t k = from; k < to; ++k) sum = compound(sum, m.odometry[k]);
   return sum;
 }
 

@@ -13,4 +13,15 @@ struct RelativePose {
   friend bool operator==(const RelativePose&, const RelativePose&) = default;
 };
 
+/// T_a_c from independent measurements of its parts, to first order.
+inline RelativePose compound(const RelativePose& a_b, const RelativePose& b_c) {
+  return {a_b.T_a_b * b_c.T_a_b, compound_covariance(b_c.T_a_b, a_b.covariance, b_c.covariance)};
+}
+
+/// T_b_a: (T Exp(xi))^-1 = T^-1 Exp(-Ad(T) xi), so the perturbation moves from frame b to frame a.
+inline RelativePose inverse(const RelativePose& a_b) {
+  const Matrix6d Ad = adjoint(a_b.T_a_b);
+  return {a_b.T_a_b.inverse(), Ad * a_b.covariance * Ad.transpose()};
+}
+
 }  // namespace tutti

@@ -37,10 +37,9 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const
   const auto keyframe = submaps_.add_odometry(stamp, T_odom_body, increment_covariance);
   if (!keyframe) return tl::unexpected(keyframe.error());
   if (state_.last_odometry) {
-    const Pose3 step = state_.last_odometry->inverse() * T_odom_body;
-    smoother_.append({step, increment_covariance});
-    state_.since_node = {state_.since_node.T_a_b * step,
-                         compound_covariance(step, state_.since_node.covariance, increment_covariance)};
+    const RelativePose step{state_.last_odometry->inverse() * T_odom_body, increment_covariance};
+    smoother_.append(step);
+    state_.since_node = compound(state_.since_node, step);
   } else {
     smoother_.set_first_pose(T_odom_body);
   }

@@ -52,8 +52,7 @@ Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, con
                   last.stamp.ns);
     const Pose3 step = last.pose.inverse() * T_odom_body;
     state_.distance_m += step.translation.norm();
-    state_.since_keyframe = {state_.since_keyframe.T_a_b * step,
-                             compound_covariance(step, state_.since_keyframe.covariance, increment_covariance)};
+    state_.since_keyframe = compound(state_.since_keyframe, {step, increment_covariance});
   }
   remember(stamp, T_odom_body);
   if (!is_keyframe(stamp, T_odom_body)) return std::optional<Keyframe>{};

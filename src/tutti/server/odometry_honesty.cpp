@@ -26,29 +26,32 @@ struct Chain {
     std::size_t piece = 0;
   };
   std::map<std::uint32_t, Node> nodes;  // by KeyframeId::index
+  Pose3 T_first_odom;
 };
 
-Chain odometry_chain(const MapEstimate& map, RobotId robot) {
-  std::map<std::size_t, const PoseGraphEdge*> edge_to;  // by the node it ends at
+std::map<RobotId, Chain> odometry_chains(const MapEstimate& map) {
+  std::vector<const PoseGraphEdge*> edge_to(map.nodes.size(), nullptr);  // the odometry that ends at a node
   for (std::size_t e = 0; e < map.odometry_edges; ++e) edge_to[map.graph.edges[e].to] = &map.graph.edges[e];
-  Chain chain;
-  Pose3 T_first_odom;
-  Matrix6d sum = Matrix6d::Zero();
-  std::size_t piece = 0;
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+  std::map<RobotId, Chain> chains;
+  Chain::Node last{.covariance = Matrix6d::Zero()};
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {  // sorted by robot and index
     const MapNode& node = map.nodes[i];
-    if (node.id.robot != robot) continue;
-    if (chain.nodes.empty()) T_first_odom = node.T_odom_body.inverse();
-    const Pose3 T_first_body = T_first_odom * node.T_odom_body;
-    if (const auto edge = edge_to.find(i); edge != edge_to.end()) {
-      const Matrix6d Ad = adjoint(T_first_body);
-      sum += Ad * edge->second->information.ldlt().solve(Matrix6d::Identity()) * Ad.transpose();
-    } else {
-      ++piece;
+    const auto [found, is_new] = chains.try_emplace(node.id.robot);
+    Chain& chain = found->second;
+    if (is_new) {
+      chain.T_first_odom = node.T_odom_body.inverse();
+      last = {.covariance = Matrix6d::Zero()};
     }
-    chain.nodes[node.id.index] = {T_first_body, sum, piece};
+    last.T_first_body = chain.T_first_odom * node.T_odom_body;
+    if (edge_to[i] != nullptr) {
+      const Matrix6d Ad = adjoint(last.T_first_body);
+      last.covariance += Ad * edge_to[i]->information.ldlt().solve(Matrix6d::Identity()) * Ad.transpose();
+    } else {
+      ++last.piece;
+    }
+    chain.nodes[node.id.index] = last;
   }
-  return chain;
+  return chains;
 }
 
 /// T_a_b by odometry alone, with covariance (right tangent); nothing across a gap.
@@ -60,10 +63,6 @@ std::optional<RelativePose> between(const Chain& chain, std::uint32_t from, std:
   const double sign = from < to ? 1.0 : -1.0;
   return RelativePose{a->second.T_first_body.inverse() * b->second.T_first_body,
                       sign * to_b * (b->second.covariance - a->second.covariance) * to_b.transpose()};
-}
-
-RelativePose operator*(const RelativePose& a_b, const RelativePose& b_c) {
-  return {a_b.T_a_b * b_c.T_a_b, compound_covariance(b_c.T_a_b, a_b.covariance, b_c.covariance)};
 }
 
 /// Squared Mahalanobis distance of two ways to know one relative pose.
@@ -84,8 +83,7 @@ std::vector<LoopClosure> closures_with(const MapEstimate& map, RobotId robot, Ro
     LoopClosure closure = judged.closure;
     if (!judged.accepted) continue;
     if (closure.from.robot == other && closure.to.robot == robot) {
-      const Matrix6d Ad = adjoint(closure.measurement.T_a_b);
-      closure.measurement = {closure.measurement.T_a_b.inverse(), Ad * closure.measurement.covariance * Ad.transpose()};
+      closure.measurement = inverse(closure.measurement);
       std::swap(closure.from, closure.to);
     }
     if (closure.from.robot == robot && closure.to.robot == other) out.push_back(closure);
@@ -97,9 +95,7 @@ std::vector<LoopClosure> closures_with(const MapEstimate& map, RobotId robot, Ro
 }  // namespace
 
 std::map<RobotId, double> odometry_variance_factors(const MapEstimate& map) {
-  std::map<RobotId, Chain> chains;
-  for (const MapNode& node : map.nodes)
-    if (!chains.contains(node.id.robot)) chains.emplace(node.id.robot, odometry_chain(map, node.id.robot));
+  const std::map<RobotId, Chain> chains = odometry_chains(map);
   std::map<RobotId, std::vector<double>> squares;
   for (const JudgedClosure& judged : map.closures) {
     const auto& [from, to, measurement] = judged.closure;
@@ -117,7 +113,8 @@ std::map<RobotId, double> odometry_variance_factors(const MapEstimate& map) {
         const auto of_one = between(one->second, first.from.index, closures[c].from.index);
         const auto of_two = between(two->second, first.to.index, closures[c].to.index);
         if (!of_one || !of_two || !tells_of(*of_one, first.measurement)) continue;
-        const double square = squared_distance(first.measurement * *of_two, *of_one * closures[c].measurement);
+        const double square =
+            squared_distance(compound(first.measurement, *of_two), compound(*of_one, closures[c].measurement));
         squares[one->first].push_back(square);
         squares[two->first].push_back(square);
       }

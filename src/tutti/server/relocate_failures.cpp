@@ -80,14 +80,14 @@ std::vector<PoseSighting> sightings_of(const Window& window, std::span<const Dou
   };
   std::vector<PoseSighting> out{end(window.from)};
   for (const LoopClosure& closure : closures) {
-    const auto& [T, covariance] = closure.measurement;
-    if (window.contains(closure.to) && is_known(closure.from)) {
-      out.push_back({closure.to.index - window.from, T_world_body(closure.from) * T, seen_from_map(covariance)});
-    } else if (window.contains(closure.from) && is_known(closure.to)) {
-      const Matrix6d back = adjoint(T);
-      out.push_back({closure.from.index - window.from, T_world_body(closure.to) * T.inverse(),
-                     seen_from_map(back * covariance * back.transpose())});
-    }
+    const auto add = [&](const KeyframeId& known, const KeyframeId& seen, const RelativePose& measurement) {
+      out.push_back(
+          {seen.index - window.from, T_world_body(known) * measurement.T_a_b, seen_from_map(measurement.covariance)});
+    };
+    if (window.contains(closure.to) && is_known(closure.from))
+      add(closure.from, closure.to, closure.measurement);
+    else if (window.contains(closure.from) && is_known(closure.to))
+      add(closure.to, closure.from, inverse(closure.measurement));
   }
   out.push_back(end(window.to));
   std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.at < b.at; });

@@ -128,8 +128,7 @@ inline CorridorRun corridor_run(const CorridorRunConfig& config, std::uint64_t s
     for (std::size_t k = 0; k < truth.size(); ++k) {
       if (k > 0) {
         const Pose3 step = simulated.odometry[k - 1].pose.inverse() * simulated.odometry[k].pose;
-        since = {since.T_a_b * step,
-                 compound_covariance(step, since.covariance, simulated.increment_covariance[k - 1])};
+        since = compound(since, {step, simulated.increment_covariance[k - 1]});
         if (since.T_a_b.translation.norm() < config.keyframe_m) continue;
         open.odometry.push_back(since);
         since = {.T_a_b = {}, .covariance = Matrix6d::Zero()};
