@@ -34,7 +34,7 @@ JointPosterior::JointPosterior(const PoseGraph& graph, std::span<const Pose3> po
   made->pairs.assign(pairs.begin(), pairs.end());
   internal::GaussNewton gauss_newton(graph, made->structure);
   gauss_newton.linearise(poses, {.loss = {}, .roles = {}, .scale = weights}, true);
-  if (gauss_newton.hessian().factorise()) made->factor = gauss_newton.hessian().take_factor();
+  if (gauss_newton.hessian().factorise()) made->factor = gauss_newton.hessian().factor();
   made->determined = made->factor.start.size() == static_cast<std::size_t>(6 * made->structure.variables + 1);
   factorised_ = std::move(made);
 }

@@ -130,19 +130,20 @@ bool BlockCholesky::pivots_are_sound() const {
   return true;
 }
 
-BlockCholesky::Columns BlockCholesky::take_factor() {
+BlockCholesky::Columns BlockCholesky::factor() {
   auto& c = *cholmod_;
   Columns out{.start = {0}, .row = {}, .value = {}};
-  if (c.factor == nullptr || cholmod_change_factor(CHOLMOD_REAL, /*to_ll=*/1, /*to_super=*/0, /*to_packed=*/1,
-                                                   /*to_monotonic=*/1, c.factor, &c.common) == 0)
-    return out;
-  const auto* start = static_cast<const int*>(c.factor->p);
-  const auto* row = static_cast<const int*>(c.factor->i);
-  const auto* value = static_cast<const double*>(c.factor->x);
-  out.start.assign(start, start + c.factor->n + 1);
-  out.row.assign(row, row + out.start.back());
-  out.value.assign(value, value + out.start.back());
-  cholmod_free_factor(&c.factor, &c.common);
+  cholmod_factor* copy = c.factor != nullptr ? cholmod_copy_factor(c.factor, &c.common) : nullptr;
+  if (copy != nullptr && cholmod_change_factor(CHOLMOD_REAL, /*to_ll=*/1, /*to_super=*/0, /*to_packed=*/1,
+                                               /*to_monotonic=*/1, copy, &c.common) != 0) {
+    const auto* start = static_cast<const int*>(copy->p);
+    const auto* row = static_cast<const int*>(copy->i);
+    const auto* value = static_cast<const double*>(copy->x);
+    out.start.assign(start, start + copy->n + 1);
+    out.row.assign(row, row + out.start.back());
+    out.value.assign(value, value + out.start.back());
+  }
+  if (copy != nullptr) cholmod_free_factor(&copy, &c.common);
   return out;
 }
 

@@ -40,12 +40,12 @@ class BlockCholesky {
   /// Overwrites b (rows: block_size x variables in elimination order) by H^-1 b. After a successful factorise() only.
   void solve(Eigen::Ref<Eigen::MatrixXd> b);
 
-  /// The factor L (L L^T = H, no permutation) by columns, rows sorted; empty on failure. Consumes the factor.
+  /// The factor L (L L^T = H, no permutation) by columns, rows sorted; empty on failure.
   struct Columns {
     std::vector<int> start, row;
     std::vector<double> value;
   };
-  [[nodiscard]] Columns take_factor();
+  [[nodiscard]] Columns factor();
 
  private:
   /// Columns of a block column are stored as one dense panel, blocks below each other, the diagonal block first.

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "tutti/model/pose_graph.hpp"
+
+namespace tutti::estimation {
+
+/// What becomes of the optimum when one edge is taken away.
+struct Influence {
+  std::size_t edge = 0;   ///< Into graph.edges.
+  double distance = 0.0;  ///< Mahalanobis length of `shift` in the covariance of all poses.
+  Eigen::VectorXd
+      shift;  ///< 6 per node, right tangents: the pose without the edge is retract(pose, shift), first order.
+};
+
+/// The edges among `candidates` whose absence moves the optimum `poses` farthest for what is known of it, at most
+/// `count`, farthest first. Case deletion (Cook, "Detection of influential observations in linear regression", 1977):
+/// with residual r, Jacobian J and information Omega of the edge, H the Hessian of all edges and C = J H^-1 J^T,
+///   shift = H^-1 J^T (Omega^-1 - C)^-1 r,   distance^2 = shift^T H shift,
+/// so one selected inverse serves all candidates, and one solution each the chosen ones. In directions in which nothing
+/// but the edge holds its two ends together it has no residual and, taken away, moves nothing. The first node of each
+/// connected component does not move. Empty for a graph that does not determine its poses.
+std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
+                                          std::span<const std::size_t> candidates, std::size_t count);
+
+}  // namespace tutti::estimation

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/influence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/estimation/testing/random_graphs.hpp"
+
+namespace tutti::estimation {
+namespace {
+
+using namespace testing;
+
+/// Solved to the last digit.
+std::vector<Pose3> optimum(const PoseGraph& graph) {
+  const auto result = solve_pose_graph(graph, {.relative_cost_tolerance = 1e-14});
+  EXPECT_TRUE(is_usable(result.summary.termination));
+  return result.poses;
+}
+
+std::vector<std::size_t> closures_of(const PoseGraph& graph) {
+  std::vector<std::size_t> out(graph.edges.size() - (graph.poses.size() - 1));
+  std::iota(out.begin(), out.end(), graph.poses.size() - 1);
+  return out;
+}
+
+PoseGraph without(PoseGraph graph, std::size_t edge) {
+  graph.edges.erase(graph.edges.begin() + static_cast<std::ptrdiff_t>(edge));
+  return graph;
+}
+
+TEST(Influence, IsWhatTakingTheEdgeAwayDoes) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    Rng rng(seed);
+    PoseGraph graph = random_graph(rng, 40, 6, 0.02).graph;
+    const std::vector<Pose3> poses = optimum(graph);
+    const auto influences = largest_influences(graph, poses, closures_of(graph), 3);
+    ASSERT_EQ(influences.size(), 3U);
+    for (const Influence& influence : influences) {
+      const PoseGraph less = without(graph, influence.edge);
+      const std::vector<Pose3> moved = optimum(less);
+      double off = 0.0, largest = 0.0;
+      for (std::size_t k = 0; k < poses.size(); ++k) {
+        const Vector6d truly = local(poses[k], moved[k]);
+        off = std::max(off, (truly - influence.shift.segment<6>(static_cast<Eigen::Index>(6 * k))).norm());
+        largest = std::max(largest, truly.norm());
+      }
+      EXPECT_LT(off, 0.05 * largest) << seed << " edge " << influence.edge;
+    }
+  }
+}
+
+TEST(Influence, TheFarthestComeFirstAndInTheirOwnMeasure) {
+  Rng rng(7);
+  PoseGraph graph = random_graph(rng, 60, 12, 0.05).graph;
+  graph.edges[64].T_from_to.translation.y() += 1.0;  // one of twelve is wrong
+  const std::vector<Pose3> poses = optimum(graph);
+  const auto all = largest_influences(graph, poses, closures_of(graph), 100);
+  ASSERT_EQ(all.size(), 12U);
+  EXPECT_EQ(all[0].edge, 64U);
+  for (std::size_t k = 1; k < all.size(); ++k) EXPECT_GE(all[k - 1].distance, all[k].distance);
+  const auto three = largest_influences(graph, poses, closures_of(graph), 3);
+  ASSERT_EQ(three.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(three[k].edge, all[k].edge);
+    // distance^2 = shift^T H shift, H the sum over all edges.
+    double energy = 0.0;
+    for (const PoseGraphEdge& edge : graph.edges) {
+      const auto factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
+      const auto of = [&](std::size_t node) { return three[k].shift.segment<6>(static_cast<Eigen::Index>(6 * node)); };
+      const Vector6d change = factor.J_i * of(edge.from) + factor.J_j * of(edge.to);
+      energy += change.dot(edge.information * change);
+    }
+    EXPECT_NEAR(three[k].distance, std::sqrt(energy), 1e-6 * three[k].distance);
+  }
+}
+
+TEST(Influence, AnEdgeThatAloneHoldsItsEndsTogetherMovesNothing) {
+  Rng rng(3);
+  const PoseGraph graph = random_graph(rng, 20, 0, 0.1).graph;  // a chain
+  const std::vector<Pose3> poses = optimum(graph);
+  const std::vector<std::size_t> steps{0, 7, 18};
+  for (const Influence& influence : largest_influences(graph, poses, steps, 3)) {
+    EXPECT_LT(influence.distance, 1e-6);
+    EXPECT_LT(influence.shift.norm(), 1e-6);
+  }
+}
+
+TEST(Influence, NothingToSay) {
+  Rng rng(3);
+  PoseGraph graph = random_graph(rng, 20, 2, 0.1).graph;
+  const std::vector<std::size_t> none;
+  EXPECT_TRUE(largest_influences(graph, graph.poses, none, 3).empty());
+  EXPECT_TRUE(largest_influences(graph, graph.poses, closures_of(graph), 0).empty());
+  for (PoseGraphEdge& edge : graph.edges) edge.information.setZero();
+  EXPECT_TRUE(largest_influences(graph, graph.poses, closures_of(graph), 3).empty());
+}
+
+}  // namespace
+}  // namespace tutti::estimation
