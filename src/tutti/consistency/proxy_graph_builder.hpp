@@ -27,6 +27,7 @@ struct ProxyGraphConfig {
   std::string reducer = "budget";
   double sparsify_threshold = 1e-3;
   int shape_samples = 32;
+  int shape_deletions = 32;
 
   template <class V>
   void describe(V& v) {
@@ -43,6 +44,9 @@ struct ProxyGraphConfig {
             "Drop a reduced edge whose weight is below this fraction of the largest; 0 = keep all.");
     v.field("shape_samples", shape_samples, between(0.0, 10'000.0),
             "Samples from which the server learns how sure it is of each trajectory's shape; 0 = do not send it.");
+    v.field("shape_deletions", shape_deletions, between(0.0, 10'000.0),
+            "And that any one closure may be wrong: how many, of those that the map hinges on most, are taken away one "
+            "by one to see what would change; 0 = none.");
   }
 };
 

@@ -54,7 +54,8 @@ struct ShapeSigma {
 
 /// How sure the server is of the shape of one robot's trajectory, stretch by stretch and over all. Let x_k be what the
 /// estimate of the robot's k-th proxy node is off by: its position after one rigid alignment of all the robot's nodes,
-/// its rotation (rotation vector) less the mean over all of them; both in the axes of `world`.
+/// its rotation (rotation vector) less the mean over all of them; both in the axes of `world`. Any one closure may be
+/// wrong: what would change without the one that matters most counts as uncertainty too (docs/math.md).
 struct ShapeUncertainty {
   static constexpr std::size_t kShortest = 4;  ///< Half the length, in nodes, of the shortest stretches.
   /// How many stretches of scale j fit into a robot's nodes: sag[j].size(); 0 = sag ends before j.

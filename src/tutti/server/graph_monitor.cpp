@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <span>
 #include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/server/odometry_honesty.hpp"
 #include "tutti/server/shape_uncertainty.hpp"
@@ -52,10 +54,26 @@ std::vector<Repair> repairs(const MapEstimate& map, RobotId robot, const std::ve
   return out;
 }
 
+/// By how much the nodes would move without the one or the other accepted closure, for those that move the map most:
+/// (6 nodes) x closures, right tangents.
+Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const std::vector<std::size_t>& nodes,
+                                         std::size_t count) {
+  std::vector<std::size_t> closures(map.graph.edges.size() - map.odometry_edges);
+  std::iota(closures.begin(), closures.end(), map.odometry_edges);
+  const auto influences = estimation::largest_influences(map.graph, map.graph.poses, closures, count);
+  Eigen::MatrixXd out(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(influences.size()));
+  for (Eigen::Index c = 0; c < out.cols(); ++c)
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      out.col(c).segment<6>(static_cast<Eigen::Index>(6 * k)) =
+          influences[static_cast<std::size_t>(c)].shift.segment<6>(static_cast<Eigen::Index>(6 * nodes[k]));
+  return out;
+}
+
 /// Of every robot's nodes in the graph. The random numbers are always the same: the result is a function of the map.
 std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& graph,
                                      const std::map<RobotId, std::vector<std::size_t>>& chosen,
-                                     const estimation::JointPosterior& posterior, std::size_t count) {
+                                     const estimation::JointPosterior& posterior,
+                                     const consistency::ProxyGraphConfig& config) {
   std::vector<std::size_t> kept;  // indices into map.nodes of graph.nodes
   for (const auto& [robot, nodes] : chosen)
     for (const std::size_t i : nodes)
@@ -63,16 +81,17 @@ std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& g
           graph.nodes[kept.size()].stamp == map.nodes[i].stamp)
         kept.push_back(i);
   TUTTI_CHECK(kept.size() == graph.nodes.size(), "{} of {} nodes found", kept.size(), graph.nodes.size());
-  const Eigen::MatrixXd samples = posterior.samples(kept, count, Rng(0).fork("shape"));
+  const Eigen::MatrixXd samples =
+      posterior.samples(kept, static_cast<std::size_t>(config.shape_samples), Rng(0).fork("shape"));
   std::vector<ShapeUncertainty> out;
   if (!samples.allFinite()) return out;
+  const Eigen::MatrixXd shifts = shifts_without_a_closure(map, kept, static_cast<std::size_t>(config.shape_deletions));
   for (std::size_t begin = 0, end = 0; begin < kept.size(); begin = end) {
     const RobotId robot = graph.nodes[begin].robot;
     std::vector<Pose3> poses;
     for (; end < kept.size() && graph.nodes[end].robot == robot; ++end) poses.push_back(graph.nodes[end].T_world_body);
-    out.push_back(shape_uncertainty(
-        robot, poses,
-        samples.middleRows(static_cast<Eigen::Index>(6 * begin), static_cast<Eigen::Index>(6 * (end - begin)))));
+    const auto first = static_cast<Eigen::Index>(6 * begin), rows = static_cast<Eigen::Index>(6 * (end - begin));
+    out.push_back(shape_uncertainty(robot, poses, samples.middleRows(first, rows), shifts.middleRows(first, rows)));
   }
   return out;
 }
@@ -166,8 +185,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     }
   }
   ProxyGraph graph = consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
-  if (config.shape_samples > 0)
-    graph.shapes = shapes(map, graph, chosen, posterior, static_cast<std::size_t>(config.shape_samples));
+  if (config.shape_samples > 0) graph.shapes = shapes(map, graph, chosen, posterior, config);
   return graph;
 }
 

@@ -115,6 +115,49 @@ TEST(MonitorGraph, ShapesAreThoseOfTheNodesSent) {
   EXPECT_TRUE(monitor_graph(map, 1, {.shape_samples = 0}).shapes.empty());
 }
 
+/// Root mean square of how far one robot's representative nodes lie from where they lie in another map, aligned.
+double moved_m(const MapEstimate& map, const MapEstimate& other, RobotId robot) {
+  std::vector<Eigen::Vector3d> a, b;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (map.nodes[i].id.robot != robot || !map.nodes[i].representative) continue;
+    a.push_back(map.nodes[i].T_world_body.translation);
+    b.push_back(other.nodes[i].T_world_body.translation);
+  }
+  const Pose3 T = align_points(a, b);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - T * b[k]).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(a.size()));
+}
+
+TEST(MonitorGraph, WhatHingesOnOneClosureIsNotSure) {
+  const RobotId robot{0};
+  SubmapSet submaps;
+  for (Submap& submap : test::make_submaps(robot, {.sigma_m = 0.1, .sigma_rad = 0.02}, Rng(4)))
+    submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
+  const test::TestFinder finder(4);
+  VerdictSet all;
+  for (auto a = submaps.begin(); a != submaps.end(); ++a)
+    for (auto b = std::next(a); b != submaps.end(); ++b)
+      if (finder.is_candidate(*a->second, *b->second))
+        all[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+  ASSERT_GT(all.size(), 2U);
+  const auto expected_m = [](const MapEstimate& map, int deletions) {
+    return monitor_graph(map, 1, {.shape_deletions = deletions}).shapes.at(0).whole.position_m;
+  };
+  const MapEstimate open = estimate_map(submaps, {}, {});
+  // A lone closure, and wrong: what it moved the map by is in doubt.
+  VerdictSet lone{*all.rbegin()};
+  lone.begin()->second.closures[0].measurement.T_a_b.translation.x() += 2.0;
+  const MapEstimate bent = estimate_map(submaps, lone, {});
+  const double moved = moved_m(bent, open, robot);
+  ASSERT_GT(moved, 0.3);
+  EXPECT_LT(expected_m(bent, 0), 0.7 * moved);
+  EXPECT_NEAR(expected_m(bent, 32), std::hypot(expected_m(bent, 0), moved), 0.2 * moved);
+  // Closures that agree: the map moved as far, and is sure of it.
+  const MapEstimate closed = estimate_map(submaps, all, {});
+  EXPECT_LT(expected_m(closed, 32), 1.5 * expected_m(closed, 0));
+}
+
 TEST(MonitorGraph, DoesNotClaimAShapeThatTheMapLeavesOpen) {
   MapEstimate map;
   for (std::uint32_t k = 0; k < 2; ++k)
@@ -170,7 +213,7 @@ TEST(MonitorGraph, TheExpectedErrorIsTheTrueOne) {
   std::vector<Ratio> sag_m(3), sag_rad(3);
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const MapEstimate map = circle_map(seed);
-    for (const ShapeUncertainty& shape : monitor_graph(map, 1, {.shape_samples = 128}).shapes) {
+    for (const ShapeUncertainty& shape : monitor_graph(map, 1, {.shape_samples = 128, .shape_deletions = 0}).shapes) {
       const auto [x_m, x_rad] = true_errors(map, shape.robot);
       for (std::size_t k = 0; k < x_m.size(); ++k) {
         whole_m.add(x_m[k], shape.whole.position_m);

@@ -189,6 +189,31 @@ TEST(ShapeUncertainty, IgnoresHowTheWholeMoves) {
     for (const ShapeSigma& sag : stretches) EXPECT_LT(sag.position_m + sag.rotation_rad, 1e-12);
 }
 
+TEST(ShapeUncertainty, TheLargestMoveWithoutAClosureCounts) {
+  const PoseGraph graph = chain(40, 0.02, 0.004, true);
+  const auto n = static_cast<Eigen::Index>(graph.poses.size());
+  std::vector<std::size_t> nodes(graph.poses.size());
+  std::iota(nodes.begin(), nodes.end(), std::size_t{0});
+  const Eigen::MatrixXd samples = estimation::JointPosterior(graph, graph.poses).samples(nodes, 100, Rng(1));
+  const ShapeUncertainty surely = shape_uncertainty(kRobot, graph.poses, samples);
+  // One closure pulls node 12 aside by 0.3 m, the middle of stretch 1 of 8 nodes, another one by 0.1 m; a third moves
+  // the whole robot.
+  Eigen::MatrixXd shifts = Eigen::MatrixXd::Zero(6 * n, 3);
+  shifts(6 * 12, 0) = 0.3;
+  shifts(6 * 12, 1) = 0.1;
+  for (Eigen::Index k = 0; k < n; ++k)
+    shifts.col(2).segment<3>(6 * k) =
+        graph.poses[static_cast<std::size_t>(k)].rotation.conjugate() * Eigen::Vector3d(1.0, 2.0, 3.0);
+  const ShapeUncertainty shape = shape_uncertainty(kRobot, graph.poses, samples, shifts);
+  EXPECT_NEAR(shape.whole.position_m, std::hypot(surely.whole.position_m, 0.3 / std::sqrt(40.0)), 0.003);
+  EXPECT_DOUBLE_EQ(shape.whole.rotation_rad, surely.whole.rotation_rad);
+  for (std::size_t i = 0; i < shape.sag[0].size(); ++i) {
+    // The alignment spreads a little of it over the whole.
+    EXPECT_NEAR(shape.sag[0][i].position_m, std::hypot(surely.sag[0][i].position_m, i == 1 ? 0.3 : 0.0), 0.003) << i;
+    EXPECT_DOUBLE_EQ(shape.sag[0][i].rotation_rad, surely.sag[0][i].rotation_rad) << i;
+  }
+}
+
 TEST(ShapeUncertainty, DegenerateShapes) {
   const ShapeUncertainty one = shape_of(chain(1, 0.02, 0.004, false), 10);
   EXPECT_EQ(one.robot, kRobot);
