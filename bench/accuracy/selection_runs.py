@@ -103,6 +103,8 @@ class Runs:
                 self.mission(f"loop_{name}", name, seed, [])
         for seed in self.seeds:
             self.curves("loops_revision", "revision", seed, [], [DEFAULT, "spectral", "every_node"], closed_loop=True)
+            self.curves("loops_trusting_revision", "revision", seed, ["server.proxy_graph.shape_deletions=0"],
+                        closed_loop=True)
         for seed in self.many_seeds:
             self.curves("loops_agree", "agree", seed, [], closed_loop=True)
             for name in ("agree", "spin", "height", "terrace", "degenerate"):
