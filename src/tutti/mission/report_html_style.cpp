@@ -58,8 +58,8 @@ figcaption b { color: var(--ink); font-size: 15px; margin-right: 8px; }
 .colourbar { max-width: 560px; margin: -6px 0 10px; } .colourbar svg { display: block; width: 100%; }
 .scroll { overflow-x: auto; background: var(--card); border: 1px solid var(--line); border-radius: 14px; padding: 4px 14px; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 14px; }
-th { font-weight: 600; color: var(--soft); font-size: 12.5px; text-align: right; padding: 9px 10px 7px; white-space: nowrap; }
-td { text-align: right; padding: 6px 10px; border-top: 1px solid var(--line); white-space: nowrap; }
+th { font-weight: 600; color: var(--soft); font-size: 12.5px; text-align: right; padding: 9px 9px 7px; vertical-align: bottom; }
+td { text-align: right; padding: 6px 9px; border-top: 1px solid var(--line); white-space: nowrap; }
 th.left, td.left { text-align: left; }
 tr.group td { border-top: 2px solid var(--line); font-weight: 650; padding-top: 12px; }
 tr.chosen td { background: color-mix(in srgb, var(--accent) 9%, transparent); font-weight: 600; }
@@ -126,7 +126,7 @@ rect.truth.slip { fill: var(--slip); } rect.truth.degeneracy { fill: var(--degen
 .robots .what small { font-weight: 400; color: var(--soft); margin-left: 6px; } .robots .value .up { color: var(--onboard); }
 .robots .value .down { color: var(--corrected); } .robots .detail b { color: var(--ink); }
 .node { stroke-width: 4.4; stroke-opacity: 0.85; }
-@media (max-width: 1120px) { table { font-size: 13px; } th, td { padding-left: 6px; padding-right: 6px; } th { white-space: normal; } td .track { width: 40px; } }
+@media (max-width: 1240px) { table { font-size: 13px; } th, td { padding-left: 6px; padding-right: 6px; } td .track { width: 40px; } }
 @media print { main { max-width: none; padding: 0; } figure, .card, .scroll { break-inside: avoid; } }
 )css";
 
