@@ -103,8 +103,9 @@ def curves_section(runs, results):
             "The server makes its map of the whole mission; every policy answers this one map from raw odometry, with "
             "every budget. RMSE",
             "in metres after one rigid alignment, at keyframes; medians over seeds, for the default with quartiles. "
-            f"{len(runs.seeds)} seeds; real recordings {len(runs.real_seeds)}",
-            "(of the closures' errors and drawn frames: the recordings do not change). `every_node` takes no budget and "
+            f"{len(runs.seeds)} seeds; the HKU recordings",
+            f"{len(runs.real_seeds['hku_degraded'])} (of the closures' errors and drawn frames: recordings do not change). "
+            "`every_node` takes no budget and "
             "has one figure,",
             "by its own rule: a link to every proxy node. `uniform` and `random` by their own rule hold 25. All figures "
             "with quartiles, and",
