@@ -14,6 +14,7 @@
 #include <string>
 
 #include "tunnel_chain.hpp"
+#include "tutti/estimation/internal/gauss_newton.hpp"
 #include "tutti/estimation/internal/odometry_runs.hpp"
 #include "tutti/estimation/internal/reduced_problem.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
@@ -164,7 +165,7 @@ void batches(const TunnelChain& chain, int repetitions) {
             draw();
           },
           [&] {
-            smoother.set_constraints(constraints);
+            smoother.set_constraints(std::move(constraints));
             summary = smoother.solve();
             bent += static_cast<double>(summary.bent_poses) / repetitions;
           });
@@ -221,19 +222,31 @@ void parts(const TunnelChain& chain, int repetitions) {
     runs = {};
     runs.update(nodes, chain.odometry);
   });
-  ChainGraph graph;
-  row("build the reduced graph", [&] { graph = reduce(nodes, runs.all(), chain.constraints, chain.truth.front()); });
-  row("analyse its sparsity", [&] { ReducedProblem{graph}; });
-  ReducedProblem problem(graph);
-  GaussNewton& gauss_newton = problem.gauss_newton();
-  std::vector<Pose3> reduced = graph.graph.poses;
-  gauss_newton.minimise(reduced, {}, {});
-  row("residuals and Hessian", [&] { gauss_newton.linearise(reduced, {}, true); });
-  row("residuals alone", [&] { gauss_newton.linearise(reduced, {}, false); });
-  row("residuals, Hessian and its Cholesky factor",
-      [&] { gauss_newton.linearise(reduced, {}, true), (void)gauss_newton.hessian().factorise(); });
+  const auto update = [&](ReducedProblem& problem) {
+    problem.update(nodes, runs.all(), chain.constraints, chain.truth.front());
+  };
+  ReducedProblem problem;
+  row("build the reduced graph and order it", [&] { problem = {}, update(problem); });
+  row("build the same again", [&] { update(problem); });
+  std::vector<Pose3> reduced = problem.graph().poses;
+  minimise(problem, reduced, {}, {});
+  const std::vector<Pose3> raw = problem.graph().poses;
+  bool moved = false;
+  const auto all_anew = [&] {
+    moved = !moved;
+    const auto& poses = moved ? raw : reduced;
+    (void)problem.cost(poses, {});
+    problem.linearise(poses, {}, true);
+  };
+  row("residuals and Jacobians", all_anew);
+  row("residuals, Jacobians and Cholesky factor of all", [&] { all_anew(), (void)problem.factorise(); });
+  row("the same where nothing changed", [&] {
+    (void)problem.cost(raw, {});
+    problem.linearise(raw, {}, true);
+    (void)problem.factorise();
+  });
   Eigen::VectorXd b = Eigen::VectorXd::Ones(6 * static_cast<Eigen::Index>(nodes.size() - 1));
-  row("solve with it", [&] { gauss_newton.hessian().solve(b); });
+  row("solve with it", [&] { problem.solve(b); });
   std::vector<Pose3> poses(chain.truth.size());
   row("bend all inner poses", [&] {
     runs.forget_bends();

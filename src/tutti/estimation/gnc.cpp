@@ -11,6 +11,7 @@
 #include "tutti/estimation/internal/chain_reduction.hpp"
 #include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/estimation/internal/graph_equations.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -53,7 +54,7 @@ GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<co
   if (worst <= c2) return out;  // nothing to reject
 
   const auto structure = internal::analyse_blocks(graph);
-  internal::GaussNewton gauss_newton(graph, structure);
+  internal::GraphEquations equations(graph, structure);
   std::vector<double> scale(edges, 1.0);
   const internal::EdgeCosts costs{.loss = {}, .roles = roles, .scale = scale};
   inner.relative_cost_tolerance = std::max(kInnerTolerance, config.solver.relative_cost_tolerance);
@@ -68,7 +69,7 @@ GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<co
       scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
     }
     if (binary) inner = config.solver;
-    out.solution.summary = gauss_newton.minimise(out.solution.poses, costs, inner);
+    out.solution.summary = internal::minimise(equations, out.solution.poses, costs, inner);
     if (!is_usable(out.solution.summary.termination)) return out;
     mu *= config.control_step;
   }
@@ -102,9 +103,9 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
   out.solution.weights = out.inlier_weight;
   internal::expand_chains(graph, reduced, reduced_poses, out.solution.poses);
   const auto structure = internal::analyse_blocks(graph);
-  internal::GaussNewton gauss_newton(graph, structure);
+  internal::GraphEquations equations(graph, structure);
   out.solution.summary =
-      gauss_newton.minimise(out.solution.poses, {.loss = {}, .roles = roles, .scale = scale}, config.solver);
+      internal::minimise(equations, out.solution.poses, {.loss = {}, .roles = roles, .scale = scale}, config.solver);
   return out;
 }
 

@@ -8,7 +8,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
-#include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/estimation/internal/graph_equations.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
 
 namespace tutti::estimation {
@@ -66,11 +66,11 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
                                           std::span<const std::size_t> candidates, std::size_t count) {
   TUTTI_CHECK(poses.size() == graph.poses.size(), "{} poses, {} nodes", poses.size(), graph.poses.size());
   const BlockStructure structure = internal::analyse_blocks(graph);
-  internal::GaussNewton gauss_newton(graph, structure);
-  gauss_newton.linearise(poses, {}, true);
-  if (candidates.empty() || count == 0 || structure.variables == 0 || !gauss_newton.hessian().factorise()) return {};
+  internal::GraphEquations equations(graph, structure);
+  equations.linearise(poses, {}, true);
+  if (candidates.empty() || count == 0 || structure.variables == 0 || !equations.hessian().factorise()) return {};
   std::vector<Pull> pulls;
-  const SelectedInverse inverse(gauss_newton.hessian().factor());
+  const SelectedInverse inverse(equations.hessian().factor());
   for (const std::size_t e : candidates) {
     TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
     pulls.push_back(pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, structure.edges[e])));
@@ -85,7 +85,7 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
     if (slot.from >= 0) column.segment<6>(6 * slot.from) = pulls[k].force.head<6>();
     if (slot.to >= 0) column.segment<6>(6 * slot.to) = pulls[k].force.tail<6>();
   }
-  gauss_newton.hessian().solve(shifts);
+  equations.hessian().solve(shifts);
 
   std::vector<Influence> out;
   for (std::size_t k = 0; k < pulls.size(); ++k) {

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "tutti/base/check.hpp"
-#include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/estimation/internal/graph_equations.hpp"
 #include "tutti/estimation/internal/posterior_samples.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
 
@@ -32,9 +32,9 @@ JointPosterior::JointPosterior(const PoseGraph& graph, std::span<const Pose3> po
   made->structure = internal::analyse_blocks(graph, pairs);
   made->poses.assign(poses.begin(), poses.end());
   made->pairs.assign(pairs.begin(), pairs.end());
-  internal::GaussNewton gauss_newton(graph, made->structure);
-  gauss_newton.linearise(poses, {.loss = {}, .roles = {}, .scale = weights}, true);
-  if (gauss_newton.hessian().factorise()) made->factor = gauss_newton.hessian().factor();
+  internal::GraphEquations equations(graph, made->structure);
+  equations.linearise(poses, {.loss = {}, .roles = {}, .scale = weights}, true);
+  if (equations.hessian().factorise()) made->factor = equations.hessian().factor();
   made->determined = made->factor.start.size() == static_cast<std::size_t>(6 * made->structure.variables + 1);
   factorised_ = std::move(made);
 }

@@ -6,6 +6,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/internal/block_structure.hpp"
 #include "tutti/estimation/internal/doubt.hpp"
 #include "tutti/estimation/internal/full_step.hpp"
 #include "tutti/estimation/internal/odometry_runs.hpp"
@@ -33,7 +34,11 @@ bool is_nearby(const PoseGraph& graph, std::span<const EdgeRole> roles, const st
 }  // namespace
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, const Pose3& first)
-    : config_(config), state_{.first = first}, poses_{first}, runs_(std::make_unique<internal::OdometryRuns>()) {}
+    : config_(config),
+      state_{.first = first},
+      poses_{first},
+      runs_(std::make_unique<internal::OdometryRuns>()),
+      problem_(std::make_unique<internal::ReducedProblem>()) {}
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state)
     : OnboardSmoother(config, state.first) {
@@ -73,15 +78,13 @@ SmootherSummary OnboardSmoother::solve() {
   SmootherSummary summary;
   auto nodes = internal::reduced_nodes(state_.constraints);
   summary.compounded_steps = runs_->update(nodes, state_.odometry);
-  auto graph = internal::reduce(std::move(nodes), runs_->all(), state_.constraints, state_.first);
-  summary.reduced_nodes = graph.graph.poses.size();
-  summary.reduced_edges = graph.graph.edges.size();
-  if (!internal::is_finite(graph.graph)) {
+  summary.analysed = problem_->update(std::move(nodes), runs_->all(), state_.constraints, state_.first);
+  summary.reduced_nodes = problem_->graph().poses.size();
+  summary.reduced_edges = problem_->graph().edges.size();
+  if (!internal::is_finite(problem_->graph())) {
     summary.termination = Termination::invalid_input;
     return summary;
   }
-  summary.analysed = problem_ == nullptr || !problem_->assign(graph);
-  if (summary.analysed) problem_ = std::make_unique<internal::ReducedProblem>(std::move(graph));
 
   std::vector<Pose3> reduced;
   const auto result = minimise(reduced);
@@ -96,15 +99,15 @@ SmootherSummary OnboardSmoother::solve() {
 
 /// From the last poses, or, when these are far off or lead nowhere, from raw odometry.
 internal::DoubtingSummary OnboardSmoother::minimise(std::vector<Pose3>& reduced) {
-  const auto& [nodes, graph, all_roles, edges] = problem_->reduced();
+  const auto& nodes = problem_->reduced().nodes;
+  const PoseGraph& graph = problem_->graph();
   const RobustLoss loss{loss_kind(config_.loss), config_.loss_scale};
   std::span<const EdgeRole> roles;
-  if (loss.kind != LossKind::none) roles = all_roles;
+  if (loss.kind != LossKind::none) roles = problem_->reduced().roles;
   const auto minimise = [&] {
     const SolverConfig solver{.max_iterations = config_.max_iterations,
                               .relative_cost_tolerance = config_.relative_cost_tolerance};
-    return internal::minimise_doubting(problem_->gauss_newton(), roles, loss, solver,
-                                       {.step_tolerance = kStepTolerance}, reduced);
+    return internal::minimise_doubting(*problem_, roles, loss, solver, {.step_tolerance = kStepTolerance}, reduced);
   };
   for (const std::size_t node : nodes) reduced.push_back(poses_[node]);
   if (is_nearby(graph, roles, reduced))
@@ -115,12 +118,12 @@ internal::DoubtingSummary OnboardSmoother::minimise(std::vector<Pose3>& reduced)
 
 /// Makes every pose of the chain follow the reduced nodes.
 void OnboardSmoother::place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary) {
-  const auto& [nodes, graph, roles, edges] = problem_->reduced();
+  const internal::ChainGraph& reduced_graph = problem_->reduced();
   const internal::EdgeCosts costs{
       .loss = loss_applied ? RobustLoss{loss_kind(config_.loss), config_.loss_scale} : RobustLoss{},
-      .roles = roles,
+      .roles = reduced_graph.roles,
       .scale = {}};
-  const std::size_t last = nodes.back();
+  const std::size_t last = reduced_graph.nodes.back();
   const Pose3 last_before = poses_[last];
   summary.bent_poses = runs_->place(reduced, state_.odometry, poses_);
   for (int k = 0; k < config_.polishing_steps; ++k) {
@@ -137,9 +140,9 @@ void OnboardSmoother::place(const std::vector<Pose3>& reduced, bool loss_applied
   for (std::size_t c = 0; c < state_.constraints.size(); ++c) {
     const auto& constraint = state_.constraints[c];
     if (!loss_applied || constraint.from == constraint.to) continue;
-    const auto& edge = graph.edges[edges[c]];
+    const auto& edge = reduced_graph.graph.edges[reduced_graph.edges[c]];
     const Vector6d r = between_residual(poses_[constraint.from], poses_[constraint.to], edge.T_from_to);
-    constraint_weights_[c] = costs.weight(edges[c], r.dot(edge.information * r));
+    constraint_weights_[c] = costs.weight(reduced_graph.edges[c], r.dot(edge.information * r));
   }
 }
 

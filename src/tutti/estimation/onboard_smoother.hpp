@@ -119,7 +119,7 @@ class OnboardSmoother {
   std::vector<Pose3> poses_;
   std::vector<double> constraint_weights_;
   std::unique_ptr<internal::OdometryRuns> runs_;
-  std::unique_ptr<internal::ReducedProblem> problem_;  ///< Of the last solve; null before.
+  std::unique_ptr<internal::ReducedProblem> problem_;  ///< Of the last solve.
   std::size_t composed_from_ = 0;                      ///< From here on, poses are raw odometry composed.
 };
 

@@ -5,6 +5,7 @@
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
+#include "tutti/estimation/internal/graph_equations.hpp"
 
 namespace tutti::estimation {
 
@@ -43,8 +44,8 @@ PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& c
     return solution;
   }
   const internal::EdgeCosts costs{.loss = {loss_kind(config.loss), config.loss_scale}, .roles = roles, .scale = {}};
-  internal::GaussNewton gauss_newton(graph, structure);
-  solution.summary = gauss_newton.minimise(solution.poses, costs, config);
+  internal::GraphEquations equations(graph, structure);
+  solution.summary = internal::minimise(equations, solution.poses, costs, config);
   if (costs.loss.kind != LossKind::none) {
     for (std::size_t e = 0; e < graph.edges.size(); ++e) {
       const auto& edge = graph.edges[e];

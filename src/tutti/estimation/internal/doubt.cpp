@@ -28,12 +28,12 @@ bool lets_go(const PoseGraph& graph, const std::vector<Pose3>& poses, const Edge
 
 }  // namespace
 
-DoubtingSummary minimise_doubting(GaussNewton& gauss_newton, std::span<const EdgeRole> roles, const RobustLoss& loss,
+DoubtingSummary minimise_doubting(NormalEquations& equations, std::span<const EdgeRole> roles, const RobustLoss& loss,
                                   const SolverConfig& config, const Continuation& how, std::vector<Pose3>& poses) {
   int iterations = 0;
   const auto minimise = [&](std::vector<Pose3> start, const EdgeCosts& costs) {
     Candidate out{.poses = std::move(start), .solve = {}};
-    out.solve = gauss_newton.minimise(out.poses, costs, config, how);
+    out.solve = internal::minimise(equations, out.poses, costs, config, how);
     iterations += out.solve.iterations;
     return out;
   };
@@ -47,7 +47,7 @@ DoubtingSummary minimise_doubting(GaussNewton& gauss_newton, std::span<const Edg
     const EdgeCosts robust{.loss = loss, .roles = roles, .scale = {}};
     std::vector<Pose3> trusted = best.poses;
     best = minimise(std::move(best.poses), robust);
-    if (lets_go(gauss_newton.graph(), best.poses, robust)) {
+    if (lets_go(equations.graph(), best.poses, robust)) {
       Candidate all = minimise(std::move(trusted), {});
       all = minimise(std::move(all.poses), robust);
       if (all.solve.final_cost < best.solve.final_cost) best = std::move(all);

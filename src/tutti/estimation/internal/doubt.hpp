@@ -18,7 +18,7 @@ struct DoubtingSummary {
 /// (weight below a half), it starts once more where all are trusted, and the lower end counts: edges that contradict
 /// the rest are let go, unless they agree with each other and what they contradict is cheaper to give up. Only the very
 /// first minimum depends on where `poses` start.
-DoubtingSummary minimise_doubting(GaussNewton& gauss_newton, std::span<const EdgeRole> roles, const RobustLoss& loss,
+DoubtingSummary minimise_doubting(NormalEquations& equations, std::span<const EdgeRole> roles, const RobustLoss& loss,
                                   const SolverConfig& config, const Continuation& how, std::vector<Pose3>& poses);
 
 }  // namespace tutti::estimation::internal

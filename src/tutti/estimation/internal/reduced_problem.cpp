@@ -1,69 +1,148 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/internal/reduced_problem.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
 
-std::size_t position_of(const std::vector<std::size_t>& nodes, std::size_t node) {
-  return static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin());
-}
-
-bool same_pattern(const ChainGraph& a, const ChainGraph& b) {
-  return a.nodes == b.nodes &&
-         std::equal(a.graph.edges.begin(), a.graph.edges.end(), b.graph.edges.begin(), b.graph.edges.end(),
-                    [](const auto& p, const auto& q) { return p.from == q.from && p.to == q.to; });
-}
+/// A factor is linearised again when its residual moved by more (m, rad) since.
+constexpr double kRelinearise = 1e-6;
 
 }  // namespace
 
-std::vector<std::size_t> reduced_nodes(std::span<const ChainConstraint> constraints) {
-  std::vector<std::size_t> nodes{0};
-  nodes.reserve(2 * constraints.size() + 1);
-  for (const auto& constraint : constraints) {
-    if (constraint.from == constraint.to) continue;
-    nodes.push_back(constraint.from);
-    nodes.push_back(constraint.to);
-  }
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-  return nodes;
-}
+bool ReducedProblem::update(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs,
+                            std::span<const ChainConstraint> constraints, const Pose3& first) {
+  std::swap(now_, before_);
+  const Carried carried = reduce(std::move(nodes), runs, constraints, first, before_, now_);
+  carry_factors(carried);
+  const int variables = static_cast<int>(now_.nodes.size()) - 1;
+  gradient_.resize(6 * variables);
+  residual_.resize(now_.graph.edges.size());
+  weighted_.resize(now_.graph.edges.size());
+  relative_.resize(now_.graph.edges.size());
+  if (!before_.nodes.empty() && carried.same_pattern()) return false;
 
-ChainGraph reduce(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs,
-                  std::span<const ChainConstraint> constraints, const Pose3& first) {
-  ChainGraph out{.nodes = std::move(nodes), .graph = {}, .roles = {}, .edges = {}};
-  PoseGraph& graph = out.graph;
-  graph.poses.reserve(out.nodes.size());
-  graph.edges.reserve(runs.size() + constraints.size());
-  graph.poses.push_back(first);
-  for (std::size_t k = 0; k < runs.size(); ++k) {
-    graph.poses.push_back(graph.poses.back() * runs[k].T_begin_end);
-    graph.edges.push_back({k, k + 1, runs[k].T_begin_end, runs[k].information});
-  }
-  out.roles.assign(runs.size(), EdgeRole::trusted);
-  for (const auto& constraint : constraints) {
-    out.edges.push_back(graph.edges.size());
-    if (constraint.from == constraint.to) continue;
-    graph.edges.push_back({position_of(out.nodes, constraint.from), position_of(out.nodes, constraint.to),
-                           constraint.measurement.T_a_b,
-                           constraint.measurement.covariance.llt().solve(Matrix6d::Identity())});
-    out.roles.push_back(constraint.doubtful ? EdgeRole::robust : EdgeRole::trusted);
-  }
-  return out;
-}
-
-ReducedProblem::ReducedProblem(ChainGraph graph)
-    : reduced_(std::move(graph)),
-      structure_(analyse_blocks(reduced_.graph)),
-      gauss_newton_(reduced_.graph, structure_) {}
-
-bool ReducedProblem::assign(ChainGraph& graph) {
-  if (!same_pattern(reduced_, graph)) return false;
-  reduced_ = std::move(graph);
+  std::vector<int> renumber;
+  for (std::size_t k = 1; k < carried.node.size(); ++k) renumber.push_back(carried.node[k] - 1);
+  for (int& n : renumber) n = std::max(n, -1);
+  std::vector<FrontTree::Pair> pairs;
+  pairs.reserve(now_.graph.edges.size());
+  for (const auto& edge : now_.graph.edges)
+    if (edge.from != 0 && edge.to != 0) pairs.emplace_back(variable(edge.from), variable(edge.to));
+  tree_.restructure(variables, renumber, {carried.changed.begin() + 1, carried.changed.end()}, pairs);
   return true;
+}
+
+void ReducedProblem::carry_factors(const Carried& carried) {
+  const std::size_t edges = carried.edges.size();
+  std::vector<char> used(factors_.size(), 0);
+  std::vector<std::size_t> slots(edges, Carried::kNew);
+  for (std::size_t e = 0; e < edges; ++e)
+    if (carried.edges[e] != Carried::kNew) used[slots[e] = slot_[carried.edges[e]]] = 1;
+  std::size_t free = 0;
+  for (std::size_t& slot : slots) {
+    if (slot != Carried::kNew) continue;
+    while (free < used.size() && used[free] != 0) ++free;
+    slot = free++;
+    if (slot == factors_.size()) factors_.emplace_back();
+    factors_[slot].valid = false;
+  }
+  slot_ = std::move(slots);
+  if (factors_.size() <= 2 * edges) return;
+  factors_.assign(edges, {});  // far fewer than there were: start again
+  std::iota(slot_.begin(), slot_.end(), std::size_t{0});
+}
+
+double ReducedProblem::cost(std::span<const Pose3> poses, const EdgeCosts& costs) {
+  double sum = 0.0;
+  for (std::size_t e = 0; e < now_.graph.edges.size(); ++e) {
+    const auto& edge = now_.graph.edges[e];
+    relative_[e] = poses[edge.from].inverse() * poses[edge.to];
+    residual_[e] = local(edge.T_from_to, relative_[e]);
+    weighted_[e].noalias() = edge.information * residual_[e];
+    sum += costs.cost(e, residual_[e].dot(weighted_[e]));
+  }
+  return sum;
+}
+
+void ReducedProblem::touch(std::size_t edge) {
+  for (const std::size_t node : {now_.graph.edges[edge].from, now_.graph.edges[edge].to})
+    if (node != 0) tree_.touch(variable(node));
+}
+
+/// J^T force, with the Jacobians of this very relative pose: what acts on one end must balance what acts on the other,
+/// or the rest turns the whole map about its weakest direction.
+void ReducedProblem::add_gradient(std::size_t e, const Vector6d& force) {
+  const PoseGraphEdge& edge = now_.graph.edges[e];
+  const Pose3& T = relative_[e];
+  const Eigen::Vector3d push = edge.T_from_to.rotation * force.head<3>();  // in the frame of `from`
+  const Eigen::Vector3d turn = so3_right_jacobian_inverse(residual_[e].tail<3>()).transpose() * force.tail<3>();
+  if (edge.from != 0) {
+    auto g = gradient_.segment<6>(6 * variable(edge.from));
+    g.head<3>() -= push;
+    g.tail<3>() -= T.translation.cross(push) + T.rotation * turn;
+  }
+  if (edge.to != 0) {
+    auto g = gradient_.segment<6>(6 * variable(edge.to));
+    g.head<3>() += T.rotation.conjugate() * push;
+    g.tail<3>() += turn;
+  }
+}
+
+void ReducedProblem::linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian) {
+  gradient_.setZero();
+  for (std::size_t e = 0; e < now_.graph.edges.size(); ++e) {
+    const double s = residual_[e].dot(weighted_[e]);
+    const double weight = costs.weight(e, s);
+    const double flatter = std::max(0.0, 1.0 - costs.curvature(e, s));
+    add_gradient(e, weight * weighted_[e]);
+    if (!with_hessian) continue;
+    Factor& f = factor(e);
+    if (f.valid && f.weight == weight && f.flatter == flatter &&
+        (residual_[e] - f.linear.residual).lpNorm<Eigen::Infinity>() <= kRelinearise)
+      continue;
+    const auto& edge = now_.graph.edges[e];
+    f = {.linear = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to),
+         .information = weight * edge.information,
+         .weight = weight,
+         .flatter = flatter,
+         .valid = true};
+    if (flatter > 0.0) f.information -= (flatter * weight / s) * weighted_[e] * weighted_[e].transpose();
+    touch(e);
+  }
+}
+
+void ReducedProblem::start_linearisation() { gradient_.setZero(); }
+
+void ReducedProblem::set_factor(std::size_t edge, const BetweenLinearisation& linear, const Matrix6d& information) {
+  factor(edge) = {.linear = linear, .information = information, .weight = 0.0, .flatter = 0.0, .valid = false};
+  touch(edge);
+  const Vector6d force = information * linear.residual;
+  const auto& ends = now_.graph.edges[edge];
+  if (ends.from != 0) gradient_.segment<6>(6 * variable(ends.from)).noalias() += linear.J_i.transpose() * force;
+  if (ends.to != 0) gradient_.segment<6>(6 * variable(ends.to)).noalias() += linear.J_j.transpose() * force;
+}
+
+bool ReducedProblem::factorise() {
+  return tree_.factorise([this](int variable, FrontTree::Column& column) { assemble(variable, column); });
+}
+
+void ReducedProblem::assemble(int variable, FrontTree::Column& column) {
+  const std::size_t node = static_cast<std::size_t>(variable) + 1;
+  for (const auto& [other, edge] : now_.incident_to(node)) {
+    const Factor& f = factor(edge);
+    const bool is_from = now_.graph.edges[edge].from == node;
+    const Matrix6d& J = is_from ? f.linear.J_i : f.linear.J_j;
+    const Matrix6d WJ = f.information * J;
+    column.add_diagonal(J.transpose() * WJ);
+    if (other != 0 && column.takes(other - 1))
+      column.add(other - 1, (is_from ? f.linear.J_j : f.linear.J_i).transpose() * WJ);
+  }
 }
 
 }  // namespace tutti::estimation::internal

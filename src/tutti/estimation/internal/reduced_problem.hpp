@@ -5,42 +5,63 @@
 #include <span>
 #include <vector>
 
-#include "tutti/estimation/internal/gauss_newton.hpp"
-#include "tutti/estimation/internal/odometry_runs.hpp"
-#include "tutti/estimation/onboard_smoother.hpp"
+#include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/internal/chain_graph.hpp"
+#include "tutti/estimation/internal/front_tree.hpp"
+#include "tutti/estimation/internal/normal_equations.hpp"
 
 namespace tutti::estimation::internal {
 
-/// Positions in the chain of the reduced graph's nodes, increasing: the first pose and every constrained one.
-std::vector<std::size_t> reduced_nodes(std::span<const ChainConstraint> constraints);
-
-/// The constrained nodes of a chain, joined by runs and constraints.
-struct ChainGraph {
-  std::vector<std::size_t> nodes;
-  PoseGraph graph;                 ///< Node k is nodes[k], composed from raw odometry; edge k run k, then constraints.
-  std::vector<EdgeRole> roles;     ///< robust = doubtful.
-  std::vector<std::size_t> edges;  ///< Of each constraint; of one with from == to: meaningless.
-};
-ChainGraph reduce(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs,
-                  std::span<const ChainConstraint> constraints, const Pose3& first);
-
-/// A reduced graph with the analysis of its normal equations, kept from one update to the next.
-class ReducedProblem {
+/// The reduced graph of a chain and its normal equations, kept from one update to the next. A factor is linearised
+/// again only if its residual (that is, the relative pose of its ends: residual and Jacobians in body frames do not
+/// show a common motion) or its weight changed since; only what lies above such a factor is computed again.
+class ReducedProblem final : public NormalEquations {
  public:
-  explicit ReducedProblem(ChainGraph graph);
-  ReducedProblem(const ReducedProblem&) = delete;
-  ReducedProblem& operator=(const ReducedProblem&) = delete;
+  /// Takes over other constraints. True when the pattern changed.
+  bool update(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs,
+              std::span<const ChainConstraint> constraints, const Pose3& first);
 
-  /// Takes over other measurements, information and roles; false, and nothing changed, when nodes or edges differ.
-  bool assign(ChainGraph& graph);
+  [[nodiscard]] const ChainGraph& reduced() const { return now_; }
 
-  [[nodiscard]] const ChainGraph& reduced() const { return reduced_; }
-  [[nodiscard]] GaussNewton& gauss_newton() { return gauss_newton_; }
+  [[nodiscard]] const PoseGraph& graph() const override { return now_.graph; }
+  [[nodiscard]] int components() const override { return 1; }
+  [[nodiscard]] int variable(std::size_t node) const override { return static_cast<int>(node) - 1; }
+  [[nodiscard]] double cost(std::span<const Pose3> poses, const EdgeCosts& costs) override;
+  void linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian) override;
+  [[nodiscard]] const Eigen::VectorXd& gradient() const override { return gradient_; }
+  [[nodiscard]] bool factorise() override;
+  void solve(Eigen::VectorXd& b) override { tree_.solve(b); }
+
+  /// A linear system of other factors on the same edges, one by one: start_linearisation, set_factor (residual and
+  /// Jacobians, weighted information) for every edge, then factorise().
+  void start_linearisation();
+  void set_factor(std::size_t edge, const BetweenLinearisation& factor, const Matrix6d& information);
 
  private:
-  ChainGraph reduced_;
-  BlockStructure structure_;
-  GaussNewton gauss_newton_;
+  struct Factor {
+    BetweenLinearisation linear;
+    Matrix6d information;  ///< Weighted, less the loss's curvature.
+    double weight = 0.0;
+    double flatter = 0.0;
+    bool valid = false;
+  };
+
+  void carry_factors(const Carried& carried);
+  [[nodiscard]] Factor& factor(std::size_t edge) { return factors_[slot_[edge]]; }
+  void touch(std::size_t edge);
+  void add_gradient(std::size_t edge, const Vector6d& force);
+  void assemble(int variable, FrontTree::Column& column);
+
+  ChainGraph now_;
+  ChainGraph before_;
+  std::vector<Factor> factors_;
+  std::vector<std::size_t> slot_;  ///< Per edge, among factors_.
+  FrontTree tree_;
+  Eigen::VectorXd gradient_;
+  /// Per edge, of the last cost(): relative pose of its ends, residual, information times that.
+  std::vector<Pose3> relative_;
+  std::vector<Vector6d> residual_;
+  std::vector<Vector6d> weighted_;
 };
 
 }  // namespace tutti::estimation::internal
