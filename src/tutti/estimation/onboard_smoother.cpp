@@ -2,6 +2,7 @@
 #include "tutti/estimation/onboard_smoother.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "tutti/base/check.hpp"
@@ -22,11 +23,12 @@ constexpr double kStepTolerance = 1e-5;
 constexpr double kNearby_rad = 0.3;
 
 bool is_nearby(const PoseGraph& graph, std::span<const EdgeRole> roles, const std::vector<Pose3>& poses) {
+  const double least = std::cos(0.5 * kNearby_rad);
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
     const PoseGraphEdge& edge = graph.edges[e];
     if (!roles.empty() && roles[e] == EdgeRole::robust) continue;
-    if (!(between_residual(poses[edge.from], poses[edge.to], edge.T_from_to).tail<3>().norm() < kNearby_rad))
-      return false;
+    const Eigen::Quaterniond predicted = poses[edge.from].rotation * edge.T_from_to.rotation;
+    if (!(std::abs(predicted.dot(poses[edge.to].rotation)) > least)) return false;
   }
   return true;
 }

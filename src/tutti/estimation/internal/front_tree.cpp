@@ -212,16 +212,19 @@ bool FrontTree::factorise(const Assemble& assemble) {
 }
 
 void FrontTree::solve(Eigen::VectorXd& b) const {
-  Eigen::VectorXd x;
+  Eigen::Index largest = 0;
+  for (const Front& front : fronts_) largest = std::max(largest, front.values.rows());
+  Eigen::VectorXd work(largest);
   const auto gather = [&](const Front& front) {
-    x.resize(front.values.rows());
+    auto x = work.head(front.values.rows());
     for (std::size_t k = 0; k < front.variables.size(); ++k) x.segment<6>(6 * k) = b.segment<6>(6 * front.variables[k]);
+    return x;
   };
   const auto panel = [](const Front& front, int k) {
     return front.values.middleCols<6>(6 * k).bottomRows(front.values.rows() - 6 * (k + 1));
   };
   for (const Front& front : fronts_) {
-    gather(front);
+    auto x = gather(front);
     for (int k = 0; k < front.pivots; ++k) {
       const auto below = panel(front, k);
       const Vector6d y = block(front.values, k, k) * x.segment<6>(6 * k);
@@ -232,7 +235,7 @@ void FrontTree::solve(Eigen::VectorXd& b) const {
   }
   for (std::size_t f = fronts_.size(); f-- > 0;) {
     const Front& front = fronts_[f];
-    gather(front);
+    auto x = gather(front);
     for (int k = front.pivots; k-- > 0;) {
       const auto below = panel(front, k);
       const Vector6d y = x.segment<6>(6 * k) - below.transpose() * x.tail(below.rows());

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "tutti/geometry/so3.hpp"
+
 namespace tutti::estimation::internal {
 namespace {
 
@@ -25,6 +27,14 @@ double still_to_go(double size, double previous) {
   return size < 0.5 * previous ? size * size / (previous - size) : size;
 }
 
+/// T Exp(xi) in SE(3). Poses that turn together about a far point keep their relative poses, which retract() grants to
+/// first order only: a long map that swings about its first pose would have to be straightened by the next step.
+Pose3 moved_by(const Pose3& T, const Vector6d& xi) {
+  Vector6d step = xi;
+  step.head<3>() = so3_right_jacobian(xi.tail<3>()).transpose() * xi.head<3>();
+  return retract(T, step);
+}
+
 struct Tried {
   double scale;
   double cost;
@@ -35,7 +45,7 @@ Tried search_line(NormalEquations& equations, const std::vector<Pose3>& poses, c
   for (Tried tried{.scale = 1.0, .cost = 0.0};; tried.scale *= 0.5) {
     for (std::size_t i = 0; i < poses.size(); ++i)
       if (const int v = equations.variable(i); v >= 0)
-        candidate[i] = retract(poses[i], tried.scale * step.segment<6>(6 * v));
+        candidate[i] = moved_by(poses[i], tried.scale * step.segment<6>(6 * v));
     tried.cost = equations.cost(candidate, costs);
     if (tried.cost <= most || max_halvings-- == 0) return tried;
   }

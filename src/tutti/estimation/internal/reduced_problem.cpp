@@ -10,8 +10,8 @@
 namespace tutti::estimation::internal {
 namespace {
 
-/// A factor is linearised again when its residual moved by more (m, rad) since.
-constexpr double kRelinearise = 1e-6;
+/// A factor is linearised again when its residual (m, rad) or its weight, as a share of it, moved by more since.
+constexpr double kRelinearise = 1e-5;
 
 }  // namespace
 
@@ -19,13 +19,13 @@ bool ReducedProblem::update(std::vector<std::size_t> nodes, std::span<const Odom
                             std::span<const ChainConstraint> constraints, const Pose3& first) {
   std::swap(now_, before_);
   const Carried carried = reduce(std::move(nodes), runs, constraints, first, before_, now_);
-  carry_factors(carried);
+  carry_edges(carried);
   const int variables = static_cast<int>(now_.nodes.size()) - 1;
   gradient_.resize(6 * variables);
-  residual_.resize(now_.graph.edges.size());
-  weighted_.resize(now_.graph.edges.size());
   relative_.resize(now_.graph.edges.size());
-  if (!before_.nodes.empty() && carried.same_pattern()) return false;
+  residual_.resize(now_.graph.edges.size());
+  force_.resize(now_.graph.edges.size());
+  if (carried.same_pattern()) return false;
 
   std::vector<int> renumber;
   for (std::size_t k = 1; k < carried.node.size(); ++k) renumber.push_back(carried.node[k] - 1);
@@ -38,9 +38,9 @@ bool ReducedProblem::update(std::vector<std::size_t> nodes, std::span<const Odom
   return true;
 }
 
-void ReducedProblem::carry_factors(const Carried& carried) {
+void ReducedProblem::carry_edges(const Carried& carried) {
   const std::size_t edges = carried.edges.size();
-  std::vector<char> used(factors_.size(), 0);
+  std::vector<char> used(linearised_.size(), 0);
   std::vector<std::size_t> slots(edges, Carried::kNew);
   for (std::size_t e = 0; e < edges; ++e)
     if (carried.edges[e] != Carried::kNew) used[slots[e] = slot_[carried.edges[e]]] = 1;
@@ -49,13 +49,14 @@ void ReducedProblem::carry_factors(const Carried& carried) {
     if (slot != Carried::kNew) continue;
     while (free < used.size() && used[free] != 0) ++free;
     slot = free++;
-    if (slot == factors_.size()) factors_.emplace_back();
-    factors_[slot].valid = false;
+    if (slot == linearised_.size()) linearised_.emplace_back();
+    linearised_[slot].valid = false;
   }
   slot_ = std::move(slots);
-  if (factors_.size() <= 2 * edges) return;
-  factors_.assign(edges, {});  // far fewer than there were: start again
-  std::iota(slot_.begin(), slot_.end(), std::size_t{0});
+  if (linearised_.size() > 2 * edges) {  // far fewer than there were: start again
+    linearised_.assign(edges, {});
+    std::iota(slot_.begin(), slot_.end(), std::size_t{0});
+  }
 }
 
 double ReducedProblem::cost(std::span<const Pose3> poses, const EdgeCosts& costs) {
@@ -64,15 +65,10 @@ double ReducedProblem::cost(std::span<const Pose3> poses, const EdgeCosts& costs
     const auto& edge = now_.graph.edges[e];
     relative_[e] = poses[edge.from].inverse() * poses[edge.to];
     residual_[e] = local(edge.T_from_to, relative_[e]);
-    weighted_[e].noalias() = edge.information * residual_[e];
-    sum += costs.cost(e, residual_[e].dot(weighted_[e]));
+    force_[e].noalias() = edge.information * residual_[e];
+    sum += costs.cost(e, residual_[e].dot(force_[e]));
   }
   return sum;
-}
-
-void ReducedProblem::touch(std::size_t edge) {
-  for (const std::size_t node : {now_.graph.edges[edge].from, now_.graph.edges[edge].to})
-    if (node != 0) tree_.touch(variable(node));
 }
 
 /// J^T force, with the Jacobians of this very relative pose: what acts on one end must balance what acts on the other,
@@ -97,31 +93,42 @@ void ReducedProblem::add_gradient(std::size_t e, const Vector6d& force) {
 void ReducedProblem::linearise(std::span<const Pose3> poses, const EdgeCosts& costs, bool with_hessian) {
   gradient_.setZero();
   for (std::size_t e = 0; e < now_.graph.edges.size(); ++e) {
-    const double s = residual_[e].dot(weighted_[e]);
+    const double s = residual_[e].dot(force_[e]);
     const double weight = costs.weight(e, s);
     const double flatter = std::max(0.0, 1.0 - costs.curvature(e, s));
-    add_gradient(e, weight * weighted_[e]);
+    add_gradient(e, weight * force_[e]);
     if (!with_hessian) continue;
-    Factor& f = factor(e);
-    if (f.valid && f.weight == weight && f.flatter == flatter &&
-        (residual_[e] - f.linear.residual).lpNorm<Eigen::Infinity>() <= kRelinearise)
+    Linearised& at = linearised_[slot_[e]];
+    if (at.valid && std::abs(at.weight - weight) <= kRelinearise * weight &&
+        std::abs(at.flatter - flatter) <= kRelinearise &&
+        (residual_[e] - at.residual).lpNorm<Eigen::Infinity>() <= kRelinearise)
       continue;
     const auto& edge = now_.graph.edges[e];
-    f = {.linear = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to),
-         .information = weight * edge.information,
-         .weight = weight,
-         .flatter = flatter,
-         .valid = true};
-    if (flatter > 0.0) f.information -= (flatter * weight / s) * weighted_[e] * weighted_[e].transpose();
-    touch(e);
+    Matrix6d information = weight * edge.information;
+    if (flatter > 0.0) information -= (flatter * weight / s) * force_[e] * force_[e].transpose();
+    linearise(e, linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to), information);
+    at.valid = true;
+    at.residual = residual_[e];
+    at.weight = weight;
+    at.flatter = flatter;
   }
+}
+
+void ReducedProblem::linearise(std::size_t edge, const BetweenLinearisation& linear, const Matrix6d& information) {
+  Linearised& at = linearised_[slot_[edge]];
+  const Matrix6d WJ_from = information * linear.J_i;
+  at.from_from.noalias() = linear.J_i.transpose() * WJ_from;
+  at.to_from.noalias() = linear.J_j.transpose() * WJ_from;
+  at.to_to.noalias() = linear.J_j.transpose() * (information * linear.J_j);
+  at.valid = false;
+  for (const std::size_t node : {now_.graph.edges[edge].from, now_.graph.edges[edge].to})
+    if (node != 0) tree_.touch(variable(node));
 }
 
 void ReducedProblem::start_linearisation() { gradient_.setZero(); }
 
 void ReducedProblem::set_factor(std::size_t edge, const BetweenLinearisation& linear, const Matrix6d& information) {
-  factor(edge) = {.linear = linear, .information = information, .weight = 0.0, .flatter = 0.0, .valid = false};
-  touch(edge);
+  linearise(edge, linear, information);
   const Vector6d force = information * linear.residual;
   const auto& ends = now_.graph.edges[edge];
   if (ends.from != 0) gradient_.segment<6>(6 * variable(ends.from)).noalias() += linear.J_i.transpose() * force;
@@ -135,13 +142,14 @@ bool ReducedProblem::factorise() {
 void ReducedProblem::assemble(int variable, FrontTree::Column& column) {
   const std::size_t node = static_cast<std::size_t>(variable) + 1;
   for (const auto& [other, edge] : now_.incident_to(node)) {
-    const Factor& f = factor(edge);
+    const Linearised& blocks = linearised_[slot_[edge]];
     const bool is_from = now_.graph.edges[edge].from == node;
-    const Matrix6d& J = is_from ? f.linear.J_i : f.linear.J_j;
-    const Matrix6d WJ = f.information * J;
-    column.add_diagonal(J.transpose() * WJ);
-    if (other != 0 && column.takes(other - 1))
-      column.add(other - 1, (is_from ? f.linear.J_j : f.linear.J_i).transpose() * WJ);
+    column.add_diagonal(is_from ? blocks.from_from : blocks.to_to);
+    if (other == 0 || !column.takes(other - 1)) continue;
+    if (is_from)
+      column.add(other - 1, blocks.to_from);
+    else
+      column.add(other - 1, blocks.to_from.transpose());
   }
 }
 

@@ -38,30 +38,30 @@ class ReducedProblem final : public NormalEquations {
   void set_factor(std::size_t edge, const BetweenLinearisation& factor, const Matrix6d& information);
 
  private:
-  struct Factor {
-    BetweenLinearisation linear;
-    Matrix6d information;  ///< Weighted, less the loss's curvature.
-    double weight = 0.0;
-    double flatter = 0.0;
+  /// An edge's part of the Hessian, and where it was linearised.
+  struct Linearised {
     bool valid = false;
+    Vector6d residual;
+    double weight = 0.0;
+    double flatter = 0.0;  ///< 1 - curvature of the loss.
+    Matrix6d from_from, to_from, to_to;
   };
 
-  void carry_factors(const Carried& carried);
-  [[nodiscard]] Factor& factor(std::size_t edge) { return factors_[slot_[edge]]; }
-  void touch(std::size_t edge);
+  void carry_edges(const Carried& carried);
+  void linearise(std::size_t edge, const BetweenLinearisation& linear, const Matrix6d& information);
   void add_gradient(std::size_t edge, const Vector6d& force);
   void assemble(int variable, FrontTree::Column& column);
 
   ChainGraph now_;
   ChainGraph before_;
-  std::vector<Factor> factors_;
-  std::vector<std::size_t> slot_;  ///< Per edge, among factors_.
+  std::vector<Linearised> linearised_;
+  std::vector<std::size_t> slot_;  ///< Per edge, among linearised_.
   FrontTree tree_;
   Eigen::VectorXd gradient_;
   /// Per edge, of the last cost(): relative pose of its ends, residual, information times that.
   std::vector<Pose3> relative_;
   std::vector<Vector6d> residual_;
-  std::vector<Vector6d> weighted_;
+  std::vector<Vector6d> force_;
 };
 
 }  // namespace tutti::estimation::internal
