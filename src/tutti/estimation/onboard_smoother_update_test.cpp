@@ -56,6 +56,25 @@ RC_GTEST_PROP(OnboardSmootherUpdate, HistoryDoesNotShow, ()) {
     RC_ASSERT(std::abs(smoother.constraint_weights()[c] - restored.constraint_weights()[c]) < 1e-3);
 }
 
+/// Two passes through a corridor, links arriving one by one: most of the reduced graph stays as it is each time.
+TEST(OnboardSmootherUpdate, ManySmallBatchesAddUpToOneLarge) {
+  Rng rng(4);
+  const auto m = mission(rng, 1200, 0);
+  auto smoother = smoother_of(m);
+  std::vector<ChainConstraint> constraints;
+  for (std::size_t k = 0; k < 150; ++k) {
+    const std::size_t a = 4 * ((k * 37) % 150);
+    const std::size_t b = 1200 - a - rng.index(4);
+    const Matrix6d covariance = random_covariance(rng, 2e-3, 1e-3);
+    constraints.push_back({a, b, {retract(m.truth[a].inverse() * m.truth[b], sample(rng, covariance)), covariance}});
+    smoother.set_constraints(constraints);
+    ASSERT_TRUE(is_usable(smoother.solve().termination));
+  }
+  OnboardSmoother restored({}, smoother.state());
+  restored.solve();
+  EXPECT_LT(largest_position_difference(smoother.poses(), restored.poses()), 2e-5);
+}
+
 TEST(OnboardSmootherUpdate, SameCallsSameBits) {
   Rng rng(2);
   const auto m = mission(rng, 500, 0);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/internal/front_tree.hpp"
 
+#include <cblas.h>
+#include <lapacke.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <numeric>
@@ -16,6 +19,11 @@ constexpr double kSmallestPivotShare = 1e-14;
 /// is ordered whole again.
 constexpr double kReorderFrom = 2.0;
 
+/// From so many blocks on, BLAS is faster than products of fixed size.
+constexpr int kLargeBlocks = 8;
+/// A column joins the front before it when that stores at most one zero per so many blocks.
+constexpr std::size_t kBlocksPerZero = 8;
+
 using Block = Eigen::Map<Matrix6d, 0, Eigen::OuterStride<>>;
 using ConstBlock = Eigen::Map<const Matrix6d, 0, Eigen::OuterStride<>>;
 
@@ -26,16 +34,36 @@ ConstBlock block(const Eigen::MatrixXd& A, int row, int column) {
   return ConstBlock(A.data() + 6 * (row + column * A.rows()), Eigen::OuterStride<>(A.rows()));
 }
 
+/// Inverts the lower triangle L of a diagonal block; false when a pivot is not sound.
+bool invert(const Matrix6d& L, const double* diagonal, Block out) {
+  for (int d = 0; d < 6; ++d)
+    if (!(L(d, d) * L(d, d) > kSmallestPivotShare * diagonal[d])) return false;
+  out = L.triangularView<Eigen::Lower>().solve(Matrix6d::Identity());
+  return true;
+}
+
+/// The same as eliminate_columns(), by BLAS.
+bool eliminate_large(Eigen::MatrixXd& A, int pivots, const Eigen::VectorXd& diagonal) {
+  const int n = static_cast<int>(A.rows());
+  const int k = 6 * pivots;
+  double* below = A.data() + k;
+  if (LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'L', k, A.data(), n) != 0) return false;
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, n - k, k, 1.0, A.data(), n, below, n);
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, n - k, k, -1.0, below, n, 1.0, below + std::ptrdiff_t{n} * k, n);
+  for (int p = 0; p < pivots; ++p)
+    if (!invert(block(A, p, p), diagonal.data() + 6 * p, block(A, p, p))) return false;
+  return true;
+}
+
 /// Eliminates the first `pivots` block columns of A. `diagonal`: entries before anything was subtracted.
 bool eliminate_columns(Eigen::MatrixXd& A, int pivots, const Eigen::VectorXd& diagonal) {
   const int blocks = static_cast<int>(A.rows()) / 6;
+  if (blocks >= kLargeBlocks) return eliminate_large(A, pivots, diagonal);
   for (int k = 0; k < pivots; ++k) {
     Matrix6d L = block(A, k, k);
     if (Eigen::LLT<Eigen::Ref<Matrix6d>> factor(L); factor.info() != Eigen::Success) return false;
-    for (int d = 0; d < 6; ++d)
-      if (!(L(d, d) * L(d, d) > kSmallestPivotShare * diagonal[6 * k + d])) return false;
-    const Matrix6d inverse = L.triangularView<Eigen::Lower>().solve(Matrix6d::Identity());
-    block(A, k, k) = inverse;
+    if (!invert(L, diagonal.data() + 6 * k, block(A, k, k))) return false;
+    const Matrix6d inverse = block(A, k, k);
     for (int i = k + 1; i < blocks; ++i) {
       const Matrix6d L_i = block(A, i, k) * inverse.transpose();
       block(A, i, k) = L_i;
@@ -142,7 +170,8 @@ std::vector<FrontTree::Front> FrontTree::eliminate(std::span<const int> variable
       auto& parent = later[mine.front()];
       parent.insert(parent.end(), mine.begin() + 1, mine.end());
     }
-    const bool joins = k > 0 && later[k - 1].size() == mine.size() + 1 && later[k - 1].front() == k;
+    const bool joins =
+        k > 0 && later[k - 1].size() + mine.size() / kBlocksPerZero >= mine.size() + 1 && later[k - 1].front() == k;
     if (!joins) fronts.emplace_back();
     Front& front = fronts.back();
     front.variables.resize(front.pivots);

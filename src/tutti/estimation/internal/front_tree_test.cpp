@@ -160,6 +160,25 @@ TEST(FrontTree, ComputesLittleAfterASmallChange) {
   EXPECT_LT(error_of(tree, m, rng), 1e-12);
 }
 
+/// Fronts large enough for BLAS, whose size is no multiple of anything.
+TEST(FrontTree, SolvesWhereAllAreNeighbours) {
+  Rng rng(3);
+  Changing m = ladder(rng, 20);
+  for (int a = 0; a < 23; ++a)
+    for (int b = 0; b < a; ++b) m.blocks[{a, b}] = random_block(rng, 0.05);
+  FrontTree tree;
+  tree.restructure(40, {}, std::vector<char>(40, 1), m.pairs());
+  ASSERT_TRUE(tree.factorise(m.assemble()));
+  EXPECT_LT(error_of(tree, m, rng), 1e-12);
+  const Matrix6d good = m.blocks[{7, 7}];
+  m.blocks[{7, 7}] = -good;
+  tree.touch(7);
+  EXPECT_FALSE(tree.factorise(m.assemble()));
+  m.blocks[{7, 7}] = good;
+  EXPECT_TRUE(tree.factorise(m.assemble()));
+  EXPECT_LT(error_of(tree, m, rng), 1e-12);
+}
+
 TEST(FrontTree, SaysWhenNotPositiveDefinite) {
   Rng rng(2);
   Changing m = ladder(rng, 10);

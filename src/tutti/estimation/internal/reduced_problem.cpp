@@ -11,7 +11,7 @@ namespace tutti::estimation::internal {
 namespace {
 
 /// A factor is linearised again when its residual (m, rad) or its weight, as a share of it, moved by more since.
-constexpr double kRelinearise = 1e-5;
+constexpr double kRelinearise = 3e-6;
 
 }  // namespace
 
