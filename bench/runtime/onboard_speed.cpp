@@ -129,8 +129,8 @@ void update_from_scratch(const TunnelChain& chain, int repetitions) {
 
 enum class Batch { add, replace };
 
-std::vector<ChainConstraint> with_batch(const TunnelChain& chain, Batch batch, int count, Rng& rng) {
-  auto out = chain.constraints;
+std::vector<ChainConstraint> with_batch(const TunnelChain& chain, std::vector<ChainConstraint> out, Batch batch,
+                                        int count, Rng& rng) {
   for (int k = 0; k < count; ++k) {
     if (batch == Batch::add) {
       const auto a = static_cast<std::size_t>(rng.index(bench::kTunnelSteps - 500));
@@ -143,41 +143,41 @@ std::vector<ChainConstraint> with_batch(const TunnelChain& chain, Batch batch, i
   return out;
 }
 
-/// set_constraints() and solve() of a smoother that has solved the rest.
+/// set_constraints() and solve() of a smoother that has solved the rest, from scratch and then `earlier` such batches.
+void batch_row(const TunnelChain& chain, int repetitions, Batch batch, int count, int earlier) {
+  const Rng seed(11);
+  OnboardSmoother smoother;
+  int k = 0;
+  std::vector<ChainConstraint> constraints;
+  double bent = 0.0;
+  const auto prepare = [&] {
+    Rng rng = seed.fork(static_cast<std::uint64_t>(k++));
+    smoother = OnboardSmoother({}, chain.state());
+    smoother.solve();
+    constraints = chain.constraints;
+    for (int e = 0; e <= earlier; ++e) {
+      if (e > 0) smoother.set_constraints(constraints), smoother.solve();
+      constraints = with_batch(chain, std::move(constraints), batch, count, rng);
+    }
+  };
+  const Times times = measure(repetitions, prepare, [&] {
+    smoother.set_constraints(std::move(constraints));
+    bent += static_cast<double>(smoother.solve().bent_poses) / repetitions;
+  });
+  OnboardSmoother fresh;
+  const Times scratch = measure(
+      repetitions, [&] { fresh = OnboardSmoother({}, smoother.state()); }, [&] { fresh.solve(); });
+  const double off = difference(smoother.poses(), fresh.poses()).max_mm;
+  fmt::print("| {} | {} {}{} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.0f} | {:.4f} |\n", chain.constraints.size(),
+             batch == Batch::add ? "add" : "replace", count, earlier == 0 ? ", the first" : "", times.best,
+             times.median, scratch.best, scratch.best / times.best, bent, off);
+  std::fflush(stdout);
+}
+
 void batches(const TunnelChain& chain, int repetitions) {
   for (const Batch batch : {Batch::add, Batch::replace}) {
-    for (const int count : {1, 5, 25, 100}) {
-      const Rng seed(11);
-      OnboardSmoother smoother;
-      SmootherSummary summary;
-      int k = 0;
-      std::vector<ChainConstraint> constraints;
-      double bent = 0.0;
-      const auto draw = [&] {
-        Rng rng = seed.fork(static_cast<std::uint64_t>(k++));
-        constraints = with_batch(chain, batch, count, rng);
-      };
-      const Times times = measure(
-          repetitions,
-          [&] {
-            smoother = OnboardSmoother({}, chain.state());
-            smoother.solve();
-            draw();
-          },
-          [&] {
-            smoother.set_constraints(std::move(constraints));
-            summary = smoother.solve();
-            bent += static_cast<double>(summary.bent_poses) / repetitions;
-          });
-      OnboardSmoother fresh;
-      const Times scratch = measure(
-          repetitions, [&] { fresh = OnboardSmoother({}, smoother.state()); }, [&] { fresh.solve(); });
-      const double off = difference(smoother.poses(), fresh.poses()).max_mm;
-      fmt::print("| {} | {} {} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.0f} | {:.4f} |\n", chain.constraints.size(),
-                 batch == Batch::add ? "add" : "replace", count, times.best, times.median, scratch.best,
-                 scratch.best / times.best, bent, off);
-      std::fflush(stdout);
-    }
+    batch_row(chain, repetitions, batch, 1, 0);
+    for (const int count : {1, 5, 25, 100}) batch_row(chain, repetitions, batch, count, 1);
   }
 }
 
@@ -274,7 +274,7 @@ void append_and_memory(int repetitions) {
   std::size_t before = 0;
   std::size_t most = 0;
   for (int update = 0; update < 200; ++update) {
-    live.set_constraints(with_batch(chain, update % 2 == 0 ? Batch::add : Batch::replace, 25, rng));
+    live.set_constraints(with_batch(chain, chain.constraints, update % 2 == 0 ? Batch::add : Batch::replace, 25, rng));
     live.solve();
     if (update == 9) before = mallinfo2().uordblks;
     if (update >= 9) most = std::max(most, mallinfo2().uordblks);

@@ -10,8 +10,16 @@
 namespace tutti::estimation::internal {
 namespace {
 
-/// A factor is linearised again when its residual (m, rad) or its weight, as a share of it, moved by more since.
-constexpr double kRelinearise = 3e-6;
+/// A factor is linearised again when its residual or its weight, as a share of it, changed by more since. A rotation
+/// that no longer fits resists, with the whole map as its lever, where the map should turn freely.
+constexpr double kRelinearise_m = 1e-5;
+constexpr double kRelinearise_rad = 1e-7;
+constexpr double kRelinearise_share = 1e-6;
+
+bool is_same(const Vector6d& a, const Vector6d& b) {
+  const Vector6d change = (a - b).cwiseAbs();
+  return change.head<3>().maxCoeff() <= kRelinearise_m && change.tail<3>().maxCoeff() <= kRelinearise_rad;
+}
 
 }  // namespace
 
@@ -99,9 +107,8 @@ void ReducedProblem::linearise(std::span<const Pose3> poses, const EdgeCosts& co
     add_gradient(e, weight * force_[e]);
     if (!with_hessian) continue;
     Linearised& at = linearised_[slot_[e]];
-    if (at.valid && std::abs(at.weight - weight) <= kRelinearise * weight &&
-        std::abs(at.flatter - flatter) <= kRelinearise &&
-        (residual_[e] - at.residual).lpNorm<Eigen::Infinity>() <= kRelinearise)
+    if (at.valid && std::abs(at.weight - weight) <= kRelinearise_share * weight &&
+        std::abs(at.flatter - flatter) <= kRelinearise_share && is_same(residual_[e], at.residual))
       continue;
     const auto& edge = now_.graph.edges[e];
     Matrix6d information = weight * edge.information;
