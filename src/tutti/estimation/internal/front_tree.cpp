@@ -145,7 +145,7 @@ void FrontTree::restructure(int variables, std::span<const int> renumber, const 
 }
 
 /// Fronts that eliminate `variables` (increasing), from `pairs` of them.
-std::vector<FrontTree::Front> FrontTree::eliminate(std::span<const int> variables, std::span<const Pair> pairs) const {
+std::vector<FrontTree::Front> FrontTree::eliminate(std::span<const int> variables, std::span<const Pair> pairs) {
   const int n = static_cast<int>(variables.size());
   const auto local = [&](int v) {
     return static_cast<int>(std::lower_bound(variables.begin(), variables.end(), v) - variables.begin());

@@ -68,7 +68,7 @@ class FrontTree {
   };
 
   std::vector<char> find_affected(std::span<const int> renumber, const std::vector<char>& changed);
-  std::vector<Front> eliminate(std::span<const int> variables, std::span<const Pair> pairs) const;
+  static std::vector<Front> eliminate(std::span<const int> variables, std::span<const Pair> pairs);
   void link();
   [[nodiscard]] double operations() const;
   bool compute(Front& front, const Assemble& assemble);
