@@ -116,8 +116,8 @@ def main():
         *drift_sweep(arguments),
         "",
         "Read: at 0.5 degrees/m the server is still at 6 cm. Beyond, submaps bend so much that some closures attach",
-        "the right place with a pose more than 2 degrees or 0.5 m off; from 1 degree/m on a robot, from 2 the joint map,",
-        "is metres off without anything saying so. What would help: submaps that may",
+        "the right place with a pose more than 2 degrees or 0.5 m off; from 1.5 degrees/m on robots, from 2 the joint map,",
+        "are decimetres to metres off without anything saying so. What would help: submaps that may",
         "bend, or shorter ones for a front end that says it is bad.",
         "",
     ]
