@@ -2,6 +2,7 @@
 """The parts of docs/results/selection.md, its table of all figures and its plots, from the results of Runs."""
 import collections
 import csv
+import math
 
 import svg_plot
 from runs import row
