@@ -202,11 +202,16 @@ def revision_section(runs, results):
 
 def revision_plot(path, results):
     panels = {}
-    for seed, lines in sorted(results["loops_revision"].items())[:3]:
-        mine = [line for line in lines if line["robot"] == "alpha" and line["policy"] == DEFAULT and line["onboard"]]
-        panels[f"revision, seed {seed}, alpha"] = {
-            title: [(line["time_s"], line[key]["rmse_m"]) for line in mine]
-            for title, key in ((DEFAULT, "corrected"), ("raw odometry", "onboard"), ("server", "server"))}
+    for robot in ("alpha", "bravo"):
+        for seed in sorted(results["loops_revision"])[:3]:
+            def updates(key):
+                return [line for line in results[key][seed]
+                        if line["robot"] == robot and line["policy"] == DEFAULT and line["onboard"]]
+            curves = {title: [(line["time_s"], line[key]["rmse_m"]) for line in updates("loops_revision")]
+                      for title, key in ((DEFAULT, "corrected"), ("raw odometry", "onboard"), ("server", "server"))}
+            curves["every closure taken at its word"] = [(line["time_s"], line["corrected"]["rmse_m"])
+                                                         for line in updates("loops_trusting_revision")]
+            panels[f"revision, seed {seed}, {robot}"] = curves
     svg_plot.write(path, panels, "mission time in s", "RMSE in m so far", x_log=False, y_log=False)
 
 
