@@ -40,28 +40,6 @@ class RigidMotionFilter {
   Eigen::Matrix3d inverse_inertia_;
 };
 
-/// What the middle of each stretch is off by when its ends are held: take(stretch, sag) for every stretch of every
-/// scale, `of` laid out as ShapeUncertainty::sag.
-template <class Stretch, class Take>
-void for_each_sag(const Eigen::Matrix3Xd& x, std::vector<std::vector<Stretch>>& of, const Take& take) {
-  auto L = static_cast<Eigen::Index>(ShapeUncertainty::kShortest);
-  for (auto& stretches : of) {
-    Eigen::Index a = 0;
-    for (Stretch& stretch : stretches) {
-      take(stretch, Eigen::Vector3d(x.col(a + L) - 0.5 * (x.col(a) + x.col(a + 2 * L))));
-      a += 2 * L;
-    }
-    L *= 2;
-  }
-}
-
-template <class Stretch>
-std::vector<std::vector<Stretch>> per_stretch(std::size_t nodes, const Stretch& value) {
-  std::vector<std::vector<Stretch>> out;
-  while (const std::size_t count = ShapeUncertainty::stretches(nodes, out.size())) out.emplace_back(count, value);
-  return out;
-}
-
 /// Standard deviation in the worst direction. The largest eigenvalue of few samples' covariance S is too large when the
 /// true ones are alike, so S is first drawn towards tr(S) / 3 I as far as the samples ask for (oracle approximating
 /// shrinkage: Chen, Wiesel, Eldar, Hero, "Shrinkage algorithms for MMSE covariance estimation", 2010, eq. 23).
@@ -77,36 +55,56 @@ double worst_sigma(const Eigen::Matrix3d& scatter, double samples) {
   return std::sqrt((1.0 - share) * largest + share * trace / 3.0);
 }
 
-/// Displacements of a robot's nodes in the axes of `world`, positions less their rigid motion, rotations less their
-/// mean.
-class Displacements {
+/// What is known of the errors of one kind, positions or rotations.
+class Doubt {
  public:
-  explicit Displacements(std::span<const Pose3> poses)
-      : filter_(positions(poses)), m(3, static_cast<Eigen::Index>(poses.size())), rad(m) {
-    for (const Pose3& pose : poses) R_.push_back(pose.rotation.toRotationMatrix());
+  explicit Doubt(std::size_t nodes) : nodes_(static_cast<double>(nodes)) {
+    while (const std::size_t count = ShapeUncertainty::stretches(nodes, stretches_.size()))
+      stretches_.emplace_back(count);
   }
-  /// From right tangents, 6 per node.
-  void assign(const Eigen::Ref<const Eigen::VectorXd>& tangents) {
-    for (Eigen::Index k = 0; k < m.cols(); ++k) {
-      m.col(k) = R_[static_cast<std::size_t>(k)] * tangents.segment<3>(6 * k);
-      rad.col(k) = R_[static_cast<std::size_t>(k)] * tangents.segment<3>(6 * k + 3);
-    }
-    filter_.apply(m);
-    rad.colwise() -= Eigen::Vector3d(rad.rowwise().mean());
+  /// One of many that the nodes may be off by.
+  void add_sample(const Eigen::Matrix3Xd& x) {
+    ++samples_;
+    squares_ += x.squaredNorm();
+    for_each_sag(x, [](Stretch& stretch, const Eigen::Vector3d& sag) { stretch.scatter += sag * sag.transpose(); });
+  }
+  /// What they would move by if one closure were wrong.
+  void add_shift(const Eigen::Matrix3Xd& x) {
+    largest_squares_ = std::max(largest_squares_, x.squaredNorm());
+    for_each_sag(x, [](Stretch& stretch, const Eigen::Vector3d& sag) {
+      stretch.largest = std::max(stretch.largest, sag.norm());
+    });
+  }
+  [[nodiscard]] double whole() const { return std::sqrt((squares_ / samples_ + largest_squares_) / nodes_); }
+  [[nodiscard]] double sag(std::size_t scale, std::size_t i) const {
+    const Stretch& stretch = stretches_[scale][i];
+    return std::hypot(worst_sigma(stretch.scatter, samples_), stretch.largest);
   }
 
  private:
-  static Eigen::Matrix3Xd positions(std::span<const Pose3> poses) {
-    Eigen::Matrix3Xd out(3, static_cast<Eigen::Index>(poses.size()));
-    for (std::size_t k = 0; k < poses.size(); ++k) out.col(static_cast<Eigen::Index>(k)) = poses[k].translation;
-    return out;
+  struct Stretch {
+    Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+    double largest = 0.0;
+  };
+  /// What the middle of each stretch is off by when its ends are held.
+  template <class Take>
+  void for_each_sag(const Eigen::Matrix3Xd& x, const Take& take) {
+    auto L = static_cast<Eigen::Index>(ShapeUncertainty::kShortest);
+    for (auto& stretches : stretches_) {
+      Eigen::Index a = 0;
+      for (Stretch& stretch : stretches) {
+        take(stretch, Eigen::Vector3d(x.col(a + L) - 0.5 * (x.col(a) + x.col(a + 2 * L))));
+        a += 2 * L;
+      }
+      L *= 2;
+    }
   }
-  RigidMotionFilter filter_;
-  std::vector<Eigen::Matrix3d> R_;
 
- public:
-  Eigen::Matrix3Xd m;
-  Eigen::Matrix3Xd rad;
+  double nodes_;
+  double samples_ = 0.0;
+  double squares_ = 0.0;          ///< |x|^2 of all nodes, over all samples.
+  double largest_squares_ = 0.0;  ///< ... the largest of all shifts.
+  std::vector<std::vector<Stretch>> stretches_;
 };
 
 }  // namespace
@@ -118,39 +116,40 @@ ShapeUncertainty shape_uncertainty(RobotId robot, std::span<const Pose3> poses, 
               samples.cols(), n);
   TUTTI_CHECK(shifts.cols() == 0 || shifts.rows() == 6 * n, "{} x {} shifts of {} poses", shifts.rows(), shifts.cols(),
               n);
-  Displacements x(poses);
-  const auto add = [](Eigen::Matrix3d& scatter, const Eigen::Vector3d& sag) { scatter += sag * sag.transpose(); };
-  auto position = per_stretch<Eigen::Matrix3d>(poses.size(), Eigen::Matrix3d::Zero());
-  auto rotation = position;
-  double squared_m = 0.0, squared_rad = 0.0;  // of all nodes, mean over the samples
-  const auto count = static_cast<double>(samples.cols());
-  for (Eigen::Index s = 0; s < samples.cols(); ++s) {
-    x.assign(samples.col(s));
-    squared_m += x.m.squaredNorm() / count;
-    squared_rad += x.rad.squaredNorm() / count;
-    for_each_sag(x.m, position, add);
-    for_each_sag(x.rad, rotation, add);
+  Eigen::Matrix3Xd points(3, n);
+  std::vector<Eigen::Matrix3d> R;
+  for (const Pose3& pose : poses) {
+    points.col(static_cast<Eigen::Index>(R.size())) = pose.translation;
+    R.push_back(pose.rotation.toRotationMatrix());
   }
-  const auto raise = [](double& most, const Eigen::Vector3d& sag) { most = std::max(most, sag.norm()); };
-  auto most_m = per_stretch(poses.size(), 0.0);
-  auto most_rad = most_m;
-  double most_squared_m = 0.0, most_squared_rad = 0.0;
+  const RigidMotionFilter filter(std::move(points));
+  Doubt position(poses.size());
+  Doubt rotation(poses.size());
+  Eigen::Matrix3Xd x_m(3, n);
+  Eigen::Matrix3Xd x_rad(3, n);
+  const auto displace = [&](const auto& tangents) {
+    for (Eigen::Index k = 0; k < n; ++k) {
+      x_m.col(k) = R[static_cast<std::size_t>(k)] * tangents.template segment<3>(6 * k);
+      x_rad.col(k) = R[static_cast<std::size_t>(k)] * tangents.template segment<3>(6 * k + 3);
+    }
+    filter.apply(x_m);
+    x_rad.colwise() -= Eigen::Vector3d(x_rad.rowwise().mean());
+  };
+  for (Eigen::Index s = 0; s < samples.cols(); ++s) {
+    displace(samples.col(s));
+    position.add_sample(x_m);
+    rotation.add_sample(x_rad);
+  }
   for (Eigen::Index s = 0; s < shifts.cols(); ++s) {
-    x.assign(shifts.col(s));
-    most_squared_m = std::max(most_squared_m, x.m.squaredNorm());
-    most_squared_rad = std::max(most_squared_rad, x.rad.squaredNorm());
-    for_each_sag(x.m, most_m, raise);
-    for_each_sag(x.rad, most_rad, raise);
+    displace(shifts.col(s));
+    position.add_shift(x_m);
+    rotation.add_shift(x_rad);
   }
 
-  ShapeUncertainty out{.robot = robot};
-  out.whole = {std::sqrt((squared_m + most_squared_m) / static_cast<double>(n)),
-               std::sqrt((squared_rad + most_squared_rad) / static_cast<double>(n))};
-  for (std::size_t j = 0; j < position.size(); ++j) {
+  ShapeUncertainty out{.robot = robot, .whole = {position.whole(), rotation.whole()}, .sag = {}};
+  for (std::size_t j = 0; const std::size_t count = ShapeUncertainty::stretches(poses.size(), j); ++j) {
     auto& stretches = out.sag.emplace_back();
-    for (std::size_t i = 0; i < position[j].size(); ++i)
-      stretches.push_back({std::hypot(worst_sigma(position[j][i], count), most_m[j][i]),
-                           std::hypot(worst_sigma(rotation[j][i], count), most_rad[j][i])});
+    for (std::size_t i = 0; i < count; ++i) stretches.push_back({position.sag(j, i), rotation.sag(j, i)});
   }
   return out;
 }
