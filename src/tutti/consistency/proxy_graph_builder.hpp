@@ -45,8 +45,8 @@ struct ProxyGraphConfig {
     v.field("shape_samples", shape_samples, between(0.0, 10'000.0),
             "Samples from which the server learns how sure it is of each trajectory's shape; 0 = do not send it.");
     v.field("shape_deletions", shape_deletions, between(0.0, 10'000.0),
-            "And that any one closure may be wrong: how many, of those that the map hinges on most, are taken away one "
-            "by one to see what would change; 0 = none.");
+            "And that any one closure may be wrong: how many of those on which the map hinges, the most influential "
+            "ones, are taken away one by one to see what would change; 0 = none.");
   }
 };
 

@@ -63,7 +63,8 @@ Pull pull_of(std::size_t e, const PoseGraphEdge& edge, std::span<const Pose3> po
 }  // namespace
 
 std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
-                                          std::span<const std::size_t> candidates, std::size_t count) {
+                                          std::span<const std::size_t> candidates, std::size_t count,
+                                          double least_distance) {
   TUTTI_CHECK(poses.size() == graph.poses.size(), "{} poses, {} nodes", poses.size(), graph.poses.size());
   const BlockStructure structure = internal::analyse_blocks(graph);
   internal::GraphEquations equations(graph, structure);
@@ -73,8 +74,10 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
   const SelectedInverse inverse(equations.hessian().factor());
   for (const std::size_t e : candidates) {
     TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
-    pulls.push_back(pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, structure.edges[e])));
+    Pull pull = pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, structure.edges[e]));
+    if (pull.distance > least_distance) pulls.push_back(std::move(pull));
   }
+  if (pulls.empty()) return {};
   std::ranges::stable_sort(pulls, std::greater(), &Pull::distance);
   pulls.resize(std::min(count, pulls.size()));
 

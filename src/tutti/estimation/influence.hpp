@@ -18,14 +18,16 @@ struct Influence {
       shift;  ///< 6 per node, right tangents: the pose without the edge is retract(pose, shift), first order.
 };
 
-/// The edges among `candidates` whose absence moves the optimum `poses` farthest for what is known of it, at most
-/// `count`, farthest first. Case deletion (Cook, "Detection of influential observations in linear regression", 1977):
-/// with residual r, Jacobian J and information Omega of the edge, H the Hessian of all edges and C = J H^-1 J^T,
+/// The edges among `candidates` whose absence moves the optimum `poses` farthest for what is known of it, by more than
+/// `least_distance`, at most `count`, farthest first. Case deletion (Cook, "Detection of influential observations in
+/// linear regression", 1977): with residual r, Jacobian J and information Omega of the edge, H the Hessian of all edges
+/// and C = J H^-1 J^T,
 ///   shift = H^-1 J^T (Omega^-1 - C)^-1 r,   distance^2 = shift^T H shift,
 /// so one selected inverse serves all candidates, and one solution each the chosen ones. In directions in which nothing
 /// but the edge holds its two ends together it has no residual and, taken away, moves nothing. The first node of each
 /// connected component does not move. Empty for a graph that does not determine its poses.
 std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
-                                          std::span<const std::size_t> candidates, std::size_t count);
+                                          std::span<const std::size_t> candidates, std::size_t count,
+                                          double least_distance = 0.0);
 
 }  // namespace tutti::estimation

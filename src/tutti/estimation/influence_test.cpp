@@ -63,6 +63,10 @@ TEST(Influence, TheFarthestComeFirstAndInTheirOwnMeasure) {
   ASSERT_EQ(all.size(), 12U);
   EXPECT_EQ(all[0].edge, 64U);
   for (std::size_t k = 1; k < all.size(); ++k) EXPECT_GE(all[k - 1].distance, all[k].distance);
+  const auto far = largest_influences(graph, poses, closures_of(graph), 100, all[4].distance);
+  ASSERT_EQ(far.size(), 4U);
+  EXPECT_EQ(far.back().edge, all[3].edge);
+  EXPECT_TRUE(largest_influences(graph, poses, closures_of(graph), 100, all[0].distance).empty());
   const auto three = largest_influences(graph, poses, closures_of(graph), 3);
   ASSERT_EQ(three.size(), 3U);
   for (std::size_t k = 0; k < 3; ++k) {
@@ -88,6 +92,7 @@ TEST(Influence, AnEdgeThatAloneHoldsItsEndsTogetherMovesNothing) {
     EXPECT_LT(influence.distance, 1e-6);
     EXPECT_LT(influence.shift.norm(), 1e-6);
   }
+  EXPECT_TRUE(largest_influences(graph, poses, steps, 3, 1e-3).empty());
 }
 
 TEST(Influence, NothingToSay) {

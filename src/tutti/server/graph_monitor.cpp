@@ -2,6 +2,7 @@
 #include "tutti/server/graph_monitor.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <span>
@@ -9,6 +10,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/estimation/chi_square.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/server/odometry_honesty.hpp"
@@ -54,13 +56,18 @@ std::vector<Repair> repairs(const MapEstimate& map, RobotId robot, const std::ve
   return out;
 }
 
-/// By how much the nodes would move without the one or the other accepted closure, for those that move the map most:
-/// (6 nodes) x closures, right tangents.
+/// The map hinges on a closure without which it would move by more than its own uncertainty lets one expect (of one
+/// closure's six numbers). What moves it less is part of that uncertainty.
+constexpr double kHingeProbability = 0.99;
+
+/// By how much the nodes would move without the one or the other accepted closure on which the map hinges, for those
+/// that move it most: (6 nodes) x closures, right tangents.
 Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const std::vector<std::size_t>& nodes,
                                          std::size_t count) {
   std::vector<std::size_t> closures(map.graph.edges.size() - map.odometry_edges);
   std::iota(closures.begin(), closures.end(), map.odometry_edges);
-  const auto influences = estimation::largest_influences(map.graph, map.graph.poses, closures, count);
+  const auto influences = estimation::largest_influences(
+      map.graph, map.graph.poses, closures, count, std::sqrt(estimation::chi_square_6_quantile(kHingeProbability)));
   Eigen::MatrixXd out(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(influences.size()));
   for (Eigen::Index c = 0; c < out.cols(); ++c)
     for (std::size_t k = 0; k < nodes.size(); ++k)
