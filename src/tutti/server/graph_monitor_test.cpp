@@ -50,16 +50,21 @@ TEST(ClosureSupport, FollowsTheChosenNodesOnly) {
   EXPECT_TRUE(closure_support(map, {}).empty());
 }
 
+VerdictSet verdicts_of(const SubmapSet& submaps, const test::TestFinder& finder) {
+  VerdictSet out;
+  for (auto a = submaps.begin(); a != submaps.end(); ++a)
+    for (auto b = std::next(a); b != submaps.end(); ++b)
+      if (finder.is_candidate(*a->second, *b->second))
+        out[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+  return out;
+}
+
 TEST(MonitorGraph, SaysLessWhereClosuresHelp) {
   const test::TestFinder finder(1);
   SubmapSet submaps;
   for (Submap& submap : test::make_submaps(RobotId{0}, {}, Rng(1)))
     submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
-  VerdictSet verdicts;
-  for (auto a = submaps.begin(); a != submaps.end(); ++a)
-    for (auto b = std::next(a); b != submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+  const VerdictSet verdicts = verdicts_of(submaps, finder);
   ASSERT_GT(verdicts.size(), 2U);
   const ProxyGraph without = monitor_graph(estimate_map(submaps, {}, {}), 1, {});
   const ProxyGraph with = monitor_graph(estimate_map(submaps, verdicts, {}), 2, {});
@@ -85,11 +90,7 @@ MapEstimate circle_map(std::uint64_t seed) {
   for (std::uint32_t r = 0; r < 2; ++r)
     for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(seed).fork(r)))
       submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
-  VerdictSet verdicts;
-  for (auto a = submaps.begin(); a != submaps.end(); ++a)
-    for (auto b = std::next(a); b != submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+  const VerdictSet verdicts = verdicts_of(submaps, finder);
   return estimate_map(submaps, verdicts, {});
 }
 
@@ -135,11 +136,7 @@ TEST(MonitorGraph, WhatHingesOnOneClosureIsNotSure) {
   for (Submap& submap : test::make_submaps(robot, {.sigma_m = 0.1, .sigma_rad = 0.02}, Rng(4)))
     submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
   const test::TestFinder finder(4);
-  VerdictSet all;
-  for (auto a = submaps.begin(); a != submaps.end(); ++a)
-    for (auto b = std::next(a); b != submaps.end(); ++b)
-      if (finder.is_candidate(*a->second, *b->second))
-        all[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+  const VerdictSet all = verdicts_of(submaps, finder);
   ASSERT_GT(all.size(), 2U);
   const auto expected_m = [](const MapEstimate& map, int deletions) {
     return monitor_graph(map, 1, {.shape_deletions = deletions}).shapes.at(0).whole.position_m;
