@@ -56,9 +56,10 @@ std::vector<Repair> repairs(const MapEstimate& map, RobotId robot, const std::ve
   return out;
 }
 
-/// The map hinges on a closure without which it would move by more than its own uncertainty lets one expect (of one
-/// closure's six numbers). What moves it less is part of that uncertainty.
-constexpr double kHingeProbability = 0.99;
+/// The map hinges on a closure without which it would move by more than its own uncertainty lets one expect of the
+/// worst of all its closures (six numbers each), but for this probability. What moves it less is part of that
+/// uncertainty.
+constexpr double kFalseHinge = 0.01;
 
 /// By how much the nodes would move without the one or the other accepted closure on which the map hinges, for those
 /// that move it most: (6 nodes) x closures, right tangents.
@@ -66,8 +67,10 @@ Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const std::vect
                                          std::size_t count) {
   std::vector<std::size_t> closures(map.graph.edges.size() - map.odometry_edges);
   std::iota(closures.begin(), closures.end(), map.odometry_edges);
-  const auto influences = estimation::largest_influences(
-      map.graph, map.graph.poses, closures, count, std::sqrt(estimation::chi_square_6_quantile(kHingeProbability)));
+  if (closures.empty()) return Eigen::MatrixXd(static_cast<Eigen::Index>(6 * nodes.size()), 0);
+  const double probability = 1.0 - kFalseHinge / static_cast<double>(closures.size());
+  const auto influences = estimation::largest_influences(map.graph, map.graph.poses, closures, count,
+                                                         std::sqrt(estimation::chi_square_6_quantile(probability)));
   Eigen::MatrixXd out(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(influences.size()));
   for (Eigen::Index c = 0; c < out.cols(); ++c)
     for (std::size_t k = 0; k < nodes.size(); ++k)
