@@ -181,10 +181,8 @@ class Window {
       forward_[k].cost += stations_[k].observe(forward_[k].belief);
     }
     for (std::size_t k = n - 1; k-- > 0;) {
-      const RelativePose& step = steps_[k];
-      const Matrix6d back = adjoint(step.T_a_b);
       backward_[k] = backward_[k + 1];
-      backward_[k].belief.advance({step.T_a_b.inverse(), back * step.covariance * back.transpose()});
+      backward_[k].belief.advance(inverse(steps_[k]));
       backward_[k].cost += stations_[k].observe(backward_[k].belief);
     }
   }

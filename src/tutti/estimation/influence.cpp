@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"

@@ -51,7 +51,6 @@ class FrontTree {
   /// Overwrites b (6 per variable) by H^-1 b. After a successful factorise() only.
   void solve(Eigen::VectorXd& b) const;
 
-  [[nodiscard]] int variables() const { return static_cast<int>(front_of_.size()); }
   /// Variables eliminated by the last factorise(), or by the fronts that the last restructure() made.
   [[nodiscard]] int computed() const { return computed_; }
 

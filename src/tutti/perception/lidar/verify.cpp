@@ -119,13 +119,12 @@ void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_ini
   const RegistrationConfig fine = with_levels(config.registration, {config.registration.levels.back()});
   const RegistrationResult forward = register_clouds(a.cloud, b.cloud, T_init, fine);
   const RegistrationResult backward = register_clouds(b.cloud, a.cloud, T_init.inverse(), fine);
-  const Pose3& T_b_a = backward.T_target_source;
-  const Vector6d gap = local(forward.T_target_source, T_b_a.inverse());
+  const RelativePose turned = inverse(RelativePose{backward.T_target_source, backward.covariance});
+  const Vector6d gap = local(forward.T_target_source, turned.T_a_b);
   weakest_b = forward.weakest_source;
   out.T_a_b = retract(forward.T_target_source, 0.5 * gap);
-  const Matrix6d Ad = adjoint(T_b_a);  // as in inverse(); what the two ways disagree by is uncertainty, too
-  out.covariance =
-      0.5 * (forward.covariance + Ad * backward.covariance * Ad.transpose()) + 0.25 * gap * gap.transpose();
+  // What the two ways disagree by is uncertainty, too.
+  out.covariance = 0.5 * (forward.covariance + turned.covariance) + 0.25 * gap * gap.transpose();
   out.overlap = 0.5 * (forward.overlap + backward.overlap);
   out.plane_rmse_m = std::max(forward.plane_rmse_m, backward.plane_rmse_m);
   out.misfit = std::max(forward.misfit, backward.misfit);
@@ -171,9 +170,9 @@ std::string why_refused(const PairVerification& v, const LidarClosureConfig& c) 
 }  // namespace
 
 PairVerification inverse(PairVerification v) {
-  const Matrix6d Ad = adjoint(v.T_a_b);  // (T Exp(xi))^-1 = T^-1 Exp(-Ad(T) xi)
-  v.covariance = Ad * v.covariance * Ad.transpose();
-  v.T_a_b = v.T_a_b.inverse();
+  const RelativePose turned = inverse(RelativePose{v.T_a_b, v.covariance});
+  v.T_a_b = turned.T_a_b;
+  v.covariance = turned.covariance;
   return v;
 }
 
