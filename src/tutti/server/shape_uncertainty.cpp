@@ -8,6 +8,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/server/worst_sigma.hpp"
 
 namespace tutti::server {
 namespace {
@@ -39,21 +40,6 @@ class RigidMotionFilter {
   Eigen::Matrix3Xd arms_;  ///< From the centroid.
   Eigen::Matrix3d inverse_inertia_;
 };
-
-/// Standard deviation in the worst direction. The largest eigenvalue of few samples' covariance S is too large when the
-/// true ones are alike, so S is first drawn towards tr(S) / 3 I as far as the samples ask for (oracle approximating
-/// shrinkage: Chen, Wiesel, Eldar, Hero, "Shrinkage algorithms for MMSE covariance estimation", 2010, eq. 23).
-double worst_sigma(const Eigen::Matrix3d& scatter, double samples) {
-  const Eigen::Matrix3d S = scatter / samples;
-  const double trace = S.trace();
-  if (!(trace > 0.0)) return 0.0;
-  const double squares = S.squaredNorm();
-  const double spread = (samples + 1.0 / 3.0) * (squares - trace * trace / 3.0);
-  const double wanted = squares / 3.0 + trace * trace;
-  const double share = wanted < spread ? wanted / spread : 1.0;
-  const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(S, Eigen::EigenvaluesOnly).eigenvalues()(2);
-  return std::sqrt((1.0 - share) * largest + share * trace / 3.0);
-}
 
 /// What is known of the errors of one kind, positions or rotations.
 class Doubt {

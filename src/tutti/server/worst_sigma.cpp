@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/worst_sigma.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace tutti::server {
+
+double worst_sigma(const Eigen::Matrix3d& scatter, double samples) {
+  const Eigen::Matrix3d S = scatter / samples;
+  const double trace = S.trace();
+  if (!(trace > 0.0)) return 0.0;
+  const double squares = S.squaredNorm();
+  const double spread = (samples + 1.0 / 3.0) * (squares - trace * trace / 3.0);
+  const double wanted = squares / 3.0 + trace * trace;
+  const double share = wanted < spread ? wanted / spread : 1.0;
+  const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(S, Eigen::EigenvaluesOnly).eigenvalues()(2);
+  return std::sqrt((1.0 - share) * largest + share * trace / 3.0);
+}
+
+}  // namespace tutti::server
