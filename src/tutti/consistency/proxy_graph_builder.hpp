@@ -28,6 +28,7 @@ struct ProxyGraphConfig {
   double sparsify_threshold = 1e-3;
   int shape_samples = 32;
   int shape_deletions = 32;
+  int shape_ties = 32;
 
   template <class V>
   void describe(V& v) {
@@ -47,6 +48,9 @@ struct ProxyGraphConfig {
     v.field("shape_deletions", shape_deletions, between(0.0, 10'000.0),
             "And that any one closure may be wrong: how many of those on which the map hinges, the most influential "
             "ones, are taken away one by one to see what would change; 0 = none.");
+    v.field("shape_ties", shape_ties, between(0.0, 1000.0),
+            "For how many pairs of a robot's nodes, far apart along its way, it says how well it knows one relative to "
+            "the other: those of which closures tell most.");
   }
 };
 

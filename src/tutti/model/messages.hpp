@@ -9,7 +9,7 @@
 
 namespace tutti {
 
-inline constexpr std::uint32_t kProtocolVersion = 3;
+inline constexpr std::uint32_t kProtocolVersion = 4;
 
 /// In front of every message. (robot, session, sequence) identifies it, so duplicates are recognised.
 struct MessageHeader {

@@ -52,10 +52,20 @@ struct ShapeSigma {
   friend bool operator==(const ShapeSigma&, const ShapeSigma&) = default;
 };
 
-/// How sure the server is of the shape of one robot's trajectory, stretch by stretch and over all. Let x_k be what the
-/// estimate of the robot's k-th proxy node is off by: its position after one rigid alignment of all the robot's nodes,
-/// its rotation (rotation vector) less the mean over all of them; both in the axes of `world`. Any one closure may be
-/// wrong: what would change without the one that matters most counts as uncertainty too (docs/math.md).
+/// Two of a robot's proxy nodes, a before b, that the map knows relative to each other, T_a_b, much better than the way
+/// between them alone would allow: what it knows of the two from closures.
+struct ShapeTie {
+  std::uint32_t a = 0;
+  std::uint32_t b = 0;  ///< Counted along the robot's nodes in the graph; a < b.
+  ShapeSigma sigma;     ///< Of T_a_b.
+  friend bool operator==(const ShapeTie&, const ShapeTie&) = default;
+};
+
+/// How sure the server is of the shape of one robot's trajectory: stretch by stretch, over all, and across the ties.
+/// Let x_k be what the estimate of the robot's k-th proxy node is off by: its position after one rigid alignment of all
+/// the robot's nodes, its rotation (rotation vector) less the mean over all of them; both in the axes of `world`. Any
+/// one closure may be wrong: what would change without the one that matters most counts as uncertainty too
+/// (docs/math.md).
 struct ShapeUncertainty {
   static constexpr std::size_t kShortest = 4;  ///< Half the length, in nodes, of the shortest stretches.
   /// How many stretches of scale j fit into a robot's nodes: sag[j].size(); 0 = sag ends before j.
@@ -68,6 +78,7 @@ struct ShapeUncertainty {
   /// stretch of 2 L nodes, L = kShortest 2^j: a = 2 L i, m = a + L, b = a + 2 L, counted along the robot's nodes in the
   /// graph. As many j as fit; sag[j].size() = (nodes - 1) / (2 L), see stretches().
   std::vector<std::vector<ShapeSigma>> sag;
+  std::vector<ShapeTie> ties;  ///< Sorted by (a, b), none twice.
   friend bool operator==(const ShapeUncertainty&, const ShapeUncertainty&) = default;
 };
 

@@ -14,6 +14,7 @@
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/server/odometry_honesty.hpp"
+#include "tutti/server/shape_ties.hpp"
 #include "tutti/server/shape_uncertainty.hpp"
 
 namespace tutti::server {
@@ -99,9 +100,15 @@ std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& g
   for (std::size_t begin = 0, end = 0; begin < kept.size(); begin = end) {
     const RobotId robot = graph.nodes[begin].robot;
     std::vector<Pose3> poses;
-    for (; end < kept.size() && graph.nodes[end].robot == robot; ++end) poses.push_back(graph.nodes[end].T_world_body);
+    std::vector<Matrix6d> steps;
+    for (; end < kept.size() && graph.nodes[end].robot == robot; ++end) {
+      poses.push_back(graph.nodes[end].T_world_body);
+      steps.push_back(graph.nodes[end].covariance);
+    }
     const auto first = static_cast<Eigen::Index>(6 * begin), rows = static_cast<Eigen::Index>(6 * (end - begin));
-    out.push_back(shape_uncertainty(robot, poses, samples.middleRows(first, rows), shifts.middleRows(first, rows)));
+    const Eigen::MatrixXd own_samples = samples.middleRows(first, rows), own_shifts = shifts.middleRows(first, rows);
+    out.push_back(shape_uncertainty(robot, poses, own_samples, own_shifts));
+    out.back().ties = shape_ties(poses, steps, own_samples, own_shifts, static_cast<std::size_t>(config.shape_ties));
   }
   return out;
 }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tutti/geometry/alignment.hpp"
@@ -114,6 +115,19 @@ TEST(MonitorGraph, ShapesAreThoseOfTheNodesSent) {
     EXPECT_GT(reduced.shapes[r].sag[0][0].position_m, whole.shapes[r].sag[0][0].position_m);
   }
   EXPECT_TRUE(monitor_graph(map, 1, {.shape_samples = 0}).shapes.empty());
+}
+
+// Once around a circle, closures say where the ends lie relative to each other.
+TEST(MonitorGraph, TiesWhatClosuresHoldTogether) {
+  const MapEstimate map = circle_map(1);
+  for (const ShapeUncertainty& shape : monitor_graph(map, 1, {}).shapes) {
+    ASSERT_FALSE(shape.ties.empty());
+    EXPECT_LE(shape.ties.size(), 32U);
+    const bool around =
+        std::ranges::any_of(shape.ties, [](const ShapeTie& tie) { return tie.b - tie.a > 30 && tie.b < 46; });
+    EXPECT_TRUE(around) << "robot " << shape.robot.value;
+  }
+  for (const ShapeUncertainty& shape : monitor_graph(map, 1, {.shape_ties = 0}).shapes) EXPECT_TRUE(shape.ties.empty());
 }
 
 /// Root mean square of how far one robot's representative nodes lie from where they lie in another map, aligned.

@@ -154,6 +154,9 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
     RC_ASSERT(out.shapes[s].sag.size() == in.shapes[s].sag.size());
     for (std::size_t j = 0; j < in.shapes[s].sag.size(); ++j)
       RC_ASSERT(std::ranges::equal(in.shapes[s].sag[j], out.shapes[s].sag[j], close));
+    RC_ASSERT(std::ranges::equal(in.shapes[s].ties, out.shapes[s].ties, [&](const ShapeTie& x, const ShapeTie& y) {
+      return x.a == y.a && x.b == y.b && close(x.sigma, y.sigma);
+    }));
   }
   const auto again = decode_proxy_graph(encode(*decoded));
   RC_ASSERT(again.has_value());
@@ -297,6 +300,19 @@ TEST(Validate, Shapes) {
                               m.graph.nodes.push_back(node);
                               m.graph.shapes.back().sag[0].pop_back();
                             }}});
+}
+
+TEST(Validate, Ties) {
+  Rng rng(9);
+  ProxyGraphMessage good = test::any_proxy_graph(rng, 1, 40, false);
+  good.graph.shapes[0].ties = {{0, 39, {0.1, 0.01}}, {3, 30, {0.0, 0.0}}, {3, 31, {0.2, 0.02}}};
+  using M = ProxyGraphMessage;
+  expect_refused<M>(good, {{"nodes 39 and 39 of 40", [](M& m) { m.graph.shapes[0].ties[0].a = 39; }},
+                           {"nodes 3 and 40 of 40", [](M& m) { m.graph.shapes[0].ties[2].b = 40; }},
+                           {"does not come after", [](M& m) { m.graph.shapes[0].ties[2].b = 30; }},
+                           {"does not come after", [](M& m) { m.graph.shapes[0].ties[0].a = 5; }},
+                           {"finite", [](M& m) { m.graph.shapes[0].ties[1].sigma.position_m = kNan; }},
+                           {"1001 ties", [](M& m) { m.graph.shapes[0].ties.resize(kMaxTies + 1); }}});
 }
 
 TEST(Validate, Verdict) {

@@ -38,7 +38,7 @@ TEST(Golden, Submap) {
                               {161, {1'577'836'981'199'104'651}, {kQuarterTurn, {2, 2, 3}}, false}};
   message.submap.odometry = {{{kQuarterTurn, {1, 0, 0}}, diagonal(4e-4, 1e-4)}};
   message.submap.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}});
-  const auto decoded = decode_submap(golden_bytes("submap_v3.bin", encode(message)));
+  const auto decoded = decode_submap(golden_bytes("submap_v4.bin", encode(message)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   const Submap& submap = decoded->submap;
   EXPECT_EQ(decoded->header, message.header);
@@ -73,8 +73,9 @@ TEST(Golden, ProxyGraph) {
   graph.reduced = true;
   graph.edges = {{0, 1, 0.625}};
   graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
-  graph.shapes = {{RobotId{0}, {0.25, 0.0}, {}}, {RobotId{7}, {0.5, 0.01}, {{{0.03, 0.002}}}}};
-  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v3.bin", encode(message)));
+  graph.shapes = {{RobotId{0}, {0.25, 0.0}, {}, {}},
+                  {RobotId{7}, {0.5, 0.01}, {{{0.03, 0.002}}}, {{0, 8, {0.05, 0.004}}}}};
+  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v4.bin", encode(message)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   EXPECT_EQ(decoded->header, message.header);
   EXPECT_EQ(decoded->graph.revision, 42U);
@@ -95,6 +96,12 @@ TEST(Golden, ProxyGraph) {
   ASSERT_EQ(decoded->graph.shapes[1].sag[0].size(), 1U);
   EXPECT_NEAR(decoded->graph.shapes[1].sag[0][0].position_m, 0.03, 0.0015);
   EXPECT_NEAR(decoded->graph.shapes[1].sag[0][0].rotation_rad, 0.002, 0.0001);
+  EXPECT_TRUE(decoded->graph.shapes[0].ties.empty());
+  ASSERT_EQ(decoded->graph.shapes[1].ties.size(), 1U);
+  EXPECT_EQ(decoded->graph.shapes[1].ties[0].a, 0U);
+  EXPECT_EQ(decoded->graph.shapes[1].ties[0].b, 8U);
+  EXPECT_NEAR(decoded->graph.shapes[1].ties[0].sigma.position_m, 0.05, 0.0025);
+  EXPECT_NEAR(decoded->graph.shapes[1].ties[0].sigma.rotation_rad, 0.004, 0.0002);
   ASSERT_EQ(decoded->graph.nodes.size(), graph.nodes.size());
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     EXPECT_EQ(decoded->graph.nodes[i].robot, graph.nodes[i].robot);
@@ -110,7 +117,7 @@ TEST(Golden, Verdict) {
   const ClosureVerdict verdict{
       .pair = {{RobotId{0}, 3}, {RobotId{1}, 4}},
       .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}}};
-  const auto decoded = decode_verdict(golden_bytes("verdict_v3.bin", encode(verdict)));
+  const auto decoded = decode_verdict(golden_bytes("verdict_v4.bin", encode(verdict)));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
   EXPECT_EQ(*decoded, verdict);
 }

@@ -35,6 +35,7 @@ struct Run {
   std::size_t nodes = 0;
   std::size_t eliminated = 0;
   bool has_shape = false;
+  std::size_t ties = 0;
 };
 
 // One routine serves both ways, so that they cannot differ: it hands each number to code(model, number), which writes
@@ -139,7 +140,8 @@ class EdgeColumns {
 };
 
 /// Shapes: `whole`, then the sags of scale after scale, each by its difference to the one before it along the way; the
-/// first of a scale to the first of the scale before.
+/// first of a scale to the first of the scale before. Then the ties: the first node by its distance to that of the tie
+/// before, how far the second one is, and the sigmas, by their differences.
 class ShapeColumns {
  public:
   /// Nothing when a number is outside what encoding makes.
@@ -161,6 +163,17 @@ class ShapeColumns {
         if (i == 0) first = previous;
       }
     }
+    SigmaCode previous{};
+    std::int64_t a = 0, length = 0;
+    for (std::size_t i = 0; i < run.ties; ++i) {
+      const ShapeTie tie = shape.ties.empty() ? ShapeTie{} : shape.ties[i];
+      a = sum(a, coder.code(tie_from_, difference(tie.a, a)));
+      length = sum(length, coder.code(tie_length_, difference(difference(tie.b, tie.a), length)));
+      const auto sigma = code(coder, tie_sigma_, tie.sigma, previous);
+      const auto nodes = static_cast<std::int64_t>(run.nodes);
+      if (!sigma || a < 0 || a >= nodes || length <= 0 || length >= nodes - a) return std::nullopt;
+      out.ties.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a + length), *sigma});
+    }
     return out;
   }
 
@@ -178,7 +191,8 @@ class ShapeColumns {
     if (!position_m || !rotation_rad) return std::nullopt;
     return ShapeSigma{*position_m, *rotation_rad};
   }
-  Models whole_, first_, next_;
+  Models whole_, first_, next_, tie_sigma_;
+  IntegerModel tie_from_, tie_length_;
 };
 
 std::vector<Run> runs_of(const ProxyGraph& graph) {
@@ -195,7 +209,10 @@ std::vector<Run> runs_of(const ProxyGraph& graph) {
   };
   add(graph.nodes, &Run::nodes);
   add(graph.eliminated, &Run::eliminated);
-  for (const ShapeUncertainty& shape : graph.shapes) runs[shape.robot].has_shape = true;
+  for (const ShapeUncertainty& shape : graph.shapes) {
+    runs[shape.robot].has_shape = true;
+    runs[shape.robot].ties = shape.ties.size();
+  }
   std::vector<Run> out;
   for (auto& [robot, run] : runs) {
     run.clock.step_ns = std::max<std::uint64_t>(run.clock.step_ns, 1);
@@ -218,11 +235,14 @@ Result<std::vector<Run>> read_runs(const v1::ProxyGraph& in) {
                   kMaxProxyNodes);
     if (run.stamp_step_ns() == 0)
       return fail(ErrorCode::invalid, "robot {}: a step of 0 ns between stamps", run.robot());
+    if (run.ties() > kMaxTies)
+      return fail(ErrorCode::invalid, "robot {}: {} ties, at most {} are accepted", run.robot(), run.ties(), kMaxTies);
     runs.push_back({RobotId{run.robot()},
                     {static_cast<std::uint64_t>(run.stamp_offset_ns()), run.stamp_step_ns()},
                     run.nodes(),
                     run.eliminated(),
-                    run.shape()});
+                    run.shape(),
+                    run.ties()});
   }
   return runs;
 }
@@ -317,6 +337,7 @@ std::string encode(const ProxyGraphMessage& message) {
     entry.set_stamp_offset_ns(static_cast<std::int64_t>(run.clock.offset_ns));
     entry.set_stamp_step_ns(run.clock.step_ns);
     entry.set_shape(run.has_shape);
+    entry.set_ties(static_cast<std::uint32_t>(run.ties));
   }
   write_body(graph, runs, out);
   for (const RobotComponent& component : graph.components) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/internal/shape.hpp"
@@ -133,6 +134,16 @@ Status check_shape(const ShapeUncertainty& shape, std::size_t nodes) {
                   ShapeUncertainty::stretches(nodes, j), nodes);
     for (const ShapeSigma& sigma : shape.sag[j])
       if (auto ok = check(sigma); !ok) return ok;
+  }
+  if (auto ok = at_most(shape.ties.size(), kMaxTies, "ties"); !ok) return ok;
+  for (std::size_t i = 0; i < shape.ties.size(); ++i) {
+    const auto& [a, b, sigma] = shape.ties[i];
+    if (a >= b || b >= nodes)
+      return fail(ErrorCode::invalid, "tie {} joins nodes {} and {} of {}, expected the earlier one first", i, a, b,
+                  nodes);
+    if (i > 0 && std::pair(shape.ties[i - 1].a, shape.ties[i - 1].b) >= std::pair(a, b))
+      return fail(ErrorCode::invalid, "tie {} ({}, {}) does not come after the one before it", i, a, b);
+    if (auto ok = check(sigma); !ok) return ok;
   }
   return {};
 }

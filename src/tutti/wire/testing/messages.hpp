@@ -70,7 +70,8 @@ inline SubmapMessage any_submap(Rng& rng, std::size_t keyframes, std::size_t poi
   return message;
 }
 
-/// As estimated from 32 samples of a drifting trajectory with as many nodes.
+/// As estimated from 32 samples of a drifting trajectory with as many nodes, 32 of which are tied to others if there
+/// are as many.
 inline ShapeUncertainty any_shape(Rng& rng, RobotId robot, std::size_t nodes) {
   const auto sigma = [&](double length) {
     return ShapeSigma{0.002 * std::pow(length, 1.3) * std::exp(rng.normal(0.12)),
@@ -80,6 +81,12 @@ inline ShapeUncertainty any_shape(Rng& rng, RobotId robot, std::size_t nodes) {
   for (std::size_t L = ShapeUncertainty::kShortest; 2 * L < nodes; L *= 2) {
     auto& stretches = shape.sag.emplace_back();
     for (std::size_t i = 0; i < (nodes - 1) / (2 * L); ++i) stretches.push_back(sigma(static_cast<double>(L)));
+  }
+  for (std::size_t i = 0, a = 0; i < 32; ++i) {
+    a += 1 + rng.index(nodes / 32 + 1);
+    if (a + 8 >= nodes) break;
+    const std::size_t b = a + 8 + rng.index(nodes - a - 8);
+    shape.ties.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), sigma(10.0)});
   }
   return shape;
 }
