@@ -36,9 +36,11 @@ HELD_OUT = {  # docs/simulation.md: never used for tuning
                                 f"{R}.odometry.scripted=[{{after_m: 150, length_m: 40, yaw_deg: 6}}]"],
 }
 ABLATION = {
-    "rmse": ("without wavelets: aligned RMSE above 3x what the server says", ["agent.policy.adaptive.detection=rmse"]),
+    "wavelets": ("without ties", ["agent.policy.adaptive.agreement.tests=wavelets"]),
+    "ties": ("without wavelets: ties alone", ["agent.policy.adaptive.agreement.tests=ties"]),
+    "rmse": ("without either: aligned RMSE above 3x what the server says", ["agent.policy.adaptive.detection=rmse"]),
     "always": ("without any detection", ["agent.policy.adaptive.detection=always"]),
-    "even": ("wavelet detection, uniform placement", ["agent.policy.adaptive.placement=uniform"]),
+    "even": ("the same detection, uniform placement", ["agent.policy.adaptive.placement=uniform"]),
     "absolute": ("absolute thresholds (5 cm, 0.5 degrees)", ["agent.policy.adaptive.agreement.thresholds=absolute"]),
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
 
 #include "tutti/base/check.hpp"
@@ -143,18 +145,29 @@ ChainAgreement::ChainAgreement(std::span<const std::size_t> ranks, const ShapeUn
   mean_square_.setConstant(bank_.scales(), 1.0);
   if (n < 2 || shape == nullptr || config.thresholds == "absolute") return;
 
-  const Propagation through = propagate(bank_, *signal_, n, static_cast<int>(shape->sag.size()));
   const double doublings = std::floor(std::log2(static_cast<double>(update)));
-  const double share = 0.5 * config.false_alarm_rate / ((doublings + 1.0) * (doublings + 2.0)) / (2.0 * bank_.scales());
+  const double look = config.false_alarm_rate / ((doublings + 1.0) * (doublings + 2.0));
+  if (config.tests != "ties")
+    set_wavelet_thresholds(ranks, *shape, look / 3.0);
+  else
+    threshold_m_.setConstant(std::numeric_limits<double>::infinity()), threshold_rad_ = threshold_m_;
+  if (config.tests != "wavelets") set_tie_thresholds(ranks, *shape, look / 3.0);
+}
+
+void ChainAgreement::set_wavelet_thresholds(std::span<const std::size_t> ranks, const ShapeUncertainty& shape,
+                                            double rate) {
+  const auto n = static_cast<Eigen::Index>(ranks.size());
+  const Propagation through = propagate(bank_, *signal_, n, static_cast<int>(shape.sag.size()));
+  const double share = rate / (2.0 * bank_.scales());
   const double factor = chi_3_exceeded_with(share / static_cast<double>(n));
   for (int s = 0; s < bank_.scales(); ++s)
-    mean_square_(s) = std::pow((shape->sag.empty() ? 1.0 : kCalibration) / factor, 2) *
+    mean_square_(s) = std::pow((shape.sag.empty() ? 1.0 : kCalibration) / factor, 2) *
                       chi_square_exceeded_with(share, 3.0 * through.modes(s)) / through.modes(s);
   for (Eigen::Index k = 0; k < n; ++k) {
-    Eigen::VectorXd position = through.whole * std::pow(shape->whole.position_m, 2);
-    Eigen::VectorXd rotation = through.whole * std::pow(shape->whole.rotation_rad, 2);
+    Eigen::VectorXd position = through.whole * std::pow(shape.whole.position_m, 2);
+    Eigen::VectorXd rotation = through.whole * std::pow(shape.whole.rotation_rad, 2);
     for (Eigen::Index c = 0; c < through.octaves.cols(); ++c) {
-      const auto sag = squared_sag(*shape, through.first + static_cast<int>(c),
+      const auto sag = squared_sag(shape, through.first + static_cast<int>(c),
                                    static_cast<double>(ranks[static_cast<std::size_t>(k)]));
       position += through.octaves.col(c) * sag.position_m;
       rotation += through.octaves.col(c) * sag.rotation_rad;
@@ -162,16 +175,43 @@ ChainAgreement::ChainAgreement(std::span<const std::size_t> ranks, const ShapeUn
     threshold_m_.row(k) = position.transpose();
     threshold_rad_.row(k) = rotation.transpose();
   }
-  bound_by_whole(threshold_m_, shape->whole.position_m, *signal_);
-  bound_by_whole(threshold_rad_, shape->whole.rotation_rad, *signal_);
+  bound_by_whole(threshold_m_, shape.whole.position_m, *signal_);
+  bound_by_whole(threshold_rad_, shape.whole.rotation_rad, *signal_);
   threshold_m_.rowwise() += std::pow(kRounding.position_m, 2) * through.rounding.transpose();
   threshold_rad_.rowwise() += std::pow(kRounding.rotation_rad, 2) * through.rounding.transpose();
   threshold_m_ = factor * threshold_m_.cwiseSqrt();
   threshold_rad_ = factor * threshold_rad_.cwiseSqrt();
 }
 
+void ChainAgreement::set_tie_thresholds(std::span<const std::size_t> ranks, const ShapeUncertainty& shape,
+                                        double rate) {
+  for (const ShapeTie& tie : shape.ties) {
+    const auto a = std::ranges::lower_bound(ranks, tie.a), b = std::ranges::lower_bound(ranks, tie.b);
+    if (a == ranks.end() || *a != tie.a || b == ranks.end() || *b != tie.b) continue;
+    ties_.push_back({static_cast<std::size_t>(a - ranks.begin()),
+                     static_cast<std::size_t>(b - ranks.begin()),
+                     {std::hypot(tie.sigma.position_m, kRounding.position_m),
+                      std::hypot(tie.sigma.rotation_rad, kRounding.rotation_rad)}});
+  }
+  if (ties_.empty()) return;
+  const double factor = chi_3_exceeded_with(rate / (2.0 * static_cast<double>(ties_.size())));
+  for (Tie& tie : ties_) tie.threshold = {factor * tie.threshold.position_m, factor * tie.threshold.rotation_rad};
+}
+
 ChainDisagreement ChainAgreement::compare(std::span<const Pose3> server, std::span<const Pose3> robot) const {
-  return compare(signal_->difference(server, robot));
+  ChainDisagreement out = compare(signal_->difference(server, robot));
+  for (const auto& [a, b, threshold] : ties_) {
+    const Pose3 T_server = server[a].inverse() * server[b], T_robot = robot[a].inverse() * robot[b];
+    MissedTie missed{.a = a,
+                     .b = b,
+                     .position_m = (T_robot.translation - T_server.translation).norm(),
+                     .rotation_rad = T_server.rotation.angularDistance(T_robot.rotation)};
+    missed.significance =
+        std::max(missed.position_m / threshold.position_m, missed.rotation_rad / threshold.rotation_rad);
+    if (missed.significance > 1.0) out.missed_ties.push_back(missed);
+  }
+  std::ranges::stable_sort(out.missed_ties, std::greater{}, &MissedTie::significance);
+  return out;
 }
 
 ChainDisagreement ChainAgreement::compare(const Eigen::MatrixXd& difference) const {

@@ -117,6 +117,98 @@ TEST_P(Calibration, AMapThatIsLessSureThanItSaysIsFoundOut) {
 
 INSTANTIATE_TEST_SUITE_P(Signals, Calibration, testing::Values("pose", "relative_motion"));
 
+/// Every second closed node with the one half the run ahead.
+std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_pairs(std::size_t nodes, std::size_t every) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> out;
+  for (std::size_t a = 0; a + nodes / 2 < nodes; a += 2 * every)
+    out.emplace_back(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a + nodes / 2));
+  return out;
+}
+
+// As above, of ties alone: their third of the rate.
+TEST(Ties, FalseAlarmsStayBelowWhatIsAskedAndTooSureAMapIsFoundOut) {
+  constexpr std::size_t kNodes = 200;
+  constexpr int kSeeds = 300;
+  AgreementConfig config;
+  config.tests = "ties";
+  config.false_alarm_rate = 0.4;
+  const WalkWithClosures map = usual_map(kNodes);
+  const auto server = test::corridor(kNodes);
+  for (const double stated : {1.0, 0.5}) {
+    ShapeUncertainty shape = map.shape(kAlpha);
+    shape.ties = map.ties(server, closed_pairs(kNodes, 25));
+    ASSERT_EQ(shape.ties.size(), 2U);
+    for (ShapeTie& tie : shape.ties) tie.sigma = {stated * tie.sigma.position_m, stated * tie.sigma.rotation_rad};
+    const ChainAgreement agreement(all_of(kNodes), &shape, 1, config);
+    int alarms = 0;
+    for (std::uint64_t seed = 0; seed < kSeeds; ++seed)
+      alarms += agreement.compare(server, map.displace(server, Rng(seed))).disagrees() ? 1 : 0;
+    const double rate = static_cast<double>(alarms) / kSeeds, asked = 0.2 / 3.0;
+    std::printf("[ MEASURED ] ties, stated sigma %.1f of the true one: %.3f of %.3f asked for\n", stated, rate, asked);
+    if (stated == 1.0)
+      EXPECT_LE(rate, asked + 2.5 * std::sqrt(asked * (1.0 - asked) / kSeeds));
+    else
+      EXPECT_GT(rate, 2.0 * asked);
+  }
+}
+
+// A long loop of which the map knows little along the way, but that it closes: a robot that misses the closing is off
+// by less than the map expects of itself, everywhere.
+TEST(Ties, TellWhatNoStretchDoes) {
+  constexpr std::size_t kNodes = 200;
+  const WalkWithClosures map(kNodes, kNodes, {0.3, 1e-4}, {0.3, 1e-4});
+  const auto server = test::corridor(kNodes);
+  ShapeUncertainty shape = map.shape(kAlpha);
+  auto robot = server;
+  for (std::size_t n = 0; n < kNodes; ++n)
+    robot[n].translation.y() += 1.5 * static_cast<double>(n) / static_cast<double>(kNodes);
+  EXPECT_FALSE(ChainAgreement(all_of(kNodes), &shape, 1, {}).compare(server, robot).disagrees());
+  shape.ties = {{10, 110, {0.5, 0.1}}, {10, 190, {0.1, 0.1}}, {50, 150, {0.1, 1e-3}}};
+  const auto missed = ChainAgreement(all_of(kNodes), &shape, 1, {}).compare(server, robot);
+  EXPECT_TRUE(missed.disagrees());
+  ASSERT_EQ(missed.missed_ties.size(), 2U);  // the largest first; the first tie is not missed
+  EXPECT_EQ(missed.missed_ties[0].a, 10U);
+  EXPECT_EQ(missed.missed_ties[0].b, 190U);
+  EXPECT_NEAR(missed.missed_ties[0].position_m, 1.5 * 180.0 / 200.0, 1e-9);
+  EXPECT_NEAR(missed.missed_ties[0].rotation_rad, 0.0, 1e-6);
+  EXPECT_GT(missed.missed_ties[0].significance, missed.missed_ties[1].significance);
+  EXPECT_GT(missed.missed_ties[1].significance, 1.0);
+
+  // Wherever the two lie among the server's nodes; a tie with an end that is not synchronised says nothing.
+  std::vector<std::size_t> ranks = all_of(kNodes);
+  std::erase(ranks, 10U);
+  robot.erase(robot.begin() + 10);
+  auto fewer = server;
+  fewer.erase(fewer.begin() + 10);
+  const auto left = ChainAgreement(ranks, &shape, 1, {}).compare(fewer, robot);
+  ASSERT_EQ(left.missed_ties.size(), 1U);
+  EXPECT_EQ(left.missed_ties[0].a, 49U);
+  EXPECT_EQ(left.missed_ties[0].b, 149U);
+}
+
+// What to test is a setting.
+TEST(Ties, EitherKindAlone) {
+  constexpr std::size_t kNodes = 100;
+  const WalkWithClosures map = usual_map(kNodes);
+  const auto server = test::corridor(kNodes);
+  ShapeUncertainty shape = map.shape(kAlpha);
+  shape.ties = map.ties(server, {{0, 75}});
+  auto robot = server;
+  for (std::size_t n = 60; n < kNodes; ++n) robot[n].translation.z() += 3.0;
+  AgreementConfig config;
+  config.tests = "wavelets";
+  const auto wavelets = ChainAgreement(all_of(kNodes), &shape, 1, config).compare(server, robot);
+  config.tests = "ties";
+  const auto ties = ChainAgreement(all_of(kNodes), &shape, 1, config).compare(server, robot);
+  EXPECT_TRUE(wavelets.missed_ties.empty());
+  EXPECT_GT(wavelets.significance.maxCoeff(), 1.0);
+  EXPECT_EQ(ties.missed_ties.size(), 1U);
+  EXPECT_EQ(ties.significance.maxCoeff(), 0.0);
+  EXPECT_EQ(ties.scale_significance.maxCoeff(), 0.0);
+  shape.ties.clear();
+  EXPECT_FALSE(ChainAgreement(all_of(kNodes), &shape, 1, config).compare(server, robot).disagrees());
+}
+
 // All looks of one mission together: the run grows, with it the number of updates.
 TEST(Mission, FalseAlarmsOfAllUpdatesTogetherStayBelowTheRate) {
   constexpr std::size_t kPerUpdate = 15, kUpdates = 16;

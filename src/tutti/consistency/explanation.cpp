@@ -47,6 +47,13 @@ Explanation explain(const ProxyGraph& graph, RobotId robot, std::span<const Robo
   out.position_m = std::move(raw.position_m);
   out.rotation_rad = std::move(raw.rotation_rad);
   out.significance = std::move(raw.significance);
+  for (const MissedTie& tie : raw.missed_ties)
+    out.missed_ways.push_back({.from = out.stamps[tie.a],
+                               .until = out.stamps[tie.b],
+                               .length_m = out.distance_m[tie.b] - out.distance_m[tie.a],
+                               .translation_m = tie.position_m,
+                               .rotation_rad = tie.rotation_rad,
+                               .significance = tie.significance});
   out.aligned_rmse_m = internal::aligned_rmse(chain.server, odometry);
   if (shape != nullptr) out.expected_rmse_m = shape->whole.position_m;
   if (!out.disagrees()) return out;  // nothing was born anywhere

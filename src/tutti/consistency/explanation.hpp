@@ -28,6 +28,16 @@ struct SuspectedOrigin {
   bool alert = false;
 };
 
+/// Two nodes that the map knows well relative to each other, and whose way odometry misses by more than that.
+struct MissedWay {
+  Timestamp from;
+  Timestamp until;
+  double length_m = 0.0;       ///< Along the server's estimate.
+  double translation_m = 0.0;  ///< Odometry against the map: relative pose from -> until.
+  double rotation_rad = 0.0;
+  double significance = 0.0;  ///< Over its threshold; > 1.
+};
+
 /// Where, at which scale and since when a robot's estimate and the server's map differ. Rows are the synchronised
 /// nodes in time order, columns the scales (0 = largest).
 struct Explanation {
@@ -39,13 +49,15 @@ struct Explanation {
   Eigen::MatrixXd rotation_rad;
   Eigen::MatrixXd significance;  ///< Disagreement over its threshold, the larger of position and rotation; 1 = at it.
   std::vector<double> scale_significance;  ///< The same for all of a scale together (ChainDisagreement).
+  std::vector<MissedWay> missed_ways;      ///< Largest significance first.
   double aligned_rmse_m = 0.0;             ///< Of the two estimates after one rigid alignment.
   double expected_rmse_m = 0.0;            ///< What the server says its own error is; 0 = it does not say.
   std::vector<SuspectedOrigin> origins;    ///< In time order, none overlapping.
   /// Something stands out of the server's uncertainty: the two do not agree.
   [[nodiscard]] bool disagrees() const {
-    return significance.size() > 0 &&
-           (significance.maxCoeff() > 1.0 || std::ranges::any_of(scale_significance, [](double s) { return s > 1.0; }));
+    const auto above = [](double s) { return s > 1.0; };
+    return !missed_ways.empty() || std::ranges::any_of(scale_significance, above) ||
+           (significance.size() > 0 && significance.maxCoeff() > 1.0);
   }
 };
 

@@ -143,6 +143,27 @@ TEST(Explanation, TheDisagreementStandsOutWhereTheSlideIs) {
   }
 }
 
+// Odometry over a missed way, against the map; measured by hand on the poses at both ends.
+TEST(Explanation, TellsTheWaysThatOdometryMisses) {
+  Scene s = scene(1, 0.1);
+  EXPECT_TRUE(explained(s).missed_ways.empty());
+  s.graph.shapes[0].ties = {{10, 50, {1.0, 0.1}}, {20, 140, {0.05, 0.01}}};
+  const Explanation e = explained(s);
+  EXPECT_TRUE(e.disagrees());
+  ASSERT_EQ(e.missed_ways.size(), 1U);
+  const MissedWay& way = e.missed_ways[0];
+  EXPECT_EQ(way.from, test::stamp_of(20));
+  EXPECT_EQ(way.until, test::stamp_of(140));
+  EXPECT_NEAR(way.length_m, e.distance_m[140] - e.distance_m[20], 1e-9);
+  Pose3 odometry;
+  for (std::size_t k = 21; k <= 140; ++k) odometry = odometry * s.nodes[k].odometry.T_a_b;
+  const auto node = [&](std::size_t k) { return s.graph.nodes[5 + k].T_world_body; };  // alpha has 5
+  const Pose3 map = node(20).inverse() * node(140);
+  EXPECT_NEAR(way.translation_m, (map.translation - odometry.translation).norm(), 1e-9);
+  EXPECT_NEAR(way.rotation_rad, map.rotation.angularDistance(odometry.rotation), 1e-9);
+  EXPECT_GT(way.significance, 1.0);
+}
+
 // Without a word from the server the absolute thresholds stand in.
 TEST(Explanation, DoesWithoutAShape) {
   Scene s = scene(1, 0.1);

@@ -57,7 +57,7 @@ struct AdaptiveConfig {
   double least_gain = 30.0;
   double tolerance_m = 0.02;
   double trust = 0.02;
-  std::string detection = "wavelets";
+  std::string detection = "agreement";
   std::string placement = "optimal";
 
   template <class V>
@@ -70,7 +70,7 @@ struct AdaptiveConfig {
             "Taken for the server's error with absolute thresholds, and when the server does not say.");
     v.field("trust", trust, between(1e-3, 1.0),
             "Instead of constraint.trust: a few links have to hold where many would help each other.");
-    v.field("detection", detection, one_of({"wavelets", "rmse", "always"}),
+    v.field("detection", detection, one_of({"agreement", "rmse", "always"}),
             "How disagreement is noticed; 'rmse' (aligned, above 3x what the server says) and 'always' are there to "
             "compare with.");
     v.field("placement", placement, one_of({"optimal", "uniform"}),

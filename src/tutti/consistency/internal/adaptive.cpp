@@ -110,7 +110,7 @@ JointPlan AdaptivePolicy::plan(const TimeChain& chain, const OdometryError& fitt
   if (config_.adaptive.placement == "uniform") return uniform_plan(fitting, most, least_gain);
   const OdometryError placing(chain.server, chain.odometry, kPlacingLever_m);
   JointPlan plan = fit_joints(fitting, place_joints(placing, most, least_gain));
-  if (config_.adaptive.detection != "wavelets") return plan;
+  if (config_.adaptive.detection != "agreement") return plan;
   // The sum of squares says little of what is large in one place or at one scale only; the wavelets do.
   while (plan.joints.size() <= most) {
     Eigen::Index node = 0, scale = 0;

@@ -67,6 +67,18 @@ class WalkWithClosures {
                                 return ShapeSigma{sag(position_, m, L), sag(rotation_, m, L)};
                               });
   }
+  /// Of some pairs of the poses, T_a_b in the worst direction: across the arm where the turn at a matters.
+  [[nodiscard]] std::vector<ShapeTie> ties(std::span<const Pose3> poses,
+                                           const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) const {
+    std::vector<ShapeTie> out;
+    for (const auto& [a, b] : pairs) {
+      const auto difference = [a, b](const Eigen::MatrixXd& C) { return C(a, a) + C(b, b) - 2.0 * C(a, b); };
+      const double arm = (poses[b].translation - poses[a].translation).squaredNorm();
+      out.push_back(
+          {a, b, {std::sqrt(difference(position_) + arm * rotation_(a, a)), std::sqrt(difference(rotation_))}});
+    }
+    return out;
+  }
   /// The poses, each off by a draw.
   [[nodiscard]] std::vector<Pose3> displace(std::vector<Pose3> poses, Rng rng) const {
     const Eigen::MatrixXd x = root_position_ * white(rng), r = root_rotation_ * white(rng);
