@@ -260,9 +260,14 @@ void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Traj
   }
 }
 
+PictureClock mission_clock(const RobotRecord& robot) {
+  return {robot.odometry.empty() ? Timestamp{} : robot.odometry.front().stamp, robot.start_s};
+}
+
 double largest_significance(const Explanation& e) {
   double largest = e.significance.size() > 0 ? e.significance.maxCoeff() : 0.0;
   for (const double whole : e.scale_significance) largest = std::max(largest, whole);
+  for (const consistency::MissedWay& way : e.missed_ways) largest = std::max(largest, way.significance);
   return largest;
 }
 
@@ -271,6 +276,17 @@ std::string format_moment(double value_s) { return std::isfinite(value_s) ? fmt:
 std::string format_origin_size(const SuspectedOrigin& origin) {
   return fmt::format("{} m, {} deg over {} m", significant(origin.translation_m),
                      significant(origin.rotation_rad / kRadPerDeg), significant(origin.length_m));
+}
+
+std::string format_disagreement(const Explanation& e, const PictureClock& clock) {
+  if (!e.disagrees()) return "odometry and map agree within what the server is sure of";
+  std::string text =
+      fmt::format("odometry and map part by up to {} the threshold", format_significance(largest_significance(e)));
+  if (e.missed_ways.empty()) return text;
+  const consistency::MissedWay& way = e.missed_ways.front();
+  return text + fmt::format(": closures tie {} to {}, and odometry misses that by {} m, {} deg",
+                            format_moment(clock(way.until)), format_moment(clock(way.from)),
+                            significant(way.translation_m), significant(way.rotation_rad / kRadPerDeg));
 }
 
 std::string format_scale(const Explanation& explanation, int scale) {

@@ -28,6 +28,9 @@ struct PictureClock {
   [[nodiscard]] double operator()(Timestamp stamp) const { return at_start_s + (stamp - start); }
 };
 
+/// Mission time.
+PictureClock mission_clock(const RobotRecord& robot);
+
 /// The disagreement map, `row_height` rows of pixels per scale (0 on top), the time axis over `width` columns: in each
 /// the largest significance of the nodes there; a node speaks for the time half-way to its neighbours. Transparent
 /// where no node is.
@@ -56,13 +59,16 @@ std::vector<LegendEntry> origin_legend(std::span<const consistency::SuspectedOri
 void draw_origins(Svg& svg, std::span<const consistency::SuspectedOrigin> origins, const Trajectory& route,
                   const Points2d& pixels, const PictureClock& clock, double width_px);
 
-/// Of any node or scale, over its threshold; 0 without nodes.
+/// Of any node, scale or missed way, over its threshold; 0 without nodes.
 double largest_significance(const consistency::Explanation& explanation);
 
 /// Seconds, as on the pictures' axes: "712.3 s".
 std::string format_moment(double value_s);
 /// "0.41 m, 1.30 deg over 12.0 m".
 std::string format_origin_size(const consistency::SuspectedOrigin& origin);
+/// "odometry and map part by up to 12 x the threshold", and the way that odometry misses by most, if any; or that they
+/// agree.
+std::string format_disagreement(const consistency::Explanation& explanation, const PictureClock& clock);
 /// The scale an origin stands out at, as a length: "16 m"; "-" when the explanation does not have it.
 std::string format_scale(const consistency::Explanation& explanation, int scale);
 /// "3.1 x"

@@ -14,10 +14,6 @@ namespace {
 
 constexpr double kWide_px = 1160.0;
 
-PictureClock clock_of(const RobotRecord& robot) {
-  return {robot.odometry.empty() ? Timestamp{} : robot.odometry.front().stamp, robot.start_s};
-}
-
 std::string between(const PictureClock& clock, Timestamp from, Timestamp until) {
   return fmt::format("{} - {}", format_moment(clock(from)), format_moment(clock(until)));
 }
@@ -25,7 +21,7 @@ std::string between(const PictureClock& clock, Timestamp from, Timestamp until) 
 std::string truth_cell(const consistency::SuspectedOrigin& origin, const RobotRecord& robot) {
   const auto truth = overlapping(origin, robot.drift_origins);
   if (!truth) return robot.drift_origins.empty() ? "" : "none";
-  return fmt::format("{}, {}: {}", drift_name(truth->kind), between(clock_of(robot), truth->from, truth->until),
+  return fmt::format("{}, {}: {}", drift_name(truth->kind), between(mission_clock(robot), truth->from, truth->until),
                      format_metres(truth->translation_m));
 }
 
@@ -38,7 +34,7 @@ std::string origins_table(const RobotRecord& robot) {
   if (truth) table.head.push_back("really");
   for (const auto& origin : e.origins) {
     std::vector<std::string> row{origin.alert ? "<b>localisation failure</b>" : "drift",
-                                 between(clock_of(robot), origin.from, origin.until),
+                                 between(mission_clock(robot), origin.from, origin.until),
                                  format_distance(origin.length_m),
                                  format_metres(origin.translation_m),
                                  fmt::format("{:.2f}°", origin.rotation_rad / kRadPerDeg),
@@ -54,9 +50,7 @@ std::string verdict(const MissionRecord& record, const RobotRecord& robot) {
   const consistency::Explanation& e = *robot.explanation;
   const PolicyRecord* policy = find_policy(robot, record.default_policy);
   const std::size_t held = policy != nullptr ? policy->constraints_added : 0;
-  std::string text = e.disagrees() ? fmt::format("odometry and map part by up to {} the threshold",
-                                                 format_significance(largest_significance(e)))
-                                   : std::string("odometry and map agree within what the server is sure of");
+  std::string text = format_disagreement(e, mission_clock(robot));
   text += fmt::format("; {} after one rigid alignment", format_metres(e.aligned_rmse_m));
   if (e.expected_rmse_m > 0.0)
     text += fmt::format(", the server expects {} of itself", format_metres(e.expected_rmse_m));
@@ -78,7 +72,7 @@ std::string explanation_html(const MissionRecord& record) {
     const ExplanationPicture picture{
         .explanation = &*robot.explanation,
         .label = fmt::format("Disagreement of {}'s odometry with the map: time and scale", robot.name),
-        .clock = clock_of(robot),
+        .clock = mission_clock(robot),
         .time_s = time_s,
         .time_axis = "mission time [s]",
         .truth = robot.drift_origins,
@@ -109,16 +103,16 @@ std::string alerts_html(const MissionRecord& record) {
       list += fmt::format("<li{}><b>Localisation failure {}:</b> {}, {}: {}{}, noticed by the robot at {}{}</li>\n",
                           alert.withdrawn_s ? " class=\"withdrawn\"" : "",
                           alert.withdrawn_s ? "no longer suspected" : "suspected", escape_xml(robot.name),
-                          between(clock_of(robot), alert.origin.from, alert.origin.until),
+                          between(mission_clock(robot), alert.origin.from, alert.origin.until),
                           format_origin_size(alert.origin), scale, format_moment(alert.known_since_s),
                           alert.withdrawn_s ? ", withdrawn at " + format_moment(*alert.withdrawn_s) : std::string());
     }
   for (const FailedOdometryRecord& failed : record.server.failed_odometry)
     for (const RobotRecord& robot : record.robots)
       if (robot.id == failed.robot)
-        list +=
-            fmt::format("<li><b>Localisation failure suspected by the server:</b> {}, {}: {:.1f} m</li>\n",
-                        escape_xml(robot.name), between(clock_of(robot), failed.from, failed.until), failed.error_m);
+        list += fmt::format("<li><b>Localisation failure suspected by the server:</b> {}, {}: {:.1f} m</li>\n",
+                            escape_xml(robot.name), between(mission_clock(robot), failed.from, failed.until),
+                            failed.error_m);
   return list.empty() ? "" : "<ul class=\"alerts\">\n" + list + "</ul>\n";
 }
 

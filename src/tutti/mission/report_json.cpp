@@ -99,6 +99,14 @@ Json explanation_json(const RobotRecord& robot) {
   for (const double significance : e.scale_significance) whole.push_back(number(significance));
   Json origins = Json::array();
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
+  Json ways = Json::array();
+  for (const auto& way : e.missed_ways)
+    ways.push_back({{"from_s", number(mission_time_s(robot, way.from))},
+                    {"until_s", number(mission_time_s(robot, way.until))},
+                    {"length_m", number(way.length_m)},
+                    {"translation_m", number(way.translation_m)},
+                    {"rotation_rad", number(way.rotation_rad)},
+                    {"significance", number(way.significance)}});
   return {{"disagrees", e.disagrees()},
           {"nodes", e.stamps.size()},
           {"aligned_rmse_m", number(e.aligned_rmse_m)},
@@ -106,6 +114,7 @@ Json explanation_json(const RobotRecord& robot) {
           {"scale_length_m", std::move(lengths)},
           {"largest_significance", std::move(largest)},
           {"scale_significance", std::move(whole)},
+          {"missed_ways", std::move(ways)},
           {"suspected_origins", std::move(origins)}};
 }
 

@@ -149,9 +149,7 @@ std::string explanation_lines(const MissionRecord& record) {
     if (robot.explanation && !robot.explanation->stamps.empty()) {
       const consistency::Explanation& e = *robot.explanation;
       const auto drift = std::count_if(e.origins.begin(), e.origins.end(), [](const auto& o) { return !o.alert; });
-      std::string text = e.disagrees() ? fmt::format("{}: odometry and map part by up to {} the threshold", robot.name,
-                                                     format_significance(largest_significance(e)))
-                                       : robot.name + ": odometry and map agree within what the server is sure of";
+      std::string text = robot.name + ": " + format_disagreement(e, mission_clock(robot));
       if (drift > 0)
         text += fmt::format("; {} of drift that odometry's covariance allows for",
                             plural(static_cast<std::size_t>(drift), "suspected origin"));

@@ -57,6 +57,18 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
   EXPECT_NE(text.find("kink     alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
             std::string::npos)
       << text;
+  auto& explanation = *record.robots[1].explanation;
+  explanation.missed_ways = {{.from = explanation.stamps[5],
+                              .until = explanation.stamps[50],
+                              .length_m = 80.0,
+                              .translation_m = 4.8,
+                              .rotation_rad = 0.02,
+                              .significance = 44.0}};
+  const std::string missed = report_text(record, "x");
+  expect_readable(missed);
+  EXPECT_NE(missed.find("bravo: odometry and map part by up to 44 x the threshold: closures tie"), std::string::npos)
+      << missed;
+  EXPECT_NE(missed.find("misses that by 4.80 m"), std::string::npos) << missed;
   record.robots.resize(1);
   record.robots[0].explanation = test::example_explanation(record.robots[0].server_estimate, {});
   record.robots[0].alerts.clear();
