@@ -44,6 +44,8 @@ ABLATION = {
     "absolute": ("absolute thresholds (5 cm, 0.5 degrees)", ["agent.policy.adaptive.agreement.thresholds=absolute"]),
 }
 
+DETECTION = ["wavelets", "ties", "rmse"]  # of these, what notices a disagreement
+
 
 class Runs:
     """Names of jobs -> their results; `all()` runs what is not there yet."""
@@ -106,6 +108,10 @@ class Runs:
                 self.curves(f"curves_{name}", name, seed, [], POLICIES, self.budgets_of(name) + [0])
             for seed in self.real_seeds[name][:3]:
                 self.mission(f"loop_{name}", name, seed, [])
+        for name in SIMULATED + self.real:
+            for seed in self.real_seeds.get(name, self.seeds):
+                for variant in DETECTION:
+                    self.curves(f"noticed_{variant}_{name}", name, seed, SETS.get(name, []) + ABLATION[variant][1])
         for seed in self.seeds:
             self.curves("loops_revision", "revision", seed, [], [DEFAULT, "spectral", "every_node"], closed_loop=True)
             self.curves("loops_trusting_revision", "revision", seed, ["server.proxy_graph.shape_deletions=0"],

@@ -6,7 +6,7 @@ import math
 
 import svg_plot
 from runs import row
-from selection_runs import ABLATION, DEFAULT, HELD_OUT, HELD_OUT_BUDGETS, POLICIES, SIMULATED
+from selection_runs import DEFAULT, POLICIES, SIMULATED
 from selection_statistics import by_case, heading, median, number, own_lines, quantile, ratio, rmse, spread
 
 
@@ -269,97 +269,3 @@ def many_section(runs, results):
         text.append(row(name, len(found), sum(f[0] for f in found), spread([f[1] for f in found], 1),
                         number(median(f[2] for f in found), 1), sum(f[3] > 0 for f in found), sum(f[3] for f in found)))
     return text + [""]
-
-
-# ---- held out --------------------------------------------------------------------------------------------------------
-
-def held_cases(results, name):
-    """robot -> title of the variant or policy -> budget -> lines."""
-    out = collections.defaultdict(lambda: collections.defaultdict(dict))
-    for robot, cases in by_case(results[f"held_{name}"]).items():
-        for (policy, budget), lines in cases.items():
-            out[robot][policy][budget] = lines
-    for variant in ABLATION:
-        for robot, cases in by_case(results[f"held_{variant}_{name}"]).items():
-            for (_, budget), lines in cases.items():
-                out[robot][variant][budget] = lines
-    return out
-
-
-def verdict_on_variant(results, variant, title):
-    """One sentence from the medians over all held-out cases and budgets."""
-    counts, added = collections.defaultdict(int), [0, 0, 0]
-    worse, better = collections.Counter(), collections.Counter()
-    for name in HELD_OUT:
-        if name == "agree":
-            cases = held_cases(results, name)
-            for robot in cases.values():
-                added[0] += sum(l["constraints"] > 0 for l in robot[variant][0])
-                added[1] += sum(l["constraints"] > 0 for l in robot[DEFAULT][0])
-                added[2] += len(robot[variant][0])
-            continue
-        for robot in held_cases(results, name).values():
-            for budget in HELD_OUT_BUDGETS:
-                own, other = (median(map(rmse, robot[p][budget])) for p in (DEFAULT, variant))
-                kind = "same" if abs(other - own) <= max(0.03 * own, 0.001) else "worse" if other > own else "better"
-                counts[kind] += 1
-                if kind != "same":
-                    (worse if kind == "worse" else better)[name] += 1
-    total = sum(counts.values())
-    where = [f"{words} in {', '.join(sorted(found))}" for words, found in (("worse", worse), ("better", better)) if found]
-    judged = "changes nothing" if counts["same"] == total else \
-        f"same {counts['same']}, worse {counts['worse']}, better {counts['better']} of {total}" + \
-        (f" ({'; '.join(where)})" if where else "")
-    return (f"- **{title}**: median RMSE against the default's (same: within 3 % or 1 mm): {judged}. In *agree* it adds "
-            f"links in {added[0]} of {added[2]} robots, the default in {added[1]}.")
-
-
-def wavelets_sentence(results):
-    """What wavelets add to accuracy, and to knowing when to be silent."""
-    same, total, silent = collections.Counter(), 0, collections.Counter()
-    for name in HELD_OUT:
-        for robot in held_cases(results, name).values():
-            if name == "agree":
-                for key in (DEFAULT, "rmse", "always"):
-                    silent[key] += sum(l["constraints"] == 0 for l in robot[key][0])
-                silent["robots"] += len(robot[DEFAULT][0])
-                continue
-            for budget in HELD_OUT_BUDGETS:
-                own = median(map(rmse, robot[DEFAULT][budget]))
-                for key in ("rmse", "always"):
-                    same[key] += median(map(rmse, robot[key][budget])) <= max(1.03 * own, own + 0.001)
-                total += 1
-    return (f"Where there is something to repair, wavelets add nothing to the accuracy in {same['always']} of {total} "
-            "cases (scenario, robot, budget): the same placement without any detection is as good there or better; with "
-            f"a threshold on the aligned RMSE instead, in {same['rmse']} of {total}. Where there is nothing to repair "
-            f"(*agree*), robots that stay silent: {silent[DEFAULT]} of {silent['robots']} with wavelets, "
-            f"{silent['rmse']} with the RMSE, {silent['always']} without detection. "
-            + ("**Wavelets add nothing that a threshold on the RMSE does not do as well here.**"
-               if same["rmse"] == total and silent["rmse"] >= silent[DEFAULT] else
-               "A threshold on the RMSE does not do as well in all of them."))
-
-
-def held_out_section(runs, results):
-    seeds = runs.held_out_seeds
-    text = ["## Never used for tuning", "",
-            f"Seeds {seeds[0]} to {seeds[-1]} and other parameters of the scenarios (docs/simulation.md), run after the "
-            "settings were frozen. Median RMSE in",
-            "metres. `every_node` and the policies' own rules as above; `uniform` uses the reduced solver like all.", "",
-            wavelets_sentence(results), ""]
-    text += [verdict_on_variant(results, variant, title) for variant, (title, _) in ABLATION.items()]
-    text += [verdict_on_variant(results, "uniform", "`uniform` with the reduced solver"), ""]
-    for name in HELD_OUT:
-        for robot, cases in held_cases(results, name).items():
-            sample = cases[DEFAULT][0]
-            text += [f"### {name}, {robot}", "",
-                     f"Onboard {number(median(l['onboard']['rmse_m'] for l in sample))} m, server "
-                     f"{number(median(l['server']['rmse_m'] for l in sample))} m.", ""]
-            text += heading("policy", *HELD_OUT_BUDGETS, "own rule (constraints)")
-            titles = {**{p: f"`{p}`" for p in POLICIES}, **{v: f"`{DEFAULT}`, {t}" for v, (t, _) in ABLATION.items()}}
-            for key, title in titles.items():
-                own = cases[key][0]
-                text.append(row(title, *(number(median(map(rmse, cases[key][b]))) if b in cases[key] else ""
-                                         for b in HELD_OUT_BUDGETS),
-                                f"{number(median(map(rmse, own)))} ({number(median(l['constraints'] for l in own), 0)})"))
-            text.append("")
-    return text

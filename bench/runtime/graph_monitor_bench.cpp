@@ -50,12 +50,13 @@ std::vector<double> sags(const ProxyGraph& graph) {
 
 void monitor(benchmark::State& state) {
   const consistency::ProxyGraphConfig config{.shape_samples = static_cast<int>(state.range(0)),
-                                             .shape_deletions = static_cast<int>(state.range(1))};
+                                             .shape_deletions = static_cast<int>(state.range(1)),
+                                             .shape_ties = static_cast<int>(state.range(2))};
   ProxyGraph graph;
   map();
   for (auto _ : state) graph = server::monitor_graph(map(), 1, config);
   static const std::vector<double> reference =
-      sags(server::monitor_graph(map(), 1, {.shape_samples = 8192, .shape_deletions = 0}));
+      sags(server::monitor_graph(map(), 1, {.shape_samples = 8192, .shape_deletions = 0, .shape_ties = 0}));
   const std::vector<double> found = sags(graph);
   double squares = 0.0;
   for (std::size_t k = 0; k < found.size(); ++k) squares += std::pow(found[k] / reference[k] - 1.0, 2);
@@ -68,14 +69,16 @@ void monitor(benchmark::State& state) {
   state.counters["expected_rmse_m"] = graph.shapes[0].whole.position_m;
 }
 BENCHMARK(monitor)
-    ->ArgNames({"samples", "deletions"})
-    ->Args({0, 0})
-    ->Args({16, 0})
-    ->Args({32, 0})
-    ->Args({32, 8})
-    ->Args({32, 32})
-    ->Args({64, 0})
-    ->Args({128, 0})
+    ->ArgNames({"samples", "deletions", "ties"})
+    ->Args({0, 0, 0})
+    ->Args({16, 0, 0})
+    ->Args({32, 0, 0})
+    ->Args({32, 8, 0})
+    ->Args({32, 0, 32})
+    ->Args({32, 32, 0})
+    ->Args({32, 32, 32})
+    ->Args({64, 0, 0})
+    ->Args({128, 0, 0})
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace
