@@ -88,10 +88,12 @@ std::string explanation_html(const MissionRecord& record) {
     legend.push_back(std::move(entry));
   }
   body = significance_scale_html() + legend_html(legend) + figures;
-  return section("Where odometry and map part",
-                 "Raw odometry against the last broadcast, stretch by stretch and scale by scale, in units of what the "
-                 "server is unsure of: above 1 it is not chance. White frames: where the map says the drift was born.",
-                 body);
+  return section(
+      "Where odometry and map part",
+      "Raw odometry against the last broadcast, stretch by stretch and scale by scale, in units of what the "
+      "server is unsure of: above 1 it is not chance. White frames: where the map says the drift was born. Missed: two "
+      "places that closures tie together, and odometry does not.",
+      body);
 }
 
 std::string alerts_html(const MissionRecord& record) {

@@ -85,6 +85,23 @@ TEST(ReportHtml, ExplainsWhereOdometryAndMapPart) {
   EXPECT_NE(report_html(record).find("Localisation failure no longer suspected:</b> alpha"), std::string::npos);
 }
 
+TEST(ReportHtml, DrawsTheWayThatOdometryMisses) {
+  MissionRecord record = test::example_record({.robots = 1});
+  EXPECT_EQ(report_html(record).find(">missed</text>"), std::string::npos);
+  auto& e = *record.robots[0].explanation;
+  e.missed_ways = {{.from = e.stamps[5],
+                    .until = e.stamps[50],
+                    .length_m = 80.0,
+                    .translation_m = 4.8,
+                    .rotation_rad = 0.02,
+                    .significance = 44.0}};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find(">missed</text>"), std::string::npos);
+  EXPECT_NE(html.find("odometry misses that by 4.80 m, 1.15 deg over 80.0 m, 44 x the threshold"), std::string::npos);
+  EXPECT_NE(html.find("part by up to 44 x the threshold: closures tie"), std::string::npos);
+}
+
 TEST(ReportHtml, SaysWhenNothingHadToBeAdded) {
   MissionRecord record = test::example_record({.robots = 1});
   auto& robot = record.robots[0];
