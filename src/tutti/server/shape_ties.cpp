@@ -7,6 +7,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/server/displacements.hpp"
 #include "tutti/server/worst_sigma.hpp"
 
 namespace tutti::server {
@@ -17,32 +18,18 @@ constexpr Eigen::Index kFewestSamples = 8;
 constexpr double kTwiceAsWell = 4.0;  ///< Ratio of variances.
 constexpr std::size_t kShare = 8;     ///< Of the way between two tied nodes: nothing else is tied so close to both.
 
-/// What nodes are off by, in the axes of `world`: one column per sample or shift.
-struct Displacements {
-  Displacements(std::span<const Pose3> poses, const Eigen::MatrixXd& tangents)
-      : position_m(3 * static_cast<Eigen::Index>(poses.size()), tangents.cols()), rotation_rad(position_m) {
-    for (std::size_t k = 0; k < poses.size(); ++k) {
-      const Eigen::Matrix3d R = poses[k].rotation.toRotationMatrix();
-      const auto row = static_cast<Eigen::Index>(k);
-      position_m.middleRows<3>(3 * row) = R * tangents.middleRows<3>(6 * row);
-      rotation_rad.middleRows<3>(3 * row) = R * tangents.middleRows<3>(6 * row + 3);
-    }
-  }
-  Eigen::MatrixXd position_m;
-  Eigen::MatrixXd rotation_rad;
-};
-
-/// What T_a_b is off by for each sample, turned into the axes of `world`: position and rotation, 3 x samples.
-struct RelativeError {
-  Eigen::Matrix3Xd position_m;
-  Eigen::Matrix3Xd rotation_rad;
-};
-RelativeError relative_error(const Displacements& x, std::span<const Pose3> poses, std::size_t a, std::size_t b) {
+/// What T_a_b is off by for each sample, in position, turned into the axes of `world`: 3 x samples.
+Eigen::Matrix3Xd position_error(const Displacements& x, std::span<const Pose3> poses, std::size_t a, std::size_t b) {
   const auto from = 3 * static_cast<Eigen::Index>(a), to = 3 * static_cast<Eigen::Index>(b);
-  const auto turn = x.rotation_rad.middleRows<3>(from);
   const Eigen::Vector3d arm = poses[b].translation - poses[a].translation;
-  return {x.position_m.middleRows<3>(to) - x.position_m.middleRows<3>(from) + skew(arm) * turn,
-          x.rotation_rad.middleRows<3>(to) - turn};
+  return x.position_m.middleRows<3>(to) - x.position_m.middleRows<3>(from) +
+         skew(arm) * x.rotation_rad.middleRows<3>(from);
+}
+
+/// The same in rotation.
+Eigen::Matrix3Xd rotation_error(const Displacements& x, std::size_t a, std::size_t b) {
+  const auto from = 3 * static_cast<Eigen::Index>(a), to = 3 * static_cast<Eigen::Index>(b);
+  return x.rotation_rad.middleRows<3>(to) - x.rotation_rad.middleRows<3>(from);
 }
 
 /// Position variance of T_a_b, all directions together, when nothing but the steps between is known.
@@ -92,15 +79,15 @@ std::vector<ShapeTie> shape_ties(std::span<const Pose3> poses, std::span<const M
   if (most == 0 || samples.cols() < kFewestSamples) return {};
   const Eigen::Index half = samples.cols() / 2;
   const Displacements choosing(poses, samples.leftCols(half)), stating(poses, samples.rightCols(half)),
-      moved(poses, shifts.cols() == 0 ? Eigen::MatrixXd(rows, 0) : shifts);
+      moved(poses, shifts);
   const Way way(poses, steps);
 
   std::vector<Candidate> candidates;
   const std::size_t stride = (poses.size() + kMostLookedAt - 1) / kMostLookedAt;
   for (std::size_t a = 0; a < poses.size(); a += stride)
     for (std::size_t b = a + std::max(stride, 2 * ShapeUncertainty::kShortest); b < poses.size(); b += stride) {
-      const double known = relative_error(choosing, poses, a, b).position_m.squaredNorm() / static_cast<double>(half) +
-                           std::pow(largest_norm(relative_error(moved, poses, a, b).position_m), 2);
+      const double known = position_error(choosing, poses, a, b).squaredNorm() / static_cast<double>(half) +
+                           std::pow(largest_norm(position_error(moved, poses, a, b)), 2);
       const double ratio = way.variance_m2(a, b) / known;
       if (ratio >= kTwiceAsWell) candidates.push_back({a, b, ratio});
     }
@@ -115,13 +102,13 @@ std::vector<ShapeTie> shape_ties(std::span<const Pose3> poses, std::span<const M
   }
   std::vector<ShapeTie> out;
   for (const auto& [a, b, ratio] : taken) {
-    const RelativeError error = relative_error(stating, poses, a, b), shift = relative_error(moved, poses, a, b);
     const auto sigma = [half](const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y) {
       return std::hypot(worst_sigma(x * x.transpose(), static_cast<double>(half)), largest_norm(y));
     };
     out.push_back({static_cast<std::uint32_t>(a),
                    static_cast<std::uint32_t>(b),
-                   {sigma(error.position_m, shift.position_m), sigma(error.rotation_rad, shift.rotation_rad)}});
+                   {sigma(position_error(stating, poses, a, b), position_error(moved, poses, a, b)),
+                    sigma(rotation_error(stating, a, b), rotation_error(moved, a, b))}});
   }
   std::ranges::sort(out, {}, [](const ShapeTie& tie) { return std::pair(tie.a, tie.b); });
   return out;

@@ -8,6 +8,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/server/displacements.hpp"
 #include "tutti/server/worst_sigma.hpp"
 
 namespace tutti::server {
@@ -103,34 +104,28 @@ ShapeUncertainty shape_uncertainty(RobotId robot, std::span<const Pose3> poses, 
   TUTTI_CHECK(shifts.cols() == 0 || shifts.rows() == 6 * n, "{} x {} shifts of {} poses", shifts.rows(), shifts.cols(),
               n);
   Eigen::Matrix3Xd points(3, n);
-  std::vector<Eigen::Matrix3d> R;
-  for (const Pose3& pose : poses) {
-    points.col(static_cast<Eigen::Index>(R.size())) = pose.translation;
-    R.push_back(pose.rotation.toRotationMatrix());
-  }
+  for (Eigen::Index k = 0; k < n; ++k) points.col(k) = poses[static_cast<std::size_t>(k)].translation;
   const RigidMotionFilter filter(std::move(points));
   Doubt position(poses.size());
   Doubt rotation(poses.size());
-  Eigen::Matrix3Xd x_m(3, n);
-  Eigen::Matrix3Xd x_rad(3, n);
-  const auto displace = [&](const auto& tangents) {
-    for (Eigen::Index k = 0; k < n; ++k) {
-      x_m.col(k) = R[static_cast<std::size_t>(k)] * tangents.template segment<3>(6 * k);
-      x_rad.col(k) = R[static_cast<std::size_t>(k)] * tangents.template segment<3>(6 * k + 3);
+  const auto for_each = [&](const Eigen::MatrixXd& tangents, const auto& take) {
+    const Displacements all(poses, tangents);
+    for (Eigen::Index s = 0; s < tangents.cols(); ++s) {
+      Eigen::Matrix3Xd x_m = all.position_m.col(s).reshaped(3, n);
+      Eigen::Matrix3Xd x_rad = all.rotation_rad.col(s).reshaped(3, n);
+      filter.apply(x_m);
+      x_rad.colwise() -= Eigen::Vector3d(x_rad.rowwise().mean());
+      take(x_m, x_rad);
     }
-    filter.apply(x_m);
-    x_rad.colwise() -= Eigen::Vector3d(x_rad.rowwise().mean());
   };
-  for (Eigen::Index s = 0; s < samples.cols(); ++s) {
-    displace(samples.col(s));
+  for_each(samples, [&](const Eigen::Matrix3Xd& x_m, const Eigen::Matrix3Xd& x_rad) {
     position.add_sample(x_m);
     rotation.add_sample(x_rad);
-  }
-  for (Eigen::Index s = 0; s < shifts.cols(); ++s) {
-    displace(shifts.col(s));
+  });
+  for_each(shifts, [&](const Eigen::Matrix3Xd& x_m, const Eigen::Matrix3Xd& x_rad) {
     position.add_shift(x_m);
     rotation.add_shift(x_rad);
-  }
+  });
 
   ShapeUncertainty out{.robot = robot, .whole = {position.whole(), rotation.whole()}, .sag = {}};
   for (std::size_t j = 0; const std::size_t count = ShapeUncertainty::stretches(poses.size(), j); ++j) {
