@@ -147,10 +147,12 @@ ChainAgreement::ChainAgreement(std::span<const std::size_t> ranks, const ShapeUn
 
   const double doublings = std::floor(std::log2(static_cast<double>(update)));
   const double look = config.false_alarm_rate / ((doublings + 1.0) * (doublings + 2.0));
-  if (config.tests != "ties")
+  if (config.tests == "ties") {
+    threshold_m_.setConstant(std::numeric_limits<double>::infinity());
+    threshold_rad_ = threshold_m_;
+  } else {
     set_wavelet_thresholds(ranks, *shape, look / 3.0);
-  else
-    threshold_m_.setConstant(std::numeric_limits<double>::infinity()), threshold_rad_ = threshold_m_;
+  }
   if (config.tests != "wavelets") set_tie_thresholds(ranks, *shape, look / 3.0);
 }
 
