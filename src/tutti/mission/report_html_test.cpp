@@ -88,13 +88,7 @@ TEST(ReportHtml, ExplainsWhereOdometryAndMapPart) {
 TEST(ReportHtml, DrawsTheWayThatOdometryMisses) {
   MissionRecord record = test::example_record({.robots = 1});
   EXPECT_EQ(report_html(record).find(">missed</text>"), std::string::npos);
-  auto& e = *record.robots[0].explanation;
-  e.missed_ways = {{.from = e.stamps[5],
-                    .until = e.stamps[50],
-                    .length_m = 80.0,
-                    .translation_m = 4.8,
-                    .rotation_rad = 0.02,
-                    .significance = 44.0}};
+  test::miss_a_way(*record.robots[0].explanation);
   const std::string html = report_html(record);
   expect_good_page(html);
   EXPECT_NE(html.find(">missed</text>"), std::string::npos);

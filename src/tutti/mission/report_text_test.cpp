@@ -57,13 +57,7 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
   EXPECT_NE(text.find("kink     alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
             std::string::npos)
       << text;
-  auto& explanation = *record.robots[1].explanation;
-  explanation.missed_ways = {{.from = explanation.stamps[5],
-                              .until = explanation.stamps[50],
-                              .length_m = 80.0,
-                              .translation_m = 4.8,
-                              .rotation_rad = 0.02,
-                              .significance = 44.0}};
+  test::miss_a_way(*record.robots[1].explanation);
   const std::string missed = report_text(record, "x");
   expect_readable(missed);
   EXPECT_NE(missed.find("bravo: odometry and map part by up to 44 x the threshold: closures tie"), std::string::npos)
