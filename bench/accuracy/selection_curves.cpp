@@ -219,17 +219,13 @@ void print_curves(const Task& task) {
     const Timestamp start = robot.recording.odometry.front().stamp;
     const auto raw = replayed(robot, task.config.agent, "none", task.seed);
     const Trajectory mapped = server_estimate(server.map(), robot.recording.robot);
-    json base{{"mission", task.label},
-              {"seed", task.seed},
-              {"robot", robot.recording.name},
-              {"odometry_factors", raw.odometry_factors()},
-              {"onboard", to_json(errors_of(keyframe_odometry(raw), robot, association))},
-              {"server", to_json(errors_of(mapped, robot, association))},
-              {"true_origins", origins_json(robot.recording.drift_origins, start)}};
-    if (const auto agreement = evaluation::agreement(keyframe_odometry(raw), mapped))
-      base["onboard_agreement_m"] = agreement->rmse_m;
-    for (const ShapeUncertainty& shape : broadcast.graph.shapes)
-      if (shape.robot == robot.recording.robot) base["expected_rmse_m"] = shape.whole.position_m;
+    const json base{{"mission", task.label},
+                    {"seed", task.seed},
+                    {"robot", robot.recording.name},
+                    {"odometry_factors", raw.odometry_factors()},
+                    {"onboard", to_json(errors_of(keyframe_odometry(raw), robot, association))},
+                    {"server", to_json(errors_of(mapped, robot, association))},
+                    {"true_origins", origins_json(robot.recording.drift_origins, start)}};
     for (const std::string& policy : task.policies)
       for (const int budget : policy.starts_with("every_node") ? std::vector<int>{0} : task.budgets) {
         auto agent = replayed(robot, task.config.agent, policy, task.seed);
