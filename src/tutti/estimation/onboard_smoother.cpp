@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
@@ -47,6 +48,7 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
   state_.odometry.reserve(state.odometry.size());
   poses_.reserve(state.odometry.size() + 1);
   for (const auto& step : state.odometry) append(step);
+  state_.jumps = std::move(state.jumps);
   set_constraints(std::move(state.constraints));
 }
 
@@ -80,6 +82,7 @@ SmootherSummary OnboardSmoother::solve() {
   SmootherSummary summary;
   auto nodes = internal::reduced_nodes(state_.constraints);
   summary.compounded_steps = runs_->update(nodes, state_.odometry);
+  if (judge_jumps(nodes)) summary.compounded_steps += runs_->update(nodes, state_.odometry);
   summary.analysed = problem_->update(std::move(nodes), runs_->all(), state_.constraints, state_.first);
   summary.reduced_nodes = problem_->graph().poses.size();
   summary.reduced_edges = problem_->graph().edges.size();
@@ -97,6 +100,36 @@ SmootherSummary OnboardSmoother::solve() {
   summary.loss_applied = result.loss_applied;
   if (is_usable(summary.termination)) place(reduced, result.loss_applied, summary);
   return summary;
+}
+
+/// A function of the constraints and of what odometry said, so that no history shows. True: some steps changed.
+bool OnboardSmoother::judge_jumps(std::span<const std::size_t> nodes) {
+  std::vector<std::size_t> overruled;  // until now
+  for (OdometryJump& jump : state_.jumps) {
+    std::swap(state_.odometry[jump.step], jump.motion);
+    overruled.push_back(jump.step);
+  }
+  const std::vector<OdometryJump> believed = std::exchange(state_.jumps, {});
+  for (const ChainConstraint& c : state_.constraints) {
+    const auto [begin, end] = std::minmax(c.from, c.to);
+    const auto node = std::ranges::lower_bound(nodes, begin);
+    if (!config_.repair_jumps || c.doubtful || begin == end || *(node + 1) != end) continue;
+    const RelativePose begin_end = c.from < c.to ? c.measurement : inverse(c.measurement);
+    const auto inside = std::ranges::lower_bound(overruled, begin);
+    const internal::OdometryRun& run = runs_->all()[static_cast<std::size_t>(node - nodes.begin())];
+    if (!(inside != overruled.end() && *inside < end) && !internal::is_implausible(run, begin_end.T_a_b)) continue;
+    const auto jump = find_jump(state_.odometry, begin, end, begin_end);
+    if (jump && std::ranges::find(state_.jumps, jump->step, &OdometryJump::step) == state_.jumps.end())
+      state_.jumps.push_back(*jump);
+  }
+  std::ranges::sort(state_.jumps, {}, &OdometryJump::step);
+  const bool changed = state_.jumps != believed;
+  if (changed) {
+    for (const OdometryJump& jump : believed) runs_->forget(jump.step);
+    for (const OdometryJump& jump : state_.jumps) runs_->forget(jump.step);
+  }
+  for (OdometryJump& jump : state_.jumps) std::swap(state_.odometry[jump.step], jump.motion);
+  return changed;
 }
 
 /// From the last poses, or, when these are far off or lead nowhere, from raw odometry.

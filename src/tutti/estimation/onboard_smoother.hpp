@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "tutti/base/config.hpp"
+#include "tutti/estimation/jump.hpp"
 #include "tutti/estimation/termination.hpp"
 #include "tutti/model/relative_pose.hpp"
 
@@ -25,6 +27,7 @@ struct OnboardSmootherConfig {
   std::string loss = "cauchy";
   double loss_scale = 3.0;
   int polishing_steps = 0;
+  bool repair_jumps = true;
 
   template <class V>
   void describe(V& v) {
@@ -36,6 +39,8 @@ struct OnboardSmootherConfig {
     v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
     v.field("polishing_steps", polishing_steps, between(0, 10),
             "Gauss-Newton steps on the full graph after the reduced one.");
+    v.field("repair_jumps", repair_jumps, any(),
+            "Correct a step of odometry that jumped where it is, instead of sharing the correction out.");
   }
 };
 
@@ -66,8 +71,9 @@ struct SmootherSummary {
 /// All that determines the estimate; enough to restore the smoother.
 struct SmootherState {
   Pose3 first;
-  std::vector<RelativePose> odometry;
+  std::vector<RelativePose> odometry;  ///< As believed.
   std::vector<ChainConstraint> constraints;
+  std::vector<OdometryJump> jumps;  ///< Steps where odometry said something else, and what; in order.
   friend bool operator==(const SmootherState&, const SmootherState&) = default;
 };
 
@@ -77,6 +83,9 @@ struct SmootherState {
 /// with fixed ends); what comes after the last constrained node is composed. A polishing step does the same about the
 /// current poses instead of the raw odometry, which makes it a Gauss-Newton step on the full graph. docs/math.md
 /// derives it.
+///
+/// Where a constraint that is not doubtful spans just one run and odometry jumped in it (find_jump()), the jump is not
+/// believed: the correction goes where it belongs and bends nothing else. Setting `repair_jumps`.
 ///
 /// Only doubtful constraints have a robust loss; the others hold, whatever their residual. A solve starts from the last
 /// one's poses and keeps what did not change: compounds, sparsity, the shape of runs. The estimate is still a function
@@ -111,6 +120,7 @@ class OnboardSmoother {
   [[nodiscard]] std::size_t stored_runs() const;
 
  private:
+  bool judge_jumps(std::span<const std::size_t> nodes);
   internal::DoubtingSummary minimise(std::vector<Pose3>& reduced);
   void place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary);
 

@@ -112,6 +112,8 @@ Carried reduce(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs
     poses.push_back(poses.back() * runs[k].T_begin_end);
     edges[k].T_from_to = runs[k].T_begin_end;
     edges[k].information = runs[k].information;
+    std::size_t& same = carried.edges[k];  // unless of other steps
+    if (same != Carried::kNew && !(before.graph.edges[same].T_from_to == runs[k].T_begin_end)) same = Carried::kNew;
   }
   for (std::size_t c = 0; c < constraints.size(); ++c) {
     const auto& [from, to, measurement, doubtful] = constraints[c];
