@@ -4,9 +4,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/failure_interval.hpp"
+#include "tutti/estimation/jump.hpp"
 
 namespace tutti::server {
 namespace {
@@ -94,6 +98,22 @@ std::vector<PoseSighting> sightings_of(const Window& window, std::span<const Dou
   return out;
 }
 
+/// The keyframe after which odometry jumped, if that explains what it missed over the window.
+std::optional<std::uint32_t> jump_within(const Window& window, const std::function<Pose3(KeyframeId)>& T_world_body) {
+  const OdometryChain& chain = *window.chain;
+  const std::size_t first = window.position(window.from) - (window.from > chain.first_index ? 1 : 0);
+  const std::size_t last = window.position(std::min(window.to + 1, last_index(chain)));
+  std::vector<RelativePose> odometry;
+  for (std::size_t k = first; k < last; ++k)
+    odometry.push_back({chain.T_odom_body[k].inverse() * chain.T_odom_body[k + 1], chain.step_covariance[k]});
+  const auto jump = estimation::find_jump(
+      odometry, window.position(window.from) - first, window.position(window.to) - first,
+      {T_world_body({chain.robot, window.from}).inverse() * T_world_body({chain.robot, window.to}),
+       seen_from_map(Matrix6d::Zero())});
+  if (!jump) return std::nullopt;
+  return chain.first_index + static_cast<std::uint32_t>(first + jump->step);
+}
+
 }  // namespace
 
 std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> failed,
@@ -114,10 +134,13 @@ std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> fa
                                    sightings_of(window, failed, closures, T_world_body));
     out.push_back(failed[f]);
     if (!found) continue;
-    out.back() = {{stretch.robot, window.from + static_cast<std::uint32_t>(found->from),
-                   window.from + static_cast<std::uint32_t>(found->to)},
-                  kDoubt * found->missed_m,
-                  kDoubt * found->missed_rad};
+    auto [from, to] = std::pair(window.from + static_cast<std::uint32_t>(found->from),
+                                window.from + static_cast<std::uint32_t>(found->to));
+    if (const auto jump = jump_within(window, T_world_body)) {
+      from = *jump;
+      to = from + 1;
+    }
+    out.back() = {{stretch.robot, from, to}, kDoubt * found->missed_m, kDoubt * found->missed_rad};
   }
   return out;
 }

@@ -17,8 +17,9 @@ struct DoubtedStretch {
 };
 
 /// The convicted stretches moved to where the map they made says odometry failed (estimation/failure_interval.hpp), up
-/// to 40 m away. All closures between a robot's way there and the rest of the map count, rejected ones too. In the
-/// order of `failed`, which is sorted; none overlap. `T_world_body`: of every keyframe of the chains.
+/// to 40 m away; to a single step, if that one jumped (estimation/jump.hpp). All closures between a robot's way there
+/// and the rest of the map count, rejected ones too. In the order of `failed`, which is sorted; none overlap.
+/// `T_world_body`: of every keyframe of the chains.
 std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> failed,
                                               std::span<const estimation::OdometryChain> chains,
                                               std::span<const LoopClosure> closures,

@@ -99,6 +99,25 @@ TEST(WhoIsWrong, SeveralFailuresAreRepaired) {
   }
 }
 
+// One step to blame: nothing on either side of it is bent.
+TEST(WhoIsWrong, ASlipIsConvictedAtItsVeryStep) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    CorridorRunConfig config;
+    config.keyframe_m = 0.2;
+    config.closures.wrong_share = 0.1;
+    config.failures = {failure(0, 180, 180, 0, 0, 20)};
+    const CorridorRun run = corridor_run(config, seed);
+    const MapEstimate map = judge(run);
+    ASSERT_EQ(map.failed_odometry.size(), 1U) << seed;
+    const FailedOdometry& failed = map.failed_odometry[0];
+    EXPECT_EQ(failed.to, failed.from + 1) << seed;
+    EXPECT_LE(seconds_of(map, {0}, failed.from), 180.0) << seed;
+    EXPECT_GE(seconds_of(map, {0}, failed.to), 180.0) << seed;
+    EXPECT_NEAR(failed.jump_rad, 20 * kRadPerDeg, 3 * kRadPerDeg) << seed;
+    EXPECT_LT(rmse(run, map), 0.1) << seed;
+  }
+}
+
 /// Odometry that climbs, little by little, three metres that are not there.
 Failure climb(double from_s, double until_s) {
   Failure out = failure(0, from_s, until_s, 0, 0, 0);
