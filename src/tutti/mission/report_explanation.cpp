@@ -291,6 +291,10 @@ double largest_significance(const Explanation& e) {
 
 std::string format_moment(double value_s) { return std::isfinite(value_s) ? fmt::format("{:.1f} s", value_s) : "-"; }
 
+std::string format_between(const PictureClock& clock, Timestamp from, Timestamp until) {
+  return fmt::format("{} - {}", format_moment(clock(from)), format_moment(clock(until)));
+}
+
 std::string format_origin_size(const SuspectedOrigin& origin) {
   return fmt::format("{} m, {} deg over {} m", significant(origin.translation_m),
                      significant(origin.rotation_rad / kRadPerDeg), significant(origin.length_m));

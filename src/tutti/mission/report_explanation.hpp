@@ -71,6 +71,8 @@ std::string format_origin_size(const consistency::SuspectedOrigin& origin);
 std::string format_disagreement(const consistency::Explanation& explanation, const PictureClock& clock);
 /// The scale an origin stands out at, as a length: "16 m"; "-" when the explanation does not have it.
 std::string format_scale(const consistency::Explanation& explanation, int scale);
+/// "62.0 s - 72.0 s"
+std::string format_between(const PictureClock& clock, Timestamp from, Timestamp until);
 /// "3.1 x"
 std::string format_significance(double significance);
 

@@ -14,14 +14,11 @@ namespace {
 
 constexpr double kWide_px = 1160.0;
 
-std::string between(const PictureClock& clock, Timestamp from, Timestamp until) {
-  return fmt::format("{} - {}", format_moment(clock(from)), format_moment(clock(until)));
-}
-
 std::string truth_cell(const consistency::SuspectedOrigin& origin, const RobotRecord& robot) {
   const auto truth = overlapping(origin, robot.drift_origins);
   if (!truth) return robot.drift_origins.empty() ? "" : "none";
-  return fmt::format("{}, {}: {}", drift_name(truth->kind), between(mission_clock(robot), truth->from, truth->until),
+  return fmt::format("{}, {}: {}", drift_name(truth->kind),
+                     format_between(mission_clock(robot), truth->from, truth->until),
                      format_metres(truth->translation_m));
 }
 
@@ -34,7 +31,7 @@ std::string origins_table(const RobotRecord& robot) {
   if (truth) table.head.push_back("really");
   for (const auto& origin : e.origins) {
     std::vector<std::string> row{origin.alert ? "<b>localisation failure</b>" : "drift",
-                                 between(mission_clock(robot), origin.from, origin.until),
+                                 format_between(mission_clock(robot), origin.from, origin.until),
                                  format_distance(origin.length_m),
                                  format_metres(origin.translation_m),
                                  fmt::format("{:.2f}°", origin.rotation_rad / kRadPerDeg),
@@ -105,7 +102,7 @@ std::string alerts_html(const MissionRecord& record) {
       list += fmt::format("<li{}><b>Localisation failure {}:</b> {}, {}: {}{}, noticed by the robot at {}{}</li>\n",
                           alert.withdrawn_s ? " class=\"withdrawn\"" : "",
                           alert.withdrawn_s ? "no longer suspected" : "suspected", escape_xml(robot.name),
-                          between(mission_clock(robot), alert.origin.from, alert.origin.until),
+                          format_between(mission_clock(robot), alert.origin.from, alert.origin.until),
                           format_origin_size(alert.origin), scale, format_moment(alert.known_since_s),
                           alert.withdrawn_s ? ", withdrawn at " + format_moment(*alert.withdrawn_s) : std::string());
     }
@@ -113,7 +110,7 @@ std::string alerts_html(const MissionRecord& record) {
     for (const RobotRecord& robot : record.robots)
       if (robot.id == failed.robot)
         list += fmt::format("<li><b>Localisation failure suspected by the server:</b> {}, {}: {:.1f} m</li>\n",
-                            escape_xml(robot.name), between(mission_clock(robot), failed.from, failed.until),
+                            escape_xml(robot.name), format_between(mission_clock(robot), failed.from, failed.until),
                             failed.error_m);
   return list.empty() ? "" : "<ul class=\"alerts\">\n" + list + "</ul>\n";
 }

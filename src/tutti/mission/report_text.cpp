@@ -131,18 +131,14 @@ std::string server_lines(const MissionRecord& record) {
   return out;
 }
 
-std::string between(const RobotRecord& robot, const consistency::SuspectedOrigin& origin) {
-  return fmt::format("{} - {}", format_moment(mission_time_s(robot, origin.from)),
-                     format_moment(mission_time_s(robot, origin.until)));
-}
-
 /// Where odometry and map part, what the robots warned of, and how gently they were corrected.
 std::string explanation_lines(const MissionRecord& record) {
   std::string out;
   for (const RobotRecord& robot : record.robots) {
     for (const AlertRecord& alert : robot.alerts)
       out += wrap(fmt::format("{}: localisation failure {}, {}: {}; noticed at {}.", robot.name,
-                              alert.withdrawn_s ? "no longer suspected" : "suspected", between(robot, alert.origin),
+                              alert.withdrawn_s ? "no longer suspected" : "suspected",
+                              format_between(mission_clock(robot), alert.origin.from, alert.origin.until),
                               format_origin_size(alert.origin), format_moment(alert.known_since_s)),
                   "  alert    ");
     const PolicyRecord* policy = find_policy(robot, record.default_policy);
