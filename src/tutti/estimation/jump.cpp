@@ -82,7 +82,7 @@ std::vector<std::size_t> suspects(std::span<const RelativePose> odometry, std::s
 
 std::optional<OdometryJump> find_jump(std::span<const RelativePose> odometry, std::size_t begin, std::size_t end,
                                       const RelativePose& begin_end) {
-  if (end <= begin + 1) return std::nullopt;
+  if (end <= begin) return std::nullopt;
   std::vector<RelativePose> steps(odometry.begin() + static_cast<std::ptrdiff_t>(begin),
                                   odometry.begin() + static_cast<std::ptrdiff_t>(end));
   const double before = gap(steps, begin_end);

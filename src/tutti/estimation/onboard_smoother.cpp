@@ -13,6 +13,7 @@
 #include "tutti/estimation/internal/full_step.hpp"
 #include "tutti/estimation/internal/odometry_runs.hpp"
 #include "tutti/estimation/internal/reduced_problem.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -55,6 +56,16 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
 OnboardSmoother::~OnboardSmoother() = default;
 OnboardSmoother::OnboardSmoother(OnboardSmoother&&) noexcept = default;
 OnboardSmoother& OnboardSmoother::operator=(OnboardSmoother&&) noexcept = default;
+
+std::vector<JumpRepair> OnboardSmoother::repaired_jumps() const {
+  std::vector<JumpRepair> out;
+  for (const auto& [step, said] : state_.jumps) {
+    const Pose3 believed = poses_[step].inverse() * poses_[step + 1];
+    out.push_back({step, (believed.translation - said.T_a_b.translation).norm(),
+                   rotation_angle(said.T_a_b.inverse() * believed)});
+  }
+  return out;
+}
 
 std::size_t OnboardSmoother::stored_runs() const { return runs_->all().size(); }
 

@@ -54,6 +54,15 @@ TEST(Kink, NeighboursCountEvenWhereNoPairIsASecondApart) {
   EXPECT_NEAR(found->translation_m, 4.0 * std::sin(0.05), 1e-9);
 }
 
+TEST(Kink, ARepairedJumpIsNoKink) {
+  const Trajectory raw = line(20, 0.5);
+  Trajectory corrected = moved_from(raw, 12, {Eigen::Quaterniond::Identity(), {0, 0.3, 0}});
+  const std::vector<RepairedJump> jumps{{raw[11].stamp, raw[12].stamp, 0.3, 0.0}};
+  EXPECT_NEAR(kink(raw, corrected, 1.0, jumps)->translation_m, 0.0, 1e-12);
+  corrected = moved_from(corrected, 13, {Eigen::Quaterniond::Identity(), {0, 0, 0.2}});  // just beside it
+  EXPECT_NEAR(kink(raw, corrected, 1.0, jumps)->translation_m, 0.2, 1e-12);
+}
+
 TEST(Kink, NeedsTwoCommonPoses) {
   EXPECT_FALSE(kink({}, {}));
   EXPECT_FALSE(kink(line(1, 1.0), line(5, 1.0)));

@@ -101,18 +101,18 @@ ProxyGraph proxy_graph(const std::vector<Node>& nodes, const CompareTrajectories
   return graph;
 }
 
-/// B at the nodes, its own motion bent by the constraints.
-Trajectory corrected(const std::vector<consistency::RobotNode>& nodes,
-                     const std::vector<consistency::Constraint>& constraints) {
+/// Bends B's own motion at the nodes by the constraints.
+void correct(const std::vector<consistency::RobotNode>& nodes, TrajectoryComparison& out) {
   estimation::OnboardSmoother smoother({}, nodes.front().T_map_body);
   for (std::size_t i = 1; i < nodes.size(); ++i) smoother.append(nodes[i].odometry);
   std::vector<estimation::ChainConstraint> links;
-  for (const auto& c : constraints) links.push_back({.from = c.from, .to = c.to, .measurement = c.measurement});
+  for (const auto& c : out.constraints) links.push_back({.from = c.from, .to = c.to, .measurement = c.measurement});
   smoother.set_constraints(std::move(links));
   smoother.solve();
-  Trajectory out;
-  for (std::size_t i = 0; i < nodes.size(); ++i) out.push_back({nodes[i].stamp, smoother.pose(i)});
-  return out;
+  out.corrected.clear();
+  for (std::size_t i = 0; i < nodes.size(); ++i) out.corrected.push_back({nodes[i].stamp, smoother.pose(i)});
+  for (const auto& [step, translation_m, rotation_rad] : smoother.repaired_jumps())
+    out.jumps.push_back({nodes[step].stamp, nodes[step + 1].stamp, translation_m, rotation_rad});
 }
 
 evaluation::AteResult lay_on(const Trajectory& judge, Trajectory& trajectory) {
@@ -171,9 +171,10 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
   out.constraints =
       (*chooser)->choose({graph, kRobot, robot, comparison, std::nullopt, Rng(0), nothing_held}).constraints;
 
-  const Trajectory raw = out.judged;
-  out.corrected = out.constraints.empty() ? raw : corrected(robot, out.constraints);
-  if (const auto kink = evaluation::kink(raw, out.corrected)) out.kink = *kink;
+  out.corrected = out.judged;
+  if (!out.constraints.empty()) correct(robot, out);
+  if (const auto kink = evaluation::kink(out.judged, out.corrected, evaluation::kKinkInterval_s, out.jumps))
+    out.kink = *kink;
   out.before = lay_on(out.judge, out.judged);
   out.after = lay_on(out.judge, out.corrected);
   return out;

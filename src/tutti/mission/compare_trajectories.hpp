@@ -49,7 +49,8 @@ struct TrajectoryComparison {
   std::vector<consistency::Constraint> constraints;  ///< Relative poses of A that would fix B; the policy `adaptive`'s.
   evaluation::AteResult before;                      ///< B's nodes against A's.
   evaluation::AteResult after;                       ///< `corrected` against A's.
-  evaluation::Kink kink;                             ///< What correcting does to B's nodes.
+  std::vector<RepairedJump> jumps;                   ///< Where correcting takes back what B jumped by.
+  evaluation::Kink kink;                             ///< What it does to B's nodes elsewhere.
 };
 
 /// Fails when fewer than two poses of B have one of A at their time, or a covariance is not positive definite.

@@ -19,6 +19,7 @@
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/recording.hpp"
+#include "tutti/model/repaired_jump.hpp"
 #include "tutti/model/trajectory.hpp"
 
 /// Everything a finished mission knows, as plain values: filled by the mission, read by the report writers. What could
@@ -47,7 +48,8 @@ struct PolicyRecord {
   std::string name;
   Accuracy accuracy;
   std::optional<double> agreement_rmse_m;  ///< ATE of the corrected estimate with the server's as the reference.
-  std::optional<evaluation::Kink> kink;    ///< What the correction does to short motions of the raw odometry.
+  std::vector<RepairedJump> jumps;         ///< Where the correction takes back what odometry jumped by.
+  std::optional<evaluation::Kink> kink;    ///< What it does to other short motions of the raw odometry.
   std::size_t constraints_added = 0;       ///< Held at the end of the mission.
   Trajectory corrected;                    ///< T_map_body at keyframes.
   std::vector<ConstraintRecord> constraints;

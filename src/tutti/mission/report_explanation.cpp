@@ -300,6 +300,11 @@ std::string format_origin_size(const SuspectedOrigin& origin) {
                      significant(origin.rotation_rad / kRadPerDeg), significant(origin.length_m));
 }
 
+std::string format_jump(const RepairedJump& jump, const PictureClock& clock) {
+  return fmt::format("{}, {:.1f} deg, {}", format_metres(jump.translation_m), jump.rotation_rad / kRadPerDeg,
+                     format_between(clock, jump.from, jump.until));
+}
+
 std::string format_disagreement(const Explanation& e, const PictureClock& clock) {
   if (!e.disagrees()) return "odometry and map agree within what the server is sure of";
   std::string text =

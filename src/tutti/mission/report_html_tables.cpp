@@ -105,7 +105,7 @@ std::string policies_html(const MissionRecord& record) {
       fmt::format(
           "Every policy answers the very same broadcasts; {} is the one the robot follows. RMSE and "
           "largest error at keyframes after one rigid alignment, without scale{}. Kink: the most that correcting "
-          "changed any motion over 1 s. Update: median / largest.",
+          "changed any motion over 1 s, but for jumps taken back. Update: median / largest.",
           record.default_policy, record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
       body + "</tbody></table></div>\n");
 }

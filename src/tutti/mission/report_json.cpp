@@ -62,9 +62,15 @@ void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy
   out[prefix + "rpe_10m_deg"] = number(accuracy.rpe_10m_deg);
 }
 
-Json policy_json(const PolicyRecord& policy) {
+Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
   Json out = Json::object();
   add_accuracy(out, "", policy.accuracy);
+  out["jumps"] = Json::array();
+  for (const RepairedJump& jump : policy.jumps)
+    out["jumps"].push_back({{"from_s", number(mission_time_s(robot, jump.from))},
+                            {"until_s", number(mission_time_s(robot, jump.until))},
+                            {"translation_m", number(jump.translation_m)},
+                            {"rotation_rad", number(jump.rotation_rad)}});
   out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
   out["kink_deg"] = policy.kink ? number(policy.kink->rotation_deg) : Json(nullptr);
   out["agreement_rmse_m"] = number(policy.agreement_rmse_m);
@@ -146,7 +152,7 @@ Json traffic_json(const std::vector<TrafficRecord>& traffic) {
 
 Json robot_json(const RobotRecord& robot) {
   Json policies = Json::object();
-  for (const auto& policy : robot.policies) policies[policy.name] = policy_json(policy);
+  for (const auto& policy : robot.policies) policies[policy.name] = policy_json(robot, policy);
   Json out{{"name", robot.name},
            {"distance_m", number(robot.distance_m)},
            {"start_s", number(robot.start_s)},

@@ -57,6 +57,13 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
   EXPECT_NE(text.find("kink     alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
             std::string::npos)
       << text;
+  ASSERT_EQ(text.find("jumped"), std::string::npos);
+  test::jump_back(record.robots[0], record.default_policy);
+  const std::string jumped = report_text(record, "x");
+  EXPECT_NE(jumped.find("jump     alpha: odometry jumped, 0.100 m, 20.1 deg, 12.0 s - 14.0 s: taken back there."),
+            std::string::npos)
+      << jumped;
+  EXPECT_NE(jumped.find("changed no other motion"), std::string::npos);
   test::miss_a_way(*record.robots[1].explanation);
   const std::string missed = report_text(record, "x");
   expect_readable(missed);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/robot/agent.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -168,6 +169,17 @@ Trajectory RobotAgent::corrected() const {
   Trajectory out;
   for (std::size_t k = 0; k < state_.keyframes.size(); ++k)
     out.push_back({state_.keyframes[k].stamp, smoother_.pose(state_.chain_index[k])});
+  return out;
+}
+
+std::vector<RepairedJump> RobotAgent::repaired_jumps() const {
+  std::vector<RepairedJump> out;
+  for (const auto& [step, translation_m, rotation_rad] : smoother_.repaired_jumps()) {
+    const auto after = std::ranges::upper_bound(state_.chain_index, step);
+    if (after == state_.chain_index.begin() || after == state_.chain_index.end()) continue;
+    const auto k = static_cast<std::size_t>(after - state_.chain_index.begin());
+    out.push_back({state_.keyframes[k - 1].stamp, state_.keyframes[k].stamp, translation_m, rotation_rad});
+  }
   return out;
 }
 

@@ -16,6 +16,7 @@
 #include "tutti/consistency/robot_node.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/model/messages.hpp"
+#include "tutti/model/repaired_jump.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/robot/submap_builder.hpp"
 
@@ -118,6 +119,8 @@ class RobotAgent {
   [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - 1; }
   /// T_map_body at the keyframes; `map` starts where `odom` does.
   [[nodiscard]] Trajectory corrected() const;
+  /// Where `corrected()` takes back what odometry jumped by, between neighbouring keyframes.
+  [[nodiscard]] std::vector<RepairedJump> repaired_jumps() const;
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:

@@ -178,6 +178,30 @@ TEST(Agent, OnlyDoubtfulLinksHaveARobustLoss) {
   }
 }
 
+// 20 degrees in one sample: taken back there, and said so.
+TEST(Agent, TakesBackAJumpWhereItWas) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  Trajectory odometry{{at(0), {}}};
+  const Pose3 slip{so3_exp(Eigen::Vector3d(0, 0, 0.35)), Eigen::Vector3d::Zero()};
+  for (int i = 1; i < 120; ++i)
+    odometry.push_back(
+        {at(i), odometry.back().pose * (true_pose(i - 1).inverse() * true_pose(i)) * (i == 61 ? slip : Pose3{})});
+  feed(agent, odometry);
+  EXPECT_TRUE(agent.repaired_jumps().empty());
+  agent.receive(broadcast(agent, 1, kWorld));
+  ASSERT_EQ(agent.repaired_jumps().size(), 1U);
+  const RepairedJump jump = agent.repaired_jumps()[0];
+  EXPECT_LE(jump.from, at(60));
+  EXPECT_GE(jump.until, at(61));
+  EXPECT_LE(jump.until - jump.from, 1.0);
+  EXPECT_NEAR(jump.rotation_rad, 0.35, 0.01);
+  EXPECT_EQ(RobotAgent(RobotId{1}, {}, Rng(1), agent.state()).repaired_jumps().size(), 1U);
+  for (const StampedPose& pose : agent.corrected()) {
+    const int sample = static_cast<int>(std::lround((pose.stamp - at(0)) / 0.5));
+    EXPECT_LT((pose.pose.translation - (true_pose(0).inverse() * true_pose(sample)).translation).norm(), 0.05);
+  }
+}
+
 TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {
   AgentConfig config;
   config.policy.name = "every_node";
