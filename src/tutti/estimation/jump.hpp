@@ -25,8 +25,10 @@ inline constexpr double kJumpGap = 38.258;
 /// the mean of the four nearest steps, as uncertain as such a guess is nearby, explains where the stretch leads, and
 /// doubting the step by as much does not. That is: doubted, the squared distance to where it should lead, in the
 /// covariance of both, is more than kJumpGap; guessed, a tenth of that or less. Returns the step with that guess.
+/// `duration_s`: what every step of `odometry` took; empty when all took the same. A body moves evenly in time, not in
+/// keyframes: what jumps is a keyframe at once.
 /// Nothing in a chain of fewer than some fifteen steps, or when more than one step jumped.
 std::optional<OdometryJump> find_jump(std::span<const RelativePose> odometry, std::size_t begin, std::size_t end,
-                                      const RelativePose& begin_end);
+                                      const RelativePose& begin_end, std::span<const double> duration_s = {});
 
 }  // namespace tutti::estimation

@@ -77,6 +77,29 @@ RC_GTEST_PROP(FindJump, LeavesASlideAlone, ()) {
   RC_ASSERT(!find_jump(walk.odometry, 20, 180, walk.seen(20, 180)).has_value());
 }
 
+// Keyframes: a jump is one at once, so its step is a short one.
+TEST(FindJump, GuessesByHowLongAStepTook) {
+  Rng rng(7);
+  const Walk walk(rng, 400);
+  std::vector<RelativePose> steps;
+  std::vector<double> duration_s;
+  std::vector<std::size_t> at{0};
+  for (std::size_t k = 0; at.back() < 400; ++k) {
+    const std::size_t samples = k == 40 ? 1 : 4;
+    RelativePose step{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+    for (std::size_t i = at.back(); i < std::min<std::size_t>(at.back() + samples, 400); ++i)
+      step = compound(step, walk.odometry[i]);
+    steps.push_back(step);
+    duration_s.push_back(0.1 * static_cast<double>(samples));
+    at.push_back(std::min<std::size_t>(at.back() + samples, 400));
+  }
+  steps[40].T_a_b = steps[40].T_a_b * turn(20.0);
+  const auto jump = find_jump(steps, 10, 80, walk.seen(at[10], at[80]), duration_s);
+  ASSERT_TRUE(jump.has_value());
+  EXPECT_EQ(jump->step, 40U);
+  EXPECT_LT(local(walk.between(at[40], at[41]), jump->motion.T_a_b).norm(), 0.02);
+}
+
 // Where nobody knows better than odometry, it may have jumped or not.
 TEST(FindJump, LeavesAJumpAloneThatIsHardlySeen) {
   Rng rng(6);

@@ -9,6 +9,7 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/ids.hpp"
+#include "tutti/base/timestamp.hpp"
 #include "tutti/model/loop_closure.hpp"
 
 namespace tutti::estimation {
@@ -19,6 +20,7 @@ struct OdometryChain {
   std::uint32_t first_index = 0;          ///< KeyframeId::index of T_odom_body[0]; the others count up from it.
   std::vector<Pose3> T_odom_body;         ///< Raw odometry.
   std::vector<Matrix6d> step_covariance;  ///< Of keyframe k -> k + 1 (right tangent); one fewer than poses.
+  std::vector<Timestamp> stamps;          ///< Of the poses.
 };
 
 struct OdometryTrialConfig {
