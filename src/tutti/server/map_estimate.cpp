@@ -63,6 +63,7 @@ std::vector<estimation::OdometryChain> odometry_chains(const SubmapSet& submaps,
     else
       chains.back().step_covariance.push_back(*step->second);
     chains.back().T_odom_body.push_back(node.T_odom_body);
+    chains.back().stamps.push_back(node.stamp);
   }
   return chains;
 }
@@ -105,9 +106,22 @@ void weaken(PoseGraph& graph, const MapEstimate& map, std::size_t from, std::siz
   }
 }
 
+/// As it was judged: a step that jumped by what it was instead, else with a variance.
+void doubt(PoseGraph& graph, const MapEstimate& map, const NodeIndex& index, const DoubtedStretch& doubted,
+           double sigma_m, double sigma_rad) {
+  const auto& [robot, from, to] = doubted.stretch;
+  const std::size_t a = index.at({robot, from}), b = index.at({robot, to});
+  if (!doubted.motion) return weaken(graph, map, a, b, sigma_m, sigma_rad);
+  for (std::size_t e = 0; e < map.odometry_edges; ++e)
+    if (graph.edges[e].from == a && graph.edges[e].to == b)
+      graph.edges[e] = {a, b, doubted.motion->T_a_b, information_of(doubted.motion->covariance)};
+}
+
 /// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A stretch that
 /// turns out to have been right, nearly or within its own doubt, is no failure.
-void record_failure(RobotId robot, std::size_t a, std::size_t b, double min_jump_m, MapEstimate& map) {
+void record_failure(const DoubtedStretch& doubted, const NodeIndex& index, double min_jump_m, MapEstimate& map) {
+  const auto& [robot, from, to] = doubted.stretch;
+  const std::size_t a = index.at({robot, from}), b = index.at({robot, to});
   const auto raw = [&](std::size_t i, std::size_t j) {
     return map.nodes[i].T_odom_body.inverse() * map.nodes[j].T_odom_body;
   };
@@ -123,8 +137,8 @@ void record_failure(RobotId robot, std::size_t a, std::size_t b, double min_jump
   const double jump_rad = jump.tail<3>().norm();
   if (estimation::failure_size(jump_m, jump_rad) < 0.5 * min_jump_m) return;
   if (jump.dot(covariance.llt().solve(jump)) < kRightAfterAll) return;
-  map.failed_odometry.push_back({robot, map.nodes[a].id.index, map.nodes[b].id.index, jump_m, jump_rad});
-  weaken(map.graph, map, a, b, jump_m, jump_rad);
+  map.failed_odometry.push_back({robot, from, to, jump_m, jump_rad});
+  doubt(map.graph, map, index, doubted, jump_m, jump_rad);
 }
 
 void label_components(MapEstimate& map) {
@@ -181,7 +195,7 @@ class Judgement {
   Optimum decide() {
     const estimation::OdometryVerdict first = trial_.decide();
     std::vector<DoubtedStretch> failed;
-    for (const auto& stretch : first.failed) failed.push_back({stretch, kFreeTranslation, kFreeRotation});
+    for (const auto& stretch : first.failed) failed.push_back({stretch, kFreeTranslation, kFreeRotation, std::nullopt});
     Optimum best = optimise(first.accepted, std::move(failed));
     for (int round = 0; round < kRelocations && !best.failed.empty(); ++round) {
       Optimum next = relocated(best);
@@ -194,9 +208,8 @@ class Judgement {
  private:
   [[nodiscard]] Optimum optimise(const std::vector<bool>& accepted, std::vector<DoubtedStretch> failed) const {
     Optimum out{.failed = std::move(failed), .graph = map_.graph, .closure_of_edge = {}, .robust = {}, .fitting = {}};
-    for (const auto& [stretch, sigma_m, sigma_rad] : out.failed)
-      weaken(out.graph, map_, index_.at({stretch.robot, stretch.from}), index_.at({stretch.robot, stretch.to}), sigma_m,
-             sigma_rad);
+    for (const DoubtedStretch& doubted : out.failed)
+      doubt(out.graph, map_, index_, doubted, doubted.sigma_m, doubted.sigma_rad);
     for (std::size_t i = 0; i < closures_.size(); ++i) {
       if (!accepted[i]) continue;
       out.graph.edges.push_back({.from = index_.at(closures_[i].from),
@@ -247,10 +260,7 @@ MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, c
   map.graph.poses = optimum.robust.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
   map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
-  for (const DoubtedStretch& doubted : optimum.failed) {
-    const auto& [robot, from, to] = doubted.stretch;
-    record_failure(robot, index.at({robot, from}), index.at({robot, to}), config.trial.min_jump_m, map);
-  }
+  for (const DoubtedStretch& doubted : optimum.failed) record_failure(doubted, index, config.trial.min_jump_m, map);
   label_components(map);
   return map;
 }

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "tutti/base/check.hpp"
@@ -98,20 +97,19 @@ std::vector<PoseSighting> sightings_of(const Window& window, std::span<const Dou
   return out;
 }
 
-/// The keyframe after which odometry jumped, if that explains what it missed over the window.
-std::optional<std::uint32_t> jump_within(const Window& window, const std::function<Pose3(KeyframeId)>& T_world_body) {
+/// The step of the window that jumped, if that explains what odometry missed over it.
+std::optional<estimation::OdometryJump> jump_within(const Window& window,
+                                                    const std::function<Pose3(KeyframeId)>& T_world_body) {
   const OdometryChain& chain = *window.chain;
-  const std::size_t first = window.position(window.from) - (window.from > chain.first_index ? 1 : 0);
-  const std::size_t last = window.position(std::min(window.to + 1, last_index(chain)));
   std::vector<RelativePose> odometry;
-  for (std::size_t k = first; k < last; ++k)
+  std::vector<double> duration_s;
+  for (std::size_t k = window.position(window.from); k < window.position(window.to); ++k) {
     odometry.push_back({chain.T_odom_body[k].inverse() * chain.T_odom_body[k + 1], chain.step_covariance[k]});
-  const auto jump = estimation::find_jump(
-      odometry, window.position(window.from) - first, window.position(window.to) - first,
-      {T_world_body({chain.robot, window.from}).inverse() * T_world_body({chain.robot, window.to}),
-       seen_from_map(Matrix6d::Zero())});
-  if (!jump) return std::nullopt;
-  return chain.first_index + static_cast<std::uint32_t>(first + jump->step);
+    duration_s.push_back(chain.stamps[k + 1] - chain.stamps[k]);
+  }
+  const Pose3 T_w_from = T_world_body({chain.robot, window.from}), T_w_to = T_world_body({chain.robot, window.to});
+  return estimation::find_jump(odometry, 0, odometry.size(),
+                               {T_w_from.inverse() * T_w_to, seen_from_map(Matrix6d::Zero())}, duration_s);
 }
 
 }  // namespace
@@ -134,13 +132,16 @@ std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> fa
                                    sightings_of(window, failed, closures, T_world_body));
     out.push_back(failed[f]);
     if (!found) continue;
-    auto [from, to] = std::pair(window.from + static_cast<std::uint32_t>(found->from),
-                                window.from + static_cast<std::uint32_t>(found->to));
+    const auto index = [&](std::size_t pose) { return window.from + static_cast<std::uint32_t>(pose); };
+    DoubtedStretch& moved = out.back();
+    moved = {{stretch.robot, index(found->from), index(found->to)},
+             kDoubt * found->missed_m,
+             kDoubt * found->missed_rad,
+             std::nullopt};
     if (const auto jump = jump_within(window, T_world_body)) {
-      from = *jump;
-      to = from + 1;
+      moved.stretch = {stretch.robot, index(jump->step), index(jump->step + 1)};
+      moved.motion = jump->motion;
     }
-    out.back() = {{stretch.robot, from, to}, kDoubt * found->missed_m, kDoubt * found->missed_rad};
   }
   return out;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,11 +10,13 @@
 
 namespace tutti::server {
 
-/// A convicted stretch and what its odometry may have missed in all (m, rad), as standard deviations.
+/// A convicted stretch and what its odometry may have missed in all (m, rad), as standard deviations; of a single step
+/// that jumped, what it was instead.
 struct DoubtedStretch {
   estimation::OdometryStretch stretch;
   double sigma_m = 0.0;
   double sigma_rad = 0.0;
+  std::optional<RelativePose> motion;
 };
 
 /// The convicted stretches moved to where the map they made says odometry failed (estimation/failure_interval.hpp), up

@@ -113,7 +113,12 @@ TEST(WhoIsWrong, ASlipIsConvictedAtItsVeryStep) {
     EXPECT_EQ(failed.to, failed.from + 1) << seed;
     EXPECT_LE(seconds_of(map, {0}, failed.from), 180.0) << seed;
     EXPECT_GE(seconds_of(map, {0}, failed.to), 180.0) << seed;
-    EXPECT_NEAR(failed.jump_rad, 20 * kRadPerDeg, 3 * kRadPerDeg) << seed;
+    EXPECT_NEAR(failed.jump_rad, 20 * kRadPerDeg, kRadPerDeg) << seed;
+    const auto at = std::ranges::lower_bound(map.nodes, KeyframeId{RobotId{0}, failed.from}, {}, &MapNode::id);
+    const Pose3 truth = run.true_poses.at(at->id).inverse() * run.true_poses.at((at + 1)->id);
+    const Vector6d off = local(truth, at->T_world_body.inverse() * (at + 1)->T_world_body);
+    EXPECT_LT(off.head<3>().norm(), 0.03) << seed;
+    EXPECT_LT(off.tail<3>().norm(), 0.5 * kRadPerDeg) << seed;
     EXPECT_LT(rmse(run, map), 0.1) << seed;
   }
 }
