@@ -172,7 +172,8 @@ def introduction(runs):
             "map. RMSE is ATE",
             "after one rigid alignment without scale. RPE: of the translation, root mean square. Kink: the most that the "
             "correction changes",
-            "any motion over 1 s of the raw odometry. A policy takes part at a budget when no seed of it holds more.", ""]
+            "any motion over 1 s of the raw odometry, but for jumps taken back. A policy takes part at a budget when no "
+            "seed of it holds more.", ""]
 
 
 def main():
