@@ -4,11 +4,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "tutti/base/check.hpp"
-#include "tutti/estimation/internal/chain_run.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -16,93 +14,105 @@ namespace {
 /// What the guess leaves of a gap that doubt alone does not explain. Measured over all missions: slips of 20 degrees
 /// at most 0.022, anything else at least 0.26.
 constexpr double kExplained = 0.1;
-constexpr std::size_t kSuspects = 6;
-/// How the body moves is learnt from so many steps on either side,
-constexpr std::size_t kNearby = 16;
-/// each beside the nearest ones, this many with itself; fewer examples than twice as many teach nothing.
+/// The guess of a step that explains so much is as far from the step, (1 - sqrt(kExplained))^2 of the gap, or further.
+constexpr double kLeastStrange = 0.46 * kJumpGap;
+/// A step is guessed from the nearest others, this many with itself,
 constexpr std::size_t kStencil = 5;
-constexpr std::size_t kFewestExamples = 2 * kStencil;
+/// and how well such guesses do is learnt from so many steps on either side; fewer than this in all teach nothing.
+constexpr std::size_t kNearby = 16;
+constexpr std::size_t kFewestExamples = 10;
 
 double squared_distance(const Vector6d& apart, const Matrix6d& covariance) {
   return apart.dot(covariance.llt().solve(apart));
 }
 
-/// How the body moved in some steps of odometry and around them, per unit of time.
+/// How the body moved in the steps [begin, end) of odometry, per unit of time, and what the motion around each step
+/// says of it.
 class Rates {
  public:
   Rates(std::span<const RelativePose> odometry, std::span<const double> duration_s, std::size_t begin, std::size_t end)
       : odometry_(odometry),
         duration_s_(duration_s),
         begin_(begin - std::min(begin, kNearby)),
-        end_(std::min(odometry.size(), end + kNearby)),
-        rate_(6, static_cast<Eigen::Index>(end_ - begin_)) {
+        end_(std::min(odometry.size(), end + kNearby)) {
+    if (end_ - begin_ < kStencil) return;
+    rate_.resize(6, column(end_));
     for (std::size_t k = begin_; k < end_; ++k) rate_.col(column(k)) = local(Pose3{}, odometry[k].T_a_b) / duration(k);
+    missed_.resize(6, column(end_));
+    for (std::size_t k = begin_; k < end_; ++k) missed_.col(column(k)) = rate_.col(column(k)) - mean_of_nearest(k);
   }
 
-  /// What the motion around a step says of it: the mean of the nearest others, as uncertain as such a guess is nearby.
-  /// Nothing in short chains.
+  /// The mean of the nearest others, as uncertain as such a guess is nearby. Nothing in short chains.
   [[nodiscard]] std::optional<RelativePose> expected_motion(std::size_t step) const {
-    const std::size_t begin = std::max(begin_, step - std::min(step, kNearby)),
-                      end = std::min(end_, step + kNearby + 1);
-    if (end - begin < kStencil) return std::nullopt;
-    const std::size_t first = std::clamp(step - std::min(step, kStencil / 2), begin, end - kStencil);
-    const auto centre = static_cast<Eigen::Index>(step - first);
-    const auto mean_of_others = [&](std::size_t stencil_begin) {
-      const auto stencil = rate_.middleCols<kStencil>(column(stencil_begin));
-      return Vector6d((stencil.rowwise().sum() - stencil.col(centre)) / (kStencil - 1));
-    };
-    Matrix6d scatter = Matrix6d::Zero();
-    std::size_t examples = 0;
-    for (std::size_t k = begin; k + kStencil <= end; ++k) {
-      if (step >= k && step < k + kStencil) continue;
-      const Vector6d missed = rate_.col(column(k) + centre) - mean_of_others(k);
-      scatter += missed * missed.transpose();
-      ++examples;
-    }
-    if (examples < kFewestExamples) return std::nullopt;
-    const double share = duration(step) * duration(step) / static_cast<double>(examples);
-    return RelativePose{retract(Pose3{}, duration(step) * mean_of_others(first)),
-                        odometry_[step].covariance + share * scatter};
+    const auto covariance = covariance_of_guess(step);
+    if (!covariance) return std::nullopt;
+    return RelativePose{retract(Pose3{}, duration(step) * mean_of_nearest(step)), *covariance};
   }
 
-  /// Squared distance of a step, neither the first nor the last, from the mean of its neighbours, in its covariance.
+  /// Squared distance of a step from that; 0 where nothing is known.
   [[nodiscard]] double strangeness(std::size_t step) const {
-    const auto k = column(step);
-    return squared_distance(duration(step) * (rate_.col(k) - 0.5 * (rate_.col(k - 1) + rate_.col(k + 1))),
-                            odometry_[step].covariance);
+    const auto covariance = covariance_of_guess(step);
+    return covariance ? squared_distance(duration(step) * missed_.col(column(step)), *covariance) : 0.0;
   }
 
  private:
+  using Columns = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
   [[nodiscard]] Eigen::Index column(std::size_t step) const { return static_cast<Eigen::Index>(step - begin_); }
   [[nodiscard]] double duration(std::size_t step) const { return duration_s_.empty() ? 1.0 : duration_s_[step]; }
+
+  [[nodiscard]] Vector6d mean_of_nearest(std::size_t step) const {
+    const std::size_t first = std::clamp(step - std::min(step, kStencil / 2), begin_, end_ - kStencil);
+    const auto stencil = rate_.middleCols<kStencil>(column(first));
+    return (stencil.rowwise().sum() - rate_.col(column(step))) / (kStencil - 1);
+  }
+
+  /// From the steps nearby whose own guess is from either side and does not contain this one.
+  [[nodiscard]] std::optional<Matrix6d> covariance_of_guess(std::size_t step) const {
+    if (missed_.cols() == 0) return std::nullopt;
+    constexpr Eigen::Index reach = kStencil / 2, nearby = kNearby;
+    const Eigen::Index k = column(step), most = missed_.cols() - reach;
+    const Eigen::Index before = std::max(reach, k - nearby), after = std::min(most, k + nearby + 1);
+    const Eigen::Index left = std::max<Eigen::Index>(0, k - reach - before);
+    const Eigen::Index right = std::max<Eigen::Index>(0, after - (k + reach + 1));
+    if (left + right < static_cast<Eigen::Index>(kFewestExamples)) return std::nullopt;
+    Matrix6d scatter = Matrix6d::Zero();
+    for (Eigen::Index i = 0; i < left; ++i) scatter += missed_.col(before + i) * missed_.col(before + i).transpose();
+    for (Eigen::Index i = 1; i <= right; ++i) scatter += missed_.col(after - i) * missed_.col(after - i).transpose();
+    const double share = duration(step) * duration(step) / static_cast<double>(left + right);
+    return odometry_[step].covariance + share * scatter;
+  }
 
   std::span<const RelativePose> odometry_;
   std::span<const double> duration_s_;
   std::size_t begin_;
   std::size_t end_;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> rate_;
+  Columns rate_;
+  Columns missed_;
 };
 
-/// Squared distance of where the steps lead to, in the covariance of both.
-double gap(std::span<const RelativePose> steps, const RelativePose& begin_end) {
-  const internal::RunSum way = internal::sum_odometry(steps);
-  const Matrix6d to_end = adjoint(way.T_a_b.inverse());
-  return squared_distance(local(way.T_a_b, begin_end.T_a_b),
-                          to_end * way.covariance * to_end.transpose() + begin_end.covariance);
-}
+/// Where a stretch leads when one of its steps is another than odometry says.
+class Detours {
+ public:
+  explicit Detours(std::span<const RelativePose> steps) : before_(steps.size() + 1, kNoWay), after_(before_) {
+    for (std::size_t k = 0; k < steps.size(); ++k) before_[k + 1] = compound(before_[k], steps[k]);
+    for (std::size_t k = steps.size(); k-- > 0;) after_[k] = compound(steps[k], after_[k + 1]);
+  }
 
-/// The strangest steps of [begin, end) and, as nobody can tell, the ends of the chain.
-std::vector<std::size_t> suspects(const Rates& rates, std::size_t begin, std::size_t end, std::size_t steps) {
-  std::vector<std::pair<double, std::size_t>> strange;
-  for (std::size_t k = std::max<std::size_t>(begin, 1); k < std::min(end, steps - 1); ++k)
-    strange.emplace_back(-rates.strangeness(k), k);
-  const std::size_t count = std::min(kSuspects, strange.size());
-  std::partial_sort(strange.begin(), strange.begin() + static_cast<std::ptrdiff_t>(count), strange.end());
-  std::vector<std::size_t> out;
-  for (std::size_t i = 0; i < count; ++i) out.push_back(strange[i].second);
-  if (begin == 0) out.push_back(0);
-  if (end == steps) out.push_back(end - 1);
-  return out;
+  [[nodiscard]] const RelativePose& way() const { return before_.back(); }
+  [[nodiscard]] RelativePose with(std::size_t k, const RelativePose& step) const {
+    return compound(compound(before_[k], step), after_[k + 1]);
+  }
+
+ private:
+  static inline const RelativePose kNoWay{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  std::vector<RelativePose> before_;
+  std::vector<RelativePose> after_;
+};
+
+/// Squared distance of two opinions about one motion, in the covariance of both.
+double gap(const RelativePose& one, const RelativePose& other) {
+  return squared_distance(local(one.T_a_b, other.T_a_b), one.covariance + other.covariance);
 }
 
 }  // namespace
@@ -112,24 +122,19 @@ std::optional<OdometryJump> find_jump(std::span<const RelativePose> odometry, st
   TUTTI_CHECK(begin <= end && end <= odometry.size(), "steps {} to {} of {}", begin, end, odometry.size());
   TUTTI_CHECK(duration_s.empty() || duration_s.size() == odometry.size(), "{} durations of {} steps", duration_s.size(),
               odometry.size());
-  if (begin == end) return std::nullopt;
-  std::vector<RelativePose> steps(odometry.begin() + static_cast<std::ptrdiff_t>(begin),
-                                  odometry.begin() + static_cast<std::ptrdiff_t>(end));
-  if (!(gap(steps, begin_end) > kJumpGap)) return std::nullopt;
+  const Detours detours(odometry.subspan(begin, end - begin));
+  if (begin == end || !(gap(detours.way(), begin_end) > kJumpGap)) return std::nullopt;
   const Rates rates(odometry, duration_s, begin, end);
   std::optional<OdometryJump> best;
   double least = std::numeric_limits<double>::infinity();
-  for (const std::size_t suspect : suspects(rates, begin, end, odometry.size())) {
-    const auto expected = rates.expected_motion(suspect);
+  for (std::size_t k = begin; k < end; ++k) {
+    if (rates.strangeness(k) < kLeastStrange) continue;
+    const auto expected = rates.expected_motion(k);
     if (!expected) continue;
-    RelativePose& step = steps[suspect - begin];
-    step.covariance = expected->covariance;
-    const double doubted = gap(steps, begin_end);
-    step = *expected;
-    const double repaired = gap(steps, begin_end);
-    step = odometry[suspect];
+    const double doubted = gap(detours.with(k - begin, {odometry[k].T_a_b, expected->covariance}), begin_end);
+    const double repaired = gap(detours.with(k - begin, *expected), begin_end);
     if (!(doubted > kJumpGap && repaired <= kExplained * doubted && repaired < least)) continue;
-    best = OdometryJump{suspect, *expected};
+    best = OdometryJump{k, *expected};
     least = repaired;
   }
   return best;

@@ -124,7 +124,7 @@ RC_GTEST_PROP(FindJump, SeesASlipInAnUnsteadyGait, ()) {
   }
   RC_ASSERT(!find_jump(walk.odometry, 50, 150, walk.seen(50, 150)).has_value());
   const std::size_t step = 70 + rng.index(60);
-  walk.slip(step, turn(15.0));
+  walk.slip(step, turn(rng.uniform(4.0, 20.0)));
   const auto jump = find_jump(walk.odometry, 50, 150, walk.seen(50, 150));
   RC_ASSERT(jump.has_value());
   RC_ASSERT(jump->step == step);
