@@ -11,8 +11,8 @@
 namespace tutti::estimation {
 namespace {
 
-/// What the guess leaves of a gap that doubt alone does not explain. Measured over all missions: slips of 20 degrees
-/// at most 0.022, anything else at least 0.26.
+/// What the guess may leave of a gap that doubt alone does not explain. Measured (docs/decisions/who-is-wrong.md): slips
+/// of 5, 10 and 20 degrees leave up to 0.10, 0.04 and 0.02, steps that did not jump at least 0.22.
 constexpr double kExplained = 0.1;
 /// The guess of a step that explains so much is as far from the step, (1 - sqrt(kExplained))^2 of the gap, or further.
 constexpr double kLeastStrange = 0.46 * kJumpGap;
