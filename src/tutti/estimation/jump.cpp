@@ -11,9 +11,12 @@
 namespace tutti::estimation {
 namespace {
 
-/// What the guess may leave of a gap that doubt alone does not explain. Measured (docs/decisions/who-is-wrong.md): slips
-/// of 5, 10 and 20 degrees leave up to 0.10, 0.04 and 0.02, steps that did not jump at least 0.22.
+/// What the guess may leave of a gap that doubt alone does not explain.
 constexpr double kExplained = 0.1;
+/// How many times better the guess explains the gap, times how far the step is from it: both errors have heavy tails,
+/// so evidence goes with the logarithms. Measured (docs/decisions/who-is-wrong.md): slips of 5 degrees and more 38,000
+/// and more, steps that did not jump 5,600 at most.
+constexpr double kLeastEvidence = 2e4;
 /// The guess of a step that explains so much is as far from the step, (1 - sqrt(kExplained))^2 of the gap, or further.
 constexpr double kLeastStrange = 0.46 * kJumpGap;
 /// A step is guessed from the nearest others, this many with itself,
@@ -128,12 +131,15 @@ std::optional<OdometryJump> find_jump(std::span<const RelativePose> odometry, st
   std::optional<OdometryJump> best;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = begin; k < end; ++k) {
-    if (rates.strangeness(k) < kLeastStrange) continue;
+    const double strangeness = rates.strangeness(k);
+    if (strangeness < kLeastStrange) continue;
     const auto expected = rates.expected_motion(k);
     if (!expected) continue;
     const double doubted = gap(detours.with(k - begin, {odometry[k].T_a_b, expected->covariance}), begin_end);
     const double repaired = gap(detours.with(k - begin, *expected), begin_end);
-    if (!(doubted > kJumpGap && repaired <= kExplained * doubted && repaired < least)) continue;
+    const bool jumped =
+        doubted > kJumpGap && repaired <= kExplained * doubted && strangeness * doubted >= kLeastEvidence * repaired;
+    if (!jumped || repaired >= least) continue;
     best = OdometryJump{k, *expected};
     least = repaired;
   }

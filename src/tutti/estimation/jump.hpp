@@ -24,7 +24,8 @@ inline constexpr double kJumpGap = 38.258;
 /// `begin_end` says, finds the one that jumped: of the few that are least like the mean of the four nearest steps, as
 /// uncertain as such a guess is nearby, the one for which this guess explains where the stretch leads, and doubting the
 /// step by as much does not. That is: doubted, the squared distance to where it should lead, in the
-/// covariance of both, is more than kJumpGap; guessed, a tenth of that or less. Returns the step with that guess.
+/// covariance of both, is more than kJumpGap; guessed, a tenth of that or less; and the less strange the step is beside
+/// the guess, the more must be explained. Returns the step with that guess.
 /// `duration_s`: what every step of `odometry` took; empty when all took the same. A body moves evenly in time, not in
 /// keyframes: what jumps is a keyframe at once.
 /// Nothing in a chain of fewer than some fifteen steps, or when more than one step jumped.
