@@ -76,7 +76,8 @@ void name_failures(const server::MapEstimate& map, ServerRecord& out) {
     out.failed_odometry.push_back({.robot = failed.robot,
                                    .from = stamp.at({failed.robot, failed.from}),
                                    .until = stamp.at({failed.robot, failed.to}),
-                                   .error_m = failed.jump_m});
+                                   .error_m = failed.jump_m,
+                                   .error_rad = failed.jump_rad});
 }
 
 /// How far accepted closures are from the reference, where there is one.

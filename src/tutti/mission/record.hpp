@@ -175,6 +175,7 @@ struct FailedOdometryRecord {
   Timestamp from;
   Timestamp until;
   double error_m = 0.0;  ///< By how much closures and odometry differ over the stretch.
+  double error_rad = 0.0;
 };
 
 struct ServerRecord {

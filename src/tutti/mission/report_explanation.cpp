@@ -300,8 +300,12 @@ std::string format_origin_size(const SuspectedOrigin& origin) {
                      significant(origin.rotation_rad / kRadPerDeg), significant(origin.length_m));
 }
 
+std::string format_motion_error(double translation_m, double rotation_rad) {
+  return fmt::format("{}, {:.1f} deg", format_metres(translation_m), rotation_rad / kRadPerDeg);
+}
+
 std::string format_jump(const RepairedJump& jump, const PictureClock& clock) {
-  return fmt::format("{}, {:.1f} deg, {}", format_metres(jump.translation_m), jump.rotation_rad / kRadPerDeg,
+  return fmt::format("{}, {}", format_motion_error(jump.translation_m, jump.rotation_rad),
                      format_between(clock, jump.from, jump.until));
 }
 

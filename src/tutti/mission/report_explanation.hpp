@@ -66,7 +66,9 @@ double largest_significance(const consistency::Explanation& explanation);
 std::string format_moment(double value_s);
 /// "0.41 m, 1.30 deg over 12.0 m".
 std::string format_origin_size(const consistency::SuspectedOrigin& origin);
-/// "0.10 m, 20.3 deg, 162.1 s - 163.0 s"
+/// "0.10 m, 20.3 deg"
+std::string format_motion_error(double translation_m, double rotation_rad);
+/// The same and when: "0.10 m, 20.3 deg, 162.1 s - 163.0 s"
 std::string format_jump(const RepairedJump& jump, const PictureClock& clock);
 /// "odometry and map part by up to 12 x the threshold", and the way that odometry misses by most, if any; or that they
 /// agree.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/mission/report_explanation.hpp"
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_html_parts.hpp"
 #include "tutti/mission/report_plot.hpp"
@@ -58,7 +59,8 @@ void draw_bands(Svg& svg, const MissionRecord& record, const RobotRecord& robot,
     band(origin.from, origin.until, fmt::format("drift {}", drift_name(origin.kind)), words(origin));
   for (const FailedOdometryRecord& failed : record.server.failed_odometry)
     if (failed.robot == robot.id)
-      band(failed.from, failed.until, "suspect", "suspected by the server: " + format_metres(failed.error_m));
+      band(failed.from, failed.until, "suspect",
+           "suspected by the server: " + format_motion_error(failed.error_m, failed.error_rad));
 }
 
 void draw_errors(Svg& svg, const RobotGeometry& g, const Axis& x, const Axis& y, std::size_t hover_points) {

@@ -115,9 +115,9 @@ std::string alerts_html(const MissionRecord& record) {
   for (const FailedOdometryRecord& failed : record.server.failed_odometry)
     for (const RobotRecord& robot : record.robots)
       if (robot.id == failed.robot)
-        list += fmt::format("<li><b>Localisation failure suspected by the server:</b> {}, {}: {:.1f} m</li>\n",
+        list += fmt::format("<li><b>Localisation failure suspected by the server:</b> {}, {}: {}</li>\n",
                             escape_xml(robot.name), format_between(mission_clock(robot), failed.from, failed.until),
-                            failed.error_m);
+                            format_motion_error(failed.error_m, failed.error_rad));
   return list.empty() ? "" : "<ul class=\"alerts\">\n" + list + "</ul>\n";
 }
 

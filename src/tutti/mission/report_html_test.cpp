@@ -58,10 +58,10 @@ TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
   EXPECT_EQ(html.find("suspected by the server"), std::string::npos);
   const auto& robot = record.robots[1];
   record.robots[1].start_s = 300.0;
-  record.server.failed_odometry = {{robot.id, robot.odometry[6].stamp, robot.odometry[15].stamp, 2.41}};
+  record.server.failed_odometry = {{robot.id, robot.odometry[6].stamp, robot.odometry[15].stamp, 2.41, 0.05}};
   html = report_html(record);
   expect_good_page(html);
-  EXPECT_NE(html.find("suspected by the server:</b> bravo, 312.0 s - 330.0 s: 2.4 m"), std::string::npos);
+  EXPECT_NE(html.find("suspected by the server:</b> bravo, 312.0 s - 330.0 s: 2.410 m, 2.9 deg"), std::string::npos);
   EXPECT_NE(html.find("<rect class=\"suspect\""), std::string::npos);
 }
 

@@ -199,7 +199,8 @@ Json server_json(const MissionRecord& record) {
         failed.push_back({{"robot", robot.name},
                           {"from_s", number(mission_time_s(robot, stretch.from))},
                           {"until_s", number(mission_time_s(robot, stretch.until))},
-                          {"error_m", number(stretch.error_m)}});
+                          {"error_m", number(stretch.error_m)},
+                          {"error_rad", number(stretch.error_rad)}});
   return {{"components", server.components},
           {"closures_accepted", counts.accepted()},
           {"closures_accepted_intra", counts.accepted_intra},

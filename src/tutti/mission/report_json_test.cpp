@@ -138,7 +138,7 @@ TEST(ReportJson, DriftIsInMissionTime) {
   MissionRecord record = test::example_record();
   record.robots[0].start_s = 2400.0;
   record.server.failed_odometry = {
-      {record.robots[0].id, record.robots[0].odometry[3].stamp, record.robots[0].odometry[4].stamp, 1.5}};
+      {record.robots[0].id, record.robots[0].odometry[3].stamp, record.robots[0].odometry[4].stamp, 1.5, 0.35}};
   const json report = json::parse(report_json(record));
   const json& origin = report["robots"][0]["drift_origins"][1];
   EXPECT_EQ(origin["kind"], "degeneracy");
@@ -148,6 +148,7 @@ TEST(ReportJson, DriftIsInMissionTime) {
   EXPECT_EQ(failed["robot"], "alpha");
   EXPECT_DOUBLE_EQ(failed["from_s"], 2406.0);
   EXPECT_DOUBLE_EQ(failed["error_m"], 1.5);
+  EXPECT_DOUBLE_EQ(failed["error_rad"], 0.35);
 }
 
 TEST(ReportJson, NotMeasuredIsNull) {
