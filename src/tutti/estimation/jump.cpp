@@ -25,9 +25,11 @@ constexpr std::size_t kStencil = 5;
 constexpr std::size_t kNearby = 16;
 constexpr std::size_t kFewestExamples = 10;
 
-double squared_distance(const Vector6d& apart, const Matrix6d& covariance) {
-  return apart.dot(covariance.llt().solve(apart));
-}
+/// What the motion around a step says of it, and how far the step is from that (squared distance, in the covariance).
+struct Guess {
+  RelativePose motion;
+  double strangeness = 0.0;
+};
 
 /// How the body moved in the steps [begin, end) of odometry, per unit of time, and what the motion around each step
 /// says of it.
@@ -46,16 +48,12 @@ class Rates {
   }
 
   /// The mean of the nearest others, as uncertain as such a guess is nearby. Nothing in short chains.
-  [[nodiscard]] std::optional<RelativePose> expected_motion(std::size_t step) const {
+  [[nodiscard]] std::optional<Guess> guess(std::size_t step) const {
     const auto covariance = covariance_of_guess(step);
     if (!covariance) return std::nullopt;
-    return RelativePose{retract(Pose3{}, duration(step) * mean_of_nearest(step)), *covariance};
-  }
-
-  /// Squared distance of a step from that; 0 where nothing is known.
-  [[nodiscard]] double strangeness(std::size_t step) const {
-    const auto covariance = covariance_of_guess(step);
-    return covariance ? squared_distance(duration(step) * missed_.col(column(step)), *covariance) : 0.0;
+    const Vector6d missed = duration(step) * missed_.col(column(step));
+    return Guess{{retract(Pose3{}, duration(step) * mean_of_nearest(step)), *covariance},
+                 missed.dot(covariance->llt().solve(missed))};
   }
 
  private:
@@ -113,11 +111,6 @@ class Detours {
   std::vector<RelativePose> after_;
 };
 
-/// Squared distance of two opinions about one motion, in the covariance of both.
-double gap(const RelativePose& one, const RelativePose& other) {
-  return squared_distance(local(one.T_a_b, other.T_a_b), one.covariance + other.covariance);
-}
-
 }  // namespace
 
 std::optional<OdometryJump> find_jump(std::span<const RelativePose> odometry, std::size_t begin, std::size_t end,
@@ -126,21 +119,20 @@ std::optional<OdometryJump> find_jump(std::span<const RelativePose> odometry, st
   TUTTI_CHECK(duration_s.empty() || duration_s.size() == odometry.size(), "{} durations of {} steps", duration_s.size(),
               odometry.size());
   const Detours detours(odometry.subspan(begin, end - begin));
-  if (begin == end || !(gap(detours.way(), begin_end) > kJumpGap)) return std::nullopt;
+  if (begin == end || !(squared_distance(detours.way(), begin_end) > kJumpGap)) return std::nullopt;
   const Rates rates(odometry, duration_s, begin, end);
   std::optional<OdometryJump> best;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = begin; k < end; ++k) {
-    const double strangeness = rates.strangeness(k);
-    if (strangeness < kLeastStrange) continue;
-    const auto expected = rates.expected_motion(k);
-    if (!expected) continue;
-    const double doubted = gap(detours.with(k - begin, {odometry[k].T_a_b, expected->covariance}), begin_end);
-    const double repaired = gap(detours.with(k - begin, *expected), begin_end);
-    const bool jumped =
-        doubted > kJumpGap && repaired <= kExplained * doubted && strangeness * doubted >= kLeastEvidence * repaired;
+    const auto guess = rates.guess(k);
+    if (!guess || guess->strangeness < kLeastStrange) continue;
+    const RelativePose unsure{odometry[k].T_a_b, guess->motion.covariance};
+    const double doubted = squared_distance(detours.with(k - begin, unsure), begin_end);
+    const double repaired = squared_distance(detours.with(k - begin, guess->motion), begin_end);
+    const bool jumped = doubted > kJumpGap && repaired <= kExplained * doubted &&
+                        guess->strangeness * doubted >= kLeastEvidence * repaired;
     if (!jumped || repaired >= least) continue;
-    best = OdometryJump{k, *expected};
+    best = OdometryJump{k, guess->motion};
     least = repaired;
   }
   return best;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Cholesky>
+
 #include "tutti/base/ids.hpp"
 #include "tutti/geometry/pose3.hpp"
 
@@ -22,6 +24,12 @@ inline RelativePose compound(const RelativePose& a_b, const RelativePose& b_c) {
 inline RelativePose inverse(const RelativePose& a_b) {
   const Matrix6d Ad = adjoint(a_b.T_a_b);
   return {a_b.T_a_b.inverse(), Ad * a_b.covariance * Ad.transpose()};
+}
+
+/// Squared Mahalanobis distance of two independent ways to know one relative pose.
+inline double squared_distance(const RelativePose& one, const RelativePose& other) {
+  const Vector6d missed = local(one.T_a_b, other.T_a_b);
+  return missed.dot((one.covariance + other.covariance).ldlt().solve(missed));
 }
 
 }  // namespace tutti

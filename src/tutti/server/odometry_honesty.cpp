@@ -65,12 +65,6 @@ std::optional<RelativePose> between(const Chain& chain, std::uint32_t from, std:
                       sign * to_b * (b->second.covariance - a->second.covariance) * to_b.transpose()};
 }
 
-/// Squared Mahalanobis distance of two ways to know one relative pose.
-double squared_distance(const RelativePose& one, const RelativePose& other) {
-  const Vector6d missed = local(one.T_a_b, other.T_a_b);
-  return missed.dot((one.covariance + other.covariance).ldlt().solve(missed));
-}
-
 /// The loop is about odometry more than about the closure.
 bool tells_of(const RelativePose& odometry, const RelativePose& closure) {
   return odometry.covariance.topLeftCorner<3, 3>().trace() > closure.covariance.topLeftCorner<3, 3>().trace();
