@@ -125,23 +125,23 @@ std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> fa
     const bool is_followed = f + 1 < failed.size() && failed[f + 1].stretch.robot == stretch.robot;
     const Window window = window_around(stretch, chains, follows ? out.back().stretch.to : 0,
                                         is_followed ? failed[f + 1].stretch.from : UINT32_MAX);
+    const auto index = [&](std::size_t pose) { return window.from + static_cast<std::uint32_t>(pose); };
+    DoubtedStretch& moved = out.emplace_back(failed[f]);
+    if (const auto jump = jump_within(window, T_world_body)) {
+      moved.stretch = {stretch.robot, index(jump->step), index(jump->step + 1)};
+      moved.motion = jump->motion;
+      continue;
+    }
     const std::size_t first = window.position(window.from);
     const auto found =
         estimation::locate_failure(std::span(window.chain->T_odom_body).subspan(first, window.poses()),
                                    std::span(window.chain->step_covariance).subspan(first, window.poses() - 1),
                                    sightings_of(window, failed, closures, T_world_body));
-    out.push_back(failed[f]);
-    if (!found) continue;
-    const auto index = [&](std::size_t pose) { return window.from + static_cast<std::uint32_t>(pose); };
-    DoubtedStretch& moved = out.back();
-    moved = {{stretch.robot, index(found->from), index(found->to)},
-             kDoubt * found->missed_m,
-             kDoubt * found->missed_rad,
-             std::nullopt};
-    if (const auto jump = jump_within(window, T_world_body)) {
-      moved.stretch = {stretch.robot, index(jump->step), index(jump->step + 1)};
-      moved.motion = jump->motion;
-    }
+    if (found)
+      moved = {{stretch.robot, index(found->from), index(found->to)},
+               kDoubt * found->missed_m,
+               kDoubt * found->missed_rad,
+               std::nullopt};
   }
   return out;
 }
