@@ -29,8 +29,8 @@ void include(const PosePair& i, const PosePair& j, Kink& largest) {
 
 }  // namespace
 
-std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, double delta_s,
-                         std::span<const RepairedJump> jumps) {
+std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, std::span<const RepairedJump> jumps,
+                         double delta_s) {
   TUTTI_CHECK(delta_s > 0.0, "delta_s = {}", delta_s);
   const auto pairs = associate(corrected, raw, {.interpolate = false, .max_difference_s = 0.0});
   if (pairs.size() < 2) return std::nullopt;

@@ -9,8 +9,6 @@
 
 namespace tutti::evaluation {
 
-inline constexpr double kKinkInterval_s = 1.0;
-
 /// The most that a correction changes short motions by, over pairs i, j of poses: j is the next pose after i, and the
 /// first at least `delta_s` later (left out where that overshoots by more than half, a gap). With R the raw and C the
 /// corrected estimate, R_ij = R_i^-1 R_j and C_ij likewise: |t(C_ij) - t(R_ij)| and the angle of rot(R_ij)^T rot(C_ij).
@@ -24,7 +22,7 @@ struct Kink {
 };
 
 /// Poses pair up where their stamps are equal; delta_s > 0. Nothing with fewer than two common poses.
-std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, double delta_s = kKinkInterval_s,
-                         std::span<const RepairedJump> jumps = {});
+std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, std::span<const RepairedJump> jumps = {},
+                         double delta_s = 1.0);
 
 }  // namespace tutti::evaluation

@@ -173,8 +173,7 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
 
   out.corrected = out.judged;
   if (!out.constraints.empty()) correct(robot, out);
-  if (const auto kink = evaluation::kink(out.judged, out.corrected, evaluation::kKinkInterval_s, out.jumps))
-    out.kink = *kink;
+  if (const auto kink = evaluation::kink(out.judged, out.corrected, out.jumps)) out.kink = *kink;
   out.before = lay_on(out.judge, out.judged);
   out.after = lay_on(out.judge, out.corrected);
   return out;
