@@ -13,7 +13,6 @@
 #include "tutti/estimation/internal/full_step.hpp"
 #include "tutti/estimation/internal/odometry_runs.hpp"
 #include "tutti/estimation/internal/reduced_problem.hpp"
-#include "tutti/geometry/so3.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -56,16 +55,6 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
 OnboardSmoother::~OnboardSmoother() = default;
 OnboardSmoother::OnboardSmoother(OnboardSmoother&&) noexcept = default;
 OnboardSmoother& OnboardSmoother::operator=(OnboardSmoother&&) noexcept = default;
-
-std::vector<JumpRepair> OnboardSmoother::repaired_jumps() const {
-  std::vector<JumpRepair> out;
-  for (const auto& [step, said] : state_.jumps) {
-    const Pose3 believed = poses_[step].inverse() * poses_[step + 1];
-    out.push_back({step, (believed.translation - said.T_a_b.translation).norm(),
-                   rotation_angle(said.T_a_b.inverse() * believed)});
-  }
-  return out;
-}
 
 std::size_t OnboardSmoother::stored_runs() const { return runs_->all().size(); }
 
@@ -115,20 +104,17 @@ SmootherSummary OnboardSmoother::solve() {
 
 /// A function of the constraints and of what odometry said, so that no history shows. True: some steps changed.
 bool OnboardSmoother::judge_jumps(std::span<const std::size_t> nodes) {
-  std::vector<std::size_t> overruled;  // until now
-  for (OdometryJump& jump : state_.jumps) {
-    std::swap(state_.odometry[jump.step], jump.motion);
-    overruled.push_back(jump.step);
-  }
+  for (OdometryJump& jump : state_.jumps) std::swap(state_.odometry[jump.step], jump.motion);
   const std::vector<OdometryJump> believed = std::exchange(state_.jumps, {});
   for (const ChainConstraint& c : state_.constraints) {
     const auto [begin, end] = std::minmax(c.from, c.to);
     const auto node = std::ranges::lower_bound(nodes, begin);
     if (!config_.repair_jumps || c.doubtful || begin == end || *(node + 1) != end) continue;
     const RelativePose begin_end = c.from < c.to ? c.measurement : inverse(c.measurement);
-    const auto inside = std::ranges::lower_bound(overruled, begin);
+    const auto inside = std::ranges::lower_bound(believed, begin, {}, &OdometryJump::step);
+    const bool was_repaired = inside != believed.end() && inside->step < end;  // then the run is not odometry's
     const internal::OdometryRun& run = runs_->all()[static_cast<std::size_t>(node - nodes.begin())];
-    if (!(inside != overruled.end() && *inside < end) && !internal::is_implausible(run, begin_end.T_a_b)) continue;
+    if (!was_repaired && !internal::is_implausible(run, begin_end.T_a_b)) continue;
     const auto jump = find_jump(state_.odometry, begin, end, begin_end);
     if (jump && std::ranges::find(state_.jumps, jump->step, &OdometryJump::step) == state_.jumps.end())
       state_.jumps.push_back(*jump);

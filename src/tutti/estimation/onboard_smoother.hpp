@@ -77,13 +77,6 @@ struct SmootherState {
   friend bool operator==(const SmootherState&, const SmootherState&) = default;
 };
 
-/// By how much the estimate differs from odometry in a step that jumped.
-struct JumpRepair {
-  std::size_t step = 0;
-  double translation_m = 0.0;
-  double rotation_rad = 0.0;
-};
-
 /// A robot's own optimiser: one odometry chain and relative constraints between some of its nodes. Each run of odometry
 /// between two constrained nodes is compounded, with covariance, into one factor; Gauss-Newton solves the small graph
 /// of constrained nodes; each run's inner poses follow exactly in closed form (the smoother of a linear-Gaussian chain
@@ -123,8 +116,6 @@ class OnboardSmoother {
   /// Per constraint as set: robust weight at the last solve; 1 where the loss did not apply.
   [[nodiscard]] const std::vector<double>& constraint_weights() const { return constraint_weights_; }
   [[nodiscard]] const SmootherState& state() const { return state_; }
-  /// In order.
-  [[nodiscard]] std::vector<JumpRepair> repaired_jumps() const;
   /// Compounded runs kept, all there is besides a pose per node, state() and the reduced graph of the last solve.
   [[nodiscard]] std::size_t stored_runs() const;
 

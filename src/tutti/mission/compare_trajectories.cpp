@@ -111,8 +111,9 @@ void correct(const std::vector<consistency::RobotNode>& nodes, TrajectoryCompari
   smoother.solve();
   out.corrected.clear();
   for (std::size_t i = 0; i < nodes.size(); ++i) out.corrected.push_back({nodes[i].stamp, smoother.pose(i)});
-  for (const auto& [step, translation_m, rotation_rad] : smoother.repaired_jumps())
-    out.jumps.push_back({nodes[step].stamp, nodes[step + 1].stamp, translation_m, rotation_rad});
+  for (const auto& [step, said] : smoother.state().jumps)
+    out.jumps.push_back(repaired_jump(nodes[step].stamp, nodes[step + 1].stamp, said.T_a_b,
+                                      smoother.pose(step).inverse() * smoother.pose(step + 1)));
 }
 
 evaluation::AteResult lay_on(const Trajectory& judge, Trajectory& trajectory) {

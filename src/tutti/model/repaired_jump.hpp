@@ -2,6 +2,8 @@
 #pragma once
 
 #include "tutti/base/timestamp.hpp"
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/geometry/so3.hpp"
 
 namespace tutti {
 
@@ -13,5 +15,10 @@ struct RepairedJump {
   double rotation_rad = 0.0;
   friend bool operator==(const RepairedJump&, const RepairedJump&) = default;
 };
+
+/// Of a step that odometry said to be one motion and the correction believes to be another.
+inline RepairedJump repaired_jump(Timestamp from, Timestamp until, const Pose3& said, const Pose3& believed) {
+  return {from, until, (believed.translation - said.translation).norm(), rotation_angle(said.inverse() * believed)};
+}
 
 }  // namespace tutti

@@ -174,11 +174,12 @@ Trajectory RobotAgent::corrected() const {
 
 std::vector<RepairedJump> RobotAgent::repaired_jumps() const {
   std::vector<RepairedJump> out;
-  for (const auto& [step, translation_m, rotation_rad] : smoother_.repaired_jumps()) {
+  for (const auto& [step, said] : smoother_.state().jumps) {
     const auto after = std::ranges::upper_bound(state_.chain_index, step);
     if (after == state_.chain_index.begin() || after == state_.chain_index.end()) continue;
     const auto k = static_cast<std::size_t>(after - state_.chain_index.begin());
-    out.push_back({state_.keyframes[k - 1].stamp, state_.keyframes[k].stamp, translation_m, rotation_rad});
+    out.push_back(repaired_jump(state_.keyframes[k - 1].stamp, state_.keyframes[k].stamp, said.T_a_b,
+                                smoother_.pose(step).inverse() * smoother_.pose(step + 1)));
   }
   return out;
 }
