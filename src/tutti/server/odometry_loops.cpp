@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/odometry_loops.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+namespace tutti::server {
+namespace {
+
+using estimation::OdometryChain;
+
+/// Odometry between any two keyframes of one chain.
+class Ways {
+ public:
+  explicit Ways(std::span<const OdometryChain> chains) {
+    for (const OdometryChain& chain : chains) {
+      Piece& piece = pieces_[{chain.robot, chain.first_index}];
+      piece.chain = &chain;
+      piece.covariance.push_back(Matrix6d::Zero());
+      for (std::size_t k = 0; k < chain.step_covariance.size(); ++k) {
+        const Matrix6d Ad = adjoint(T_first_body(chain, k + 1));
+        piece.covariance.push_back(piece.covariance.back() + Ad * chain.step_covariance[k] * Ad.transpose());
+      }
+    }
+  }
+
+  /// T_a_b with covariance; nothing across a gap.
+  [[nodiscard]] std::optional<RelativePose> between(const KeyframeId& a, const KeyframeId& b) const {
+    const auto after = pieces_.upper_bound(std::min(a, b));
+    if (after == pieces_.begin()) return std::nullopt;
+    const auto& [first, piece] = *std::prev(after);
+    const std::size_t from = a.index - first.index, to = b.index - first.index;
+    if (first.robot != a.robot || first.robot != b.robot || std::max(from, to) >= piece.covariance.size())
+      return std::nullopt;
+    const Pose3 T_first_b = T_first_body(*piece.chain, to);
+    const Matrix6d to_b = adjoint(T_first_b.inverse());
+    const double sign = from < to ? 1.0 : -1.0;
+    return RelativePose{T_first_body(*piece.chain, from).inverse() * T_first_b,
+                        sign * to_b * (piece.covariance[to] - piece.covariance[from]) * to_b.transpose()};
+  }
+
+ private:
+  struct Piece {
+    const OdometryChain* chain = nullptr;
+    std::vector<Matrix6d> covariance;  ///< Of each pose, in the frame of the first.
+  };
+  static Pose3 T_first_body(const OdometryChain& chain, std::size_t k) {
+    return chain.T_odom_body.front().inverse() * chain.T_odom_body[k];
+  }
+
+  std::map<KeyframeId, Piece> pieces_;  // by first keyframe
+};
+
+/// Closures between two robots, the end of `robot` first, in its order.
+std::vector<LoopClosure> closures_with(std::span<const LoopClosure> closures, RobotId robot, RobotId other) {
+  std::vector<LoopClosure> out;
+  for (LoopClosure closure : closures) {
+    if (closure.from.robot == other && closure.to.robot == robot) {
+      closure.measurement = inverse(closure.measurement);
+      std::swap(closure.from, closure.to);
+    }
+    if (closure.from.robot == robot && closure.to.robot == other) out.push_back(closure);
+  }
+  std::ranges::stable_sort(out, {}, [](const LoopClosure& c) { return c.from.index; });
+  return out;
+}
+
+/// One way by closure, then odometry of the second robot; the other by odometry of the first, then closure.
+OdometryLoop loop_of(const LoopClosure& first, const RelativePose& of_two, const RelativePose& of_one,
+                     const LoopClosure& second) {
+  const Matrix6d over_two = adjoint(of_two.T_a_b.inverse());
+  const Matrix6d over_second = adjoint(second.measurement.T_a_b.inverse());
+  return {.missed = local(first.measurement.T_a_b * of_two.T_a_b, of_one.T_a_b * second.measurement.T_a_b),
+          .odometry = of_two.covariance + over_second * of_one.covariance * over_second.transpose(),
+          .closures = over_two * first.measurement.covariance * over_two.transpose() + second.measurement.covariance};
+}
+
+}  // namespace
+
+std::map<RobotId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
+                                                            std::span<const LoopClosure> closures) {
+  const Ways ways(chains);
+  std::map<RobotId, std::vector<OdometryLoop>> loops;
+  for (const OdometryChain& chain : chains) loops[chain.robot];
+  for (const auto& [from, to, measurement] : closures)
+    if (const auto odometry = ways.between(from, to))
+      loops.at(from.robot)
+          .push_back({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance});
+  for (auto one = loops.begin(); one != loops.end(); ++one)
+    for (auto two = std::next(one); two != loops.end(); ++two) {
+      const std::vector<LoopClosure> between = closures_with(closures, one->first, two->first);
+      const std::size_t apart = between.size() / 2;
+      for (std::size_t c = apart; c < between.size(); ++c) {
+        const LoopClosure &first = between[c - apart], &second = between[c];
+        const auto of_one = ways.between(first.from, second.from);
+        const auto of_two = ways.between(first.to, second.to);
+        if (!of_one || !of_two) continue;
+        one->second.push_back(loop_of(first, *of_two, *of_one, second));
+        two->second.push_back(one->second.back());
+      }
+    }
+  return loops;
+}
+
+}  // namespace tutti::server
