@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "tutti/server/relocate_failures.hpp"
+#include "tutti/server/rotation_honesty.hpp"
 
 namespace tutti::server {
 namespace {
@@ -78,6 +79,20 @@ std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const Node
     return std::tie(a.from, a.to) < std::tie(b.from, b.to);
   });
   return closures;
+}
+
+/// Odometry's rotations count as much as the closures show that they are worth.
+void see_through(MapEstimate& map, std::vector<estimation::OdometryChain>& chains) {
+  for (estimation::OdometryChain& chain : chains) {
+    const Vector6d scale = rotation_scale(map.rotation_factors.at(chain.robot));
+    for (Matrix6d& covariance : chain.step_covariance)
+      covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
+  }
+  for (std::size_t e = 0; e < map.odometry_edges; ++e) {
+    PoseGraphEdge& edge = map.graph.edges[e];
+    const Vector6d scale = rotation_scale(1.0 / map.rotation_factors.at(map.nodes[edge.from].id.robot));
+    edge.information = scale.asDiagonal() * edge.information * scale.asDiagonal();
+  }
 }
 
 /// What failed odometry is let go by over its whole stretch: enough for any jump, and the map stays in one piece.
@@ -250,7 +265,11 @@ MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, c
   MapEstimate map;
   const NodeIndex index = attach_submaps(submaps, map);
   const std::vector<LoopClosure> closures = collect_closures(verdicts, index);
-  const std::vector<estimation::OdometryChain> chains = odometry_chains(submaps, map);
+  std::vector<estimation::OdometryChain> chains = odometry_chains(submaps, map);
+  if (config.judge_rotation) {
+    map.rotation_factors = rotation_variance_factors(chains, closures);
+    see_through(map, chains);
+  }
   const Optimum optimum = Judgement(map, index, closures, chains, config).decide();
   for (const LoopClosure& closure : closures) map.closures.push_back({closure, false});
   for (const std::size_t edge : optimum.fitting) {

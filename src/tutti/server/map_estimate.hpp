@@ -51,17 +51,22 @@ struct MapEstimate {
   std::size_t odometry_edges = 0;               ///< graph.edges[0 .. odometry_edges) are odometry.
   std::vector<JudgedClosure> closures;          ///< Sorted by (from, to).
   std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (robot, from).
-  std::uint32_t components = 0;                 ///< Connected components that contain a node.
+  /// By which the variances of each robot's odometry count, in rotation (rotation_honesty.hpp); `graph` has them so.
+  std::map<RobotId, double> rotation_factors;
+  std::uint32_t components = 0;  ///< Connected components that contain a node.
   bool converged = false;
 };
 
 struct MapConfig {
   estimation::OdometryTrialConfig trial;
   estimation::GncConfig gnc;
+  bool judge_rotation = true;
   template <class V>
   void describe(V& v) {
     v.field("trial", trial);
     v.field("gnc", gnc);
+    v.field("judge_rotation", judge_rotation, any(),
+            "Odometry that turns better than it says counts as much as the closures show (off: as it says).");
   }
 };
 

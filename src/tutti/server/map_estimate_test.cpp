@@ -86,6 +86,21 @@ TEST(MapEstimate, RejectsWrongClosures) {
   }
 }
 
+TEST(MapEstimate, SeesThroughRotationsThatAreBetterThanStated) {
+  double judged = 0.0, stated = 0.0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Inputs in = make_inputs(2, TestFinder(seed), seed);
+    for (auto& [id, submap] : in.submaps) {
+      Submap overstated = *submap;
+      for (RelativePose& odometry : overstated.odometry) odometry.covariance.bottomRightCorner<3, 3>() *= 100.0;
+      submap = std::make_shared<const Submap>(std::move(overstated));
+    }
+    judged += rmse(estimate_map(in.submaps, in.verdicts, {}));
+    stated += rmse(estimate_map(in.submaps, in.verdicts, {.judge_rotation = false}));
+  }
+  EXPECT_LT(judged, 0.9 * stated);
+}
+
 TEST(MapEstimate, ALoneClosureDoesNotJoinTwoRobots) {
   Inputs in = make_inputs(2, TestFinder(3), 3);
   const auto inter = std::find_if(in.verdicts.begin(), in.verdicts.end(), [](const auto& entry) {

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/rotation_honesty.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/base/random.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::server {
+namespace {
+
+constexpr RobotId kRobot{0};
+constexpr std::uint32_t kKeyframes = 400;
+constexpr double kStep_m = 0.03, kStep_rad = 0.004;  // what odometry is truly good for
+constexpr double kClosure_m = 0.05, kClosure_rad = 0.01;
+
+Matrix6d variances(double sigma_m, double sigma_rad) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
+  return sigma.array().square().matrix().asDiagonal();
+}
+
+Vector6d noise(double sigma_m, double sigma_rad, Rng& rng) {
+  Vector6d out;
+  for (int i = 0; i < 6; ++i) out(i) = rng.normal(i < 3 ? sigma_m : sigma_rad);
+  return out;
+}
+
+struct Case {
+  double stated = 1.0;  ///< Standard deviation of rotations as stated, over the true one.
+  std::size_t closures = 80;
+  double wrong_share = 0.0;
+  double scale = 1.0;  ///< Of odometry's translations.
+};
+
+double factor(const Case& c, std::uint64_t seed) {
+  Rng rng(seed);
+  estimation::OdometryChain chain{.robot = kRobot};
+  std::vector<Pose3> truth(1);
+  chain.T_odom_body.resize(1);
+  for (std::uint32_t k = 1; k < kKeyframes; ++k) {
+    const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 0.1)), Eigen::Vector3d(1, 0, 0)};
+    Pose3 measured = retract(step, noise(kStep_m, kStep_rad, rng));
+    measured.translation *= c.scale;
+    truth.push_back(truth.back() * step);
+    chain.T_odom_body.push_back(chain.T_odom_body.back() * measured);
+    chain.step_covariance.push_back(variances(kStep_m, kStep_rad * c.stated));
+  }
+  std::vector<LoopClosure> closures;
+  while (closures.size() < c.closures) {
+    const auto a = static_cast<std::uint32_t>(rng.index(kKeyframes));
+    const auto b = static_cast<std::uint32_t>(rng.index(kKeyframes));
+    if (std::max(a, b) - std::min(a, b) < 40) continue;
+    Pose3 T_a_b = retract(truth[a].inverse() * truth[b], noise(kClosure_m, kClosure_rad, rng));
+    if (rng.bernoulli(c.wrong_share)) T_a_b = T_a_b * Pose3{so3_exp(Eigen::Vector3d(0, 0, 1.0)), {3, 2, 1}};
+    closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, variances(kClosure_m, kClosure_rad)}});
+  }
+  const std::vector<estimation::OdometryChain> chains{chain};
+  return rotation_variance_factors(chains, closures).at(kRobot);
+}
+
+constexpr std::uint64_t kSeeds = 20;
+
+TEST(RotationHonesty, SeesHowMuchIsOverstated) {
+  for (const double stated : {2.0, 3.0, 4.0}) {
+    std::vector<double> ratios;  // of the factor to the true one
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed)
+      ratios.push_back(factor({.stated = stated}, seed) * stated * stated);
+    std::ranges::sort(ratios);
+    EXPECT_NEAR(ratios[kSeeds / 2], 2.0, 0.7) << stated;  // twice as careful as it would have to be,
+    EXPECT_GT(ratios.front(), 0.7) << stated;             // which is what one walk may be wrong by
+  }
+}
+
+TEST(RotationHonesty, HonestAndUnderstatedRotationsStayAsTheyAre) {
+  std::size_t untouched = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    EXPECT_GT(factor({}, seed), 0.7) << seed;
+    untouched += factor({}, seed) == 1.0 ? 1 : 0;
+    EXPECT_EQ(factor({.stated = 0.3}, seed), 1.0) << seed;
+  }
+  EXPECT_GE(untouched, kSeeds * 3 / 4);
+}
+
+TEST(RotationHonesty, WrongClosuresMakeItCarefulOnly) {
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    EXPECT_GE(factor({.stated = 4.0, .wrong_share = 0.15}, seed), 0.7 / 16.0) << seed;
+    EXPECT_LT(factor({.stated = 4.0, .wrong_share = 0.15}, seed), 1.0) << seed;
+    EXPECT_EQ(factor({.stated = 4.0, .wrong_share = 0.5}, seed), 1.0) << seed;
+  }
+}
+
+TEST(RotationHonesty, AScaleErrorIsNoneOfItsBusiness) {
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed)
+    EXPECT_NEAR(factor({.stated = 3.0, .scale = 1.05}, seed), factor({.stated = 3.0}, seed), 1e-9);
+}
+
+TEST(RotationHonesty, StaysWithinItsBounds) {
+  EXPECT_EQ(factor({.stated = 4.0, .closures = 7}, 1), 1.0);  // too few to tell
+  EXPECT_EQ(factor({.stated = 100.0}, 1), 0.08);
+  EXPECT_TRUE(rotation_variance_factors({}, {}).empty());
+}
+
+TEST(RotationHonesty, ScalesOnlyRotations) {
+  const Matrix6d scaled = rotation_scale(0.25).asDiagonal() * variances(2.0, 2.0) * rotation_scale(0.25).asDiagonal();
+  EXPECT_LT((scaled - variances(2.0, 1.0)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace tutti::server
