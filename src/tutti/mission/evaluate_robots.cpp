@@ -77,6 +77,8 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.keyframes = agent->second->keyframes().size();
     for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
     read_server_estimate(map, out);
+    if (const auto factor = map.rotation_factors.find(out.id); factor != map.rotation_factors.end())
+      out.rotation_factor = factor->second;
     if (recording.score_against_reference) out.reference = recording.recording.reference;
     out.start_s = recording.start_s;
     out.drift_origins = recording.recording.drift_origins;

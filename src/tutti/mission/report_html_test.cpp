@@ -105,6 +105,15 @@ TEST(ReportHtml, NamesTheJumpsTakenBack) {
   EXPECT_NE(html.find("Odometry jumped:</b> alpha, 0.100 m, 20.1 deg, 12.0 s - 14.0 s"), std::string::npos);
 }
 
+TEST(ReportHtml, NamesOdometryThatIsBetterThanStated) {
+  MissionRecord record = test::example_record();
+  EXPECT_EQ(report_html(record).find("better than stated"), std::string::npos);
+  record.robots[0].rotation_factor = 0.16;
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("Odometry better than stated:</b> alpha, whose turns are at least 2.5 times"), std::string::npos);
+}
+
 TEST(ReportHtml, SaysWhenNothingHadToBeAdded) {
   MissionRecord record = test::example_record({.robots = 1});
   auto& robot = record.robots[0];

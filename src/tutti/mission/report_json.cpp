@@ -158,6 +158,7 @@ Json robot_json(const RobotRecord& robot) {
            {"start_s", number(robot.start_s)},
            {"duration_s", number(robot.duration_s)},
            {"odometry_factors", robot.odometry_factors},
+           {"rotation_variance_factor", number(robot.rotation_factor)},
            {"keyframes", robot.keyframes},
            {"submaps", robot.submaps},
            {"component", robot.component}};

@@ -31,8 +31,8 @@ TEST(ReportJson, HasTheDocumentedKeys) {
                        "association", "rpe_interval", "duration_s", "description"});
   ASSERT_EQ(report["robots"].size(), 2U);
   for (const auto& robot : report["robots"]) {
-    expect_keys(robot, {"name", "distance_m", "odometry_factors", "onboard_rmse_m", "server_rmse_m", "policies",
-                        "bytes_up", "bytes_down", "traffic", "proxy_nodes"});
+    expect_keys(robot, {"name", "distance_m", "odometry_factors", "rotation_variance_factor", "onboard_rmse_m",
+                        "server_rmse_m", "policies", "bytes_up", "bytes_down", "traffic", "proxy_nodes"});
     ASSERT_EQ(robot["traffic"].size(), 2U);
     for (const auto& row : robot["traffic"])
       expect_keys(row,

@@ -150,6 +150,12 @@ std::string correction_lines(const RobotRecord& robot, const PolicyRecord& polic
 std::string explanation_lines(const MissionRecord& record) {
   std::string out;
   for (const RobotRecord& robot : record.robots) {
+    if (robot.rotation_factor < 1.0)
+      out +=
+          wrap(fmt::format("{}: closures show that odometry turns at least {} better than it says; the server counts "
+                           "it so.",
+                           robot.name, format_surer(robot.rotation_factor)),
+               "  odometry ");
     for (const AlertRecord& alert : robot.alerts)
       out += wrap(fmt::format("{}: localisation failure {}, {}: {}; noticed at {}.", robot.name,
                               alert.withdrawn_s ? "no longer suspected" : "suspected",

@@ -57,6 +57,10 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
   EXPECT_NE(text.find("kink     alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
             std::string::npos)
       << text;
+  ASSERT_EQ(text.find("better than it says"), std::string::npos);
+  record.robots[1].rotation_factor = 0.25;
+  EXPECT_NE(report_text(record, "x").find("bravo: closures show that odometry turns at least 2.0 times better"),
+            std::string::npos);
   ASSERT_EQ(text.find("jumped"), std::string::npos);
   test::jump_back(record.robots[0], record.default_policy);
   const std::string jumped = report_text(record, "x");
