@@ -278,10 +278,6 @@ void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Traj
   }
 }
 
-PictureClock mission_clock(const RobotRecord& robot) {
-  return {robot.odometry.empty() ? Timestamp{} : robot.odometry.front().stamp, robot.start_s};
-}
-
 double largest_significance(const Explanation& e) {
   double largest = e.significance.size() > 0 ? e.significance.maxCoeff() : 0.0;
   for (const double whole : e.scale_significance) largest = std::max(largest, whole);

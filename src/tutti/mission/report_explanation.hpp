@@ -21,16 +21,6 @@ namespace tutti::mission {
 formats::Rgb significance_colour(double significance);
 inline constexpr double kMostShown = 10.0;
 
-/// Clock of a picture: `at_start_s` is shown where `start` is.
-struct PictureClock {
-  Timestamp start;
-  double at_start_s = 0.0;
-  [[nodiscard]] double operator()(Timestamp stamp) const { return at_start_s + (stamp - start); }
-};
-
-/// Mission time.
-PictureClock mission_clock(const RobotRecord& robot);
-
 /// The disagreement map, `row_height` rows of pixels per scale (0 on top), the time axis over `width` columns: in each
 /// the largest significance of the nodes there; a node speaks for the time half-way to its neighbours. Transparent
 /// where no node is.

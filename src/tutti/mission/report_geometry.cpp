@@ -80,15 +80,15 @@ RobotGeometry robot_geometry(const MissionRecord& record, const RobotRecord& rob
   for (std::size_t k = 0; k < robot.odometry.size(); ++k) {
     const auto& [stamp, pose] = robot.odometry[k];
     if (k > 0) distance_m += (pose.translation - robot.odometry[k - 1].pose.translation).norm();
-    out.errors.push_back({distance_m, mission_time_s(robot, stamp), at(onboard.errors_m, stamp),
+    out.errors.push_back({distance_m, mission_clock(robot)(stamp), at(onboard.errors_m, stamp),
                           at(corrected.errors_m, stamp), out.has_reference ? at(server.errors_m, stamp) : kNaN,
                           at(born, stamp)});
   }
   return out;
 }
 
-double mission_time_s(const RobotRecord& robot, Timestamp stamp) {
-  return robot.odometry.empty() ? robot.start_s : robot.start_s + (stamp - robot.odometry.front().stamp);
+PictureClock mission_clock(const RobotRecord& robot) {
+  return {robot.odometry.empty() ? Timestamp{} : robot.odometry.front().stamp, robot.start_s};
 }
 
 std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timestamp from, Timestamp until) {

@@ -47,8 +47,15 @@ struct GroundPlane {
 };
 GroundPlane ground_plane(const std::vector<Points3d>& layers);
 
-/// Mission time of a stamp of the robot's own clock.
-double mission_time_s(const RobotRecord& robot, Timestamp stamp);
+/// Clock of a picture: `at_start_s` is shown where `start` is.
+struct PictureClock {
+  Timestamp start;
+  double at_start_s = 0.0;
+  [[nodiscard]] double operator()(Timestamp stamp) const { return at_start_s + (stamp - start); }
+};
+
+/// Mission time of stamps of the robot's own clock.
+PictureClock mission_clock(const RobotRecord& robot);
 
 /// Indices [first, last) of the poses from `from` until `until`, with one more on either side: at least a short line.
 std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timestamp from, Timestamp until);

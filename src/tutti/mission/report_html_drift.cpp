@@ -51,8 +51,8 @@ void draw_bands(Svg& svg, const MissionRecord& record, const RobotRecord& robot,
                 double bottom) {
   constexpr double kThinnest_px = 1.5;
   const auto band = [&](Timestamp from, Timestamp until, const std::string& css_class, const std::string& title) {
-    const double left = x(mission_time_s(robot, from));
-    svg.rect({left, top}, {std::max(kThinnest_px, x(mission_time_s(robot, until)) - left), bottom - top}, css_class,
+    const double left = x(mission_clock(robot)(from));
+    svg.rect({left, top}, {std::max(kThinnest_px, x(mission_clock(robot)(until)) - left), bottom - top}, css_class,
              title);
   };
   for (const DriftOrigin& origin : robot.drift_origins)
@@ -89,7 +89,7 @@ void draw_constraints(Svg& svg, const MissionRecord& record, const RobotRecord& 
   if (policy == nullptr) return;
   std::vector<double> ends_s;
   for (const ConstraintRecord& c : policy->constraints)
-    for (const Timestamp end : {c.from, c.to}) ends_s.push_back(mission_time_s(robot, end));
+    for (const Timestamp end : {c.from, c.to}) ends_s.push_back(mission_clock(robot)(end));
   std::sort(ends_s.begin(), ends_s.end());
   ends_s.erase(std::unique(ends_s.begin(), ends_s.end()), ends_s.end());
   Strokes strokes;

@@ -45,8 +45,8 @@ Json drift_json(const RobotRecord& robot) {
   Json out = Json::array();
   for (const DriftOrigin& drift : robot.drift_origins)
     out.push_back({{"kind", drift_name(drift.kind)},
-                   {"from_s", number(mission_time_s(robot, drift.from))},
-                   {"until_s", number(mission_time_s(robot, drift.until))},
+                   {"from_s", number(mission_clock(robot)(drift.from))},
+                   {"until_s", number(mission_clock(robot)(drift.until))},
                    {"translation_m", number(drift.translation_m)},
                    {"rotation_rad", number(drift.rotation_rad)}});
   return out;
@@ -67,8 +67,8 @@ Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
   add_accuracy(out, "", policy.accuracy);
   out["jumps"] = Json::array();
   for (const RepairedJump& jump : policy.jumps)
-    out["jumps"].push_back({{"from_s", number(mission_time_s(robot, jump.from))},
-                            {"until_s", number(mission_time_s(robot, jump.until))},
+    out["jumps"].push_back({{"from_s", number(mission_clock(robot)(jump.from))},
+                            {"until_s", number(mission_clock(robot)(jump.until))},
                             {"translation_m", number(jump.translation_m)},
                             {"rotation_rad", number(jump.rotation_rad)}});
   out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
@@ -81,8 +81,8 @@ Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
 Json origin_json(const RobotRecord& robot, const consistency::SuspectedOrigin& origin) {
   const auto& lengths_m = robot.explanation ? robot.explanation->scale_length_m : std::vector<double>{};
   const auto scale = static_cast<std::size_t>(std::max(origin.scale, 0));
-  return {{"from_s", number(mission_time_s(robot, origin.from))},
-          {"until_s", number(mission_time_s(robot, origin.until))},
+  return {{"from_s", number(mission_clock(robot)(origin.from))},
+          {"until_s", number(mission_clock(robot)(origin.until))},
           {"scale", origin.scale},
           {"scale_length_m", scale < lengths_m.size() ? number(lengths_m[scale]) : Json(nullptr)},
           {"length_m", number(origin.length_m)},
@@ -107,8 +107,8 @@ Json explanation_json(const RobotRecord& robot) {
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
   Json ways = Json::array();
   for (const auto& way : e.missed_ways)
-    ways.push_back({{"from_s", number(mission_time_s(robot, way.from))},
-                    {"until_s", number(mission_time_s(robot, way.until))},
+    ways.push_back({{"from_s", number(mission_clock(robot)(way.from))},
+                    {"until_s", number(mission_clock(robot)(way.until))},
                     {"length_m", number(way.length_m)},
                     {"translation_m", number(way.translation_m)},
                     {"rotation_rad", number(way.rotation_rad)},
@@ -198,8 +198,8 @@ Json server_json(const MissionRecord& record) {
     for (const RobotRecord& robot : record.robots)
       if (robot.id == stretch.robot)
         failed.push_back({{"robot", robot.name},
-                          {"from_s", number(mission_time_s(robot, stretch.from))},
-                          {"until_s", number(mission_time_s(robot, stretch.until))},
+                          {"from_s", number(mission_clock(robot)(stretch.from))},
+                          {"until_s", number(mission_clock(robot)(stretch.until))},
                           {"error_m", number(stretch.error_m)},
                           {"error_rad", number(stretch.error_rad)}});
   return {{"components", server.components},
