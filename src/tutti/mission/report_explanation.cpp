@@ -305,10 +305,6 @@ std::string format_jump(const RepairedJump& jump, const PictureClock& clock) {
                      format_between(clock, jump.from, jump.until));
 }
 
-std::string format_surer(double rotation_factor) {
-  return fmt::format("{:.1f} times", 1.0 / std::sqrt(rotation_factor));
-}
-
 std::string format_disagreement(const Explanation& e, const PictureClock& clock) {
   if (!e.disagrees()) return "odometry and map agree within what the server is sure of";
   std::string text =

@@ -60,8 +60,6 @@ std::string format_origin_size(const consistency::SuspectedOrigin& origin);
 std::string format_motion_error(double translation_m, double rotation_rad);
 /// The same and when: "0.10 m, 20.3 deg, 162.1 s - 163.0 s"
 std::string format_jump(const RepairedJump& jump, const PictureClock& clock);
-/// "2.1 times": by how much a robot's rotations are surer than stated, in standard deviations.
-std::string format_surer(double rotation_factor);
 /// "odometry and map part by up to 12 x the threshold", and the way that odometry misses by most, if any; or that they
 /// agree.
 std::string format_disagreement(const consistency::Explanation& explanation, const PictureClock& clock);

@@ -103,4 +103,14 @@ ClosureCounts count_closures(const ServerRecord& server) {
   return counts;
 }
 
+std::string format_surer_turns(std::span<const RobotRecord> robots) {
+  std::string names;
+  for (const RobotRecord& robot : robots)
+    if (robot.rotation_factor < 1.0)
+      names += fmt::format("{}{} {:.1f} times", names.empty() ? "" : ", ", robot.name,
+                           1.0 / std::sqrt(robot.rotation_factor));
+  if (names.empty()) return "";
+  return "Closures show that odometry turns better than it says (at least: " + names + "); the server counts it so.";
+}
+
 }  // namespace tutti::mission

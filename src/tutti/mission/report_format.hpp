@@ -51,5 +51,7 @@ struct ClosureCounts {
   [[nodiscard]] std::size_t rejected() const { return rejected_intra + rejected_inter; }
 };
 ClosureCounts count_closures(const ServerRecord& server);
+/// Whose odometry turns better than it says, in standard deviations, as a sentence; empty when nobody's does.
+std::string format_surer_turns(std::span<const RobotRecord> robots);
 
 }  // namespace tutti::mission

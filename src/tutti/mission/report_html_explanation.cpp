@@ -107,13 +107,6 @@ std::string alerts_html(const MissionRecord& record) {
                           alert.withdrawn_s ? ", withdrawn at " + format_moment(*alert.withdrawn_s) : std::string());
     }
   for (const RobotRecord& robot : record.robots)
-    if (robot.rotation_factor < 1.0)
-      list += fmt::format(
-          "<li class=\"repaired\"><b>Odometry better than stated:</b> {}, whose turns are at least {} as sure as it "
-          "says; "
-          "the server counts them so</li>\n",
-          escape_xml(robot.name), format_surer(robot.rotation_factor));
-  for (const RobotRecord& robot : record.robots)
     if (const PolicyRecord* policy = find_policy(robot, record.default_policy))
       for (const RepairedJump& jump : policy->jumps)
         list +=

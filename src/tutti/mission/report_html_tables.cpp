@@ -127,6 +127,8 @@ std::string closures_html(const MissionRecord& record) {
         " Against the reference, {} of {} accepted closures are wrong by more than 0.5 m or 2 degrees; the largest "
         "errors are {} and {:.2f} degrees.",
         check->wrong, check->checked, format_metres(check->max_error_m), check->max_error_deg);
+  if (const std::string surer = format_surer_turns(record.robots); !surer.empty())
+    lead += fmt::format(" {}", escape_xml(surer));
   return section("Loop closures", lead, html(table));
 }
 

@@ -107,11 +107,11 @@ TEST(ReportHtml, NamesTheJumpsTakenBack) {
 
 TEST(ReportHtml, NamesOdometryThatIsBetterThanStated) {
   MissionRecord record = test::example_record();
-  EXPECT_EQ(report_html(record).find("better than stated"), std::string::npos);
+  EXPECT_EQ(report_html(record).find("turns better"), std::string::npos);
   record.robots[0].rotation_factor = 0.16;
   const std::string html = report_html(record);
   expect_good_page(html);
-  EXPECT_NE(html.find("Odometry better than stated:</b> alpha, whose turns are at least 2.5 times"), std::string::npos);
+  EXPECT_NE(html.find("odometry turns better than it says (at least: alpha 2.5 times); the server"), std::string::npos);
 }
 
 TEST(ReportHtml, SaysWhenNothingHadToBeAdded) {

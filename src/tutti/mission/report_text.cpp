@@ -114,6 +114,7 @@ std::string server_lines(const MissionRecord& record) {
                         check->checked, check->wrong == 1 ? "1 is" : fmt::format("{} are", check->wrong),
                         format_metres(check->max_error_m), check->max_error_deg);
   std::string out = wrap(text + ".", "  server   ");
+  if (const std::string surer = format_surer_turns(record.robots); !surer.empty()) out += wrap(surer, "  odometry ");
   for (const auto& transform : record.transforms) {
     const Eigen::Vector3d& t = transform.T_from_to.translation;
     std::string line =
@@ -150,12 +151,6 @@ std::string correction_lines(const RobotRecord& robot, const PolicyRecord& polic
 std::string explanation_lines(const MissionRecord& record) {
   std::string out;
   for (const RobotRecord& robot : record.robots) {
-    if (robot.rotation_factor < 1.0)
-      out +=
-          wrap(fmt::format("{}: closures show that odometry turns at least {} better than it says; the server counts "
-                           "it so.",
-                           robot.name, format_surer(robot.rotation_factor)),
-               "  odometry ");
     for (const AlertRecord& alert : robot.alerts)
       out += wrap(fmt::format("{}: localisation failure {}, {}: {}; noticed at {}.", robot.name,
                               alert.withdrawn_s ? "no longer suspected" : "suspected",

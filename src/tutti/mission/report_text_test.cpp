@@ -59,7 +59,7 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
       << text;
   ASSERT_EQ(text.find("better than it says"), std::string::npos);
   record.robots[1].rotation_factor = 0.25;
-  EXPECT_NE(report_text(record, "x").find("bravo: closures show that odometry turns at least 2.0 times better"),
+  EXPECT_NE(report_text(record, "x").find("odometry turns better than it says (at least: bravo 2.0"),
             std::string::npos);
   ASSERT_EQ(text.find("jumped"), std::string::npos);
   test::jump_back(record.robots[0], record.default_policy);
