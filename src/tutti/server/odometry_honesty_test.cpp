@@ -7,6 +7,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {
@@ -18,12 +19,6 @@ Vector6d noise(Rng& rng, double sigma_m, double sigma_rad) {
   Vector6d out;
   for (int i = 0; i < 6; ++i) out(i) = rng.normal(i < 3 ? sigma_m : sigma_rad);
   return out;
-}
-
-Matrix6d diagonal(double sigma_m, double sigma_rad) {
-  Vector6d sigma;
-  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
-  return sigma.array().square().matrix().asDiagonal();
 }
 
 struct Rounds {
@@ -48,10 +43,11 @@ MapEstimate walked(const Rounds& rounds, std::uint64_t seed) {
         const Pose3 measured = retract(step, noise(rng, 0.02, 0.004));
         T_world_body = T_world_body * step;
         T_odom_body = T_odom_body * measured;
-        map.graph.edges.push_back({.from = map.nodes.size() - 1,
-                                   .to = map.nodes.size(),
-                                   .T_from_to = measured,
-                                   .information = diagonal(0.02 * rounds.stated, 0.004 * rounds.stated).inverse()});
+        map.graph.edges.push_back(
+            {.from = map.nodes.size() - 1,
+             .to = map.nodes.size(),
+             .T_from_to = measured,
+             .information = test::diagonal_covariance(0.02 * rounds.stated, 0.004 * rounds.stated).inverse()});
       }
       map.nodes.push_back({.id = {RobotId{r}, k}, .T_odom_body = T_odom_body, .T_world_body = T_world_body});
       truth.push_back(T_world_body);
@@ -66,7 +62,8 @@ MapEstimate walked(const Rounds& rounds, std::uint64_t seed) {
     LoopClosure closure;
     closure.from = {RobotId{0}, a};
     closure.to = {RobotId{other}, b};
-    closure.measurement = {retract(T_a_b, noise(rng, kClosure_m, kClosure_rad)), diagonal(kClosure_m, kClosure_rad)};
+    closure.measurement = {retract(T_a_b, noise(rng, kClosure_m, kClosure_rad)),
+                           test::diagonal_covariance(kClosure_m, kClosure_rad)};
     map.closures.push_back({closure, true});
   }
   return map;

@@ -7,6 +7,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {
@@ -14,16 +15,8 @@ namespace {
 constexpr std::uint32_t kKeyframes = 60;
 constexpr RobotId kOne{0}, kTwo{1};
 
-Matrix6d variances(double sigma_m, double sigma_rad) {
-  Vector6d sigma;
-  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
-  return sigma.array().square().matrix().asDiagonal();
-}
-
 RelativePose measured(const Pose3& truth, double sigma_m, double sigma_rad, Rng& rng) {
-  Vector6d noise;
-  for (int i = 0; i < 6; ++i) noise(i) = rng.normal(i < 3 ? sigma_m : sigma_rad);
-  return {retract(truth, noise), variances(sigma_m, sigma_rad)};
+  return {retract(truth, test::draw(rng, sigma_m, sigma_rad)), test::diagonal_covariance(sigma_m, sigma_rad)};
 }
 
 /// Two robots on one winding way, the second a metre beside the first.
