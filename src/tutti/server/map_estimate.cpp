@@ -49,24 +49,13 @@ NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
   return index;
 }
 
-/// The robots' odometry as the trial wants it: one chain per piece without a gap.
-std::vector<estimation::OdometryChain> odometry_chains(const SubmapSet& submaps, const MapEstimate& map) {
-  std::unordered_map<KeyframeId, const Matrix6d*> step_covariance;  // of the step that ends at this keyframe
+/// Per node the covariance, as stated, of the step that ends there.
+std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, const NodeIndex& index) {
+  std::vector<std::optional<Matrix6d>> out(index.size());
   for (const auto& [id, submap] : submaps)
     for (std::size_t k = 0; k < submap->odometry.size(); ++k)
-      step_covariance[{id.robot, submap->keyframes[k + 1].index}] = &submap->odometry[k].covariance;
-
-  std::vector<estimation::OdometryChain> chains;
-  for (const MapNode& node : map.nodes) {
-    const auto step = step_covariance.find(node.id);
-    if (step == step_covariance.end())
-      chains.push_back({.robot = node.id.robot, .first_index = node.id.index});
-    else
-      chains.back().step_covariance.push_back(*step->second);
-    chains.back().T_odom_body.push_back(node.T_odom_body);
-    chains.back().stamps.push_back(node.stamp);
-  }
-  return chains;
+      out[index.at({id.robot, submap->keyframes[k + 1].index})] = submap->odometry[k].covariance;
+  return out;
 }
 
 /// All closures of all verdicts whose keyframes are in the map, in a fixed order.
@@ -83,15 +72,12 @@ std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const Node
 
 /// Odometry's rotations count as much as the closures show that they are worth.
 void see_through(MapEstimate& map, std::vector<estimation::OdometryChain>& chains) {
-  for (estimation::OdometryChain& chain : chains) {
-    const Vector6d scale = rotation_scale(map.rotation_factors.at(chain.robot));
+  for (estimation::OdometryChain& chain : chains)
     for (Matrix6d& covariance : chain.step_covariance)
-      covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
-  }
+      covariance = scale_rotation(covariance, map.rotation_factors.at(chain.robot));
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     PoseGraphEdge& edge = map.graph.edges[e];
-    const Vector6d scale = rotation_scale(1.0 / map.rotation_factors.at(map.nodes[edge.from].id.robot));
-    edge.information = scale.asDiagonal() * edge.information * scale.asDiagonal();
+    edge.information = scale_rotation(edge.information, 1.0 / map.rotation_factors.at(map.nodes[edge.from].id.robot));
   }
 }
 
@@ -261,11 +247,25 @@ class Judgement {
 
 }  // namespace
 
+std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
+                                                       const std::vector<std::optional<Matrix6d>>& step_to) {
+  std::vector<estimation::OdometryChain> chains;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (step_to[i])
+      chains.back().step_covariance.push_back(*step_to[i]);
+    else
+      chains.push_back({.robot = nodes[i].id.robot, .first_index = nodes[i].id.index});
+    chains.back().T_odom_body.push_back(nodes[i].T_odom_body);
+    chains.back().stamps.push_back(nodes[i].stamp);
+  }
+  return chains;
+}
+
 MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config) {
   MapEstimate map;
   const NodeIndex index = attach_submaps(submaps, map);
   const std::vector<LoopClosure> closures = collect_closures(verdicts, index);
-  std::vector<estimation::OdometryChain> chains = odometry_chains(submaps, map);
+  std::vector<estimation::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
   if (config.judge_rotation) {
     map.rotation_factors = rotation_variance_factors(chains, closures);
     see_through(map, chains);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "tutti/base/config.hpp"
@@ -69,6 +70,11 @@ struct MapConfig {
             "Odometry that turns better than it says counts as much as the closures show (off: as it says).");
   }
 };
+
+/// Raw odometry of nodes sorted by id, one chain per piece without a gap. `step_to`: per node the covariance of the
+/// step that ends there, nothing where odometry begins.
+std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
+                                                       const std::vector<std::optional<Matrix6d>>& step_to);
 
 /// The map of a set of submaps and verdicts: attaches submaps by their shared keyframes, judges closures and odometry,
 /// optimises. Pure: the same sets give the same map, whatever the order they came in.

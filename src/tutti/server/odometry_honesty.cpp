@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "tutti/server/odometry_loops.hpp"
@@ -14,21 +15,12 @@ constexpr double kMedianChiSquare6 = 5.348;
 constexpr double kLeast = 0.04;
 constexpr std::size_t kEnough = 8;
 
-/// Raw odometry with the covariances that the map gives it.
-std::vector<estimation::OdometryChain> chains_of(const MapEstimate& map) {
-  std::vector<const PoseGraphEdge*> edge_to(map.nodes.size(), nullptr);  // the odometry that ends at a node
-  for (std::size_t e = 0; e < map.odometry_edges; ++e) edge_to[map.graph.edges[e].to] = &map.graph.edges[e];
-  std::vector<estimation::OdometryChain> chains;
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    const MapNode& node = map.nodes[i];
-    if (edge_to[i] == nullptr)
-      chains.push_back({.robot = node.id.robot, .first_index = node.id.index});
-    else
-      chains.back().step_covariance.emplace_back(edge_to[i]->information.ldlt().solve(Matrix6d::Identity()));
-    chains.back().T_odom_body.push_back(node.T_odom_body);
-    chains.back().stamps.push_back(node.stamp);
-  }
-  return chains;
+/// Per node the covariance that the map gives the step of odometry that ends there.
+std::vector<std::optional<Matrix6d>> steps_of(const MapEstimate& map) {
+  std::vector<std::optional<Matrix6d>> out(map.nodes.size());
+  for (std::size_t e = 0; e < map.odometry_edges; ++e)
+    out[map.graph.edges[e].to] = map.graph.edges[e].information.ldlt().solve(Matrix6d::Identity());
+  return out;
 }
 
 std::vector<LoopClosure> accepted_closures(const MapEstimate& map) {
@@ -46,8 +38,9 @@ bool tells_of_position(const OdometryLoop& loop) {
 }  // namespace
 
 std::map<RobotId, double> odometry_variance_factors(const MapEstimate& map) {
+  const auto chains = odometry_chains(map.nodes, steps_of(map));
   std::map<RobotId, double> factors;
-  for (const auto& [robot, loops] : odometry_loops(chains_of(map), accepted_closures(map))) {
+  for (const auto& [robot, loops] : odometry_loops(chains, accepted_closures(map))) {
     std::vector<double> squares;
     for (const OdometryLoop& loop : loops)
       if (tells_of_position(loop))

@@ -69,10 +69,10 @@ std::map<RobotId, double> rotation_variance_factors(std::span<const estimation::
   return out;
 }
 
-Vector6d rotation_scale(double factor) {
-  Vector6d out = Vector6d::Ones();
-  out.tail<3>().setConstant(std::sqrt(factor));
-  return out;
+Matrix6d scale_rotation(const Matrix6d& covariance, double factor) {
+  Vector6d scale = Vector6d::Ones();
+  scale.tail<3>().setConstant(std::sqrt(factor));
+  return scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
 }  // namespace tutti::server

@@ -20,8 +20,8 @@ namespace tutti::server {
 std::map<RobotId, double> rotation_variance_factors(std::span<const estimation::OdometryChain> chains,
                                                     std::span<const LoopClosure> closures);
 
-/// diag(1, 1, 1, s, s, s) with s = sqrt(factor): applied on both sides of a covariance (right tangent), scales its
-/// rotations.
-Vector6d rotation_scale(double factor);
+/// S C S, S = diag(1, 1, 1, s, s, s), s = sqrt(factor): a covariance (right tangent) with the variances of its
+/// rotations times `factor`. To its inverse, information, 1 / factor does the same.
+Matrix6d scale_rotation(const Matrix6d& covariance, double factor);
 
 }  // namespace tutti::server

@@ -8,6 +8,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {
@@ -16,18 +17,6 @@ constexpr RobotId kRobot{0};
 constexpr std::uint32_t kKeyframes = 400;
 constexpr double kStep_m = 0.03, kStep_rad = 0.004;  // what odometry is truly good for
 constexpr double kClosure_m = 0.05, kClosure_rad = 0.01;
-
-Matrix6d variances(double sigma_m, double sigma_rad) {
-  Vector6d sigma;
-  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
-  return sigma.array().square().matrix().asDiagonal();
-}
-
-Vector6d noise(double sigma_m, double sigma_rad, Rng& rng) {
-  Vector6d out;
-  for (int i = 0; i < 6; ++i) out(i) = rng.normal(i < 3 ? sigma_m : sigma_rad);
-  return out;
-}
 
 struct Case {
   double stated = 1.0;  ///< Standard deviation of rotations as stated, over the true one.
@@ -43,20 +32,20 @@ double factor(const Case& c, std::uint64_t seed) {
   chain.T_odom_body.resize(1);
   for (std::uint32_t k = 1; k < kKeyframes; ++k) {
     const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 0.1)), Eigen::Vector3d(1, 0, 0)};
-    Pose3 measured = retract(step, noise(kStep_m, kStep_rad, rng));
+    Pose3 measured = retract(step, test::draw(rng, kStep_m, kStep_rad));
     measured.translation *= c.scale;
     truth.push_back(truth.back() * step);
     chain.T_odom_body.push_back(chain.T_odom_body.back() * measured);
-    chain.step_covariance.push_back(variances(kStep_m, kStep_rad * c.stated));
+    chain.step_covariance.push_back(test::diagonal_covariance(kStep_m, kStep_rad * c.stated));
   }
   std::vector<LoopClosure> closures;
   while (closures.size() < c.closures) {
     const auto a = static_cast<std::uint32_t>(rng.index(kKeyframes));
     const auto b = static_cast<std::uint32_t>(rng.index(kKeyframes));
     if (std::max(a, b) - std::min(a, b) < 40) continue;
-    Pose3 T_a_b = retract(truth[a].inverse() * truth[b], noise(kClosure_m, kClosure_rad, rng));
+    Pose3 T_a_b = retract(truth[a].inverse() * truth[b], test::draw(rng, kClosure_m, kClosure_rad));
     if (rng.bernoulli(c.wrong_share)) T_a_b = T_a_b * Pose3{so3_exp(Eigen::Vector3d(0, 0, 1.0)), {3, 2, 1}};
-    closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, variances(kClosure_m, kClosure_rad)}});
+    closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, test::diagonal_covariance(kClosure_m, kClosure_rad)}});
   }
   const std::vector<estimation::OdometryChain> chains{chain};
   return rotation_variance_factors(chains, closures).at(kRobot);
@@ -105,8 +94,8 @@ TEST(RotationHonesty, StaysWithinItsBounds) {
 }
 
 TEST(RotationHonesty, ScalesOnlyRotations) {
-  const Matrix6d scaled = rotation_scale(0.25).asDiagonal() * variances(2.0, 2.0) * rotation_scale(0.25).asDiagonal();
-  EXPECT_LT((scaled - variances(2.0, 1.0)).norm(), 1e-12);
+  EXPECT_LT((scale_rotation(test::diagonal_covariance(2.0, 2.0), 0.25) - test::diagonal_covariance(2.0, 1.0)).norm(),
+            1e-12);
 }
 
 }  // namespace
