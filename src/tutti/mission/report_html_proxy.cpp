@@ -66,53 +66,72 @@ std::uint32_t shown_component(const std::vector<std::uint32_t>& component) {
   return best;
 }
 
-}  // namespace
+/// One component of the graph from above, in the frame of the display.
+struct Plan {
+  std::vector<std::uint32_t> component;  ///< Per proxy node.
+  std::uint32_t shown = 0;
+  Pose3 T_display_world;
+  GroundPlane ground;
+  PlanView view;
+  Points2d pixels;  ///< Of the proxy nodes.
 
-std::string proxy_graph_html(const MissionRecord& record) {
+  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector3d& p_world) const {
+    return view(ground(T_display_world * p_world));
+  }
+};
+
+Plan plan_of(const MissionRecord& record) {
   const ProxyGraph& graph = record.server.proxy;
-  if (graph.nodes.empty()) return "";
   std::vector<std::uint32_t> component;
   for (const auto& node : graph.nodes) component.push_back(component_of(graph, node.robot));
   const std::uint32_t shown = shown_component(component);
-
   const Pose3 T_display_world = record.server.T_reference_world.value_or(Pose3{});
-  Points3d positions;
-  for (const auto& node : graph.nodes) positions.push_back(T_display_world * node.T_world_body.translation);
-  Points3d box;
-  for (std::size_t i = 0; i < positions.size(); ++i)
-    if (component[i] == shown) box.push_back(positions[i]);
+  Points3d positions, box;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    positions.push_back(T_display_world * graph.nodes[i].T_world_body.translation);
+    if (component[i] == shown) box.push_back(positions.back());
+  }
   const GroundPlane ground = ground_plane({box});
   const PlanView view({ground(box)}, kWide_px, 0.56 * kWide_px);
-  const Points2d pixels = view(ground(positions));
-  Svg svg(view.width(), view.height(), "The proxy graph from above with loop closures and constraints");
+  return {std::move(component), shown, T_display_world, ground, view, view(ground(positions))};
+}
 
-  const Edges edges = proxy_edges(graph, component);
+void draw_edges(Svg& svg, const Plan& plan, const Edges& edges) {
   Strokes strokes;
   for (const auto& [a, b] : edges.shown)
-    if (component[a] == shown) strokes.emplace_back(pixels[a], pixels[b]);
+    if (plan.component[a] == plan.shown) strokes.emplace_back(plan.pixels[a], plan.pixels[b]);
   svg.segments(strokes, "edge", fmt::format("{} of {} edges", edges.shown.size(), edges.total));
+}
 
-  const auto keyframes = keyframe_positions(record.server);
-  Strokes closures;
-  for (const auto& closure : record.server.closures) {
+/// How many there are.
+std::size_t draw_closures(Svg& svg, const Plan& plan, const ServerRecord& server) {
+  const auto keyframes = keyframe_positions(server);
+  Strokes strokes;
+  for (const auto& closure : server.closures) {
     const auto from = keyframes.find(closure.from);
     const auto to = keyframes.find(closure.to);
-    if (from != keyframes.end() && to != keyframes.end() && component_of(graph, closure.from.robot) == shown)
-      closures.emplace_back(view(ground(T_display_world * from->second)), view(ground(T_display_world * to->second)));
+    if (from != keyframes.end() && to != keyframes.end() &&
+        component_of(server.proxy, closure.from.robot) == plan.shown)
+      strokes.emplace_back(plan(from->second), plan(to->second));
   }
-  svg.segments(thinned(closures), "closure", fmt::format("{} loop closures", closures.size()));
+  svg.segments(thinned(strokes), "closure", fmt::format("{} loop closures", strokes.size()));
+  return strokes.size();
+}
 
-  std::array<std::size_t, 4> kinds{};
+using PerKind = std::array<std::size_t, kKindName.size()>;
+
+/// How many there are of each kind.
+PerKind draw_constraints(Svg& svg, const Plan& plan, const MissionRecord& record) {
+  PerKind kinds{};
   for (const auto& robot : record.robots) {
     const PolicyRecord* policy = find_policy(robot, record.default_policy);
-    if (policy == nullptr || component_of(graph, robot.id) != shown) continue;
-    std::array<Strokes, 4> arcs;
+    if (policy == nullptr || component_of(record.server.proxy, robot.id) != plan.shown) continue;
+    std::array<Strokes, kKindName.size()> arcs;
     for (const auto& constraint : policy->constraints) {
       const Eigen::Vector3d* from = find_position(robot.server_estimate, constraint.from);
       const Eigen::Vector3d* to = find_position(robot.server_estimate, constraint.to);
       if (from == nullptr || to == nullptr) continue;
-      arcs[static_cast<std::size_t>(constraint.kind)].emplace_back(view(ground(T_display_world * *from)),
-                                                                   view(ground(T_display_world * *to)));
+      arcs[static_cast<std::size_t>(constraint.kind)].emplace_back(plan(*from), plan(*to));
     }
     for (std::size_t k = 0; k < arcs.size(); ++k) {
       kinds[k] += arcs[k].size();
@@ -120,19 +139,38 @@ std::string proxy_graph_html(const MissionRecord& record) {
                fmt::format("{}: {} constraints, {}", robot.name, arcs[k].size(), kKindName[k]));
     }
   }
+  return kinds;
+}
+
+void draw_nodes(Svg& svg, const Plan& plan, const MissionRecord& record) {
+  const auto& graph_nodes = record.server.proxy.nodes;
   for (const auto& robot : record.robots) {
     Points2d nodes;
-    for (std::size_t i = 0; i < pixels.size(); ++i)
-      if (graph.nodes[i].robot == robot.id && component[i] == shown) nodes.push_back(pixels[i]);
+    for (std::size_t i = 0; i < graph_nodes.size(); ++i)
+      if (graph_nodes[i].robot == robot.id && plan.component[i] == plan.shown) nodes.push_back(plan.pixels[i]);
     svg.dots(nodes, "node " + robot_class(record, robot.id));
   }
-  view.draw_scale_bar(svg);
+}
+
+}  // namespace
+
+std::string proxy_graph_html(const MissionRecord& record) {
+  const ProxyGraph& graph = record.server.proxy;
+  if (graph.nodes.empty()) return "";
+  const Plan plan = plan_of(record);
+  const Edges edges = proxy_edges(graph, plan.component);
+  Svg svg(plan.view.width(), plan.view.height(), "The proxy graph from above with loop closures and constraints");
+  draw_edges(svg, plan, edges);
+  const std::size_t closures = draw_closures(svg, plan, record.server);
+  const PerKind kinds = draw_constraints(svg, plan, record);
+  draw_nodes(svg, plan, record);
+  plan.view.draw_scale_bar(svg);
 
   std::vector<LegendEntry> legend;
   for (const auto& robot : record.robots)
     legend.push_back({"route " + robot_class(record, robot.id), "nodes of " + robot.name});
   legend.push_back({"edge", fmt::format("edges (the {} heaviest of {})", edges.shown.size(), edges.total)});
-  legend.push_back({"closure", fmt::format("{} loop closures", closures.size())});
+  legend.push_back({"closure", fmt::format("{} loop closures", closures)});
   for (std::size_t k = 0; k < kinds.size(); ++k)
     if (kinds[k] > 0)
       legend.push_back(

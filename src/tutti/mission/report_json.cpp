@@ -41,14 +41,22 @@ Json map_error_json(const std::optional<evaluation::CloudDistance>& distance) {
           {"within_1m", number(distance->within_1m)}};
 }
 
+/// Something that lasts from `from` to `until`: both in mission time, and then its own keys.
+template <typename Stretch>
+Json stretch_json(const RobotRecord& robot, const Stretch& stretch, const Json& its_own) {
+  const PictureClock clock = mission_clock(robot);
+  Json out = {{"from_s", number(clock(stretch.from))}, {"until_s", number(clock(stretch.until))}};
+  out.update(its_own);
+  return out;
+}
+
 Json drift_json(const RobotRecord& robot) {
   Json out = Json::array();
   for (const DriftOrigin& drift : robot.drift_origins)
-    out.push_back({{"kind", drift_name(drift.kind)},
-                   {"from_s", number(mission_clock(robot)(drift.from))},
-                   {"until_s", number(mission_clock(robot)(drift.until))},
-                   {"translation_m", number(drift.translation_m)},
-                   {"rotation_rad", number(drift.rotation_rad)}});
+    out.push_back(stretch_json(robot, drift,
+                               {{"kind", drift_name(drift.kind)},
+                                {"translation_m", number(drift.translation_m)},
+                                {"rotation_rad", number(drift.rotation_rad)}}));
   return out;
 }
 
@@ -67,10 +75,8 @@ Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
   add_accuracy(out, "", policy.accuracy);
   out["jumps"] = Json::array();
   for (const RepairedJump& jump : policy.jumps)
-    out["jumps"].push_back({{"from_s", number(mission_clock(robot)(jump.from))},
-                            {"until_s", number(mission_clock(robot)(jump.until))},
-                            {"translation_m", number(jump.translation_m)},
-                            {"rotation_rad", number(jump.rotation_rad)}});
+    out["jumps"].push_back(stretch_json(
+        robot, jump, {{"translation_m", number(jump.translation_m)}, {"rotation_rad", number(jump.rotation_rad)}}));
   out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
   out["kink_deg"] = policy.kink ? number(policy.kink->rotation_deg) : Json(nullptr);
   out["agreement_rmse_m"] = number(policy.agreement_rmse_m);
@@ -81,15 +87,14 @@ Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
 Json origin_json(const RobotRecord& robot, const consistency::SuspectedOrigin& origin) {
   const auto& lengths_m = robot.explanation ? robot.explanation->scale_length_m : std::vector<double>{};
   const auto scale = static_cast<std::size_t>(std::max(origin.scale, 0));
-  return {{"from_s", number(mission_clock(robot)(origin.from))},
-          {"until_s", number(mission_clock(robot)(origin.until))},
-          {"scale", origin.scale},
-          {"scale_length_m", scale < lengths_m.size() ? number(lengths_m[scale]) : Json(nullptr)},
-          {"length_m", number(origin.length_m)},
-          {"translation_m", number(origin.translation_m)},
-          {"rotation_rad", number(origin.rotation_rad)},
-          {"significance", number(origin.significance)},
-          {"alert", origin.alert}};
+  return stretch_json(robot, origin,
+                      {{"scale", origin.scale},
+                       {"scale_length_m", scale < lengths_m.size() ? number(lengths_m[scale]) : Json(nullptr)},
+                       {"length_m", number(origin.length_m)},
+                       {"translation_m", number(origin.translation_m)},
+                       {"rotation_rad", number(origin.rotation_rad)},
+                       {"significance", number(origin.significance)},
+                       {"alert", origin.alert}});
 }
 
 /// The last update's; null when there was none.
@@ -107,12 +112,11 @@ Json explanation_json(const RobotRecord& robot) {
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
   Json ways = Json::array();
   for (const auto& way : e.missed_ways)
-    ways.push_back({{"from_s", number(mission_clock(robot)(way.from))},
-                    {"until_s", number(mission_clock(robot)(way.until))},
-                    {"length_m", number(way.length_m)},
-                    {"translation_m", number(way.translation_m)},
-                    {"rotation_rad", number(way.rotation_rad)},
-                    {"significance", number(way.significance)}});
+    ways.push_back(stretch_json(robot, way,
+                                {{"length_m", number(way.length_m)},
+                                 {"translation_m", number(way.translation_m)},
+                                 {"rotation_rad", number(way.rotation_rad)},
+                                 {"significance", number(way.significance)}}));
   return {{"disagrees", e.disagrees()},
           {"nodes", e.stamps.size()},
           {"aligned_rmse_m", number(e.aligned_rmse_m)},
@@ -197,11 +201,9 @@ Json server_json(const MissionRecord& record) {
   for (const FailedOdometryRecord& stretch : server.failed_odometry)
     for (const RobotRecord& robot : record.robots)
       if (robot.id == stretch.robot)
-        failed.push_back({{"robot", robot.name},
-                          {"from_s", number(mission_clock(robot)(stretch.from))},
-                          {"until_s", number(mission_clock(robot)(stretch.until))},
-                          {"error_m", number(stretch.error_m)},
-                          {"error_rad", number(stretch.error_rad)}});
+        failed.push_back(stretch_json(
+            robot, stretch,
+            {{"robot", robot.name}, {"error_m", number(stretch.error_m)}, {"error_rad", number(stretch.error_rad)}}));
   return {{"components", server.components},
           {"closures_accepted", counts.accepted()},
           {"closures_accepted_intra", counts.accepted_intra},
