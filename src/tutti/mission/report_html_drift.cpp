@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tutti/geometry/so3.hpp"
 #include "tutti/mission/report_explanation.hpp"
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_html_parts.hpp"
@@ -42,8 +41,8 @@ struct Common {
 };
 
 std::string words(const DriftOrigin& origin) {
-  return fmt::format("{} for {:.1f} s: {}, {:.2f} degrees", drift_name(origin.kind), origin.until - origin.from,
-                     format_metres(origin.translation_m), origin.rotation_rad / kRadPerDeg);
+  return fmt::format("{} for {:.1f} s: {}", drift_name(origin.kind), origin.until - origin.from,
+                     format_motion_error(origin.translation_m, origin.rotation_rad));
 }
 
 /// Bands from the top to the bottom of the plot.

@@ -19,7 +19,7 @@ std::string truth_cell(const consistency::SuspectedOrigin& origin, const RobotRe
   if (!truth) return robot.drift_origins.empty() ? "" : "none";
   return fmt::format("{}, {}: {}", drift_name(truth->kind),
                      format_between(mission_clock(robot), truth->from, truth->until),
-                     format_metres(truth->translation_m));
+                     format_motion_error(truth->translation_m, truth->rotation_rad));
 }
 
 /// Every suspected origin of the last update, with the true one under it where the truth is known.

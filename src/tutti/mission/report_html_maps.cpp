@@ -46,7 +46,8 @@ void draw_drift(Svg& svg, const RobotRecord& robot, const Trajectory& route, con
   for (const DriftOrigin& origin : robot.drift_origins) {
     const auto [first, last] = stretch(route, origin.from, origin.until);
     svg.polyline(std::span(pixels).subspan(first, last - first), fmt::format("drift {}", drift_name(origin.kind)),
-                 fmt::format("{}: {}, {}", robot.name, drift_name(origin.kind), format_metres(origin.translation_m)));
+                 fmt::format("{}: {}, {}", robot.name, drift_name(origin.kind),
+                             format_motion_error(origin.translation_m, origin.rotation_rad)));
   }
 }
 

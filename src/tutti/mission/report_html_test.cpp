@@ -77,7 +77,7 @@ TEST(ReportHtml, ExplainsWhereOdometryAndMapPart) {
           "Localisation failure suspected:</b> alpha, 662.0 s - 672.0 s: 1.87 m, 17.8 deg over 7.00 m (scale 8.0 m), "
           "noticed by the robot at 720.0 s"),
       std::string::npos);
-  EXPECT_NE(html.find("<td>failure, 660.0 s - 672.0 s: 1.900 m</td>"), std::string::npos) << "the true one";
+  EXPECT_NE(html.find("<td>failure, 660.0 s - 672.0 s: 1.900 m, 17.2 deg</td>"), std::string::npos) << "the true one";
   for (const char* shape : {"<rect class=\"origin alert\"", "<rect class=\"origin\"", "<rect class=\"truth failure\"",
                             "<rect class=\"originbox\""})
     EXPECT_NE(html.find(shape), std::string::npos) << shape;
