@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
 #include <utility>
 
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/internal/shape.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
 namespace {
-
-constexpr double kPsdTolerance = 1e-9;  // of the trace
 
 Status at_most(std::size_t count, std::size_t limit, const char* what) {
   if (count <= limit) return {};
@@ -29,25 +27,12 @@ Status check_pose(const Pose3& T) {
   return {};
 }
 
-Status check_covariance(const Matrix6d& covariance) {
-  if (!covariance.allFinite()) return fail(ErrorCode::invalid, "covariance is not finite");
+/// A covariance that the codec can carry, too.
+Status check_coded_covariance(const Matrix6d& covariance) {
+  if (auto ok = check_covariance(covariance); !ok) return ok;
   const double largest = covariance.cwiseAbs().maxCoeff();
   if (largest > kMaxVariance)
     return fail(ErrorCode::invalid, "covariance entry of {}, at most {}", largest, kMaxVariance);
-  if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > kPsdTolerance * largest)
-    return fail(ErrorCode::invalid, "covariance is not symmetric");
-  // Scaled to a unit diagonal, so that metres and radians are judged alike.
-  if (covariance.diagonal().minCoeff() < 0.0) return fail(ErrorCode::invalid, "negative variance");
-  Vector6d scale;
-  for (int i = 0; i < 6; ++i) scale(i) = covariance(i, i) > 0.0 ? 1.0 / std::sqrt(covariance(i, i)) : 0.0;
-  Matrix6d correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
-  for (int i = 0; i < 6; ++i) {
-    if (covariance(i, i) == 0.0 && covariance.row(i).cwiseAbs().maxCoeff() > 0.0)
-      return fail(ErrorCode::invalid, "covariance row {} has no variance but correlations", i);
-    correlation(i, i) = 1.0 + 6.0 * kPsdTolerance;
-  }
-  if (correlation.llt().info() != Eigen::Success)
-    return fail(ErrorCode::invalid, "covariance is not positive semidefinite");
   return {};
 }
 
@@ -71,7 +56,8 @@ Status check_submap(const Submap& submap) {
                   previous.stamp.ns);
     const RelativePose& odometry = submap.odometry[k - 1];
     if (auto ok = check_pose(odometry.T_a_b); !ok) return in_context("odometry to " + where(), ok.error());
-    if (auto ok = check_covariance(odometry.covariance); !ok) return in_context("odometry to " + where(), ok.error());
+    if (auto ok = check_coded_covariance(odometry.covariance); !ok)
+      return in_context("odometry to " + where(), ok.error());
   }
   return submap.cloud == nullptr ? Status() : validate(*submap.cloud);
 }
@@ -110,7 +96,7 @@ Status check_nodes(const ProxyGraph& graph) {
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const auto where = [&] { return "node " + std::to_string(i); };
     if (auto ok = check_pose(graph.nodes[i].T_world_body); !ok) return in_context(where(), ok.error());
-    if (auto ok = check_covariance(graph.nodes[i].covariance); !ok) return in_context(where(), ok.error());
+    if (auto ok = check_coded_covariance(graph.nodes[i].covariance); !ok) return in_context(where(), ok.error());
   }
   return check_order(graph.nodes, "node");
 }
@@ -219,7 +205,7 @@ Status validate(const ClosureVerdict& verdict) {
       return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where, closure.from.robot.value,
                   closure.to.robot.value);
     if (auto ok = check_pose(closure.measurement.T_a_b); !ok) return in_context(where, ok.error());
-    if (auto ok = check_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
+    if (auto ok = check_coded_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
   }
   return {};
 }
