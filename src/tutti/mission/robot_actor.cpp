@@ -100,6 +100,8 @@ void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::o
     if (summary.synchronised > 0) member.timing.update_ms.push_back(whole.lap_ms());
   }
   if (!is_default || summary.synchronised == 0) return;
+  if (!estimation::is_usable(summary.optimised))
+    note(failed_updates_, fmt::format("the optimisation on board ended {}", to_string(summary.optimised)));
   UpdateRecord record{.time_s = time_s,
                       .revision = summary.revision,
                       .synchronised_nodes = summary.synchronised,
@@ -125,19 +127,20 @@ std::vector<PolicyTiming> RobotActor::timing() const {
   return out;
 }
 
-void RobotActor::note(Refusal& refusal, const std::string& message) {
-  if (refusal.count++ == 0) refusal.first = message;
+void RobotActor::note(Trouble& trouble, const std::string& message) {
+  if (trouble.count++ == 0) trouble.first = message;
 }
 
-std::vector<std::string> RobotActor::refusals() const {
+std::vector<std::string> RobotActor::troubles() const {
   std::vector<std::string> out;
-  const auto add = [&](const Refusal& refusal, const char* what) {
-    if (refusal.count > 0)
-      out.push_back(fmt::format("{}: {} {} refused, the first because: {}", recording_.recording.name, refusal.count,
-                                what, refusal.first));
+  const auto add = [&](const Trouble& trouble, const char* what) {
+    if (trouble.count > 0)
+      out.push_back(fmt::format("{}: {} {}, the first because: {}", recording_.recording.name, trouble.count, what,
+                                trouble.first));
   };
-  add(refused_odometry_, "odometry samples");
-  add(refused_scans_, "scans");
+  add(refused_odometry_, "odometry samples refused");
+  add(refused_scans_, "scans refused");
+  add(failed_updates_, "updates without a correction");
   return out;
 }
 

@@ -42,8 +42,9 @@ class RobotActor {
   [[nodiscard]] const std::optional<consistency::Explanation>& explanation() const { return explanation_; }
   [[nodiscard]] std::vector<PolicyTiming> timing() const;
   [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< Of the default agent.
-  /// What was refused (bad samples or scans), one line per kind with a count and the first case.
-  [[nodiscard]] std::vector<std::string> refusals() const;
+  /// What went wrong (bad samples or scans refused, updates without a correction): one line per kind with a count and
+  /// the first case.
+  [[nodiscard]] std::vector<std::string> troubles() const;
 
  private:
   struct Member {
@@ -51,7 +52,7 @@ class RobotActor {
     robot::RobotAgent agent;
     PolicyTiming timing;
   };
-  struct Refusal {
+  struct Trouble {
     std::size_t count = 0;
     std::string first;
   };
@@ -59,7 +60,7 @@ class RobotActor {
   robot::RobotAgent& default_agent() { return members_[default_].agent; }
   void update(Member& member, const ProxyGraphMessage& message, std::optional<std::size_t> budget, double time_s);
   void feed_scan(std::size_t sample);
-  static void note(Refusal& refusal, const std::string& message);
+  static void note(Trouble& trouble, const std::string& message);
 
   const MissionRecording& recording_;
   std::vector<Member> members_;  // `spectral` first, if it is there: it sets the budget
@@ -68,8 +69,9 @@ class RobotActor {
   std::vector<UpdateRecord> updates_;
   std::optional<consistency::Explanation> explanation_;
   double cpu_s_ = 0.0;
-  Refusal refused_odometry_;
-  Refusal refused_scans_;
+  Trouble refused_odometry_;
+  Trouble refused_scans_;
+  Trouble failed_updates_;
 };
 
 }  // namespace tutti::mission

@@ -308,7 +308,7 @@ MissionRecord MissionRun::record() const {
   std::vector<RobotOutcome> outcomes;
   for (const auto& robot : robots_) {
     outcomes.push_back(robot->outcome());
-    for (std::string& refusal : robot->refusals()) record.notes.push_back(std::move(refusal));
+    for (std::string& trouble : robot->troubles()) record.notes.push_back(std::move(trouble));
   }
   if (!refusals_.empty())
     record.notes.push_back(

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/covariance.hpp"
 
 namespace tutti::robot {
 namespace {
@@ -14,6 +15,9 @@ std::unique_ptr<consistency::ConstraintPolicy> known_policy(const consistency::P
   TUTTI_CHECK(policy.has_value(), "{}", policy.error().message);
   return std::move(*policy);
 }
+
+/// Quaternions printed with few digits are off by this much at most.
+constexpr double kRoundedQuaternion = 1e-3;
 
 }  // namespace
 
@@ -33,12 +37,17 @@ RobotAgent::~RobotAgent() = default;
 RobotAgent::RobotAgent(RobotAgent&&) noexcept = default;
 RobotAgent& RobotAgent::operator=(RobotAgent&&) noexcept = default;
 
-Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance) {
+Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given, const Matrix6d& increment_covariance) {
+  Pose3 T_odom_body = T_odom_body_given;
+  if (is_valid(T_odom_body, kRoundedQuaternion)) T_odom_body.rotation.normalize();
+  if (auto ok = check_covariance(increment_covariance); !ok)
+    return in_context(fmt::format("robot {}: odometry at {} ns", robot_.value, stamp.ns), ok.error());
+  const Matrix6d covariance = invertible_covariance(bounded_covariance(increment_covariance));
   const std::uint32_t submap = submaps_.current_submap();
-  const auto keyframe = submaps_.add_odometry(stamp, T_odom_body, increment_covariance);
+  const auto keyframe = submaps_.add_odometry(stamp, T_odom_body, covariance);
   if (!keyframe) return tl::unexpected(keyframe.error());
   if (state_.last_odometry) {
-    const RelativePose step{state_.last_odometry->inverse() * T_odom_body, increment_covariance};
+    const RelativePose step{state_.last_odometry->inverse() * T_odom_body, covariance};
     smoother_.append(step);
     state_.since_node = compound(state_.since_node, step);
   } else {
@@ -109,7 +118,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   summary.ledger.withdrawn += withdrawn;
   ended(UpdateStage::choose);
 
-  optimise();
+  summary.optimised = optimise();
   locate_others(message.graph, own, comparison.pairs);
   ended(UpdateStage::optimise);
 
@@ -127,7 +136,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   return summary;
 }
 
-void RobotAgent::optimise() {
+estimation::Termination RobotAgent::optimise() {
   std::vector<estimation::ChainConstraint> constraints;
   for (const consistency::Constraint& c : state_.ledger.constraints())
     constraints.push_back({.from = c.from,
@@ -135,7 +144,7 @@ void RobotAgent::optimise() {
                            .measurement = c.measurement,
                            .doubtful = consistency::is_doubtful(c, config_.policy.constraint)});
   smoother_.set_constraints(std::move(constraints));
-  smoother_.solve();
+  return smoother_.solve().termination;
 }
 
 // Frames differ by an unknown transform; the newest common node ties them together where this robot is now.

@@ -56,8 +56,10 @@ struct UpdateSummary {
   std::size_t constraints = 0;        ///< In the ledger afterwards.
   Eigen::VectorXd mean_disagreement;  ///< Per scale, before the correction, in the signal's unit.
   Eigen::VectorXd max_disagreement;
-  int order = 0;                         ///< Of the Chebyshev transform; 0 = exact.
-  consistency::LedgerUpdate ledger;      ///< What became of the constraints.
+  int order = 0;                     ///< Of the Chebyshev transform; 0 = exact.
+  consistency::LedgerUpdate ledger;  ///< What became of the constraints.
+  /// How the optimisation with them ended; where it is not usable, the poses stayed as they were.
+  estimation::Termination optimised = estimation::Termination::not_run;
   consistency::Explanation explanation;  ///< Of raw odometry against the server's map.
 };
 
@@ -96,7 +98,9 @@ class RobotAgent {
   RobotAgent(RobotAgent&&) noexcept;
   RobotAgent& operator=(RobotAgent&&) noexcept;
 
-  /// Raw odometry, see SubmapBuilder::add_odometry; a bad sample is refused and nothing changes.
+  /// Raw odometry, see SubmapBuilder::add_odometry; a bad sample is refused and nothing changes. Quaternions are
+  /// normalised where they are off by rounding only (1e-3). Covariances may lack a coordinate (odometry in the plane)
+  /// or call one unknown; what is used is invertible_covariance(bounded_covariance(.)) (geometry/covariance.hpp).
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
   Status add_scan(const Scan& scan);
   /// The latest odometry sample is a keyframe; a scan elsewhere is hardly worth taking.
@@ -126,7 +130,7 @@ class RobotAgent {
  private:
   void send(Submap submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
-  void optimise();
+  estimation::Termination optimise();
   void locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                      std::span<const consistency::NodePair> pairs);
 

@@ -81,6 +81,28 @@ TEST_P(AgentPolicies, CorrectsTheRobotFromAnUnrelatedFrame) {
   EXPECT_LT(local(agent.keyframes().front().T_odom_body, agent.corrected().front().pose).norm(), 1e-9);
 }
 
+/// Odometry in the plane says nothing of height, roll and pitch; an unknown one says that it knows nothing.
+TEST_P(AgentPolicies, CorrectsOdometryInThePlaneAndOfUnknownHeight) {
+  for (const double others : {0.0, 1e6, 1e20}) {
+    AgentConfig config;
+    config.policy.name = GetParam();
+    RobotAgent agent(RobotId{1}, 1, config, Rng(1));
+    Matrix6d covariance = kStepCovariance;
+    for (const int axis : {2, 3, 4}) covariance(axis, axis) = others;
+    Trajectory truth;
+    for (const auto& [stamp, pose] : drifting_odometry(240)) {
+      ASSERT_TRUE(agent.add_odometry(stamp, pose, covariance));
+      truth.push_back({stamp, true_pose(static_cast<int>(truth.size()))});
+    }
+    const double before = evaluation::agreement(agent.corrected(), truth)->rmse_m;
+    UpdateSummary summary;
+    for (std::uint64_t revision = 1; revision <= 10; ++revision)
+      summary = agent.receive(broadcast(agent, revision, kWorld), 40);
+    EXPECT_TRUE(estimation::is_usable(summary.optimised)) << to_string(summary.optimised);
+    EXPECT_LT(evaluation::agreement(agent.corrected(), truth)->rmse_m, 0.15 * before) << others;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, AgentPolicies,
                          testing::Values("spectral", "every_node", "every_node_2", "uniform", "random", "skeleton",
                                          "adaptive"));
@@ -227,6 +249,24 @@ TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {
   }
   EXPECT_EQ(alone.corrected().size(), alone.keyframes().size());
   EXPECT_EQ(alone.odometry_factors(), 239U);
+}
+
+TEST(Agent, WhatItTakesTheServerTakes) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  for (auto [stamp, pose] : drifting_odometry(60)) {
+    pose.rotation.coeffs() *= 1.0 + 1e-5;  // five digits were printed
+    ASSERT_TRUE(agent.add_odometry(stamp, pose, kStepCovariance));
+  }
+  agent.finish();
+  const auto messages = agent.take_outgoing();
+  ASSERT_FALSE(messages.empty());
+  for (const SubmapMessage& message : messages)
+    for (const Keyframe& keyframe : message.submap.keyframes) EXPECT_TRUE(is_valid(keyframe.T_odom_body));
+  Matrix6d indefinite = kStepCovariance;
+  indefinite(0, 5) = indefinite(5, 0) = 1.0;
+  const Status refused = agent.add_odometry(at(60), drifting_odometry(61).back().pose, indefinite);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("semidefinite"), std::string::npos) << refused.error().message;
 }
 
 TEST(Agent, AnEmptyAgentTakesABroadcast) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
 
@@ -11,12 +12,11 @@ namespace tutti::robot {
 namespace {
 
 Status check_sample(RobotId robot, Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& covariance) {
-  if (!is_valid(T_odom_body, 1e-3))
+  if (!is_valid(T_odom_body))
     return fail(ErrorCode::invalid, "robot {}: odometry at {} ns is not a pose (|q| = {}, expected finite and 1)",
                 robot.value, stamp.ns, T_odom_body.rotation.norm());
-  if (!covariance.allFinite() || covariance.diagonal().minCoeff() < 0.0)
-    return fail(ErrorCode::invalid, "robot {}: odometry covariance at {} ns is not finite and non-negative",
-                robot.value, stamp.ns);
+  if (auto ok = check_covariance(covariance); !ok)
+    return in_context(fmt::format("robot {}: odometry at {} ns", robot.value, stamp.ns), ok.error());
   return {};
 }
 

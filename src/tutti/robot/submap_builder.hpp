@@ -56,7 +56,8 @@ class SubmapBuilder {
   SubmapBuilder(RobotId robot, const SubmapConfig& config, SubmapBuilderState state = {});
 
   /// Raw pose with the covariance of the increment since the previous one (ignored for the first). Stamps must
-  /// increase; poses must be finite with unit quaternions: otherwise an error, and nothing changes. Returns the
+  /// increase; poses must be finite with unit quaternions, covariances what check_covariance() says (geometry/
+  /// covariance.hpp): otherwise an error, and nothing changes. Returns the
   /// keyframe this sample became, if it did.
   Result<std::optional<Keyframe>> add_odometry(Timestamp stamp, const Pose3& T_odom_body,
                                                const Matrix6d& increment_covariance);
