@@ -7,6 +7,7 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/server/relocate_failures.hpp"
 #include "tutti/server/rotation_honesty.hpp"
 
@@ -27,6 +28,25 @@ Matrix6d information_of(const Matrix6d& covariance) {
   return 0.5 * (inverse + inverse.transpose());
 }
 
+/// The submap begins at its robot's last keyframe so far, or after it.
+bool continues(const Keyframe& last, const Keyframe& first) {
+  return first.index == last.index ? first.stamp == last.stamp : first.index > last.index && first.stamp > last.stamp;
+}
+
+/// The submaps without those that contradict earlier ones of their robot. A function of the set: the smallest index is
+/// believed first, in whatever order they came.
+SubmapSet without_contradictions(const SubmapSet& submaps, std::vector<SubmapId>& left_out) {
+  SubmapSet out;
+  for (const auto& [id, submap] : submaps) {
+    const bool is_first = out.empty() || out.rbegin()->first.robot != id.robot;
+    if (is_first || continues(out.rbegin()->second->keyframes.back(), submap->keyframes.front()))
+      out.emplace_hint(out.end(), id, submap);
+    else
+      left_out.push_back(id);
+  }
+  return out;
+}
+
 /// Nodes and odometry edges of all submaps. Neighbouring submaps share a keyframe, so they attach by its id; a missing
 /// submap leaves a gap, and what follows it hangs on by closures alone until the submap comes.
 NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
@@ -44,26 +64,32 @@ NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
       map.graph.edges.push_back({.from = index.at({id.robot, submap->keyframes[k].index}),
                                  .to = index.at({id.robot, submap->keyframes[k + 1].index}),
                                  .T_from_to = submap->odometry[k].T_a_b,
-                                 .information = information_of(submap->odometry[k].covariance)});
+                                 .information = information_of(bounded_covariance(submap->odometry[k].covariance))});
   map.odometry_edges = map.graph.edges.size();
   return index;
 }
 
-/// Per node the covariance, as stated, of the step that ends there.
+/// Per node the covariance, as stated but for its bounds, of the step that ends there.
 std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, const NodeIndex& index) {
   std::vector<std::optional<Matrix6d>> out(index.size());
   for (const auto& [id, submap] : submaps)
     for (std::size_t k = 0; k < submap->odometry.size(); ++k)
-      out[index.at({id.robot, submap->keyframes[k + 1].index})] = submap->odometry[k].covariance;
+      out[index.at({id.robot, submap->keyframes[k + 1].index})] = bounded_covariance(submap->odometry[k].covariance);
   return out;
 }
 
-/// All closures of all verdicts whose keyframes are in the map, in a fixed order.
-std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const NodeIndex& index) {
+/// All closures of all verdicts on submaps in the map, in a fixed order.
+std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const SubmapSet& submaps,
+                                          const NodeIndex& index) {
   std::vector<LoopClosure> closures;
-  for (const auto& [pair, verdict] : verdicts)
+  for (const auto& [pair, verdict] : verdicts) {
+    if (!submaps.contains(pair.first) || !submaps.contains(pair.second)) continue;
     for (const LoopClosure& closure : verdict.closures)
-      if (index.contains(closure.from) && index.contains(closure.to)) closures.push_back(closure);
+      if (index.contains(closure.from) && index.contains(closure.to)) {
+        closures.push_back(closure);
+        closures.back().measurement.covariance = bounded_covariance(closure.measurement.covariance);
+      }
+  }
   std::stable_sort(closures.begin(), closures.end(), [](const LoopClosure& a, const LoopClosure& b) {
     return std::tie(a.from, a.to) < std::tie(b.from, b.to);
   });
@@ -245,6 +271,16 @@ class Judgement {
   estimation::OdometryTrial trial_;
 };
 
+void adopt(const Optimum& optimum, const NodeIndex& index, double min_jump_m, MapEstimate& map) {
+  for (const std::size_t edge : optimum.fitting) {
+    map.graph.edges.push_back(optimum.graph.edges[edge]);
+    map.closures[optimum.closure_of_edge[edge - map.odometry_edges]].accepted = true;
+  }
+  map.graph.poses = optimum.robust.solution.poses;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
+  for (const DoubtedStretch& doubted : optimum.failed) record_failure(doubted, index, min_jump_m, map);
+}
+
 }  // namespace
 
 std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
@@ -261,10 +297,11 @@ std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode
   return chains;
 }
 
-MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config) {
+MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdicts, const MapConfig& config) {
   MapEstimate map;
+  const SubmapSet submaps = without_contradictions(all_submaps, map.left_out);
   const NodeIndex index = attach_submaps(submaps, map);
-  const std::vector<LoopClosure> closures = collect_closures(verdicts, index);
+  const std::vector<LoopClosure> closures = collect_closures(verdicts, submaps, index);
   std::vector<estimation::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
   if (config.judge_rotation) {
     map.rotation_factors = rotation_variance_factors(chains, closures);
@@ -272,14 +309,8 @@ MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, c
   }
   const Optimum optimum = Judgement(map, index, closures, chains, config).decide();
   for (const LoopClosure& closure : closures) map.closures.push_back({closure, false});
-  for (const std::size_t edge : optimum.fitting) {
-    map.graph.edges.push_back(optimum.graph.edges[edge]);
-    map.closures[optimum.closure_of_edge[edge - map.odometry_edges]].accepted = true;
-  }
-  map.graph.poses = optimum.robust.solution.poses;
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
   map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
-  for (const DoubtedStretch& doubted : optimum.failed) record_failure(doubted, index, config.trial.min_jump_m, map);
+  if (map.converged) adopt(optimum, index, config.trial.min_jump_m, map);
   label_components(map);
   return map;
 }

@@ -55,7 +55,10 @@ struct MapEstimate {
   /// By which the variances of each robot's odometry count, in rotation (rotation_honesty.hpp); `graph` has them so.
   std::map<RobotId, double> rotation_factors;
   std::uint32_t components = 0;  ///< Connected components that contain a node.
-  bool converged = false;
+  /// Submaps that contradict earlier ones of their robot: keyframes that are there already, at other moments or out of
+  /// order. As after a restart without its state.
+  std::vector<SubmapId> left_out;
+  bool converged = false;  ///< Otherwise no closure is accepted, and every robot's odometry stands alone.
 };
 
 struct MapConfig {

@@ -4,12 +4,16 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/server/graph_monitor.hpp"
 
 namespace tutti::server {
 namespace {
 
-/// What the wire cannot know: the submap must agree with the keyframes that are already there.
+/// Between neighbouring keyframes. Odometry that diverged beyond this would leave the joint map without a solution.
+constexpr double kLongestStep_m = 1e4;
+
+/// What the map relies on, also of callers who do not come by wire.
 Status check_submap(const Submap& submap) {
   if (submap.keyframes.empty() || submap.odometry.size() + 1 != submap.keyframes.size())
     return fail(ErrorCode::invalid, "submap {}/{}: {} keyframes and {} odometry factors, expected n and n - 1, n >= 1",
@@ -25,6 +29,15 @@ Status check_submap(const Submap& submap) {
       return fail(ErrorCode::invalid, "submap {}/{}: keyframe {} at {} ns does not follow keyframe {} at {} ns",
                   submap.id.robot.value, submap.id.index, keyframe.index, keyframe.stamp.ns, previous.index,
                   previous.stamp.ns);
+    const RelativePose& step = submap.odometry[k - 1];
+    if (!is_valid(step.T_a_b) || step.T_a_b.translation.norm() > kLongestStep_m)
+      return fail(ErrorCode::invalid, "submap {}/{}: odometry of {} m to keyframe {}, expected at most {} m",
+                  submap.id.robot.value, submap.id.index, step.T_a_b.translation.norm(), keyframe.index,
+                  kLongestStep_m);
+    if (auto ok = check_covariance(step.covariance); !ok)
+      return in_context(
+          fmt::format("submap {}/{}: odometry to keyframe {}", submap.id.robot.value, submap.id.index, keyframe.index),
+          ok.error());
   }
   return {};
 }
@@ -57,7 +70,12 @@ Status MapServer::receive(const SubmapMessage& message) {
                 "submap {}/{} from robot {}: expected one of the mission's {} robots, as sender", id.robot.value,
                 id.index, message.header.robot.value, robots_.size());
   if (auto ok = check_submap(message.submap); !ok) return ok;
-  if (state_.submaps.contains(id)) return {};  // a duplicate
+  if (const auto known = state_.submaps.find(id); known != state_.submaps.end()) {
+    if (known->second->keyframes == message.submap.keyframes) return {};  // a duplicate
+    return fail(ErrorCode::invalid,
+                "submap {}/{} differs from the one in the map: has robot {} restarted without its saved state?",
+                id.robot.value, id.index, id.robot.value);
+  }
   const std::shared_ptr<const PointCloud>& cloud = message.submap.cloud;
   if (cloud != nullptr && !cloud->points.empty()) {
     if (auto ok = clouds_->put(id, cloud); !ok) return ok;
@@ -97,9 +115,10 @@ Status MapServer::receive(const ClosureVerdict& verdict) {
     return fail(ErrorCode::invalid, "verdict on submaps {}/{} and {}/{}: not both are in the map",
                 pair.first.robot.value, pair.first.index, pair.second.robot.value, pair.second.index);
   for (const LoopClosure& closure : closures) {
-    if (!is_valid(closure.measurement.T_a_b) || !closure.measurement.covariance.allFinite())
-      return fail(ErrorCode::invalid, "verdict on submaps {}/{} and {}/{}: its closure is not finite",
-                  pair.first.robot.value, pair.first.index, pair.second.robot.value, pair.second.index);
+    const std::string where = fmt::format("verdict on submaps {}/{} and {}/{}", pair.first.robot.value,
+                                          pair.first.index, pair.second.robot.value, pair.second.index);
+    if (!is_valid(closure.measurement.T_a_b)) return fail(ErrorCode::invalid, "{}: its closure is no pose", where);
+    if (auto ok = check_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
   }
   const auto [entry, is_new] = state_.verdicts.try_emplace(pair, verdict);
   if (is_new && !closures.empty()) news_ = true;

@@ -85,8 +85,17 @@ TEST(MapServer, RefusesStrangersAndMalformedSubmapsAndKeepsTheMap) {
   Submap uneven = good;
   uneven.odometry.pop_back();
   refused(uneven, ErrorCode::invalid, "odometry factors");
+  Submap diverged = good;
+  diverged.odometry[4].T_a_b.translation.y() = 1e9;
+  refused(diverged, ErrorCode::invalid, "to keyframe 5, expected at most 10000 m");
+  Submap indefinite = good;
+  indefinite.odometry[4].covariance(0, 1) = indefinite.odometry[4].covariance(1, 0) = 1.0;
+  refused(indefinite, ErrorCode::invalid, "odometry to keyframe 5: covariance is not positive semidefinite");
   Submap nothing{.id = {RobotId{0}, 98}};
   refused(nothing, ErrorCode::invalid, "0 keyframes");
+
+  Submap restarted = test::make_submaps(RobotId{0}, {}, Rng(7)).front();  // other odometry, the same numbers
+  refused(restarted, ErrorCode::invalid, "restarted without its saved state");
 
   SubmapMessage disguised = message_of(good);
   disguised.header.robot = RobotId{1};  // a robot may not write another's map
