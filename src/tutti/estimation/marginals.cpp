@@ -2,6 +2,9 @@
 #include "tutti/estimation/marginals.hpp"
 
 #include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
@@ -13,13 +16,39 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// L; nothing where the graph does not determine its poses.
+std::optional<internal::BlockCholesky::Columns> factor_of(const PoseGraph& graph, std::span<const Pose3> poses,
+                                                          const internal::BlockStructure& structure,
+                                                          std::span<const double> weights) {
+  internal::GraphEquations equations(graph, structure);
+  equations.linearise(poses, {.loss = {}, .roles = {}, .scale = weights}, true);
+  if (!equations.hessian().factorise()) return std::nullopt;
+  auto factor = equations.hessian().factor();
+  if (factor.start.size() != static_cast<std::size_t>(6 * structure.variables + 1)) return std::nullopt;
+  return factor;
+}
+
+/// The edges of some components, over all nodes (those of the others are then alone), and their weights.
+std::pair<PoseGraph, std::vector<double>> edges_of(const PoseGraph& graph, std::span<const double> weights,
+                                                   const std::vector<bool>& components,
+                                                   const internal::BlockStructure& structure) {
+  std::pair<PoseGraph, std::vector<double>> out;
+  out.first.poses = graph.poses;
+  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
+    if (!components[static_cast<std::size_t>(structure.component[graph.edges[e].from])]) continue;
+    out.first.edges.push_back(graph.edges[e]);
+    if (!weights.empty()) out.second.push_back(weights[e]);
+  }
+  return out;
+}
+
 }  // namespace
 
 struct JointPosterior::Factorised {
   internal::BlockStructure structure;
   std::vector<Pose3> poses;
   std::vector<Pair> pairs;
-  bool determined = false;
+  std::vector<bool> determined;             ///< Per node.
   internal::BlockCholesky::Columns factor;  ///< L, in elimination order.
 };
 
@@ -32,10 +61,26 @@ JointPosterior::JointPosterior(const PoseGraph& graph, std::span<const Pose3> po
   made->structure = internal::analyse_blocks(graph, pairs);
   made->poses.assign(poses.begin(), poses.end());
   made->pairs.assign(pairs.begin(), pairs.end());
-  internal::GraphEquations equations(graph, made->structure);
-  equations.linearise(poses, {.loss = {}, .roles = {}, .scale = weights}, true);
-  if (equations.hessian().factorise()) made->factor = equations.hessian().factor();
-  made->determined = made->factor.start.size() == static_cast<std::size_t>(6 * made->structure.variables + 1);
+  made->determined.assign(poses.size(), true);
+  if (auto factor = factor_of(graph, poses, made->structure, weights)) {
+    made->factor = std::move(*factor);
+  } else {
+    // What one component lacks is not the others' fault.
+    std::vector<bool> determined(static_cast<std::size_t>(made->structure.components), false);
+    for (std::size_t c = 0; c < determined.size(); ++c) {
+      std::vector<bool> only(determined.size(), false);
+      only[c] = true;
+      const auto [part, part_weights] = edges_of(graph, weights, only, made->structure);
+      determined[c] = factor_of(part, poses, internal::analyse_blocks(part), part_weights).has_value();
+    }
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      made->determined[i] = determined[static_cast<std::size_t>(made->structure.component[i])];
+    const auto [sound, sound_weights] = edges_of(graph, weights, determined, made->structure);
+    made->structure = internal::analyse_blocks(sound, pairs);
+    auto sound_factor = factor_of(sound, poses, made->structure, sound_weights);
+    TUTTI_CHECK(sound_factor.has_value(), "{} components, determined each but not together", determined.size());
+    made->factor = std::move(*sound_factor);
+  }
   factorised_ = std::move(made);
 }
 
@@ -44,11 +89,10 @@ JointPosterior::~JointPosterior() = default;
 std::vector<Matrix6d> JointPosterior::relative_covariances() const {
   const auto& [structure, poses, pairs, determined, factor] = *factorised_;
   std::vector<Matrix6d> out(pairs.size(), Matrix6d(Vector6d::Constant(kInfinity).asDiagonal()));
-  if (!determined) return out;
   const internal::SelectedInverse inverse(factor);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const auto [a, b] = pairs[k];
-    if (structure.component[a] != structure.component[b]) continue;
+    if (!determined[a] || structure.component[a] != structure.component[b]) continue;
     if (a == b) {
       out[k].setZero();
       continue;
@@ -76,10 +120,10 @@ Eigen::MatrixXd JointPosterior::samples(std::span<const std::size_t> nodes, std:
     TUTTI_CHECK(node < structure.variable.size(), "node {} of {}", node, structure.variable.size());
     variables.push_back(structure.variable[node]);
   }
-  if (!factorised_->determined)
-    return Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(count),
-                                     kInfinity);
-  return internal::posterior_samples(factorised_->factor, variables, count, rng);
+  Eigen::MatrixXd out = internal::posterior_samples(factorised_->factor, variables, count, rng);
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    if (!factorised_->determined[nodes[k]]) out.middleRows<6>(static_cast<Eigen::Index>(6 * k)).setConstant(kInfinity);
+  return out;
 }
 
 std::vector<Matrix6d> relative_covariances(const PoseGraph& graph, std::span<const Pose3> poses,

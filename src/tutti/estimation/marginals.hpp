@@ -29,14 +29,14 @@ class JointPosterior {
 
   /// Covariances of relative poses T_a_b = T_a^-1 T_b (right tangent) of the pairs, in their order: the exact blocks of
   /// the inverse, computed only on the pattern of the sparse factor (Takahashi, Fagan, Chin 1973; blocked by
-  /// supernodes). About the time of one factorisation. Pairs in different components, or a graph that does not
-  /// determine its poses: infinity on the diagonal. a == b: zero.
+  /// supernodes). About the time of one factorisation. Pairs in different components, or in one that does not determine
+  /// its poses: infinity on the diagonal. a == b: zero where determined.
   [[nodiscard]] std::vector<Matrix6d> relative_covariances() const;
 
   /// `count` joint samples of the nodes' errors: (6 nodes) x count, rows [6 k, 6 k + 6) what node k of `nodes` is off
   /// by. Zero mean and the covariance of the posterior; not normal: L^-T z with random signs z, because second moments
   /// estimated with signs scatter less than with normal numbers (Hutchinson 1990). A node's sample does not depend on
-  /// which others are asked for. A graph that does not determine its poses: infinity.
+  /// which others are asked for. In a component that does not determine its poses: infinity.
   [[nodiscard]] Eigen::MatrixXd samples(std::span<const std::size_t> nodes, std::size_t count, Rng rng) const;
 
  private:

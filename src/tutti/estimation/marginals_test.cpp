@@ -124,6 +124,32 @@ TEST(Marginals, ASampleDoesNotDependOnWhatElseIsAsked) {
               of_all.middleRows<6>(static_cast<Eigen::Index>(6 * some[k])));
 }
 
+/// One robot's odometry that knows nothing of a coordinate leaves what is known of the others as it is.
+TEST(Marginals, AnUndeterminedComponentLeavesTheOthers) {
+  Rng rng(6);
+  PoseGraph graph = random_graph(rng, 30, 4, 0.0).graph;
+  std::erase_if(graph.edges, [](const PoseGraphEdge& e) {  // nodes 0..9, 10..19 and 20..29
+    return e.from / 10 != e.to / 10;
+  });
+  std::vector<double> weights(graph.edges.size());
+  for (double& weight : weights) weight = rng.uniform(0.5, 2.0);
+  const Pairs pairs{{1, 8}, {11, 14}, {21, 29}, {22, 22}, {3, 25}};
+  const std::vector<std::size_t> nodes{8, 14, 29};
+  const JointPosterior before(graph, graph.poses, pairs, weights);
+  for (PoseGraphEdge& edge : graph.edges)
+    if (edge.from / 10 == 1) edge.information.row(2).setZero(), edge.information.col(2).setZero();
+  const JointPosterior after(graph, graph.poses, pairs, weights);
+  const auto known = before.relative_covariances(), now = after.relative_covariances();
+  for (const std::size_t k : {0U, 2U, 3U}) EXPECT_LT((known[k] - now[k]).norm(), 1e-9 * (1e-9 + known[k].norm())) << k;
+  EXPECT_TRUE(std::isinf(now[1](2, 2)));
+  EXPECT_TRUE(std::isinf(now[4](0, 0)));
+  const Eigen::MatrixXd samples = after.samples(nodes, 5, Rng(2));
+  EXPECT_TRUE(samples.topRows<6>().allFinite());
+  EXPECT_TRUE(samples.middleRows<6>(6).array().isInf().all());
+  EXPECT_TRUE(samples.bottomRows<6>().allFinite());
+  EXPECT_GT(samples.bottomRows<6>().norm(), 0.0);
+}
+
 TEST(Marginals, SayWhatIsNotDetermined) {
   Rng rng(5);
   PoseGraph graph = random_graph(rng, 10, 0, 0.0).graph;
@@ -137,7 +163,8 @@ TEST(Marginals, SayWhatIsNotDetermined) {
   const std::vector<std::size_t> nodes{1, 7};
   const Eigen::MatrixXd samples = JointPosterior(graph, graph.poses).samples(nodes, 3, Rng(1));
   EXPECT_EQ(samples.rows(), 12);
-  EXPECT_TRUE((samples.array() == std::numeric_limits<double>::infinity()).all());
+  EXPECT_TRUE((samples.topRows<6>().array() == std::numeric_limits<double>::infinity()).all());
+  EXPECT_TRUE(samples.bottomRows<6>().allFinite());
   EXPECT_TRUE(relative_covariances({}, {}, {}).empty());
   EXPECT_EQ(JointPosterior({}, {}).samples({}, 3, Rng(1)).rows(), 0);
 }

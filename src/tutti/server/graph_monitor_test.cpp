@@ -95,6 +95,28 @@ MapEstimate circle_map(std::uint64_t seed) {
   return estimate_map(submaps, verdicts, {});
 }
 
+TEST(MonitorGraph, ARobotWhosePosesAreOpenIsLeftOutAlone) {
+  SubmapSet submaps;
+  for (const std::uint32_t robot : {0U, 1U, 2U})
+    for (Submap& submap : test::make_submaps(RobotId{robot}, {}, Rng(robot)))
+      submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
+  MapEstimate map = estimate_map(submaps, {}, {});
+  const ProxyGraph all = monitor_graph(map, 1, {});
+  for (std::size_t e = 0; e < map.odometry_edges; ++e)
+    if (map.nodes[map.graph.edges[e].from].id.robot == RobotId{1}) map.graph.edges[e].information.setZero();
+  const ProxyGraph graph = monitor_graph(map, 1, {});
+  const auto of = [](const auto& list, std::uint32_t robot) {
+    return std::ranges::count_if(list, [robot](const auto& entry) { return entry.robot == RobotId{robot}; });
+  };
+  EXPECT_EQ(of(graph.nodes, 1), 0);
+  EXPECT_EQ(of(graph.components, 1), 0);
+  for (const std::uint32_t robot : {0U, 2U}) {
+    EXPECT_EQ(of(graph.nodes, robot), of(all.nodes, robot));
+    EXPECT_EQ(of(graph.shapes, robot), 1);
+  }
+  for (const ProxyNode& node : graph.nodes) EXPECT_TRUE(node.covariance.allFinite());
+}
+
 TEST(MonitorGraph, ShapesAreThoseOfTheNodesSent) {
   const MapEstimate map = circle_map(1);
   const ProxyGraph whole = monitor_graph(map, 1, {});
@@ -169,13 +191,13 @@ TEST(MonitorGraph, WhatHingesOnOneClosureIsNotSure) {
   EXPECT_LT(expected_m(closed, 32), 1.5 * expected_m(closed, 0));
 }
 
-TEST(MonitorGraph, DoesNotClaimAShapeThatTheMapLeavesOpen) {
+TEST(MonitorGraph, SaysNothingThatTheMapLeavesOpen) {
   MapEstimate map;
   for (std::uint32_t k = 0; k < 2; ++k)
     map.nodes.push_back({.id = {RobotId{0}, k}, .stamp = {k + 1}, .representative = true});
   map.graph.poses.resize(2);
   map.graph.edges.push_back({0, 1, {}, Matrix6d::Zero()});
-  EXPECT_EQ(monitor_graph(map, 1, {}).nodes.size(), 2U);
+  EXPECT_TRUE(monitor_graph(map, 1, {}).nodes.empty());
   EXPECT_TRUE(monitor_graph(map, 1, {}).shapes.empty());
   EXPECT_TRUE(monitor_graph({}, 1, {}).shapes.empty());
 }
