@@ -15,11 +15,21 @@ constexpr double kMedianChiSquare6 = 5.348;
 constexpr double kLeast = 0.04;
 constexpr std::size_t kEnough = 8;
 
-/// Per node the covariance that the map gives the step of odometry that ends there.
+bool is_failed(const MapEstimate& map, const KeyframeId& from, const KeyframeId& to) {
+  return std::ranges::any_of(map.failed_odometry, [&](const FailedOdometry& failed) {
+    return failed.robot == from.robot && failed.from < to.index && from.index < failed.to;
+  });
+}
+
+/// Per node the covariance that the map gives the step of odometry that ends there. What failed is a gap: the map's
+/// word on it is not odometry's.
 std::vector<std::optional<Matrix6d>> steps_of(const MapEstimate& map) {
   std::vector<std::optional<Matrix6d>> out(map.nodes.size());
-  for (std::size_t e = 0; e < map.odometry_edges; ++e)
-    out[map.graph.edges[e].to] = map.graph.edges[e].information.ldlt().solve(Matrix6d::Identity());
+  for (std::size_t e = 0; e < map.odometry_edges; ++e) {
+    const PoseGraphEdge& edge = map.graph.edges[e];
+    if (!is_failed(map, map.nodes[edge.from].id, map.nodes[edge.to].id))
+      out[edge.to] = edge.information.ldlt().solve(Matrix6d::Identity());
+  }
   return out;
 }
 

@@ -97,6 +97,17 @@ TEST(OdometryHonesty, StaysWithinItsBounds) {
   EXPECT_TRUE(odometry_variance_factors({}).empty());
 }
 
+/// The map puts another motion in the place of a step that jumped; raw odometry still has the jump.
+TEST(OdometryHonesty, LoopsOverFailedOdometryDoNotCount) {
+  auto map = walked({.stated = 4.0, .closures = 120}, 5);
+  const Pose3 jump{so3_exp(Eigen::Vector3d(0, 0, 0.3)), Eigen::Vector3d(3, -2, 0)};
+  const Pose3 before = map.nodes[99].T_odom_body;
+  for (std::size_t i = 100; i < map.nodes.size(); ++i)
+    map.nodes[i].T_odom_body = before * jump * before.inverse() * map.nodes[i].T_odom_body;
+  map.failed_odometry = {{RobotId{0}, 99, 100, jump.translation.norm(), 0.3}};
+  EXPECT_LT(odometry_variance_factors(map).at(RobotId{0}), 2.5 / 16.0);
+}
+
 TEST(OdometryHonesty, RefusedClosuresDoNotCount) {
   auto map = walked({.stated = 4.0}, 1);
   for (JudgedClosure& judged : map.closures) judged.accepted = false;
