@@ -14,10 +14,18 @@ namespace {
 using Key = std::pair<Timestamp, Timestamp>;
 Key key(const Constraint& constraint) { return {constraint.from_stamp, constraint.to_stamp}; }
 
-bool differs(const Constraint& a, const Constraint& b, const LedgerConfig& config) {
-  const Pose3 difference = a.measurement.T_a_b.inverse() * b.measurement.T_a_b;
+bool says_otherwise(const Constraint& held, const Constraint& fresh, const LedgerConfig& config) {
+  const Pose3 difference = held.measurement.T_a_b.inverse() * fresh.measurement.T_a_b;
   return difference.translation.norm() > config.replace_translation_m ||
          rotation_angle(difference) > config.replace_rotation_deg * kRadPerDeg;
+}
+
+/// The server has become surer or less sure.
+bool counts_otherwise(const Constraint& held, const Constraint& fresh, const LedgerConfig& config) {
+  if (held.support != fresh.support) return true;
+  const Eigen::Array<double, 6, 1> before = held.measurement.covariance.diagonal().array().sqrt();
+  const Eigen::Array<double, 6, 1> now = fresh.measurement.covariance.diagonal().array().sqrt();
+  return ((now - before).abs() > config.replace_sigma_share * before).any();
 }
 
 }  // namespace
@@ -57,7 +65,7 @@ LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& 
       fresh.erase(found);
       continue;
     }
-    const bool replace = differs(held, found->second, config);
+    const bool replace = says_otherwise(held, found->second, config) || counts_otherwise(held, found->second, config);
     ++(replace ? counts.replaced : counts.unchanged);
     next.push_back(std::move(replace ? found->second : held));
     fresh.erase(found);

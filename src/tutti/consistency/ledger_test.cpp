@@ -40,6 +40,24 @@ TEST(Ledger, KeepsAConstraintUntilItDiffersReasonably) {
   EXPECT_EQ(ledger.constraints()[0].revision, 4U);
 }
 
+/// What a constraint weighs follows the server: three closures behind it that become one, or the other way round.
+TEST(Ledger, ReplacesAConstraintThatCountsOtherwise) {
+  const auto weighing = [](std::uint32_t support, double sigma, std::uint64_t revision) {
+    Constraint out = link(0, 1, 1.0, 0.0, revision);
+    out.support = support;
+    out.measurement.covariance = sigma * sigma * Matrix6d::Identity();
+    return out;
+  };
+  Ledger ledger({weighing(3, 0.01, 1)});
+  EXPECT_EQ(ledger.update({weighing(3, 0.0105, 2)}, kConfig, false).unchanged, 1U);
+  EXPECT_EQ(ledger.update({weighing(1, 0.01, 3)}, kConfig, false).replaced, 1U);
+  EXPECT_EQ(ledger.constraints()[0].support, 1U);
+  EXPECT_EQ(ledger.update({weighing(3, 0.01, 4)}, kConfig, false).replaced, 1U);
+  EXPECT_EQ(ledger.update({weighing(3, 0.012, 5)}, kConfig, false).replaced, 1U);
+  EXPECT_EQ(ledger.constraints()[0].revision, 5U);
+  EXPECT_EQ(ledger.update({weighing(3, 0.0105, 6)}, kConfig, false).replaced, 1U);
+}
+
 // Small steps each below the threshold must not add up unseen: the comparison is with what is held.
 TEST(Ledger, SmallStepsAddUpToAReplacement) {
   Ledger ledger({link(0, 1)});
@@ -53,7 +71,7 @@ TEST(Ledger, EitherDirectionIsTheSameConstraint) {
   Constraint backward = link(0, 1, 1.0, 30.0);
   std::swap(backward.from, backward.to);
   std::swap(backward.from_stamp, backward.to_stamp);
-  backward.measurement.T_a_b = backward.measurement.T_a_b.inverse();
+  backward.measurement = inverse(backward.measurement);
   Ledger ledger({link(0, 1, 1.0, 30.0)});
   const auto update = ledger.update({backward}, kConfig, false);
   EXPECT_EQ(update.unchanged, 1U);
@@ -118,7 +136,7 @@ Constraint supported(Constraint constraint, std::uint32_t support) {
 TEST(Withdraw, WhatIsChosenAgainWithoutSupport) {
   for (const bool replaces_all : {false, true}) {
     Ledger ledger({supported(link(0, 1), 3), supported(link(1, 2), 3)});
-    const auto update = ledger.update({supported(link(0, 1, 7.0), 0), supported(link(1, 2), 2)}, kConfig, replaces_all);
+    const auto update = ledger.update({supported(link(0, 1, 7.0), 0), supported(link(1, 2), 3)}, kConfig, replaces_all);
     EXPECT_EQ(update.withdrawn, 1U);
     EXPECT_EQ(update.unchanged, 1U);
     EXPECT_EQ(update.removed + update.added + update.replaced, 0U);
