@@ -46,12 +46,6 @@ class ConstraintPolicy {
   [[nodiscard]] virtual Selection choose(const PolicyInput& input) const = 0;
 };
 
-/// The thresholds of `spectral` were set once, on simulated corridor missions (bench/runtime/closed_loop.cpp, five
-/// seeds: 1295 nodes in one hour, an update every 7 nodes, onboard error 1.1-2.3 m, server's own error 0.07 m), so that
-/// it adds the paper's share of constraints: 728-784, 2.6 % of 29,152 odometry factors, agreement with the server
-/// 0.04-0.07 m. The large group does the work (alone, at 0.1: 1300 links and 0.02 m; at 0.3: 540 and 0.06 m); the small
-/// group repairs bends within a submap (60 m with 0.3 degrees of yaw drift per metre: 0.7 m -> 0.010-0.016 m); the mid
-/// group hardly speaks unless something is badly wrong.
 struct AdaptiveConfig {
   AgreementConfig agreement;
   double least_gain = 30.0;
@@ -78,6 +72,12 @@ struct AdaptiveConfig {
   }
 };
 
+/// The thresholds of `spectral` were set once, on simulated corridor missions (bench/runtime/closed_loop.cpp, five
+/// seeds: 1295 nodes in one hour, an update every 7 nodes, onboard error 1.1-2.3 m, server's own error 0.07 m), so that
+/// it adds the paper's share of constraints: 728-784, 2.6 % of 29,152 odometry factors, agreement with the server
+/// 0.04-0.07 m. The large group does the work (alone, at 0.1: 1300 links and 0.02 m; at 0.3: 540 and 0.06 m); the small
+/// group repairs bends within a submap (60 m with 0.3 degrees of yaw drift per metre: 0.7 m -> 0.010-0.016 m); the mid
+/// group hardly speaks unless something is badly wrong.
 struct PolicyConfig {
   std::string name = "adaptive";
   std::string classifier = "thresholds";

@@ -26,7 +26,8 @@ std::vector<RobotRange> robot_ranges(const std::vector<ServerNode>& nodes) {
   return ranges;
 }
 
-// Largest remainder: shares add up to the budget unless the ends of the robots alone exceed it.
+// Largest remainder. Shares add up to the budget unless the ends of the robots alone exceed it: what small robots get
+// beyond their share, for their ends, the largest shares give back.
 std::vector<std::size_t> share_budget(std::size_t budget, const std::vector<RobotRange>& ranges, std::size_t nodes) {
   std::vector<std::size_t> share(ranges.size()), order(ranges.size());
   std::size_t spent = 0;
@@ -34,6 +35,11 @@ std::vector<std::size_t> share_budget(std::size_t budget, const std::vector<Robo
     share[r] = std::max(budget * ranges[r].size() / nodes, std::min<std::size_t>(2, ranges[r].size()));
     spent += share[r];
     order[r] = r;
+  }
+  for (; spent > budget; --spent) {
+    const auto largest = std::ranges::max_element(share);
+    if (*largest <= 2) break;
+    --*largest;
   }
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return budget * ranges[a].size() % nodes > budget * ranges[b].size() % nodes;

@@ -35,14 +35,15 @@ struct ProxyGraphConfig {
     v.field("radius_m", radius_m, greater_than(0.0), "Nodes closer than this are neighbours.");
     v.field("sigma_m", sigma_m, greater_than(0.0), "Scale of the edge weights exp(-d / (2 sigma^2)), eq. 1.");
     v.field("node_budget", node_budget, at_least(0.0),
-            "Reduce the proxy graph to at most this many nodes over all robots; 0 = never. The first and last node of "
-            "every robot are always kept.");
+            "Reduce the proxy graph to this many nodes over all robots; 0 = never. The first and last node of every "
+            "robot are always kept, even if they alone are more.");
     v.field(
         "reducer", reducer, one_of({"budget", "paper"}),
-        "Which nodes stay: 'budget' meets node_budget exactly and is reproducible; 'paper' keeps u_max(n) >= 0 (eq. "
-        "3) once the graph exceeds node_budget.");
+        "Which nodes stay: 'budget' meets node_budget and is reproducible; 'paper' keeps u_max(n) >= 0 (eq. 3) once "
+        "the graph exceeds node_budget.");
     v.field("sparsify_threshold", sparsify_threshold, between(0.0, 1.0),
-            "Drop a reduced edge whose weight is below this fraction of the largest; 0 = keep all.");
+            "Drop a reduced edge whose weight is below this fraction of the smaller degree of its ends, but none that "
+            "holds the graph together; 0 = keep all.");
     v.field("shape_samples", shape_samples, between(0.0, 10'000.0),
             "Samples from which the server learns how sure it is of each trajectory's shape; 0 = do not send it.");
     v.field("shape_deletions", shape_deletions, between(0.0, 10'000.0),

@@ -64,6 +64,17 @@ RC_GTEST_PROP(ProxyGraphBuilder, MeetsTheBudgetAndKeepsTheEnds, ()) {
   }
 }
 
+TEST(ProxyGraphBuilder, TheEndsOfManySmallRobotsComeOutOfTheLargeShares) {
+  auto nodes = two_robots(100, 2);
+  for (const std::uint32_t robot : {11U, 12U, 13U})
+    for (const ServerNode& node : test::server_nodes(RobotId{robot}, {Pose3{}, Pose3{{1, 0, 0, 0}, {1, 0, 0}}}))
+      nodes.push_back(node);
+  const auto graph = build_proxy_graph(1, nodes, {}, {.node_budget = 12});
+  EXPECT_EQ(graph.nodes.size(), 12U);
+  EXPECT_EQ(nodes_of(graph, kAlpha), 4U);
+  EXPECT_EQ(build_proxy_graph(1, nodes, {}, {.node_budget = 5}).nodes.size(), 10U);  // the ends alone
+}
+
 TEST(ProxyGraphBuilder, EdgesStayWithinARobotAndArePositive) {
   const auto graph = build_proxy_graph(1, two_robots(80, 60), {}, {.node_budget = 70});
   ASSERT_TRUE(graph.reduced);

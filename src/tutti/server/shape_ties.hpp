@@ -16,7 +16,7 @@ namespace tutti::server {
 /// that is taken already (both ends within an eighth of the way). `steps[k]`: covariance of pose k relative to pose k -
 /// 1 (right tangent, the first unused), taken as independent. `samples` and `shifts` as for shape_uncertainty(). One
 /// half of the samples chooses the pairs and the other half says how well they are known, so that being chosen for a
-/// small sigma does not make it smaller; fewer than 8 samples: no ties. At most 200 evenly spread nodes are looked at.
+/// small sigma does not make it smaller; fewer than 8 samples: no ties. About 200 evenly spread nodes are looked at.
 std::vector<ShapeTie> shape_ties(std::span<const Pose3> poses, std::span<const Matrix6d> steps,
                                  const Eigen::MatrixXd& samples, const Eigen::MatrixXd& shifts, std::size_t most);
 
