@@ -3,6 +3,7 @@
 """Runs the two real LiDAR missions over seeds and drifts and writes docs/results/hku.md.
 
 Usage: bench/accuracy/hku.py TUTTI_PROGRAM --data FOLDER [--seeds 10]
+docs/data.md says what FOLDER holds.
 """
 import argparse
 import statistics

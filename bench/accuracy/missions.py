@@ -4,6 +4,7 @@
 in paper.py.
 
 Usage: bench/accuracy/missions.py TUTTI_PROGRAM --data FOLDER [--seed 1]
+docs/data.md says what FOLDER holds.
 """
 import argparse
 
