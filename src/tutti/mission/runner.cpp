@@ -160,9 +160,12 @@ class MissionRun {
   void receive_submap(const std::string& bytes) {
     if (const Status taken = take_submap(bytes); !taken) return refusals_.push_back(taken.error().message);
     const double before_s = load_.verification_cpu_s;
-    for (const auto& verdict : verify(server_.take_jobs())) {
-      const Status ok = verdict ? server_.receive(*verdict) : Status(tl::unexpected(verdict.error()));
+    std::vector<server::VerificationJob> jobs = server_.take_jobs();
+    const auto verdicts = verify(jobs);
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
+      const Status ok = verdicts[i] ? server_.receive(*verdicts[i]) : Status(tl::unexpected(verdicts[i].error()));
       if (!ok) refusals_.push_back(ok.error().message);
+      if (!verdicts[i]) server_.give_back(std::move(jobs[i]));
     }
     unanswered_.push_back({time_s_, load_.verification_cpu_s - before_s});
   }

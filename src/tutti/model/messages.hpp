@@ -11,7 +11,8 @@ namespace tutti {
 
 inline constexpr std::uint32_t kProtocolVersion = 4;
 
-/// In front of every message. (robot, session, sequence) identifies it, so duplicates are recognised.
+/// In front of every message; (robot, session, sequence) identifies it. Duplicates are recognised by what is inside:
+/// a submap's id, a proxy graph's revision.
 struct MessageHeader {
   RobotId robot;              ///< Sender; of a server's message: unused, 0.
   std::uint64_t session = 0;  ///< Changes when the sender restarts.

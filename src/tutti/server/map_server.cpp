@@ -109,6 +109,10 @@ void MapServer::plan_verifications(const std::shared_ptr<const Submap>& submap) 
 
 std::vector<VerificationJob> MapServer::take_jobs() { return std::exchange(jobs_, {}); }
 
+void MapServer::give_back(VerificationJob job) {
+  if (asked_.contains(job.pair) && !state_.verdicts.contains(job.pair)) jobs_.push_back(std::move(job));
+}
+
 Status MapServer::receive(const ClosureVerdict& verdict) {
   const auto& [pair, closures, reason] = verdict;
   if (!state_.submaps.contains(pair.first) || !state_.submaps.contains(pair.second))

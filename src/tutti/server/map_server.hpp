@@ -62,6 +62,8 @@ class MapServer {
   Status receive(const ClosureVerdict& verdict);
   /// Verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
+  /// A job that had an error instead of an answer: the next take_jobs() hands it out again.
+  void give_back(VerificationJob job);
 
   /// True when something came since the last optimise().
   [[nodiscard]] bool has_news() const { return news_; }

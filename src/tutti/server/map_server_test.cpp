@@ -59,6 +59,19 @@ TEST(MapServer, AsksForEachPairOnceAndIgnoresDuplicates) {
   EXPECT_EQ(server.state().submaps.size(), 18U);
 }
 
+TEST(MapServer, HandsOutAJobThatWasGivenBackUntilItHasAVerdict) {
+  const auto finder = std::make_shared<const TestFinder>(1);
+  MapServer server = filled_server(finder);
+  const std::vector<VerificationJob> jobs = server.take_jobs();
+  server.give_back(jobs[2]);  // its cloud could not be read
+  const std::vector<VerificationJob> again = server.take_jobs();
+  ASSERT_EQ(again.size(), 1U);
+  EXPECT_EQ(again.front().pair, jobs[2].pair);
+  EXPECT_TRUE(server.receive(ClosureVerdict{jobs[2].pair, {}, "nothing in common"}));
+  server.give_back(jobs[2]);
+  EXPECT_TRUE(server.take_jobs().empty());
+}
+
 TEST(MapServer, RefusesStrangersAndMalformedSubmapsAndKeepsTheMap) {
   const auto finder = std::make_shared<const TestFinder>(1);
   MapServer server = filled_server(finder);
