@@ -9,6 +9,7 @@
 #include "eval_command.hpp"
 #include "optimise_command.hpp"
 #include "run_command.hpp"
+#include "settings_command.hpp"
 #include "world_command.hpp"
 
 /// OpenBLAS. Small matrices are faster without its threads, and results must not depend on their number.
@@ -33,6 +34,7 @@ int main(int argc, char** argv) {
   tutti::app::add_eval_command(app, exit_code);
   tutti::app::add_compare_command(app, exit_code);
   tutti::app::add_optimise_command(app, exit_code);
+  tutti::app::add_settings_command(app, exit_code);
   tutti::app::add_world_command(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -181,7 +181,8 @@ std::string to_yaml(const ConfigNode& node) {
 Status apply_override(ConfigNode& root, const std::string& assignment) {
   const auto equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
-    return fail(ErrorCode::configuration, "--set {}: expected key=value, for example robots.0.voxel_m=0.4", assignment);
+    return fail(ErrorCode::configuration, "--set {}: expected key=value, for example agent.submap.voxel_m=0.4",
+                assignment);
   auto value = parse_yaml(assignment.substr(equals + 1), "--set " + assignment);
   if (!value) return tl::unexpected(value.error());
   forget_lines(*value);
