@@ -62,8 +62,10 @@ Explanation explain(const ProxyGraph& graph, RobotId robot, std::span<const Robo
       return poses[stretch.first].inverse() * poses[stretch.last];
     };
     const Vector6d missed = local(relative(chain.server), relative(odometry));
+    const NodePair& middle = pairs[(stretch.first + stretch.last) / 2];
     out.origins.push_back({.from = out.stamps[stretch.first],
                            .until = out.stamps[stretch.last],
+                           .place_m = graph.nodes[middle.proxy].T_world_body.translation,
                            .scale = scale_of(test, static_cast<double>(stretch.last - stretch.first)),
                            .length_m = out.distance_m[stretch.last] - out.distance_m[stretch.first],
                            .translation_m = missed.head<3>().norm(),

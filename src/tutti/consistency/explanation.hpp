@@ -19,6 +19,7 @@ namespace tutti::consistency {
 struct SuspectedOrigin {
   Timestamp from;
   Timestamp until;
+  Eigen::Vector3d place_m = Eigen::Vector3d::Zero();  ///< Of the middle of the stretch, by the server: `world`.
   int scale = 0;               ///< Of Explanation::significance: where the disagreement stands out most.
   double length_m = 0.0;       ///< Of the stretch, along the server's estimate.
   double translation_m = 0.0;  ///< Odometry against the map over the stretch: relative pose from -> until.

@@ -105,6 +105,8 @@ TEST(Explanation, TranslationAndRotationAreThoseOfTheRelativePose) {
         last = &node.T_world_body;
       }
       ASSERT_TRUE(from != nullptr && until != nullptr);
+      EXPECT_LE((origin.place_m - from->translation).norm(), 0.5 * length + 1.0)
+          << "about half-way, in the map's frame";
       const Pose3 map = from->inverse() * *until;
       EXPECT_NEAR(origin.translation_m, (map.translation - T_from_until.translation).norm(), 1e-9);
       EXPECT_NEAR(origin.rotation_rad, map.rotation.angularDistance(T_from_until.rotation), 1e-9);

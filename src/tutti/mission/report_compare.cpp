@@ -36,13 +36,13 @@ std::string origins_table(const TrajectoryComparison& c, const PictureClock& clo
   const auto& origins = c.explanation.origins;
   if (origins.empty()) return "  No stretch stands out from the rest of the way: B drifts all along.\n";
   TextTable table(0);
-  table.add({"from", "until", "way", "translation", "rotation", "scale", "over threshold", ""});
+  table.add({"from", "until", "where", "way", "translation", "rotation", "scale", "over threshold", ""});
   table.rule();
   for (std::size_t i = 0; i < std::min(origins.size(), kMostRows); ++i) {
     const auto& o = origins[i];
-    table.add({format_moment(clock(o.from)), format_moment(clock(o.until)), fmt::format("{:.1f} m", o.length_m),
-               format_metres(o.translation_m), degrees(o.rotation_rad), format_scale(c.explanation, o.scale),
-               format_significance(o.significance), o.alert ? "failure suspected" : ""});
+    table.add({format_moment(clock(o.from)), format_moment(clock(o.until)), format_place(o.place_m),
+               fmt::format("{:.1f} m", o.length_m), format_metres(o.translation_m), degrees(o.rotation_rad),
+               format_scale(c.explanation, o.scale), format_significance(o.significance), o.alert ? "failure?" : ""});
   }
   return table.str() + more(origins.size(), "stretches");
 }

@@ -52,7 +52,8 @@ Json origins_json(const TrajectoryComparison& c) {
     Json row = Json::object();
     add_moment(row, "from", origin.from, c);
     add_moment(row, "until", origin.until, c);
-    row.update({{"scale", origin.scale},
+    row.update({{"place_m", {number(origin.place_m.x()), number(origin.place_m.y()), number(origin.place_m.z())}},
+                {"scale", origin.scale},
                 {"length_m", number(origin.length_m)},
                 {"translation_m", number(origin.translation_m)},
                 {"rotation_rad", number(origin.rotation_rad)},

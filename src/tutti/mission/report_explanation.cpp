@@ -296,6 +296,19 @@ std::string format_origin_size(const SuspectedOrigin& origin) {
                      significant(origin.rotation_rad / kRadPerDeg), significant(origin.length_m));
 }
 
+std::string format_place(const Eigen::Vector3d& place_m) {
+  const Eigen::Vector3d shown = 0.1 * (10.0 * place_m).array().round() + 0.0;  // no -0.0
+  return fmt::format("({:.1f}, {:.1f}, {:.1f}) m", shown.x(), shown.y(), shown.z());
+}
+
+std::string format_origin(const SuspectedOrigin& origin, const PictureClock& clock,
+                          const std::optional<Explanation>& explanation) {
+  std::string out = fmt::format("{}, at {}: {}", format_between(clock, origin.from, origin.until),
+                                format_place(origin.place_m), format_origin_size(origin));
+  if (explanation) out += fmt::format(" (scale {})", format_scale(*explanation, origin.scale));
+  return out;
+}
+
 std::string format_motion_error(double translation_m, double rotation_rad) {
   return fmt::format("{}, {:.1f} deg", format_metres(translation_m), rotation_rad / kRadPerDeg);
 }

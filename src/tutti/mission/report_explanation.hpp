@@ -56,6 +56,12 @@ double largest_significance(const consistency::Explanation& explanation);
 std::string format_moment(double value_s);
 /// "0.41 m, 1.30 deg over 12.0 m".
 std::string format_origin_size(const consistency::SuspectedOrigin& origin);
+/// Where, when, how much and at which scale: "62.0 s - 72.0 s, at (12.3, -4.0, 0.2) m: 0.41 m, 1.30 deg over 12.0 m
+/// (scale 16 m)"; without an explanation no scale.
+std::string format_origin(const consistency::SuspectedOrigin& origin, const PictureClock& clock,
+                          const std::optional<consistency::Explanation>& explanation);
+/// "(12.3, -4.0, 0.2) m"
+std::string format_place(const Eigen::Vector3d& place_m);
 /// "0.10 m, 20.3 deg"
 std::string format_motion_error(double translation_m, double rotation_rad);
 /// The same and when: "0.10 m, 20.3 deg, 162.1 s - 163.0 s"

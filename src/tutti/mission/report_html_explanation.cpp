@@ -27,11 +27,12 @@ std::string origins_table(const RobotRecord& robot) {
   const consistency::Explanation& e = *robot.explanation;
   if (e.origins.empty()) return "";
   const bool truth = !robot.drift_origins.empty();
-  HtmlTable table{{"suspected", "when", "way", "translation", "rotation", "scale", "over threshold"}, {}, 2};
+  HtmlTable table{{"suspected", "when", "where", "way", "translation", "rotation", "scale", "over threshold"}, {}, 3};
   if (truth) table.head.push_back("really");
   for (const auto& origin : e.origins) {
     std::vector<std::string> row{origin.alert ? "<b>localisation failure</b>" : "drift",
                                  format_between(mission_clock(robot), origin.from, origin.until),
+                                 format_place(origin.place_m),
                                  format_distance(origin.length_m),
                                  format_metres(origin.translation_m),
                                  fmt::format("{:.2f}°", origin.rotation_rad / kRadPerDeg),
@@ -96,16 +97,13 @@ std::string explanation_html(const MissionRecord& record) {
 std::string alerts_html(const MissionRecord& record) {
   std::string list;
   for (const RobotRecord& robot : record.robots)
-    for (const AlertRecord& alert : robot.alerts) {
-      const std::string scale =
-          robot.explanation ? " (scale " + format_scale(*robot.explanation, alert.origin.scale) + ")" : std::string();
-      list += fmt::format("<li{}><b>Localisation failure {}:</b> {}, {}: {}{}, noticed by the robot at {}{}</li>\n",
+    for (const AlertRecord& alert : robot.alerts)
+      list += fmt::format("<li{}><b>Localisation failure {}:</b> {}, {}, noticed by the robot at {}{}</li>\n",
                           alert.withdrawn_s ? " class=\"withdrawn\"" : "",
                           alert.withdrawn_s ? "no longer suspected" : "suspected", escape_xml(robot.name),
-                          format_between(mission_clock(robot), alert.origin.from, alert.origin.until),
-                          format_origin_size(alert.origin), scale, format_moment(alert.known_since_s),
+                          format_origin(alert.origin, mission_clock(robot), robot.explanation),
+                          format_moment(alert.known_since_s),
                           alert.withdrawn_s ? ", withdrawn at " + format_moment(*alert.withdrawn_s) : std::string());
-    }
   for (const RobotRecord& robot : record.robots)
     if (const PolicyRecord* policy = find_policy(robot, record.default_policy))
       for (const RepairedJump& jump : policy->jumps)

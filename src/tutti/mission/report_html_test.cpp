@@ -74,7 +74,8 @@ TEST(ReportHtml, ExplainsWhereOdometryAndMapPart) {
   EXPECT_NE(html.find("Where odometry and map part"), std::string::npos);
   EXPECT_NE(
       html.find(
-          "Localisation failure suspected:</b> alpha, 662.0 s - 672.0 s: 1.87 m, 17.8 deg over 7.00 m (scale 8.0 m), "
+          "Localisation failure suspected:</b> alpha, 662.0 s - 672.0 s, at (12.3, -4.0, 0.0) m: 1.87 m, 17.8 deg over "
+          "7.00 m (scale 8.0 m), "
           "noticed by the robot at 720.0 s"),
       std::string::npos);
   EXPECT_NE(html.find("<td>failure, 660.0 s - 672.0 s: 1.900 m, 17.2 deg</td>"), std::string::npos) << "the true one";

@@ -21,11 +21,13 @@ Json number(std::optional<double> value, double per_unit = 1e6) {
 }
 
 /// {"translation_m", "quaternion_xyzw"}
+Json vector_json(const Eigen::Vector3d& v) { return {number(v.x()), number(v.y()), number(v.z())}; }
+
 Json pose_json(const Pose3& T) {
   Eigen::Vector4d q = T.rotation.coeffs();
   if (q.w() < 0.0) q = -q;  // q and -q are one rotation: always print the same
   constexpr double kPerUnit = 1e9;
-  return {{"translation_m", {number(T.translation.x()), number(T.translation.y()), number(T.translation.z())}},
+  return {{"translation_m", vector_json(T.translation)},
           {"quaternion_xyzw",
            {number(q.x(), kPerUnit), number(q.y(), kPerUnit), number(q.z(), kPerUnit), number(q.w(), kPerUnit)}}};
 }
@@ -88,7 +90,8 @@ Json origin_json(const RobotRecord& robot, const consistency::SuspectedOrigin& o
   const auto& lengths_m = robot.explanation ? robot.explanation->scale_length_m : std::vector<double>{};
   const auto scale = static_cast<std::size_t>(std::max(origin.scale, 0));
   return stretch_json(robot, origin,
-                      {{"scale", origin.scale},
+                      {{"place_m", vector_json(origin.place_m)},
+                       {"scale", origin.scale},
                        {"scale_length_m", scale < lengths_m.size() ? number(lengths_m[scale]) : Json(nullptr)},
                        {"length_m", number(origin.length_m)},
                        {"translation_m", number(origin.translation_m)},

@@ -99,6 +99,7 @@ TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
   ASSERT_EQ(report["robots"][1]["alerts"].size(), 1U);
   const json& alert = report["robots"][1]["alerts"][0];
   EXPECT_DOUBLE_EQ(alert["from_s"], 362.0);
+  EXPECT_EQ(alert["place_m"], (json{12.34, -4.02, -0.01}));
   EXPECT_EQ(alert["known_since_broadcast"], record.robots[1].alerts[0].known_since_revision);
   EXPECT_TRUE(alert["withdrawn_s"].is_null());
   EXPECT_DOUBLE_EQ(report["robots"][1]["onboard_rpe_10m_m"], 0.095);

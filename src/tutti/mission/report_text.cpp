@@ -152,10 +152,10 @@ std::string explanation_lines(const MissionRecord& record) {
   std::string out;
   for (const RobotRecord& robot : record.robots) {
     for (const AlertRecord& alert : robot.alerts)
-      out += wrap(fmt::format("{}: localisation failure {}, {}: {}; noticed at {}.", robot.name,
+      out += wrap(fmt::format("{}: localisation failure {}, {}; noticed at {}.", robot.name,
                               alert.withdrawn_s ? "no longer suspected" : "suspected",
-                              format_between(mission_clock(robot), alert.origin.from, alert.origin.until),
-                              format_origin_size(alert.origin), format_moment(alert.known_since_s)),
+                              format_origin(alert.origin, mission_clock(robot), robot.explanation),
+                              format_moment(alert.known_since_s)),
                   "  alert    ");
     const PolicyRecord* policy = find_policy(robot, record.default_policy);
     if (robot.explanation && !robot.explanation->stamps.empty()) {

@@ -50,7 +50,7 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
   MissionRecord record = test::example_record();
   const std::string text = report_text(record, "x");
   expect_readable(text);
-  EXPECT_NE(text.find("alert    alpha: localisation failure suspected, 62.0 s - 72.0 s: 1.87 m, 17.8 deg"),
+  EXPECT_NE(text.find("alert    alpha: localisation failure suspected, 62.0 s - 72.0 s, at (12.3, -4.0, 0.0) m:"),
             std::string::npos)
       << text;
   EXPECT_NE(text.find("compare  bravo: odometry and map part by up to"), std::string::npos) << text;

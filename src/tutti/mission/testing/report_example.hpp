@@ -260,6 +260,7 @@ inline MissionRecord example_record(ExampleOptions options = {}) {
                                                                      .significance = 2.4},
                                                                     {.from = stamp(31),
                                                                      .until = stamp(36),
+                                                                     .place_m = {12.34, -4.02, -0.01},
                                                                      .scale = 4,
                                                                      .length_m = 7.0,
                                                                      .translation_m = 1.87,
