@@ -1,29 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cmath>
-#include <nlohmann/json.hpp>
-
-#include "tutti/geometry/so3.hpp"
 #include "tutti/mission/report_compare.hpp"
+#include "tutti/mission/report_json_parts.hpp"
 
 namespace tutti::mission {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-/// Rounded, so that the text is short; null unless finite.
-Json number(double value, double per_unit = 1e6) {
-  if (!std::isfinite(value)) return nullptr;
-  const double rounded = std::round(value * per_unit) / per_unit;
-  return rounded == 0.0 ? 0.0 : rounded;
-}
-
-Json pose_json(const Pose3& T) {
-  const Eigen::Vector3d& t = T.translation;
-  const double sign = T.rotation.w() < 0.0 ? -1.0 : 1.0;
-  Json q = Json::array();
-  for (const double x : T.rotation.coeffs()) q.push_back(number(sign * x, 1e9));
-  return {{"translation_m", {number(t.x()), number(t.y()), number(t.z())}}, {"quaternion_xyzw", std::move(q)}};
-}
 
 /// Seconds after the first node, and the stamp itself.
 void add_moment(Json& out, const std::string& name, Timestamp stamp, const TrajectoryComparison& c) {
@@ -52,7 +32,7 @@ Json origins_json(const TrajectoryComparison& c) {
     Json row = Json::object();
     add_moment(row, "from", origin.from, c);
     add_moment(row, "until", origin.until, c);
-    row.update({{"place_m", {number(origin.place_m.x()), number(origin.place_m.y()), number(origin.place_m.z())}},
+    row.update({{"place_m", vector_json(origin.place_m)},
                 {"scale", origin.scale},
                 {"length_m", number(origin.length_m)},
                 {"translation_m", number(origin.translation_m)},

@@ -1,36 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/report_json.hpp"
 
-#include <cmath>
-#include <nlohmann/json.hpp>
-
 #include "tutti/mission/report_explanation.hpp"
 #include "tutti/mission/report_format.hpp"
 #include "tutti/mission/report_geometry.hpp"
+#include "tutti/mission/report_json_parts.hpp"
 
 namespace tutti::mission {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-/// Rounded, so that the shortest text that reads back the same is also short; null unless finite.
-Json number(std::optional<double> value, double per_unit = 1e6) {
-  if (!value || !std::isfinite(*value)) return nullptr;
-  const double rounded = std::round(*value * per_unit) / per_unit;
-  return rounded == 0.0 ? 0.0 : rounded;  // no "-0.0"
-}
-
-/// {"translation_m", "quaternion_xyzw"}
-Json vector_json(const Eigen::Vector3d& v) { return {number(v.x()), number(v.y()), number(v.z())}; }
-
-Json pose_json(const Pose3& T) {
-  Eigen::Vector4d q = T.rotation.coeffs();
-  if (q.w() < 0.0) q = -q;  // q and -q are one rotation: always print the same
-  constexpr double kPerUnit = 1e9;
-  return {{"translation_m", vector_json(T.translation)},
-          {"quaternion_xyzw",
-           {number(q.x(), kPerUnit), number(q.y(), kPerUnit), number(q.z(), kPerUnit), number(q.w(), kPerUnit)}}};
-}
 
 Json map_error_json(const std::optional<evaluation::CloudDistance>& distance) {
   if (!distance) return nullptr;
