@@ -42,6 +42,19 @@ std::pair<PoseGraph, std::vector<double>> edges_of(const PoseGraph& graph, std::
   return out;
 }
 
+/// Per component: do its own edges determine its poses?
+std::vector<bool> determined_components(const PoseGraph& graph, std::span<const Pose3> poses,
+                                        const internal::BlockStructure& structure, std::span<const double> weights) {
+  std::vector<bool> out(static_cast<std::size_t>(structure.components), false);
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    std::vector<bool> only(out.size(), false);
+    only[c] = true;
+    const auto [part, part_weights] = edges_of(graph, weights, only, structure);
+    out[c] = factor_of(part, poses, internal::analyse_blocks(part), part_weights).has_value();
+  }
+  return out;
+}
+
 }  // namespace
 
 struct JointPosterior::Factorised {
@@ -62,25 +75,17 @@ JointPosterior::JointPosterior(const PoseGraph& graph, std::span<const Pose3> po
   made->poses.assign(poses.begin(), poses.end());
   made->pairs.assign(pairs.begin(), pairs.end());
   made->determined.assign(poses.size(), true);
-  if (auto factor = factor_of(graph, poses, made->structure, weights)) {
-    made->factor = std::move(*factor);
-  } else {
-    // What one component lacks is not the others' fault.
-    std::vector<bool> determined(static_cast<std::size_t>(made->structure.components), false);
-    for (std::size_t c = 0; c < determined.size(); ++c) {
-      std::vector<bool> only(determined.size(), false);
-      only[c] = true;
-      const auto [part, part_weights] = edges_of(graph, weights, only, made->structure);
-      determined[c] = factor_of(part, poses, internal::analyse_blocks(part), part_weights).has_value();
-    }
+  auto factor = factor_of(graph, poses, made->structure, weights);
+  if (!factor) {  // what one component lacks is not the others' fault
+    const auto determined = determined_components(graph, poses, made->structure, weights);
     for (std::size_t i = 0; i < poses.size(); ++i)
       made->determined[i] = determined[static_cast<std::size_t>(made->structure.component[i])];
     const auto [sound, sound_weights] = edges_of(graph, weights, determined, made->structure);
     made->structure = internal::analyse_blocks(sound, pairs);
-    auto sound_factor = factor_of(sound, poses, made->structure, sound_weights);
-    TUTTI_CHECK(sound_factor.has_value(), "{} components, determined each but not together", determined.size());
-    made->factor = std::move(*sound_factor);
+    factor = factor_of(sound, poses, made->structure, sound_weights);
+    TUTTI_CHECK(factor.has_value(), "{} components, determined each but not together", determined.size());
   }
+  made->factor = std::move(*factor);
   factorised_ = std::move(made);
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <set>
 #include <span>
 #include <utility>
 
@@ -167,26 +166,24 @@ std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::ve
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config) {
   auto chosen = choose_nodes(map);
   std::vector<std::pair<std::size_t, std::size_t>> stretches;
-  std::vector<RobotId> robot_of;  // per stretch
   for (const auto& [robot, nodes] : chosen) {
     for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
     for (const auto& [first, last] : repairs(map, robot, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
-    robot_of.resize(stretches.size(), robot);
   }
   const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches, honest_weights(map));
   const std::vector<Matrix6d> covariances = posterior.relative_covariances();
-  // A robot whose own edges leave its poses open gets nothing; the others do.
-  std::set<RobotId> undetermined;
-  for (std::size_t s = 0; s < stretches.size(); ++s)
-    if (!covariances[s].allFinite()) undetermined.insert(robot_of[s]);
 
   std::vector<consistency::ServerNode> nodes;
   std::vector<RobotComponent> components;
   std::size_t stretch = 0;
   for (auto& [robot, indices] : chosen) {
-    if (undetermined.contains(robot)) {
-      stretch += static_cast<std::size_t>(std::ranges::count(robot_of, robot));
+    bool determined = true;
+    std::size_t next = stretch;  // after this robot's
+    for (; next < stretches.size() && map.nodes[stretches[next].first].id.robot == robot; ++next)
+      determined = determined && covariances[next].allFinite();
+    if (!determined) {  // its own edges leave its poses open: it gets nothing, and the others do
       indices.clear();
+      stretch = next;
     }
     if (indices.empty()) continue;
     components.push_back({robot, map.nodes[indices.front()].component});

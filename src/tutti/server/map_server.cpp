@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/server/map_server.hpp"
 
+#include <string>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -15,29 +16,25 @@ constexpr double kLongestStep_m = 1e4;
 
 /// What the map relies on, also of callers who do not come by wire.
 Status check_submap(const Submap& submap) {
+  const std::string where = fmt::format("submap {}/{}", submap.id.robot.value, submap.id.index);
   if (submap.keyframes.empty() || submap.odometry.size() + 1 != submap.keyframes.size())
-    return fail(ErrorCode::invalid, "submap {}/{}: {} keyframes and {} odometry factors, expected n and n - 1, n >= 1",
-                submap.id.robot.value, submap.id.index, submap.keyframes.size(), submap.odometry.size());
+    return fail(ErrorCode::invalid, "{}: {} keyframes and {} odometry factors, expected n and n - 1, n >= 1", where,
+                submap.keyframes.size(), submap.odometry.size());
   for (std::size_t k = 0; k < submap.keyframes.size(); ++k) {
     const Keyframe& keyframe = submap.keyframes[k];
     if (!is_valid(keyframe.T_odom_body))
-      return fail(ErrorCode::invalid, "submap {}/{}: keyframe {} has no valid pose", submap.id.robot.value,
-                  submap.id.index, keyframe.index);
+      return fail(ErrorCode::invalid, "{}: keyframe {} has no valid pose", where, keyframe.index);
     if (k == 0) continue;
     const Keyframe& previous = submap.keyframes[k - 1];
     if (keyframe.index != previous.index + 1 || keyframe.stamp <= previous.stamp)
-      return fail(ErrorCode::invalid, "submap {}/{}: keyframe {} at {} ns does not follow keyframe {} at {} ns",
-                  submap.id.robot.value, submap.id.index, keyframe.index, keyframe.stamp.ns, previous.index,
-                  previous.stamp.ns);
+      return fail(ErrorCode::invalid, "{}: keyframe {} at {} ns does not follow keyframe {} at {} ns", where,
+                  keyframe.index, keyframe.stamp.ns, previous.index, previous.stamp.ns);
     const RelativePose& step = submap.odometry[k - 1];
     if (!is_valid(step.T_a_b) || step.T_a_b.translation.norm() > kLongestStep_m)
-      return fail(ErrorCode::invalid, "submap {}/{}: odometry of {} m to keyframe {}, expected at most {} m",
-                  submap.id.robot.value, submap.id.index, step.T_a_b.translation.norm(), keyframe.index,
-                  kLongestStep_m);
+      return fail(ErrorCode::invalid, "{}: odometry of {} m to keyframe {}, expected at most {} m", where,
+                  step.T_a_b.translation.norm(), keyframe.index, kLongestStep_m);
     if (auto ok = check_covariance(step.covariance); !ok)
-      return in_context(
-          fmt::format("submap {}/{}: odometry to keyframe {}", submap.id.robot.value, submap.id.index, keyframe.index),
-          ok.error());
+      return in_context(fmt::format("{}: odometry to keyframe {}", where, keyframe.index), ok.error());
   }
   return {};
 }
@@ -115,12 +112,11 @@ void MapServer::give_back(VerificationJob job) {
 
 Status MapServer::receive(const ClosureVerdict& verdict) {
   const auto& [pair, closures, reason] = verdict;
+  const std::string where = fmt::format("verdict on submaps {}/{} and {}/{}", pair.first.robot.value, pair.first.index,
+                                        pair.second.robot.value, pair.second.index);
   if (!state_.submaps.contains(pair.first) || !state_.submaps.contains(pair.second))
-    return fail(ErrorCode::invalid, "verdict on submaps {}/{} and {}/{}: not both are in the map",
-                pair.first.robot.value, pair.first.index, pair.second.robot.value, pair.second.index);
+    return fail(ErrorCode::invalid, "{}: not both are in the map", where);
   for (const LoopClosure& closure : closures) {
-    const std::string where = fmt::format("verdict on submaps {}/{} and {}/{}", pair.first.robot.value,
-                                          pair.first.index, pair.second.robot.value, pair.second.index);
     if (!is_valid(closure.measurement.T_a_b)) return fail(ErrorCode::invalid, "{}: its closure is no pose", where);
     if (auto ok = check_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
   }

@@ -107,6 +107,7 @@ Evidence Prosecution::evidence(const Charge& charge) const {
       }
   return out;
 }
+
 bool Prosecution::would_notice(const PlacedClosure& closure, const Charge& charge) const {
   const Pose3 T_to_j = odometry(charge.chain, charge.cut.to, closure.j);
   const Vector6d missed = local({}, T_to_j.inverse() * (charge.missed * T_to_j));
