@@ -26,22 +26,22 @@ INCLUDE = re.compile(r'\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 
 def layer_order(root):
-    """The one list of layers is the list CMake builds them by; perception/lidar is layer perception."""
+    """The one list of layers is the list CMake builds them by."""
     cmake = (root / "src/tutti/CMakeLists.txt").read_text()
-    modules = re.search(r"foreach\(module IN ITEMS ([^)]*)\)", cmake).group(1).split()
-    order = []
-    for module in modules:
-        if (layer := module.split("/")[0]) not in order:
-            order.append(layer)
-    return order
+    return re.search(r"foreach\(module IN ITEMS ([^)]*)\)", cmake).group(1).split()
+
+
+def layer_of(order, path):
+    """The innermost listed folder that holds `path`, which is relative to src/tutti; None outside of them."""
+    return max((layer for layer in order if path.startswith(layer + "/")), key=len, default=None)
 
 
 def include_breach(order, relative, include):
-    layer = relative.split("/")[0]
+    layer = layer_of(order, relative)
     if include.startswith("tutti/") and not include.endswith(".pb.h"):  # those are generated from proto/
-        other = include.split("/")[1]
-        if other not in order:
-            return f"'{other}' is no layer"
+        other = layer_of(order, include.removeprefix("tutti/"))
+        if other is None:
+            return f"'{include.split('/')[1]}' is no layer"
         if order.index(other) > order.index(layer):
             return f"{layer} may not use {other}, a layer below it"
         if (layer, other) == ("server", "robot"):
@@ -57,7 +57,7 @@ def breaches(root):
     source = root / "src/tutti"
     for path in sorted(p for p in source.rglob("*") if p.suffix in (".hpp", ".cpp")):
         relative = path.relative_to(source).as_posix()
-        if relative.split("/")[0] not in order:
+        if layer_of(order, relative) is None:
             yield f"{path}:1: '{relative.split('/')[0]}' is missing in src/tutti/CMakeLists.txt"
             continue
         text = re.sub(r"/\*.*?\*/", lambda m: "\n" * m.group().count("\n"), path.read_text(), flags=re.S)

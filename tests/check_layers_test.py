@@ -7,7 +7,7 @@ import tempfile
 import unittest
 
 SCRIPT = pathlib.Path(__file__).parents[1] / "scripts/check_layers.py"
-CMAKE = "foreach(module IN ITEMS base geometry estimation perception/lidar robot server wire)\nendforeach()\n"
+CMAKE = "foreach(module IN ITEMS base geometry estimation perception/lidar robot server wire wire/replay)\nendforeach()\n"
 
 
 def check(files):
@@ -28,6 +28,7 @@ class CheckLayers(unittest.TestCase):
             "base/b.cpp": '// std::cout\nauto s = "std::cout";\n/* abort()\n exit(1); */\n',
             "base/a_test.cpp": "#include <ceres/ceres.h>\nstd::cout << 1;\n",
             "perception/lidar/a.cpp": '#include "tutti/geometry/a.hpp"\n#include <nanoflann.hpp>\n',
+            "wire/replay/internal/a.hpp": '#include "tutti/wire/a.hpp"\n#include "tutti/wire/replay/a.hpp"\n',
             "wire/a.cpp": '#include "tutti/v1/a.pb.h"\n#include <google/protobuf/message.h>\n',
         })
         self.assertEqual(code, 0, out)
@@ -39,6 +40,7 @@ class CheckLayers(unittest.TestCase):
             ("robot/a.hpp", '#include "tutti/server/a.hpp"'),
             ("server/a.hpp", '#include "tutti/robot/a.hpp"'),
             ("server/b.hpp", '#include "tutti/wire/a.hpp"'),
+            ("wire/a.hpp", '#include "tutti/wire/replay/a.hpp"'),
             ("base/a.hpp", '#include "tutti/nowhere/a.hpp"'),
             ("attic/a.hpp", "int x;"),
             ("base/other.cpp", "#include <yaml-cpp/yaml.h>"),

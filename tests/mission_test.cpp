@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tutti/mission/report_json.hpp"
+#include "tutti/mission/report/json.hpp"
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {

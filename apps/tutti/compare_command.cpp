@@ -16,7 +16,7 @@
 #include "compare_input.hpp"
 #include "finite_number.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/report_compare.hpp"
+#include "tutti/mission/report/compare.hpp"
 
 namespace tutti::app {
 namespace {

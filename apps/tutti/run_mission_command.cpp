@@ -8,8 +8,8 @@
 #include <chrono>
 #include <iostream>
 
-#include "tutti/mission/report_files.hpp"
-#include "tutti/mission/report_text.hpp"
+#include "tutti/mission/report/files.hpp"
+#include "tutti/mission/report/text.hpp"
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::app {

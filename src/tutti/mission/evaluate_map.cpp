@@ -5,7 +5,6 @@
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/evaluation/cloud_distance.hpp"
 #include "tutti/mission/evaluate.hpp"
-#include "tutti/mission/report_format.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 
 namespace tutti::mission {

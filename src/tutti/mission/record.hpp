@@ -264,4 +264,8 @@ struct MissionRecord {
   TimingRecord timing;
 };
 
+/// By name; null when there is none.
+const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name);
+const PolicyTiming* find_timing(const MissionRecord& record, const std::string& robot, const std::string& policy);
+
 }  // namespace tutti::mission

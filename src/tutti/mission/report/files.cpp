@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/files.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "tutti/formats/g2o.hpp"
+#include "tutti/formats/ply.hpp"
+#include "tutti/formats/tum.hpp"
+#include "tutti/mission/report/colours.hpp"
+#include "tutti/mission/report/format.hpp"
+#include "tutti/mission/report/html.hpp"
+#include "tutti/mission/report/json.hpp"
+#include "tutti/mission/report/map_pictures.hpp"
+
+namespace tutti::mission {
+namespace {
+
+namespace fs = std::filesystem;
+
+Status write_text(const fs::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.flush();
+  if (!file) return fail(ErrorCode::io, "{}: cannot write: {}", path.string(), std::strerror(errno));
+  return {};
+}
+
+std::string file_name(const std::string& robot) {
+  std::string out = robot;
+  for (char& c : out)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_') c = '_';
+  return out;
+}
+
+Status write_trajectories(const MissionRecord& record, const fs::path& out_dir) {
+  for (const auto& robot : record.robots) {
+    const PolicyRecord* policy = find_policy(robot, record.default_policy);
+    const std::pair<const char*, const Trajectory*> files[] = {{"onboard", &robot.odometry},
+                                                               {"corrected", policy ? &policy->corrected : nullptr},
+                                                               {"server", &robot.server_estimate},
+                                                               {"reference", &robot.reference}};
+    for (const auto& [estimate, trajectory] : files) {
+      if (trajectory == nullptr || trajectory->empty()) continue;
+      const fs::path path = out_dir / fmt::format("{}_{}.tum", file_name(robot.name), estimate);
+      if (auto status = formats::write_tum(path.string(), *trajectory); !status) return status;
+    }
+  }
+  return {};
+}
+
+/// Vertex ids are positions in the graph; the side file says which robot and moment each one is.
+Status write_graph(const ServerRecord& server, const fs::path& out_dir) {
+  if (auto status = formats::write_g2o((out_dir / "graph.g2o").string(), server.graph); !status) return status;
+  std::string csv = "id,robot,keyframe,stamp_ns\n";
+  for (std::size_t i = 0; i < server.nodes.size(); ++i)
+    csv += fmt::format("{},{},{},{}\n", i, server.nodes[i].id.robot.value, server.nodes[i].id.index,
+                       server.nodes[i].stamp.ns);
+  return write_text(out_dir / "graph_stamps.csv", csv);
+}
+
+Status write_map(const MissionRecord& record, const fs::path& out_dir) {
+  std::vector<Eigen::Vector3f> points;
+  std::vector<formats::Rgb> colours;
+  for (const auto& seen : record.server.clouds) {
+    const auto robot = std::find_if(record.robots.begin(), record.robots.end(),
+                                    [&](const RobotRecord& r) { return r.id == seen.robot; });
+    points.insert(points.end(), seen.cloud.points.begin(), seen.cloud.points.end());
+    colours.resize(points.size(), robot_rgb(static_cast<std::size_t>(robot - record.robots.begin())));
+  }
+  if (!points.empty())
+    if (auto status = formats::write_ply((out_dir / "map.ply").string(), points, colours); !status) return status;
+  return record.survey ? formats::write_ply((out_dir / "survey.ply").string(), record.survey->points) : Status();
+}
+
+Status write_pictures(const MissionRecord& record, const fs::path& out_dir) {
+  for (const auto& [name, picture, columns] :
+       {std::tuple<const char*, MapPicture, std::size_t>{"map_top.png", map_from_above(record), 2},
+        {"map_section.png", map_section(record), 1}})
+    if (!picture.panels.empty())
+      if (auto status = write_text(out_dir / name, encode_png(compose(picture, columns))); !status) return status;
+  return {};
+}
+
+std::string config_text(const MissionRecord& record) {
+  return fmt::format("# Tutti {}; mission {}; seed {}.\n# Every setting this run used, defaults included.\n{}",
+                     record.version, record.mission, record.seed, record.effective_config_yaml);
+}
+
+}  // namespace
+
+Status write_report(const MissionRecord& record, const fs::path& out_dir) {
+  std::error_code error;
+  fs::create_directories(out_dir, error);
+  if (error) return fail(ErrorCode::io, "{}: cannot make the output folder: {}", out_dir.string(), error.message());
+  for (const auto& [name, text] : {std::pair<const char*, std::string>{"report.json", report_json(record)},
+                                   {"timing.json", timing_json(record)},
+                                   {"report.html", report_html(record)},
+                                   {"config.yaml", config_text(record)}})
+    if (auto status = write_text(out_dir / name, text); !status) return status;
+  if (auto status = write_trajectories(record, out_dir); !status) return status;
+  if (auto status = write_graph(record.server, out_dir); !status) return status;
+  if (auto status = write_map(record, out_dir); !status) return status;
+  return write_pictures(record, out_dir);
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/format.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace tutti::mission {
+namespace {
+
+/// Three significant digits without exponent, for 0 <= value < 1000.
+std::string three_digits(double value) {
+  if (value < 9.995) return fmt::format("{:.2f}", value);
+  if (value < 99.95) return fmt::format("{:.1f}", value);
+  return fmt::format("{:.0f}", value);
+}
+
+}  // namespace
+
+std::string format_metres(std::optional<double> value_m) {
+  return value_m && std::isfinite(*value_m) ? fmt::format("{:.3f} m", *value_m) : "-";
+}
+
+std::string format_distance(double value_m) {
+  if (!std::isfinite(value_m)) return "-";
+  return value_m < 999.5 ? fmt::format("{:.0f} m", value_m) : fmt::format("{:.2f} km", value_m / 1000.0);
+}
+
+std::string format_duration_ms(double value_ms) {
+  if (!std::isfinite(value_ms)) return "-";
+  return value_ms < 999.5 ? three_digits(value_ms) + " ms" : fmt::format("{:.2f} s", value_ms / 1000.0);
+}
+
+std::string format_mission_time(double value_s) {
+  if (!std::isfinite(value_s)) return "-";
+  const auto seconds = static_cast<long long>(std::llround(value_s));
+  if (seconds < 60) return fmt::format("{} s", seconds);
+  if (seconds < 3600) return fmt::format("{} min {:02} s", seconds / 60, seconds % 60);
+  return fmt::format("{} h {:02} min", seconds / 3600, seconds % 3600 / 60);
+}
+
+std::string format_bytes(double bytes) {
+  if (!std::isfinite(bytes)) return "-";
+  if (bytes < 999.5) return fmt::format("{:.0f} B", bytes);
+  constexpr std::array<const char*, 4> kUnits{"kB", "MB", "GB", "TB"};
+  std::size_t unit = 0;
+  for (bytes /= 1000.0; bytes >= 999.5 && unit + 1 < kUnits.size(); ++unit) bytes /= 1000.0;
+  return three_digits(bytes) + " " + kUnits[unit];
+}
+
+std::string format_share(std::size_t part, std::size_t whole) {
+  return whole == 0 ? "-" : fmt::format("{:.1f} %", 100.0 * static_cast<double>(part) / static_cast<double>(whole));
+}
+
+std::optional<Spread> spread(std::span<const double> samples) {
+  if (samples.empty()) return std::nullopt;
+  std::vector<double> sorted(samples.begin(), samples.end());
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t middle = sorted.size() / 2;
+  const double median = sorted.size() % 2 == 1 ? sorted[middle] : 0.5 * (sorted[middle - 1] + sorted[middle]);
+  return Spread{sorted.size(), median, sorted.back()};
+}
+
+std::string format_spread(std::span<const double> samples) {
+  const auto s = spread(samples);
+  return s ? fmt::format("{:.1f} / {:.1f}", s->median, s->max) : "-";
+}
+
+std::string_view drift_name(DriftOrigin::Kind kind) {
+  switch (kind) {
+    case DriftOrigin::Kind::slip:
+      return "slip";
+    case DriftOrigin::Kind::degeneracy:
+      return "degeneracy";
+    case DriftOrigin::Kind::failure:
+      return "failure";
+  }
+  return "";
+}
+
+ClosureCounts count_closures(const ServerRecord& server) {
+  ClosureCounts counts;
+  for (const auto& closure : server.closures)
+    ++(closure.from.robot == closure.to.robot ? counts.accepted_intra : counts.accepted_inter);
+  for (const auto& rejection : server.rejections) {
+    counts.rejected_intra += rejection.intra;
+    counts.rejected_inter += rejection.inter;
+  }
+  return counts;
+}
+
+std::string format_surer_turns(std::span<const RobotRecord> robots) {
+  std::string names;
+  for (const RobotRecord& robot : robots)
+    if (robot.rotation_factor < 1.0)
+      names += fmt::format("{}{} {:.1f} times", names.empty() ? "" : ", ", robot.name,
+                           1.0 / std::sqrt(robot.rotation_factor));
+  if (names.empty()) return "";
+  return "Closures show that odometry turns better than it says (at least: " + names + "); the server counts it so.";
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "tutti/mission/record.hpp"
+
+/// How the report's figures are worded; shared by console and page.
+namespace tutti::mission {
+
+/// Three decimals with the unit, "-" when not measured or not finite: "0.013 m".
+std::string format_metres(std::optional<double> value_m);
+/// Long distances: "46 m", "1.21 km".
+std::string format_distance(double value_m);
+/// Three significant digits: "0.42 ms", "12.3 ms", "1.20 s".
+std::string format_duration_ms(double value_ms);
+/// Mission time: "42 s", "9 min 40 s", "1 h 02 min".
+std::string format_mission_time(double value_s);
+/// Powers of 1000: "812 B", "3.42 kB", "1.20 MB".
+std::string format_bytes(double bytes);
+/// "2.6 %"; "-" when the whole is 0.
+std::string format_share(std::size_t part, std::size_t whole);
+
+/// Middle and largest of some samples; none without samples. An even number of samples: mean of the two middle ones.
+struct Spread {
+  std::size_t count = 0;
+  double median = 0.0;
+  double max = 0.0;
+};
+std::optional<Spread> spread(std::span<const double> samples);
+/// "12.3 / 45.0" (median / max); "-" without samples.
+std::string format_spread(std::span<const double> samples);
+
+/// "slip", "degeneracy", "failure".
+std::string_view drift_name(DriftOrigin::Kind kind);
+
+/// Sums of what the tables repeat.
+struct ClosureCounts {
+  std::size_t accepted_intra = 0;
+  std::size_t accepted_inter = 0;
+  std::size_t rejected_intra = 0;
+  std::size_t rejected_inter = 0;
+  [[nodiscard]] std::size_t accepted() const { return accepted_intra + accepted_inter; }
+  [[nodiscard]] std::size_t rejected() const { return rejected_intra + rejected_inter; }
+};
+ClosureCounts count_closures(const ServerRecord& server);
+/// Whose odometry turns better than it says, in standard deviations, as a sentence; empty when nobody's does.
+std::string format_surer_turns(std::span<const RobotRecord> robots);
+
+}  // namespace tutti::mission

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What one reads first: the mission, what was corrected with how little, the map in figures.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/mission/report/format.hpp"
+#include "tutti/mission/report/html_parts.hpp"
+
+namespace tutti::mission {
+namespace {
+
+struct Card {
+  std::string what, value, detail;  ///< HTML
+};
+
+std::string cards_html(const std::vector<Card>& cards, std::string_view css_class) {
+  std::string out = fmt::format("<div class=\"{}\">\n", css_class);
+  for (const auto& card : cards)
+    out += fmt::format(
+        "<div class=\"card\"><p class=\"what\">{}</p><p class=\"value\">{}</p><p class=\"detail\">{}</p></div>\n",
+        card.what, card.value, card.detail);
+  return out + "</div>\n";
+}
+
+std::string rate(std::uint64_t bytes, double seconds) {
+  return seconds > 0.0 ? format_bytes(static_cast<double>(bytes) / seconds) + "/s" : "-";
+}
+
+std::string from_to(std::optional<double> onboard_m, std::optional<double> corrected_m) {
+  return fmt::format("<span class=\"up\">{}</span> → <span class=\"down\">{}</span>", format_metres(onboard_m),
+                     format_metres(corrected_m));
+}
+
+/// What was corrected with how little.
+Card robot_card(const MissionRecord& record, const RobotRecord& robot) {
+  const PolicyRecord* policy = find_policy(robot, record.default_policy);
+  const std::size_t constraints = policy != nullptr ? policy->constraints_added : 0;
+  Card card;
+  card.what =
+      fmt::format("<span class=\"swatch {}\"></span>{} <small>{} in {}</small>", robot_class(record, robot.id),
+                  escape_xml(robot.name), format_distance(robot.distance_m), format_mission_time(robot.duration_s));
+  if (robot.onboard.rmse_m && policy != nullptr)
+    card.value = from_to(robot.onboard.rmse_m, policy->accuracy.rmse_m) +
+                 fmt::format(" <small>server {}</small>", format_metres(robot.server.rmse_m));
+  else
+    card.value =
+        format_metres(policy != nullptr ? policy->agreement_rmse_m : std::nullopt) + " <small>from the server</small>";
+  card.detail =
+      fmt::format("<b>{}</b> constraints beside {} odometry factors ({}); <b>{}</b> received ({}), {} sent ({})",
+                  constraints, robot.odometry_factors, format_share(constraints, robot.odometry_factors),
+                  format_bytes(static_cast<double>(robot.bytes_down)), rate(robot.bytes_down, robot.duration_s),
+                  format_bytes(static_cast<double>(robot.bytes_up)), rate(robot.bytes_up, robot.duration_s));
+  if (const auto& [onboard, corrected] = robot.map_error; onboard && corrected)
+    card.detail += fmt::format("<br>its map, mean distance to the survey: <b>{} → {}</b>",
+                               format_metres(onboard->mean_m), format_metres(corrected->mean_m));
+  return card;
+}
+
+std::string robots_html(const MissionRecord& record) {
+  std::vector<Card> cards;
+  bool referenced = false;
+  for (const RobotRecord& robot : record.robots) {
+    cards.push_back(robot_card(record, robot));
+    referenced = referenced || robot.onboard.rmse_m.has_value();
+  }
+  if (cards.empty()) return "";
+  return fmt::format("<p class=\"lead\">{}</p>\n", referenced
+                                                       ? "Error of every robot, RMSE: by its own odometry → corrected"
+                                                       : "Difference between corrected robots and server, RMSE; no "
+                                                         "reference, so errors could not be measured") +
+         cards_html(cards, "robots");
+}
+
+std::vector<Card> map_cards(const MissionRecord& record) {
+  const ServerRecord& server = record.server;
+  std::vector<Card> cards;
+  if (server.joint.rmse_m)
+    cards.push_back({"Error of the server's map, RMSE", format_metres(server.joint.rmse_m),
+                     "all robots in one alignment; largest " + format_metres(server.joint.max_error_m)});
+  if (server.map_error)
+    cards.push_back(
+        {"Joint map off the survey, mean", format_metres(server.map_error->mean_m),
+         fmt::format("95 % of {} points within {}", server.map_error->points, format_metres(server.map_error->p95_m))});
+  const ClosureCounts closures = count_closures(server);
+  cards.push_back({"Loop closures in the map", std::to_string(closures.accepted()),
+                   fmt::format("{} between robots; {} refused", closures.accepted_inter, closures.rejected())});
+  std::vector<double> update_ms;
+  for (const auto& robot : record.robots)
+    if (const PolicyTiming* timing = find_timing(record, robot.name, record.default_policy))
+      update_ms.insert(update_ms.end(), timing->update_ms.begin(), timing->update_ms.end());
+  if (const auto update = spread(update_ms))
+    cards.push_back({"A robot's answer to a broadcast", format_duration_ms(update->median),
+                     fmt::format("median of {}; slowest {}", update->count, format_duration_ms(update->max))});
+  return cards;
+}
+
+std::string header_html(const MissionRecord& record) {
+  double distance_m = 0.0;
+  for (const auto& robot : record.robots) distance_m += robot.distance_m;
+  const std::size_t maps = record.server.components;
+  std::string out =
+      fmt::format("<p class=\"brand\">Tutti</p>\n<h1>{}</h1>\n<p class=\"description\">{}</p>\n<ul class=\"facts\">\n",
+                  escape_xml(record.mission), escape_xml(record.description));
+  const auto fact = [&](const std::string& text, std::string_view css_class = {}) {
+    out += fmt::format("<li{}>{}</li>\n", css_class.empty() ? "" : fmt::format(" class=\"{}\"", css_class),
+                       escape_xml(text));
+  };
+  if (!record.input.empty()) fact(record.input, "input");
+  fact(fmt::format("{} robot{}, {} map{}", record.robots.size(), record.robots.size() == 1 ? "" : "s", maps,
+                   maps == 1 ? "" : "s"));
+  fact(fmt::format("{} in {}", format_distance(distance_m), format_mission_time(record.duration_s)));
+  fact("policy " + record.default_policy);
+  fact(fmt::format("seed {}", record.seed));
+  return out + "</ul>\n";
+}
+
+}  // namespace
+
+std::string headline_html(const MissionRecord& record) {
+  return header_html(record) + alerts_html(record) + robots_html(record) + cards_html(map_cards(record), "cards");
+}
+
+}  // namespace tutti::mission

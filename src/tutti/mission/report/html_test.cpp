@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/html.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tutti/mission/report/testing/good_page.hpp"
+#include "tutti/mission/report/testing/report_example.hpp"
+
+namespace tutti::mission {
+namespace {
+
+using test::expect_good_page;
+using test::has_number_that_is_not_finite;
+using test::malformed;
+
+TEST(CheckerOfThisTest, SeesMistakes) {
+  EXPECT_EQ(malformed("<style>a > b</style><p class=\"x\">a &amp; b<br></p><path d=\"M0\"/>"), "");
+  for (const char* wrong : {"<p><b></p></b>", "<p>", "</p>", "<p>a & b</p>", "<p>a < b</p>", "<p>a > b</p>",
+                            "<p title=\"a & b\"></p>", "<p title=\"a</p>", "<p"})
+    EXPECT_NE(malformed(wrong), "") << wrong;
+  EXPECT_TRUE(has_number_that_is_not_finite("d=\"M0 0L1 nan\""));
+  EXPECT_TRUE(has_number_that_is_not_finite("width:-inf%"));
+  EXPECT_TRUE(has_number_that_is_not_finite("<td>nan m</td>"));
+  EXPECT_FALSE(has_number_that_is_not_finite("information, finance, banana"));
+}
+
+TEST(ReportHtml, IsWellFormedAndSelfContained) { expect_good_page(report_html(test::example_record({.cloud = true}))); }
+
+TEST(ReportHtml, HasEverySection) {
+  const std::string html = report_html(test::example_record({.cloud = true}));
+  for (const char* title : {"The joint map", "Each robot by itself", "The map: odometry alone, and joint",
+                            "Who drifted where and when", "Policies side by side", "Where and when the maps disagree",
+                            "The proxy graph", "Loop closures", "How the robots&#39; frames lie",
+                            "What goes over the radio", "Time", "What to keep in mind", "Effective configuration"})
+    EXPECT_NE(html.find(title), std::string::npos) << title;
+  for (const char* policy : {"every_node_2", "uniform", "random", "euclidean"})
+    EXPECT_NE(html.find(policy), std::string::npos) << policy;
+  EXPECT_NE(html.find("slides along one direction"), std::string::npos);
+}
+
+TEST(ReportHtml, ShowsTheMapBesideTheSurvey) {
+  const std::string html = report_html(test::example_record({.survey = true}));
+  expect_good_page(html);
+  EXPECT_NE(html.find("The map beside the survey"), std::string::npos);
+  EXPECT_NE(html.find("its map, mean distance to the survey: <b>0.410 m → 0.060 m</b>"), std::string::npos);
+  std::size_t pictures = 0;  // one under the joint map; four from above and four sections; two disagreement maps
+  for (std::size_t at = html.find("<image"); at != std::string::npos; at = html.find("<image", at + 1)) ++pictures;
+  EXPECT_EQ(pictures, 11U);
+}
+
+TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
+  MissionRecord record = test::example_record();
+  std::string html = report_html(record);
+  for (const char* kind : {"drift slip", "drift degeneracy", "drift failure"})
+    EXPECT_NE(html.find(std::string("<rect class=\"") + kind), std::string::npos) << kind;
+  EXPECT_EQ(html.find("suspected by the server"), std::string::npos);
+  const auto& robot = record.robots[1];
+  record.robots[1].start_s = 300.0;
+  record.server.failed_odometry = {{robot.id, robot.odometry[6].stamp, robot.odometry[15].stamp, 2.41, 0.05}};
+  html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("suspected by the server:</b> bravo, 312.0 s - 330.0 s: 2.410 m, 2.9 deg"), std::string::npos);
+  EXPECT_NE(html.find("<rect class=\"suspect\""), std::string::npos);
+}
+
+TEST(ReportHtml, ExplainsWhereOdometryAndMapPart) {
+  MissionRecord record = test::example_record();
+  record.robots[0].start_s = 600.0;
+  for (auto& alert : record.robots[0].alerts) alert.known_since_s += 600.0;
+  std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("Where odometry and map part"), std::string::npos);
+  EXPECT_NE(
+      html.find(
+          "Localisation failure suspected:</b> alpha, 662.0 s - 672.0 s, at (12.3, -4.0, 0.0) m: 1.87 m, 17.8 deg over "
+          "7.00 m (scale 8.0 m), "
+          "noticed by the robot at 720.0 s"),
+      std::string::npos);
+  EXPECT_NE(html.find("<td>failure, 660.0 s - 672.0 s: 1.900 m, 17.2 deg</td>"), std::string::npos) << "the true one";
+  for (const char* shape : {"<rect class=\"origin alert\"", "<rect class=\"origin\"", "<rect class=\"truth failure\"",
+                            "<rect class=\"originbox\""})
+    EXPECT_NE(html.find(shape), std::string::npos) << shape;
+  record.robots[0].alerts[0].withdrawn_s = 770.0;
+  EXPECT_NE(report_html(record).find("Localisation failure no longer suspected:</b> alpha"), std::string::npos);
+}
+
+TEST(ReportHtml, DrawsTheWayThatOdometryMisses) {
+  MissionRecord record = test::example_record({.robots = 1});
+  EXPECT_EQ(report_html(record).find(">missed</text>"), std::string::npos);
+  test::miss_a_way(*record.robots[0].explanation);
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find(">missed</text>"), std::string::npos);
+  EXPECT_NE(html.find("odometry misses that by 4.80 m, 1.15 deg over 80.0 m, 44 x the threshold"), std::string::npos);
+  EXPECT_NE(html.find("part by up to 44 x the threshold: closures tie"), std::string::npos);
+}
+
+TEST(ReportHtml, NamesTheJumpsTakenBack) {
+  MissionRecord record = test::example_record();
+  EXPECT_EQ(report_html(record).find("Odometry jumped"), std::string::npos);
+  test::jump_back(record.robots[0], record.default_policy);
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("Odometry jumped:</b> alpha, 0.100 m, 20.1 deg, 12.0 s - 14.0 s"), std::string::npos);
+}
+
+TEST(ReportHtml, NamesOdometryThatIsBetterThanStated) {
+  MissionRecord record = test::example_record();
+  EXPECT_EQ(report_html(record).find("turns better"), std::string::npos);
+  record.robots[0].rotation_factor = 0.16;
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("odometry turns better than it says (at least: alpha 2.5 times); the server"), std::string::npos);
+}
+
+TEST(ReportHtml, SaysWhenNothingHadToBeAdded) {
+  MissionRecord record = test::example_record({.robots = 1});
+  auto& robot = record.robots[0];
+  robot.explanation = test::example_explanation(robot.server_estimate, {});
+  robot.policies[2].constraints_added = 0;
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(html.find("odometry and map agree within what the server is sure of"), std::string::npos);
+  EXPECT_NE(html.find("nothing was added"), std::string::npos);
+  EXPECT_EQ(html.find("<rect class=\"origin"), std::string::npos);
+}
+
+TEST(ReportHtml, ListsTrafficByKindAndTheServersLoad) {
+  MissionRecord record = test::example_record();
+  record.robots[0].traffic = {{"alpha", "server", "sub<map", 24, 812'345, 900'000, 3398.0, 41'000}};
+  record.timing.server_load = {3600.0, 30.0, 150.0, {20.0, 4000.0, 9000.0}, 512.0};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  for (const char* cell :
+       {"sub&lt;map", "812 kB", "900 kB", "3.40 kB/s", "0.83 %", "4.17 %", "20 x", "4.00 s / 9.00 s", "512 MB"})
+    EXPECT_NE(html.find(cell), std::string::npos) << cell;
+}
+
+TEST(ReportHtml, IsAFunctionOfTheRecord) {
+  EXPECT_EQ(report_html(test::example_record()), report_html(test::example_record()));
+}
+
+TEST(ReportHtml, EscapesEveryText) {
+  MissionRecord record = test::example_record({.keyframes = 40});
+  const std::string evil = "</title><b>&\"'";
+  record.mission = record.description = record.input = record.version = evil;
+  record.effective_config_yaml = record.timing.machine = record.rpe_interval = evil;
+  record.notes = {evil};
+  record.default_policy = evil;
+  for (auto& robot : record.robots) {
+    robot.name = evil + robot.name;
+    robot.policies[2].name = evil;
+  }
+  record.server.rejections = {{evil, 1, 2}};
+  record.transforms[0].from = record.transforms[0].to = evil;
+  for (auto& timing : record.timing.policies) timing.robot = timing.policy = evil;
+  record.timing.load = {{evil, 0.5, 12.0}};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_EQ(html.find(evil), std::string::npos);
+}
+
+TEST(ReportHtml, WorksWithoutReferenceCloudOrUpdates) {
+  MissionRecord record = test::example_record({.reference = false});
+  for (auto& robot : record.robots) robot.updates.clear();
+  record.timing = {};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_EQ(html.find("Where and when"), std::string::npos);
+  EXPECT_NE(html.find("no reference"), std::string::npos);
+}
+
+TEST(ReportHtml, EmptyMission) { expect_good_page(report_html(MissionRecord{})); }
+
+TEST(ReportHtml, RobotThatNeverMovedOrSpoke) {
+  MissionRecord record;
+  record.robots.push_back({.name = "silent"});
+  RobotRecord& still = record.robots.emplace_back(RobotRecord{.id = {1}, .name = "still"});
+  still.odometry = {{Timestamp{5}, Pose3{}}};
+  still.server_estimate = still.reference = still.odometry;
+  still.updates = {{.time_s = 20.0, .revision = 1}};
+  expect_good_page(report_html(record));
+}
+
+TEST(ReportHtml, SurvivesNumbersThatAreNotFinite) {
+  MissionRecord record = test::example_record({.keyframes = 60});
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  record.robots[0].odometry[7].pose.translation.x() = kNaN;
+  record.robots[0].policies[2].corrected[9].pose.translation.y() = std::numeric_limits<double>::infinity();
+  record.robots[0].updates[0].mean_disagreement_m[2] = kNaN;
+  record.robots[0].updates[0].max_disagreement_m.resize(3);
+  record.robots[0].onboard.rmse_m = kNaN;
+  record.robots[0].explanation->significance(4, 2) = kNaN;
+  record.robots[0].explanation->significance(9, 1) = std::numeric_limits<double>::infinity();
+  record.robots[0].explanation->origins[0].translation_m = kNaN;
+  record.robots[0].explanation->origins[1].significance = std::numeric_limits<double>::infinity();
+  record.robots[0].explanation->scale_length_m[3] = kNaN;
+  record.server.proxy.nodes[5].T_world_body.translation.z() = kNaN;
+  record.transforms[0].T_from_to.translation.x() = kNaN;
+  expect_good_page(report_html(record));
+}
+
+TEST(ReportHtml, GroupsThatNeverMetGetTheirOwnPicture) {
+  MissionRecord record = test::example_record({.robots = 3, .keyframes = 60});
+  record.robots[2].component = 1;
+  record.server.components = 2;
+  record.server.proxy.components[2].component = 1;
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  std::size_t pictures = 0;
+  for (std::size_t at = html.find("The joint map from above"); at != std::string::npos;
+       at = html.find("The joint map from above", at + 1))
+    ++pictures;
+  EXPECT_EQ(pictures, 2U);
+}
+
+TEST(ReportHtml, LongMissionStaysSmall) {
+  const std::string html = report_html(test::example_record({.robots = 3, .keyframes = 1000}));
+  EXPECT_LT(html.size(), 2'000'000U);
+  EXPECT_LT(report_html(test::example_record({.robots = 3, .keyframes = 1000, .survey = true})).size(),
+            html.size() + 4'000'000U);  // pictures, however many the points
+}
+
+}  // namespace
+}  // namespace tutti::mission

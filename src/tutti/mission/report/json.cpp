@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/json.hpp"
+
+#include "tutti/mission/report/explanation.hpp"
+#include "tutti/mission/report/format.hpp"
+#include "tutti/mission/report/geometry.hpp"
+#include "tutti/mission/report/json_parts.hpp"
+
+namespace tutti::mission {
+namespace {
+
+Json map_error_json(const std::optional<evaluation::CloudDistance>& distance) {
+  if (!distance) return nullptr;
+  return {{"points", distance->points},
+          {"mean_m", number(distance->mean_m)},
+          {"rms_m", number(distance->rms_m)},
+          {"p95_m", number(distance->p95_m)},
+          {"within_10cm", number(distance->within_10cm)},
+          {"within_30cm", number(distance->within_30cm)},
+          {"within_1m", number(distance->within_1m)}};
+}
+
+/// Something that lasts from `from` to `until`: both in mission time, and then its own keys.
+template <typename Stretch>
+Json stretch_json(const RobotRecord& robot, const Stretch& stretch, const Json& its_own) {
+  const PictureClock clock = mission_clock(robot);
+  Json out = {{"from_s", number(clock(stretch.from))}, {"until_s", number(clock(stretch.until))}};
+  out.update(its_own);
+  return out;
+}
+
+Json drift_json(const RobotRecord& robot) {
+  Json out = Json::array();
+  for (const DriftOrigin& drift : robot.drift_origins)
+    out.push_back(stretch_json(robot, drift,
+                               {{"kind", drift_name(drift.kind)},
+                                {"translation_m", number(drift.translation_m)},
+                                {"rotation_rad", number(drift.rotation_rad)}}));
+  return out;
+}
+
+/// Keys of one estimate's figures, each behind `prefix`.
+void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy) {
+  out[prefix + "rmse_m"] = number(accuracy.rmse_m);
+  out[prefix + "max_error_m"] = number(accuracy.max_error_m);
+  out[prefix + "rpe_m"] = number(accuracy.rpe_m);
+  out[prefix + "rpe_deg"] = number(accuracy.rpe_deg);
+  out[prefix + "rpe_10m_m"] = number(accuracy.rpe_10m_m);
+  out[prefix + "rpe_10m_deg"] = number(accuracy.rpe_10m_deg);
+}
+
+Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
+  Json out = Json::object();
+  add_accuracy(out, "", policy.accuracy);
+  out["jumps"] = Json::array();
+  for (const RepairedJump& jump : policy.jumps)
+    out["jumps"].push_back(stretch_json(
+        robot, jump, {{"translation_m", number(jump.translation_m)}, {"rotation_rad", number(jump.rotation_rad)}}));
+  out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
+  out["kink_deg"] = policy.kink ? number(policy.kink->rotation_deg) : Json(nullptr);
+  out["agreement_rmse_m"] = number(policy.agreement_rmse_m);
+  out["constraints"] = policy.constraints_added;
+  return out;
+}
+
+Json origin_json(const RobotRecord& robot, const consistency::SuspectedOrigin& origin) {
+  const auto& lengths_m = robot.explanation ? robot.explanation->scale_length_m : std::vector<double>{};
+  const auto scale = static_cast<std::size_t>(std::max(origin.scale, 0));
+  return stretch_json(robot, origin,
+                      {{"place_m", vector_json(origin.place_m)},
+                       {"scale", origin.scale},
+                       {"scale_length_m", scale < lengths_m.size() ? number(lengths_m[scale]) : Json(nullptr)},
+                       {"length_m", number(origin.length_m)},
+                       {"translation_m", number(origin.translation_m)},
+                       {"rotation_rad", number(origin.rotation_rad)},
+                       {"significance", number(origin.significance)},
+                       {"alert", origin.alert}});
+}
+
+/// The last update's; null when there was none.
+Json explanation_json(const RobotRecord& robot) {
+  if (!robot.explanation) return nullptr;
+  const consistency::Explanation& e = *robot.explanation;
+  Json lengths = Json::array();
+  for (const double length_m : e.scale_length_m) lengths.push_back(number(length_m));
+  Json largest = Json::array();
+  Json whole = Json::array();
+  for (Eigen::Index s = 0; s < e.significance.cols() && e.significance.rows() > 0; ++s)
+    largest.push_back(number(e.significance.col(s).maxCoeff()));
+  for (const double significance : e.scale_significance) whole.push_back(number(significance));
+  Json origins = Json::array();
+  for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
+  Json ways = Json::array();
+  for (const auto& way : e.missed_ways)
+    ways.push_back(stretch_json(robot, way,
+                                {{"length_m", number(way.length_m)},
+                                 {"translation_m", number(way.translation_m)},
+                                 {"rotation_rad", number(way.rotation_rad)},
+                                 {"significance", number(way.significance)}}));
+  return {{"disagrees", e.disagrees()},
+          {"nodes", e.stamps.size()},
+          {"aligned_rmse_m", number(e.aligned_rmse_m)},
+          {"expected_rmse_m", e.expected_rmse_m > 0.0 ? number(e.expected_rmse_m) : Json(nullptr)},
+          {"scale_length_m", std::move(lengths)},
+          {"largest_significance", std::move(largest)},
+          {"scale_significance", std::move(whole)},
+          {"missed_ways", std::move(ways)},
+          {"suspected_origins", std::move(origins)}};
+}
+
+Json alerts_json(const RobotRecord& robot) {
+  Json out = Json::array();
+  for (const AlertRecord& alert : robot.alerts) {
+    Json row = origin_json(robot, alert.origin);
+    row["known_since_s"] = number(alert.known_since_s);
+    row["known_since_broadcast"] = alert.known_since_revision;
+    row["withdrawn_s"] = number(alert.withdrawn_s);
+    out.push_back(std::move(row));
+  }
+  return out;
+}
+
+Json traffic_json(const std::vector<TrafficRecord>& traffic) {
+  Json rows = Json::array();
+  for (const auto& row : traffic)
+    rows.push_back({{"from", row.from},
+                    {"to", row.to},
+                    {"kind", row.kind},
+                    {"messages", row.messages},
+                    {"bytes", row.bytes},
+                    {"transmitted_bytes", row.transmitted_bytes},
+                    {"bytes_per_s", number(row.bytes_per_s)},
+                    {"largest_message", row.largest_message}});
+  return rows;
+}
+
+Json robot_json(const RobotRecord& robot) {
+  Json policies = Json::object();
+  for (const auto& policy : robot.policies) policies[policy.name] = policy_json(robot, policy);
+  Json out{{"name", robot.name},
+           {"distance_m", number(robot.distance_m)},
+           {"start_s", number(robot.start_s)},
+           {"duration_s", number(robot.duration_s)},
+           {"odometry_factors", robot.odometry_factors},
+           {"rotation_variance_factor", number(robot.rotation_factor)},
+           {"keyframes", robot.keyframes},
+           {"submaps", robot.submaps},
+           {"component", robot.component}};
+  add_accuracy(out, "onboard_", robot.onboard);
+  add_accuracy(out, "server_", robot.server);
+  out.update({{"map_error",
+               {{"onboard", map_error_json(robot.map_error.onboard)},
+                {"corrected", map_error_json(robot.map_error.corrected)}}},
+              {"drift_origins", drift_json(robot)},
+              {"explanation", explanation_json(robot)},
+              {"alerts", alerts_json(robot)},
+              {"policies", std::move(policies)},
+              {"bytes_up", robot.bytes_up},
+              {"bytes_down", robot.bytes_down},
+              {"messages_up", robot.messages_up},
+              {"messages_down", robot.messages_down},
+              {"traffic", traffic_json(robot.traffic)},
+              {"proxy_nodes", robot.proxy_nodes},
+              {"updates", robot.updates.size()}});
+  return out;
+}
+
+Json server_json(const MissionRecord& record) {
+  const ServerRecord& server = record.server;
+  const ClosureCounts counts = count_closures(server);
+  Json rejections = Json::array();
+  for (const auto& rejection : server.rejections)
+    rejections.push_back({{"reason", rejection.reason}, {"intra", rejection.intra}, {"inter", rejection.inter}});
+  Json check = nullptr;
+  if (server.closure_check)
+    check = {{"checked", server.closure_check->checked},
+             {"wrong", server.closure_check->wrong},
+             {"max_error_m", number(server.closure_check->max_error_m)},
+             {"max_error_deg", number(server.closure_check->max_error_deg)}};
+  Json failed = Json::array();
+  for (const FailedOdometryRecord& stretch : server.failed_odometry)
+    for (const RobotRecord& robot : record.robots)
+      if (robot.id == stretch.robot)
+        failed.push_back(stretch_json(
+            robot, stretch,
+            {{"robot", robot.name}, {"error_m", number(stretch.error_m)}, {"error_rad", number(stretch.error_rad)}}));
+  return {{"components", server.components},
+          {"closures_accepted", counts.accepted()},
+          {"closures_accepted_intra", counts.accepted_intra},
+          {"closures_accepted_inter", counts.accepted_inter},
+          {"closures_rejected", counts.rejected()},
+          {"rejections", std::move(rejections)},
+          {"closure_check", std::move(check)},
+          {"rmse_m", number(server.joint.rmse_m)},
+          {"max_error_m", number(server.joint.max_error_m)},
+          {"rpe_m", number(server.joint.rpe_m)},
+          {"T_reference_world", server.T_reference_world ? pose_json(*server.T_reference_world) : Json(nullptr)},
+          {"map_error", map_error_json(server.map_error)},
+          {"survey_covered", number(server.survey_covered)},
+          {"failed_odometry", std::move(failed)}};
+}
+
+Json transform_json(const TransformRecord& transform) {
+  Json out{{"from", transform.from}, {"to", transform.to}};
+  out.update(pose_json(transform.T_from_to));
+  out["error_m"] = number(transform.error_m);
+  out["error_deg"] = number(transform.error_deg);
+  return out;
+}
+
+/// {"count", "median_ms", "max_ms"}; the two figures are null without samples.
+Json spread_json(const std::vector<double>& samples) {
+  const auto s = spread(samples);
+  return {{"count", samples.size()},
+          {"median_ms", s ? number(s->median) : Json(nullptr)},
+          {"max_ms", s ? number(s->max) : Json(nullptr)}};
+}
+
+Json load_json(const ServerLoadRecord& load) {
+  const double busy_s = load.map_cpu_s + load.verification_cpu_s;
+  return {{"mission_s", number(load.mission_s)},
+          {"map_cpu_s", number(load.map_cpu_s)},
+          {"verification_cpu_s", number(load.verification_cpu_s)},
+          {"share_of_one_core", load.mission_s > 0.0 ? number(busy_s / load.mission_s) : Json(nullptr)},
+          {"update_latency", spread_json(load.update_latency_ms)},
+          {"peak_memory_mb", load.peak_memory_mb > 0.0 ? number(load.peak_memory_mb) : Json(nullptr)}};
+}
+
+/// Foreign text with broken UTF-8 must not make the writer throw.
+std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+}  // namespace
+
+std::string report_json(const MissionRecord& record) {
+  Json robots = Json::array();
+  for (const auto& robot : record.robots) robots.push_back(robot_json(robot));
+  Json transforms = Json::array();
+  for (const auto& transform : record.transforms) transforms.push_back(transform_json(transform));
+  return dump(Json{{"mission", record.mission},
+                   {"description", record.description},
+                   {"input", record.input},
+                   {"notes", record.notes},
+                   {"seed", record.seed},
+                   {"default_policy", record.default_policy},
+                   {"duration_s", number(record.duration_s)},
+                   {"association",
+                    {{"interpolate", record.association.interpolate},
+                     {"max_gap_s", number(record.association.max_gap_s)},
+                     {"max_difference_s", number(record.association.max_difference_s)}}},
+                   {"rpe_interval", record.rpe_interval},
+                   {"robots", std::move(robots)},
+                   {"server", server_json(record)},
+                   {"transforms", std::move(transforms)}});
+}
+
+std::string timing_json(const MissionRecord& record) {
+  const TimingRecord& timing = record.timing;
+  Json policies = Json::array();
+  for (const auto& policy : timing.policies)
+    policies.push_back({{"robot", policy.robot},
+                        {"policy", policy.policy},
+                        {"update", spread_json(policy.update_ms)},
+                        {"comparison", spread_json(policy.comparison_ms)},
+                        {"optimisation", spread_json(policy.optimisation_ms)}});
+  Json load = Json::array();
+  for (const auto& entry : timing.load)
+    load.push_back({{"name", entry.name},
+                    {"cpu_share", number(entry.cpu_share)},
+                    {"worst_latency_ms", number(entry.worst_latency_ms)}});
+  return dump(Json{{"mission", record.mission},
+                   {"seed", record.seed},
+                   {"version", record.version},
+                   {"machine", timing.machine},
+                   {"wall_s", number(timing.wall_s)},
+                   {"rate", number(timing.rate)},
+                   {"policies", std::move(policies)},
+                   {"server",
+                    {{"verification", spread_json(timing.server_verification_ms)},
+                     {"optimisation", spread_json(timing.server_optimisation_ms)},
+                     {"load", load_json(timing.server_load)}}},
+                   {"load", std::move(load)}});
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/json.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "tutti/mission/report/testing/report_example.hpp"
+
+namespace tutti::mission {
+namespace {
+
+using nlohmann::json;
+
+std::set<std::string> keys(const json& object) {
+  std::set<std::string> out;
+  for (const auto& [key, value] : object.items()) out.insert(key);
+  return out;
+}
+
+void expect_keys(const json& object, const std::vector<std::string>& wanted) {
+  const auto have = keys(object);
+  for (const auto& key : wanted) EXPECT_TRUE(have.contains(key)) << "missing " << key << " in " << object.dump();
+}
+
+TEST(ReportJson, HasTheDocumentedKeys) {
+  const json report = json::parse(report_json(test::example_record()));
+  expect_keys(report, {"mission", "seed", "default_policy", "robots", "server", "transforms", "input", "notes",
+                       "association", "rpe_interval", "duration_s", "description"});
+  ASSERT_EQ(report["robots"].size(), 2U);
+  for (const auto& robot : report["robots"]) {
+    expect_keys(robot, {"name", "distance_m", "odometry_factors", "rotation_variance_factor", "onboard_rmse_m",
+                        "server_rmse_m", "policies", "bytes_up", "bytes_down", "traffic", "proxy_nodes"});
+    ASSERT_EQ(robot["traffic"].size(), 2U);
+    for (const auto& row : robot["traffic"])
+      expect_keys(row,
+                  {"from", "to", "kind", "messages", "bytes", "transmitted_bytes", "bytes_per_s", "largest_message"});
+    EXPECT_EQ(robot["traffic"][1]["largest_message"], 9876);
+    ASSERT_EQ(robot["policies"].size(), 6U);
+    for (const auto& policy : robot["policies"])
+      EXPECT_EQ(keys(policy),
+                (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg", "jumps",
+                                       "kink_m", "kink_deg", "agreement_rmse_m", "constraints"}));
+  }
+  expect_keys(report["server"], {"components", "closures_accepted", "closures_rejected", "rmse_m"});
+  for (const auto& transform : report["transforms"])
+    expect_keys(transform, {"from", "to", "translation_m", "quaternion_xyzw"});
+}
+
+TEST(ReportJson, CarriesTheRecordsFigures) {
+  MissionRecord record = test::example_record();
+  record.robots[0].onboard.rmse_m = 0.1234567891;
+  const json report = json::parse(report_json(record));
+  EXPECT_EQ(report["seed"], 7);
+  EXPECT_DOUBLE_EQ(report["robots"][0]["onboard_rmse_m"], 0.123457);
+  EXPECT_EQ(report["robots"][0]["policies"]["spectral"]["constraints"], 24);
+  EXPECT_EQ(report["server"]["closures_accepted"], record.server.closures.size());
+  EXPECT_EQ(report["server"]["closure_check"]["wrong"], 0);
+  EXPECT_EQ(report["server"]["closures_rejected"], 31 + 55 + 4 + 9 + 0 + 3);
+  EXPECT_EQ(
+      report["server"]["closures_accepted_intra"].get<int>() + report["server"]["closures_accepted_inter"].get<int>(),
+      report["server"]["closures_accepted"].get<int>());
+}
+
+TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
+  MissionRecord record = test::example_record();
+  record.robots[1].start_s = 300.0;
+  record.robots[0].explanation.reset();
+  const auto& stamps = record.robots[1].explanation->stamps;
+  record.robots[1].explanation->missed_ways = {{.from = stamps[3],
+                                                .until = stamps[90],
+                                                .length_m = 80.0,
+                                                .translation_m = 4.8,
+                                                .rotation_rad = 0.02,
+                                                .significance = 14.0}};
+  record.robots[0].alerts.clear();
+  const json report = json::parse(report_json(record));
+  EXPECT_TRUE(report["robots"][0]["explanation"].is_null());
+  EXPECT_TRUE(report["robots"][0]["alerts"].empty());
+  const json& explanation = report["robots"][1]["explanation"];
+  EXPECT_TRUE(explanation["disagrees"]);
+  EXPECT_EQ(explanation["nodes"], record.robots[1].explanation->stamps.size());
+  ASSERT_EQ(explanation["largest_significance"].size(), explanation["scale_length_m"].size());
+  EXPECT_NEAR(explanation["largest_significance"][4], 8.7, 1.0);
+  ASSERT_EQ(explanation["missed_ways"].size(), 1U);
+  const json& way = explanation["missed_ways"][0];
+  EXPECT_DOUBLE_EQ(way["from_s"], 300.0 + (stamps[3] - record.robots[1].odometry.front().stamp));
+  EXPECT_DOUBLE_EQ(way["until_s"], 300.0 + (stamps[90] - record.robots[1].odometry.front().stamp));
+  EXPECT_DOUBLE_EQ(way["translation_m"], 4.8);
+  EXPECT_DOUBLE_EQ(way["significance"], 14.0);
+  ASSERT_EQ(explanation["suspected_origins"].size(), 2U);
+  const json& failure = explanation["suspected_origins"][1];
+  EXPECT_DOUBLE_EQ(failure["from_s"], 362.0);
+  EXPECT_DOUBLE_EQ(failure["until_s"], 372.0);
+  EXPECT_DOUBLE_EQ(failure["scale_length_m"], 8.0);
+  EXPECT_TRUE(failure["alert"]);
+  ASSERT_EQ(report["robots"][1]["alerts"].size(), 1U);
+  const json& alert = report["robots"][1]["alerts"][0];
+  EXPECT_DOUBLE_EQ(alert["from_s"], 362.0);
+  EXPECT_EQ(alert["place_m"], (json{12.34, -4.02, -0.01}));
+  EXPECT_EQ(alert["known_since_broadcast"], record.robots[1].alerts[0].known_since_revision);
+  EXPECT_TRUE(alert["withdrawn_s"].is_null());
+  EXPECT_DOUBLE_EQ(report["robots"][1]["onboard_rpe_10m_m"], 0.095);
+  EXPECT_DOUBLE_EQ(report["robots"][1]["policies"]["spectral"]["kink_m"], 0.01);
+}
+
+TEST(ReportJson, JumpsThatAPolicyTakesBack) {
+  MissionRecord record = test::example_record();
+  record.robots[1].start_s = 300.0;
+  test::jump_back(record.robots[1], "spectral");
+  const json policies = json::parse(report_json(record))["robots"][1]["policies"];
+  EXPECT_TRUE(policies["uniform"]["jumps"].empty());
+  ASSERT_EQ(policies["spectral"]["jumps"].size(), 1U);
+  const json& jump = policies["spectral"]["jumps"][0];
+  EXPECT_DOUBLE_EQ(jump["from_s"], 312.0);
+  EXPECT_DOUBLE_EQ(jump["until_s"], 314.0);
+  EXPECT_DOUBLE_EQ(jump["translation_m"], 0.1);
+  EXPECT_DOUBLE_EQ(jump["rotation_rad"], 0.35);
+}
+
+TEST(ReportJson, MapErrorWhereThereIsASurvey) {
+  MissionRecord record = test::example_record({.survey = true});
+  const json report = json::parse(report_json(record));
+  EXPECT_DOUBLE_EQ(report["server"]["map_error"]["rms_m"], 0.07);
+  EXPECT_DOUBLE_EQ(report["server"]["survey_covered"], 0.97);
+  EXPECT_DOUBLE_EQ(report["robots"][1]["map_error"]["onboard"]["mean_m"], 0.41);
+  EXPECT_DOUBLE_EQ(report["robots"][1]["map_error"]["corrected"]["p95_m"], 0.15);
+  const json& pose = report["server"]["T_reference_world"];
+  const auto t = pose["translation_m"].get<std::vector<double>>();
+  const auto q = pose["quaternion_xyzw"].get<std::vector<double>>();
+  const Pose3 T{Eigen::Quaterniond(q[3], q[0], q[1], q[2]), Eigen::Vector3d(t[0], t[1], t[2])};
+  EXPECT_LT(local(*record.server.T_reference_world, T).norm(), 1e-5);
+  EXPECT_TRUE(json::parse(report_json(test::example_record()))["server"]["map_error"].is_null());
+}
+
+TEST(ReportJson, DriftIsInMissionTime) {
+  MissionRecord record = test::example_record();
+  record.robots[0].start_s = 2400.0;
+  record.server.failed_odometry = {
+      {record.robots[0].id, record.robots[0].odometry[3].stamp, record.robots[0].odometry[4].stamp, 1.5, 0.35}};
+  const json report = json::parse(report_json(record));
+  const json& origin = report["robots"][0]["drift_origins"][1];
+  EXPECT_EQ(origin["kind"], "degeneracy");
+  EXPECT_DOUBLE_EQ(origin["from_s"], 2436.0);
+  EXPECT_DOUBLE_EQ(origin["until_s"], 2448.0);
+  const json& failed = report["server"]["failed_odometry"][0];
+  EXPECT_EQ(failed["robot"], "alpha");
+  EXPECT_DOUBLE_EQ(failed["from_s"], 2406.0);
+  EXPECT_DOUBLE_EQ(failed["error_m"], 1.5);
+  EXPECT_DOUBLE_EQ(failed["error_rad"], 0.35);
+}
+
+TEST(ReportJson, NotMeasuredIsNull) {
+  MissionRecord record = test::example_record({.reference = false});
+  record.robots[0].policies[0].agreement_rmse_m = std::numeric_limits<double>::quiet_NaN();
+  record.robots[0].distance_m = std::numeric_limits<double>::infinity();
+  const json report = json::parse(report_json(record));
+  const json& robot = report["robots"][0];
+  EXPECT_TRUE(robot["onboard_rmse_m"].is_null());
+  EXPECT_TRUE(robot["server_rmse_m"].is_null());
+  EXPECT_TRUE(robot["distance_m"].is_null());
+  EXPECT_TRUE(robot["policies"]["every_node"]["rmse_m"].is_null());
+  EXPECT_TRUE(robot["policies"]["every_node"]["agreement_rmse_m"].is_null());
+  EXPECT_FALSE(robot["policies"]["spectral"]["agreement_rmse_m"].is_null());
+  EXPECT_TRUE(report["server"]["rmse_m"].is_null());
+  EXPECT_TRUE(report["server"]["T_reference_world"].is_null());
+  EXPECT_TRUE(robot["map_error"]["onboard"].is_null());
+}
+
+TEST(ReportJson, IsTheSameWhateverTheClockSays) {
+  MissionRecord record = test::example_record();
+  const std::string before = report_json(record);
+  record.timing.wall_s = 99.0;
+  record.timing.machine = "another";
+  record.timing.policies.clear();
+  record.version = "1.2.3";
+  EXPECT_EQ(report_json(record), before);
+  record.seed = 8;
+  EXPECT_NE(report_json(record), before);
+}
+
+TEST(ReportJson, OneRotationIsPrintedOneWay) {
+  MissionRecord record = test::example_record();
+  const std::string before = report_json(record);
+  auto& q = record.transforms[0].T_from_to.rotation;
+  q.coeffs() = -q.coeffs();
+  EXPECT_EQ(report_json(record), before);
+}
+
+TEST(ReportJson, EmptyMission) {
+  const json report = json::parse(report_json(MissionRecord{}));
+  EXPECT_TRUE(report["robots"].is_array());
+  EXPECT_TRUE(report["robots"].empty());
+  EXPECT_TRUE(report["transforms"].empty());
+  EXPECT_EQ(report["server"]["components"], 0);
+  EXPECT_NO_THROW(std::ignore = json::parse(timing_json(MissionRecord{})));
+}
+
+TEST(ReportJson, BrokenUtf8DoesNotThrow) {
+  MissionRecord record;
+  record.mission = "caf\xe9 \"quoted\"\n";
+  EXPECT_NO_THROW(std::ignore = json::parse(report_json(record)));
+}
+
+TEST(TimingJson, MedianAndLargestPerPolicy) {
+  MissionRecord record;
+  record.timing.policies.push_back({"alpha", "spectral", {3.0, 1.0, 10.0, 2.0}, {}, {5.0}});
+  const json policy = json::parse(timing_json(record))["policies"][0];
+  EXPECT_EQ(policy["robot"], "alpha");
+  EXPECT_EQ(policy["policy"], "spectral");
+  EXPECT_EQ(policy["update"]["count"], 4);
+  EXPECT_DOUBLE_EQ(policy["update"]["median_ms"], 2.5);
+  EXPECT_DOUBLE_EQ(policy["update"]["max_ms"], 10.0);
+  EXPECT_TRUE(policy["comparison"]["median_ms"].is_null());
+  EXPECT_DOUBLE_EQ(policy["optimisation"]["median_ms"], 5.0);
+}
+
+}  // namespace
+}  // namespace tutti::mission

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/map_pictures.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "tutti/mission/report/colours.hpp"
+#include "tutti/mission/report/label.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr double kHalf_px = 562.0;
+constexpr double kWide_px = 1160.0;
+constexpr formats::Rgb kSurveyColour{168, 178, 194};
+
+template <class F>
+void for_each_point(const std::vector<CloudLayer>& layers, std::size_t at_most, F&& use) {
+  std::size_t total = 0;
+  for (const CloudLayer& layer : layers) total += layer.cloud->points.size();
+  const std::size_t step = total / at_most + 1;
+  for (const CloudLayer& layer : layers)
+    for (std::size_t i = 0; i < layer.cloud->points.size(); i += step)
+      use((layer.T_display_cloud * layer.cloud->points[i].cast<double>().eval()).eval());
+}
+
+std::vector<CloudLayer> onboard_layers(const MissionRecord& record, std::uint32_t component) {
+  std::vector<CloudLayer> out;
+  for (std::size_t r = 0; r < record.robots.size(); ++r)
+    if (const RobotRecord& robot = record.robots[r];
+        robot.component == component && !robot.onboard_cloud.points.empty())
+      out.push_back({&robot.onboard_cloud, {}, robot_rgb_on_dark(r)});
+  return out;
+}
+
+/// The panels' clouds; the survey's only where the map can be laid on it.
+struct Shown {
+  std::vector<CloudLayer> onboard, server, survey, distance;
+  std::vector<Points3d> routes;  ///< Server, display frame.
+};
+
+Shown shown(const MissionRecord& record) {
+  const std::uint32_t component = record.server.largest_component;
+  Shown out{.onboard = onboard_layers(record, component), .server = server_layers(record, component)};
+  const Pose3 T_display_world = record.server.T_reference_world.value_or(Pose3{});
+  for (const RobotRecord& robot : record.robots) {
+    if (robot.component != component) continue;
+    Points3d& route = out.routes.emplace_back();
+    for (const StampedPose& p : robot.server_estimate) route.push_back(T_display_world * p.pose.translation);
+  }
+  if (!record.survey || !record.server.T_reference_world) return out;
+  out.survey.push_back({record.survey.get(), {}, kSurveyColour});
+  for (const CloudRecord& seen : record.server.clouds)
+    if (seen.distance_m.size() == seen.cloud.points.size() && !seen.distance_m.empty())
+      out.distance.push_back({&seen.cloud, T_display_world, {}, &seen.distance_m});
+  return out;
+}
+
+Image draw(const std::vector<CloudLayer>& layers, const PlanView& view,
+           const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
+  constexpr double kPoint_m = 0.15;  // submaps are thinned to 0.3 m, and lie over each other
+  const int point_px =
+      static_cast<int>(std::lround(std::clamp(kPoint_m * view.pixels_per_metre() * kPixelRatio, 1.0, 5.0)));
+  PointRaster raster(static_cast<std::size_t>(std::ceil(kPixelRatio * view.width())),
+                     static_cast<std::size_t>(std::ceil(kPixelRatio * view.height())));
+  const Projection project = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector2d> {
+    const auto flat = to_plane(p);
+    if (!flat) return std::nullopt;
+    return (kPixelRatio * view(*flat)).eval();
+  };
+  for (const CloudLayer& layer : layers) raster.add(layer, project, point_px);
+  return raster.on_dark();
+}
+
+MapPicture picture(const Shown& clouds, const PlanView& view,
+                   const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
+  MapPicture out{view, {}};
+  const auto add = [&](const char* name, const char* words, const std::vector<CloudLayer>& layers) {
+    if (!layers.empty()) out.panels.push_back({name, words, draw(layers, view, to_plane)});
+  };
+  add("onboard", "each robot's own map, by odometry alone", clouds.onboard);
+  add("server", "the joint map", clouds.server);
+  add("survey", "what is really there", clouds.survey);
+  add("distance", "the joint map, by distance to the survey", clouds.distance);
+  return out;
+}
+
+/// How much a slice shows: places where steps of a route cross it, each at most 1, less where they cross at an angle.
+/// Every further crossing of a place counts little.
+double crossings(const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>& steps, const Slice& slice) {
+  constexpr double kPlace_m = 3.0;
+  constexpr double kAgain = 0.01;
+  const Eigen::Vector2d across(-slice.along.y(), slice.along.x());
+  std::map<int, double> places;
+  double score = 0.0;
+  for (const auto& [from, to] : steps) {
+    const double before = across.dot(from - slice.centre);
+    const double after = across.dot(to - slice.centre);
+    if ((before < 0.0) == (after < 0.0)) continue;
+    const double u = slice.along.dot(from + before / (before - after) * (to - from) - slice.centre);
+    if (std::abs(u) > 0.5 * slice.length_m) continue;
+    const double square = std::pow((after - before) / (to - from).norm(), 2);
+    double& place = places[static_cast<int>(std::lround(u / kPlace_m))];
+    score += kAgain + std::max(0.0, square - place);
+    place = std::max(place, square);
+  }
+  return score;
+}
+
+/// Up and down from a cloud's points in the slice: all but the outermost 0.5 %.
+Range heights(const std::vector<CloudLayer>& layers,
+              const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
+  std::vector<double> seen;
+  for_each_point(layers, 4'000'000, [&](const Eigen::Vector3d& p) {
+    if (const auto flat = to_plane(p); flat && flat->allFinite()) seen.push_back(flat->y());
+  });
+  Range out;
+  if (seen.empty()) return out;
+  std::sort(seen.begin(), seen.end());
+  out.include(seen[seen.size() / 200]);
+  out.include(seen[seen.size() - 1 - seen.size() / 200]);
+  return out;
+}
+
+}  // namespace
+
+std::vector<CloudLayer> server_layers(const MissionRecord& record, std::uint32_t component) {
+  const bool laid_on = component == record.server.largest_component;
+  const Pose3 T_display_world = laid_on ? record.server.T_reference_world.value_or(Pose3{}) : Pose3{};
+  std::vector<CloudLayer> out;
+  for (const CloudRecord& seen : record.server.clouds)
+    for (std::size_t r = 0; r < record.robots.size(); ++r)
+      if (record.robots[r].id == seen.robot && record.robots[r].component == component)
+        out.push_back({&seen.cloud, T_display_world, robot_rgb_on_dark(r)});
+  return out;
+}
+
+Points2d cloud_corners(const std::vector<CloudLayer>& clouds, const GroundPlane& ground,
+                       const std::vector<Points2d>& routes) {
+  constexpr double kLeast_m = 4.0;
+  std::array<std::vector<double>, 2> seen;
+  std::array<Range, 2> visited;
+  for_each_point(clouds, 200'000, [&](const Eigen::Vector3d& p) {
+    if (!p.allFinite()) return;
+    seen[0].push_back(ground(p).x());
+    seen[1].push_back(ground(p).y());
+  });
+  for (const auto& route : routes)
+    for (const auto& p : route)
+      for (std::size_t axis = 0; axis < 2; ++axis) visited[axis].include(p[static_cast<int>(axis)]);
+  if (seen[0].empty() || visited[0].empty || visited[1].empty) return {};
+  const double around =
+      std::max({kLeast_m, 0.5 * (visited[0].high - visited[0].low), 0.5 * (visited[1].high - visited[1].low)});
+  Points2d corners(2);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    auto& values = seen[axis];
+    std::sort(values.begin(), values.end());
+    const std::size_t cut = values.size() / 100;
+    corners[0][static_cast<int>(axis)] = std::max(values[cut], visited[axis].low - around);
+    corners[1][static_cast<int>(axis)] = std::min(values[values.size() - 1 - cut], visited[axis].high + around);
+  }
+  return corners;
+}
+
+Slice busiest_slice(const std::vector<Points2d>& routes, double length_m) {
+  constexpr std::size_t kMostSteps = 2000;
+  constexpr std::size_t kMostCentres = 250;
+  constexpr int kDirections = 12;
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> steps;
+  std::size_t total = 0;
+  for (const auto& route : routes) total += route.size();
+  const std::size_t stride = total / kMostSteps + 1;
+  for (const auto& route : routes)
+    for (std::size_t i = stride; i < route.size(); i += stride)
+      if (route[i].allFinite() && route[i - stride].allFinite()) steps.emplace_back(route[i - stride], route[i]);
+  Slice best{.length_m = length_m};
+  if (!steps.empty()) best.centre = steps.front().first;
+  double most = 0.0;
+  for (int d = 0; d < kDirections; ++d) {
+    const double angle = M_PI * d / kDirections;
+    const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
+    for (std::size_t c = 0; c < steps.size(); c += steps.size() / kMostCentres + 1) {
+      const Slice slice{steps[c].first, along, length_m};
+      const double found = crossings(steps, slice);
+      if (found <= most) continue;
+      most = found;
+      best = slice;
+    }
+  }
+  return best;
+}
+
+MapPicture map_from_above(const MissionRecord& record) {
+  const Shown clouds = shown(record);
+  if (clouds.server.empty()) return {};
+  const GroundPlane ground = ground_plane(clouds.routes);
+  std::vector<Points2d> routes;
+  for (const Points3d& route : clouds.routes) routes.push_back(ground(route));
+  const PlanView view({cloud_corners(clouds.server, ground, routes), cloud_corners(clouds.onboard, ground, routes)},
+                      kHalf_px, 0.9 * kHalf_px);
+  return picture(clouds, view, [&](const Eigen::Vector3d& p) { return std::optional(ground(p)); });
+}
+
+MapPicture map_section(const MissionRecord& record) {
+  const Shown clouds = shown(record);
+  if (clouds.server.empty()) return {};
+  const GroundPlane ground = ground_plane(clouds.routes);
+  std::vector<Points2d> routes;
+  for (const Points3d& route : clouds.routes) routes.push_back(ground(route));
+  const Points2d corners = cloud_corners(clouds.server, ground, routes);
+  if (corners.empty()) return {};
+  const Slice slice = busiest_slice(routes, std::clamp(0.4 * (corners[1] - corners[0]).maxCoeff(), 10.0, 40.0));
+  const Eigen::Vector2d across(-slice.along.y(), slice.along.x());
+  const Eigen::Index height = 3 - ground.right - ground.up;
+  const auto to_plane = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector2d> {
+    const Eigen::Vector2d from_centre = ground(p) - slice.centre;
+    const double u = slice.along.dot(from_centre);
+    if (std::abs(across.dot(from_centre)) > 0.5 * kSliceThickness_m || std::abs(u) > 0.5 * slice.length_m)
+      return std::nullopt;
+    return Eigen::Vector2d(u, p[height]);
+  };
+  std::vector<CloudLayer> own = clouds.server;
+  own.insert(own.end(), clouds.onboard.begin(), clouds.onboard.end());
+  const Range high = heights(own, to_plane);
+  if (high.empty) return {};
+  const Points2d box{{-0.5 * slice.length_m, high.low}, {0.5 * slice.length_m, high.high}};
+  return picture(clouds, PlanView({box}, kWide_px, 0.4 * kWide_px), to_plane);
+}
+
+Image compose(const MapPicture& picture, std::size_t columns) {
+  constexpr std::size_t kGap_px = 6;
+  constexpr int kSquare_px = 4;
+  constexpr int kMargin_px = 20;
+  constexpr formats::Rgb kInk{231, 233, 238};
+  constexpr std::uint8_t kBetween[4] = {70, 78, 92, 255};
+  const std::size_t rows = (picture.panels.size() + columns - 1) / columns;
+  columns = std::min(columns, picture.panels.size());
+  const std::size_t width = picture.panels.front().image.width;
+  const std::size_t height = picture.panels.front().image.height;
+  Image out{columns * (width + kGap_px) - kGap_px, rows * (height + kGap_px) - kGap_px, {}};
+  out.rgba.resize(4 * out.width * out.height);
+  for (std::size_t i = 0; i < out.rgba.size(); ++i) out.rgba[i] = kBetween[i % 4];
+  for (std::size_t p = 0; p < picture.panels.size(); ++p) {
+    Image panel = picture.panels[p].image;
+    draw_label(panel, kMargin_px, kMargin_px, picture.panels[p].name, kSquare_px, kInk);
+    if (p == 0) {
+      const double bar_m = picture.view.scale_bar_m();
+      const auto bar_px = static_cast<int>(std::lround(bar_m * picture.view.pixels_per_metre() * kPixelRatio));
+      const int bottom = static_cast<int>(height) - kMargin_px;
+      draw_label(panel, kMargin_px, bottom - 10 * kSquare_px, length_label(bar_m), kSquare_px, kInk);
+      fill(panel, kMargin_px, bottom, bar_px, kSquare_px, kInk);
+    }
+    const std::size_t left = p % columns * (width + kGap_px);
+    const std::size_t top = p / columns * (height + kGap_px);
+    for (std::size_t y = 0; y < height; ++y)
+      std::copy_n(&panel.rgba[4 * y * width], 4 * width, &out.rgba[4 * ((top + y) * out.width + left)]);
+  }
+  return out;
+}
+
+}  // namespace tutti::mission

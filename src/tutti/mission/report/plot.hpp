@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/mission/report/svg.hpp"
+
+/// Axes, views from above and colour scales on top of Svg.
+namespace tutti::mission {
+
+/// Smallest to largest value seen; ignores what is not finite.
+struct Range {
+  double low = 0.0;
+  double high = 0.0;
+  bool empty = true;
+  void include(double value);
+};
+
+/// One axis: values to pixels, linear or logarithmic, with ticks at 1, 2, 5 x 10^n (many decades: powers of ten).
+class Axis {
+ public:
+  /// Linear; `widen`: to the next tick on both sides. An empty or single-valued range gets some room.
+  static Axis linear(Range values, double pixel_low, double pixel_high, int max_ticks, bool widen);
+  /// Widened to the next 1, 2 or 5 x 10^n; at most 6 decades. Values below the lower end, and those <= 0, are clamped
+  /// to it.
+  static Axis logarithmic(Range values, double pixel_low, double pixel_high);
+
+  [[nodiscard]] double operator()(double value) const;
+  [[nodiscard]] const std::vector<double>& ticks() const { return ticks_; }
+  [[nodiscard]] bool is_logarithmic() const { return logarithmic_; }
+
+ private:
+  double low_ = 0.0;
+  double high_ = 1.0;
+  double pixel_low_ = 0.0;
+  double pixel_high_ = 1.0;
+  bool logarithmic_ = false;
+  std::vector<double> ticks_;
+};
+
+/// Shortest plain text of a tick: "0.05", "200".
+std::string tick_label(double value);
+/// A length for an axis of metres: "1 mm", "5 cm", "2 m".
+std::string length_label(double value_m);
+
+/// Grid, tick labels and axis names of a chart whose plot area the two axes span. Without a name, no labels along x.
+void draw_axes(Svg& svg, const Axis& x, const Axis& y, const Eigen::Vector2d& top_left,
+               const Eigen::Vector2d& bottom_right, std::string_view x_name, bool y_is_length);
+
+/// A map seen from above: metres to pixels with equal axes, x to the right, y up.
+class PlanView {
+ public:
+  /// Fits the box of all points into `width` and at most `max_height`, with a margin.
+  PlanView(const std::vector<Points2d>& layers, double width, double max_height);
+  [[nodiscard]] double width() const { return width_; }
+  [[nodiscard]] double height() const { return height_; }
+  [[nodiscard]] double pixels_per_metre() const { return scale_; }
+  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector2d& p) const;
+  [[nodiscard]] Points2d operator()(const Points2d& points) const;
+  /// A bar of a round length in the lower left corner; `look`: one more CSS class for it.
+  void draw_scale_bar(Svg& svg, std::string_view look = {}) const;
+  [[nodiscard]] double scale_bar_m() const;
+
+ private:
+  double width_;
+  double height_;
+  double scale_ = 1.0;
+  Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
+};
+
+/// Colour of t in [0, 1] from dark blue to yellow, lightness strictly increasing: reads without colour vision too.
+std::string heat_colour(double t);
+
+/// Squares of one line for a legend above or below a picture; HTML.
+struct LegendEntry {
+  std::string css_class;  ///< Of the stroke.
+  std::string label;
+};
+std::string legend_html(const std::vector<LegendEntry>& entries);
+
+}  // namespace tutti::mission

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "tutti/formats/ply.hpp"
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/mission/report/png.hpp"
+#include "tutti/model/point_cloud.hpp"
+
+/// Clouds of millions of points as pictures: no place for SVG.
+namespace tutti::mission {
+
+/// A cloud to draw. Does not own it.
+struct CloudLayer {
+  const PointCloud* cloud = nullptr;
+  Pose3 T_display_cloud;
+  formats::Rgb colour;
+  const std::vector<float>* distance_m = nullptr;  ///< Set: colours by distance_colour() instead; one per point.
+};
+
+/// From a point of the display frame to pixels (y down); nothing when it is not to be seen.
+using Projection = std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>;
+
+/// Many points in one pixel shine: the mean of their colours, brighter with the logarithm of their number.
+class PointRaster {
+ public:
+  PointRaster(std::size_t width, std::size_t height);
+  /// Every point as a square of `point_px` pixels.
+  void add(const CloudLayer& layer, const Projection& project, int point_px);
+  /// On a dark ground: for pictures that stand alone.
+  [[nodiscard]] Image on_dark() const;
+  /// Only the ink, more opaque where many points are: to lie under other shapes.
+  [[nodiscard]] Image transparent() const;
+
+ private:
+  struct Pixel {
+    float red = 0.0F, green = 0.0F, blue = 0.0F, count = 0.0F;
+  };
+  [[nodiscard]] Image shaded(bool opaque) const;
+  std::size_t width_;
+  std::size_t height_;
+  std::vector<Pixel> pixels_;
+};
+
+inline constexpr double kWorstShown_m = 0.5;  ///< Distances from here on look the same.
+/// From calm blue (0) to red (kWorstShown_m and more).
+formats::Rgb distance_colour(double distance_m);
+
+}  // namespace tutti::mission

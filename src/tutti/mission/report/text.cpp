@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tutti/mission/report/explanation.hpp"
+#include "tutti/mission/report/format.hpp"
+#include "tutti/mission/report/geometry.hpp"
+#include "tutti/mission/report/table.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr std::size_t kRobotsPerPolicyTable = 2;
+
+std::string plural(std::size_t count, const std::string& noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+std::string robots_table(const MissionRecord& record) {
+  TextTable table(2);
+  table.add({"robot", "estimate", "RMSE", "max", "RPE", "RPE 10 m", "to server", "constraints", "update ms"});
+  for (const auto& robot : record.robots) {
+    table.rule();
+    const auto row = [&](const std::string& left, const std::string& estimate, const Accuracy& accuracy,
+                         std::vector<std::string> rest) {
+      std::vector<std::string> cells{left,
+                                     estimate,
+                                     format_metres(accuracy.rmse_m),
+                                     format_metres(accuracy.max_error_m),
+                                     format_metres(accuracy.rpe_m),
+                                     format_metres(accuracy.rpe_10m_m)};
+      cells.insert(cells.end(), rest.begin(), rest.end());
+      table.add(std::move(cells));
+    };
+    row(robot.name, "onboard", robot.onboard, {});
+    const PolicyRecord* policy = find_policy(robot, record.default_policy);
+    const PolicyTiming* timing = find_timing(record, robot.name, record.default_policy);
+    const std::string size = format_distance(robot.distance_m);
+    if (policy != nullptr)
+      row(size, "corrected", policy->accuracy,
+          {format_metres(policy->agreement_rmse_m), std::to_string(policy->constraints_added),
+           timing != nullptr ? format_spread(timing->update_ms) : "-"});
+    row(policy != nullptr ? "" : size, "server", robot.server, {});
+  }
+  return table.str();
+}
+
+/// Policies down, robots across; several tables when there are many robots.
+std::string policies_table(const MissionRecord& record, std::size_t first, std::size_t last) {
+  std::vector<std::string> names;
+  for (std::size_t r = first; r < last; ++r)
+    for (const auto& policy : record.robots[r].policies)
+      if (std::find(names.begin(), names.end(), policy.name) == names.end()) names.push_back(policy.name);
+  if (names.empty()) return "";
+
+  TextTable table(1);
+  std::vector<std::string> robots{""};
+  std::vector<std::string> head{"policy"};
+  for (std::size_t r = first; r < last; ++r) {
+    robots.insert(robots.end(), {"", "", "", record.robots[r].name});
+    head.insert(head.end(), {"RMSE", "to server", "constr.", "update ms"});
+  }
+  table.add(robots);
+  table.add(head);
+  table.rule();
+  for (const auto& name : names) {
+    std::vector<std::string> cells{name == record.default_policy ? name + " *" : name};
+    for (std::size_t r = first; r < last; ++r) {
+      const RobotRecord& robot = record.robots[r];
+      const PolicyRecord* policy = find_policy(robot, name);
+      const PolicyTiming* timing = find_timing(record, robot.name, name);
+      if (policy == nullptr)
+        cells.insert(cells.end(), {"-", "-", "-", "-"});
+      else
+        cells.insert(cells.end(), {format_metres(policy->accuracy.rmse_m), format_metres(policy->agreement_rmse_m),
+                                   std::to_string(policy->constraints_added),
+                                   timing != nullptr ? format_spread(timing->update_ms) : "-"});
+    }
+    table.add(std::move(cells));
+  }
+  return table.str();
+}
+
+/// Bytes per second over each robot's own time.
+std::string radio_table(const MissionRecord& record) {
+  TextTable table(2);
+  table.add({"radio", "kind", "messages", "total", "mean rate", "largest"});
+  for (const auto& robot : record.robots) {
+    if (robot.traffic.empty()) continue;
+    table.rule();
+    for (const auto& row : robot.traffic)
+      table.add({fmt::format("{} to {}", row.from, row.to), row.kind, std::to_string(row.messages),
+                 format_bytes(static_cast<double>(row.bytes)), format_bytes(row.bytes_per_s) + "/s",
+                 format_bytes(static_cast<double>(row.largest_message))});
+  }
+  return table.str();
+}
+
+std::string server_lines(const MissionRecord& record) {
+  const ServerRecord& server = record.server;
+  const ClosureCounts closures = count_closures(server);
+  std::string text = fmt::format("{} of {}, {} ({} between robots), {} refused", plural(server.components, "map"),
+                                 plural(record.robots.size(), "robot"), plural(closures.accepted(), "loop closure"),
+                                 closures.accepted_inter, closures.rejected());
+  if (server.joint.rmse_m)
+    text += fmt::format(", RMSE {} over all robots at once (max {})", format_metres(server.joint.rmse_m),
+                        format_metres(server.joint.max_error_m));
+  if (const auto& check = server.closure_check)
+    text += fmt::format(". Of {} closures checked against the reference {} wrong (largest error {}, {:.2f} deg)",
+                        check->checked, check->wrong == 1 ? "1 is" : fmt::format("{} are", check->wrong),
+                        format_metres(check->max_error_m), check->max_error_deg);
+  std::string out = wrap(text + ".", "  server   ");
+  if (const std::string surer = format_surer_turns(record.robots); !surer.empty()) out += wrap(surer, "  odometry ");
+  for (const auto& transform : record.transforms) {
+    const Eigen::Vector3d& t = transform.T_from_to.translation;
+    std::string line =
+        fmt::format("{} in {}'s frame: [{:.2f} {:.2f} {:.2f}] m, turned by {:.1f} deg", transform.to, transform.from,
+                    t.x(), t.y(), t.z(), rotation_angle(transform.T_from_to) * 180.0 / M_PI);
+    if (transform.error_m && transform.error_deg)
+      line +=
+          fmt::format("; off the reference by {}, {:.2f} deg", format_metres(transform.error_m), *transform.error_deg);
+    out += wrap(line + ".", "  frames   ");
+  }
+  for (const auto& load : record.timing.load)
+    out += wrap(fmt::format("{}: {:.0f} % of one core, answers after {} at worst.", load.name, 100.0 * load.cpu_share,
+                            format_duration_ms(load.worst_latency_ms)),
+                "  load     ");
+  return out;
+}
+
+/// Where the correction took back jumps, and how gently it bent all else.
+std::string correction_lines(const RobotRecord& robot, const PolicyRecord& policy) {
+  std::string out;
+  for (const RepairedJump& jump : policy.jumps)
+    out += wrap(
+        fmt::format("{}: odometry jumped, {}: taken back there.", robot.name, format_jump(jump, mission_clock(robot))),
+        "  jump     ");
+  if (policy.kink && policy.constraints_added > 0)
+    out += wrap(fmt::format("{}: correcting changed no {}motion over 1 s by more than {} and {:.3f} deg.", robot.name,
+                            policy.jumps.empty() ? "" : "other ", format_metres(policy.kink->translation_m),
+                            policy.kink->rotation_deg),
+                "  kink     ");
+  return out;
+}
+
+/// Where odometry and map part, what the robots warned of, and how gently they were corrected.
+std::string explanation_lines(const MissionRecord& record) {
+  std::string out;
+  for (const RobotRecord& robot : record.robots) {
+    for (const AlertRecord& alert : robot.alerts)
+      out += wrap(fmt::format("{}: localisation failure {}, {}; noticed at {}.", robot.name,
+                              alert.withdrawn_s ? "no longer suspected" : "suspected",
+                              format_origin(alert.origin, mission_clock(robot), robot.explanation),
+                              format_moment(alert.known_since_s)),
+                  "  alert    ");
+    const PolicyRecord* policy = find_policy(robot, record.default_policy);
+    if (robot.explanation && !robot.explanation->stamps.empty()) {
+      const consistency::Explanation& e = *robot.explanation;
+      const auto drift = std::count_if(e.origins.begin(), e.origins.end(), [](const auto& o) { return !o.alert; });
+      std::string text = robot.name + ": " + format_disagreement(e, mission_clock(robot));
+      if (drift > 0)
+        text += fmt::format("; {} of drift that odometry's covariance allows for",
+                            plural(static_cast<std::size_t>(drift), "suspected origin"));
+      if (policy != nullptr && policy->constraints_added == 0) text += "; nothing was added";
+      out += wrap(text + ".", "  compare  ");
+    }
+    if (policy != nullptr) out += correction_lines(robot, *policy);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string report_text(const MissionRecord& record, const std::string& report_html_path) {
+  std::string out = "\n";
+  out +=
+      wrap(record.description.empty() ? record.mission : fmt::format("{}: {}", record.mission, record.description), "");
+  out += wrap(fmt::format("Input: {}. Seed {}, {} of mission time.", record.input, record.seed,
+                          format_mission_time(record.duration_s)),
+              "");
+  if (!record.robots.empty()) {
+    const bool referenced = std::any_of(record.robots.begin(), record.robots.end(),
+                                        [](const RobotRecord& robot) { return robot.onboard.rmse_m.has_value(); });
+    out += "\n";
+    out += robots_table(record);
+    out +=
+        referenced
+            ? fmt::format(
+                  "  RMSE, max: against the reference, after one rigid alignment per robot. RPE: over {} and 10 m.\n",
+                  record.rpe_interval)
+            : std::string("  No reference: only the distance of corrected to server could be measured.\n");
+    out += "  to server: RMSE of corrected against server. update ms: median / max, wall clock.\n";
+    out += "\n  Policies side by side, on the same broadcasts (* = corrected above)\n";
+    for (std::size_t first = 0; first < record.robots.size(); first += kRobotsPerPolicyTable)
+      out += policies_table(record, first, std::min(first + kRobotsPerPolicyTable, record.robots.size())) + "\n";
+    out += radio_table(record) + "\n";
+  }
+  out += explanation_lines(record);
+  out += server_lines(record);
+  for (const auto& note : record.notes) out += wrap(note, "  note     ");
+  if (record.timing.wall_s > 0.0)
+    out += wrap(fmt::format("{} for {} of mission time.", format_duration_ms(1000.0 * record.timing.wall_s),
+                            format_mission_time(record.duration_s)),
+                "  took     ");
+  return out + "\nReport: " + report_html_path + "\n";
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/report/text.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "tutti/mission/report/format.hpp"
+#include "tutti/mission/report/testing/report_example.hpp"
+
+namespace tutti::mission {
+namespace {
+
+void expect_readable(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    EXPECT_LE(line.size(), 100U) << line;
+    EXPECT_TRUE(line.empty() || line.back() != ' ') << "trailing blank: " << line;
+  }
+  EXPECT_TRUE(std::all_of(text.begin(), text.end(), [](char c) { return c == '\n' || (c >= ' ' && c <= '~'); }));
+}
+
+std::string line_with(const std::string& text, const std::string& word) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    if (line.find(word) != std::string::npos) return line;
+  return "";
+}
+
+TEST(ReportText, FitsTheScreenAndEndsWithThePath) {
+  for (const std::size_t robots : {0U, 1U, 2U, 3U, 5U}) {
+    const std::string text = report_text(test::example_record({.robots = robots}), "out/report.html");
+    expect_readable(text);
+    EXPECT_TRUE(text.ends_with("Report: out/report.html\n"));
+  }
+}
+
+TEST(ReportText, ShowsTheFigures) {
+  const std::string text = report_text(test::example_record(), "x");
+  EXPECT_NE(line_with(text, "onboard").find("0.712 m  1.400 m"), std::string::npos) << text;
+  EXPECT_NE(line_with(text, "every_node ").find("119"), std::string::npos) << text;
+  EXPECT_NE(line_with(text, "spectral *").find("0.034 m"), std::string::npos) << text;
+  EXPECT_NE(line_with(text, "server   1 map of 2 robots").find("18 between robots"), std::string::npos) << text;
+  EXPECT_NE(text.find("simulated"), std::string::npos);
+  EXPECT_NE(text.find("kB/s"), std::string::npos);
+}
+
+TEST(ReportText, TellsOfAlertsAndKinks) {
+  MissionRecord record = test::example_record();
+  const std::string text = report_text(record, "x");
+  expect_readable(text);
+  EXPECT_NE(text.find("alert    alpha: localisation failure suspected, 62.0 s - 72.0 s, at (12.3, -4.0, 0.0) m:"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("compare  bravo: odometry and map part by up to"), std::string::npos) << text;
+  EXPECT_NE(text.find("kink     alpha: correcting changed no motion over 1 s by more than 0.010 m and 0.400 deg"),
+            std::string::npos)
+      << text;
+  ASSERT_EQ(text.find("better than it says"), std::string::npos);
+  record.robots[1].rotation_factor = 0.25;
+  EXPECT_NE(report_text(record, "x").find("odometry turns better than it says (at least: bravo 2.0"),
+            std::string::npos);
+  ASSERT_EQ(text.find("jumped"), std::string::npos);
+  test::jump_back(record.robots[0], record.default_policy);
+  const std::string jumped = report_text(record, "x");
+  EXPECT_NE(jumped.find("jump     alpha: odometry jumped, 0.100 m, 20.1 deg, 12.0 s - 14.0 s: taken back there."),
+            std::string::npos)
+      << jumped;
+  EXPECT_NE(jumped.find("changed no other motion"), std::string::npos);
+  test::miss_a_way(*record.robots[1].explanation);
+  const std::string missed = report_text(record, "x");
+  expect_readable(missed);
+  EXPECT_NE(missed.find("bravo: odometry and map part by up to 44 x the threshold: closures tie"), std::string::npos)
+      << missed;
+  EXPECT_NE(missed.find("misses that by 4.80 m"), std::string::npos) << missed;
+  record.robots.resize(1);
+  record.robots[0].explanation = test::example_explanation(record.robots[0].server_estimate, {});
+  record.robots[0].alerts.clear();
+  record.robots[0].policies[2].constraints_added = 0;
+  const std::string quiet = report_text(record, "x");
+  EXPECT_EQ(quiet.find("localisation failure"), std::string::npos);
+  EXPECT_NE(quiet.find("agree within what the server is sure of; nothing was added"), std::string::npos) << quiet;
+  EXPECT_EQ(quiet.find("kink  "), std::string::npos);
+}
+
+TEST(ReportText, SaysWhenThereIsNoReference) {
+  const std::string text = report_text(test::example_record({.reference = false}), "x");
+  EXPECT_NE(text.find("No reference"), std::string::npos);
+  expect_readable(text);
+}
+
+TEST(ReportText, EmptyMission) { expect_readable(report_text(MissionRecord{}, "x")); }
+
+TEST(Format, Words) {
+  EXPECT_EQ(format_metres(std::nullopt), "-");
+  EXPECT_EQ(format_metres(0.0126), "0.013 m");
+  EXPECT_EQ(format_distance(999.4), "999 m");
+  EXPECT_EQ(format_distance(1210.0), "1.21 km");
+  EXPECT_EQ(format_duration_ms(0.4249), "0.42 ms");
+  EXPECT_EQ(format_duration_ms(12.34), "12.3 ms");
+  EXPECT_EQ(format_duration_ms(1234.0), "1.23 s");
+  EXPECT_EQ(format_mission_time(59.6), "1 min 00 s");
+  EXPECT_EQ(format_mission_time(580.0), "9 min 40 s");
+  EXPECT_EQ(format_mission_time(3720.0), "1 h 02 min");
+  EXPECT_EQ(format_bytes(812.0), "812 B");
+  EXPECT_EQ(format_bytes(3424.0), "3.42 kB");
+  EXPECT_EQ(format_bytes(999'600.0), "1.00 MB");
+  EXPECT_EQ(format_share(26, 1000), "2.6 %");
+  EXPECT_EQ(format_share(1, 0), "-");
+}
+
+TEST(Format, SpreadIsMedianAndLargest) {
+  EXPECT_FALSE(spread({}).has_value());
+  const std::vector<double> odd{5.0, 1.0, 3.0};
+  EXPECT_DOUBLE_EQ(spread(odd)->median, 3.0);
+  EXPECT_DOUBLE_EQ(spread(odd)->max, 5.0);
+  const std::vector<double> even{4.0, 1.0, 2.0, 9.0};
+  EXPECT_DOUBLE_EQ(spread(even)->median, 3.0);
+  EXPECT_EQ(format_spread(even), "3.0 / 9.0");
+}
+
+}  // namespace
+}  // namespace tutti::mission
