@@ -273,6 +273,7 @@ TEST(Validate, ProxyGraph) {
                               m.graph.edges[0] = {0, m.graph.edges.back().b, 1.0};
                             }},
                            {"weight", [](M& m) { m.graph.edges[0].weight = -1.0; }},
+                           {"weight 0, expected a finite one > 0", [](M& m) { m.graph.edges[0].weight = 0.0; }},
                            {"weight", [](M& m) { m.graph.edges[0].weight = 1e300; }},
                            {"unreduced", [](M& m) { m.graph.reduced = false; }}});
 }

@@ -86,8 +86,8 @@ Status check_edges(const ProxyGraph& graph) {
     if (graph.nodes[edge.a].robot != graph.nodes[edge.b].robot)
       return fail(ErrorCode::invalid, "edge {} joins robots {} and {}, expected one robot", i,
                   graph.nodes[edge.a].robot.value, graph.nodes[edge.b].robot.value);
-    if (!std::isfinite(static_cast<float>(edge.weight)) || edge.weight < 0.0)
-      return fail(ErrorCode::invalid, "edge {} has weight {}, expected a finite one >= 0", i, edge.weight);
+    if (!std::isfinite(static_cast<float>(edge.weight)) || edge.weight <= 0.0)
+      return fail(ErrorCode::invalid, "edge {} has weight {}, expected a finite one > 0", i, edge.weight);
   }
   return {};
 }
