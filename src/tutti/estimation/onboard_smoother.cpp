@@ -23,6 +23,9 @@ constexpr double kStepTolerance = 1e-5;
 /// that raw odometry leads to.
 constexpr double kNearby_rad = 0.3;
 
+/// Chi-square by which rounding may seem to raise the cost of the full graph.
+constexpr double kCostTolerance = 1e-3;
+
 bool is_nearby(const PoseGraph& graph, std::span<const EdgeRole> roles, const std::vector<Pose3>& poses) {
   const double least = std::cos(0.5 * kNearby_rad);
   for (std::size_t e = 0; e < graph.edges.size(); ++e) {
@@ -148,6 +151,18 @@ internal::DoubtingSummary OnboardSmoother::minimise(std::vector<Pose3>& reduced)
   return minimise();
 }
 
+/// A step on the full graph, unless it makes matters worse: where odometry knows little of some axes and much of
+/// others, Gauss-Newton can lead metres away from where it started.
+bool OnboardSmoother::polish(const internal::EdgeCosts& costs) {
+  std::vector<Pose3> polished = poses_;
+  if (!internal::full_step(*problem_, costs, state_.odometry, polished)) return false;
+  const double change = internal::full_cost_change(*problem_, costs, state_.odometry, poses_, polished);
+  if (!(change < kCostTolerance)) return false;
+  poses_.swap(polished);
+  runs_->forget_bends();
+  return true;
+}
+
 /// Makes every pose of the chain follow the reduced nodes.
 void OnboardSmoother::place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary) {
   const internal::ChainGraph& reduced_graph = problem_->reduced();
@@ -158,10 +173,7 @@ void OnboardSmoother::place(const std::vector<Pose3>& reduced, bool loss_applied
   const std::size_t last = reduced_graph.nodes.back();
   const Pose3 last_before = poses_[last];
   summary.bent_poses = runs_->place(reduced, state_.odometry, poses_);
-  for (int k = 0; k < config_.polishing_steps; ++k) {
-    runs_->forget_bends();
-    if (!internal::full_step(*problem_, costs, state_.odometry, poses_)) break;
-  }
+  for (int k = 0; k < config_.polishing_steps && polish(costs); ++k) ++summary.polishing_steps;
   if (composed_from_ <= last) {
     const Pose3 motion = poses_[last] * last_before.inverse();
     for (std::size_t k = last + 1; k < poses_.size(); ++k) poses_[k] = motion * poses_[k];

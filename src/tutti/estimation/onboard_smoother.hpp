@@ -19,6 +19,7 @@ class OdometryRuns;
 class ReducedProblem;
 struct ChainGraph;
 struct DoubtingSummary;
+struct EdgeCosts;
 }  // namespace internal
 
 struct OnboardSmootherConfig {
@@ -38,7 +39,7 @@ struct OnboardSmootherConfig {
     v.field("loss", loss, one_of({"none", "huber", "cauchy"}), "Robust loss on the doubtful constraints.");
     v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
     v.field("polishing_steps", polishing_steps, between(0, 10),
-            "Gauss-Newton steps on the full graph after the reduced one.");
+            "Gauss-Newton steps on the full graph after the reduced one, at most; none that raises its cost.");
     v.field("repair_jumps", repair_jumps, any(),
             "Correct a step of odometry that jumped where it is, instead of sharing the correction out.");
   }
@@ -59,6 +60,7 @@ struct SmootherSummary {
   double initial_cost = -1.0;  ///< Of the reduced graph: compounded odometry and the constraints not doubtful.
   double final_cost = -1.0;    ///< Of the reduced graph, the doubtful constraints by their loss.
   bool loss_applied = false;   ///< There are doubtful constraints, and a loss for them.
+  int polishing_steps = 0;     ///< Taken: one that would raise the cost of the full graph is not.
   std::size_t reduced_nodes = 0;
   std::size_t reduced_edges = 0;
   /// What had to be done again since the last solve: odometry steps compounded, inner poses bent (the others moved
@@ -81,8 +83,8 @@ struct SmootherState {
 /// between two constrained nodes is compounded, with covariance, into one factor; Gauss-Newton solves the small graph
 /// of constrained nodes; each run's inner poses follow exactly in closed form (the smoother of a linear-Gaussian chain
 /// with fixed ends); what comes after the last constrained node is composed. A polishing step does the same about the
-/// current poses instead of the raw odometry, which makes it a Gauss-Newton step on the full graph. docs/math.md
-/// derives it.
+/// current poses instead of the raw odometry, which makes it a Gauss-Newton step on the full graph; it is taken only
+/// when the full graph's cost does not rise. docs/math.md derives it.
 ///
 /// Where a constraint that is not doubtful spans just one run and odometry jumped in it (find_jump()), the jump is not
 /// believed: the correction goes where it belongs and bends nothing else. Setting `repair_jumps`.
@@ -122,6 +124,7 @@ class OnboardSmoother {
  private:
   bool judge_jumps(std::span<const std::size_t> nodes);
   internal::DoubtingSummary minimise(std::vector<Pose3>& reduced);
+  bool polish(const internal::EdgeCosts& costs);
   void place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary);
 
   OnboardSmootherConfig config_;

@@ -48,6 +48,43 @@ TEST(OnboardSmoother, PolishingConvergesToTheFullOptimumUnderHeavyDrift) {
   EXPECT_LT(largest_position_difference(smoother.poses(), full_optimum(m, smoother.poses())), 1e-5);
 }
 
+/// Wheel odometry: sure of its plane, and says of the rest that it does not know.
+Mission planar_mission(Rng& rng, double unknown) {
+  Mission out{.truth = {{}}, .odometry = {}, .constraints = {}};
+  Vector6d sigma(0.007, 0.007, 0.0, 0.0, 0.0, 0.0012);
+  for (int k = 0; k < 500; ++k) {
+    Pose3 step{Eigen::Quaterniond(Eigen::AngleAxisd(1.0 / 60, Eigen::Vector3d::UnitZ())), {0.5, 0.0, 0.0}};
+    const Vector6d noise = sigma.unaryExpr([&](double s) { return rng.normal(s); });
+    Vector6d sway = Vector6d::Zero();
+    sway[3] = 0.01 * std::cos(0.5 * k);
+    out.truth.push_back(retract(out.truth.back() * step, sway));
+    Matrix6d covariance = sigma.cwiseAbs2().asDiagonal();
+    for (const int axis : {2, 3, 4}) covariance(axis, axis) = unknown;
+    out.odometry.push_back({retract(step, noise), covariance});
+  }
+  const Matrix6d sure = Vector6d(1e-4, 1e-4, 1e-4, 2.5e-7, 2.5e-7, 2.5e-7).asDiagonal();
+  for (std::size_t k = 0; k < 500; k += 50)
+    out.constraints.push_back({k, k + 50, {out.truth[k].inverse() * out.truth[k + 50], sure}});
+  return out;
+}
+
+TEST(OnboardSmoother, PolishingNeverMakesMattersWorse) {
+  bool refused = false;
+  for (const double unknown : {1e-4, 1.0, 9.0}) {
+    Rng rng(3);
+    const auto m = planar_mission(rng, unknown);
+    auto plain = smoother_of(m);
+    ASSERT_EQ(plain.solve().termination, Termination::converged);
+    auto polished = smoother_of(m, {.polishing_steps = 3});
+    const auto summary = polished.solve();
+    ASSERT_EQ(summary.termination, Termination::converged);
+    const double unpolished_m = largest_position_difference(plain.poses(), m.truth);
+    EXPECT_LT(largest_position_difference(polished.poses(), m.truth), 1.1 * unpolished_m + 0.01) << unknown;
+    refused = refused || summary.polishing_steps < 3;
+  }
+  EXPECT_TRUE(refused);
+}
+
 TEST(OnboardSmoother, TailFollowsTheLastConstrainedNode) {
   Rng rng(2);
   const auto m = mission(rng, 500, 10);

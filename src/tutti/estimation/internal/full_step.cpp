@@ -47,4 +47,26 @@ bool full_step(ReducedProblem& problem, const EdgeCosts& costs, std::span<const 
   return true;
 }
 
+double full_cost_change(const ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
+                        std::span<const Pose3> before, std::span<const Pose3> after) {
+  const auto& nodes = problem.reduced().nodes;
+  const auto& graph = problem.reduced().graph;
+  double change = 0.0;
+  for (std::size_t i = 0; i < nodes.back(); ++i) {
+    const Eigen::LLT<Matrix6d> factor(odometry[i].covariance);
+    Eigen::Matrix<double, 6, 2> r;
+    r.col(0) = between_residual(before[i], before[i + 1], odometry[i].T_a_b);
+    r.col(1) = between_residual(after[i], after[i + 1], odometry[i].T_a_b);
+    factor.matrixL().solveInPlace(r);
+    change += r.col(1).squaredNorm() - r.col(0).squaredNorm();
+  }
+  const auto cost = [&](std::size_t e, std::span<const Pose3> poses) {
+    const PoseGraphEdge& edge = graph.edges[e];
+    const Vector6d r = between_residual(poses[nodes[edge.from]], poses[nodes[edge.to]], edge.T_from_to);
+    return costs.cost(e, r.dot(edge.information * r));
+  };
+  for (std::size_t e = nodes.size() - 1; e < graph.edges.size(); ++e) change += cost(e, after) - cost(e, before);
+  return change;
+}
+
 }  // namespace tutti::estimation::internal

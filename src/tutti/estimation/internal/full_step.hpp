@@ -12,4 +12,9 @@ namespace tutti::estimation::internal {
 bool full_step(ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
                std::span<Pose3> poses);
 
+/// By how much the cost of the full graph is higher at `after` than at `before`: all odometry up to the last reduced
+/// node, and the constraints by their loss.
+double full_cost_change(const ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
+                        std::span<const Pose3> before, std::span<const Pose3> after);
+
 }  // namespace tutti::estimation::internal
