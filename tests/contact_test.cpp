@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
+#include <string>
 
 #include "tutti/mission/runner.hpp"
 
@@ -96,6 +98,28 @@ TEST(Contact, TenMinutesOutOfRangeLoseNothing) {
   for (std::size_t i = 0; i < record.server.graph.poses.size(); ++i)
     EXPECT_LT((record.server.graph.poses[i].translation - always.server.graph.poses[i].translation).norm(), 1e-3);
   for (const RobotRecord& robot : record.robots) expect_as_good_as_the_server(robot);
+}
+
+TEST(Contact, AnOutageForEverEndsTheMissionAndIsNoted) {
+  MissionConfig config = an_hour(2);
+  for (auto& robot : config.simulation.robots) robot.walk.duration_s = 10.0 * kMinute_s;
+  // For ever, and until long after the end.
+  for (const double until_s : {std::numeric_limits<double>::infinity(), 1e9}) {
+    RobotLinkConfig bravo{.robot = std::string("bravo"), .link = {}};
+    bravo.link.outages = {{.from_s = 0.0, .until_s = until_s}};
+    config.robot_links = {bravo};
+    const MissionRecord record = run(config);
+    ASSERT_EQ(record.robots.size(), 2U);
+    EXPECT_EQ(record.robots[1].submaps, 0U);
+    EXPECT_TRUE(record.robots[1].updates.empty());
+    EXPECT_GT(record.robots[0].submaps, 5U);
+    const auto notes = [&](const std::string& what) {
+      return std::ranges::count_if(record.notes, [&](const auto& n) { return n.find(what) != std::string::npos; });
+    };
+    EXPECT_EQ(notes("bravo to server: "), 1);
+    EXPECT_EQ(notes("server to bravo: 1 messages (proxy graph) were never delivered"), 1);
+    EXPECT_EQ(notes("alpha"), 0);
+  }
 }
 
 TEST(Contact, ALinkOfAnUnknownRobotIsAnError) {

@@ -5,6 +5,7 @@
 #include <compare>
 #include <cstdint>
 #include <functional>
+#include <limits>
 
 namespace tutti {
 
@@ -15,10 +16,32 @@ struct Timestamp {
   friend auto operator<=>(const Timestamp&, const Timestamp&) = default;
 };
 
+inline constexpr Timestamp kFirstTimestamp{std::numeric_limits<std::int64_t>::min()};
+inline constexpr Timestamp kLastTimestamp{std::numeric_limits<std::int64_t>::max()};
+
+/// To the nearest nanosecond; what 64 bits do not hold (292 years) becomes the most they hold. Not for NaN.
+inline std::int64_t to_nanoseconds(double seconds) {
+  constexpr double kTooMany = 0x1p63;
+  const double ns = seconds * 1e9;
+  if (ns >= kTooMany) return kLastTimestamp.ns;
+  return ns < -kTooMany ? kFirstTimestamp.ns : std::llround(ns);
+}
+
 /// Seconds from b to a.
-inline double operator-(Timestamp a, Timestamp b) { return static_cast<double>(a.ns - b.ns) * 1e-9; }
-inline Timestamp operator+(Timestamp a, double seconds) { return {a.ns + std::llround(seconds * 1e9)}; }
-inline Timestamp operator-(Timestamp a, double seconds) { return {a.ns - std::llround(seconds * 1e9)}; }
+inline double operator-(Timestamp a, Timestamp b) {
+  std::int64_t ns = 0;
+  const bool wraps = __builtin_sub_overflow(a.ns, b.ns, &ns);
+  return (wraps ? static_cast<double>(a.ns) - static_cast<double>(b.ns) : static_cast<double>(ns)) * 1e-9;
+}
+/// Ends at the first or the last timestamp: so does a step that 64 bits do not hold, from anywhere.
+inline Timestamp operator+(Timestamp a, double seconds) {
+  const Timestamp step{to_nanoseconds(seconds)};
+  if (step == kFirstTimestamp || step == kLastTimestamp) return step;
+  Timestamp sum;
+  if (__builtin_add_overflow(a.ns, step.ns, &sum.ns)) return step.ns > 0 ? kLastTimestamp : kFirstTimestamp;
+  return sum;
+}
+inline Timestamp operator-(Timestamp a, double seconds) { return a + -seconds; }
 
 }  // namespace tutti
 

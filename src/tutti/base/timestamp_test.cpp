@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <unordered_set>
 
 namespace tutti {
@@ -32,6 +33,22 @@ TEST(Timestamp, AddingSecondsIsExactToTheNanosecond) {
 TEST(Timestamp, BeforeTheEpochDoesNotWrap) {
   EXPECT_DOUBLE_EQ((Timestamp{-1'000'000'000} - Timestamp{1'000'000'000}), -2.0);
   EXPECT_LT(Timestamp{-1}, Timestamp{0});
+}
+
+TEST(Timestamp, StaysAtTheFirstAndTheLastThereIs) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double forever : {kInfinity, 1e10, 1e300}) {
+    EXPECT_EQ(kEpoch + forever, kLastTimestamp);
+    EXPECT_EQ(kEpoch - forever, kFirstTimestamp);
+    EXPECT_EQ(kEpoch - -forever, kLastTimestamp);
+    EXPECT_EQ(kLastTimestamp + forever, kLastTimestamp);
+  }
+  EXPECT_EQ(kLastTimestamp + 1e-9, kLastTimestamp);
+  EXPECT_EQ(kFirstTimestamp - 1.0, kFirstTimestamp);
+  EXPECT_EQ((kEpoch + 7e9).ns, kEpoch.ns + 7'000'000'000'000'000'000);
+  EXPECT_EQ(kEpoch + 8e9, kLastTimestamp);  // the sum wraps, not the step
+  EXPECT_NEAR(kLastTimestamp - kFirstTimestamp, 0x1p64 * 1e-9, 1.0);
+  EXPECT_NEAR(kFirstTimestamp - kLastTimestamp, -0x1p64 * 1e-9, 1.0);
 }
 
 TEST(Timestamp, OrdersAndHashesByNanosecond) {

@@ -11,7 +11,7 @@ namespace {
 /// A proxy graph is worth sending only until there is a newer one.
 bool only_latest_counts(MessageKind kind) { return kind == MessageKind::proxy_graph; }
 
-/// First time not before `t` with contact.
+/// First time not before `t` with contact; the last timestamp: never.
 Timestamp in_contact(const LinkConfig& link, Timestamp start, Timestamp t) {
   for (bool moved = true; moved;) {
     moved = false;
@@ -158,11 +158,22 @@ std::vector<Delivery> InProcessBus::deliver_until(Timestamp now) {
 
 std::optional<Timestamp> InProcessBus::next_delivery() const {
   std::optional<Timestamp> next;
-  const auto consider = [&](Timestamp t) { next = next ? std::min(*next, t) : t; };
+  const auto consider = [&](Timestamp t) {
+    if (t < kLastTimestamp) next = next ? std::min(*next, t) : t;
+  };
   if (!in_flight_.empty()) consider(in_flight_.begin()->first);
   for (const auto& [ends, way] : directions_)
     if (!way.queue.empty()) consider(transmission_start(way));
   return next;
+}
+
+std::map<InProcessBus::Topic, std::size_t> InProcessBus::undelivered() const {
+  std::map<Topic, std::size_t> count;
+  const auto add = [&](const Delivery& message) { ++count[{message.from, message.to, message.kind}]; };
+  for (const auto& [arrival, message] : in_flight_) add(message);
+  for (const auto& [ends, way] : directions_)
+    for (const Waiting& waiting : way.queue) add(waiting.message);
+  return count;
 }
 
 }  // namespace tutti::bus

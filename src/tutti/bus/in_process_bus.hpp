@@ -31,14 +31,17 @@ struct Endpoint {
   friend auto operator<=>(const Endpoint&, const Endpoint&) = default;
 };
 
-/// Time without contact: [from_s, until_s) in seconds after the bus's start.
+/// Longer than any radio takes; a robot that is away for longer has an outage.
+inline constexpr double kLongestLinkTime_s = 3600.0;
+
+/// Time without contact: [from_s, until_s) in seconds after the bus's start; infinity: for ever.
 struct Outage {
   double from_s = 0.0;
   double until_s = 0.0;
   template <class V>
   void describe(V& v) {
     v.field("from_s", from_s, at_least(0.0), "Contact is lost, seconds after the start of the mission.");
-    v.field("until_s", until_s, at_least(0.0), "Contact is back.");
+    v.field("until_s", until_s, at_least(0.0), "Contact is back; .inf = never.");
   }
 };
 
@@ -55,14 +58,15 @@ struct LinkConfig {
   std::vector<Outage> outages;
   template <class V>
   void describe(V& v) {
-    v.field("latency_s", latency_s, at_least(0.0), "Time from sending to arrival.");
-    v.field("jitter_s", jitter_s, at_least(0.0),
+    v.field("latency_s", latency_s, between(0.0, kLongestLinkTime_s), "Time from sending to arrival.");
+    v.field("jitter_s", jitter_s, between(0.0, kLongestLinkTime_s),
             "Up to this much later, at random; larger than the spacing = reordered.");
     v.field("loss", loss, between(0.0, 0.95), "Share of transmissions lost; all but proxy graphs are sent again.");
-    v.field("retransmit_s", retransmit_s, at_least(0.0), "A lost transmission is repeated after this time.");
+    v.field("retransmit_s", retransmit_s, between(0.0, kLongestLinkTime_s),
+            "A lost transmission is repeated after this time.");
     v.field("duplicate", duplicate, between(0.0, 1.0), "Share of messages that arrive twice.");
     v.field("in_order", in_order, any(), "Messages of one direction never overtake each other.");
-    v.field("bandwidth_bytes_per_s", bandwidth_bytes_per_s, at_least(0.0), "0 = unlimited.");
+    v.field("bandwidth_bytes_per_s", bandwidth_bytes_per_s, between(0.0, 1e12), "0 = unlimited.");
     v.field("queue_messages", queue_messages, at_least(1),
             "Messages that wait for contact or bandwidth; then the oldest is dropped.");
     v.field("outages", outages, any(), "Times out of range; messages wait.");
@@ -110,11 +114,13 @@ class InProcessBus {
   void publish(Timestamp now, Endpoint from, std::optional<Endpoint> to, MessageKind kind, std::string bytes);
   /// All messages that have arrived by `now`, in the order of arrival, each once (duplicates of the link: twice).
   std::vector<Delivery> deliver_until(Timestamp now);
-  /// Nothing arrives before this time, and nothing is under way when there is none. deliver_until() at this time may
+  /// Nothing arrives before this time, and nothing ever arrives when there is none. deliver_until() at this time may
   /// still return nothing: a message that only now leaves its queue arrives later.
   [[nodiscard]] std::optional<Timestamp> next_delivery() const;
 
   using Topic = std::tuple<Endpoint, Endpoint, MessageKind>;  ///< (from, to, kind)
+  /// How many messages wait or are under way.
+  [[nodiscard]] std::map<Topic, std::size_t> undelivered() const;
   [[nodiscard]] const std::map<Topic, TopicStatistics>& statistics() const { return statistics_; }
 
  private:

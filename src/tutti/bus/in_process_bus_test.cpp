@@ -5,6 +5,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -221,6 +222,45 @@ TEST(InProcessBus, TenMinutesOutOfRangeCostNoSubmapAndAnotherRobotNothing) {
   EXPECT_EQ(graphs.size(), 51U - 29U);
   EXPECT_TRUE(std::ranges::find(graphs, 88) != graphs.end());
   EXPECT_EQ(bus.statistics().at({kServer, kAlpha, MessageKind::proxy_graph}).superseded, 29U);
+}
+
+TEST(InProcessBus, AnOutageForEverIsOne) {
+  for (const double forever : {std::numeric_limits<double>::infinity(), 1e10}) {
+    LinkConfig link;
+    link.outages = {{10.0, forever}};
+    InProcessBus bus(kStart, link, 1);
+    bus.publish(at(0), kAlpha, kServer, MessageKind::submap, "heard");
+    bus.publish(at(10), kAlpha, kServer, MessageKind::submap, "alone");
+    bus.publish(at(11), kAlpha, kServer, MessageKind::submap, "and again");
+    const auto deliveries = drain(bus, at(11));
+    ASSERT_EQ(deliveries.size(), 1U);
+    EXPECT_EQ(*deliveries[0].bytes, "heard");
+    EXPECT_EQ(bus.next_delivery(), std::nullopt);
+    EXPECT_EQ(bus.undelivered().at({kAlpha, kServer, MessageKind::submap}), 2U);
+  }
+}
+
+TEST(InProcessBus, WhatArrivesAfterTheEndOfTimeNeverArrives) {
+  InProcessBus bus(kStart, {.bandwidth_bytes_per_s = 1e-12}, 1);
+  bus.publish(at(0), kAlpha, kServer, MessageKind::submap, "slow");
+  bus.publish(at(1), kAlpha, kServer, MessageKind::submap, "slower");
+  EXPECT_TRUE(drain(bus, at(1)).empty());
+  EXPECT_EQ(bus.next_delivery(), std::nullopt);
+  EXPECT_EQ(bus.undelivered().at({kAlpha, kServer, MessageKind::submap}), 2U);
+}
+
+TEST(InProcessBus, TimesThatNoRadioTakesAreRefused) {
+  for (const std::string setting : {"latency_s", "jitter_s", "retransmit_s", "bandwidth_bytes_per_s"}) {
+    const auto node = parse_yaml(setting + ": .inf", "link");
+    ASSERT_TRUE(node.has_value());
+    LinkConfig link;
+    const Status ok = load_config(*node, link, "link");
+    ASSERT_FALSE(ok.has_value()) << setting;
+    EXPECT_NE(ok.error().message.find(setting + ": is .inf, must be in [0, "), std::string::npos) << ok.error().message;
+  }
+  const auto away = parse_yaml("outages: [{from_s: 5, until_s: .inf}]", "link");
+  LinkConfig link;
+  EXPECT_TRUE(load_config(*away, link, "link").has_value());
 }
 
 TEST(InProcessBus, EveryRobotMayHaveItsOwnLink) {

@@ -26,7 +26,8 @@ namespace tutti::mission {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr Timestamp kMissionStart{0};  // virtual time; robots' own stamps are never compared with it
+constexpr double kPatience_s = 86400.0;  // after the end, for what is still under way
+constexpr Timestamp kMissionStart{0};    // virtual time; robots' own stamps are never compared with it
 
 /// Keeps virtual time in step with the wall clock, when asked to.
 class Pace {
@@ -88,7 +89,7 @@ class MissionRun {
       if (sample_s == kNever) finish_robots();
       const double delivery_s = next_delivery();
       const double now_s = std::min({sample_s, delivery_s, next_update_s});
-      if (sample_s == kNever && delivery_s == kNever && !server_.has_news()) break;
+      if (sample_s == kNever && delivery_s > duration_s_ + kPatience_s && !server_.has_news()) break;
       pace_.wait_until(now_s);
       time_s_ = now_s;
       deliver();
@@ -231,6 +232,7 @@ class MissionRun {
   }
 
   void record_traffic(RobotRecord& robot) const;
+  void note_undelivered(MissionRecord& record) const;
   void record_timing(MissionRecord& record) const;
 
   const MissionConfig& config_;
@@ -277,6 +279,19 @@ void MissionRun::record_traffic(RobotRecord& robot) const {
   }
 }
 
+void MissionRun::note_undelivered(MissionRecord& record) const {
+  const auto name = [&](const bus::Endpoint& end) {
+    return end.robot ? robots_[end.robot->value]->recording().recording.name : "server";
+  };
+  for (const auto& [topic, messages] : bus_.undelivered()) {
+    const auto& [from, to, kind] = topic;
+    record.notes.push_back(
+        fmt::format("{} to {}: {} messages ({}) were never delivered; the link would have taken "
+                    "more than a day after the end",
+                    name(from), name(to), messages, wire::name(kind)));
+  }
+}
+
 void MissionRun::record_timing(MissionRecord& record) const {
   record.timing = timing_;
   record.timing.machine = machine_description();
@@ -316,6 +331,7 @@ MissionRecord MissionRun::record() const {
   if (!refusals_.empty())
     record.notes.push_back(
         fmt::format("{} messages were refused, the first because: {}", refusals_.size(), refusals_.front()));
+  note_undelivered(record);
   const auto& left_out = server_.map().left_out;
   if (!left_out.empty())
     record.notes.push_back(fmt::format(
