@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person meets at the command line: exit codes and messages. Usage: cli_test.py TUTTI_PROGRAM SOURCE_DIR"""
+"""What a person meets at the command line: exit codes and messages. Usage: cli_test.py TUTTI_PROGRAM SOURCE_DIR [CommandLine.TEST...]"""
 import json
 import math
 import pathlib
@@ -13,6 +13,11 @@ TUTTI, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 SMALL = [  # two minutes with LiDAR in a small tunnel
     "--set", "simulation.robots=[{walk: {duration_s: 120}}, {walk: {duration_s: 120}}]",
     "--set", "simulation.world.network={rows: 2, columns: 3, block_m: 15, jitter_m: 2}",
+]
+
+BRIEF = [  # half a minute of trajectories only
+    "--set", "simulation.robots=[{walk: {duration_s: 30}}, {walk: {duration_s: 30}}]",
+    "--set", "simulation.sensors=none", "--set", "closures.finder=reference",
 ]
 
 
@@ -111,6 +116,19 @@ class CommandLine(unittest.TestCase):
         # The effective configuration is a mission file that runs again with the same result.
         self.expect(tutti("run", out / "config.yaml", "--out", self.path / "again", "--seed", 7), 0)
         self.assertEqual((out / "report.json").read_text(), (self.path / "again" / "report.json").read_text())
+
+    def test_a_mission_removes_nothing_of_the_users(self):
+        data = self.path / "data"
+        (data / "clouds").mkdir(parents=True)
+        (data / "clouds" / "000000.pcd").write_text("mine")
+        mission = self.mission("robots: [{name: a, odometry: {file: a.tum}, scans: clouds}]\nclosures: {finder: lidar}\n")
+        self.expect(tutti("run", mission, "--data", data, "--out", data), 1, "a.tum")  # never starts
+        self.assertEqual([p.relative_to(data).as_posix() for p in sorted(data.rglob("*"))],
+                         ["clouds", "clouds/000000.pcd"])
+        (self.path / "clouds").write_text("a plain file")
+        self.expect(tutti("demo", *BRIEF, "--out", self.path), 0)
+        self.assertEqual((self.path / "clouds").read_text(), "a plain file")
+        self.assertEqual([p.name for p in self.path.glob(".*")], [])
 
     def test_settings_say_what_can_be_set(self):
         self.expect(tutti("settings"), 0, "closures.finder = ", "simulation.robots[].start_s = 0")
@@ -275,4 +293,4 @@ class CommandLine(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <iostream>
 
+#include "own_folder.hpp"
 #include "tutti/mission/report/files.hpp"
 #include "tutti/mission/report/text.hpp"
 #include "tutti/mission/runner.hpp"
@@ -86,10 +87,14 @@ int run_and_report(const Result<mission::MissionConfig>& config, const MissionAr
     std::cerr << "tutti: --out " << arguments.out.string() << ": cannot make the folder: " << failure.message() << '\n';
     return 1;
   }
+  const auto clouds = OwnFolder::make(arguments.out, "clouds");
+  if (!clouds) {
+    std::cerr << "tutti: --out " << clouds.error().message << '\n';
+    return 1;
+  }
   ProgressLine progress;
-  const std::filesystem::path clouds = arguments.out / "clouds";  // while the mission runs
   const mission::RunOptions options{.data = arguments.data,
-                                    .clouds = clouds,
+                                    .clouds = (*clouds)->path(),
                                     .seed = arguments.seed,
                                     .rate = arguments.rate,
                                     .threads = arguments.threads,
@@ -97,7 +102,6 @@ int run_and_report(const Result<mission::MissionConfig>& config, const MissionAr
                                     .progress = std::ref(progress)};
   const auto record = mission::run_mission(*config, options);
   progress.close();
-  std::filesystem::remove_all(clouds, failure);
   if (!record) {
     std::cerr << "tutti: " << record.error().message << '\n';
     if (record.error().code == ErrorCode::io && arguments.data.empty())
