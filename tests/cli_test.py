@@ -196,27 +196,60 @@ class CommandLine(unittest.TestCase):
         self.assertFalse(loose["disagree"])
         self.assertEqual(loose["robots"][0]["constraints"], [])
 
+    def write_graph(self, name, heading, steps=80):
+        """A straight way of 1 m per vertex; from the 40th on it drifts to the left."""
+        text = "".join("VERTEX_SE3:QUAT %d %d %.3f 0 0 0 0 1\n" % (i, i, heading * max(0, i - 40)) for i in
+                       range(steps))
+        information = "1e4 0 0 0 0 0 1e4 0 0 0 0 1e4 0 0 0 1e4 0 0 1e4 0 1e4"
+        text += "".join("EDGE_SE3:QUAT %d %d 1 %.3f 0 0 0 0 1 %s\n" % (i, i + 1, heading * (i >= 40), information)
+                        for i in range(steps - 1))
+        (self.path / name).write_text(text)
+        return self.path / name
+
+    def write_stamps(self, name, seconds_per_vertex=5, steps=80):
+        (self.path / name).write_text("id,robot,keyframe,stamp_ns\n" + "".join(
+            "%d,3,%d,%d\n" % (i, i, seconds_per_vertex * 1_000_000_000 * i) for i in range(steps)))
+
     def test_compare_reads_graphs_with_and_without_stamps(self):
-        def graph(name, heading):
-            steps = 80
-            text = "".join("VERTEX_SE3:QUAT %d %d %.3f 0 0 0 0 1\n" % (i, i, heading * max(0, i - 40)) for i in
-                           range(steps))
-            information = "1e4 0 0 0 0 0 1e4 0 0 0 0 1e4 0 0 0 1e4 0 0 1e4 0 1e4"
-            text += "".join("EDGE_SE3:QUAT %d %d 1 %.3f 0 0 0 0 1 %s\n" % (i, i + 1, heading * (i >= 40), information)
-                            for i in range(steps - 1))
-            (self.path / name).write_text(text)
-            return self.path / name
-        a, b = graph("a.g2o", 0.0), graph("b.g2o", 0.5)
+        a, b = self.write_graph("a.g2o", 0.0), self.write_graph("b.g2o", 0.5)
         report = json.loads(tutti("compare", a, b, "--json").stdout)
         self.assertTrue(report["disagree"])
-        self.assertEqual(report["notes"], [])  # every pose has an edge to the next
+        self.assertEqual([note.split(":")[0] for note in report["notes"]], [str(a), str(b)])  # invented times
+        self.assertIn("n seconds", report["notes"][0])
         self.assertEqual(report["robots"][0]["duration_s"], 79)
-        (self.path / "b_stamps.csv").write_text("id,robot,keyframe,stamp_ns\n" + "".join(
-            "%d,3,%d,%d\n" % (i, i, 5_000_000_000 * i) for i in range(80)))
+        self.write_stamps("b_stamps.csv")
         self.expect(tutti("compare", b, b), 0, "They agree")
-        self.assertEqual(json.loads(tutti("compare", b, b, "--json").stdout)["robots"][0]["duration_s"], 395)
+        report = json.loads(tutti("compare", b, b, "--json").stdout)
+        self.assertEqual(report["robots"][0]["duration_s"], 395)
+        self.assertEqual(report["notes"], [])  # every pose has an edge to the next, and a time
         (self.path / "b_stamps.csv").write_text("id,robot,keyframe,stamp_ns\n0,3,0,0\n")
         self.expect(tutti("compare", b, b), 1, "b_stamps.csv", "vertex 1")
+
+    def test_compare_invents_no_times_beside_real_ones(self):
+        graph, copy = self.write_graph("graph.g2o", 0.5), self.write_graph("copy.g2o", 0.5)
+        self.write_stamps("graph_stamps.csv")
+        for a, b in ((graph, copy), (copy, graph)):  # the same vertices
+            report = json.loads(tutti("compare", a, b, "--json").stdout)
+            self.assertFalse(report["disagree"])
+            self.assertEqual(report["robots"][0]["duration_s"], 395)
+            self.assertIn("copy.g2o: no times of its own", report["notes"][0])
+        fewer, way = self.write_graph("fewer.g2o", 0.5, steps=60), self.write_way("way.tum")
+        self.expect(tutti("compare", graph, fewer), 1, "fewer.g2o: 60 vertices, expected the 80 of")
+        for a, b in ((way, copy), (copy, way)):
+            self.expect(tutti("compare", a, b), 1, "copy.g2o", "no times", "copy_stamps.csv")
+
+    def test_optimise_takes_the_stamps_along(self):
+        graph = self.write_graph("graph.g2o", 0.5)
+        self.write_stamps("graph_stamps.csv")
+        self.expect(tutti("optimise", graph, "-o", self.path / "better.g2o"), 0)
+        self.assertEqual((self.path / "better_stamps.csv").read_text(), (self.path / "graph_stamps.csv").read_text())
+        self.expect(tutti("optimise", graph, "-o", graph), 0)
+        report = json.loads(tutti("compare", graph, self.path / "better.g2o", "--json").stdout)
+        self.assertFalse(report["disagree"])
+        self.assertEqual(report["notes"], [])
+        (self.path / "better_stamps.csv").unlink()
+        (self.path / "better_stamps.csv").mkdir()
+        self.expect(tutti("optimise", graph, "-o", self.path / "better.g2o"), 1, "better_stamps.csv")
 
     def test_compare_says_what_is_wrong(self):
         truth = self.write_way("truth.tum")

@@ -35,10 +35,9 @@ struct Options {
 };
 
 Result<mission::CompareReport> compare(const Options& options) {
-  const auto a = load_side(options.a, options.a_estimate);
-  if (!a) return tl::unexpected(a.error());
-  const auto b = load_side(options.b, options.b_estimate);
-  if (!b) return tl::unexpected(b.error());
+  const auto sides = load_sides({options.a, options.a_estimate}, {options.b, options.b_estimate});
+  if (!sides) return tl::unexpected(sides.error());
+  const auto& [a, b] = *sides;
   mission::CompareReport report{.a = options.a, .b = options.b, .config = options.config, .version = TUTTI_VERSION};
   report.config.tolerance_deg =
       options.tolerance_deg.value_or(std::atan(options.config.tolerance_m / kArm_m) / kRadPerDeg);
@@ -46,8 +45,10 @@ Result<mission::CompareReport> compare(const Options& options) {
     report.config.association = {.interpolate = false, .max_difference_s = *options.max_difference_s};
   if (std::filesystem::is_directory(options.a)) report.a += " (" + options.a_estimate + ")";
   if (std::filesystem::is_directory(options.b)) report.b += " (" + options.b_estimate + ")";
-  report.notes = b->notes;
-  const auto pairs = pair_robots(*a, *b, report.notes);
+  report.notes = a.notes;
+  report.notes.insert(report.notes.end(), b.notes.begin(), b.notes.end());
+  report.notes.insert(report.notes.end(), b.judged_notes.begin(), b.judged_notes.end());
+  const auto pairs = pair_robots(a, b, report.notes);
   if (!pairs) return tl::unexpected(pairs.error());
   for (const ComparePair& pair : *pairs) {
     auto comparison = mission::compare_trajectories(*pair.a, *pair.b, report.config);
@@ -130,9 +131,9 @@ void add_compare_command(CLI::App& app, int& exit_code) {
       "wavelets along the way separate scales, and what stands out of A's tolerance at a node and scale is a\n"
       "disagreement. Told are the stretches where it was born, and the fewest relative poses of A that would bring B\n"
       "into agreement. B need not be aligned.\n\n"
-      "Files: TUM, EuRoC csv, KITTI, or g2o (times and robots from x_stamps.csv beside x.g2o; without it vertex n is "
-      "at\n"
-      "n seconds). Folders: what `tutti run --out` wrote; every robot that both have is compared. How a mission's\n"
+      "Files: TUM, EuRoC csv, KITTI, or g2o (times and robots from x_stamps.csv beside x.g2o; two graphs without it:\n"
+      "vertex n is at n seconds). Folders: what `tutti run --out` wrote; every robot that both have is compared. How a "
+      "mission's\n"
       "robots drifted from the server's map:\n"
       "  tutti compare OUT OUT --out OUT/compare\n\n"
       "Exit code 0, whether they agree or not (--json says \"disagree\"); 1 when a file is bad or no times are "

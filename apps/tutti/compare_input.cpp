@@ -42,22 +42,33 @@ Result<CompareSide> load_folder(const fs::path& folder, const std::string& estim
   return out;
 }
 
-/// Of every vertex of the graph: which robot, and when.
-Result<std::vector<formats::VertexStamp>> vertex_stamps(const std::string& path, const formats::G2oFile& file) {
-  constexpr double kLatest_s = 4e9;  // as stamps have to fit
-  fs::path beside(path);
-  beside.replace_filename(beside.stem().string() + "_stamps.csv");
-  if (!fs::exists(beside)) {
-    std::vector<formats::VertexStamp> out;
-    for (const std::int64_t id : file.vertex_ids) {
-      if (std::abs(static_cast<double>(id)) > kLatest_s)
-        return fail(ErrorCode::unsupported, "{}: vertex {} cannot stand for a time in seconds, expected {} beside it",
-                    path, id, beside.string());
-      out.push_back({id, {}, Timestamp{} + static_cast<double>(id)});
-    }
-    return out;
+bool is_folder(const std::string& path) { return fs::is_directory(path); }
+
+bool is_graph(const std::string& path) { return fs::path(path).extension() == ".g2o"; }
+
+bool is_there(const std::string& path) {
+  std::error_code unreadable;
+  return fs::exists(path, unreadable);
+}
+
+/// Vertex n of one robot at n seconds.
+Result<std::vector<formats::VertexStamp>> numbers_as_stamps(const std::string& path, const formats::G2oFile& file) {
+  constexpr double kLatest_s = 2e9;  // as stamps have to fit
+  std::vector<formats::VertexStamp> out;
+  for (const std::int64_t id : file.vertex_ids) {
+    if (std::abs(static_cast<double>(id)) > kLatest_s)
+      return fail(ErrorCode::unsupported, "{}: vertex {} cannot stand for a time in seconds, expected {} beside it",
+                  path, id, formats::stamps_beside(path));
+    out.push_back({id, {}, Timestamp{} + static_cast<double>(id)});
   }
-  auto stamps = formats::read_graph_stamps(beside.string());
+  return out;
+}
+
+/// Of every vertex of the graph: which robot, and when. `stamps_path` empty: none are known.
+Result<std::vector<formats::VertexStamp>> vertex_stamps(const std::string& path, const formats::G2oFile& file,
+                                                        const std::string& stamps_path) {
+  if (stamps_path.empty()) return numbers_as_stamps(path, file);
+  auto stamps = formats::read_graph_stamps(stamps_path);
   if (!stamps) return tl::unexpected(stamps.error());
   std::map<std::int64_t, formats::VertexStamp> by_id;
   for (const auto& stamp : *stamps) by_id[stamp.vertex_id] = stamp;
@@ -65,9 +76,12 @@ Result<std::vector<formats::VertexStamp>> vertex_stamps(const std::string& path,
   for (const std::int64_t id : file.vertex_ids) {
     const auto found = by_id.find(id);
     if (found == by_id.end())
-      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", beside.string(), id, path);
+      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", stamps_path, id, path);
     out.push_back(found->second);
   }
+  if (stamps_path != formats::stamps_beside(path) && by_id.size() != out.size())
+    return fail(ErrorCode::invalid, "{}: {} vertices, expected the {} of {}, or {} beside it", path, out.size(),
+                by_id.size(), stamps_path, formats::stamps_beside(path));
   return out;
 }
 
@@ -86,10 +100,10 @@ std::optional<Matrix6d> motion_covariance(const std::map<std::pair<std::size_t, 
   return std::nullopt;
 }
 
-Result<CompareSide> load_g2o(const std::string& path) {
+Result<CompareSide> load_g2o(const std::string& path, const std::string& stamps_path) {
   const auto file = formats::read_g2o(path);
   if (!file) return tl::unexpected(file.error());
-  const auto stamps = vertex_stamps(path, *file);
+  const auto stamps = vertex_stamps(path, *file, stamps_path);
   if (!stamps) return tl::unexpected(stamps.error());
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> edge_of;
   for (std::size_t e = 0; e < file->graph.edges.size(); ++e)
@@ -101,6 +115,14 @@ Result<CompareSide> load_g2o(const std::string& path) {
                   file->vertex_ids[v]);
   if (robots.empty()) return fail(ErrorCode::invalid, "{}: holds no vertex, expected at least one", path);
   CompareSide out;
+  if (stamps_path.empty())
+    out.notes.push_back(fmt::format("{}: no times ({} is not there): vertex n counts as at n seconds.", path,
+                                    formats::stamps_beside(path)));
+  else if (stamps_path != formats::stamps_beside(path))
+    out.notes.push_back(
+        fmt::format("{}: no times of its own ({} is not there): its vertices are those of the other "
+                    "graph, and so are their times and robots.",
+                    path, formats::stamps_beside(path)));
   for (const auto& [robot, vertices] : robots) {
     NamedTrajectory trajectory{robots.size() == 1 ? std::string() : fmt::format("robot {}", robot.value), {}, {}};
     std::optional<std::size_t> before;
@@ -116,10 +138,10 @@ Result<CompareSide> load_g2o(const std::string& path) {
     }
     if (!complete) {
       trajectory.step_covariance.clear();
-      out.notes.push_back(fmt::format(
-          "{}{}: not every pose has an edge of full rank to the next one; as judged trajectory its odometry counts as "
-          "--odometry-sigma says.",
-          path, trajectory.name.empty() ? "" : ", " + trajectory.name));
+      out.judged_notes.push_back(
+          fmt::format("{}{}: not every pose has an edge of full rank to the next one; its odometry counts as "
+                      "--odometry-sigma says.",
+                      path, trajectory.name.empty() ? "" : ", " + trajectory.name));
     }
     out.robots.push_back(std::move(trajectory));
   }
@@ -132,15 +154,43 @@ std::vector<std::string> names(const CompareSide& side) {
   return out;
 }
 
-}  // namespace
-
-Result<CompareSide> load_side(const std::string& path, const std::string& estimate) {
-  if (fs::is_directory(path)) return load_folder(path, estimate);
-  if (fs::path(path).extension() == ".g2o") return load_g2o(path);
+/// `stamps_path`: of a graph.
+Result<CompareSide> load_side(const CompareSource& source, const std::string& stamps_path) {
+  const std::string& path = source.path;
+  if (is_folder(path)) return load_folder(path, source.estimate);
+  if (is_graph(path)) return load_g2o(path, stamps_path);
   auto poses = formats::read_trajectory(path);
   if (!poses) return tl::unexpected(poses.error());
   if (poses->empty()) return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
-  return CompareSide{{NamedTrajectory{"", std::move(*poses), {}}}, {}};
+  return CompareSide{{NamedTrajectory{"", std::move(*poses), {}}}, {}, {}};
+}
+
+/// Where a graph's stamps are when the other side is `other`; empty when neither side has times.
+Result<std::string> stamps_of(const std::string& path, const std::string& other) {
+  if (!is_graph(path) || is_folder(path)) return std::string();
+  const std::string own = formats::stamps_beside(path);
+  if (is_there(own)) return own;
+  const bool other_is_graph = is_graph(other) && !is_folder(other);
+  if (other_is_graph && is_there(formats::stamps_beside(other))) return formats::stamps_beside(other);
+  if (other_is_graph || !is_there(path) || !is_there(other)) return std::string();
+  return fail(ErrorCode::invalid,
+              "{}: its poses have no times, but those of {} have: expected {} beside it, as `tutti run` writes it and "
+              "`tutti optimise` copies it",
+              path, other, own);
+}
+
+}  // namespace
+
+Result<std::pair<CompareSide, CompareSide>> load_sides(const CompareSource& a, const CompareSource& b) {
+  const auto a_stamps = stamps_of(a.path, b.path);
+  if (!a_stamps) return tl::unexpected(a_stamps.error());
+  const auto b_stamps = stamps_of(b.path, a.path);
+  if (!b_stamps) return tl::unexpected(b_stamps.error());
+  auto side_a = load_side(a, *a_stamps);
+  if (!side_a) return tl::unexpected(side_a.error());
+  auto side_b = load_side(b, *b_stamps);
+  if (!side_b) return tl::unexpected(side_b.error());
+  return std::pair(std::move(*side_a), std::move(*side_b));
 }
 
 Result<std::vector<ComparePair>> pair_robots(const CompareSide& a, const CompareSide& b,

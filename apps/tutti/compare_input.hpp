@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/result.hpp"
@@ -14,12 +15,20 @@ namespace tutti::app {
 struct CompareSide {
   std::vector<mission::NamedTrajectory> robots;
   std::vector<std::string> notes;
+  std::vector<std::string> judged_notes;  ///< Of its own motion's covariance: said of the side that is judged.
 };
 
-/// `estimate`: of a folder, the files *_<estimate>.tum. A graph x.g2o takes stamps and robots from x_stamps.csv beside
-/// it; without that, vertex n is one robot's pose at n seconds. Its edges give each motion's covariance when every pose
-/// has one to the next; a note says when not.
-Result<CompareSide> load_side(const std::string& path, const std::string& estimate);
+/// Which file or folder; of a folder, the files *_<estimate>.tum.
+struct CompareSource {
+  std::string path;
+  std::string estimate;
+};
+
+/// A graph x.g2o takes stamps and robots from x_stamps.csv beside it. Without it, from the other side's, if that is a
+/// graph of the very same vertices; or, when neither side has times, vertex n is one robot's pose at n seconds. Notes
+/// say so; a graph without times beside anything else is refused. A graph's edges give each motion's covariance when
+/// every pose has one to the next.
+Result<std::pair<CompareSide, CompareSide>> load_sides(const CompareSource& a, const CompareSource& b);
 
 /// Robots that both sides have, by name; two sides of one robot each belong together whatever their names.
 struct ComparePair {

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -13,6 +14,7 @@
 #include "tutti/estimation/gnc.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
 
 namespace tutti::app {
 namespace {
@@ -79,6 +81,17 @@ void print(const PoseGraph& graph, const Outcome& outcome, const OptimiseOptions
              to_string(summary.termination));
 }
 
+/// The same vertices at the same times: the stamps beside the input, if any, go beside the output.
+Status copy_stamps(const OptimiseOptions& options) {
+  const std::string from = formats::stamps_beside(options.input);
+  const std::string to = formats::stamps_beside(options.output);
+  std::error_code failure;
+  if (!std::filesystem::exists(from, failure) || std::filesystem::equivalent(from, to, failure)) return {};
+  std::filesystem::copy_file(from, to, std::filesystem::copy_options::overwrite_existing, failure);
+  if (failure) return fail(ErrorCode::io, "{}: cannot write: {}", to, failure.message());
+  return {};
+}
+
 int run(const OptimiseOptions& options) {
   auto file = formats::read_g2o(options.input);
   if (!file) {
@@ -95,7 +108,9 @@ int run(const OptimiseOptions& options) {
     return 1;
   }
   file->graph.poses = outcome.solution.poses;
-  if (const auto written = formats::write_g2o(options.output, *file); !written) {
+  auto written = formats::write_g2o(options.output, *file);
+  if (written) written = copy_stamps(options);
+  if (!written) {
     fmt::print(stderr, "tutti optimise: {}\n", written.error().message);
     return 1;
   }
@@ -111,6 +126,7 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "Gauss-Newton on sparse Cholesky; the first vertex of every connected component stays where it is.\n"
       "SE(2) graphs are optimised lifted to SE(3). With a robust loss or gnc, edges between vertices that follow each\n"
       "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
+      "IN_stamps.csv, if it is there, is copied beside the output.\n"
       "Example: tutti optimise sphere2500.g2o -o out.g2o\n");
   command->add_option("input", options->input, "Graph to read (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional).")
       ->required()

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/graph_stamps.hpp"
 
+#include <filesystem>
 #include <limits>
 
 #include "tutti/formats/internal/text.hpp"
@@ -19,6 +20,12 @@ Result<std::uint32_t> small_number(const internal::LineReader& line, std::size_t
 }
 
 }  // namespace
+
+std::string stamps_beside(const std::string& graph_path) {
+  std::filesystem::path path(graph_path);
+  path.replace_filename(path.stem().string() + "_stamps.csv");
+  return path.string();
+}
 
 Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name) {
   internal::LineReader line(text, name, internal::Separator::comma);

@@ -21,6 +21,9 @@ struct VertexStamp {
   friend bool operator==(const VertexStamp&, const VertexStamp&) = default;
 };
 
+/// Where the stamps of a graph's file are looked for: "x_stamps.csv" beside "x.g2o".
+std::string stamps_beside(const std::string& graph_path);
+
 /// In file order. Errors name file and line.
 Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name);
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path);
