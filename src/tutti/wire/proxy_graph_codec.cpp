@@ -13,6 +13,7 @@
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/columns.hpp"
 #include "tutti/wire/internal/integer_coder.hpp"
+#include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/internal/shape.hpp"
 #include "tutti/wire/limits.hpp"
@@ -222,8 +223,6 @@ std::vector<Run> runs_of(const ProxyGraph& graph) {
 }
 
 Result<std::vector<Run>> read_runs(const v1::ProxyGraph& in) {
-  if (static_cast<std::size_t>(in.run_size()) > kMaxRobots)
-    return fail(ErrorCode::invalid, "{} robots, at most {} are accepted", in.run_size(), kMaxRobots);
   std::vector<Run> runs;
   std::size_t nodes = 0;
   std::size_t eliminated = 0;
@@ -307,7 +306,7 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
 }
 
 Status read_components(const v1::ProxyGraph& in, ProxyGraph& graph) {
-  if (in.component_size() != in.component_robot_size() || static_cast<std::size_t>(in.component_size()) > kMaxRobots)
+  if (in.component_size() != in.component_robot_size())
     return fail(ErrorCode::parse, "{} components for {} robots", in.component_size(), in.component_robot_size());
   for (int i = 0; i < in.component_size(); ++i)
     graph.components.push_back({RobotId{in.component_robot(i)}, in.component(i)});
@@ -348,10 +347,9 @@ std::string encode(const ProxyGraphMessage& message) {
 }
 
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes) {
-  const Result<std::string> payload = unpack_frame(MessageKind::proxy_graph, bytes);
-  if (!payload) return tl::unexpected(payload.error());
-  v1::ProxyGraph in;
-  if (!in.ParseFromString(*payload)) return fail(ErrorCode::parse, "proxy graph: not the protobuf message expected");
+  const auto parsed = parse_frame<v1::ProxyGraph>(MessageKind::proxy_graph, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const v1::ProxyGraph& in = *parsed;
 
   ProxyGraphMessage message;
   message.header = {RobotId{in.header().robot()}, in.header().session(), in.header().sequence()};

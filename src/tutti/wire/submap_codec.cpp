@@ -7,6 +7,7 @@
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/cloud_codec.hpp"
 #include "tutti/wire/internal/columns.hpp"
+#include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/limits.hpp"
 
@@ -38,8 +39,7 @@ void write_odometry(const Submap& submap, v1::Submap& out) {
 
 Status read_keyframes(const v1::Submap& in, Submap& submap) {
   const auto count = static_cast<std::size_t>(in.stamp_ns_size());
-  if (count == 0 || count > kMaxKeyframes)
-    return fail(ErrorCode::invalid, "{} keyframes, expected 1 to {}", count, kMaxKeyframes);
+  if (count == 0) return fail(ErrorCode::invalid, "no keyframes, expected at least one");
   const auto stamps = read_columns<1>(in.stamp_ns(), count);
   const auto poses = read_columns<6>(in.pose(), count);
   if (!poses || static_cast<std::size_t>(in.representative_size()) != count)
@@ -100,10 +100,9 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
 }
 
 Result<SubmapMessage> decode_submap(std::string_view bytes) {
-  const Result<std::string> payload = unpack_frame(MessageKind::submap, bytes);
-  if (!payload) return tl::unexpected(payload.error());
-  v1::Submap in;
-  if (!in.ParseFromString(*payload)) return fail(ErrorCode::parse, "submap: not the protobuf message expected");
+  const auto parsed = parse_frame<v1::Submap>(MessageKind::submap, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const v1::Submap& in = *parsed;
 
   SubmapMessage message;
   message.header = {RobotId{in.header().robot()}, in.header().session(), in.header().sequence()};

@@ -3,6 +3,7 @@
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/payload.hpp"
 
 namespace tutti::wire {
 namespace {
@@ -49,10 +50,9 @@ std::string encode(const ClosureVerdict& verdict) {
 }
 
 Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
-  const Result<std::string> payload = unpack_frame(MessageKind::verdict, bytes);
-  if (!payload) return tl::unexpected(payload.error());
-  v1::Verdict in;
-  if (!in.ParseFromString(*payload)) return fail(ErrorCode::parse, "verdict: not the protobuf message expected");
+  const auto parsed = parse_frame<v1::Verdict>(MessageKind::verdict, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const v1::Verdict& in = *parsed;
   ClosureVerdict verdict{
       .pair = {{RobotId{in.first_robot()}, in.first_index()}, {RobotId{in.second_robot()}, in.second_index()}}};
   for (const v1::LoopClosure& closure : in.closure()) {

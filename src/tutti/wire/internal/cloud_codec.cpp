@@ -12,6 +12,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -106,8 +107,6 @@ void encode_cloud(const PointCloud& cloud, const CloudCodec& codec, v1::Cloud& o
 
 Result<std::shared_ptr<const PointCloud>> decode_cloud(const v1::Cloud& in) {
   const auto count = static_cast<std::size_t>(in.voxel_size());
-  if (count > kMaxCloudPoints)
-    return fail(ErrorCode::invalid, "cloud: {} points, at most {} are accepted", count, kMaxCloudPoints);
   const std::array<const std::string*, 3> offsets = {&in.offset_x(), &in.offset_y(), &in.offset_z()};
   for (const std::string* offset : offsets)
     if (offset->size() != count)
@@ -148,10 +147,9 @@ std::string encode(const PointCloud& cloud, const CloudCodec& codec) {
 }
 
 Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes) {
-  const Result<std::string> payload = unpack_frame(MessageKind::cloud, bytes);
-  if (!payload) return tl::unexpected(payload.error());
-  v1::Cloud in;
-  if (!in.ParseFromString(*payload)) return fail(ErrorCode::parse, "cloud: not the protobuf message expected");
+  const auto parsed = parse_frame<v1::Cloud>(MessageKind::cloud, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const v1::Cloud& in = *parsed;
   return decode_cloud(in);
 }
 
