@@ -9,8 +9,6 @@ namespace tutti {
 namespace {
 
 constexpr double kPsdTolerance = 1e-9;  // of the trace
-constexpr double kLeastTranslation_m = 1e-6;
-constexpr double kLeastRotation_rad = 1e-7;
 /// Of a correlation matrix: with less, the inverse is rounding.
 constexpr double kLeastPivot = 1e-9;
 

@@ -10,6 +10,10 @@ namespace tutti {
 inline constexpr double kUnknownTranslation_m = 100.0;
 inline constexpr double kUnknownRotation_rad = 3.0;
 
+/// Nor is odometry believed to be surer than this over one step, on board or on the server: links must outweigh it.
+inline constexpr double kLeastTranslation_m = 1e-4;
+inline constexpr double kLeastRotation_rad = 1e-5;
+
 /// Is it a covariance of a pose (right tangent: m, rad)? Finite, symmetric and positive semidefinite, each to rounding;
 /// a coordinate without variance, like the height of odometry in the plane, must have no correlations either.
 [[nodiscard]] Status check_covariance(const Matrix6d& covariance);
@@ -19,7 +23,7 @@ inline constexpr double kUnknownRotation_rad = 3.0;
 [[nodiscard]] Matrix6d bounded_covariance(const Matrix6d& covariance);
 
 /// One that has an inverse: the same where the correlations are away from 1 by more than rounding and no standard
-/// deviation is below 1 um and 0.1 urad; otherwise with these variances added.
+/// deviation is below kLeastTranslation_m and kLeastRotation_rad; otherwise with these variances added.
 [[nodiscard]] Matrix6d invertible_covariance(const Matrix6d& covariance);
 
 }  // namespace tutti

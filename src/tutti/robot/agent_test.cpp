@@ -39,10 +39,10 @@ void feed(RobotAgent& agent, const Trajectory& odometry) {
 }
 
 /// The server's view of what the agent uploaded: the truth, in a frame of its own, and another robot.
-ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revision, const Pose3& T_world_true) {
+ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revision, const Pose3& T_world_true,
+                            const Matrix6d& covariance = Matrix6d::Identity() * 1e-6) {
   ProxyGraphMessage message;
   message.graph.revision = revision;
-  Matrix6d covariance = Matrix6d::Identity() * 1e-6;
   for (const Keyframe& k : agent.keyframes()) {
     if (!k.representative) continue;
     const int sample = static_cast<int>(std::lround((k.stamp - at(0)) / 0.5));
@@ -106,6 +106,23 @@ TEST_P(AgentPolicies, CorrectsOdometryInThePlaneAndOfUnknownHeight) {
 INSTANTIATE_TEST_SUITE_P(All, AgentPolicies,
                          testing::Values("spectral", "every_node", "every_node_2", "uniform", "random", "skeleton",
                                          "adaptive"));
+
+/// Drivers that leave the covariance at zero claim to be perfect, which server and robot believe up to the same sigma.
+TEST(Agent, CorrectsOdometryThatClaimsToBePerfect) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  Trajectory truth;
+  for (const auto& [stamp, pose] : drifting_odometry(240)) {
+    ASSERT_TRUE(agent.add_odometry(stamp, pose, Matrix6d::Zero()));
+    truth.push_back({stamp, true_pose(static_cast<int>(truth.size()))});
+  }
+  const double before = evaluation::agreement(agent.corrected(), truth)->rmse_m;
+  const Matrix6d stated = Vector6d(1e-8, 1e-8, 1e-8, 1e-10, 1e-10, 1e-10).asDiagonal();
+  UpdateSummary summary;
+  for (std::uint64_t revision = 1; revision <= 10; ++revision)
+    summary = agent.receive(broadcast(agent, revision, kWorld, stated), 40);
+  EXPECT_TRUE(estimation::is_usable(summary.optimised)) << to_string(summary.optimised);
+  EXPECT_LT(evaluation::agreement(agent.corrected(), truth)->rmse_m, 0.15 * before);
+}
 
 TEST(Agent, KnowsWhereTheOthersAre) {
   AgentConfig config;

@@ -16,14 +16,11 @@ namespace {
 
 using NodeIndex = std::unordered_map<KeyframeId, std::size_t>;
 
-/// Standard deviations below these (m, rad) are not believed: they make the normal equations needlessly stiff.
-constexpr double kMinTranslationSigma = 1e-4;
-constexpr double kMinRotationSigma = 1e-5;
-
+/// Stiffer normal equations tell nothing.
 Matrix6d information_of(const Matrix6d& covariance) {
   Matrix6d floored = covariance;
-  floored.diagonal().head<3>().array() += kMinTranslationSigma * kMinTranslationSigma;
-  floored.diagonal().tail<3>().array() += kMinRotationSigma * kMinRotationSigma;
+  floored.diagonal().head<3>().array() += kLeastTranslation_m * kLeastTranslation_m;
+  floored.diagonal().tail<3>().array() += kLeastRotation_rad * kLeastRotation_rad;
   const Matrix6d inverse = floored.llt().solve(Matrix6d::Identity());
   return 0.5 * (inverse + inverse.transpose());
 }
