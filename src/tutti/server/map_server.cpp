@@ -68,7 +68,7 @@ Status MapServer::receive(const SubmapMessage& message) {
                 id.index, message.header.robot.value, robots_.size());
   if (auto ok = check_submap(message.submap); !ok) return ok;
   if (const auto known = state_.submaps.find(id); known != state_.submaps.end()) {
-    if (known->second->keyframes == message.submap.keyframes) return {};  // a duplicate
+    if (known->second->keyframes == message.submap.keyframes) return replace_lost_cloud(message.submap);
     return fail(ErrorCode::invalid,
                 "submap {}/{} differs from the one in the map: has robot {} restarted without its saved state?",
                 id.robot.value, id.index, id.robot.value);
@@ -84,6 +84,14 @@ Status MapServer::receive(const SubmapMessage& message) {
   plan_verifications(kept);
   news_ = true;
   return {};
+}
+
+Status MapServer::replace_lost_cloud(const Submap& duplicate) {
+  const auto size = state_.cloud_sizes.find(duplicate.id);
+  if (size == state_.cloud_sizes.end() || duplicate.cloud == nullptr ||
+      duplicate.cloud->points.size() != size->second || clouds_->get(duplicate.id))
+    return {};
+  return clouds_->put(duplicate.id, duplicate.cloud);
 }
 
 bool MapServer::may_be_verified(SubmapId id) const {

@@ -56,7 +56,8 @@ class MapServer {
             const ServerConfig& config, MapServerState state);
 
   /// A submap, in any order, any number of times. Unknown robots and malformed submaps are refused; what is already
-  /// mapped stays. So is one whose cloud the store cannot keep; it may be sent again.
+  /// mapped stays. So is one whose cloud the store cannot keep; it may be sent again. One that comes again puts its
+  /// cloud back if the store has lost it.
   Status receive(const SubmapMessage& message);
   /// The answer to a job, in any order, any number of times.
   Status receive(const ClosureVerdict& verdict);
@@ -75,6 +76,8 @@ class MapServer {
   [[nodiscard]] const CloudStore& clouds() const { return *clouds_; }
 
  private:
+  /// If it is the cloud that was there.
+  Status replace_lost_cloud(const Submap& duplicate);
   [[nodiscard]] bool may_be_verified(SubmapId id) const;
   void plan_verifications(const std::shared_ptr<const Submap>& submap);
 

@@ -162,6 +162,8 @@ class BrokenStore final : public CloudStore {
  public:
   Status put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) override {
     if (is_full) return fail(ErrorCode::io, "disk full");
+    ++puts;
+    lost.erase(id);
     return inner_.put(id, cloud);
   }
   [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override {
@@ -169,6 +171,7 @@ class BrokenStore final : public CloudStore {
     return inner_.get(id);
   }
   bool is_full = false;
+  std::size_t puts = 0;
   std::set<SubmapId> lost;
 
  private:
@@ -230,6 +233,37 @@ TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
   EXPECT_EQ(failures, 3U);
   EXPECT_EQ(server.state().verdicts.size(), 3U);
   EXPECT_GT(server.optimise().graph.nodes.size(), 10U);
+}
+
+TEST(MapServer, ASubmapThatComesAgainReplacesItsLostCloud) {
+  const auto finder = std::make_shared<const CloudReader>();
+  const auto store = std::make_shared<BrokenStore>();
+  MapServer server(kRobots, finder, store, {});
+  const auto messages = submaps_with_some_clouds();
+  for (const SubmapMessage& message : messages) ASSERT_TRUE(server.receive(message).has_value());
+  const std::size_t puts = store->puts;
+  for (const SubmapMessage& message : messages) ASSERT_TRUE(server.receive(message).has_value());
+  EXPECT_EQ(store->puts, puts);  // nothing is lost
+
+  const SubmapId id = messages[3].submap.id;
+  store->lost = {id};
+  SubmapMessage other = messages[3];
+  other.submap.cloud = messages[5].submap.cloud;  // not what was in the map
+  EXPECT_TRUE(server.receive(other).has_value());
+  other.submap.cloud = nullptr;
+  EXPECT_TRUE(server.receive(other).has_value());
+  other.submap = messages[5].submap;
+  other.submap.id = id;
+  EXPECT_FALSE(server.receive(other).has_value());
+  EXPECT_FALSE(store->get(id).has_value());
+  store->is_full = true;
+  EXPECT_FALSE(server.receive(messages[3]).has_value());
+  store->is_full = false;
+  EXPECT_TRUE(server.receive(messages[3]).has_value());
+  EXPECT_EQ(store->puts, puts + 1);
+  ASSERT_TRUE(store->get(id).has_value());
+  EXPECT_EQ((*store->get(id))->points, messages[3].submap.cloud->points);
+  EXPECT_EQ(server.state().submaps.size(), messages.size());
 }
 
 }  // namespace
