@@ -4,16 +4,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/tum.hpp"
 #include "tutti/mission/report/colours.hpp"
-#include "tutti/mission/report/format.hpp"
+#include "tutti/mission/report/file_names.hpp"
 #include "tutti/mission/report/html.hpp"
 #include "tutti/mission/report/json.hpp"
 #include "tutti/mission/report/map_pictures.hpp"
@@ -31,11 +32,24 @@ Status write_text(const fs::path& path, const std::string& text) {
   return {};
 }
 
-std::string file_name(const std::string& robot) {
-  std::string out = robot;
-  for (char& c : out)
-    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '_') c = '_';
-  return out;
+/// What an earlier mission wrote here, as its report.json says, is not to be taken for this one's.
+Status remove_former(const fs::path& out_dir) {
+  std::ifstream file(out_dir / "report.json", std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();  // of a folder, nothing
+  const auto former = nlohmann::json::parse(text.str(), nullptr, false);
+  if (!former.is_object() || !former.contains("files") || !former["files"].is_array()) return {};
+  for (const auto& entry : former["files"]) {
+    if (!entry.is_string() || !is_report_file_name(entry.get<std::string>())) continue;
+    const fs::path path = out_dir / entry.get<std::string>();
+    std::error_code failure;
+    if (!fs::is_regular_file(fs::symlink_status(path, failure))) continue;
+    fs::remove(path, failure);
+    if (failure)
+      return fail(ErrorCode::io, "{}: cannot remove what an earlier mission wrote: {}", path.string(),
+                  failure.message());
+  }
+  return {};
 }
 
 Status write_trajectories(const MissionRecord& record, const fs::path& out_dir) {
@@ -47,7 +61,7 @@ Status write_trajectories(const MissionRecord& record, const fs::path& out_dir) 
                                                                {"reference", &robot.reference}};
     for (const auto& [estimate, trajectory] : files) {
       if (trajectory == nullptr || trajectory->empty()) continue;
-      const fs::path path = out_dir / fmt::format("{}_{}.tum", file_name(robot.name), estimate);
+      const fs::path path = out_dir / trajectory_file_name(robot.name, estimate);
       if (auto status = formats::write_tum(path.string(), *trajectory); !status) return status;
     }
   }
@@ -98,6 +112,7 @@ Status write_report(const MissionRecord& record, const fs::path& out_dir) {
   std::error_code error;
   fs::create_directories(out_dir, error);
   if (error) return fail(ErrorCode::io, "{}: cannot make the output folder: {}", out_dir.string(), error.message());
+  if (auto status = remove_former(out_dir); !status) return status;
   for (const auto& [name, text] : {std::pair<const char*, std::string>{"report.json", report_json(record)},
                                    {"timing.json", timing_json(record)},
                                    {"report.html", report_html(record)},

@@ -99,6 +99,35 @@ TEST_F(ReportFiles, LeavesOutWhatThereIsNot) {
   EXPECT_TRUE(names().contains("alpha_onboard.tum"));
 }
 
+TEST_F(ReportFiles, WhatAnEarlierMissionWroteIsNotTakenForThisOnes) {
+  ASSERT_TRUE(write_report(test::example_record({.keyframes = 40, .survey = true}), dir_));
+  const auto listed = nlohmann::json::parse(text("report.json"))["files"].get<std::set<std::string>>();
+  EXPECT_EQ(listed, names());
+  std::ofstream(dir_ / "delta_server.tum") << "the user's\n";
+  std::ofstream(dir_ / "scan.pcd") << "the user's\n";
+  const MissionRecord later = test::example_record({.robots = 1, .keyframes = 20, .reference = false});
+  ASSERT_TRUE(write_report(later, dir_));
+  EXPECT_EQ(names(), (std::set<std::string>{"report.json", "timing.json", "report.html", "config.yaml", "graph.g2o",
+                                            "graph_stamps.csv", "alpha_onboard.tum", "alpha_corrected.tum",
+                                            "alpha_server.tum", "delta_server.tum", "scan.pcd"}));
+}
+
+TEST_F(ReportFiles, RemovesNothingThatAReportCannotHaveWritten) {
+  fs::create_directories(dir_ / "inner" / "survey.ply");  // a folder of that name
+  std::ofstream(dir_ / "outside_server.tum") << "not in the folder\n";
+  std::ofstream(dir_ / "inner" / "notes.txt") << "mine\n";
+  std::ofstream(dir_ / "inner" / "map.ply") << "mine: the earlier mission had no clouds\n";
+  std::ofstream(dir_ / "inner" / "report.json")
+      << R"({"files": ["../outside_server.tum", "notes.txt", "survey.ply", "", "_server.tum", 7, null]})";
+  ASSERT_TRUE(write_report(test::example_record({.robots = 1, .keyframes = 20}), dir_ / "inner"));
+  for (const char* name : {"outside_server.tum", "inner/notes.txt", "inner/map.ply", "inner/survey.ply"})
+    EXPECT_TRUE(fs::exists(dir_ / name)) << name;
+  for (const char* foreign : {"", "[]", "{}", "{\"files\": {}}", "no json"}) {
+    std::ofstream(dir_ / "inner" / "report.json") << foreign;
+    EXPECT_TRUE(write_report(test::example_record({.robots = 1, .keyframes = 20}), dir_ / "inner")) << foreign;
+  }
+}
+
 TEST_F(ReportFiles, EmptyMission) {
   const auto status = write_report(MissionRecord{}, dir_);
   ASSERT_TRUE(status) << status.error().message;

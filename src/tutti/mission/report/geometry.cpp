@@ -132,10 +132,13 @@ const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp sta
   return found == trajectory.end() || found->stamp != stamp ? nullptr : &found->pose.translation;
 }
 
-std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const ServerRecord& server) {
+std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const MissionRecord& record) {
   std::map<KeyframeId, Eigen::Vector3d> out;
-  for (std::size_t i = 0; i < std::min(server.nodes.size(), server.graph.poses.size()); ++i)
-    out[server.nodes[i].id] = server.graph.poses[i].translation;
+  for (const RobotRecord& robot : record.robots)
+    for (const NodeRecord& node : record.server.nodes)
+      if (node.id.robot == robot.id)
+        if (const Eigen::Vector3d* position = find_position(robot.server_estimate, node.stamp))
+          out[node.id] = *position;
   return out;
 }
 

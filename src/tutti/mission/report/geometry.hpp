@@ -63,7 +63,7 @@ std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timest
 /// Position of a robot's estimate at a stamp of its keyframes.
 const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp stamp);
 
-/// The server's final estimate of every keyframe.
-std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const ServerRecord& server);
+/// The server's final estimate of every keyframe, in `world` of its robot's component; without those of another.
+std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const MissionRecord& record);
 
 }  // namespace tutti::mission

@@ -60,6 +60,16 @@ TEST(RobotGeometry, NewDriftIsWhereTheOdometryWentWrong) {
   }
 }
 
+TEST(KeyframePositions, LeaveOutWhatLiesInAnotherComponent) {
+  MissionRecord record = test::example_record({.robots = 1, .keyframes = 30});
+  EXPECT_EQ(keyframe_positions(record).size(), 30U);
+  record.robots[0].server_estimate.resize(20);  // the last ten are not joined to the first
+  const auto positions = keyframe_positions(record);
+  EXPECT_EQ(positions.size(), 20U);
+  EXPECT_TRUE(positions.contains(record.server.nodes[19].id));
+  EXPECT_FALSE(positions.contains(record.server.nodes[20].id));
+}
+
 TEST(Stretch, HasOnePoseMoreOnEitherSide) {
   Trajectory trajectory;
   for (std::int64_t t = 0; t < 100; t += 10) trajectory.push_back({Timestamp{t}, {}});

@@ -64,7 +64,7 @@ bool is_member(const MissionRecord& record, const std::vector<std::size_t>& robo
 
 void draw_closures(Svg& svg, const MissionRecord& record, const Pose3& T_display_world, const GroundPlane& ground,
                    const PlanView& view, const std::vector<std::size_t>& robots) {
-  const auto positions = keyframe_positions(record.server);
+  const auto positions = keyframe_positions(record);
   Strokes intra;
   Strokes inter;
   for (const auto& closure : record.server.closures) {

@@ -104,14 +104,14 @@ void draw_edges(Svg& svg, const Plan& plan, const Edges& edges) {
 }
 
 /// How many there are.
-std::size_t draw_closures(Svg& svg, const Plan& plan, const ServerRecord& server) {
-  const auto keyframes = keyframe_positions(server);
+std::size_t draw_closures(Svg& svg, const Plan& plan, const MissionRecord& record) {
+  const auto keyframes = keyframe_positions(record);
   Strokes strokes;
-  for (const auto& closure : server.closures) {
+  for (const auto& closure : record.server.closures) {
     const auto from = keyframes.find(closure.from);
     const auto to = keyframes.find(closure.to);
     if (from != keyframes.end() && to != keyframes.end() &&
-        component_of(server.proxy, closure.from.robot) == plan.shown)
+        component_of(record.server.proxy, closure.from.robot) == plan.shown)
       strokes.emplace_back(plan(from->second), plan(to->second));
   }
   svg.segments(thinned(strokes), "closure", fmt::format("{} loop closures", strokes.size()));
@@ -161,7 +161,7 @@ std::string proxy_graph_html(const MissionRecord& record) {
   const Edges edges = proxy_edges(graph, plan.component);
   Svg svg(plan.view.width(), plan.view.height(), "The proxy graph from above with loop closures and constraints");
   draw_edges(svg, plan, edges);
-  const std::size_t closures = draw_closures(svg, plan, record.server);
+  const std::size_t closures = draw_closures(svg, plan, record);
   const PerKind kinds = draw_constraints(svg, plan, record);
   draw_nodes(svg, plan, record);
   plan.view.draw_scale_bar(svg);

@@ -2,6 +2,7 @@
 #include "tutti/mission/report/json.hpp"
 
 #include "tutti/mission/report/explanation.hpp"
+#include "tutti/mission/report/file_names.hpp"
 #include "tutti/mission/report/format.hpp"
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/json_parts.hpp"
@@ -250,7 +251,8 @@ std::string report_json(const MissionRecord& record) {
                    {"rpe_interval", record.rpe_interval},
                    {"robots", std::move(robots)},
                    {"server", server_json(record)},
-                   {"transforms", std::move(transforms)}});
+                   {"transforms", std::move(transforms)},
+                   {"files", report_file_names(record)}});
 }
 
 std::string timing_json(const MissionRecord& record) {
