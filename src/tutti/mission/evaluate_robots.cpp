@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "tutti/evaluation/agreement.hpp"
@@ -30,12 +32,19 @@ Accuracy accuracy_of(const Trajectory& estimate, const MissionRecording& robot,
   return out;
 }
 
-void read_server_estimate(const server::MapEstimate& map, RobotRecord& out) {
+/// Only of the first node's component: a chain with a gap may lie in several, and their frames are unrelated. How many
+/// keyframes are left out.
+std::size_t read_server_estimate(const server::MapEstimate& map, RobotRecord& out) {
+  std::size_t left_out = 0;
   for (const server::MapNode& node : map.nodes) {
     if (node.id.robot != out.id) continue;
     if (out.server_estimate.empty()) out.component = node.component;
-    out.server_estimate.push_back({node.stamp, node.T_world_body});
+    if (node.component == out.component)
+      out.server_estimate.push_back({node.stamp, node.T_world_body});
+    else
+      ++left_out;
   }
+  return left_out;
 }
 
 PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& agent, const MissionRecording& robot,
@@ -76,7 +85,11 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.odometry_factors = agent->second->odometry_factors();
     out.keyframes = agent->second->keyframes().size();
     for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
-    read_server_estimate(map, out);
+    if (const std::size_t left_out = read_server_estimate(map, out); left_out > 0)
+      record.notes.push_back(
+          fmt::format("{}: the server holds pieces of its way that nothing joins; {} of {} keyframes "
+                      "are not in the piece with the first and left out of its figures",
+                      out.name, left_out, left_out + out.server_estimate.size()));
     if (const auto factor = map.rotation_factors.find(out.id); factor != map.rotation_factors.end())
       out.rotation_factor = factor->second;
     if (recording.score_against_reference) out.reference = recording.recording.reference;

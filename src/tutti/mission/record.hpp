@@ -123,7 +123,7 @@ struct RobotRecord {
   std::size_t proxy_nodes = 0;  ///< Of this robot in the last broadcast.
   std::uint32_t component = 0;  ///< Robots of one component share the server's world frame.
   Trajectory odometry;          ///< T_odom_body at keyframes.
-  Trajectory server_estimate;   ///< T_world_body at keyframes.
+  Trajectory server_estimate;   ///< T_world_body at keyframes, those of `component`.
   Trajectory reference;         ///< T_reference_body, one frame for all robots; empty when there is none.
   std::vector<UpdateRecord> updates;
   std::vector<AlertRecord> alerts;                      ///< By start; see follow_alerts().

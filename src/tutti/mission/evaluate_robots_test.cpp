@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "tutti/mission/evaluate.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr int kSamples = 41;
+
+Timestamp at(double seconds) { return Timestamp{1'000'000'000'000} + seconds; }
+
+/// Once round a circle of 10 m radius, a metre a second.
+Pose3 true_pose(int k) {
+  const double angle = 0.1 * k;
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
+          {10.0 * std::sin(angle), 10.0 * (1.0 - std::cos(angle)), 0.0}};
+}
+
+/// One robot with perfect odometry, and the server's map of it: the truth in another frame.
+class EvaluateRobots : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    recording_.recording.name = "alpha";
+    const Matrix6d covariance = 1e-4 * Matrix6d::Identity();
+    for (int k = 0; k < kSamples; ++k) {
+      recording_.recording.odometry.push_back({at(k), true_pose(k)});
+      recording_.recording.reference.push_back({at(k), true_pose(k)});
+      ASSERT_TRUE(agent_.add_odometry(at(k), true_pose(k), covariance));
+    }
+    agent_.finish();
+    std::uint32_t index = 0;
+    for (const Keyframe& keyframe : agent_.keyframes())
+      map_.nodes.push_back({.id = {RobotId{0}, index++},
+                            .stamp = keyframe.stamp,
+                            .T_odom_body = keyframe.T_odom_body,
+                            .T_world_body = T_world_reference_ * keyframe.T_odom_body});
+    map_.components = 1;
+  }
+  const RobotRecord& evaluate() {
+    record_.robots.resize(1);
+    evaluate_robots({{&recording_, "spectral", {{"spectral", &agent_}}}}, map_, {}, record_);
+    return record_.robots[0];
+  }
+
+  MissionRecording recording_;
+  robot::RobotAgent agent_{RobotId{0}, 1, robot::AgentConfig{}, Rng(1)};
+  server::MapEstimate map_;
+  MissionRecord record_;
+  const Pose3 T_world_reference_{Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitX())), {5, 6, 7}};
+};
+
+TEST_F(EvaluateRobots, AWholeChainIsScoredWhole) {
+  const RobotRecord& robot = evaluate();
+  EXPECT_EQ(robot.server_estimate.size(), map_.nodes.size());
+  EXPECT_LT(*robot.server.rmse_m, 1e-9);
+  EXPECT_TRUE(record_.notes.empty());
+}
+
+TEST_F(EvaluateRobots, PosesOfAnotherComponentAreNotCompared) {
+  const Pose3 T_elsewhere_world{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {100, 0, 0}};
+  const std::size_t first = map_.nodes.size() - 10;
+  for (std::size_t i = first; i < map_.nodes.size(); ++i) {
+    map_.nodes[i].component = 1;
+    map_.nodes[i].T_world_body = T_elsewhere_world * map_.nodes[i].T_world_body;
+  }
+  map_.components = 2;
+  const RobotRecord& robot = evaluate();
+  EXPECT_EQ(robot.component, 0U);
+  EXPECT_EQ(robot.server_estimate.size(), first);
+  EXPECT_LT(*robot.server.rmse_m, 1e-9);
+  ASSERT_EQ(robot.policies.size(), 1U);
+  EXPECT_LT(*robot.policies[0].agreement_rmse_m, 1e-9);
+  ASSERT_EQ(record_.notes.size(), 1U);
+  EXPECT_NE(record_.notes[0].find("alpha"), std::string::npos);
+  EXPECT_NE(record_.notes[0].find("10 of 41 keyframes"), std::string::npos) << record_.notes[0];
+}
+
+}  // namespace
+}  // namespace tutti::mission
