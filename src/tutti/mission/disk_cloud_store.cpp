@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/disk_cloud_store.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -13,6 +16,20 @@
 
 namespace tutti::mission {
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Waits until a file's bytes, or the names in a folder, would outlive a halt of the machine.
+Status sync_to_disk(const fs::path& path) {
+  const int opened = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int reason = opened >= 0 && ::fsync(opened) == 0 ? 0 : errno;
+  if (opened >= 0) ::close(opened);
+  if (reason == 0 || reason == EINVAL) return {};  // EINVAL: the file system has no such thing
+  return fail(ErrorCode::io, "{}: cannot be brought to disk: {}", path.string(),
+              std::generic_category().message(reason));
+}
+
+}  // namespace
 
 Result<std::shared_ptr<DiskCloudStore>> DiskCloudStore::open(const fs::path& folder, const wire::CloudCodec& codec,
                                                              std::size_t kept_in_memory) {
@@ -38,9 +55,11 @@ Status DiskCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud>&
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();
   if (!out) return fail(ErrorCode::io, "{}: cannot write {} bytes", aside.string(), bytes.size());
+  if (auto ok = sync_to_disk(aside); !ok) return ok;
   std::error_code failure;
   fs::rename(aside, file, failure);
   if (failure) return fail(ErrorCode::io, "{}: cannot be renamed: {}", aside.string(), failure.message());
+  if (auto ok = sync_to_disk(folder_); !ok) return ok;
   const auto rounded = wire::decode_cloud(bytes);  // what get() would read
   TUTTI_CHECK(rounded.has_value(), "{}", rounded.error().message);
   remember(id, *rounded);

@@ -14,8 +14,9 @@
 namespace tutti::mission {
 
 /// Clouds as files of one folder, "<robot>_<index>.cloud", in the coding of the wire: a cloud that came over the wire
-/// with the same CloudCodec comes back to the bit. Files are written aside and renamed, so that what is there is whole
-/// even when the machine stops in between. Of the clouds used last a few stay in memory.
+/// with the same CloudCodec comes back to the bit. Files are written aside, brought to disk and renamed, so that what
+/// is there is whole, and what put() has taken is there, even when the machine stops. Of the clouds used last a few
+/// stay in memory.
 class DiskCloudStore final : public server::CloudStore {
  public:
   /// Makes the folder if it is missing; clouds that are there already can be got.

@@ -2,14 +2,35 @@
 #include "tutti/mission/disk_cloud_store.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/random.hpp"
 #include "tutti/server/map_server.hpp"
+
+namespace {
+
+/// What was made safe on disk: its path then and, of a file, how many bytes it had.
+thread_local std::vector<std::pair<std::filesystem::path, std::uintmax_t>> synced;
+thread_local int refuse_with = 0;  // errno
+
+}  // namespace
+
+extern "C" int fsync(int file) {  // instead of the C library's
+  const std::filesystem::path path = std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(file));
+  synced.emplace_back(path, std::filesystem::is_directory(path) ? 0 : std::filesystem::file_size(path));
+  if (refuse_with == 0) return static_cast<int>(::syscall(SYS_fsync, file));
+  errno = refuse_with;
+  return -1;
+}
 
 namespace tutti::mission {
 namespace {
@@ -80,6 +101,26 @@ TEST_F(DiskCloudStoreTest, WhatCannotBeWrittenIsRefused) {
   EXPECT_FALSE(store->get(kId).has_value());
   std::ofstream(folder_) << "a file where the folder should be";
   EXPECT_FALSE(DiskCloudStore::open(folder_, {}).has_value());
+}
+
+TEST_F(DiskCloudStoreTest, ACloudIsOnTheDiskBeforeItHasItsNameAndSoIsItsName) {
+  const auto store = open();
+  synced.clear();
+  ASSERT_TRUE(store->put(kId, some_cloud(1)).has_value());
+  const fs::path file = fs::directory_iterator(folder_)->path();
+  ASSERT_EQ(synced.size(), 2U);
+  EXPECT_EQ(synced[0].first.filename(), file.filename().string() + ".part");
+  EXPECT_EQ(synced[0].second, fs::file_size(file));  // all of it
+  EXPECT_EQ(synced[1].first, fs::canonical(folder_));
+
+  refuse_with = EIO;
+  const Status failed = store->put(kId, some_cloud(2));
+  refuse_with = EINVAL;  // there are file systems that cannot
+  const Status unknown = store->put(kId, some_cloud(2));
+  refuse_with = 0;
+  ASSERT_FALSE(failed.has_value());
+  EXPECT_NE(failed.error().message.find("3_17.cloud.part"), std::string::npos) << failed.error().message;
+  EXPECT_TRUE(unknown.has_value());
 }
 
 TEST_F(DiskCloudStoreTest, SeveralThreadsAtOnce) {
