@@ -18,7 +18,10 @@ namespace {
 constexpr RobotId kRobot{};
 constexpr std::uint32_t kFullySupported = 1'000'000;  // A is what B is judged by: never doubted
 constexpr double kNodesPerWay = 500.0;
+constexpr std::size_t kMostNodes = 2000;  // where B parts from A all the time
 constexpr double kLeastSpacing_m = 0.1;
+constexpr double kArm_m = 5.0;
+constexpr double kPartedSpacings = 2.0;    // nearer than that, the next node shows it
 constexpr double kWholeStep = 1.0 - 1e-6;  // poses that are just the spacing apart, but for rounding
 constexpr double kLeastStep_m = 0.01;      // of way, for the covariance of a motion: standing still is not exact
 
@@ -29,12 +32,23 @@ struct Node {
   double way_m = 0.0;  ///< Along A, from the first pair.
 };
 
-/// B's poses that have a partner, thinned: the first, the last, and one every `spacing_m` along A.
+/// Whether B moved otherwise than A since the last node by more than the way between nodes, as A may stand still
+/// meanwhile; a rotation counts by how far it moves a point kArm_m away.
+bool parted(const Node& last, const Node& here, double spacing_m) {
+  const Pose3 error = (last.pair.reference.inverse() * here.pair.reference).inverse() *
+                      (last.pair.estimate.inverse() * here.pair.estimate);
+  return std::max(error.translation.norm(), kArm_m * rotation_angle(error)) >= kPartedSpacings * spacing_m;
+}
+
+/// B's poses that have a partner, thinned: the first, the last, one every `spacing_m` along A, and one where B parted
+/// from A on the way there.
 std::vector<Node> thin(const std::vector<Node>& all, double spacing_m) {
   std::vector<Node> out{all.front()};
-  for (std::size_t i = 1; i + 1 < all.size(); ++i)
-    if (all[i].way_m - out.back().way_m >= kWholeStep * spacing_m && all.back().way_m - all[i].way_m >= 0.5 * spacing_m)
-      out.push_back(all[i]);
+  for (std::size_t i = 1; i + 1 < all.size(); ++i) {
+    const bool far =
+        all[i].way_m - out.back().way_m >= kWholeStep * spacing_m && all.back().way_m - all[i].way_m >= 0.5 * spacing_m;
+    if (far || parted(out.back(), all[i], spacing_m)) out.push_back(all[i]);
+  }
   out.push_back(all.back());
   return out;
 }
@@ -153,7 +167,8 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
   TrajectoryComparison out{.name = b.name, .poses = b.poses.size(), .paired = all.size()};
   out.way_m = all.back().way_m;
   out.spacing_m = config.spacing_m > 0.0 ? config.spacing_m : std::max(out.way_m / kNodesPerWay, kLeastSpacing_m);
-  const std::vector<Node> nodes = thin(all, out.spacing_m);
+  std::vector<Node> nodes = thin(all, out.spacing_m);
+  while (config.spacing_m == 0.0 && nodes.size() > kMostNodes) nodes = thin(all, out.spacing_m *= 2.0);
   for (const Node& node : nodes) {
     out.judge.push_back({node.pair.stamp, node.pair.reference});
     out.judged.push_back({node.pair.stamp, node.pair.estimate});

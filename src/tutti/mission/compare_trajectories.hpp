@@ -30,7 +30,9 @@ struct CompareTrajectoriesConfig {
   evaluation::AssociationConfig association;  ///< B's poses are the estimates, A's the references.
   double tolerance_m = 0.05;                  ///< Standard deviation of A's positions, over stretches of any length.
   double tolerance_deg = 0.5;                 ///< The same of its rotations.
-  double spacing_m = 0.0;     ///< Nodes are this far apart along A; 0: a 500th of the way, at least 0.1 m.
+  /// Nodes are this far apart along A, nearer where B parts from A by twice as much; 0: a 500th of the way, at least
+  /// 0.1 m.
+  double spacing_m = 0.0;
   double odometry_m = 0.03;   ///< Where B brings no covariance: standard deviation of its motion over 1 m; grows with
   double odometry_deg = 0.3;  ///< the square root of the way.
   double false_alarm_rate = 0.01;

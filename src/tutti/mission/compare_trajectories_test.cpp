@@ -102,6 +102,48 @@ TEST(CompareTrajectories, BsOwnCovarianceDecidesWhatIsAFailure) {
   for (const auto& origin : honest->explanation.origins) EXPECT_FALSE(origin.alert);
 }
 
+TEST(CompareTrajectories, WhatBDoesWhileAStandsStillCounts) {
+  Trajectory stands = way(20.0);
+  const std::size_t begin = stands.size();
+  for (int i = 1; i <= 300; ++i) stands.push_back({stands.back().stamp + 0.1, stands.back().pose});
+  const Trajectory still(stands.begin() + static_cast<std::ptrdiff_t>(begin), stands.end());
+  for (const Trajectory& a : {stands, still}) {
+    Trajectory walks = a;
+    Trajectory turns = a;
+    Trajectory trembles = a;
+    Rng rng(5);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const double phase =
+          2.0 * M_PI * std::max(0.0, static_cast<double>(i + 300) - static_cast<double>(a.size())) / 300;
+      walks[i].pose = a[i].pose * Pose3{Eigen::Quaterniond::Identity(), {1.0 - std::cos(phase), std::sin(phase), 0.0}};
+      turns[i].pose = a[i].pose * Pose3{so3_exp({0.0, 0.0, std::sin(phase)}), {}};
+      trembles[i].pose.translation += test::random_vector(rng, 0.003);
+    }
+    for (const Trajectory& b : {walks, turns}) {  // and come back to where A is
+      const auto c = compare_trajectories({"", a, {}}, {"", b, {}}, {});
+      ASSERT_TRUE(c) << c.error().message;
+      EXPECT_TRUE(c->explanation.disagrees());
+      EXPECT_FALSE(c->constraints.empty());
+      EXPECT_LT(c->after.rmse_m, 0.1);
+      EXPECT_LT(c->after.rmse_deg, 2.0);
+    }
+    EXPECT_FALSE(compare_trajectories({"", a, {}}, {"", trembles, {}}, {})->explanation.disagrees());
+  }
+}
+
+TEST(CompareTrajectories, ManyWaysBesideAStandingAStayFew) {
+  Trajectory still;
+  Trajectory far;
+  for (int i = 0; i < 20'000; ++i) {  // two kilometres around a place that A never leaves
+    still.push_back({Timestamp{} + 0.1 * i, {}});
+    far.push_back({Timestamp{} + 0.1 * i, {so3_exp({0.0, 0.0, 0.01 * i}), {10.0 * std::cos(0.01 * i), 0.1 * i, 0.0}}});
+  }
+  const auto c = compare_trajectories({"", still, {}}, {"", far, {}}, {});
+  ASSERT_TRUE(c) << c.error().message;
+  EXPECT_TRUE(c->explanation.disagrees());
+  EXPECT_LE(c->judge.size(), 2000U);
+}
+
 TEST(CompareTrajectories, RefusesWhatCannotBeCompared) {
   const Trajectory truth = way(10.0);
   Trajectory later = truth;
