@@ -163,6 +163,23 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
   RC_ASSERT(again->graph == out);
 }
 
+TEST(ProxyGraphCodec, NodesMayBeAsFarApartAsLegalPosesAre) {
+  for (const double far : {6e8, kMaxCoordinate_m - 1.0}) {
+    Rng rng(12);
+    ProxyGraphMessage message = test::any_proxy_graph(rng, 1, 20, false);
+    // From corner to corner, along one axis of the body.
+    const Eigen::Vector3d corner = Eigen::Vector3d::Constant(far);
+    const auto rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), corner);
+    for (std::size_t i = 0; ProxyNode & node : message.graph.nodes)
+      node.T_world_body = {rotation, (i++ % 2 == 0 ? 1.0 : -1.0) * corner};
+    const auto decoded = decode_proxy_graph(encode(message));
+    ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+    for (std::size_t i = 0; i < message.graph.nodes.size(); ++i)
+      EXPECT_TRUE(near(message.graph.nodes[i].T_world_body, decoded->graph.nodes[i].T_world_body, 5e-4, 1e-4)) << i;
+    EXPECT_EQ(decode_proxy_graph(encode(*decoded))->graph, decoded->graph);
+  }
+}
+
 RC_GTEST_PROP(ProxyGraphCodec, SigmasKeepFivePercentAndChangeOnlyOnce, ()) {
   const double sigma = std::exp(any_rng().uniform(std::log(1.1e-6), std::log(3e4)));
   const auto code = quantise_sigma(sigma);

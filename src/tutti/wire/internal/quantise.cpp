@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "tutti/geometry/so3.hpp"
-#include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
 namespace {
@@ -64,7 +63,7 @@ std::optional<Pose3> dequantise(const PoseCode& code, const PoseSteps& steps) {
     translation(i) = static_cast<double>(code[i]) * steps.translation_m;
     theta(i) = static_cast<double>(code[3 + i]) * steps.rotation_rad;
   }
-  if (translation.cwiseAbs().maxCoeff() > kMaxCoordinate_m || theta.norm() > kMaxRotation_rad) return std::nullopt;
+  if (translation.cwiseAbs().maxCoeff() > steps.largest_m || theta.norm() > kMaxRotation_rad) return std::nullopt;
   return Pose3{so3_exp(theta).normalized(), translation};
 }
 

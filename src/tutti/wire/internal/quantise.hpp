@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/wire/limits.hpp"
 
 /// Poses and covariances as small integers. quantise(dequantise(code)) == code for every code that quantise makes, so
 /// values change once, not at every hop (covariances at the limit of 1e-3 named below: twice).
@@ -17,15 +18,16 @@ using CovarianceCode = std::array<std::int64_t, 21>;
 struct PoseSteps {
   double translation_m = 0.0;
   double rotation_rad = 0.0;
+  double largest_m = kMaxCoordinate_m;  ///< Of the translation, per axis.
 };
 /// Errors: 0.87e-5 m, 1e-6 rad.
 inline constexpr PoseSteps kKeyframePoseSteps{1e-5, 5e-7};
-/// Errors: 0.44e-3 m, 1e-4 rad.
-inline constexpr PoseSteps kProxyPoseSteps{5e-4, 5e-5};
+/// Errors: 0.44e-3 m, 1e-4 rad. Of the motion from one pose to another, each within kMaxCoordinate_m per axis.
+inline constexpr PoseSteps kProxyPoseSteps{5e-4, 5e-5, 4.0 * kMaxCoordinate_m};  // 2 sqrt(3), with room for rounding
 
 /// Translation and rotation vector, rounded; the rotation vector stays shorter than pi, so that it is unique.
 PoseCode quantise(const Pose3& T, const PoseSteps& steps);
-/// Nothing when a coordinate exceeds kMaxCoordinate_m or the rotation vector pi.
+/// Nothing when a coordinate exceeds the steps' largest or the rotation vector pi.
 std::optional<Pose3> dequantise(const PoseCode& code, const PoseSteps& steps);
 
 /// Of the logarithm of the Cholesky factor's diagonal, and of its rows divided by their diagonal. With both s,
