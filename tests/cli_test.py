@@ -130,6 +130,22 @@ class CommandLine(unittest.TestCase):
         self.assertEqual((self.path / "clouds").read_text(), "a plain file")
         self.assertEqual([p.name for p in self.path.glob(".*")], [])
 
+    def test_keyframes_without_a_scan_are_counted(self):
+        self.write_way("a.tum", seconds=20)
+        (self.path / "scans").mkdir()
+        mission = self.mission("robots: [{name: a, odometry: {file: a.tum}, scans: scans}]\nclosures: {finder: lidar}\n")
+        run = lambda: tutti("run", mission, "--data", self.path, "--out", self.path / "out")
+        (self.path / "scans" / "0.pcd").write_text("named otherwise")
+        self.expect(run(), 1, "robot a", "scans: holds none of 000000.pcd to 000100.pcd")
+        (self.path / "scans" / "000000.pcd").write_text(
+            "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
+            "DATA ascii\n1 2 3\n")
+        self.expect(run(), 0)
+        report = json.loads((self.path / "out" / "report.json").read_text())
+        note, = [note for note in report["notes"] if "scans refused" in note]
+        self.assertEqual(int(note.split()[1]), report["robots"][0]["keyframes"] - 1, note)
+        self.assertIn(".pcd: is not there", note)
+
     def test_settings_say_what_can_be_set(self):
         self.expect(tutti("settings"), 0, "closures.finder = ", "simulation.robots[].start_s = 0")
         one = tutti("settings", "agreement", "alarm")

@@ -67,27 +67,49 @@ class ScanFolder final : public ScanSource {
   ScanFolder(fs::path folder, std::vector<std::size_t> numbers, std::vector<Timestamp> stamps)
       : folder_(std::move(folder)), numbers_(std::move(numbers)), stamps_(std::move(stamps)) {}
 
+  /// Fails when the folder holds none of the files: they are named otherwise.
+  [[nodiscard]] Status check() const {
+    for (std::size_t sample = 0; sample < numbers_.size(); ++sample)
+      if (is_there(sample)) return {};
+    return fail(ErrorCode::io, "{}: holds none of {} to {}, expected one per odometry pose", folder_.string(),
+                file_name(0), file_name(numbers_.size() - 1));
+  }
+
+  /// Asked for at keyframes: those that have none are counted among the mission's notes.
   [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
-    const fs::path file = folder_ / fmt::format("{:06d}.pcd", numbers_[sample]);
-    if (!fs::exists(file)) return std::nullopt;
-    auto cloud = formats::read_pcd(file.string());
+    if (!is_there(sample))
+      return fail(ErrorCode::io, "{}: is not there", (folder_.filename() / file_name(sample)).string());
+    auto cloud = formats::read_pcd((folder_ / file_name(sample)).string());
     if (!cloud) return tl::unexpected(cloud.error());
     return Scan{.stamp = stamps_[sample], .cloud = std::make_shared<const PointCloud>(std::move(*cloud)), .age_s = {}};
   }
 
  private:
+  [[nodiscard]] std::string file_name(std::size_t sample) const { return fmt::format("{:06d}.pcd", numbers_[sample]); }
+  [[nodiscard]] bool is_there(std::size_t sample) const {
+    std::error_code failure;
+    return fs::exists(folder_ / file_name(sample), failure);
+  }
+
   fs::path folder_;
   std::vector<std::size_t> numbers_;
   std::vector<Timestamp> stamps_;
 };
 
-std::shared_ptr<const ScanSource> scans_of(const fs::path& folder, std::size_t count, double from_share,
-                                           double to_share, const Trajectory& replayed) {
+/// `count`: odometry poses of the whole recording.
+Result<std::shared_ptr<const ScanSource>> scans_of(const RobotConfig& robot, const fs::path& data, std::size_t count,
+                                                   const Trajectory& replayed) {
+  const fs::path folder = data / robot.scans;
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure)) return fail(ErrorCode::io, "{}: no such folder of scans", folder.string());
   std::vector<std::size_t> numbers(count);
   std::iota(numbers.begin(), numbers.end(), std::size_t{0});
   std::vector<Timestamp> stamps;
   for (const StampedPose& sample : replayed) stamps.push_back(sample.stamp);
-  return std::make_shared<ScanFolder>(folder, part(numbers, from_share, to_share), std::move(stamps));
+  const auto scans =
+      std::make_shared<ScanFolder>(folder, part(numbers, robot.from_share, robot.to_share), std::move(stamps));
+  if (auto ok = scans->check(); !ok) return tl::unexpected(ok.error());
+  return scans;
 }
 
 bool is_degraded(const simulation::DegradeConfig& degrade) {
@@ -98,10 +120,6 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
   auto odometry = read_trajectory(robot.odometry, data);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
-  if (!robot.scans.empty()) {
-    if (!fs::is_directory(data / robot.scans))
-      return fail(ErrorCode::io, "{}: no such folder of scans (robot {})", (data / robot.scans).string(), robot.name);
-  }
   if (!robot.reference.file.empty()) {
     auto reference = read_trajectory(robot.reference, data);
     if (!reference) return tl::unexpected(reference.error());
@@ -122,8 +140,11 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
     return fail(ErrorCode::invalid, "robot {}: {} odometry poses to replay, expected at least 2", robot.name,
                 raw.size());
   if (is_degraded(robot.degrade)) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
-  if (!robot.scans.empty())
-    out.recording.scans = scans_of(data / robot.scans, odometry->size(), robot.from_share, robot.to_share, raw);
+  if (!robot.scans.empty()) {
+    auto scans = scans_of(robot, data, odometry->size(), raw);
+    if (!scans) return tl::unexpected(scans.error());
+    out.recording.scans = std::move(*scans);
+  }
   raw = simulation::degrade_odometry(raw, robot.degrade);
   if (robot.random_frame) {
     out.T_odom_recorded = simulation::random_frame(rng, config.max_tilt_deg, config.max_shift_m);

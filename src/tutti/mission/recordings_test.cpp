@@ -25,6 +25,11 @@ class Recordings : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
+  [[nodiscard]] std::string problem() const {
+    const auto input = load_input(config_, folder_, 1);
+    return input ? "" : input.error().message;
+  }
+
   std::filesystem::path folder_;
   Trajectory recorded_;
   MissionConfig config_;
@@ -77,23 +82,35 @@ TEST_F(Recordings, DegradedOdometryHasNoOneTrueFrame) {
   EXPECT_EQ(input->robots.front().recording.reference, recorded_);
 }
 
+constexpr const char* kOnePoint =
+    "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n1 2 3\n";
+
 TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
   config_.robots[0].scans = std::string("scans");
   config_.robots[0].from_share = 0.1;
-  std::ofstream(folder_ / "scans" / "000012.pcd") << "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 "
-                                                     "1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n1 2 3\n";
+  std::ofstream(folder_ / "scans" / "000012.pcd") << kOnePoint;
   const auto input = load_input(config_, folder_, 1);
-  ASSERT_TRUE(input.has_value());
+  ASSERT_TRUE(input.has_value()) << input.error().message;
   const Recording& recording = input->robots.front().recording;
   const auto there = recording.scans->scan(2);
   ASSERT_TRUE(there.has_value() && there->has_value());
   EXPECT_EQ((*there)->stamp, recording.odometry[2].stamp);
   EXPECT_EQ((*there)->cloud->points.size(), 1U);
-  const auto absent = recording.scans->scan(3);
-  ASSERT_TRUE(absent.has_value());
-  EXPECT_FALSE(absent->has_value());
+  const auto absent = recording.scans->scan(3);  // the robot counts it among its troubles
+  ASSERT_FALSE(absent.has_value());
+  EXPECT_EQ(absent.error().message, "scans/000013.pcd: is not there");
   config_.robots[0].scans = std::string("nowhere");
-  EXPECT_FALSE(load_input(config_, folder_, 1).has_value());
+  EXPECT_NE(problem().find("nowhere: no such folder"), std::string::npos) << problem();
+}
+
+TEST_F(Recordings, ScansOfOtherNamesAreNotPassedOver) {
+  config_.robots[0].scans = std::string("scans");
+  config_.robots[0].from_share = 0.1;
+  for (const char* name : {"13.pcd", "scan_000012.pcd", "000012.PCD", "000009.pcd"})  // the last is out of range
+    std::ofstream(folder_ / "scans" / name) << kOnePoint;
+  EXPECT_NE(problem().find("scans: holds none of 000010.pcd to 000099.pcd"), std::string::npos) << problem();
+  std::ofstream(folder_ / "scans" / "000099.pcd") << kOnePoint;
+  EXPECT_EQ(problem(), "");
 }
 
 }  // namespace
