@@ -42,15 +42,30 @@ std::pair<PoseGraph, std::vector<double>> edges_of(const PoseGraph& graph, std::
   return out;
 }
 
-/// Per component: do its own edges determine its poses?
-std::vector<bool> determined_components(const PoseGraph& graph, std::span<const Pose3> poses,
-                                        const internal::BlockStructure& structure, std::span<const double> weights) {
-  std::vector<bool> out(static_cast<std::size_t>(structure.components), false);
-  for (std::size_t c = 0; c < out.size(); ++c) {
-    std::vector<bool> only(out.size(), false);
-    only[c] = true;
-    const auto [part, part_weights] = edges_of(graph, weights, only, structure);
-    out[c] = factor_of(part, poses, internal::analyse_blocks(part), part_weights).has_value();
+/// What is known of the components that are left, and their factor.
+struct Sound {
+  std::vector<bool> components;  ///< The others' poses are open.
+  internal::BlockStructure structure;
+  internal::BlockCholesky::Columns factor;
+};
+
+/// Components are taken in turn as long as all together have a factor: what one lacks is not the others' fault.
+Sound sound_components(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const double> weights,
+                       std::span<const JointPosterior::Pair> pairs, const internal::BlockStructure& structure) {
+  std::vector<bool> none(static_cast<std::size_t>(structure.components), false);
+  Sound out{.components = none, .structure = {}, .factor = {}};
+  const auto factorise = [&](const std::vector<bool>& components, internal::BlockStructure& of) {
+    const auto [part, part_weights] = edges_of(graph, weights, components, structure);
+    of = internal::analyse_blocks(part, pairs);
+    return factor_of(part, poses, of, part_weights);
+  };
+  if (auto factor = factorise(none, out.structure)) out.factor = std::move(*factor);
+  for (std::size_t c = 0; c < none.size(); ++c) {
+    std::vector<bool> with = out.components;
+    with[c] = true;
+    internal::BlockStructure of;
+    auto factor = factorise(with, of);
+    if (factor) out = {std::move(with), std::move(of), std::move(*factor)};
   }
   return out;
 }
@@ -75,17 +90,15 @@ JointPosterior::JointPosterior(const PoseGraph& graph, std::span<const Pose3> po
   made->poses.assign(poses.begin(), poses.end());
   made->pairs.assign(pairs.begin(), pairs.end());
   made->determined.assign(poses.size(), true);
-  auto factor = factor_of(graph, poses, made->structure, weights);
-  if (!factor) {  // what one component lacks is not the others' fault
-    const auto determined = determined_components(graph, poses, made->structure, weights);
+  if (auto factor = factor_of(graph, poses, made->structure, weights)) {
+    made->factor = std::move(*factor);
+  } else {
+    Sound sound = sound_components(graph, poses, weights, pairs, made->structure);
     for (std::size_t i = 0; i < poses.size(); ++i)
-      made->determined[i] = determined[static_cast<std::size_t>(made->structure.component[i])];
-    const auto [sound, sound_weights] = edges_of(graph, weights, determined, made->structure);
-    made->structure = internal::analyse_blocks(sound, pairs);
-    factor = factor_of(sound, poses, made->structure, sound_weights);
-    TUTTI_CHECK(factor.has_value(), "{} components, determined each but not together", determined.size());
+      made->determined[i] = sound.components[static_cast<std::size_t>(made->structure.component[i])];
+    made->structure = std::move(sound.structure);
+    made->factor = std::move(sound.factor);
   }
-  made->factor = std::move(*factor);
   factorised_ = std::move(made);
 }
 

@@ -13,6 +13,7 @@
 #include "tutti/estimation/chi_square.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/marginals.hpp"
+#include "tutti/geometry/covariance.hpp"
 #include "tutti/server/odometry_honesty.hpp"
 #include "tutti/server/shape_ties.hpp"
 #include "tutti/server/shape_uncertainty.hpp"
@@ -180,8 +181,8 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     bool determined = true;
     std::size_t next = stretch;  // after this robot's
     for (; next < stretches.size() && map.nodes[stretches[next].first].id.robot == robot; ++next)
-      determined = determined && covariances[next].allFinite();
-    if (!determined) {  // its own edges leave its poses open: it gets nothing, and the others do
+      determined = determined && check_covariance(covariances[next]);
+    if (!determined) {  // its own edges leave its poses open, or nearly: it gets nothing, and the others do
       indices.clear();
       stretch = next;
     }

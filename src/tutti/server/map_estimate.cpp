@@ -294,9 +294,11 @@ std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode
   return chains;
 }
 
-MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdicts, const MapConfig& config) {
+namespace {
+
+/// Of submaps that do not contradict each other.
+MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config) {
   MapEstimate map;
-  const SubmapSet submaps = without_contradictions(all_submaps, map.left_out);
   const NodeIndex index = attach_submaps(submaps, map);
   const std::vector<LoopClosure> closures = collect_closures(verdicts, submaps, index);
   std::vector<estimation::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
@@ -310,6 +312,32 @@ MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdict
   if (map.converged) adopt(optimum, index, config.trial.min_jump_m, map);
   label_components(map);
   return map;
+}
+
+}  // namespace
+
+MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdicts, const MapConfig& config) {
+  std::vector<SubmapId> left_out;
+  const SubmapSet submaps = without_contradictions(all_submaps, left_out);
+  MapEstimate map = estimate_together(submaps, verdicts, config);
+  map.left_out = std::move(left_out);
+  if (map.converged) return map;
+
+  // One robot's numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
+  MapEstimate best = map;
+  for (auto robot = submaps.begin(); robot != submaps.end();) {
+    const auto next = submaps.lower_bound({{robot->first.robot.value + 1}, 0});
+    SubmapSet others(submaps.begin(), robot);
+    others.insert(next, submaps.end());
+    MapEstimate without = estimate_together(others, verdicts, config);
+    if (without.converged && (!best.converged || without.nodes.size() > best.nodes.size())) {
+      best = std::move(without);
+      best.left_out = map.left_out;
+      for (auto it = robot; it != next; ++it) best.left_out.push_back(it->first);
+    }
+    robot = next;
+  }
+  return best;
 }
 
 }  // namespace tutti::server

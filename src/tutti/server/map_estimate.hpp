@@ -56,7 +56,8 @@ struct MapEstimate {
   std::map<RobotId, double> rotation_factors;
   std::uint32_t components = 0;  ///< Connected components that contain a node.
   /// Submaps that contradict earlier ones of their robot: keyframes that are there already, at other moments or out of
-  /// order. As after a restart without its state.
+  /// order. As after a restart without its state. And all of a robot without which the map can be solved, and with
+  /// which it cannot.
   std::vector<SubmapId> left_out;
   bool converged = false;  ///< Otherwise no closure is accepted, and every robot's odometry stands alone.
 };
