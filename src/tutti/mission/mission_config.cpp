@@ -41,6 +41,13 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
   if (config.closures.finder != "reference" && !config.closures.planted.empty())
     problem(fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'",
                         config.closures.finder));
+  const simulation::ReferenceClosureConfig& reference = config.closures.reference;
+  if (reference.wrong_max_m < reference.wrong_min_m)
+    problem(fmt::format("closures.reference.wrong_max_m: is {}, expected at least wrong_min_m = {}",
+                        reference.wrong_max_m, reference.wrong_min_m));
+  if (config.closures.wrong.max_m < config.closures.wrong.min_m)
+    problem(fmt::format("closures.wrong.max_m: is {}, expected at least min_m = {}", config.closures.wrong.max_m,
+                        config.closures.wrong.min_m));
   for (const std::string& policy : config.compare_policies)
     if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
       problem("compare_policies: " + known.error().message);

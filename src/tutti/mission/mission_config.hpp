@@ -14,6 +14,7 @@
 #include "tutti/perception/lidar/closure_config.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/degrade.hpp"
 #include "tutti/simulation/recordings.hpp"
 #include "tutti/simulation/reference_closures.hpp"
@@ -31,7 +32,7 @@ struct TrajectoryFile {
     v.field("file", file, any(), "File below the --data folder.");
     v.field("format", format, one_of({"tum", "euroc", "kitti"}), "How the file is written.");
     v.field("times", times, any(), "kitti format: file with one stamp in seconds per line.");
-    v.field("rate_hz", rate_hz, greater_than(0.0), "kitti format without times: poses per second.");
+    v.field("rate_hz", rate_hz, between(1e-3, 1e6), "kitti format without times: poses per second.");
   }
 };
 
@@ -61,7 +62,7 @@ struct RobotConfig {
     v.field("score_against_reference", score_against_reference, any(),
             "false: the reference judges only closures and transforms, not trajectories.");
     v.field("scans", scans, any(), "Folder with one PCD per odometry pose, numbered 000000.pcd up.");
-    v.field("start_s", start_s, at_least(0.0), "Mission time of the first sample.");
+    v.field("start_s", start_s, between(0.0, simulation::kLongest_s), "Mission time of the first sample.");
     v.field("from_share", from_share, between(0.0, 1.0), "First part of the recording to replay.");
     v.field("to_share", to_share, between(0.0, 1.0), "Last part of the recording to replay.");
     v.field("random_frame", random_frame, any(), "Draw the odometry frame from the seed.");
@@ -132,8 +133,8 @@ struct MissionConfig {
     v.field("notes", notes, any(), "Sentences shown in the report.");
     v.field("duration_s", duration_s, at_least(0.0), "Mission time; 0 = until the last sample.");
     v.field("association", association);
-    v.field("max_tilt_deg", max_tilt_deg, at_least(0.0), "Largest tilt of a random frame.");
-    v.field("max_shift_m", max_shift_m, at_least(0.0), "Largest shift of a random frame.");
+    v.field("max_tilt_deg", max_tilt_deg, between(0.0, 180.0), "Largest tilt of a random frame.");
+    v.field("max_shift_m", max_shift_m, between(0.0, simulation::kFarthest_m), "Largest shift of a random frame.");
     v.field("source", source, one_of({"recordings", "simulation"}), "Replay `robots`, or simulate.");
     v.field("robots", robots, any(), "The robots whose recordings are replayed.");
     v.field("simulation", simulation);

@@ -46,6 +46,11 @@ TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
   EXPECT_NE(problem_with(kGood, {"robots.0.from_share=0.7", "robots.0.to_share=0.7"}).find("from_share 0.7"),
             std::string::npos);
   EXPECT_NE(problem_with(kGood, {"compare_policies=[oracle]"}).find("oracle"), std::string::npos);
+  EXPECT_NE(problem_with(kGood, {"closures.reference.wrong_min_m=9"}).find("wrong_max_m: is 8, expected at least"),
+            std::string::npos);
+  EXPECT_NE(problem_with(kGood, {"closures.wrong.max_m=1"}).find("closures.wrong.max_m: is 1, expected at least"),
+            std::string::npos);
+  EXPECT_NE(problem_with(kGood, {"robots.0.start_s=.inf"}).find("start_s: is .inf"), std::string::npos);
   EXPECT_NE(problem_with(kGood, {"robots.0.reference_offset_m=[1, 2]"}).find("expected 3"), std::string::npos);
   EXPECT_EQ(problem_with(kGood, {"closures.planted=[{robot: a, at_s: 9}]"}), "");
   EXPECT_NE(problem_with(kGood, {"closures.planted=[{robot: a}]", "closures.finder=lidar", "robots.0.scans=s"})

@@ -9,6 +9,7 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/server/closure_finder.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/reference_closures.hpp"
 
 namespace tutti::mission {
@@ -23,8 +24,8 @@ struct SpoiledClosureConfig {
   void describe(V& v) {
     v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
             "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
-    v.field("min_m", min_m, greater_than(0.0), "Least offset of a wrong closure.");
-    v.field("max_m", max_m, greater_than(0.0), "Largest offset; not below min_m.");
+    v.field("min_m", min_m, simulation::above_zero_to(simulation::kFarthest_m), "Least offset of a wrong closure.");
+    v.field("max_m", max_m, simulation::above_zero_to(simulation::kFarthest_m), "Largest offset; not below min_m.");
     v.field("max_deg", max_deg, between(0.0, 180.0), "Largest turn.");
   }
 };
@@ -62,8 +63,9 @@ struct PlantedClosureConfig {
     v.field("at_s", at_s, at_least(0.0), "Mission time of a moment in this submap.");
     v.field("other", other, any(), "Robot whose submap it is joined to; empty: the same.");
     v.field("other_at_s", other_at_s, at_least(0.0), "Mission time of a moment in that submap.");
-    v.field("ahead_m", ahead_m, any(), "The claim's error as seen by the other robot at that moment: ahead,");
-    v.field("left_m", left_m, any(), "... to the left,");
+    v.field("ahead_m", ahead_m, between(-simulation::kFarthest_m, simulation::kFarthest_m),
+            "The claim's error as seen by the other robot at that moment: ahead,");
+    v.field("left_m", left_m, between(-simulation::kFarthest_m, simulation::kFarthest_m), "... to the left,");
     v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "... and turned about the other robot.");
   }
 };

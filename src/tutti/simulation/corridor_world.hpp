@@ -22,8 +22,8 @@ struct CorridorWorldConfig {
   void describe(V& v) {
     v.field("rows", rows, between(2, 100), "Rows of junctions.");
     v.field("columns", columns, between(2, 100), "Columns of junctions.");
-    v.field("block_m", block_m, greater_than(0.0), "Distance between neighbouring junctions before they are moved.");
-    v.field("jitter_m", jitter_m, at_least(0.0),
+    v.field("block_m", block_m, between(1.0, 500.0), "Distance between neighbouring junctions before they are moved.");
+    v.field("jitter_m", jitter_m, between(0.0, 500.0),
             "Each junction moves by up to this along x and y; at most block_m / 4.");
     v.field("missing_share", missing_share, between(0.0, 1.0),
             "Share of corridors left out, as far as the network stays connected and without dead ends.");

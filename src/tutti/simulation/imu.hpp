@@ -28,14 +28,16 @@ struct ImuConfig {
   template <class V>
   void describe(V& v) {
     v.field("enabled", enabled, any(), "Record inertial samples.");
-    v.field("rate_hz", rate_hz, greater_than(0.0), "Samples per second.");
-    v.field("gyroscope_noise_density", gyroscope_noise_density, at_least(0.0), "White noise, rad/s/sqrt(Hz).");
-    v.field("gyroscope_bias_walk", gyroscope_bias_walk, at_least(0.0), "Random walk of the bias, rad/s^2/sqrt(Hz).");
-    v.field("gyroscope_start_bias_rad_s", gyroscope_start_bias_rad_s, at_least(0.0), "First bias, per axis.");
-    v.field("accelerometer_noise_density", accelerometer_noise_density, at_least(0.0), "White noise, m/s^2/sqrt(Hz).");
-    v.field("accelerometer_bias_walk", accelerometer_bias_walk, at_least(0.0),
+    v.field("rate_hz", rate_hz, between(1.0, 1e4), "Samples per second.");
+    v.field("gyroscope_noise_density", gyroscope_noise_density, between(0.0, 1e3), "White noise, rad/s/sqrt(Hz).");
+    v.field("gyroscope_bias_walk", gyroscope_bias_walk, between(0.0, 1e3),
+            "Random walk of the bias, rad/s^2/sqrt(Hz).");
+    v.field("gyroscope_start_bias_rad_s", gyroscope_start_bias_rad_s, between(0.0, 1e3), "First bias, per axis.");
+    v.field("accelerometer_noise_density", accelerometer_noise_density, between(0.0, 1e3),
+            "White noise, m/s^2/sqrt(Hz).");
+    v.field("accelerometer_bias_walk", accelerometer_bias_walk, between(0.0, 1e3),
             "Random walk of the bias, m/s^3/sqrt(Hz).");
-    v.field("accelerometer_start_bias_mps2", accelerometer_start_bias_mps2, at_least(0.0), "First bias, per axis.");
+    v.field("accelerometer_start_bias_mps2", accelerometer_start_bias_mps2, between(0.0, 1e3), "First bias, per axis.");
   }
 };
 

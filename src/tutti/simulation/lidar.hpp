@@ -11,6 +11,7 @@
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/bvh.hpp"
 
 namespace tutti::simulation {
@@ -35,13 +36,13 @@ struct LidarConfig {
     v.field("highest_deg", highest_deg, between(-90.0, 90.0), "Elevation of the highest beam.");
     v.field("rate_hz", rate_hz, between(0.5, 100.0), "Turns per second.");
     v.field("azimuth_step_deg", azimuth_step_deg, between(0.05, 30.0), "Between two firings of all beams.");
-    v.field("min_range_m", min_range_m, at_least(0.0), "Nothing is measured nearer than this.");
-    v.field("max_range_m", max_range_m, greater_than(0.0), "Nothing is measured farther than this.");
-    v.field("range_sigma_m", range_sigma_m, at_least(0.0), "Noise of a range.");
+    v.field("min_range_m", min_range_m, between(0.0, 1e4), "Nothing is measured nearer than this.");
+    v.field("max_range_m", max_range_m, above_zero_to(1e4), "Nothing is measured farther than this.");
+    v.field("range_sigma_m", range_sigma_m, between(0.0, 1e4), "Noise of a range.");
     v.field("dropout_share", dropout_share, between(0.0, 1.0), "Share of the echoes lost.");
     v.field("grazing_cosine", grazing_cosine, between(0.0, 1.0),
             "Below this cosine of the angle of incidence, echoes are lost in proportion; at 0 all of them.");
-    v.field("mount_height_m", mount_height_m, any(), "Sensor above the body frame.");
+    v.field("mount_height_m", mount_height_m, between(-kLargestRoom_m, kLargestRoom_m), "Sensor above the body frame.");
   }
 };
 

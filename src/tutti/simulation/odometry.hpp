@@ -11,6 +11,7 @@
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
@@ -27,7 +28,7 @@ struct DegeneracyConfig {
             "Error of the speed along the axis, drawn anew at every visit.");
     v.field("least_slide_percent", least_slide_percent, between(0.0, 50.0),
             "What is drawn smaller becomes this large, with its sign.");
-    v.field("along_m_per_sqrt_m", along_m_per_sqrt_m, at_least(0.0), "Random walk along the axis.");
+    v.field("along_m_per_sqrt_m", along_m_per_sqrt_m, between(0.0, kFarthest_m), "Random walk along the axis.");
   }
 };
 
@@ -39,10 +40,11 @@ struct FailureConfig {
   double drift_m = 0.0;
   template <class V>
   void describe(V& v) {
-    v.field("after_m", after_m, at_least(0.0), "Begins after this way in the open.");
-    v.field("length_m", length_m, greater_than(0.0), "Lasts this long, or until the robot is back inside.");
+    v.field("after_m", after_m, between(0.0, kFarthest_m), "Begins after this way in the open.");
+    v.field("length_m", length_m, above_zero_to(kFarthest_m), "Lasts this long, or until the robot is back inside.");
     v.field("yaw_deg", yaw_deg, between(0.0, 180.0), "Yaw error it ends with, to either side.");
-    v.field("drift_m", drift_m, at_least(0.0), "Position error it ends with, in one drawn horizontal direction.");
+    v.field("drift_m", drift_m, between(0.0, kFarthest_m),
+            "Position error it ends with, in one drawn horizontal direction.");
   }
 };
 
@@ -59,13 +61,13 @@ struct ScriptedErrorConfig {
   double up_m = 0.0;
   template <class V>
   void describe(V& v) {
-    v.field("after_m", after_m, at_least(0.0), "After this way of the run.");
+    v.field("after_m", after_m, between(0.0, kFarthest_m), "After this way of the run.");
     v.field("at_start", at_start, any(), "... waits until the robot next passes where it started.");
-    v.field("length_m", length_m, at_least(0.0), "Way over which the error grows; 0 = all at once.");
+    v.field("length_m", length_m, between(0.0, kFarthest_m), "Way over which the error grows; 0 = all at once.");
     v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "Size it ends with: a turn to the left");
-    v.field("ahead_m", ahead_m, any(), "... and a move ahead,");
-    v.field("left_m", left_m, any(), "... to the left,");
-    v.field("up_m", up_m, any(), "... up.");
+    v.field("ahead_m", ahead_m, between(-kFarthest_m, kFarthest_m), "... and a move ahead,");
+    v.field("left_m", left_m, between(-kFarthest_m, kFarthest_m), "... to the left,");
+    v.field("up_m", up_m, between(-kFarthest_m, kFarthest_m), "... up.");
   }
 };
 
@@ -93,28 +95,31 @@ struct OdometryNoiseConfig {
   double start_shift_m = 50.0;
   template <class V>
   void describe(V& v) {
-    v.field("translation_m_per_sqrt_m", translation_m_per_sqrt_m, at_least(0.0), "Random walk of position, per axis.");
-    v.field("yaw_deg_per_sqrt_m", yaw_deg_per_sqrt_m, at_least(0.0), "Random walk of yaw.");
-    v.field("tilt_deg_per_sqrt_m", tilt_deg_per_sqrt_m, at_least(0.0), "Random walk of roll and of pitch.");
-    v.field("floor_m", floor_m, greater_than(0.0),
+    v.field("translation_m_per_sqrt_m", translation_m_per_sqrt_m, between(0.0, kFarthest_m),
+            "Random walk of position, per axis.");
+    v.field("yaw_deg_per_sqrt_m", yaw_deg_per_sqrt_m, between(0.0, 180.0), "Random walk of yaw.");
+    v.field("tilt_deg_per_sqrt_m", tilt_deg_per_sqrt_m, between(0.0, 180.0), "Random walk of roll and of pitch.");
+    v.field("floor_m", floor_m, above_zero_to(kFarthest_m),
             "Position noise of an increment even when standing still, per axis.");
-    v.field("floor_deg", floor_deg, greater_than(0.0), "Rotation noise of an increment even when standing still.");
-    v.field("yaw_bias_deg_per_m", yaw_bias_deg_per_m, at_least(0.0), "Slowly varying yaw drift (Gauss-Markov).");
-    v.field("bias_length_m", bias_length_m, greater_than(0.0), "Distance over which that bias forgets itself.");
-    v.field("yaw_drift_deg_per_m", yaw_drift_deg_per_m, at_least(0.0), "Constant yaw drift of the run.");
+    v.field("floor_deg", floor_deg, above_zero_to(180.0), "Rotation noise of an increment even when standing still.");
+    v.field("yaw_bias_deg_per_m", yaw_bias_deg_per_m, between(0.0, 180.0), "Slowly varying yaw drift (Gauss-Markov).");
+    v.field("bias_length_m", bias_length_m, above_zero_to(kFarthest_m),
+            "Distance over which that bias forgets itself.");
+    v.field("yaw_drift_deg_per_m", yaw_drift_deg_per_m, between(0.0, 180.0), "Constant yaw drift of the run.");
     v.field("scale_percent", scale_percent, between(0.0, 50.0), "Constant scale error of the run.");
-    v.field("consistent_length_m", consistent_length_m, greater_than(0.0),
+    v.field("consistent_length_m", consistent_length_m, above_zero_to(kFarthest_m),
             "Length at which the covariance of independent increments matches the constant errors.");
-    v.field("slips_per_km", slips_per_km, at_least(0.0), "Sudden errors that the covariance does not know.");
-    v.field("slip_m", slip_m, at_least(0.0), "Horizontal size of a slip, per axis.");
-    v.field("slip_deg", slip_deg, at_least(0.0), "Yaw of a slip.");
+    v.field("slips_per_km", slips_per_km, between(0.0, 1e6), "Sudden errors that the covariance does not know.");
+    v.field("slip_m", slip_m, between(0.0, kFarthest_m), "Horizontal size of a slip, per axis.");
+    v.field("slip_deg", slip_deg, between(0.0, 180.0), "Yaw of a slip.");
     v.field("degeneracy", degeneracy, any(), "Along featureless corridors.");
     v.field("failure", failure, any(), "In the open.");
     v.field("scripted", scripted, any(), "Errors of given size at given places.");
-    v.field("stated_sigma_factor", stated_sigma_factor, greater_than(0.0),
+    v.field("stated_sigma_factor", stated_sigma_factor, above_zero_to(1e6),
             "Stated standard deviations over the honest ones: above 1 the odometry is better than it says.");
     v.field("start_tilt_deg", start_tilt_deg, between(0.0, 30.0), "Largest tilt of the odom frame.");
-    v.field("start_shift_m", start_shift_m, at_least(0.0), "Largest distance of the odom origin, per axis.");
+    v.field("start_shift_m", start_shift_m, between(0.0, kFarthest_m),
+            "Largest distance of the odom origin, per axis.");
   }
 };
 

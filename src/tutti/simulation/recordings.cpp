@@ -10,6 +10,8 @@
 namespace tutti::simulation {
 namespace {
 
+constexpr double kMostImuSamples = 5e7;
+
 std::string name_of(const SimulationConfig& config, std::size_t i) {
   constexpr std::array kNames = {"alpha", "bravo", "charlie", "delta", "echo", "foxtrot", "golf", "hotel"};
   if (!config.robots[i].name.empty()) return config.robots[i].name;
@@ -30,6 +32,12 @@ Status check_robots(const SimulationConfig& config, const CorridorWorld& network
       return fail(ErrorCode::configuration, "simulation.robots.{}: name '{}' is taken", i, name);
     if (auto ok = check_walk(network, config.robots[i].walk, given_start(config.robots[i])); !ok)
       return in_context("robot " + name, ok.error());
+    const ImuConfig& imu = config.robots[i].imu;
+    const double samples = imu.enabled ? config.robots[i].walk.duration_s * imu.rate_hz : 0.0;
+    if (samples > kMostImuSamples)
+      return fail(ErrorCode::configuration,
+                  "robot {}: walk.duration_s {} at imu.rate_hz {} makes {:.3g} samples, expected at most {:g}", name,
+                  config.robots[i].walk.duration_s, imu.rate_hz, samples, kMostImuSamples);
   }
   return {};
 }
@@ -61,6 +69,7 @@ Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Times
   if (auto ok = check_robots(config, world.network); !ok) return tl::unexpected(ok.error());
   std::shared_ptr<const Bvh> walls;
   if (config.sensors == "lidar") {
+    if (auto ok = check_surface(world.network, config.surface); !ok) return tl::unexpected(ok.error());
     world.surface = std::make_shared<const TriangleMesh>(world_mesh(config, seed));
     walls = std::make_shared<const Bvh>(*world.surface);
   }

@@ -10,6 +10,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/recording.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 #include "tutti/simulation/imu.hpp"
 #include "tutti/simulation/lidar.hpp"
@@ -30,7 +31,7 @@ struct SimulatedRobotConfig {
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name; empty: alpha, bravo, ... by place in the list.");
-    v.field("start_s", start_s, at_least(0.0), "Mission time at which it starts to walk.");
+    v.field("start_s", start_s, between(0.0, kLongest_s), "Mission time at which it starts to walk.");
     v.field("start_junction", start_junction, at_least(0.0), "Where it starts; none: far from the others.");
     v.field("walk", walk, any(), "How it walks.");
     v.field("odometry", odometry, any(), "Errors of its odometry.");

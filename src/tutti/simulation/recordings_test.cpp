@@ -86,5 +86,29 @@ TEST(SimulateRecordings, WhatTheWorldHasNotIsAClearError) {
   EXPECT_NE(problem_with(short_walks(0)).find("empty"), std::string::npos);
 }
 
+TEST(SimulateRecordings, SettingsThatCannotBeComputedAreRefused) {
+  for (const std::string setting :
+       {"robots: [{walk: {duration_s: .inf}}]", "robots: [{walk: {rate_hz: 1e9}}]", "robots: [{start_s: .inf}]",
+        "robots: [{walk: {length_m: .inf}}]", "robots: [{walk: {lookahead_m: 0}}]", "robots: [{imu: {rate_hz: .inf}}]",
+        "robots: [{odometry: {slip_m: .inf}}]", "world: {network: {block_m: 0.001}}", "world: {roof_length_m: .inf}",
+        "surface: {width_m: .inf}", "surface: {doors_per_100m: .inf}", "lidar: {max_range_m: .inf}"}) {
+    const auto node = parse_yaml(setting, "simulation");
+    ASSERT_TRUE(node.has_value()) << setting;
+    SimulationConfig config;
+    const Status ok = load_config(*node, config, "simulation");
+    ASSERT_FALSE(ok.has_value()) << setting;
+    EXPECT_NE(ok.error().message.find("must be in"), std::string::npos) << ok.error().message;
+  }
+  SimulationConfig config = short_walks(1);
+  config.robots[0].imu = {.enabled = true, .rate_hz = 1e4};
+  config.robots[0].walk.duration_s = 86400.0;
+  EXPECT_NE(problem_with(config).find("8.64e+08 samples"), std::string::npos) << problem_with(config);
+  config = short_walks(1);
+  config.sensors = "lidar";
+  config.world.network.rows = config.world.network.columns = 20;
+  config.surface.cell_m = 0.05;
+  EXPECT_NE(problem_with(config).find("surface.cell_m is 0.05"), std::string::npos) << problem_with(config);
+}
+
 }  // namespace
 }  // namespace tutti::simulation

@@ -11,6 +11,7 @@
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/simulation/bounds.hpp"
 
 namespace tutti::simulation {
 
@@ -37,15 +38,16 @@ struct ReferenceClosureConfig {
     v.field("min_submap_gap", min_submap_gap, at_least(1), "Submaps of one robot closer in sequence are not compared.");
     v.field("min_time_gap_s", min_time_gap_s, at_least(0.0), "Keyframes of one robot closer in time are not compared.");
     v.field("per_pair", per_pair, at_least(1), "At most this many closures from one pair of submaps.");
-    v.field("sigma_m", sigma_m, greater_than(0.0), "Noise of the translation, per axis.");
-    v.field("sigma_deg", sigma_deg, greater_than(0.0), "Noise of the rotation, per axis.");
+    v.field("sigma_m", sigma_m, above_zero_to(kFarthest_m), "Noise of the translation, per axis.");
+    v.field("sigma_deg", sigma_deg, above_zero_to(180.0), "Noise of the rotation, per axis.");
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the reporting pairs that are wrong, as confident as the others.");
     v.field("distant_share", distant_share, between(0.0, 1.0), "Share of the wrong ones that join distant places.");
     v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
             "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
-    v.field("wrong_min_m", wrong_min_m, greater_than(0.0), "Least offset of a wrong closure.");
-    v.field("wrong_max_m", wrong_max_m, greater_than(0.0), "Largest offset of a wrong closure; not below wrong_min_m.");
+    v.field("wrong_min_m", wrong_min_m, above_zero_to(kFarthest_m), "Least offset of a wrong closure.");
+    v.field("wrong_max_m", wrong_max_m, above_zero_to(kFarthest_m),
+            "Largest offset of a wrong closure; not below wrong_min_m.");
     v.field("wrong_max_deg", wrong_max_deg, between(0.0, 180.0), "Largest turn of a wrong closure.");
     v.field("max_reference_gap_s", max_reference_gap_s, greater_than(0.0),
             "A keyframe needs reference poses before and after it, at most this far apart.");

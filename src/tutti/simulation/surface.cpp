@@ -136,6 +136,29 @@ class SurfaceNets {
 
 }  // namespace
 
+Status check_surface(const CorridorWorld& world, const SurfaceConfig& config) {
+  constexpr double kMostCells = 1e9;
+  constexpr double kAround_m = 2.0;  // alcoves, and the blocks that the walls lie in
+  const double width = std::max(config.width_m, config.office_width_m) + 2.0 * kAround_m;
+  const double height = std::max(config.height_m, config.office_height_m) + 2.0 * kAround_m;
+  double volume = 0.0;
+  Eigen::AlignedBox2d roof;
+  for (const Corridor& corridor : world.corridors) {
+    volume += (corridor.length_m + width) * width * height;
+    if (corridor.kind != CorridorKind::open) continue;
+    roof.extend(world.junctions[corridor.a].head<2>());
+    roof.extend(world.junctions[corridor.b].head<2>());
+  }
+  if (!roof.isEmpty())
+    volume += (roof.sizes().array() + 2.0 * config.roof_margin_m).prod() * (config.parapet_height_m + 2.0 * kAround_m);
+  const double cells = volume / std::pow(config.cell_m, 3);
+  if (cells <= kMostCells) return {};
+  return fail(ErrorCode::configuration,
+              "surface.cell_m is {}: the world's walls take about {:.2g} cells, expected at most {:g}; larger cells, "
+              "narrower or fewer corridors take fewer",
+              config.cell_m, cells, kMostCells);
+}
+
 TriangleMesh extract_surface(const FreeSpace& space, double cell_m) { return SurfaceNets(space, cell_m).run(); }
 
 TriangleMesh world_surface(const CorridorWorld& world, const SurfaceConfig& config, Rng rng) {

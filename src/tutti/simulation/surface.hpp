@@ -3,7 +3,9 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/model/point_cloud.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 #include "tutti/simulation/triangle_mesh.hpp"
 
@@ -33,26 +35,37 @@ struct SurfaceConfig {
   template <class V>
   void describe(V& v) {
     v.field("cell_m", cell_m, between(0.05, 1.0), "Grid the surface is built on: details below it are lost.");
-    v.field("body_height_m", body_height_m, greater_than(0.0), "Height of the network's lines above the floor.");
-    v.field("width_m", width_m, greater_than(0.0), "Of rough and featureless corridors.");
-    v.field("height_m", height_m, greater_than(0.0), "Of rough and featureless corridors.");
-    v.field("roughness_m", roughness_m, at_least(0.0), "Rough walls stray from smooth by about this at most.");
-    v.field("roughness_length_m", roughness_length_m, greater_than(0.0), "Distance between bumps of rough walls.");
+    v.field("body_height_m", body_height_m, above_zero_to(kLargestRoom_m),
+            "Height of the network's lines above the floor.");
+    v.field("width_m", width_m, above_zero_to(kLargestRoom_m), "Of rough and featureless corridors.");
+    v.field("height_m", height_m, above_zero_to(kLargestRoom_m), "Of rough and featureless corridors.");
+    v.field("roughness_m", roughness_m, between(0.0, kLargestRoom_m),
+            "Rough walls stray from smooth by about this at most.");
+    v.field("roughness_length_m", roughness_length_m, above_zero_to(kLargestRoom_m),
+            "Distance between bumps of rough walls.");
     v.field("width_variation", width_variation, between(0.0, 0.3),
             "Rough corridors widen and narrow by up to this share.");
-    v.field("width_variation_length_m", width_variation_length_m, greater_than(0.0), "How far apart wide places are.");
-    v.field("alcoves_per_100m", alcoves_per_100m, at_least(0.0), "Dug into the walls of rough corridors.");
-    v.field("obstacles_per_100m", obstacles_per_100m, at_least(0.0), "Standing at the walls of rough corridors.");
-    v.field("office_width_m", office_width_m, greater_than(0.0), "Of office corridors.");
-    v.field("office_height_m", office_height_m, greater_than(0.0), "Of office corridors.");
-    v.field("doors_per_100m", doors_per_100m, at_least(0.0), "Office: door niches; every third stands open to a room.");
-    v.field("furniture_per_100m", furniture_per_100m, at_least(0.0), "Office: cupboards and pillars at the walls.");
-    v.field("roof_margin_m", roof_margin_m, greater_than(1.0), "Roof: from the outermost open corridors to its edge.");
-    v.field("parapet_height_m", parapet_height_m, at_least(0.0), "Roof: wall around its edge.");
+    v.field("width_variation_length_m", width_variation_length_m, above_zero_to(kLargestRoom_m),
+            "How far apart wide places are.");
+    v.field("alcoves_per_100m", alcoves_per_100m, between(0.0, kMostPer100m), "Dug into the walls of rough corridors.");
+    v.field("obstacles_per_100m", obstacles_per_100m, between(0.0, kMostPer100m),
+            "Standing at the walls of rough corridors.");
+    v.field("office_width_m", office_width_m, above_zero_to(kLargestRoom_m), "Of office corridors.");
+    v.field("office_height_m", office_height_m, above_zero_to(kLargestRoom_m), "Of office corridors.");
+    v.field("doors_per_100m", doors_per_100m, between(0.0, kMostPer100m),
+            "Office: door niches; every third stands open to a room.");
+    v.field("furniture_per_100m", furniture_per_100m, between(0.0, kMostPer100m),
+            "Office: cupboards and pillars at the walls.");
+    v.field("roof_margin_m", roof_margin_m, Bound{.low = 1.0, .high = kLargestRoom_m, .low_open = true},
+            "Roof: from the outermost open corridors to its edge.");
+    v.field("parapet_height_m", parapet_height_m, between(0.0, kLargestRoom_m), "Roof: wall around its edge.");
     v.field("chimneys", chimneys, between(0, 20),
             "Roof: the only things that stand on it, beside the house of the door.");
   }
 };
+
+/// Is the grid of this world's surface small enough to be computed?
+Status check_surface(const CorridorWorld& world, const SurfaceConfig& config);
 
 /// The walls, floors and ceilings around a world's corridors: zero set of FreeSpace by naive surface nets (Gibson,
 /// "Constrained Elastic Surface Nets", MICCAI 1998; without elasticity, each vertex then moved onto the zero set), on a

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/simulation/trajectory.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -157,6 +158,54 @@ std::vector<double> draw_speeds(const WalkConfig& config, std::size_t samples, i
   return speeds;
 }
 
+/// Can be computed: in memory, and step by step along the way.
+Status check_size(const WalkConfig& config) {
+  constexpr double kMostPoses = 5e6;
+  const double poses = config.duration_s * config.rate_hz;
+  if (poses > kMostPoses)
+    return fail(ErrorCode::configuration, "walk: duration_s {} at rate_hz {} makes {:.3g} poses, expected at most {:g}",
+                config.duration_s, config.rate_hz, poses, kMostPoses);
+  const double way_m = config.length_m > 0.0 ? config.length_m : config.duration_s * config.max_speed_mps;
+  if (way_m > kFarthest_m)
+    return fail(ErrorCode::configuration,
+                "walk: duration_s {} at max_speed_mps {} makes {:.3g} m, expected at most {:g}", config.duration_s,
+                config.max_speed_mps, way_m, kFarthest_m);
+  return {};
+}
+
+/// Of the places the walk leads to, along x or y: wherever the robot is, one is at least half of this away.
+double width_of(const CorridorWorld& world, const std::vector<int>& route) {
+  Eigen::AlignedBox2d box;
+  if (route.empty())
+    for (const Eigen::Vector3d& junction : world.junctions) box.extend(junction.head<2>());
+  for (const int junction : route) box.extend(world.junctions[static_cast<std::size_t>(junction)].head<2>());
+  return box.sizes().maxCoeff();
+}
+
+/// The point that the robot steers to must be somewhere on its way.
+Status check_lookahead(const CorridorWorld& world, const WalkConfig& config) {
+  const double most_m = 0.5 * width_of(world, config.route);
+  if (config.lookahead_m < most_m) return {};
+  return fail(ErrorCode::configuration,
+              "walk.lookahead_m is {}, expected less than {:.3g}, half the width of the network or route",
+              config.lookahead_m, most_m);
+}
+
+Status check_route(const CorridorWorld& world, const std::vector<int>& junctions) {
+  const std::vector<std::size_t> route(junctions.begin(), junctions.end());
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    if (route[i] >= world.junctions.size())
+      return fail(ErrorCode::configuration, "walk.route.{} is {}, the world has 0 .. {}", i, junctions[i],
+                  world.junctions.size() - 1);
+    const std::size_t next = route[(i + 1) % route.size()];
+    if (next < world.junctions.size() && !are_joined(world, route[i], next))
+      return fail(ErrorCode::configuration, "walk.route: no corridor joins junctions {} and {}", route[i], next);
+    if (route[(i + 2) % route.size()] == route[i])
+      return fail(ErrorCode::configuration, "walk.route: turns back at junction {}, where there is no room", next);
+  }
+  return {};
+}
+
 }  // namespace
 
 Status check_walk(const CorridorWorld& world, const WalkConfig& config, std::optional<std::size_t> start_junction) {
@@ -167,23 +216,13 @@ Status check_walk(const CorridorWorld& world, const WalkConfig& config, std::opt
   if (start_junction && *start_junction >= junctions)
     return fail(ErrorCode::configuration, "start_junction is {}, the world has 0 .. {}", *start_junction,
                 junctions - 1);
-  if (config.route.empty()) return {};
-  if (start_junction)
+  if (!config.route.empty() && start_junction)
     return fail(ErrorCode::configuration,
                 "start_junction and walk.route are both given, expected one: a route starts "
                 "at its first junction");
-  const std::vector<std::size_t> route(config.route.begin(), config.route.end());
-  for (std::size_t i = 0; i < route.size(); ++i) {
-    if (route[i] >= junctions)
-      return fail(ErrorCode::configuration, "walk.route.{} is {}, the world has 0 .. {}", i, config.route[i],
-                  junctions - 1);
-    const std::size_t next = route[(i + 1) % route.size()];
-    if (next < junctions && !are_joined(world, route[i], next))
-      return fail(ErrorCode::configuration, "walk.route: no corridor joins junctions {} and {}", route[i], next);
-    if (route[(i + 2) % route.size()] == route[i])
-      return fail(ErrorCode::configuration, "walk.route: turns back at junction {}, where there is no room", next);
-  }
-  return {};
+  if (auto ok = check_route(world, config.route); !ok) return ok;
+  if (auto ok = check_size(config); !ok) return ok;
+  return check_lookahead(world, config);
 }
 
 Trajectory simulate_walk(const CorridorWorld& world, const WalkConfig& config, Timestamp start,

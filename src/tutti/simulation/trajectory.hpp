@@ -9,6 +9,7 @@
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
@@ -28,25 +29,27 @@ struct WalkConfig {
   double step_hz = 1.3;
   template <class V>
   void describe(V& v) {
-    v.field("duration_s", duration_s, greater_than(0.0), "Length of the walk.");
-    v.field("length_m", length_m, at_least(0.0),
+    v.field("duration_s", duration_s, above_zero_to(kLongest_s), "Length of the walk.");
+    v.field("length_m", length_m, between(0.0, kFarthest_m),
             "Way to travel: all speeds are scaled so that the walk has this length; 0 = as far as the speeds lead.");
-    v.field("rate_hz", rate_hz, greater_than(0.0), "Poses per second.");
-    v.field("min_speed_mps", min_speed_mps, greater_than(0.0), "Slowest speed along the path.");
-    v.field("max_speed_mps", max_speed_mps, greater_than(0.0), "Fastest speed along the path.");
+    v.field("rate_hz", rate_hz, between(0.1, 1000.0), "Poses per second.");
+    v.field("min_speed_mps", min_speed_mps, above_zero_to(100.0), "Slowest speed along the path.");
+    v.field("max_speed_mps", max_speed_mps, above_zero_to(100.0), "Fastest speed along the path.");
     v.field("pauses_per_min", pauses_per_min, between(0.0, 60.0), "How often the robot stops to look around.");
-    v.field("pause_s", pause_s, greater_than(0.0), "Mean length of such a stop.");
+    v.field("pause_s", pause_s, above_zero_to(kLongest_s), "Mean length of such a stop.");
     v.field("route", route, at_least(0.0),
             "Junctions to walk to, in order and then again from the first; neighbours in the list, and last and first, "
             "must be joined by a corridor, without turning back. Empty: the corridors seen least.");
-    v.field("lookahead_m", lookahead_m, greater_than(0.0), "How far ahead the robot steers; wider turns with more.");
+    v.field("lookahead_m", lookahead_m, between(0.1, kFarthest_m),
+            "How far ahead the robot steers; wider turns with more.");
     v.field("sway_deg", sway_deg, between(0.0, 10.0), "Roll and pitch of the gait; 0 for a wheeled robot.");
     v.field("bob_m", bob_m, between(0.0, 0.2), "Up and down of the gait; 0 for a wheeled robot.");
-    v.field("step_hz", step_hz, greater_than(0.0), "Gait frequency.");
+    v.field("step_hz", step_hz, above_zero_to(1000.0), "Gait frequency.");
   }
 };
 
-/// Is `config.route` a closed walk along corridors of this world without U-turns, and `start_junction` a junction?
+/// Is `config.route` a closed walk along corridors of this world without U-turns, `start_junction` a junction, is there
+/// room for `lookahead_m`, and the walk not too long to be computed?
 Status check_walk(const CorridorWorld& world, const WalkConfig& config, std::optional<std::size_t> start_junction);
 
 /// A walk from junction to junction. Without a route: no U-turns, corridors seen least being preferred: covers the

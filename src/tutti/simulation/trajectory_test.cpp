@@ -189,6 +189,29 @@ TEST(CheckWalk, SaysWhatIsWrong) {
   EXPECT_NE(problem({0, 1}, 0).find("expected one"), std::string::npos);
 }
 
+TEST(CheckWalk, RefusesWhatHasNoRoomOrNoEnd) {
+  const CorridorWorld world =
+      make_corridor_world({.rows = 3, .columns = 3, .jitter_m = 0.0, .missing_share = 0.0}, Rng(1));
+  const auto problem = [&](const WalkConfig& config) {
+    const Status ok = check_walk(world, config, {});
+    return ok ? std::string() : ok.error().message;
+  };
+  EXPECT_EQ(problem({.lookahead_m = 24.9}), "");  // the network is 50 m wide
+  EXPECT_NE(problem({.lookahead_m = 25.0}).find("walk.lookahead_m is 25, expected less than 25"), std::string::npos);
+  EXPECT_EQ(problem({.route = {0, 1, 4, 3}, .lookahead_m = 12.0}), "");
+  EXPECT_NE(problem({.route = {0, 1, 4, 3}, .lookahead_m = 13.0}).find("less than 12.5"), std::string::npos);
+  EXPECT_NE(problem({.duration_s = 604800.0, .rate_hz = 1000.0}).find("6.05e+08 poses"), std::string::npos);
+  EXPECT_NE(problem({.duration_s = 604800.0, .rate_hz = 1.0, .max_speed_mps = 100.0}).find("6.05e+07 m"),
+            std::string::npos);
+}
+
+TEST(CheckWalk, AWalkWithTheLeastRoomEnds) {
+  const CorridorWorld world =
+      make_corridor_world({.rows = 2, .columns = 2, .jitter_m = 0.0, .missing_share = 0.0}, Rng(1));
+  const Trajectory truth = simulate_walk(world, {.duration_s = 200.0, .lookahead_m = 12.4}, {}, 0, Rng(1));
+  for (const StampedPose& sample : truth) ASSERT_LT(sample.pose.translation.norm(), 50.0);
+}
+
 TEST(SimulateWalk, SameSeedSameBits) {
   const CorridorWorld world = make_corridor_world({}, Rng(1));
   WalkConfig config;

@@ -10,9 +10,12 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
+
+inline constexpr double kLongestLoop_m = 1000.0;
 
 /// Where robots can go and what it is like there.
 struct WorldConfig {
@@ -35,12 +38,14 @@ struct WorldConfig {
             "tunnel: share of the corridors that are straight, smooth and empty: the longest.");
     v.field("featureless", featureless, at_least(0.0),
             "tunnel: also the corridors between these junctions, two by two.");
-    v.field("office_length_m", office_length_m, greater_than(0.0), "terrace: the office loop, x.");
-    v.field("office_width_m", office_width_m, greater_than(0.0), "terrace: the office loop, y.");
-    v.field("roof_length_m", roof_length_m, greater_than(0.0), "terrace: the loop on the roof, x.");
-    v.field("roof_width_m", roof_width_m, greater_than(0.0), "terrace: the loop on the roof, y.");
-    v.field("ramp_length_m", ramp_length_m, greater_than(0.0), "terrace: from the office to the loop on the roof.");
-    v.field("ramp_rise_m", ramp_rise_m, any(), "terrace: the roof above the office.");
+    v.field("office_length_m", office_length_m, above_zero_to(kLongestLoop_m), "terrace: the office loop, x.");
+    v.field("office_width_m", office_width_m, above_zero_to(kLongestLoop_m), "terrace: the office loop, y.");
+    v.field("roof_length_m", roof_length_m, above_zero_to(kLongestLoop_m), "terrace: the loop on the roof, x.");
+    v.field("roof_width_m", roof_width_m, above_zero_to(kLongestLoop_m), "terrace: the loop on the roof, y.");
+    v.field("ramp_length_m", ramp_length_m, above_zero_to(kLongestLoop_m),
+            "terrace: from the office to the loop on the roof.");
+    v.field("ramp_rise_m", ramp_rise_m, between(-kLongestLoop_m, kLongestLoop_m),
+            "terrace: the roof above the office.");
   }
 };
 
