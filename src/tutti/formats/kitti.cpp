@@ -7,11 +7,22 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::formats {
+namespace {
+
+/// A rotation but for few digits, in the rows up to the current line.
+Status check_rotation(const internal::LineReader& line, const Eigen::Matrix3d& R) {
+  constexpr double kRotationTolerance = 1e-3;
+  const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (error <= kRotationTolerance && R.determinant() > 0.0) return {};
+  return line.fail(ErrorCode::invalid, "|R^T R - I| is {:.3g}, det R {:.3g}, expected a rotation within {}", error,
+                   R.determinant(), kRotationTolerance);
+}
+
+}  // namespace
 
 Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start) {
   constexpr double kLowestRate = 1e-2;
   constexpr double kHighestRate = 1e6;
-  constexpr double kRotationTolerance = 1e-3;
   if (!(rate_hz >= kLowestRate && rate_hz <= kHighestRate))
     return fail(ErrorCode::configuration, "{}: rate of the poses is {} Hz, expected {} to {}", name, rate_hz,
                 kLowestRate, kHighestRate);
@@ -25,10 +36,7 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
     Eigen::Matrix<double, 3, 4, Eigen::RowMajor> m;
     if (auto ok = line.numbers(0, {m.data(), 12}); !ok) return tl::unexpected(ok.error());
     const Eigen::Matrix3d R = m.leftCols<3>();
-    const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    if (!(error <= kRotationTolerance) || R.determinant() < 0.0)
-      return line.fail(ErrorCode::invalid, "|R^T R - I| is {:.3g}, det R {:.3g}, expected a rotation within {}", error,
-                       R.determinant(), kRotationTolerance);
+    if (auto ok = check_rotation(line, R); !ok) return tl::unexpected(ok.error());
     const Timestamp stamp = start + static_cast<double>(trajectory.size()) / rate_hz;
     const Eigen::Quaterniond q(project_to_so3(R));
     if (auto ok = append(line, trajectory, {stamp, {q.normalized(), m.col(3)}}); !ok) return tl::unexpected(ok.error());
@@ -39,6 +47,27 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
 Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz, Timestamp start) {
   return internal::read_file(path).and_then(
       [&](const std::string& text) { return parse_kitti_poses(text, path, rate_hz, start); });
+}
+
+Result<Pose3> parse_transform(std::string_view text, const std::string& name) {
+  internal::LineReader line(text, name);
+  Eigen::Matrix<double, 4, 4, Eigen::RowMajor> m;
+  for (Eigen::Index row = 0; row < 4; ++row) {
+    if (!line.next()) return fail(ErrorCode::parse, "{}: {} rows, expected the 4 of a 4x4 transform", name, row);
+    if (auto ok = line.expect_columns(4, "a row of a 4x4 transform"); !ok) return tl::unexpected(ok.error());
+    if (auto ok = line.numbers(0, {m.row(row).data(), 4}); !ok) return tl::unexpected(ok.error());
+    if (row == 2)
+      if (auto ok = check_rotation(line, m.topLeftCorner<3, 3>()); !ok) return tl::unexpected(ok.error());
+  }
+  if (m.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0))
+    return line.fail(ErrorCode::invalid, "last row is {} {} {} {}, expected 0 0 0 1", m(3, 0), m(3, 1), m(3, 2),
+                     m(3, 3));
+  if (line.next()) return line.fail(ErrorCode::parse, "a fifth row, expected the 4 of a 4x4 transform");
+  return Pose3::from_matrix(m);
+}
+
+Result<Pose3> read_transform(const std::string& path) {
+  return internal::read_file(path).and_then([&](const std::string& text) { return parse_transform(text, path); });
 }
 
 Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::string& name) {

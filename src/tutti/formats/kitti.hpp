@@ -18,6 +18,10 @@ namespace tutti::formats {
 Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start);
 Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz = 10.0, Timestamp start = {});
 
+/// A rigid motion as a 4x4 matrix, four rows of four; R as in the poses, the last row 0 0 0 1, and nothing after it.
+Result<Pose3> parse_transform(std::string_view text, const std::string& name);
+Result<Pose3> read_transform(const std::string& path);
+
 /// One stamp in seconds a line, strictly increasing, read exactly.
 Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::string& name);
 Result<std::vector<Timestamp>> read_times(const std::string& path);

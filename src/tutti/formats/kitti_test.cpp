@@ -77,6 +77,28 @@ TEST(Kitti, TimesReplaceStamps) {
 }
 
 /// Pose counts of data/SOURCES-lidar-kitti-graphs-bags.md.
+TEST(Kitti, ATransformIsFourRowsOfARigidMotion) {
+  const auto turned = parse_transform("# of two sessions\n0 -1 0 1\n1 0 0 2  # turned\n\n0 0 1 3\n0 0 0 1\n", "t");
+  ASSERT_TRUE(turned) << turned.error().message;
+  EXPECT_EQ(turned->translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_NEAR(turned->rotation.toRotationMatrix()(1, 0), 1.0, 1e-12);
+  const auto problem = [](const std::string& text) {
+    const auto pose = parse_transform(text, "t.txt");
+    return pose ? "" : pose.error().message;
+  };
+  const std::string zeros = "0 0 0 0\n";
+  EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"), "");
+  EXPECT_EQ(problem(zeros + zeros + zeros + zeros),
+            "t.txt:3: |R^T R - I| is 1, det R 0, expected a rotation within 0.001");
+  EXPECT_EQ(problem("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n").find("t.txt:3: |R^T R - I| is 3"), 0U);
+  EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n").find("t.txt:3: |R^T R - I| is 0, det R -1"), 0U);
+  EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 2\n"), "t.txt:4: last row is 0 0 0 2, expected 0 0 0 1");
+  EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\nand more\n").find("t.txt:5: a fifth row"), 0U);
+  EXPECT_EQ(problem("1 0 0 0 m\n").find("t.txt:1: row has 5 columns"), 0U);
+  EXPECT_EQ(problem("1 0 0 0\n0 nan 0 0\n").find("t.txt:2: column 2"), 0U);
+  EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n"), "t.txt: 2 rows, expected the 4 of a 4x4 transform");
+}
+
 TEST(Kitti, RealFiles) {
   TUTTI_REQUIRE_SHARED("data/kitti");
   const std::vector<std::pair<std::string, std::size_t>> counts = {

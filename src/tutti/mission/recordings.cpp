@@ -6,9 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <numeric>
-#include <sstream>
 
 #include "tutti/base/random.hpp"
 #include "tutti/formats/euroc_csv.hpp"
@@ -33,21 +31,6 @@ Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path&
   const auto times = formats::read_times((data / source.times).string());
   if (!times) return tl::unexpected(times.error());
   return formats::with_times(*poses, *times);
-}
-
-/// Four rows of four numbers; '#' starts a comment.
-Result<Pose3> read_transform(const fs::path& path) {
-  std::ifstream in(path);
-  if (!in) return fail(ErrorCode::io, "{}: cannot be read (expected a 4x4 transform)", path.string());
-  std::vector<double> values;
-  std::string line;
-  while (std::getline(in, line)) {
-    std::istringstream numbers(line.substr(0, line.find('#')));
-    for (double value = 0.0; numbers >> value;) values.push_back(value);
-  }
-  if (values.size() != 16)
-    return fail(ErrorCode::parse, "{}: {} numbers, expected the 16 of a 4x4 transform", path.string(), values.size());
-  return Pose3::from_matrix(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data()));
 }
 
 /// The samples between two shares of a recording, and which they were.
@@ -125,7 +108,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
     if (!reference) return tl::unexpected(reference.error());
     Pose3 T_common_reference;
     if (!robot.reference_transform.empty()) {
-      const auto transform = read_transform(data / robot.reference_transform);
+      const auto transform = formats::read_transform((data / robot.reference_transform).string());
       if (!transform) return tl::unexpected(transform.error());
       T_common_reference = *transform;
     }

@@ -63,6 +63,16 @@ TEST_F(Recordings, HalvesMeetAndMissNothing) {
   EXPECT_EQ(input->robots[1].recording.robot, RobotId{1});
 }
 
+TEST_F(Recordings, AReferenceTransformThatIsNoneIsRefused) {
+  config_.robots[0].reference_transform = std::string("T.txt");
+  std::ofstream(folder_ / "T.txt") << "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_TRUE(input.has_value()) << input.error().message;
+  EXPECT_EQ(input->robots[0].recording.reference[0].pose.translation.x(), 5.0);
+  std::ofstream(folder_ / "T.txt") << "2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n";
+  EXPECT_NE(problem().find("T.txt:3: "), std::string::npos) << problem();
+}
+
 TEST_F(Recordings, ARandomFrameMovesTheOdometryAndIsKnownToTheJudge) {
   config_.robots[0].random_frame = true;
   const auto input = load_input(config_, folder_, 1);
