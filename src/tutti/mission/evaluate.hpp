@@ -21,6 +21,7 @@ struct RobotOutcome {
   const MissionRecording* recording = nullptr;
   std::string default_policy;
   std::vector<std::pair<std::string, const robot::RobotAgent*>> agents;  ///< By policy; the default one is among them.
+  std::size_t replayed = 0;  ///< Odometry poses of the recording, from the first; a mission may end before the rest.
 };
 
 /// Fill in what is measured at the end, in this order: accuracy of every estimate; the final map, its closures and the

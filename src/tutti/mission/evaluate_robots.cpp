@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
 
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/evaluation/ate.hpp"
@@ -61,11 +62,23 @@ PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& age
   return out;
 }
 
-double path_length(const Trajectory& trajectory) {
+double path_length(std::span<const StampedPose> trajectory) {
   double length = 0.0;
   for (std::size_t i = 1; i < trajectory.size(); ++i)
     length += (trajectory[i].pose.translation - trajectory[i - 1].pose.translation).norm();
   return length;
+}
+
+/// Way, time and where odometry went wrong, as far as the robot came.
+void read_run(const RobotOutcome& robot, RobotRecord& out) {
+  const Recording& recording = robot.recording->recording;
+  const std::span<const StampedPose> replayed(recording.odometry.data(), robot.replayed);
+  out.distance_m = path_length(replayed);
+  out.start_s = robot.recording->start_s;
+  if (replayed.empty()) return;
+  out.duration_s = replayed.back().stamp - replayed.front().stamp;
+  for (const DriftOrigin& origin : recording.drift_origins)
+    if (origin.from <= replayed.back().stamp) out.drift_origins.push_back(origin);
 }
 
 }  // namespace
@@ -80,8 +93,7 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
                                     [&](const auto& entry) { return entry.first == robot.default_policy; });
     out.id = recording.recording.robot;
     out.name = recording.recording.name;
-    out.distance_m = path_length(recording.recording.odometry);
-    out.duration_s = recording.recording.odometry.back().stamp - recording.recording.odometry.front().stamp;
+    read_run(robot, out);
     out.odometry_factors = agent->second->odometry_factors();
     out.keyframes = agent->second->keyframes().size();
     for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
@@ -93,8 +105,6 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     if (const auto factor = map.rotation_factors.find(out.id); factor != map.rotation_factors.end())
       out.rotation_factor = factor->second;
     if (recording.score_against_reference) out.reference = recording.recording.reference;
-    out.start_s = recording.start_s;
-    out.drift_origins = recording.recording.drift_origins;
     out.onboard = accuracy_of(out.odometry, recording, association);
     out.server = accuracy_of(out.server_estimate, recording, association);
     for (const auto& [name, policy_agent] : robot.agents)

@@ -39,7 +39,7 @@ class EvaluateRobots : public ::testing::Test {
   }
   const RobotRecord& evaluate() {
     record_.robots.resize(1);
-    evaluate_robots({{&recording_, "spectral", {{"spectral", &agent_}}}}, map_, {}, record_);
+    evaluate_robots({{&recording_, "spectral", {{"spectral", &agent_}}, replayed_}}, map_, {}, record_);
     return record_.robots[0];
   }
 
@@ -47,6 +47,7 @@ class EvaluateRobots : public ::testing::Test {
   robot::RobotAgent agent_{RobotId{0}, 1, robot::AgentConfig{}, Rng(1)};
   server::MapEstimate map_;
   MissionRecord record_;
+  std::size_t replayed_ = kSamples;
   const Pose3 T_world_reference_{Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitX())), {5, 6, 7}};
 };
 
@@ -74,6 +75,26 @@ TEST_F(EvaluateRobots, PosesOfAnotherComponentAreNotCompared) {
   ASSERT_EQ(record_.notes.size(), 1U);
   EXPECT_NE(record_.notes[0].find("alpha"), std::string::npos);
   EXPECT_NE(record_.notes[0].find("10 of 41 keyframes"), std::string::npos) << record_.notes[0];
+}
+
+TEST_F(EvaluateRobots, OnlyWhatWasReplayedCounts) {
+  recording_.recording.drift_origins = {{.from = at(5), .until = at(7)}, {.from = at(30), .until = at(31)}};
+  const RobotRecord whole = evaluate();
+  EXPECT_DOUBLE_EQ(whole.duration_s, 40.0);
+  EXPECT_NEAR(whole.distance_m, 40.0, 0.1);
+  EXPECT_EQ(whole.drift_origins.size(), 2U);
+  record_ = {};
+  replayed_ = 21;  // the mission ended after 20 s
+  const RobotRecord half = evaluate();
+  EXPECT_DOUBLE_EQ(half.duration_s, 20.0);
+  EXPECT_NEAR(half.distance_m, 20.0, 0.05);
+  EXPECT_EQ(half.drift_origins.size(), 1U);
+  record_ = {};
+  replayed_ = 0;  // it ended before the robot started
+  const RobotRecord none = evaluate();
+  EXPECT_EQ(none.duration_s, 0.0);
+  EXPECT_EQ(none.distance_m, 0.0);
+  EXPECT_TRUE(none.drift_origins.empty());
 }
 
 }  // namespace

@@ -143,7 +143,8 @@ void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEst
       const auto T_b_world = odom_from_world(b.recording.robot, map);
       if (!T_a_world || !T_b_world) continue;
       TransformRecord transform{a.recording.name, b.recording.name, *T_a_world * T_b_world->inverse(), {}, {}};
-      const auto centre = evaluation::centroid(b.recording.odometry);
+      const auto& way = b.recording.odometry;
+      const auto centre = evaluation::centroid({way.begin(), way.begin() + static_cast<long>(robots[j].replayed)});
       if (a.T_common_odom && b.T_common_odom && centre) {
         const auto error =
             evaluation::transform_error(transform.T_from_to, a.T_common_odom->inverse() * *b.T_common_odom, *centre);

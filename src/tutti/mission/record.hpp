@@ -106,8 +106,8 @@ struct RobotRecord {
   RobotId id;
   std::string name;
   double start_s = 0.0;     ///< Mission time of its first odometry pose.
-  double distance_m = 0.0;  ///< Along the raw odometry, every pose.
-  double duration_s = 0.0;  ///< First to last odometry pose.
+  double distance_m = 0.0;  ///< Along the raw odometry, every pose replayed.
+  double duration_s = 0.0;  ///< First to last odometry pose replayed.
   std::size_t odometry_factors = 0;
   double rotation_factor = 1.0;  ///< By which the server scales its odometry's variances of rotation; 1: as stated.
   Accuracy onboard;              ///< Raw odometry.

@@ -116,7 +116,8 @@ void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::o
 }
 
 RobotOutcome RobotActor::outcome() const {
-  RobotOutcome out{.recording = &recording_, .default_policy = members_[default_].policy};
+  RobotOutcome out{
+      .recording = &recording_, .default_policy = members_[default_].policy, .agents = {}, .replayed = next_};
   for (const Member& member : members_) out.agents.emplace_back(member.policy, &member.agent);
   return out;
 }

@@ -165,7 +165,8 @@ class MissionRun {
     const auto verdicts = verify(jobs);
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       const Status ok = verdicts[i] ? server_.receive(*verdicts[i]) : Status(tl::unexpected(verdicts[i].error()));
-      if (!ok) refusals_.push_back(ok.error().message);
+      const bool is_news = verdicts[i] || unreadable_.insert(jobs[i].pair).second;  // it is tried again and again
+      if (!ok && is_news) refusals_.push_back(ok.error().message);
       if (!verdicts[i]) server_.give_back(std::move(jobs[i]));
     }
     unanswered_.push_back({time_s_, load_.verification_cpu_s - before_s});
@@ -250,6 +251,7 @@ class MissionRun {
   double duration_s_ = 0.0;
   ProxyGraph proxy_graph_;  // the last broadcast
   std::vector<std::string> refusals_;
+  std::set<SubmapPair> unreadable_;  // pairs that had an error instead of a verdict
   TimingRecord timing_;
   struct Unanswered {
     double arrived_s = 0.0;
@@ -274,7 +276,9 @@ void MissionRun::record_traffic(RobotRecord& robot) const {
                              .messages = statistics.published,
                              .bytes = statistics.published_bytes,
                              .transmitted_bytes = statistics.transmitted_bytes,
-                             .bytes_per_s = static_cast<double>(statistics.published_bytes) / robot.duration_s,
+                             .bytes_per_s = robot.duration_s > 0.0
+                                                ? static_cast<double>(statistics.published_bytes) / robot.duration_s
+                                                : 0.0,
                              .largest_message = statistics.largest_message});
   }
 }
