@@ -91,6 +91,17 @@ ClosureCounts count_closures(const ServerRecord& server) {
   return counts;
 }
 
+std::string format_mapped_robots(const MissionRecord& record) {
+  if (record.server.components <= 1) return "all robots";
+  std::vector<std::string> names;
+  for (const RobotRecord& robot : record.robots)
+    if (robot.component == record.server.largest_component) names.push_back(robot.name);
+  std::string out;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    out += (i == 0 ? "" : i + 1 < names.size() ? ", " : " and ") + names[i];
+  return out;
+}
+
 std::string format_surer_turns(std::span<const RobotRecord> robots) {
   std::string names;
   for (const RobotRecord& robot : robots)

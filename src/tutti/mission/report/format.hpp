@@ -48,6 +48,9 @@ struct ClosureCounts {
   [[nodiscard]] std::size_t rejected() const { return rejected_intra + rejected_inter; }
 };
 ClosureCounts count_closures(const ServerRecord& server);
+/// Whom the figures of the joint map speak of: "all robots", or of several maps those of the largest: "alpha and
+/// bravo".
+std::string format_mapped_robots(const MissionRecord& record);
 /// Whose odometry turns better than it says, in standard deviations, as a sentence; empty when nobody's does.
 std::string format_surer_turns(std::span<const RobotRecord> robots);
 

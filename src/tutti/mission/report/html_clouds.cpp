@@ -53,7 +53,7 @@ std::string error_table(const MissionRecord& record) {
     add(robot.name, "onboard odometry", robot.map_error.onboard);
     add(robot.name, "corrected, policy " + escape_xml(record.default_policy), robot.map_error.corrected);
   }
-  add("all robots", "<b>server</b>", record.server.map_error);
+  add(format_mapped_robots(record), "<b>server</b>", record.server.map_error);
   return table.rows.empty() ? "" : html(table);
 }
 
@@ -73,9 +73,9 @@ std::string clouds_html(const MissionRecord& record) {
       "at the same scale.",
       kSliceThickness_m);
   if (surveyed)
-    lead +=
-        fmt::format(" The joint map is {} off the survey on average, and holds {:.0f} % of it.",
-                    format_metres(record.server.map_error->mean_m), 100.0 * record.server.survey_covered.value_or(0.0));
+    lead += fmt::format(" The joint map of {} is {} off the survey on average, and holds {:.0f} % of it.",
+                        format_mapped_robots(record), format_metres(record.server.map_error->mean_m),
+                        100.0 * record.server.survey_covered.value_or(0.0));
   return section(surveyed ? "The map beside the survey" : "The map: odometry alone, and joint", lead, body);
 }
 

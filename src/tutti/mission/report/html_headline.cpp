@@ -75,14 +75,15 @@ std::string robots_html(const MissionRecord& record) {
 
 std::vector<Card> map_cards(const MissionRecord& record) {
   const ServerRecord& server = record.server;
+  const std::string whose = escape_xml(format_mapped_robots(record));
   std::vector<Card> cards;
   if (server.joint.rmse_m)
     cards.push_back({"Error of the server's map, RMSE", format_metres(server.joint.rmse_m),
-                     "all robots in one alignment; largest " + format_metres(server.joint.max_error_m)});
+                     whose + " in one alignment; largest " + format_metres(server.joint.max_error_m)});
   if (server.map_error)
-    cards.push_back(
-        {"Joint map off the survey, mean", format_metres(server.map_error->mean_m),
-         fmt::format("95 % of {} points within {}", server.map_error->points, format_metres(server.map_error->p95_m))});
+    cards.push_back({"Joint map off the survey, mean", format_metres(server.map_error->mean_m),
+                     fmt::format("{}; 95 % of {} points within {}", whose, server.map_error->points,
+                                 format_metres(server.map_error->p95_m))});
   const ClosureCounts closures = count_closures(server);
   cards.push_back({"Loop closures in the map", std::to_string(closures.accepted()),
                    fmt::format("{} between robots; {} refused", closures.accepted_inter, closures.rejected())});

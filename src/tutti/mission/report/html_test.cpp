@@ -216,6 +216,19 @@ TEST(ReportHtml, GroupsThatNeverMetGetTheirOwnPicture) {
   EXPECT_EQ(pictures, 2U);
 }
 
+TEST(ReportHtml, FiguresOfOneOfSeveralMapsNameItsRobots) {
+  MissionRecord record = test::example_record({.robots = 3, .cloud = true, .survey = true});
+  EXPECT_NE(report_html(record).find("all robots in one alignment"), std::string::npos);
+  record.robots[1].component = 1;
+  record.server.components = 2;
+  const std::string apart = report_html(record);
+  expect_good_page(apart);
+  for (const char* words : {"alpha and charlie in one alignment", "alpha and charlie; 95 %",
+                            "<td class=\"left\">alpha and charlie</td>", "The joint map of alpha and charlie is"})
+    EXPECT_NE(apart.find(words), std::string::npos) << words;
+  EXPECT_EQ(apart.find("all robots"), std::string::npos) << apart.substr(apart.find("all robots") - 100, 200);
+}
+
 TEST(ReportHtml, LongMissionStaysSmall) {
   const std::string html = report_html(test::example_record({.robots = 3, .keyframes = 1000}));
   EXPECT_LT(html.size(), 2'000'000U);

@@ -107,8 +107,8 @@ std::string server_lines(const MissionRecord& record) {
                                  plural(record.robots.size(), "robot"), plural(closures.accepted(), "loop closure"),
                                  closures.accepted_inter, closures.rejected());
   if (server.joint.rmse_m)
-    text += fmt::format(", RMSE {} over all robots at once (max {})", format_metres(server.joint.rmse_m),
-                        format_metres(server.joint.max_error_m));
+    text += fmt::format(", RMSE {} over {} at once (max {})", format_metres(server.joint.rmse_m),
+                        format_mapped_robots(record), format_metres(server.joint.max_error_m));
   if (const auto& check = server.closure_check)
     text += fmt::format(". Of {} closures checked against the reference {} wrong (largest error {}, {:.2f} deg)",
                         check->checked, check->wrong == 1 ? "1 is" : fmt::format("{} are", check->wrong),

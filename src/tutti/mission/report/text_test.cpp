@@ -21,6 +21,14 @@ void expect_readable(const std::string& text) {
   EXPECT_TRUE(std::all_of(text.begin(), text.end(), [](char c) { return c == '\n' || (c >= ' ' && c <= '~'); }));
 }
 
+/// Every run of blanks and line ends as one blank.
+std::string unwrapped(const std::string& text) {
+  std::string out;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) out += word + " ";
+  return out;
+}
+
 std::string line_with(const std::string& text, const std::string& word) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);)
@@ -88,6 +96,18 @@ TEST(ReportText, SaysWhenThereIsNoReference) {
   const std::string text = report_text(test::example_record({.reference = false}), "x");
   EXPECT_NE(text.find("No reference"), std::string::npos);
   expect_readable(text);
+}
+
+TEST(ReportText, FiguresOfOneOfSeveralMapsNameItsRobots) {
+  MissionRecord record = test::example_record({.robots = 3});
+  EXPECT_NE(unwrapped(report_text(record, "x")).find("over all robots at once"), std::string::npos);
+  record.robots[1].component = 1;
+  record.server.components = 2;
+  const std::string apart = unwrapped(report_text(record, "x"));
+  EXPECT_EQ(apart.find("all robots"), std::string::npos) << apart;
+  EXPECT_NE(apart.find("over alpha and charlie at once"), std::string::npos) << apart;
+  record.server.largest_component = 1;
+  EXPECT_EQ(format_mapped_robots(record), "bravo");
 }
 
 TEST(ReportText, EmptyMission) { expect_readable(report_text(MissionRecord{}, "x")); }
