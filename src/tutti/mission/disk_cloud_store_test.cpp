@@ -2,7 +2,6 @@
 #include "tutti/mission/disk_cloud_store.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/mission/runner.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace {
@@ -24,12 +24,11 @@ thread_local int refuse_with = 0;  // errno
 
 }  // namespace
 
-extern "C" int fsync(int file) {  // instead of the C library's
+extern "C" int fsync(int file) {  // instead of the C library's: no test waits for a disk
   const std::filesystem::path path = std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(file));
   synced.emplace_back(path, std::filesystem::is_directory(path) ? 0 : std::filesystem::file_size(path));
-  if (refuse_with == 0) return static_cast<int>(::syscall(SYS_fsync, file));
   errno = refuse_with;
-  return -1;
+  return refuse_with == 0 ? 0 : -1;
 }
 
 namespace tutti::mission {
@@ -209,6 +208,29 @@ TEST_F(DiskCloudStoreTest, AServerOf700SubmapsHoldsOnlyAFewCloudsAndGoesOnAfterA
   EXPECT_EQ(unanswered, 1U);
   EXPECT_EQ(restored.state().verdicts.size(), kSubmaps - 2U);
   EXPECT_EQ(restored.state().submaps.size(), kSubmaps);
+}
+
+TEST_F(DiskCloudStoreTest, AMissionNotesAnUnreadablePairOnceHoweverOftenItIsTried) {
+  MissionConfig config;
+  config.source = "simulation";
+  config.simulation.sensors = "lidar";
+  config.simulation.world.network = {.rows = 2, .columns = 2, .block_m = 12.0, .jitter_m = 0.0, .missing_share = 0.0};
+  config.simulation.robots.resize(1);
+  config.simulation.robots[0].walk.duration_s = 20.0;
+  config.simulation.lidar.azimuth_step_deg = 3.0;
+  config.agent.submap.duration_s = 2.0;
+  config.server.update_period_s = 1.0;
+  config.closures.finder = "lidar";
+  config.closures.min_submap_gap = 7;  // when the first pair is asked for, the first cloud lies on disk only
+  const auto lose_the_first = [&](const Progress& progress) {
+    if (progress.submaps > 5) fs::remove(folder_ / "0_0.cloud");
+  };
+  const auto record = run_mission(config, {.clouds = folder_, .threads = 1, .progress = lose_the_first});
+  ASSERT_TRUE(record.has_value()) << record.error().message;
+  ASSERT_EQ(record->robots[0].submaps, 10U);  // pairs of submap 0 with 7, 8 and 9 are tried 3, 2 and 1 times
+  ASSERT_FALSE(record->notes.empty());
+  EXPECT_NE(record->notes[0].find("3 messages were refused"), std::string::npos) << record->notes[0];
+  EXPECT_NE(record->notes[0].find("cloud of submap 0/0"), std::string::npos) << record->notes[0];
 }
 
 }  // namespace
