@@ -130,6 +130,10 @@ class CommandLine(unittest.TestCase):
         self.assertEqual((self.path / "clouds").read_text(), "a plain file")
         self.assertEqual([p.name for p in self.path.glob(".*")], [])
 
+    def test_robot_names_are_those_of_files(self):
+        names = "simulation.robots=[{name: \u00e9}, {name: \u00fc}]"
+        self.expect(tutti("demo", "--set", names, "--out", self.path / "out"), 1, "simulation.robots.0.name", "letters")
+
     def test_keyframes_without_a_scan_are_counted(self):
         self.write_way("a.tum", seconds=20)
         (self.path / "scans").mkdir()
