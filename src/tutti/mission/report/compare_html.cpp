@@ -57,10 +57,11 @@ std::string scales_html(const TrajectoryComparison& c, const PictureClock& clock
 
 std::string origins_html(const TrajectoryComparison& c, const PictureClock& clock) {
   if (c.explanation.origins.empty()) return "";
-  HtmlTable table{{"suspected", "from", "until", "way", "translation", "rotation", "scale", "over threshold"}, {}, 1};
+  HtmlTable table{
+      {"suspected", "from", "until", "where", "way", "translation", "rotation", "scale", "over threshold"}, {}, 1};
   for (const auto& o : c.explanation.origins)
     table.rows.push_back({o.alert ? "<b>localisation failure</b>" : "drift", format_moment(clock(o.from)),
-                          format_moment(clock(o.until)), fmt::format("{:.1f} m", o.length_m),
+                          format_moment(clock(o.until)), format_place(o.place_m), fmt::format("{:.1f} m", o.length_m),
                           format_metres(o.translation_m), fmt::format("{:.2f}°", o.rotation_rad / kRadPerDeg),
                           format_scale(c.explanation, o.scale), format_significance(o.significance)});
   return "<h3>Where it was born</h3>\n" + html(table);
@@ -79,6 +80,29 @@ std::string constraints_html(const TrajectoryComparison& c, const PictureClock& 
                      c.constraints.size(), html(table));
 }
 
+/// What bending B by the constraints does to its own motion.
+std::string bent_html(const TrajectoryComparison& c, const PictureClock& clock) {
+  if (c.constraints.empty()) return "";
+  std::string out = "<ul class=\"notes\">\n";
+  for (const RepairedJump& jump : c.jumps)
+    out += fmt::format("<li>B jumped, {}: taken back there.</li>\n", format_jump(jump, clock));
+  return out +
+         fmt::format("<li>No {}motion over 1 s or between nodes changes by more than {} and {:.3f}°.</li>\n</ul>\n",
+                     c.jumps.empty() ? "" : "other ", format_metres(c.kink.translation_m), c.kink.rotation_deg);
+}
+
+std::string lead_text(const TrajectoryComparison& c) {
+  const std::string off = fmt::format("{} RMSE after one rigid alignment, {} at most", format_metres(c.before.rmse_m),
+                                      format_metres(c.before.max_m));
+  if (!c.explanation.disagrees()) return fmt::format("They agree: {}, and nothing stands out at any scale.", off);
+  std::string out = fmt::format("They disagree, by up to {} the threshold: {}.",
+                                format_significance(largest_significance(c.explanation)), off);
+  if (!c.constraints.empty())
+    out += fmt::format(" {} relative poses of A would bring B to {}, {} at most.", c.constraints.size(),
+                       format_metres(c.after.rmse_m), format_metres(c.after.max_m));
+  return out;
+}
+
 std::string robot_html(const TrajectoryComparison& c) {
   const PictureClock clock{c.judged.front().stamp};
   const auto& e = c.explanation;
@@ -89,27 +113,19 @@ std::string robot_html(const TrajectoryComparison& c) {
                                    .label = "Disagreement of B with A: time and scale",
                                    .clock = clock,
                                    .time_s = time_s,
-                                   .time_axis = "time after B's first pose [s]"};
+                                   .time_axis = "time after B's first pose that has one of A [s]"};
   std::vector<LegendEntry> legend{{"server", "A"}, {"onboard", "B, aligned"}};
   if (!c.constraints.empty()) {
     legend.push_back({"corrected", "B with the constraints"});
     legend.push_back({"node other", "ends of constraints"});
   }
   for (auto& entry : origin_legend(e.origins)) legend.push_back(std::move(entry));
-  std::string lead =
-      e.disagrees() ? fmt::format("They disagree, by up to {} the threshold: {} RMSE after one rigid alignment.",
-                                  format_significance(largest_significance(e)), format_metres(c.before.rmse_m))
-                    : fmt::format("They agree: {} RMSE after one rigid alignment, and nothing stands out at any scale.",
-                                  format_metres(c.before.rmse_m));
-  if (!c.constraints.empty())
-    lead += fmt::format(" {} relative poses of A would bring B to {}.", c.constraints.size(),
-                        format_metres(c.after.rmse_m));
-  return section(c.name.empty() ? "B against A" : c.name, lead,
-                 legend_html(legend) + "<div class=\"figures\">\n" +
-                     figure(top_view(c, clock), "From above", "", true) + "</div>\n<br>\n" + significance_scale_html() +
-                     "<div class=\"figures\">\n" +
-                     figure(explanation_svg(picture, kWide_px), "Disagreement by time and scale", "", true) +
-                     "</div>\n" + scales_html(c, clock) + origins_html(c, clock) + constraints_html(c, clock));
+  return section(
+      c.name.empty() ? "B against A" : c.name, lead_text(c),
+      legend_html(legend) + "<div class=\"figures\">\n" + figure(top_view(c, clock), "From above", "", true) +
+          "</div>\n<br>\n" + significance_scale_html() + "<div class=\"figures\">\n" +
+          figure(explanation_svg(picture, kWide_px), "Disagreement by time and scale", "", true) + "</div>\n" +
+          scales_html(c, clock) + origins_html(c, clock) + constraints_html(c, clock) + bent_html(c, clock));
 }
 
 }  // namespace

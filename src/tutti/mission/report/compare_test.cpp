@@ -29,6 +29,7 @@ TrajectoryComparison example(bool disagrees) {
   if (disagrees) {
     origins = {{.from = c.judge[38].stamp,
                 .until = c.judge[44].stamp,
+                .place_m = {38.0, 1.0, 2.0},
                 .scale = 3,
                 .length_m = 6.0,
                 .translation_m = 0.4,
@@ -125,7 +126,11 @@ TEST(CompareHtml, IsAGoodPageWithBothPictures) {
   const std::string html = compare_html(report(true));
   test::expect_good_page(html);
   expect_in(html, {"odometry &amp; co.tum", "A &lt;note&gt;.", "<path class=\"origin alert along\"",
-                   "<rect class=\"origin alert\"", "<image", "1 relative poses of A would bring B to 0.012 m"});
+                   "<rect class=\"origin alert\"", "<image",
+                   "1 relative poses of A would bring B to 0.012 m, 0.030 m at most",
+                   "1.234 m RMSE after one rigid alignment, 3.000 m at most", "<th>where</th>", "(38.0, 1.0, 2.0) m",
+                   "B jumped, 0.050 m, 20.1 deg, 40.0 s - 41.0 s: taken back there", "0.110 m and 2.900°",
+                   "first pose that has one of A"});
   const std::string quiet = compare_html(report(false));
   test::expect_good_page(quiet);
   expect_in(quiet, {"They agree"});
