@@ -111,6 +111,7 @@ rect.suspect { fill: none; stroke: var(--failure); stroke-width: 1.6; stroke-das
 .origin.alert { stroke: var(--failure); } rect.origin.alert { stroke: none; fill: var(--failure); }
 .origin.along { stroke-opacity: 0.4; stroke-width: 11; }
 rect.originbox { fill: none; stroke: #ffffff; stroke-width: 1.6; pointer-events: none; }
+.figures + .figures { margin-top: 18px; }
 .figures + .scroll { margin: 8px 0 26px; }
 .rowline { stroke: #ffffff; stroke-width: 0.5; stroke-opacity: 0.28; }
 rect.truth.slip { fill: var(--slip); } rect.truth.degeneracy { fill: var(--degeneracy); } rect.truth.failure { fill: var(--failure); }

@@ -216,6 +216,14 @@ TEST(ReportHtml, GroupsThatNeverMetGetTheirOwnPicture) {
   EXPECT_EQ(pictures, 2U);
 }
 
+TEST(ReportHtml, RowsOfFiguresHaveAGap) {
+  MissionRecord record = test::example_record();  // without a table of origins between the robots' figures
+  for (RobotRecord& robot : record.robots) robot.explanation = test::example_explanation(robot.server_estimate, {});
+  const std::string html = report_html(record);
+  EXPECT_NE(html.find("</figure>\n</div>\n<div class=\"figures\">\n<figure class=\"wide\">"), std::string::npos);
+  EXPECT_NE(html.find(".figures + .figures { margin-top: 18px; }"), std::string::npos);
+}
+
 TEST(ReportHtml, FiguresOfOneOfSeveralMapsNameItsRobots) {
   MissionRecord record = test::example_record({.robots = 3, .cloud = true, .survey = true});
   EXPECT_NE(report_html(record).find("all robots in one alignment"), std::string::npos);
