@@ -2,6 +2,7 @@
 #include "tutti/bus/in_process_bus.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "tutti/base/check.hpp"
 
@@ -23,6 +24,32 @@ Timestamp in_contact(const LinkConfig& link, Timestamp start, Timestamp t) {
     }
   }
   return t;
+}
+
+/// When `airtime_s` with contact have passed since `t`.
+Timestamp after_airtime(const LinkConfig& link, Timestamp start, Timestamp t, double airtime_s) {
+  while (true) {
+    t = in_contact(link, start, t);
+    Timestamp lost = kLastTimestamp;
+    for (const Outage& outage : link.outages)
+      if (const Timestamp from = start + outage.from_s; from > t && outage.until_s > outage.from_s)
+        lost = std::min(lost, from);
+    if (t + airtime_s <= lost) return t + airtime_s;
+    airtime_s = std::max(0.0, airtime_s - (lost - t));
+    t = lost;
+  }
+}
+
+/// What the repetitions of a message last sent at `t` wait for contact, beside the time between them.
+double wait_of_repetitions(const LinkConfig& link, Timestamp start, Timestamp t, int repetitions) {
+  double waited_s = 0.0;
+  for (int i = 0; i < repetitions; ++i) {
+    const Timestamp due = t + link.retransmit_s;
+    t = in_contact(link, start, due);
+    if (t == kLastTimestamp) return std::numeric_limits<double>::infinity();
+    waited_s += t - due;
+  }
+  return waited_s;
 }
 
 }  // namespace
@@ -117,19 +144,20 @@ void InProcessBus::transmit(Direction& way, Timestamp start) {
   }
   const auto size = static_cast<double>(message.bytes->size());
   const double airtime_s = link.bandwidth_bytes_per_s > 0.0 ? attempts * size / link.bandwidth_bytes_per_s : 0.0;
-  way.free_at = start + airtime_s;
+  way.free_at = after_airtime(link, start_, start, airtime_s);
   statistics.transmitted_bytes += static_cast<std::uint64_t>(attempts) * message.bytes->size();
   if (!arrives) {
     ++statistics.lost;
     return;
   }
-  const double retransmissions_s = (attempts - 1) * link.retransmit_s;
+  const double retransmissions_s =
+      (attempts - 1) * link.retransmit_s + wait_of_repetitions(link, start_, way.free_at, attempts - 1);
   const int copies = rng.bernoulli(link.duplicate) ? 2 : 1;
   for (int copy = 0; copy < copies; ++copy) {
     message.arrived = way.free_at + (retransmissions_s + link.latency_s + rng.uniform(0.0, 1.0) * link.jitter_s);
     if (link.in_order) message.arrived = std::max(message.arrived, way.last_arrival);
     way.last_arrival = std::max(way.last_arrival, message.arrived);
-    in_flight_.emplace(message.arrived, message);
+    in_flight_.emplace(std::pair{message.arrived, front.number}, message);
   }
 }
 
@@ -147,7 +175,7 @@ std::vector<Delivery> InProcessBus::deliver_until(Timestamp now) {
   now_ = now;
   advance(now);
   std::vector<Delivery> arrived;
-  const auto end = in_flight_.upper_bound(now);
+  const auto end = in_flight_.upper_bound({now, std::numeric_limits<std::uint64_t>::max()});
   for (auto at = in_flight_.begin(); at != end; ++at) {
     ++statistics_of(at->second).delivered;
     arrived.push_back(std::move(at->second));
@@ -161,7 +189,7 @@ std::optional<Timestamp> InProcessBus::next_delivery() const {
   const auto consider = [&](Timestamp t) {
     if (t < kLastTimestamp) next = next ? std::min(*next, t) : t;
   };
-  if (!in_flight_.empty()) consider(in_flight_.begin()->first);
+  if (!in_flight_.empty()) consider(in_flight_.begin()->first.first);
   for (const auto& [ends, way] : directions_)
     if (!way.queue.empty()) consider(transmission_start(way));
   return next;

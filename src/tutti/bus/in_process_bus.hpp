@@ -63,13 +63,13 @@ struct LinkConfig {
             "Up to this much later, at random; larger than the spacing = reordered.");
     v.field("loss", loss, between(0.0, 0.95), "Share of transmissions lost; all but proxy graphs are sent again.");
     v.field("retransmit_s", retransmit_s, between(0.0, kLongestLinkTime_s),
-            "A lost transmission is repeated after this time.");
+            "A lost transmission is repeated after this time, once there is contact.");
     v.field("duplicate", duplicate, between(0.0, 1.0), "Share of messages that arrive twice.");
     v.field("in_order", in_order, any(), "Messages of one direction never overtake each other.");
     v.field("bandwidth_bytes_per_s", bandwidth_bytes_per_s, between(0.0, 1e12), "0 = unlimited.");
     v.field("queue_messages", queue_messages, at_least(1),
             "Messages that wait for contact or bandwidth; then the oldest is dropped.");
-    v.field("outages", outages, any(), "Times out of range; messages wait.");
+    v.field("outages", outages, any(), "Times out of range; messages wait, also one that is half sent.");
   }
 };
 
@@ -98,8 +98,9 @@ struct TopicStatistics {
 /// All messages of a mission in one process, in virtual time, without threads. Each robot has one link to the server;
 /// one end of every message is the server (server to server needs no link). What happens to a message is drawn from
 /// (seed, its number), so the same calls give the same deliveries. A message waits in the bounded queue of its
-/// direction until there is contact and bandwidth; of the waiting proxy graphs only the newest is kept. A lost proxy
-/// graph is lost (a newer one follows); everything else is sent again until it arrives.
+/// direction until there is contact and bandwidth; its airtime passes with contact only, its latency always. Of the
+/// waiting proxy graphs only the newest is kept. A lost proxy graph is lost (a newer one follows); everything else is
+/// sent again, with contact, until it arrives.
 class InProcessBus {
  public:
   InProcessBus(Timestamp start, const LinkConfig& link, std::uint64_t seed);
@@ -149,7 +150,8 @@ class InProcessBus {
   std::map<RobotId, LinkConfig> links_;
   std::set<std::pair<MessageKind, Endpoint>> subscriptions_;
   std::map<std::pair<Endpoint, Endpoint>, Direction> directions_;
-  std::multimap<Timestamp, Delivery> in_flight_;  ///< By arrival; equal ones in the order they were sent.
+  /// By arrival and number: of equal arrivals, what was published first.
+  std::multimap<std::pair<Timestamp, std::uint64_t>, Delivery> in_flight_;
   std::map<Topic, TopicStatistics> statistics_;
 };
 

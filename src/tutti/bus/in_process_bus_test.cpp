@@ -224,6 +224,38 @@ TEST(InProcessBus, TenMinutesOutOfRangeCostNoSubmapAndAnotherRobotNothing) {
   EXPECT_EQ(bus.statistics().at({kServer, kAlpha, MessageKind::proxy_graph}).superseded, 29U);
 }
 
+TEST(InProcessBus, AirtimePausesOutOfRange) {
+  LinkConfig link;
+  link.latency_s = 0.5;
+  link.bandwidth_bytes_per_s = 10.0;
+  link.outages = {{5.0, 65.0}, {67.0, 70.0}, {69.0, 80.0}};
+  InProcessBus bus(kStart, link, 1);
+  bus.publish(at(0), kAlpha, kServer, MessageKind::submap, std::string(100, 'x'));  // 5 s before, 2 s between, 3 after
+  bus.publish(at(1), kAlpha, kServer, MessageKind::submap, std::string(20, 'y'));
+  bus.publish(at(1), kBravo, kServer, MessageKind::submap, std::string(40, 'z'));  // just in time
+  std::vector<double> arrived;
+  for (const Delivery& delivery : drain(bus, at(1))) arrived.push_back(delivery.arrived - kStart);
+  EXPECT_EQ(arrived, (std::vector<double>{5.5, 83.5, 85.5}));
+}
+
+TEST(InProcessBus, RepetitionsWaitForContact) {
+  LinkConfig link;
+  link.latency_s = 0.0;
+  link.loss = 0.7;
+  link.retransmit_s = 3.0;
+  link.outages = {{5.0, 25.0}, {31.0, 32.0}, {50.0, std::numeric_limits<double>::infinity()}};
+  InProcessBus bus(kStart, link, 1);
+  for (int i = 0; i < 50; ++i) bus.publish(at(i), kAlpha, kServer, MessageKind::submap, std::to_string(i));
+  const auto deliveries = drain(bus, at(49));
+  EXPECT_GT(deliveries.size(), 30U);
+  for (const Delivery& delivery : deliveries)
+    for (const Outage& outage : link.outages)
+      EXPECT_FALSE(delivery.arrived >= at(outage.from_s) && delivery.arrived < at(outage.until_s))
+          << *delivery.bytes << " at " << delivery.arrived - kStart;
+  EXPECT_GT(bus.undelivered().at({kAlpha, kServer, MessageKind::submap}), 0U);
+  EXPECT_EQ(bus.next_delivery(), std::nullopt);
+}
+
 TEST(InProcessBus, AnOutageForEverIsOne) {
   for (const double forever : {std::numeric_limits<double>::infinity(), 1e10}) {
     LinkConfig link;
