@@ -331,6 +331,8 @@ class CommandLine(unittest.TestCase):
             self.expect(tutti("eval", "--map", survey, survey, "--transform", transform), 2, "--transform")
         self.expect(tutti("eval", survey, survey, "--refine"), 2, "--map")
         self.expect(tutti("eval", "--map", survey, survey, "--voxel", "0"), 2, "--voxel")
+        self.expect(tutti("eval", "--map", self.write_ply("beyond.ply", self.room() + [(2e5, 0, 0)]), survey), 1,
+                    "beyond.ply", "(200000, 0, 0)", "within 104858 m", "--voxel")
         far = self.write_ply("far.ply", self.room(shift=500.0))
         self.expect(tutti("eval", "--map", far, survey, "--refine"), 1, "does not settle")
         report = self.path / "report.json"

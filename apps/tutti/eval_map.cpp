@@ -138,6 +138,12 @@ Result<MapReport> evaluate(const EvalMapOptions& options) {
   auto survey = load(options.survey_path);
   if (!survey) return tl::unexpected(survey.error());
   MapReport report{.map_points = map->points.size(), .survey_points = survey->points.size(), .T_survey_map = *initial};
+  if (const Eigen::Vector3f* lost = lidar::first_skipped(*map, options.voxel_m))
+    return fail(
+        ErrorCode::invalid,
+        "{}: the point at ({:g}, {:g}, {:g}) m is more than 2^20 voxels of {:g} m from the origin: expected all "
+        "within {:g} m; take a larger --voxel",
+        options.map_path, lost->x(), lost->y(), lost->z(), options.voxel_m, options.voxel_m * 0x1p20);
   *map = lidar::voxel_downsample(*map, options.voxel_m);
   if (options.refine) {
     const auto refined = refine(*map, *survey, *initial, report);
@@ -148,8 +154,7 @@ Result<MapReport> evaluate(const EvalMapOptions& options) {
   const auto back =
       evaluation::summarise(evaluation::CloudIndex(*map).distances(*survey, report.T_survey_map.inverse()));
   if (!there || !back)
-    return fail(ErrorCode::invalid, "{}: no point within 2^20 voxels of {} m of the origin, expected at least one",
-                options.map_path, options.voxel_m);
+    return fail(ErrorCode::invalid, "{}: no distance to {} could be measured", options.map_path, options.survey_path);
   report.map_to_survey = *there;
   report.survey_to_map = *back;
   return report;

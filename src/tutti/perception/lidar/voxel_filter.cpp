@@ -28,10 +28,19 @@ std::uint64_t spread_bits(std::uint64_t x) {
   return (x | (x << 2U)) & 0x1249249249249249ULL;
 }
 
+/// Counted from the far corner of the range.
+Eigen::Array3d cell_of(const Eigen::Vector3f& p, double voxel_m) {
+  return (p.cast<double>().array() / voxel_m).floor() + kHalfRange;
+}
+
+bool is_in_range(const Eigen::Array3d& cell) {
+  return (cell >= 0.0).all() && (cell < 2.0 * kHalfRange).all();  // also false for NaN
+}
+
 /// Appends the point unless it is not finite or out of range.
 void append(std::vector<KeyedPoint>& out, const Eigen::Vector3f& p, double voxel_m) {
-  const Eigen::Array3d cell = (p.cast<double>().array() / voxel_m).floor() + kHalfRange;
-  if (!((cell >= 0.0).all() && (cell < 2.0 * kHalfRange).all())) return;  // also false for NaN
+  const Eigen::Array3d cell = cell_of(p, voxel_m);
+  if (!is_in_range(cell)) return;
   const auto axis = [&](int i) { return spread_bits(static_cast<std::uint64_t>(cell[i])); };
   out.push_back({axis(0) | (axis(1) << 1U) | (axis(2) << 2U), p});
 }
@@ -61,6 +70,13 @@ PointCloud voxel_downsample(const PointCloud& cloud, double voxel_m) {
   keyed.reserve(cloud.points.size());
   for (const auto& p : cloud.points) append(keyed, p, voxel_m);
   return centroids(std::move(keyed));
+}
+
+const Eigen::Vector3f* first_skipped(const PointCloud& cloud, double voxel_m) {
+  TUTTI_CHECK(voxel_m > 0.0, "voxel_m = {}", voxel_m);
+  const auto found = std::find_if(cloud.points.begin(), cloud.points.end(),
+                                  [&](const Eigen::Vector3f& p) { return !is_in_range(cell_of(p, voxel_m)); });
+  return found == cloud.points.end() ? nullptr : &*found;
 }
 
 PointCloud merge_scans(std::span<const PosedCloud> scans, double voxel_m, RangeLimits limits) {

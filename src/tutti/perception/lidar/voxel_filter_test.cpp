@@ -66,6 +66,15 @@ TEST(VoxelDownsample, skipsWhatIsNotFiniteOrTooFarAway) {
   const PointCloud cloud{{{nan, 0, 0}, {0, infinity, 0}, {0, 0, -infinity}, {1e9F, 0, 0}, {1, 2, 3}}};
   EXPECT_EQ(voxel_downsample(cloud, 0.3).points, (std::vector<Eigen::Vector3f>{{1, 2, 3}}));
   EXPECT_TRUE(voxel_downsample({}, 0.3).points.empty());
+  EXPECT_EQ(first_skipped(cloud, 0.3), &cloud.points[0]);
+}
+
+TEST(VoxelDownsample, saysWhetherItKeepsEveryPoint) {
+  const PointCloud cloud{{{1, 2, 3}, {0, -1048.5F, 1048.5F}, {0, 0, 1048.6F}, {0, 0, 2000}}};
+  EXPECT_EQ(first_skipped(cloud, 1e-3), &cloud.points[2]);
+  EXPECT_EQ(voxel_downsample(cloud, 1e-3).points.size(), 2U);
+  EXPECT_EQ(first_skipped(cloud, 2e-3), nullptr);
+  EXPECT_EQ(voxel_downsample(cloud, 2e-3).points.size(), 4U);
 }
 
 TEST(VoxelDownsample, refusesAVoxelWithoutSize) { EXPECT_THROW(voxel_downsample({}, 0.0), std::logic_error); }
