@@ -55,7 +55,7 @@ TEST(EurocCsv, ErrorsSayWhereAndWhat) {
   EXPECT_EQ(message("1,0,,0,1,0,0,0"), "a.csv:1: column 3 is '', expected a number");
   EXPECT_EQ(message("1,0,0,0,2,0,0,0"), "a.csv:1: quaternion has norm 2, expected 1 within 0.001");
   EXPECT_EQ(message("9223372036854775807,0,0,0,1,0,0,0"),
-            "a.csv:1: stamp is 9223372036854775807 ns, expected at most 2^62 either way");
+            "a.csv:1: stamp is 9223372036854775807 ns, expected at most 2^61 either way");
 }
 
 TEST(EurocCsv, SurvivesAnyBytes) {

@@ -51,10 +51,12 @@ Result<Pose3> read_pose(const LineReader& line, std::size_t first, bool is_2d) {
   if (is_2d) {
     double v[3];
     if (auto ok = line.numbers(first, v); !ok) return tl::unexpected(ok.error());
+    if (auto ok = check_position(line, {v[0], v[1], 0.0}); !ok) return tl::unexpected(ok.error());
     return lift(v[0], v[1], v[2]);
   }
   double v[7];
   if (auto ok = line.numbers(first, v); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_position(line, {v[0], v[1], v[2]}); !ok) return tl::unexpected(ok.error());
   const auto q = internal::to_unit(line, {v[6], v[3], v[4], v[5]});
   if (!q) return tl::unexpected(q.error());
   return Pose3{*q, {v[0], v[1], v[2]}};

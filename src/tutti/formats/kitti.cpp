@@ -27,7 +27,7 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
     return fail(ErrorCode::configuration, "{}: rate of the poses is {} Hz, expected {} to {}", name, rate_hz,
                 kLowestRate, kHighestRate);
   if (!internal::is_in_range(start))
-    return fail(ErrorCode::configuration, "{}: first stamp is {} ns, expected at most 2^62 either way", name, start.ns);
+    return fail(ErrorCode::configuration, "{}: first stamp is {} ns, expected at most 2^61 either way", name, start.ns);
 
   internal::LineReader line(text, name);
   Trajectory trajectory;
@@ -63,6 +63,7 @@ Result<Pose3> parse_transform(std::string_view text, const std::string& name) {
     return line.fail(ErrorCode::invalid, "last row is {} {} {} {}, expected 0 0 0 1", m(3, 0), m(3, 1), m(3, 2),
                      m(3, 3));
   if (line.next()) return line.fail(ErrorCode::parse, "a fifth row, expected the 4 of a 4x4 transform");
+  if (auto ok = check_position(line, m.topRightCorner<3, 1>()); !ok) return tl::unexpected(ok.error());
   return Pose3::from_matrix(m);
 }
 

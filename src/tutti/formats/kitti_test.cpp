@@ -94,6 +94,7 @@ TEST(Kitti, ATransformIsFourRowsOfARigidMotion) {
   EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n").find("t.txt:3: |R^T R - I| is 0, det R -1"), 0U);
   EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 2\n"), "t.txt:4: last row is 0 0 0 2, expected 0 0 0 1");
   EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\nand more\n").find("t.txt:5: a fifth row"), 0U);
+  EXPECT_EQ(problem("1 0 0 0\n0 1 0 1e300\n0 0 1 0\n0 0 0 1\n").find("t.txt:4: position is (0, 1e+300, 0)"), 0U);
   EXPECT_EQ(problem("1 0 0 0 m\n").find("t.txt:1: row has 5 columns"), 0U);
   EXPECT_EQ(problem("1 0 0 0\n0 nan 0 0\n").find("t.txt:2: column 2"), 0U);
   EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n"), "t.txt: 2 rows, expected the 4 of a 4x4 transform");

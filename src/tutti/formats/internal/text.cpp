@@ -183,9 +183,16 @@ Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quatern
   return Eigen::Quaterniond(q.coeffs() / norm);
 }
 
+Status check_position(const LineReader& where, const Eigen::Vector3d& p) {
+  if ((p.array().abs() <= kMaxCoordinate_m).all()) return {};
+  return where.fail(ErrorCode::invalid, "position is ({:g}, {:g}, {:g}) m, expected at most {:g} m along each axis",
+                    p.x(), p.y(), p.z(), kMaxCoordinate_m);
+}
+
 Status append(const LineReader& where, Trajectory& trajectory, const StampedPose& pose) {
   if (!is_in_range(pose.stamp))
-    return where.fail(ErrorCode::invalid, "stamp is {} ns, expected at most 2^62 either way", pose.stamp.ns);
+    return where.fail(ErrorCode::invalid, "stamp is {} ns, expected at most 2^61 either way", pose.stamp.ns);
+  if (auto ok = check_position(where, pose.pose.translation); !ok) return ok;
   if (!trajectory.empty() && pose.stamp <= trajectory.back().stamp)
     return where.fail(ErrorCode::invalid,
                       "stamp {} s does not come after the previous {} s, expected increasing stamps",

@@ -17,9 +17,11 @@ namespace tutti::formats::internal {
 Result<std::string> read_file(const std::string& path);
 Status write_file(const std::string& path, std::string_view bytes);
 
-/// Stamps are kept within +-2^62 ns (years 1823 to 2116), so that the difference of any two fits an int64.
-inline constexpr std::int64_t kMaxStampNs = std::int64_t{1} << 62;
+/// Stamps are kept within +-2^61 ns (years 1896 to 2043), so that the difference of any two fits an int64 twice.
+inline constexpr std::int64_t kMaxStampNs = std::int64_t{1} << 61;
 constexpr bool is_in_range(Timestamp stamp) { return -kMaxStampNs <= stamp.ns && stamp.ns <= kMaxStampNs; }
+/// Positions are kept within +-1e9 m along each axis: squares and sums of many stay finite.
+inline constexpr double kMaxCoordinate_m = 1e9;
 /// Quaternions off unit norm by more than this are refused.
 inline constexpr double kUnitTolerance = 1e-3;
 
@@ -71,7 +73,8 @@ class LineReader {
 
 /// The unit quaternion that is meant, or what is wrong with it; left bit for bit when already unit to rounding.
 Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quaterniond& q);
-/// Appends if the stamp comes after the last one and is within range.
+Status check_position(const LineReader& where, const Eigen::Vector3d& position_m);
+/// Appends if the position is within range and the stamp comes after the last one and is within range.
 Status append(const LineReader& where, Trajectory& trajectory, const StampedPose& pose);
 
 }  // namespace tutti::formats::internal

@@ -96,7 +96,7 @@ inline Pose3 any_pose() {
 
 inline Trajectory any_trajectory(std::size_t longest = 8) {
   Trajectory trajectory;
-  std::int64_t ns = *rc::gen::inRange<std::int64_t>(-4'000'000'000'000'000'000, 4'000'000'000'000'000'000);
+  std::int64_t ns = *rc::gen::inRange<std::int64_t>(-2'000'000'000'000'000'000, 2'000'000'000'000'000'000);
   const auto size = *rc::gen::inRange<std::size_t>(0, longest);
   for (std::size_t k = 0; k < size; ++k, ns += *rc::gen::inRange<std::int64_t>(1, 10'000'000'000))
     trajectory.push_back({{ns}, any_pose()});
