@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/evaluation/rpe.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
@@ -12,17 +14,18 @@ namespace {
 
 constexpr double kMaxOvershoot = 0.5;  // of the interval
 
-/// E over all i, where `abscissa` says how far along pair i is (s or m), without decreasing.
-std::optional<RpeResult> rpe(std::span<const PosePair> pairs, std::span<const double> abscissa, double delta) {
-  TUTTI_CHECK(delta > 0.0, "delta = {}", delta);
+/// E over all i, where `abscissa` says how far along pair i is (ns or m), without decreasing; j is the first pair at
+/// least `least` after i, and none when that is more than `most`.
+template <class T>
+std::optional<RpeResult> rpe(std::span<const PosePair> pairs, const std::vector<T>& abscissa, T least, T most) {
   RpeResult result;
   double sum_m2 = 0.0;
   double sum_rad2 = 0.0;
   std::size_t j = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    while (j < pairs.size() && abscissa[j] - abscissa[i] < delta) ++j;
+    while (j < pairs.size() && abscissa[j] - abscissa[i] < least) ++j;
     if (j == pairs.size()) break;
-    if (abscissa[j] - abscissa[i] > (1.0 + kMaxOvershoot) * delta) continue;
+    if (abscissa[j] - abscissa[i] > most) continue;
     const Pose3 step_reference = pairs[i].reference.inverse() * pairs[j].reference;
     const Pose3 step_estimate = pairs[i].estimate.inverse() * pairs[j].estimate;
     const Pose3 error = step_reference.inverse() * step_estimate;  // eq. 1
@@ -40,20 +43,24 @@ std::optional<RpeResult> rpe(std::span<const PosePair> pairs, std::span<const do
 }  // namespace
 
 std::optional<RpeResult> rpe_over_time(std::span<const PosePair> pairs, double delta_s) {
-  std::vector<double> seconds;
+  TUTTI_CHECK(delta_s > 0.0, "delta_s = {}", delta_s);
+  std::vector<std::int64_t> ns;  // seconds would be rounded, and an interval of n samples now and then have n + 1
   for (const PosePair& pair : pairs) {
-    seconds.push_back(pair.stamp - pairs.front().stamp);
-    TUTTI_CHECK(seconds.size() < 2 || seconds.back() > seconds[seconds.size() - 2], "stamps of one robot increase");
+    ns.push_back(pair.stamp.ns - pairs.front().stamp.ns);
+    TUTTI_CHECK(ns.size() < 2 || ns.back() > ns[ns.size() - 2], "stamps of one robot increase");
   }
-  return rpe(pairs, seconds, delta_s);
+  return rpe(pairs, ns, std::max<std::int64_t>(1, to_nanoseconds(delta_s)),
+             to_nanoseconds((1.0 + kMaxOvershoot) * delta_s));
 }
 
 std::optional<RpeResult> rpe_over_distance(std::span<const PosePair> pairs, double delta_m) {
+  constexpr double kRounding = 1e-9;  // of the interval: the way is a sum
+  TUTTI_CHECK(delta_m > 0.0, "delta_m = {}", delta_m);
   std::vector<double> metres;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     metres.push_back(
         i == 0 ? 0.0 : metres.back() + (pairs[i].reference.translation - pairs[i - 1].reference.translation).norm());
-  return rpe(pairs, metres, delta_m);
+  return rpe(pairs, metres, (1.0 - kRounding) * delta_m, (1.0 + kMaxOvershoot + kRounding) * delta_m);
 }
 
 }  // namespace tutti::evaluation

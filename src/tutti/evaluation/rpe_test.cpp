@@ -75,6 +75,27 @@ TEST(Rpe, GapsAreLeftOut) {
   EXPECT_EQ(rpe_over_distance(pairs, 2.0)->count, 6U);
 }
 
+TEST(Rpe, RoundingOfTimesAddsNoSample) {
+  for (const int rate_hz : {4, 8, 10, 20}) {
+    std::vector<PosePair> pairs;
+    const Timestamp start{1'403'636'579'763'555'584};
+    for (int i = 0; i < 4000; ++i) pairs.push_back({{start.ns + i * kSecond / rate_hz}, at_x(1.01 * i), at_x(i)});
+    for (const int samples : {1, rate_hz / 2, rate_hz}) {
+      const auto result = rpe_over_time(pairs, static_cast<double>(samples) / rate_hz);
+      EXPECT_EQ(result->count, static_cast<std::size_t>(4000 - samples));
+      EXPECT_NEAR(result->rmse_m, 0.01 * samples, 1e-9) << rate_hz;
+    }
+  }
+}
+
+TEST(Rpe, RoundingOfTheWayAddsNoSample) {
+  std::vector<PosePair> pairs;
+  for (int i = 0; i < 4000; ++i) pairs.push_back({{i * kSecond}, at_x(0.101 * i), at_x(0.1 * i)});
+  const auto ten_metres = rpe_over_distance(pairs, 10.0);
+  EXPECT_EQ(ten_metres->count, 3900U);
+  EXPECT_NEAR(ten_metres->rmse_m, 0.1, 1e-9);
+}
+
 TEST(Rpe, TooShortIsNoAnswer) {
   EXPECT_FALSE(rpe_over_time({}, 1.0));
   EXPECT_FALSE(rpe_over_distance({}, 1.0));
