@@ -51,10 +51,17 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti(), 2)
         self.expect(tutti("dance"), 2)
         self.expect(tutti("run"), 2, "mission")
-        self.expect(tutti("demo", "--rate", "-1"), 2, "rate")
+        for rate in ("-1", "nan", "1e-300", "inf"):
+            self.expect(tutti("demo", "--rate", rate), 2, "rate", "0.001 to 1e+06")
+        for seed in ("-1", "1.5", "18446744073709551616"):
+            self.expect(tutti("demo", "--seed", seed), 2, "seed", "whole number")
+        self.expect(tutti("demo", "--seed", "18446744073709551615", "--print-config"), 0)
+        for points in ("nan", "1e300", "0", "-1"):
+            self.expect(tutti("world", "one", "-o", "two", "--points", points), 2, "points", "0.001 to 1000")
+        self.expect(tutti("world", "one", "-o", "two", "--seed", "-1"), 2, "seed")
         self.expect(tutti("eval", "one"), 2)
         self.expect(tutti("compare", "one"), 2)
-        for wrong in (("--tolerance", "nan"), ("--tolerance", "0"), ("--false-alarms", "1"), ("--a-estimate", "best"),
+        for wrong in (("--tolerance", "nan"), ("--tolerance", "0"), ("--false-alarms", "1"), ("--false-alarms", "nan"), ("--a-estimate", "best"),
                       ("--spacing", "-1"), ("--odometry-sigma", "inf")):
             self.expect(tutti("compare", "one", "two", *wrong), 2, wrong[0])
 
@@ -283,6 +290,12 @@ class CommandLine(unittest.TestCase):
         later = self.write_way("later.tum", start=1000.0)
         self.expect(tutti("compare", truth, later), 1, "later.tum", "1000.000", "110.000")
         self.expect(tutti("compare", self.path, truth), 1, "_server.tum")
+        for endless in ("x" * 5000, "x" * 5000 + ".g2o"):
+            self.expect(tutti("compare", endless, truth), 1, "tutti compare: xxx", "too long")
+            self.expect(tutti("compare", truth, endless), 1, "tutti compare: xxx", "too long")
+            self.expect(tutti("optimise", endless, "-o", self.path / "x.g2o"), 1, "too long")
+            self.expect(tutti("eval", truth, endless), 1, "too long")
+            self.expect(tutti("eval", "--map", truth, endless), 1, "truth.tum")
         (self.path / "file").write_text("")
         self.expect(tutti("compare", truth, truth, "--out", self.path / "file" / "x"), 1, "--out")
 
@@ -338,9 +351,14 @@ class CommandLine(unittest.TestCase):
         report = self.path / "report.json"
         for text, word in (("{", "report.json"), ("{}", "T_reference_world"),
                            ('{"server": {"T_reference_world": null}}', "null"),
-                           ('{"server": {"T_reference_world": {"translation_m": [1, 2]}}}', "3 numbers")):
+                           ('{"server": {"T_reference_world": {"translation_m": [1, 2]}}}', "3 numbers"),
+                           ('{"server": {"T_reference_world": 5}}', "3 numbers"),
+                           ('{"server": {"T_reference_world": [[0, 0, 0], [0, 0, 0, 1]]}}', "3 numbers"),
+                           ('{"server": [1]}', "T_reference_world"), ('[5]', "T_reference_world")):
             report.write_text(text)
-            self.expect(tutti("eval", "--map", survey, survey, "--report", report), 1, word)
+            self.expect(tutti("eval", "--map", survey, survey, "--report", report), 1, "report.json", word)
+        self.expect(tutti("eval", "--map", survey, survey, "--report", self.path), 1, "tutti eval: %s: " % self.path)
+        self.expect(tutti("eval", "--map", survey, survey, "--report", self.path / "none"), 1, "none")
 
     def test_missions_of_the_repository_are_valid(self):
         for mission in sorted((SOURCE / "missions").glob("*.yaml")):

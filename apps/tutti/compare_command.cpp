@@ -43,8 +43,8 @@ Result<mission::CompareReport> compare(const Options& options) {
       options.tolerance_deg.value_or(std::atan(options.config.tolerance_m / kArm_m) / kRadPerDeg);
   if (options.max_difference_s)
     report.config.association = {.interpolate = false, .max_difference_s = *options.max_difference_s};
-  if (std::filesystem::is_directory(options.a)) report.a += " (" + options.a_estimate + ")";
-  if (std::filesystem::is_directory(options.b)) report.b += " (" + options.b_estimate + ")";
+  if (is_folder(options.a)) report.a += " (" + options.a_estimate + ")";
+  if (is_folder(options.b)) report.b += " (" + options.b_estimate + ")";
   report.notes = a.notes;
   report.notes.insert(report.notes.end(), b.notes.begin(), b.notes.end());
   report.notes.insert(report.notes.end(), b.judged_notes.begin(), b.judged_notes.end());
@@ -116,7 +116,7 @@ void add_noise_options(CLI::App& command, Options& options) {
   command
       .add_option("--false-alarms", options.config.false_alarm_rate,
                   "Chance of calling it disagreement when B differs from A within the tolerance only")
-      ->check(CLI::Range(1e-9, 0.5))
+      ->check(within(1e-9, 0.5))
       ->capture_default_str()
       ->type_name("RATE");
 }

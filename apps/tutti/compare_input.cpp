@@ -42,8 +42,6 @@ Result<CompareSide> load_folder(const fs::path& folder, const std::string& estim
   return out;
 }
 
-bool is_folder(const std::string& path) { return fs::is_directory(path); }
-
 bool is_graph(const std::string& path) { return fs::path(path).extension() == ".g2o"; }
 
 bool is_there(const std::string& path) {
@@ -180,6 +178,11 @@ Result<std::string> stamps_of(const std::string& path, const std::string& other)
 }
 
 }  // namespace
+
+bool is_folder(const std::string& path) {
+  std::error_code unreadable;
+  return fs::is_directory(path, unreadable);
+}
 
 Result<std::pair<CompareSide, CompareSide>> load_sides(const CompareSource& a, const CompareSource& b) {
   const auto a_stamps = stamps_of(a.path, b.path);

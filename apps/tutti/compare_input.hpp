@@ -18,6 +18,9 @@ struct CompareSide {
   std::vector<std::string> judged_notes;  ///< Of its own motion's covariance: said of the side that is judged.
 };
 
+/// Not what cannot be looked at.
+bool is_folder(const std::string& path);
+
 /// Which file or folder; of a folder, the files *_<estimate>.tum.
 struct CompareSource {
   std::string path;

@@ -63,8 +63,10 @@ std::optional<std::array<double, 7>> seven_numbers(const std::string& text) {
 
 Result<Pose3> transform_of_report(const std::string& path) {
   std::ifstream file(path);
-  if (!file) return fail(ErrorCode::io, "{}: cannot open", path);
-  const Json report = Json::parse(file, nullptr, false);
+  std::ostringstream text;
+  if (file) text << file.rdbuf();
+  if (!file || !text) return fail(ErrorCode::io, "{}: cannot be read, expected the report.json of a mission", path);
+  const Json report = Json::parse(text.str(), nullptr, false);
   const auto wanted = Json::json_pointer("/server/T_reference_world");
   if (report.is_discarded() || !report.is_object() || !report.contains(wanted))
     return fail(ErrorCode::invalid, "{}: no server.T_reference_world, expected the report.json of a mission", path);
@@ -76,7 +78,7 @@ Result<Pose3> transform_of_report(const std::string& path) {
                 path);
   std::array<double, 7> values{};
   for (std::size_t i = 0; i < 7; ++i) {
-    const Json& list = pose.value(i < 3 ? "translation_m" : "quaternion_xyzw", Json());
+    const Json list = pose.is_object() ? pose.value(i < 3 ? "translation_m" : "quaternion_xyzw", Json()) : Json();
     const std::size_t at = i < 3 ? i : i - 3;
     if (!list.is_array() || list.size() != (i < 3 ? 3U : 4U) || !list[at].is_number())
       return fail(ErrorCode::invalid,

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 namespace tutti::app {
@@ -16,6 +18,28 @@ inline CLI::Validator finite(bool zero_too) {
             const bool is_finite = CLI::detail::lexical_cast(input, value) && std::isfinite(value);
             if (is_finite && (value > 0.0 || (zero_too && value == 0.0))) return std::string();
             return fmt::format("is '{}', expected a finite number {} 0", input, zero_too ? ">=" : ">");
+          },
+          ""};
+}
+
+/// CLI11's own Range lets NaN through.
+inline CLI::Validator within(double low, double high) {
+  return {[low, high](const std::string& input) {
+            double value = 0.0;
+            if (CLI::detail::lexical_cast(input, value) && value >= low && value <= high) return std::string();
+            return fmt::format("is '{}', expected a number from {:g} to {:g}", input, low, high);
+          },
+          ""};
+}
+
+/// CLI11 takes -1, and what is too large, for the largest number there is.
+inline CLI::Validator whole_number() {
+  return {[](const std::string& input) {
+            std::uint64_t value = 0;
+            const char* end = input.data() + input.size();
+            const auto [last, error] = std::from_chars(input.data(), end, value);
+            if (error == std::errc{} && last == end) return std::string();
+            return fmt::format("is '{}', expected a whole number from 0 to 2^64 - 1", input);
           },
           ""};
 }

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <iostream>
 
+#include "finite_number.hpp"
 #include "own_folder.hpp"
 #include "tutti/mission/report/files.hpp"
 #include "tutti/mission/report/text.hpp"
@@ -52,13 +53,15 @@ void add_mission_options(CLI::App& command, MissionArguments& arguments) {
       .add_option("--out", arguments.out,
                   "Folder for the report, made if missing; default: out/ and the mission's name")
       ->type_name("DIR");
-  command.add_option("--seed", arguments.seed, "Everything random comes from this number; default: 1")->type_name("N");
+  command.add_option("--seed", arguments.seed, "Everything random comes from this number; default: 1")
+      ->type_name("N")
+      ->check(whole_number());
   command
       .add_option("--rate", arguments.rate,
                   "Times real time, e.g. 1; shows each robot's and the server's CPU share and worst update\n"
                   "latency. Without it: as fast as possible")
       ->type_name("R")
-      ->check(CLI::PositiveNumber);
+      ->check(within(1e-3, 1e6));
   command.add_option("--threads", arguments.threads, "Threads for verifying closures; 0 = all cores")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));

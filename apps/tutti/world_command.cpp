@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "finite_number.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/simulation/surface.hpp"
@@ -59,9 +60,9 @@ void add_world_command(CLI::App& app, int& exit_code) {
       ->required()
       ->type_name("MISSION.yaml");
   command->add_option("-o,--output", options->output, "Where to write it.")->required()->type_name("OUT.ply");
-  command->add_option("--seed", options->seed, "As for tutti run.")->capture_default_str();
+  command->add_option("--seed", options->seed, "As for tutti run.")->check(whole_number())->capture_default_str();
   command->add_option("--points", options->points_m, "Points about this far apart instead of a mesh, in metres.")
-      ->check(CLI::PositiveNumber);
+      ->check(within(1e-3, 1e3));
   command->add_option("--set", options->assignments, "Change a setting of the mission: key=value.")
       ->type_name("KEY=VALUE");
   command->callback([options, &exit_code] { exit_code = run(*options); });
