@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/mission_config.hpp"
 
+#include <functional>
 #include <set>
 
 #include "tutti/consistency/policy.hpp"
@@ -8,6 +9,22 @@
 
 namespace tutti::mission {
 namespace {
+
+constexpr double kShortestUpdate_s = 0.001;
+
+using Problem = std::function<void(std::string)>;
+
+void check_outages(const bus::LinkConfig& link, const std::string& path, const Problem& problem) {
+  for (std::size_t i = 0; i < link.outages.size(); ++i)
+    if (const auto& [from_s, until_s] = link.outages[i]; until_s < from_s)
+      problem(fmt::format("{}.outages.{}.until_s: is {}, expected at least from_s = {}", path, i, until_s, from_s));
+}
+
+void check_links(const MissionConfig& config, const Problem& problem) {
+  check_outages(config.link, "link", problem);
+  for (std::size_t i = 0; i < config.robot_links.size(); ++i)
+    check_outages(config.robot_links[i].link, fmt::format("robot_links.{}.link", i), problem);
+}
 
 /// What a single field cannot know.
 Status check_mission(const MissionConfig& config, const std::string& name) {
@@ -48,6 +65,10 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
   if (config.closures.wrong.max_m < config.closures.wrong.min_m)
     problem(fmt::format("closures.wrong.max_m: is {}, expected at least min_m = {}", config.closures.wrong.max_m,
                         config.closures.wrong.min_m));
+  check_links(config, problem);
+  if (config.server.update_period_s < kShortestUpdate_s)  // every one is a step of the mission
+    problem(fmt::format("server.update_period_s: is {}, expected at least {}", config.server.update_period_s,
+                        kShortestUpdate_s));
   for (const std::string& policy : config.compare_policies)
     if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
       problem("compare_policies: " + known.error().message);

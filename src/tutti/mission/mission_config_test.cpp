@@ -50,6 +50,15 @@ TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
             std::string::npos);
   EXPECT_NE(problem_with(kGood, {"closures.wrong.max_m=1"}).find("closures.wrong.max_m: is 1, expected at least"),
             std::string::npos);
+  EXPECT_EQ(problem_with(kGood, {"link.outages=[{from_s: 5, until_s: .inf}]"}), "");
+  EXPECT_NE(problem_with(kGood, {"link.outages=[{from_s: 5, until_s: 9}, {from_s: 50, until_s: 20}]"})
+                .find("link.outages.1.until_s: is 20, expected at least from_s = 50"),
+            std::string::npos);
+  EXPECT_NE(problem_with(kGood, {"robot_links=[{robot: a, link: {outages: [{from_s: 2, until_s: 1}]}}]"})
+                .find("robot_links.0.link.outages.0.until_s"),
+            std::string::npos);
+  EXPECT_NE(problem_with(kGood, {"server.update_period_s=1e-9"}).find("is 1e-09, expected at least 0.001"),
+            std::string::npos);
   EXPECT_NE(problem_with(kGood, {"robots.0.start_s=.inf"}).find("start_s: is .inf"), std::string::npos);
   EXPECT_NE(problem_with(kGood, {"robots.0.reference_offset_m=[1, 2]"}).find("expected 3"), std::string::npos);
   EXPECT_EQ(problem_with(kGood, {"closures.planted=[{robot: a, at_s: 9}]"}), "");
