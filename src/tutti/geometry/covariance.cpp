@@ -44,8 +44,8 @@ Status check_covariance(const Matrix6d& covariance) {
   return {};
 }
 
-Matrix6d bounded_covariance(const Matrix6d& covariance) {
-  const Vector6d most = per_axis(kUnknownTranslation_m, kUnknownRotation_rad).cwiseAbs2();
+Matrix6d bounded_covariance(const Matrix6d& covariance, double most_m, double most_rad) {
+  const Vector6d most = per_axis(most_m, most_rad).cwiseAbs2();
   if ((covariance.diagonal().array() <= most.array()).all()) return covariance;
   const Vector6d scale = (most.array() / covariance.diagonal().array().max(most.array())).sqrt();
   return scale.asDiagonal() * covariance * scale.asDiagonal();

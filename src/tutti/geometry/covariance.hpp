@@ -18,9 +18,10 @@ inline constexpr double kLeastRotation_rad = 1e-5;
 /// a coordinate without variance, like the height of odometry in the plane, must have no correlations either.
 [[nodiscard]] Status check_covariance(const Matrix6d& covariance);
 
-/// The covariance with standard deviations of at most kUnknownTranslation_m and kUnknownRotation_rad, correlations
-/// kept: numbers far apart in one graph leave it without a solution for anybody. Unchanged where all are below.
-[[nodiscard]] Matrix6d bounded_covariance(const Matrix6d& covariance);
+/// The covariance with standard deviations of at most `most_m` and `most_rad`, correlations kept: numbers far apart in
+/// one graph leave it without a solution for anybody. Unchanged where all are below.
+[[nodiscard]] Matrix6d bounded_covariance(const Matrix6d& covariance, double most_m = kUnknownTranslation_m,
+                                          double most_rad = kUnknownRotation_rad);
 
 /// One that has an inverse: the same where the correlations are away from 1 by more than rounding and no standard
 /// deviation is below kLeastTranslation_m and kLeastRotation_rad; otherwise with these variances added.

@@ -102,6 +102,8 @@ void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::o
   if (!is_default || summary.synchronised == 0) return;
   if (!estimation::is_usable(summary.optimised))
     note(failed_updates_, fmt::format("the optimisation on board ended {}", to_string(summary.optimised)));
+  else if (summary.taken_back)
+    note(failed_updates_, "the chosen constraints led farther from the map than odometry is");
   UpdateRecord record{.time_s = time_s,
                       .revision = summary.revision,
                       .synchronised_nodes = summary.synchronised,

@@ -2,9 +2,11 @@
 #include "tutti/robot/agent.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/covariance.hpp"
 
 namespace tutti::robot {
@@ -14,6 +16,24 @@ std::unique_ptr<consistency::ConstraintPolicy> known_policy(const consistency::P
   auto policy = consistency::make_policy(config.name, config);
   TUTTI_CHECK(policy.has_value(), "{}", policy.error().message);
   return std::move(*policy);
+}
+
+/// A step less sure than this says nothing about a run of many: the few links of a graph of runs hold it or do not.
+/// With 100 m and 3 rad that graph is often without a solution; a robot moves less from one sample to the next.
+constexpr double kUnknownStep_m = 10.0;
+constexpr double kUnknownStep_rad = 0.3;
+/// Nearer to the map than this nobody can say that odometry was better.
+constexpr double kAstray_m = 0.02;
+
+/// RMSE of the nodes' positions against the server's after one rigid alignment.
+double distance_to_map(const ProxyGraph& graph, std::span<const consistency::NodePair> pairs,
+                       const std::vector<Eigen::Vector3d>& positions) {
+  std::vector<Eigen::Vector3d> map;
+  for (const auto& pair : pairs) map.push_back(graph.nodes[pair.proxy].T_world_body.translation);
+  const Pose3 T_world_robot = align_points(map, positions);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < map.size(); ++k) sum += (map[k] - T_world_robot * positions[k]).squaredNorm();
+  return map.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(map.size()));
 }
 
 /// Quaternions printed with few digits are off by this much at most.
@@ -42,7 +62,8 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given,
   if (is_valid(T_odom_body, kRoundedQuaternion)) T_odom_body.rotation.normalize();
   if (auto ok = check_covariance(increment_covariance); !ok)
     return in_context(fmt::format("robot {}: odometry at {} ns", robot_.value, stamp.ns), ok.error());
-  const Matrix6d covariance = invertible_covariance(bounded_covariance(increment_covariance));
+  const Matrix6d covariance =
+      invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
   const std::uint32_t submap = submaps_.current_submap();
   const auto keyframe = submaps_.add_odometry(stamp, T_odom_body, covariance);
   if (!keyframe) return tl::unexpected(keyframe.error());
@@ -106,6 +127,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   ended(UpdateStage::compare);
 
   const std::size_t withdrawn = state_.ledger.withdraw_unknown(message.graph, robot_);
+  const consistency::Ledger held = state_.ledger;
   const auto selection = policy_->choose({.graph = message.graph,
                                           .robot = robot_,
                                           .nodes = own,
@@ -119,6 +141,16 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   ended(UpdateStage::choose);
 
   summary.optimised = optimise();
+  const bool whole_plan = selection.replaces_all && !policy_->needs_budget();
+  const auto astray = [&] { return whole_plan && leads_astray(message.graph, own, comparison.pairs); };
+  if (!estimation::is_usable(summary.optimised) || astray()) {
+    summary.taken_back = true;
+    state_.ledger = held;
+    if (!estimation::is_usable(optimise()) || astray()) {
+      state_.ledger = {};
+      optimise();
+    }
+  }
   locate_others(message.graph, own, comparison.pairs);
   ended(UpdateStage::optimise);
 
@@ -145,6 +177,21 @@ estimation::Termination RobotAgent::optimise() {
                            .doubtful = consistency::is_doubtful(c, config_.policy.constraint)});
   smoother_.set_constraints(std::move(constraints));
   return smoother_.solve().termination;
+}
+
+/// Corrected, it is farther from the map than by odometry alone: the reduced problem promised what did not come true.
+bool RobotAgent::leads_astray(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
+                              std::span<const consistency::NodePair> pairs) const {
+  std::vector<Eigen::Vector3d> by_odometry;  // of all representative keyframes, as `own` has them
+  for (const Keyframe& keyframe : state_.keyframes)
+    if (keyframe.representative) by_odometry.push_back(keyframe.T_odom_body.translation);
+  std::vector<Eigen::Vector3d> raw;
+  std::vector<Eigen::Vector3d> corrected;
+  for (const auto& pair : pairs) {
+    raw.push_back(by_odometry[pair.robot]);
+    corrected.push_back(smoother_.pose(own[pair.robot].chain_index).translation);
+  }
+  return distance_to_map(graph, pairs, corrected) > distance_to_map(graph, pairs, raw) + kAstray_m;
 }
 
 // Frames differ by an unknown transform; the newest common node ties them together where this robot is now.

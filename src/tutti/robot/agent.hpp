@@ -58,8 +58,11 @@ struct UpdateSummary {
   Eigen::VectorXd max_disagreement;
   int order = 0;                     ///< Of the Chebyshev transform; 0 = exact.
   consistency::LedgerUpdate ledger;  ///< What became of the constraints.
-  /// How the optimisation with them ended; where it is not usable, the poses stayed as they were.
+  /// How the optimisation with them ended.
   estimation::Termination optimised = estimation::Termination::not_run;
+  /// They could not be solved, or a whole plan of them led farther from the map than odometry is: the ledger holds what
+  /// it held before, or nothing.
+  bool taken_back = false;
   consistency::Explanation explanation;  ///< Of raw odometry against the server's map.
 };
 
@@ -100,7 +103,8 @@ class RobotAgent {
 
   /// Raw odometry, see SubmapBuilder::add_odometry; a bad sample is refused and nothing changes. Quaternions are
   /// normalised where they are off by rounding only (1e-3). Covariances may lack a coordinate (odometry in the plane)
-  /// or call one unknown; what is used is invertible_covariance(bounded_covariance(.)) (geometry/covariance.hpp).
+  /// or call one unknown; what is used and uploaded has standard deviations of at most 10 m and 0.3 rad and an inverse
+  /// (geometry/covariance.hpp).
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
   Status add_scan(const Scan& scan);
   /// The latest odometry sample is a keyframe; a scan elsewhere is hardly worth taking.
@@ -131,6 +135,8 @@ class RobotAgent {
   void send(Submap submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
   estimation::Termination optimise();
+  [[nodiscard]] bool leads_astray(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
+                                  std::span<const consistency::NodePair> pairs) const;
   void locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                      std::span<const consistency::NodePair> pairs);
 

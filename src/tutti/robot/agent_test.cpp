@@ -124,6 +124,38 @@ TEST(Agent, CorrectsOdometryThatClaimsToBePerfect) {
   EXPECT_LT(evaluation::agreement(agent.corrected(), truth)->rmse_m, 0.15 * before);
 }
 
+/// A first step that says it knows nothing, and links that claim to be exact across half a kilometre.
+TEST(Agent, WhatCannotBeSolvedIsTakenBack) {
+  const auto on_circle = [](int sample) {
+    const double angle = sample / 500.0;
+    return Pose3{Eigen::Quaterniond(Eigen::AngleAxisd(angle + std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
+                 {500.0 * std::cos(angle), 500.0 * std::sin(angle), 0.0}};
+  };
+  const Pose3 bend{Eigen::Quaterniond(Eigen::AngleAxisd(2e-4, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero()};
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  Pose3 T_odom_body;
+  for (int i = 0; i < 3455; ++i) {
+    if (i > 0) T_odom_body = T_odom_body * (on_circle(i - 1).inverse() * on_circle(i)) * bend;
+    const Matrix6d covariance = i == 1 ? Matrix6d(1e6 * Matrix6d::Identity()) : kStepCovariance;
+    ASSERT_TRUE(agent.add_odometry(at(i), T_odom_body, covariance));
+  }
+  ProxyGraphMessage message{.graph = {.revision = 1}};
+  for (const Keyframe& k : agent.keyframes())
+    if (k.representative)
+      message.graph.nodes.push_back({.robot = RobotId{1},
+                                     .stamp = k.stamp,
+                                     .T_world_body = on_circle(static_cast<int>(std::lround((k.stamp - at(0)) / 0.5))),
+                                     .covariance = Matrix6d::Zero(),
+                                     .support = 5});
+  message.graph.components = {{RobotId{1}, 0}};
+  const auto summary = agent.receive(message, 2);
+  ASSERT_FALSE(estimation::is_usable(summary.optimised)) << to_string(summary.optimised);
+  EXPECT_TRUE(summary.taken_back);
+  EXPECT_EQ(summary.constraints, 0U);
+  const RobotAgent restored(RobotId{1}, {}, Rng(1), agent.state());
+  EXPECT_LT(evaluation::agreement(restored.corrected(), agent.corrected())->max_m, 1e-6);
+}
+
 TEST(Agent, KnowsWhereTheOthersAre) {
   AgentConfig config;
   config.policy.name = "every_node";
