@@ -11,8 +11,9 @@
 
 namespace tutti::mission {
 
-LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap)
-    : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)) {}
+LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap,
+                                       std::size_t kept_in_memory)
+    : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), kept_in_memory_(kept_in_memory) {}
 
 bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
   return first.id.robot != second.id.robot || second.id.index - first.id.index >= min_submap_gap_;  // first < second
@@ -37,6 +38,7 @@ Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::feature
   {
     const std::lock_guard lock(mutex_);
     if (const auto found = features_.find(submap.id); found != features_.end()) return found->second;
+    if (auto found = recent_.find(submap.id)) return found;
   }
   auto cloud = clouds.get(submap.id);
   if (!cloud) return tl::unexpected(cloud.error());
@@ -45,7 +47,10 @@ Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::feature
   // Computed outside the lock; two threads may do it twice, with the same result.
   auto features = std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(seen, config_));
   const std::lock_guard lock(mutex_);
-  return features_.try_emplace(submap.id, std::move(features)).first->second;
+  if (features_.size() < kept_in_memory_ || features_.contains(submap.id))
+    return features_.try_emplace(submap.id, std::move(features)).first->second;
+  recent_.keep(submap.id, features);
+  return features;
 }
 
 namespace {

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <fstream>
 #include <sstream>
@@ -69,11 +68,7 @@ Status DiskCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud>&
 Result<std::shared_ptr<const PointCloud>> DiskCloudStore::get(SubmapId id) const {
   {
     const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find(recent_, id, &Entry::first);
-    if (found != recent_.end()) {
-      recent_.splice(recent_.begin(), recent_, found);
-      return found->second;
-    }
+    if (auto found = recent_.find(id)) return found;
   }
   const fs::path file = file_of(id);
   const std::string what = fmt::format("cloud of submap {}/{}: {}", id.robot.value, id.index, file.string());
@@ -89,9 +84,7 @@ Result<std::shared_ptr<const PointCloud>> DiskCloudStore::get(SubmapId id) const
 
 void DiskCloudStore::remember(SubmapId id, std::shared_ptr<const PointCloud> cloud) const {
   const std::lock_guard lock(mutex_);
-  std::erase_if(recent_, [&](const Entry& entry) { return entry.first == id; });
-  recent_.emplace_front(id, std::move(cloud));
-  while (recent_.size() > kept_in_memory_) recent_.pop_back();
+  recent_.keep(id, std::move(cloud));
 }
 
 }  // namespace tutti::mission

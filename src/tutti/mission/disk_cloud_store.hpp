@@ -3,11 +3,11 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <list>
 #include <memory>
 #include <mutex>
 #include <utility>
 
+#include "tutti/mission/recently_used.hpp"
 #include "tutti/server/cloud_store.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -27,18 +27,15 @@ class DiskCloudStore final : public server::CloudStore {
   [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override;
 
  private:
-  using Entry = std::pair<SubmapId, std::shared_ptr<const PointCloud>>;
-
   DiskCloudStore(std::filesystem::path folder, const wire::CloudCodec& codec, std::size_t kept_in_memory)
-      : folder_(std::move(folder)), codec_(codec), kept_in_memory_(kept_in_memory) {}
+      : folder_(std::move(folder)), codec_(codec), recent_(kept_in_memory) {}
   [[nodiscard]] std::filesystem::path file_of(SubmapId id) const;
   void remember(SubmapId id, std::shared_ptr<const PointCloud> cloud) const;
 
   std::filesystem::path folder_;
   wire::CloudCodec codec_;
-  std::size_t kept_in_memory_;
-  mutable std::mutex mutex_;         // guards recent_; files are read and written without it
-  mutable std::list<Entry> recent_;  // the last used first
+  mutable std::mutex mutex_;  // guards recent_; files are read and written without it
+  mutable RecentlyUsed<PointCloud> recent_;
 };
 
 }  // namespace tutti::mission

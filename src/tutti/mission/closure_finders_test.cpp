@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/closure_finders.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+#include "tutti/mission/parallel.hpp"
+
+namespace tutti::mission {
+namespace {
+
+/// Counts how often each cloud is looked at: as often as features are computed.
+class CountingStore final : public server::CloudStore {
+ public:
+  Status put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) override { return inner_.put(id, cloud); }
+  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override {
+    ++gets;
+    return inner_.get(id);
+  }
+  mutable std::atomic<std::size_t> gets{0};
+
+ private:
+  server::MemoryCloudStore inner_;
+};
+
+/// A room with a cupboard, seen while walking through it; its size depends on the submap.
+Submap room(SubmapId id, server::CloudStore& store) {
+  Rng rng(id.index % 3);
+  const double length = 10.0 + id.index % 3, width = 7.0;
+  auto cloud = std::make_shared<PointCloud>();
+  for (int i = 0; i < 6000; ++i) {
+    const double x = rng.uniform(-0.5, 0.5) * length, y = rng.uniform(-0.5, 0.5) * width, z = rng.uniform(-0.5, 2.5);
+    const double side = rng.bernoulli(0.5) ? 0.5 : -0.5;
+    const std::uint64_t face = rng.index(4);
+    if (face == 0) cloud->points.emplace_back(side * length, y, z);
+    if (face == 1) cloud->points.emplace_back(x, side * width, z);
+    if (face == 2) cloud->points.emplace_back(x, y, 1.0 + 3.0 * side);
+    if (face == 3) cloud->points.emplace_back(2.0 + side, 1.0 + 0.3 * y, z);
+  }
+  EXPECT_TRUE(store.put(id, cloud).has_value());
+  Submap submap{.id = id};
+  for (std::uint32_t k = 0; k < 11; ++k) {
+    submap.keyframes.push_back({k, {1'000'000'000LL * k}, {Eigen::Quaterniond::Identity(), {0.3 * k, 0.0, 0.0}}, true});
+    if (k > 0)
+      submap.odometry.push_back({{Eigen::Quaterniond::Identity(), {0.3, 0.0, 0.0}}, Matrix6d::Identity() * 1e-4});
+  }
+  return submap;
+}
+
+struct Rooms {
+  explicit Rooms(std::uint32_t count) {
+    for (std::uint32_t i = 0; i < count; ++i) submaps.push_back(room({RobotId{0}, i}, store));
+  }
+  /// Every new one with the first one and the one before it.
+  std::vector<ClosureVerdict> verify_all(const LidarClosureFinder& finder, std::size_t threads) {
+    std::vector<std::pair<std::size_t, std::size_t>> pairs;
+    for (std::size_t b = 0; b < submaps.size(); ++b)
+      for (std::size_t a = 0; a < b; ++a)
+        if (a < 1 || a + 2 > b) pairs.emplace_back(a, b);
+    std::vector<ClosureVerdict> verdicts(pairs.size());
+    store.gets = 0;
+    for_each_parallel(pairs.size(), threads, [&](std::size_t i) {
+      verdicts[i] = *finder.verify(submaps[pairs[i].first], submaps[pairs[i].second], store);
+    });
+    return verdicts;
+  }
+  CountingStore store;
+  std::vector<Submap> submaps;
+};
+
+TEST(LidarClosureFinder, ComputesFeaturesOnceWhileThereIsRoom) {
+  Rooms rooms(6);
+  const LidarClosureFinder finder({}, 1);
+  const auto verdicts = rooms.verify_all(finder, 1);
+  EXPECT_EQ(rooms.store.gets, 6U);
+  EXPECT_TRUE(std::ranges::any_of(verdicts, [](const ClosureVerdict& v) { return !v.closures.empty(); }));
+  EXPECT_EQ(rooms.verify_all(finder, 1), verdicts);
+  EXPECT_EQ(rooms.store.gets, 0U);
+}
+
+TEST(LidarClosureFinder, KeepsFeaturesOfSoManySubmapsAndFindsTheSame) {
+  Rooms rooms(22);
+  const auto verdicts = rooms.verify_all(LidarClosureFinder({}, 1), 1);
+  const LidarClosureFinder finder({}, 1, 4);
+  EXPECT_EQ(rooms.verify_all(finder, 1), verdicts);
+  const auto gets_to_verify = [&](std::size_t a, std::size_t b) {
+    rooms.store.gets = 0;
+    EXPECT_TRUE(finder.verify(rooms.submaps[a], rooms.submaps[b], rooms.store).has_value());
+    return rooms.store.gets.load();
+  };
+  EXPECT_EQ(gets_to_verify(0, 3), 0U);    // the first stay
+  EXPECT_EQ(gets_to_verify(20, 21), 0U);  // and those used last
+  EXPECT_EQ(gets_to_verify(4, 5), 2U);
+  EXPECT_EQ(gets_to_verify(4, 5), 0U);
+  EXPECT_EQ(rooms.verify_all(finder, 3), verdicts);
+}
+
+}  // namespace
+}  // namespace tutti::mission
