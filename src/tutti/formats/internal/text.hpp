@@ -39,11 +39,13 @@ std::string shown(std::string_view text);
 enum class Separator { whitespace, comma };
 
 /// Walks over the lines of a text and splits them into columns. Whatever a '#' starts is a comment; empty lines are
-/// passed over. Its errors begin with "name:line: ".
+/// passed over, as is the byte order mark that some editors put first. Its errors begin with "name:line: ".
 class LineReader {
  public:
   LineReader(std::string_view text, std::string name, Separator separator = Separator::whitespace)
-      : rest_(text), name_(std::move(name)), separator_(separator) {}
+      : rest_(text), name_(std::move(name)), separator_(separator) {
+    if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
+  }
 
   /// The next line with content; false at the end of the text.
   bool next();
@@ -64,6 +66,8 @@ class LineReader {
   [[nodiscard]] Result<std::int64_t> integer(std::size_t column, std::string_view what) const;
 
  private:
+  static constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // of UTF-8
+
   std::string_view rest_;
   std::string name_;
   Separator separator_;

@@ -61,6 +61,21 @@ TEST(Number, PlusSignsButNoRubbish) {
   for (const char* text : {"", "1.0", "9223372036854775808"}) EXPECT_FALSE(parse_integer(text)) << text;
 }
 
+TEST(LineReader, PassesOverAByteOrderMark) {
+  LineReader line(
+      "\xEF\xBB\xBF"
+      "1 2\n\xEF\xBB\xBF 3\n",
+      "f");
+  ASSERT_TRUE(line.next());
+  EXPECT_EQ(line.columns()[0], "1");
+  ASSERT_TRUE(line.next());
+  EXPECT_EQ(line.columns().size(), 2U);  // only the first counts
+  LineReader comment("\xEF\xBB\xBF# head\n4\n", "f");
+  ASSERT_TRUE(comment.next());
+  EXPECT_EQ(comment.columns()[0], "4");
+  EXPECT_FALSE(LineReader("\xEF\xBB\xBF", "f").next());
+}
+
 TEST(LineReader, PassesOverCommentsAndEmptyLinesButCountsThem) {
   LineReader line("# head\r\n\r\n 1\t2  3 # tail\r\n\n4", "f");
   ASSERT_TRUE(line.next());
