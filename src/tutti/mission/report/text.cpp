@@ -179,7 +179,8 @@ std::string report_text(const MissionRecord& record, const std::string& report_h
   std::string out = "\n";
   out +=
       wrap(record.description.empty() ? record.mission : fmt::format("{}: {}", record.mission, record.description), "");
-  out += wrap(fmt::format("Input: {}. Seed {}, {} of mission time.", record.input, record.seed,
+  out += wrap(fmt::format("{}Seed {}, {} of mission time.",
+                          record.input.empty() ? "" : fmt::format("Input: {}. ", record.input), record.seed,
                           format_mission_time(record.duration_s)),
               "");
   if (!record.robots.empty()) {

@@ -112,6 +112,13 @@ TEST(ReportText, FiguresOfOneOfSeveralMapsNameItsRobots) {
 
 TEST(ReportText, EmptyMission) { expect_readable(report_text(MissionRecord{}, "x")); }
 
+TEST(ReportText, AMissionNeedNotSayWhatItsInputIs) {
+  MissionRecord record = test::example_record();
+  EXPECT_NE(report_text(record, "x").find("\nInput: simulated. Seed 7, "), std::string::npos);
+  record.input.clear();
+  EXPECT_NE(report_text(record, "x").find("\nSeed 7, "), std::string::npos);
+}
+
 TEST(Format, Words) {
   EXPECT_EQ(format_metres(std::nullopt), "-");
   EXPECT_EQ(format_metres(0.0126), "0.013 m");
