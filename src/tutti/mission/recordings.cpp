@@ -119,9 +119,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
     if (robot.reference.file == robot.odometry.file) out.T_common_odom = T_common_reference;
   }
   Trajectory raw = part(*odometry, robot.from_share, robot.to_share);
-  if (raw.size() < 2)
-    return fail(ErrorCode::invalid, "robot {}: {} odometry poses to replay, expected at least 2", robot.name,
-                raw.size());
+  if (raw.size() < 2) return fail(ErrorCode::invalid, "{} odometry poses to replay, expected at least 2", raw.size());
   if (is_degraded(robot.degrade)) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
   if (!robot.scans.empty()) {
     auto scans = scans_of(robot, data, odometry->size(), raw);

@@ -52,6 +52,11 @@ TEST_F(Recordings, AreReplayedAsTheyAre) {
   EXPECT_LT(local({}, *input->robots.front().T_common_odom).norm(), 1e-12);
 }
 
+TEST_F(Recordings, ErrorsNameTheRobotOnce) {
+  config_.robots[0].to_share = 0.01;
+  EXPECT_EQ(problem(), "robot a: 1 odometry poses to replay, expected at least 2");
+}
+
 TEST_F(Recordings, HalvesMeetAndMissNothing) {
   config_.robots.push_back(config_.robots.front());
   config_.robots[0].to_share = config_.robots[1].from_share = 0.5;
