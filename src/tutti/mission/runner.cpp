@@ -339,8 +339,8 @@ MissionRecord MissionRun::record() const {
   const auto& left_out = server_.map().left_out;
   if (!left_out.empty())
     record.notes.push_back(fmt::format(
-        "{} submaps contradict earlier ones of their robot and are not in the map, the "
-        "first is {} of {}",
+        "{} submaps are not in the map, because they contradict earlier ones of their robot or keep the map from being "
+        "solved; the first is {} of {}",
         left_out.size(), left_out.front().index, robots_[left_out.front().robot.value]->recording().recording.name));
   record.robots.resize(robots_.size());
   evaluate_robots(outcomes, server_.map(), config_.association, record);

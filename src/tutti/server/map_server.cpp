@@ -13,6 +13,24 @@ namespace {
 
 /// Between neighbouring keyframes. Odometry that diverged beyond this would leave the joint map without a solution.
 constexpr double kLongestStep_m = 1e4;
+/// By which odometry may differ from the poses it made: what rounding leaves, however far away they are.
+constexpr double kRounding_m = 0.01;
+constexpr double kRounding_rad = 1e-3;
+
+/// Odometry is what leads from one keyframe's pose to the next.
+Status check_step(const Keyframe& from, const Keyframe& to, const RelativePose& step) {
+  if (!is_valid(step.T_a_b) || step.T_a_b.translation.norm() > kLongestStep_m)
+    return fail(ErrorCode::invalid, "odometry of {} m to keyframe {}, expected at most {} m",
+                step.T_a_b.translation.norm(), to.index, kLongestStep_m);
+  const Vector6d apart = local(from.T_odom_body.inverse() * to.T_odom_body, step.T_a_b);
+  const double apart_m = apart.head<3>().norm(), apart_rad = apart.tail<3>().norm();
+  if (apart_m > kRounding_m || apart_rad > kRounding_rad)
+    return fail(ErrorCode::invalid, "odometry to keyframe {} is {:.3f} m and {:.3f} rad from its poses, expected 0",
+                to.index, apart_m, apart_rad);
+  if (auto ok = check_covariance(step.covariance); !ok)
+    return in_context(fmt::format("odometry to keyframe {}", to.index), ok.error());
+  return {};
+}
 
 /// What the map relies on, also of callers who do not come by wire.
 Status check_submap(const Submap& submap) {
@@ -29,12 +47,7 @@ Status check_submap(const Submap& submap) {
     if (keyframe.index != previous.index + 1 || keyframe.stamp <= previous.stamp)
       return fail(ErrorCode::invalid, "{}: keyframe {} at {} ns does not follow keyframe {} at {} ns", where,
                   keyframe.index, keyframe.stamp.ns, previous.index, previous.stamp.ns);
-    const RelativePose& step = submap.odometry[k - 1];
-    if (!is_valid(step.T_a_b) || step.T_a_b.translation.norm() > kLongestStep_m)
-      return fail(ErrorCode::invalid, "{}: odometry of {} m to keyframe {}, expected at most {} m", where,
-                  step.T_a_b.translation.norm(), keyframe.index, kLongestStep_m);
-    if (auto ok = check_covariance(step.covariance); !ok)
-      return in_context(fmt::format("{}: odometry to keyframe {}", where, keyframe.index), ok.error());
+    if (auto ok = check_step(previous, keyframe, submap.odometry[k - 1]); !ok) return in_context(where, ok.error());
   }
   return {};
 }

@@ -101,6 +101,9 @@ TEST(MapServer, RefusesStrangersAndMalformedSubmapsAndKeepsTheMap) {
   Submap diverged = good;
   diverged.odometry[4].T_a_b.translation.y() = 1e9;
   refused(diverged, ErrorCode::invalid, "to keyframe 5, expected at most 10000 m");
+  Submap contradictory = good;
+  contradictory.odometry[4].T_a_b.translation.y() += 0.5;
+  refused(contradictory, ErrorCode::invalid, "odometry to keyframe 5 is 0.500 m and 0.000 rad from its poses");
   Submap indefinite = good;
   indefinite.odometry[4].covariance(0, 1) = indefinite.odometry[4].covariance(1, 0) = 1.0;
   refused(indefinite, ErrorCode::invalid, "odometry to keyframe 5: covariance is not positive semidefinite");
