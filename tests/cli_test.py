@@ -139,7 +139,7 @@ class CommandLine(unittest.TestCase):
 
     def test_robot_names_are_those_of_files(self):
         names = "simulation.robots=[{name: \u00e9}, {name: \u00fc}]"
-        self.expect(tutti("demo", "--set", names, "--out", self.path / "out"), 1, "simulation.robots.0.name", "letters")
+        self.expect(tutti("demo", "--set", names, "--out", self.path / "out"), 2, "simulation.robots.0.name", "letters")
 
     def test_keyframes_without_a_scan_are_counted(self):
         self.write_way("a.tum", seconds=20)
@@ -153,7 +153,7 @@ class CommandLine(unittest.TestCase):
             "DATA ascii\n1 2 3\n")
         self.expect(run(), 0)
         report = json.loads((self.path / "out" / "report.json").read_text())
-        note, = [note for note in report["notes"] if "scans refused" in note]
+        note, = [note for note in report["notes"] if "keyframes without a scan" in note]
         self.assertEqual(int(note.split()[1]), report["robots"][0]["keyframes"] - 1, note)
         self.assertIn(".pcd: is not there", note)
 

@@ -11,6 +11,7 @@ namespace tutti::mission {
 namespace {
 
 constexpr double kShortestUpdate_s = 0.001;
+constexpr std::size_t kLongestName = 64;
 
 using Problem = std::function<void(std::string)>;
 
@@ -26,21 +27,21 @@ void check_links(const MissionConfig& config, const Problem& problem) {
     check_outages(config.robot_links[i].link, fmt::format("robot_links.{}.link", i), problem);
 }
 
-/// What a single field cannot know.
-Status check_mission(const MissionConfig& config, const std::string& name) {
-  std::vector<std::string> problems;
-  const auto problem = [&](std::string text) { problems.push_back(": " + std::move(text)); };
-  if (config.source == "recordings" && config.robots.empty())
-    problem("robots: none given, expected at least one (or source: simulation)");
+/// Files are named after robots: no two names may become one file's, nor a longer one than files may have.
+void check_name(const std::string& name, const std::string& path, const Problem& problem) {
+  constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+  if (name.size() > kLongestName || name.find_first_not_of(kLetters) != std::string::npos)
+    problem(
+        fmt::format("{}.name: is '{}', expected at most {} letters, digits, '_' and '-'", path, name, kLongestName));
+}
+
+void check_robots(const MissionConfig& config, const Problem& problem) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
     const RobotConfig& robot = config.robots[i];
     const std::string path = fmt::format("robots.{}", i);
     if (robot.name.empty()) problem(path + ".name: missing");
-    if (!robot.name.empty() &&
-        robot.name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") !=
-            std::string::npos)
-      problem(fmt::format("{}.name: is '{}', expected only letters, digits, '_' and '-'", path, robot.name));
+    check_name(robot.name, path, problem);
     if (!names.insert(robot.name).second) problem(fmt::format("{}.name: '{}' is there twice", path, robot.name));
     if (robot.odometry.file.empty()) problem(path + ".odometry.file: missing");
     if (!robot.reference_offset_m.empty() && robot.reference_offset_m.size() != 3)
@@ -52,6 +53,17 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
     if (config.closures.finder == "lidar" && robot.scans.empty())
       problem(path + ".scans: missing, but closures.finder is 'lidar'");
   }
+  for (std::size_t i = 0; i < config.simulation.robots.size(); ++i)  // without a name: named by place
+    check_name(config.simulation.robots[i].name, fmt::format("simulation.robots.{}", i), problem);
+}
+
+/// What a single field cannot know.
+Status check_mission(const MissionConfig& config, const std::string& name) {
+  std::vector<std::string> problems;
+  const auto problem = [&](std::string text) { problems.push_back(": " + std::move(text)); };
+  if (config.source == "recordings" && config.robots.empty())
+    problem("robots: none given, expected at least one (or source: simulation)");
+  check_robots(config, problem);
   if (config.source == "simulation" && config.closures.finder == "lidar" && config.simulation.sensors != "lidar")
     problem(fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
                         config.simulation.sensors));
@@ -77,7 +89,7 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
 
 Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std::vector<std::string>& assignments) {
   for (const std::string& assignment : assignments)
-    if (const auto ok = apply_override(root, assignment); !ok) return in_context("--set", ok.error());
+    if (const auto ok = apply_override(root, assignment); !ok) return tl::unexpected(ok.error());
   MissionConfig config;
   if (const auto ok = tutti::load_config(root, config, name); !ok) return tl::unexpected(ok.error());
   if (const auto ok = check_mission(config, name); !ok) return tl::unexpected(ok.error());

@@ -41,6 +41,20 @@ TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {
   EXPECT_NE(problem_with("robots: [{name: 'a/b', odometry: {file: a}, scans: s}]").find("a/b"), std::string::npos);
 }
 
+TEST(MissionConfig, RobotsAreCalledWhatFilesCanBeCalled) {
+  const auto problem = [](const std::string& name) {
+    const auto mission = demo_mission({"simulation.robots=[{name: alpha}, {name: " + name + "}]"});
+    return mission ? std::string() : mission.error().message;
+  };
+  EXPECT_EQ(problem("bravo_2-b"), "");
+  EXPECT_EQ(problem("''"), "");  // named by place
+  EXPECT_EQ(problem(std::string(64, 'b')), "");
+  for (const std::string& name : {std::string("\u00fc"), std::string("../b"), std::string(65, 'b')})
+    EXPECT_NE(problem(name).find("simulation.robots.1.name: is '" + name + "', expected at most 64 letters"),
+              std::string::npos)
+        << problem(name);
+}
+
 TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
   EXPECT_EQ(problem_with(kGood, {"agent.policy.name=uniform", "robots.0.start_s=5"}), "");
   EXPECT_NE(problem_with(kGood, {"robots.0.from_share=0.7", "robots.0.to_share=0.7"}).find("from_share 0.7"),

@@ -171,26 +171,6 @@ Result<MissionInput> replay_or_simulate(const MissionConfig& config, const fs::p
   return MissionInput{.robots = std::move(*robots), .survey = nullptr};
 }
 
-/// Files are named after robots: two names must not become one file's, nor longer than a file's may be.
-Status check_names(const MissionConfig& config) {
-  static constexpr std::size_t kLongest = 64;
-  const auto check = [](const std::string& where, std::size_t i, const std::string& name) -> Status {
-    if (name.size() <= kLongest &&
-        name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos)
-      return {};
-    return fail(ErrorCode::configuration, "{}.{}.name: is '{}', expected at most {} letters, digits, '_' and '-'",
-                where, i, name, kLongest);
-  };
-  if (config.source == "recordings") {
-    for (std::size_t i = 0; i < config.robots.size(); ++i)
-      if (auto ok = check("robots", i, config.robots[i].name); !ok) return ok;
-    return {};
-  }
-  for (std::size_t i = 0; i < config.simulation.robots.size(); ++i)
-    if (auto ok = check("simulation.robots", i, config.simulation.robots[i].name); !ok) return ok;
-  return {};
-}
-
 /// A closure planted on a robot that is not there would silently do nothing.
 Status check_planted(const MissionConfig& config, const std::vector<MissionRecording>& robots) {
   for (const PlantedClosureConfig& planted : config.closures.planted)
@@ -203,7 +183,6 @@ Status check_planted(const MissionConfig& config, const std::vector<MissionRecor
 }  // namespace
 
 Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed) {
-  if (auto ok = check_names(config); !ok) return tl::unexpected(ok.error());
   auto input = replay_or_simulate(config, data, seed);
   if (!input) return input;
   if (auto ok = check_planted(config, input->robots); !ok) return tl::unexpected(ok.error());

@@ -68,30 +68,6 @@ TEST_F(Recordings, HalvesMeetAndMissNothing) {
   EXPECT_EQ(input->robots[1].recording.robot, RobotId{1});
 }
 
-TEST_F(Recordings, NamesOfBothSourcesAreThoseOfFiles) {
-  const auto with_names = [&](const std::string& first, const std::string& second) {
-    config_.simulation.robots.resize(2);
-    config_.simulation.robots[0].name = first;
-    config_.simulation.robots[1].name = second;
-    config_.robots[0].name = second;
-    for (auto& robot : config_.simulation.robots) robot.walk.duration_s = 5.0;
-  };
-  for (const char* source : {"simulation", "recordings"}) {
-    config_.source = source;
-    const std::string where =
-        source == std::string("simulation") ? "simulation.robots.1.name: is " : "robots.0.name: is ";
-    with_names("alpha", "\u00fc");
-    EXPECT_EQ(problem().find(where + "'\u00fc', expected at most 64 letters"), 0U) << problem();
-    with_names("alpha", std::string(65, 'b'));
-    EXPECT_EQ(problem().find(where), 0U) << problem();
-    with_names("alpha", std::string(63, 'b') + "-");
-    EXPECT_EQ(problem(), "");
-  }
-  config_.source = std::string("simulation");
-  with_names("", "");  // named by place
-  EXPECT_EQ(problem(), "");
-}
-
 TEST_F(Recordings, AReferenceTransformThatIsNoneIsRefused) {
   config_.robots[0].reference_transform = std::string("T.txt");
   std::ofstream(folder_ / "T.txt") << "1 0 0 5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";

@@ -142,7 +142,7 @@ std::vector<std::string> RobotActor::troubles() const {
                                 trouble.first));
   };
   add(refused_odometry_, "odometry samples refused");
-  add(refused_scans_, "scans refused");
+  add(refused_scans_, "keyframes without a scan");
   add(failed_updates_, "updates without a correction");
   return out;
 }
