@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <numeric>
 #include <ranges>
+#include <set>
 #include <tuple>
 #include <unordered_map>
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/server/relocate_failures.hpp"
 #include "tutti/server/rotation_honesty.hpp"
+#include "tutti/server/spare_pairs.hpp"
 
 namespace tutti::server {
 namespace {
@@ -76,11 +78,11 @@ std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, cons
 }
 
 /// All closures of all verdicts on submaps in the map, in a fixed order.
-std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const SubmapSet& submaps,
-                                          const NodeIndex& index) {
+std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const SubmapSet& submaps, const NodeIndex& index,
+                                          const std::set<SubmapPair>& spare) {
   std::vector<LoopClosure> closures;
   for (const auto& [pair, verdict] : verdicts) {
-    if (!submaps.contains(pair.first) || !submaps.contains(pair.second)) continue;
+    if (!submaps.contains(pair.first) || !submaps.contains(pair.second) || spare.contains(pair)) continue;
     for (const LoopClosure& closure : verdict.closures)
       if (index.contains(closure.from) && index.contains(closure.to)) {
         closures.push_back(closure);
@@ -300,7 +302,9 @@ namespace {
 MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config) {
   MapEstimate map;
   const NodeIndex index = attach_submaps(submaps, map);
-  const std::vector<LoopClosure> closures = collect_closures(verdicts, submaps, index);
+  const auto spare = spare_pairs(verdicts, submaps, static_cast<std::size_t>(config.most_closed_pairs));
+  map.spare_pairs = spare.size();
+  const std::vector<LoopClosure> closures = collect_closures(verdicts, submaps, index, spare);
   std::vector<estimation::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
   if (config.judge_rotation) {
     map.rotation_factors = rotation_variance_factors(chains, closures);

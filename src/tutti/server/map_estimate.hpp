@@ -59,19 +59,23 @@ struct MapEstimate {
   /// order. As after a restart without its state. And all of a robot without which the map can be solved, and with
   /// which it cannot.
   std::vector<SubmapId> left_out;
-  bool converged = false;  ///< Otherwise no closure is accepted, and every robot's odometry stands alone.
+  std::size_t spare_pairs = 0;  ///< Of submaps whose closures were not judged (MapConfig::most_closed_pairs).
+  bool converged = false;       ///< Otherwise no closure is accepted, and every robot's odometry stands alone.
 };
 
 struct MapConfig {
   estimation::OdometryTrialConfig trial;
   estimation::GncConfig gnc;
   bool judge_rotation = true;
+  int most_closed_pairs = 40;
   template <class V>
   void describe(V& v) {
     v.field("trial", trial);
     v.field("gnc", gnc);
     v.field("judge_rotation", judge_rotation, any(),
             "Odometry that turns better than it says counts as much as the closures show (off: as it says).");
+    v.field("most_closed_pairs", most_closed_pairs, at_least(1),
+            "A submap that closures tie to more others than this does not have them all judged (spare_pairs.hpp).");
   }
 };
 

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/spare_pairs.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+
+#include "tutti/server/testing/world.hpp"
+
+namespace tutti::server {
+namespace {
+
+struct Room {
+  SubmapSet submaps;
+  VerdictSet verdicts;
+};
+
+/// Two robots walk in circles for `submaps` of ten keyframes each and close every pair that is not a neighbour.
+Room one_room(std::uint32_t submaps) {
+  Room out;
+  for (const std::uint32_t robot : {0U, 1U})
+    for (Submap& submap : test::make_submaps({robot}, {.keyframes = 10 * submaps + 1}, Rng(robot)))
+      out.submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
+  const test::TestFinder finder(1);
+  for (auto a = out.submaps.begin(); a != out.submaps.end(); ++a)
+    for (auto b = std::next(a); b != out.submaps.end(); ++b)
+      if (a->first.robot != b->first.robot || b->first.index > a->first.index + 1)
+        out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+  return out;
+}
+
+std::map<SubmapId, std::size_t> left_of(const Room& room, const std::set<SubmapPair>& spare) {
+  std::map<SubmapId, std::size_t> out;
+  for (const auto& [pair, verdict] : room.verdicts)
+    if (!spare.contains(pair)) ++out[pair.first], ++out[pair.second];
+  return out;
+}
+
+TEST(SparePairs, AreNoneWhereNobodyHasTooMany) {
+  const Room room = one_room(8);
+  EXPECT_TRUE(spare_pairs(room.verdicts, room.submaps, 16).empty());
+  EXPECT_FALSE(spare_pairs(room.verdicts, room.submaps, 8).empty());
+}
+
+TEST(SparePairs, LeaveEverySubmapItsShareAndGrowWithTheMissionOnly) {
+  for (const std::uint32_t submaps : {20U, 40U}) {
+    const Room room = one_room(submaps);
+    const auto left = left_of(room, spare_pairs(room.verdicts, room.submaps, 10));
+    std::size_t sum = 0;
+    for (const auto& [submap, count] : left) {
+      EXPECT_GE(count, 10U);
+      sum += count;
+    }
+    EXPECT_EQ(left.size(), 2 * submaps);
+    EXPECT_LE(sum, 2 * 10 * left.size());
+  }
+}
+
+TEST(SparePairs, ThoseWithoutAClosureOrASubmapDoNotCount) {
+  Room room = one_room(20);
+  const auto all = spare_pairs(room.verdicts, room.submaps, 10);
+  Room more = room;
+  for (auto& [pair, verdict] : more.verdicts)
+    if (all.contains(pair)) verdict.closures.clear();
+  EXPECT_TRUE(spare_pairs(more.verdicts, more.submaps, 20).empty());
+  more = room;
+  std::erase_if(more.submaps, [](const auto& entry) { return entry.first.index >= 5; });
+  EXPECT_TRUE(spare_pairs(more.verdicts, more.submaps, 10).empty());
+}
+
+TEST(SparePairs, TheMapIsAsGoodWithoutThem) {
+  const Room room = one_room(20);
+  const auto error_m = [&](int most) {
+    const MapEstimate map = estimate_map(room.submaps, room.verdicts, {.most_closed_pairs = most});
+    EXPECT_TRUE(map.converged);
+    EXPECT_EQ(map.components, 1U);
+    EXPECT_EQ(map.closures.size() + map.spare_pairs, room.verdicts.size());
+    double worst = 0.0;
+    for (const MapNode& node : map.nodes) {
+      const MapNode& start = map.nodes.front();
+      const Pose3 T = start.T_world_body.inverse() * node.T_world_body;
+      const Pose3 truth =
+          test::true_pose(start.id.robot, start.id.index).inverse() * test::true_pose(node.id.robot, node.id.index);
+      worst = std::max(worst, (T.translation - truth.translation).norm());
+    }
+    return worst;
+  };
+  EXPECT_LT(error_m(10), 2.0 * error_m(1000) + 0.01);
+}
+
+}  // namespace
+}  // namespace tutti::server
