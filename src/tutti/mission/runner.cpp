@@ -18,6 +18,7 @@
 #include "tutti/mission/follow_alerts.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/parallel.hpp"
+#include "tutti/mission/record_notes.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/wire/codec.hpp"
@@ -233,7 +234,6 @@ class MissionRun {
   }
 
   void record_traffic(RobotRecord& robot) const;
-  void note_undelivered(MissionRecord& record) const;
   void record_timing(MissionRecord& record) const;
 
   const MissionConfig& config_;
@@ -283,19 +283,6 @@ void MissionRun::record_traffic(RobotRecord& robot) const {
   }
 }
 
-void MissionRun::note_undelivered(MissionRecord& record) const {
-  const auto name = [&](const bus::Endpoint& end) {
-    return end.robot ? robots_[end.robot->value]->recording().recording.name : "server";
-  };
-  for (const auto& [topic, messages] : bus_.undelivered()) {
-    const auto& [from, to, kind] = topic;
-    record.notes.push_back(
-        fmt::format("{} to {}: {} messages ({}) were never delivered; the link would have taken "
-                    "more than a day after the end",
-                    name(from), name(to), messages, wire::name(kind)));
-  }
-}
-
 void MissionRun::record_timing(MissionRecord& record) const {
   record.timing = timing_;
   record.timing.machine = machine_description();
@@ -335,15 +322,10 @@ MissionRecord MissionRun::record() const {
   if (!refusals_.empty())
     record.notes.push_back(
         fmt::format("{} messages were refused, the first because: {}", refusals_.size(), refusals_.front()));
-  note_undelivered(record);
-  const auto& left_out = server_.map().left_out;
-  if (!left_out.empty())
-    record.notes.push_back(fmt::format(
-        "{} submaps are not in the map, because they contradict earlier ones of their robot or keep the map from being "
-        "solved; the first is {} of {}",
-        left_out.size(), left_out.front().index, robots_[left_out.front().robot.value]->recording().recording.name));
   record.robots.resize(robots_.size());
   evaluate_robots(outcomes, server_.map(), config_.association, record);
+  note_undelivered(bus_.undelivered(), record);
+  note_what_the_map_lacks(server_.map(), record);
   evaluate_server(outcomes, server_, config_.association, record);
   record.server.proxy = proxy_graph_;
   for (RobotRecord& robot : record.robots) {

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <map>
+
+#include "tutti/bus/in_process_bus.hpp"
+#include "tutti/mission/record.hpp"
+#include "tutti/server/map_estimate.hpp"
+
+/// What a mission's reader has to know beside its figures, in plain words: appended to the record's notes. Its robots
+/// are there already, in the order of their ids.
+namespace tutti::mission {
+
+/// Messages that the links still hold.
+void note_undelivered(const std::map<bus::InProcessBus::Topic, std::size_t>& undelivered, MissionRecord& record);
+/// Submaps that are not in the map, and closures that were not judged.
+void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record);
+
+}  // namespace tutti::mission
