@@ -117,7 +117,7 @@ TEST(Contact, AnOutageForEverEndsTheMissionAndIsNoted) {
       return std::ranges::count_if(record.notes, [&](const auto& n) { return n.find(what) != std::string::npos; });
     };
     EXPECT_EQ(notes("bravo to server: "), 1);
-    EXPECT_EQ(notes("server to bravo: 1 messages (proxy graph) were never delivered"), 1);
+    EXPECT_EQ(notes("server to bravo: 1 x proxy graph never delivered"), 1);
     EXPECT_EQ(notes("alpha"), 0);
   }
 }

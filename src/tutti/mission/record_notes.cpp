@@ -13,10 +13,8 @@ void note_undelivered(const std::map<bus::InProcessBus::Topic, std::size_t>& und
   };
   for (const auto& [topic, messages] : undelivered) {
     const auto& [from, to, kind] = topic;
-    record.notes.push_back(
-        fmt::format("{} to {}: {} messages ({}) were never delivered; the link would have taken "
-                    "more than a day after the end",
-                    name(from), name(to), messages, wire::name(kind)));
+    record.notes.push_back(fmt::format("{} to {}: {} x {} never delivered; the link would have taken more than a day",
+                                       name(from), name(to), messages, wire::name(kind)));
   }
 }
 
