@@ -14,7 +14,7 @@
 #include <string>
 
 #include "compare_input.hpp"
-#include "finite_number.hpp"
+#include "number_checks.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/report/compare.hpp"
 

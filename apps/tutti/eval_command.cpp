@@ -12,7 +12,7 @@
 #include <string>
 
 #include "eval_map.hpp"
-#include "finite_number.hpp"
+#include "number_checks.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/formats/trajectory_file.hpp"

@@ -8,7 +8,7 @@
 #include <chrono>
 #include <iostream>
 
-#include "finite_number.hpp"
+#include "number_checks.hpp"
 #include "own_folder.hpp"
 #include "tutti/mission/report/files.hpp"
 #include "tutti/mission/report/text.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "finite_number.hpp"
+#include "number_checks.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/simulation/surface.hpp"

@@ -61,6 +61,7 @@ inline Bound any() { return {}; }
 inline Bound at_least(double low) { return {.low = low}; }
 inline Bound greater_than(double low) { return {.low = low, .low_open = true}; }
 inline Bound between(double low, double high) { return {.low = low, .high = high}; }
+inline Bound above_zero_to(double high) { return {.low = 0.0, .high = high, .low_open = true}; }
 inline Bound one_of(std::vector<std::string> choices) { return {.choices = std::move(choices)}; }
 
 namespace config_internal {

@@ -7,18 +7,26 @@
 
 namespace tutti {
 
+/// Every bit of the outcome depends on every bit of x, and no two x have the same: the finaliser of splitmix64 (Steele,
+/// Lea, Flood 2014).
+constexpr std::uint64_t mixed(std::uint64_t x) {
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31U);
+}
+
 /// Seeded randomness that is handed in, never global. `fork("alpha/odometry")` gives an independent stream that depends
 /// only on the seed and the name, so adding a consumer never changes what the others draw.
 class Rng {
  public:
-  explicit Rng(std::uint64_t seed) : seed_(mix(seed)), engine_(seed_) {}
+  explicit Rng(std::uint64_t seed) : seed_(mixed(seed)), engine_(seed_) {}
 
   [[nodiscard]] Rng fork(std::string_view name) const {
     std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
     for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
     return Rng(seed_ ^ hash);
   }
-  [[nodiscard]] Rng fork(std::uint64_t number) const { return Rng(seed_ ^ mix(number + 0x9e3779b97f4a7c15ULL)); }
+  [[nodiscard]] Rng fork(std::uint64_t number) const { return Rng(seed_ ^ mixed(number + 0x9e3779b97f4a7c15ULL)); }
 
   /// Uniform in [low, high).
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
@@ -28,11 +36,6 @@ class Rng {
   bool bernoulli(double probability) { return uniform(0.0, 1.0) < probability; }
 
  private:
-  static std::uint64_t mix(std::uint64_t x) {  // splitmix64 finaliser
-    x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-    x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
-    return x ^ (x >> 31U);
-  }
   std::uint64_t seed_;
   std::mt19937_64 engine_;
 };

@@ -9,6 +9,9 @@ namespace tutti {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
+/// Files and messages are held to positions within this along each axis: squares and sums of many stay finite.
+inline constexpr double kMaxCoordinate_m = 1e9;
+
 /// Rigid transform. T_a_b maps coordinates of b to a: p_a = T_a_b * p_b, and T_a_c = T_a_b * T_b_c.
 /// Tangent order everywhere: [translation m; rotation rad], right perturbation in the frame b (docs/math.md).
 struct Pose3 {

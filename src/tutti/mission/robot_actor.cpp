@@ -16,13 +16,6 @@ namespace {
 
 constexpr const char* kBudgetPolicy = "spectral";
 
-Trajectory broadcast_trajectory(const ProxyGraph& graph, RobotId robot) {
-  Trajectory out;
-  for (const ProxyNode& node : graph.nodes)
-    if (node.robot == robot) out.push_back({node.stamp, node.T_world_body});
-  return out;
-}
-
 }  // namespace
 
 RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
@@ -112,7 +105,7 @@ void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::o
                       .max_disagreement_m = summary.max_disagreement,
                       .origins = summary.explanation.origins};
   explanation_ = std::move(summary.explanation);
-  if (const auto agreement = evaluation::agreement(member.agent.corrected(), broadcast_trajectory(message.graph, id())))
+  if (const auto agreement = evaluation::agreement(member.agent.corrected(), trajectory_of(message.graph, id())))
     record.agreement_rmse_m = agreement->rmse_m;
   updates_.push_back(std::move(record));
 }

@@ -24,8 +24,8 @@ struct SpoiledClosureConfig {
   void describe(V& v) {
     v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
             "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
-    v.field("min_m", min_m, simulation::above_zero_to(simulation::kFarthest_m), "Least offset of a wrong closure.");
-    v.field("max_m", max_m, simulation::above_zero_to(simulation::kFarthest_m), "Largest offset; not below min_m.");
+    v.field("min_m", min_m, above_zero_to(simulation::kFarthest_m), "Least offset of a wrong closure.");
+    v.field("max_m", max_m, above_zero_to(simulation::kFarthest_m), "Largest offset; not below min_m.");
     v.field("max_deg", max_deg, between(0.0, 180.0), "Largest turn.");
   }
 };

@@ -8,6 +8,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/model/trajectory.hpp"
 
 namespace tutti {
 
@@ -96,5 +97,13 @@ struct ProxyGraph {
   std::vector<ShapeUncertainty> shapes;    ///< Sorted by robot; a robot may be missing: nothing is known.
   friend bool operator==(const ProxyGraph&, const ProxyGraph&) = default;
 };
+
+/// T_world_body of one robot's nodes.
+inline Trajectory trajectory_of(const ProxyGraph& graph, RobotId robot) {
+  Trajectory out;
+  for (const ProxyNode& node : graph.nodes)
+    if (node.robot == robot) out.push_back({node.stamp, node.T_world_body});
+  return out;
+}
 
 }  // namespace tutti

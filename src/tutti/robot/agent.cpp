@@ -2,11 +2,10 @@
 #include "tutti/robot/agent.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/geometry/alignment.hpp"
+#include "tutti/evaluation/agreement.hpp"
 #include "tutti/geometry/covariance.hpp"
 
 namespace tutti::robot {
@@ -24,17 +23,6 @@ constexpr double kUnknownStep_m = 10.0;
 constexpr double kUnknownStep_rad = 0.3;
 /// Nearer to the map than this nobody can say that odometry was better.
 constexpr double kAstray_m = 0.02;
-
-/// RMSE of the nodes' positions against the server's after one rigid alignment.
-double distance_to_map(const ProxyGraph& graph, std::span<const consistency::NodePair> pairs,
-                       const std::vector<Eigen::Vector3d>& positions) {
-  std::vector<Eigen::Vector3d> map;
-  for (const auto& pair : pairs) map.push_back(graph.nodes[pair.proxy].T_world_body.translation);
-  const Pose3 T_world_robot = align_points(map, positions);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < map.size(); ++k) sum += (map[k] - T_world_robot * positions[k]).squaredNorm();
-  return map.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(map.size()));
-}
 
 /// Quaternions printed with few digits are off by this much at most.
 constexpr double kRoundedQuaternion = 1e-3;
@@ -142,7 +130,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
 
   summary.optimised = optimise();
   const bool whole_plan = selection.replaces_all && !policy_->needs_budget();
-  const auto astray = [&] { return whole_plan && leads_astray(message.graph, own, comparison.pairs); };
+  const auto astray = [&] { return whole_plan && leads_astray(message.graph); };
   if (!estimation::is_usable(summary.optimised) || astray()) {
     summary.taken_back = true;
     state_.ledger = held;
@@ -180,18 +168,13 @@ estimation::Termination RobotAgent::optimise() {
 }
 
 /// Corrected, it is farther from the map than by odometry alone: the reduced problem promised what did not come true.
-bool RobotAgent::leads_astray(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
-                              std::span<const consistency::NodePair> pairs) const {
-  std::vector<Eigen::Vector3d> by_odometry;  // of all representative keyframes, as `own` has them
-  for (const Keyframe& keyframe : state_.keyframes)
-    if (keyframe.representative) by_odometry.push_back(keyframe.T_odom_body.translation);
-  std::vector<Eigen::Vector3d> raw;
-  std::vector<Eigen::Vector3d> corrected;
-  for (const auto& pair : pairs) {
-    raw.push_back(by_odometry[pair.robot]);
-    corrected.push_back(smoother_.pose(own[pair.robot].chain_index).translation);
-  }
-  return distance_to_map(graph, pairs, corrected) > distance_to_map(graph, pairs, raw) + kAstray_m;
+bool RobotAgent::leads_astray(const ProxyGraph& graph) const {
+  Trajectory odometry;
+  for (const Keyframe& keyframe : state_.keyframes) odometry.push_back({keyframe.stamp, keyframe.T_odom_body});
+  const Trajectory map = trajectory_of(graph, robot_);
+  const auto by_odometry = evaluation::agreement(odometry, map);
+  const auto by_constraints = evaluation::agreement(corrected(), map);
+  return by_odometry && by_constraints && by_constraints->rmse_m > by_odometry->rmse_m + kAstray_m;
 }
 
 // Frames differ by an unknown transform; the newest common node ties them together where this robot is now.

@@ -135,8 +135,7 @@ class RobotAgent {
   void send(Submap submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
   estimation::Termination optimise();
-  [[nodiscard]] bool leads_astray(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
-                                  std::span<const consistency::NodePair> pairs) const;
+  [[nodiscard]] bool leads_astray(const ProxyGraph& graph) const;
   void locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                      std::span<const consistency::NodePair> pairs);
 

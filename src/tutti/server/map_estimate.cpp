@@ -2,6 +2,8 @@
 #include "tutti/server/map_estimate.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <numeric>
 #include <ranges>
 #include <set>
@@ -323,24 +325,23 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
 MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdicts, const MapConfig& config) {
   std::vector<SubmapId> left_out;
   const SubmapSet submaps = without_contradictions(all_submaps, left_out);
-  MapEstimate map = estimate_together(submaps, verdicts, config);
-  map.left_out = std::move(left_out);
-  if (map.converged) return map;
-
+  MapEstimate best = estimate_together(submaps, verdicts, config);
   // One robot's numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
-  MapEstimate best = map;
-  for (auto robot = submaps.begin(); robot != submaps.end();) {
-    const auto next = submaps.lower_bound({{robot->first.robot.value + 1}, 0});
+  std::vector<SubmapId> unsolvable;
+  for (auto robot = best.converged ? submaps.end() : submaps.begin(); robot != submaps.end();) {
+    const auto next = submaps.upper_bound({robot->first.robot, std::numeric_limits<std::uint32_t>::max()});
     SubmapSet others(submaps.begin(), robot);
     others.insert(next, submaps.end());
     MapEstimate without = estimate_together(others, verdicts, config);
     if (without.converged && (!best.converged || without.nodes.size() > best.nodes.size())) {
       best = std::move(without);
-      best.left_out = map.left_out;
-      for (auto it = robot; it != next; ++it) best.left_out.push_back(it->first);
+      unsolvable.clear();
+      for (auto it = robot; it != next; ++it) unsolvable.push_back(it->first);
     }
     robot = next;
   }
+  left_out.insert(left_out.end(), unsolvable.begin(), unsolvable.end());
+  best.left_out = std::move(left_out);
   return best;
 }
 

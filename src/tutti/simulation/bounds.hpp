@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "tutti/base/config.hpp"
-
 /// The most that settings of simulated missions may ask for: far beyond any mission, and everything stays finite, small
 /// enough to be computed, and exact to the nanosecond.
 namespace tutti::simulation {
@@ -11,7 +9,5 @@ inline constexpr double kLongest_s = 7.0 * 86400.0;
 inline constexpr double kFarthest_m = 1e6;       ///< Ways, moves and errors.
 inline constexpr double kLargestRoom_m = 100.0;  ///< Across a corridor.
 inline constexpr double kMostPer100m = 1000.0;
-
-inline Bound above_zero_to(double high) { return {.low = 0.0, .high = high, .low_open = true}; }
 
 }  // namespace tutti::simulation

@@ -16,7 +16,6 @@ inline constexpr std::size_t kMaxRobots = 1'000;
 inline constexpr std::size_t kMaxClosures = 1'000;  ///< Per verdict.
 inline constexpr std::size_t kMaxReasonBytes = 1'000;
 
-inline constexpr double kMaxCoordinate_m = 1e9;     ///< Of a pose, per axis.
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.
 inline constexpr double kMaxVariance = 1e20;
 

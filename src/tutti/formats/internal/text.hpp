@@ -20,8 +20,6 @@ Status write_file(const std::string& path, std::string_view bytes);
 /// Stamps are kept within +-2^61 ns (years 1896 to 2043), so that the difference of any two fits an int64 twice.
 inline constexpr std::int64_t kMaxStampNs = std::int64_t{1} << 61;
 constexpr bool is_in_range(Timestamp stamp) { return -kMaxStampNs <= stamp.ns && stamp.ns <= kMaxStampNs; }
-/// Positions are kept within +-1e9 m along each axis: squares and sums of many stay finite.
-inline constexpr double kMaxCoordinate_m = 1e9;
 /// Quaternions off unit norm by more than this are refused.
 inline constexpr double kUnitTolerance = 1e-3;
 
