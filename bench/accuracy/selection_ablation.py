@@ -109,9 +109,9 @@ def noticed_section(runs, results):
 
 def held_out_section(runs, results):
     seeds = runs.held_out_seeds
-    text = ["## Never used for tuning", "",
-            f"Seeds {seeds[0]} to {seeds[-1]} and other parameters of the scenarios (docs/simulation.md), run after the "
-            "settings were frozen. Median RMSE in",
+    text = ["## Held out", "",
+            f"Seeds {seeds[0]} to {seeds[-1]} and other parameters of the scenarios (docs/simulation.md): never used to "
+            "choose a setting, but looked at after every change. Median RMSE in",
             "metres. `every_node` and the policies' own rules as above; `uniform` uses the reduced solver like all.", "",
             detection_sentence(results), *silence_spoken(results), ""]
     text += [verdict_on_variant(results, variant, title) for variant, (title, _) in ABLATION.items()]

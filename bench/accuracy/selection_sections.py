@@ -112,10 +112,7 @@ def curves_section(runs, results):
             "with quartiles, and",
             "the largest error, RPE, kink and constraints of each: `selection.csv`. Where there is no truth "
             "(hku_two_sessions) errors are",
-            "against the server's map. hku_degraded is scored against its own odometry before it was degraded.", "",
-            "![Budget curves, simulated](images/selection_simulated.svg)", ""]
-    if runs.real:
-        text += ["![Budget curves, real recordings](images/selection_real.svg)", ""]
+            "against the server's map. hku_degraded is scored against its own odometry before it was degraded.", ""]
     middle = 25
     for name in SIMULATED + runs.real:
         for robot, cases in by_case(results[f"curves_{name}"]).items():
@@ -126,7 +123,7 @@ def curves_section(runs, results):
 
 # ---- closed loop -----------------------------------------------------------------------------------------------------
 
-def loop_section(runs, results):
+def loop_section(runs, results, policies):
     text = ["## The whole mission in closed loop", "",
             "`tutti run`: the map grows, every update is answered, the radio is modelled; figures at the mission's end, "
             "medians over seeds.",
@@ -139,7 +136,7 @@ def loop_section(runs, results):
         reports = list(results[key].values())
         for k, robot in enumerate(reports[0]["robots"]):
             robots = [report["robots"][k] for report in reports]
-            for policy in [DEFAULT, "spectral", "every_node"]:
+            for policy in policies:
                 own = [r["policies"][policy] for r in robots]
 
                 def med(name, entries=own, factor=1.0, digits=3):
