@@ -34,7 +34,6 @@ MissionConfig an_hour(std::size_t robots) {
   config.server.update_period_s = 2.0 * kMinute_s;
   config.closures.finder = "reference";
   config.closures.reference.wrong_share = 0.1;
-  config.compare_policies = {};
   return config;
 }
 

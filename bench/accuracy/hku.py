@@ -45,7 +45,7 @@ def degraded(arguments):
     lines = [row("seed", "server", "robot", "onboard", "server", "corrected", "allowed: 1.1 x server + 10 mm",
                  "RPE onboard", "RPE corrected", "constraints"), row(*["---"] * 10)]
     for seed in range(1, arguments.seeds + 1):
-        report = run(arguments, "hku_degraded", seed, "compare_policies=[spectral]")
+        report = run(arguments, "hku_degraded", seed)
         for robot in report["robots"]:
             own = corrected(report, robot)
             lines.append(row(seed, millimetres(report["server"]["rmse_m"]), robot["name"],
@@ -63,7 +63,7 @@ def drift_sweep(arguments):
         for seed in range(1, 4):
             sets = [f"robots.{i}.degrade.yaw_deg_per_m={sign * yaw}" for i, sign in ((0, 1), (1, -1))]
             sets += [f"robots.{i}.covariance.rotation_deg_per_sqrt_m={max(0.3, 2.3 * yaw)}" for i in (0, 1)]
-            runs.append(run(arguments, "hku_degraded", seed, "compare_policies=[spectral]", *sets))
+            runs.append(run(arguments, "hku_degraded", seed, *sets))
         median = lambda values: statistics.median(v if v is not None else float("nan") for v in values)
         lines.append(row(
             f"{yaw} deg/m",

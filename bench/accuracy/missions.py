@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the missions once (and the demo) with all policies and writes docs/results/missions.md; tunnel and terrace are
-in paper.py.
+"""Runs the missions once (and the demo) with all policies side by side and writes docs/results/missions.md; tunnel and
+terrace are in paper.py.
 
 Usage: bench/accuracy/missions.py TUTTI_PROGRAM --data FOLDER [--seed 1]
 docs/data.md says what FOLDER holds.
 """
 import argparse
 
-from runs import SOURCE, mission_file, report_of, row, write_results
+from runs import SOURCE, compare, mission_file, report_of, row, write_results
+
+COMPETITORS = ["every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"]
 
 
 def metres(value):
@@ -48,13 +50,13 @@ def main():
         "rigid alignment (SE(3), no scale) at keyframes, in brackets the constraints held at the end; * is the policy the",
         "robot follows. Where there is no reference, the figure is the RMSE to the server. Which part of the input is real",
         "is said in each line. `uniform`, `random` and `euclidean` have the budget of `spectral`. `tunnel` and `terrace` are in",
-        "`paper.md`.", "",
+        f"`paper.md`. Every run: `--set {compare(*COMPETITORS)}`.", "",
     ]
-    seed = ["--seed", arguments.seed]
-    text += section(report_of(arguments.tutti, "demo", *seed))
+    options = ["--seed", arguments.seed, "--set", compare(*COMPETITORS)]
+    text += section(report_of(arguments.tutti, "demo", *options))
     for name in sorted(file.stem for file in (SOURCE / "missions").glob("*.yaml")
                        if file.stem not in ("demo", "tunnel", "terrace")):
-        text += section(report_of(arguments.tutti, "run", mission_file(name), "--data", arguments.data, *seed))
+        text += section(report_of(arguments.tutti, "run", mission_file(name), "--data", arguments.data, *options))
     write_results("missions.md", text)
 
 

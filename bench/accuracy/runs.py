@@ -24,6 +24,11 @@ def outcome_of(out, *command):
     return [json.loads((out / name).read_text()) for name in ("report.json", "timing.json")]
 
 
+def compare(*policies):
+    """The assignment with which a mission runs these policies, too, beside the one its robots follow."""
+    return f"compare_policies=[{','.join(policies)}]"
+
+
 def mission_file(name):
     return SOURCE / "missions" / f"{name}.yaml"
 

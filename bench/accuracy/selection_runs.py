@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 
-from runs import mission_file, outcome_of
+from runs import compare, mission_file, outcome_of
 
 POLICIES = ["every_node", "spectral", "uniform", "random", "euclidean", "skeleton", "adaptive"]
 DEFAULT = "adaptive"
@@ -78,7 +78,7 @@ class Runs:
 
     def mission(self, key, mission, seed, sets):
         command = [self.arguments.tutti, "run", mission_file(mission), "--seed", seed, "--threads", 1, "--set",
-                   "compare_policies=[spectral,every_node]"]
+                   compare("spectral", "every_node")]
         command += ["--data", self.arguments.data] if self.arguments.data else []
         for assignment in sets:
             command += ["--set", assignment]

@@ -123,8 +123,7 @@ struct MissionConfig {
   ClosureConfig closures;
   bus::LinkConfig link;
   std::vector<RobotLinkConfig> robot_links;
-  std::vector<std::string> compare_policies = {"every_node", "every_node_2", "spectral", "uniform",
-                                               "random",     "euclidean",    "skeleton"};
+  std::vector<std::string> compare_policies;  ///< Beside the one the robots follow.
   template <class V>
   void describe(V& v) {
     v.field("mission", mission, any(), "Name of the mission.");
@@ -143,7 +142,8 @@ struct MissionConfig {
     v.field("closures", closures);
     v.field("link", link);
     v.field("robot_links", robot_links, any(), "Radios of single robots.");
-    v.field("compare_policies", compare_policies, any(), "Policies run side by side as shadow agents.");
+    v.field("compare_policies", compare_policies, any(),
+            "Further policies, run beside the robots' own on the same broadcasts.");
   }
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/record.hpp"
 
+#include <algorithm>
+
 namespace tutti::mission {
 
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name) {
@@ -13,6 +15,10 @@ const PolicyTiming* find_timing(const MissionRecord& record, const std::string& 
   for (const auto& timing : record.timing.policies)
     if (timing.robot == robot && timing.policy == policy) return &timing;
   return nullptr;
+}
+
+bool compares_policies(const MissionRecord& record) {
+  return std::ranges::any_of(record.robots, [](const RobotRecord& robot) { return robot.policies.size() > 1; });
 }
 
 }  // namespace tutti::mission

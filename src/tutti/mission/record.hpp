@@ -267,5 +267,7 @@ struct MissionRecord {
 /// By name; null when there is none.
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name);
 const PolicyTiming* find_timing(const MissionRecord& record, const std::string& robot, const std::string& policy);
+/// Did other policies than the robots' own run beside it?
+bool compares_policies(const MissionRecord& record);
 
 }  // namespace tutti::mission

@@ -15,7 +15,7 @@
 namespace tutti::mission {
 
 /// One robot of a mission: replays its recording into an agent with the default policy, which talks to the server, and
-/// into shadow agents with the other policies, which hear the same broadcasts but are never heard.
+/// into shadow agents with the policies that the mission compares, which hear the same broadcasts but are never heard.
 class RobotActor {
  public:
   /// `policies`: all that run, the default one (config.policy.name) among them.

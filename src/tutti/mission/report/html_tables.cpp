@@ -100,13 +100,16 @@ std::string policies_html(const MissionRecord& record) {
       "odometry</th><th>update, ms</th>"
       "</tr></thead>\n<tbody>\n";
   for (const auto& robot : record.robots) add_policy_rows(record, robot, body);
+  const bool several = compares_policies(record);
   return section(
-      "Policies side by side",
-      fmt::format(
-          "Every policy answers the very same broadcasts; {} is the one the robot follows. RMSE and "
-          "largest error at keyframes after one rigid alignment, without scale{}. Kink: the most that correcting "
-          "changed any motion over 1 s, but for jumps taken back. Update: median / largest.",
-          record.default_policy, record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
+      several ? "Policies side by side" : "Each robot in figures",
+      fmt::format("{} RMSE and largest error at keyframes after one rigid alignment, without scale{}. Kink: the most "
+                  "that correcting changed any motion over 1 s, but for jumps taken back. Update: median / largest.",
+                  several
+                      ? fmt::format("Every policy answers the very same broadcasts; {} is the one the robot follows.",
+                                    record.default_policy)
+                      : fmt::format("Corrected by the policy {}.", record.default_policy),
+                  record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
       body + "</tbody></table></div>\n");
 }
 

@@ -195,9 +195,12 @@ std::string report_text(const MissionRecord& record, const std::string& report_h
                   record.rpe_interval)
             : std::string("  No reference: only the distance of corrected to server could be measured.\n");
     out += "  to server: RMSE of corrected against server. update ms: median / max, wall clock.\n";
-    out += "\n  Policies side by side, on the same broadcasts (* = corrected above)\n";
-    for (std::size_t first = 0; first < record.robots.size(); first += kRobotsPerPolicyTable)
-      out += policies_table(record, first, std::min(first + kRobotsPerPolicyTable, record.robots.size())) + "\n";
+    out += "\n";
+    if (compares_policies(record)) {
+      out += "  Policies side by side, on the same broadcasts (* = corrected above)\n";
+      for (std::size_t first = 0; first < record.robots.size(); first += kRobotsPerPolicyTable)
+        out += policies_table(record, first, std::min(first + kRobotsPerPolicyTable, record.robots.size())) + "\n";
+    }
     out += radio_table(record) + "\n";
   }
   out += explanation_lines(record);

@@ -54,6 +54,19 @@ TEST(ReportText, ShowsTheFigures) {
   EXPECT_NE(text.find("kB/s"), std::string::npos);
 }
 
+TEST(ReportText, PoliciesAreSideBySideOnlyWhereThereAreSeveral) {
+  MissionRecord record = test::example_record();
+  EXPECT_NE(report_text(record, "x").find("Policies side by side"), std::string::npos);
+  test::keep_the_default_policy(record);
+  const std::string text = report_text(record, "x");
+  expect_readable(text);
+  EXPECT_EQ(text.find("olic"), std::string::npos) << text;
+  EXPECT_EQ(text.find("\n\n\n"), std::string::npos) << text;     // no gap where the table was
+  const std::string corrected = line_with(text, " corrected ");  // the robots' table has it all
+  EXPECT_NE(corrected.find("0.034 m"), std::string::npos) << text;
+  EXPECT_NE(corrected.find("  24  11.2 / 31.0"), std::string::npos) << text;
+}
+
 TEST(ReportText, TellsOfAlertsAndKinks) {
   MissionRecord record = test::example_record();
   const std::string text = report_text(record, "x");

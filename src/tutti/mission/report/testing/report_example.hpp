@@ -222,6 +222,14 @@ inline void jump_back(RobotRecord& robot, const std::string& policy_name) {
     if (policy.name == policy_name) policy.jumps = {{robot.odometry[6].stamp, robot.odometry[7].stamp, 0.1, 0.35}};
 }
 
+/// As a mission that compares no policies records it.
+inline void keep_the_default_policy(MissionRecord& record) {
+  const auto other = [&](const std::string& policy) { return policy != record.default_policy; };
+  for (RobotRecord& robot : record.robots)
+    std::erase_if(robot.policies, [&](const PolicyRecord& policy) { return other(policy.name); });
+  std::erase_if(record.timing.policies, [&](const PolicyTiming& timing) { return other(timing.policy); });
+}
+
 inline MissionRecord example_record(ExampleOptions options = {}) {
   options.cloud = options.cloud || options.survey;
   const Rng rng(7);
