@@ -22,16 +22,24 @@ TEST(ClosedLoop, SpectralBringsAShortRunToTheServersMap) {
     const auto result = run_closed_loop(short_mission(seed), {});
     EXPECT_GT(result.onboard_m, 0.3);
     EXPECT_LT(result.agreement_m, 0.02) << "seed " << seed;
-    EXPECT_LT(result.corrected_m, 0.05);
+    EXPECT_LT(result.corrected_m, 0.025) << "seed " << seed;
   }
 }
 
-TEST(ClosedLoop, SpectralNeedsFewConstraintsOnALongerRun) {
-  const auto result = run_closed_loop(corridor_mission(400, {}, 1), {});
-  EXPECT_GT(result.onboard_m, 0.3);
-  EXPECT_LT(result.agreement_m, 0.08);
-  EXPECT_LT(result.constraints, 399U);  // fewer than a link per node
-  EXPECT_GT(result.constraints, 50U);
+// The paper's recipe adds and never takes back: 343 to 406 links with seeds 1 to 5, the default 45 to 100.
+TEST(ClosedLoop, OnALongerRunSpectralTakesALinkPerNodeAndAdaptiveFew) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const auto many = run_closed_loop(corridor_mission(400, {}, seed), {});
+    EXPECT_GT(many.onboard_m, 0.3);
+    EXPECT_LT(many.agreement_m, 0.04) << "seed " << seed;  // 0.028
+    EXPECT_GT(many.constraints, 300U) << "seed " << seed;
+    EXPECT_LT(many.constraints, 480U) << "seed " << seed;
+  }
+  LoopConfig adaptive;
+  adaptive.policy.name = "adaptive";
+  const auto few = run_closed_loop(corridor_mission(400, {}, 1), adaptive);
+  EXPECT_LT(few.agreement_m, 0.03);
+  EXPECT_LE(few.constraints, 75U);
 }
 
 TEST(ClosedLoop, EveryNodeReachesTheServersMapAndUniformWithFewer) {
@@ -40,12 +48,12 @@ TEST(ClosedLoop, EveryNodeReachesTheServersMapAndUniformWithFewer) {
   config.policy.name = "every_node";
   const auto all = run_closed_loop(mission, config);
   EXPECT_EQ(all.constraints, 299U);
-  EXPECT_LT(all.agreement_m, 0.03);
+  EXPECT_LT(all.agreement_m, 0.015);
   config.policy.name = "uniform";
   config.policy.default_budget = 30;
   const auto few = run_closed_loop(mission, config);
   EXPECT_EQ(few.constraints, 30U);
-  EXPECT_LT(few.agreement_m, 0.05);
+  EXPECT_LT(few.agreement_m, 0.038);
 }
 
 TEST(ClosedLoop, SkeletonAgreesWithAHandfulOfConstraints) {
@@ -59,20 +67,20 @@ TEST(ClosedLoop, SkeletonAgreesWithAHandfulOfConstraints) {
     config.policy.skeleton_tolerance_m = 0.06;
     const auto rough = run_closed_loop(short_mission(seed), config);
     EXPECT_LT(rough.agreement_m, 0.045) << "seed " << seed;
-    EXPECT_LE(rough.constraints, 15U) << "seed " << seed;
+    EXPECT_LE(rough.constraints, 12U) << "seed " << seed;
     EXPECT_LT(rough.constraints, close.constraints);
   }
   config.policy.skeleton_tolerance_m = 0.1;
   const auto longer = run_closed_loop(corridor_mission(400, {}, 1), config);
-  EXPECT_LT(longer.agreement_m, 0.08);
-  EXPECT_LT(longer.constraints, 40U);
+  EXPECT_LT(longer.agreement_m, 0.07);
+  EXPECT_LE(longer.constraints, 20U);
 }
 
 TEST(ClosedLoop, WorksOnReducedProxyGraphs) {
   LoopConfig config;
   config.proxy_graph.node_budget = 120;
   const auto result = run_closed_loop(corridor_mission(300, {}, 3), config);
-  EXPECT_LT(result.agreement_m, 0.08);
+  EXPECT_LT(result.agreement_m, 0.06);
 }
 
 // Constraints of an old map are measured again, not fought by new ones.
@@ -80,8 +88,8 @@ TEST(ClosedLoop, FollowsAMapThatChanges) {
   auto mission = corridor_mission(300, {}, 4);
   mission.settling = true;
   const auto result = run_closed_loop(mission, {});
-  EXPECT_GT(result.replaced, 0U);
-  EXPECT_LT(result.agreement_m, 0.1);
+  EXPECT_GT(result.replaced, 1000U);  // some 200 links, most of them many times
+  EXPECT_LT(result.agreement_m, 0.03);
 }
 
 // Without any closure the server's map is odometry: nothing to correct.
