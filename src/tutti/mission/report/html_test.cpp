@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "tutti/mission/report/testing/good_page.hpp"
 #include "tutti/mission/report/testing/report_example.hpp"
@@ -14,6 +16,48 @@ namespace {
 using test::expect_good_page;
 using test::has_number_that_is_not_finite;
 using test::malformed;
+
+/// What lies between every `open` and the `close` after it.
+std::vector<std::string> all_between(const std::string& html, const std::string& open, const std::string& close) {
+  std::vector<std::string> out;
+  for (std::size_t at = html.find(open); at != std::string::npos; at = html.find(open, at)) {
+    at += open.size();
+    out.push_back(html.substr(at, html.find(close, at) - at));
+  }
+  return out;
+}
+
+/// What a reader sees of it: no tags.
+std::string text_of(std::string html) {
+  for (std::size_t at = html.find('<'); at != std::string::npos; at = html.find('<', at))
+    html.erase(at, html.find('>', at) + 1 - at);
+  return html;
+}
+
+std::vector<std::string> headings(const std::string& html) { return all_between(html, "<h2>", "</h2>"); }
+
+/// The section of that heading; empty when there is none.
+std::string section_of(const std::string& html, const std::string& heading) {
+  const auto found = all_between(html, "<h2>" + heading + "</h2>", "</section>");
+  return found.empty() ? std::string() : found.front();
+}
+
+/// Cells of the rows that a reader sees in the tables of a piece of the page, the heads' left out.
+std::vector<std::vector<std::string>> rows_of(const std::string& html) {
+  std::vector<std::vector<std::string>> out;
+  for (const std::string& row : all_between(html, "<tr", "</tr>")) {
+    std::vector<std::string> cells;
+    for (const std::string& cell : all_between(row, "<td", "</td>")) cells.push_back(text_of("<td" + cell));
+    if (!cells.empty()) out.push_back(std::move(cells));
+  }
+  return out;
+}
+
+std::vector<std::string> first_cells(const std::string& html) {
+  std::vector<std::string> out;
+  for (const auto& row : rows_of(html)) out.push_back(row.front());
+  return out;
+}
 
 TEST(CheckerOfThisTest, SeesMistakes) {
   EXPECT_EQ(malformed("<style>a > b</style><p class=\"x\">a &amp; b<br></p><path d=\"M0\"/>"), "");
@@ -28,16 +72,54 @@ TEST(CheckerOfThisTest, SeesMistakes) {
 
 TEST(ReportHtml, IsWellFormedAndSelfContained) { expect_good_page(report_html(test::example_record({.cloud = true}))); }
 
-TEST(ReportHtml, HasEverySection) {
+TEST(ReportHtml, HasEverySectionInOrder) {
   const std::string html = report_html(test::example_record({.cloud = true}));
-  for (const char* title : {"The joint map", "Each robot by itself", "The map: odometry alone, and joint",
-                            "Who drifted where and when", "Policies side by side", "Where and when the maps disagree",
-                            "The proxy graph", "Loop closures", "How the robots&#39; frames lie",
-                            "What goes over the radio", "Time", "What to keep in mind", "Effective configuration"})
-    EXPECT_NE(html.find(title), std::string::npos) << title;
-  for (const char* policy : {"every_node_2", "uniform", "random", "euclidean"})
-    EXPECT_NE(html.find(policy), std::string::npos) << policy;
-  EXPECT_NE(html.find("slides along one direction"), std::string::npos);
+  const std::vector<std::string> expected{"The joint map",
+                                          "The map: odometry alone, and joint",
+                                          "Who drifted where and when",
+                                          "Where odometry and map part",
+                                          "Each robot by itself",
+                                          "Policies side by side",
+                                          "Where and when the maps disagree",
+                                          "The proxy graph",
+                                          "Loop closures",
+                                          "How the robots&#39; frames lie",
+                                          "What goes over the radio",
+                                          "Time",
+                                          "What to keep in mind"};
+  EXPECT_EQ(headings(html), expected);
+  EXPECT_NE(html.find("<details><summary>Effective configuration</summary>"), std::string::npos);
+  const std::vector<std::vector<std::string>> closures = rows_of(section_of(html, "Loop closures"));
+  ASSERT_EQ(closures.size(), 4U);
+  EXPECT_EQ(closures[2], (std::vector<std::string>{"refused: slides along one direction", "4", "9", "13"}));
+}
+
+TEST(ReportHtml, PoliciesSideBySideAreThoseOfTheRecord) {
+  MissionRecord record = test::example_record();
+  const std::string several = section_of(report_html(record), "Policies side by side");
+  const std::vector<std::string> of_a_robot{
+      "onboard (raw odometry)", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "server"};
+  std::vector<std::string> expected;
+  for (const char* robot : {"alpha", "bravo"}) {
+    expected.emplace_back(robot);
+    expected.insert(expected.end(), of_a_robot.begin(), of_a_robot.end());
+  }
+  EXPECT_EQ(first_cells(several), expected);
+  const auto rows = rows_of(several);
+  EXPECT_EQ(rows.at(1), (std::vector<std::string>{"onboard (raw odometry)", "0.712 m", "1.400 m", "0.021 m", "0.095 m",
+                                                  "", "", "", "", ""}));
+  EXPECT_EQ(rows.at(4), (std::vector<std::string>{"spectral", "0.034 m", "0.080 m", "0.016 m", "0.022 m", "0.010 m",
+                                                  "0.020 m", "24", "20.2 %", "11.2 / 31.0"}));
+
+  test::keep_the_default_policy(record);
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_EQ(section_of(html, "Policies side by side"), "");
+  const std::string one = section_of(html, "Each robot in figures");
+  EXPECT_EQ(rows_of(one).at(2), rows.at(4));
+  EXPECT_EQ(first_cells(one), (std::vector<std::string>{"alpha", "onboard (raw odometry)", "spectral", "server",
+                                                        "bravo", "onboard (raw odometry)", "spectral", "server"}));
+  EXPECT_EQ(one.find("roadcast"), std::string::npos) << one;  // nothing is side by side
 }
 
 TEST(ReportHtml, ShowsTheMapBesideTheSurvey) {
@@ -216,12 +298,18 @@ TEST(ReportHtml, GroupsThatNeverMetGetTheirOwnPicture) {
   EXPECT_EQ(pictures, 2U);
 }
 
-TEST(ReportHtml, RowsOfFiguresHaveAGap) {
-  MissionRecord record = test::example_record();  // without a table of origins between the robots' figures
-  for (RobotRecord& robot : record.robots) robot.explanation = test::example_explanation(robot.server_estimate, {});
-  const std::string html = report_html(record);
-  EXPECT_NE(html.find("</figure>\n</div>\n<div class=\"figures\">\n<figure class=\"wide\">"), std::string::npos);
-  EXPECT_NE(html.find(".figures + .figures { margin-top: 18px; }"), std::string::npos);
+TEST(ReportHtml, EveryRobotHasItsDisagreementMapAndOriginsBelowIt) {
+  MissionRecord record = test::example_record();
+  const auto section = [&] { return section_of(report_html(record), "Where odometry and map part"); };
+  const auto robots = [&] { return all_between(section(), "<figcaption><b>", "</b>"); };
+  const std::vector<std::string> both{"alpha", "bravo"};
+  EXPECT_EQ(robots(), both);
+  EXPECT_EQ(rows_of(section()).size(), 4U);  // two origins each
+  record.robots[0].explanation = test::example_explanation(record.robots[0].server_estimate, {});
+  EXPECT_EQ(robots(), both);
+  EXPECT_EQ(rows_of(section()).size(), 2U);
+  record.robots[0].explanation.reset();
+  EXPECT_EQ(robots(), std::vector<std::string>{"bravo"});
 }
 
 TEST(ReportHtml, FiguresOfOneOfSeveralMapsNameItsRobots) {
