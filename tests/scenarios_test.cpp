@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What makes each scenario of missions/ the scenario it is, by the truth: where the error is and how large, what the
-// server's map does over time. How well robots correct themselves is measured elsewhere.
+// server's map does over time; and that robots end as good as that map. Bounds on errors: about 1.5 times the measured.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +19,7 @@
 namespace tutti::mission {
 namespace {
 
-MissionConfig scenario(const std::string& name, std::vector<std::string> assignments = {}) {
-  assignments.emplace_back("compare_policies=[]");
+MissionConfig scenario(const std::string& name, const std::vector<std::string>& assignments = {}) {
   auto config = load_mission(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions" / (name + ".yaml"), assignments);
   EXPECT_TRUE(config.has_value()) << config.error().message;
   return config ? *config : MissionConfig{};
@@ -98,6 +97,19 @@ Difference difference_over_uncertainty(const MissionRecord& record, const RobotR
 /// Chi-square (3 dof) of one in ten thousand; the stated sigma is that of the worst of three directions.
 constexpr double kExplained = 4.6;
 
+/// What a robot that corrects itself is to be: as good as the server's map, and better than its odometry where that is
+/// not as good anyway.
+void expect_repaired(const MissionRecord& record, const std::string& what) {
+  EXPECT_EQ(record.server.components, 1U) << what;
+  ASSERT_TRUE(record.server.closure_check.has_value()) << what;
+  EXPECT_EQ(record.server.closure_check->wrong, 0U) << what;
+  for (const RobotRecord& robot : record.robots) {
+    const double corrected_m = *robot.policies.front().accuracy.rmse_m;
+    const double best_m = std::min(*robot.onboard.rmse_m, *robot.server.rmse_m);
+    EXPECT_LT(corrected_m, 1.1 * best_m + 0.01) << what << ", " << robot.name;
+  }
+}
+
 TEST(Scenarios, EveryMissionFileLoads) {
   int files = 0;
   for (const auto& file : std::filesystem::directory_iterator(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions")) {
@@ -153,7 +165,8 @@ TEST(Scenarios, SpinTurnsHalfOfTheWayAboutTheStartAndDistancesToItCannotSeeIt) {
   EXPECT_LT(seen, ordinary + 0.15);
 
   const MissionRecord record = run(config);
-  EXPECT_LT(*record.server.joint.rmse_m, 0.15);  // the server knows
+  EXPECT_LT(*record.server.joint.rmse_m, 0.08);  // 0.054: the server knows
+  expect_repaired(record, "spin");
   EXPECT_GT(difference_over_uncertainty(record, record.robots[0]).worst, 3.0 * kExplained);
 }
 
@@ -173,8 +186,9 @@ TEST(Scenarios, HeightGrowsByThreeMetresWhileTheRobotClimbsTheRamp) {
     EXPECT_NEAR(error_over(alpha, from, (from + until) / 2).z(), 1.5, 0.4);  // gradually
   }
   const MissionRecord record = run(scenario("height", {"server.update_period_s=60"}));
-  EXPECT_LT(*record.server.joint.rmse_m, 0.25);
-  EXPECT_GT(*record.robots[0].onboard.rmse_m, 1.0);
+  EXPECT_LT(*record.server.joint.rmse_m, 0.09);      // 0.058
+  EXPECT_GT(*record.robots[0].onboard.rmse_m, 1.0);  // 1.40
+  expect_repaired(record, "height");
   EXPECT_GT(difference_over_uncertainty(record, record.robots[0]).worst, 3.0 * kExplained);
 }
 
@@ -199,8 +213,9 @@ TEST(Scenarios, DegenerateSlidesAlongOneCorridorForAMinuteAndSaysSo) {
     EXPECT_LT(inside(1, 1), 2.0 * outside(1, 1));
   }
   const MissionRecord record = run(config);
-  EXPECT_LT(*record.server.joint.rmse_m, 0.25);
-  EXPECT_GT(*record.robots[0].onboard.rmse_m, 0.5);
+  EXPECT_LT(*record.server.joint.rmse_m, 0.17);      // 0.11
+  EXPECT_GT(*record.robots[0].onboard.rmse_m, 1.1);  // 1.69
+  expect_repaired(record, "degenerate");
   EXPECT_GT(difference_over_uncertainty(record, record.robots[0]).worst, 1.5 * kExplained);
 }
 
@@ -264,31 +279,46 @@ TEST(Scenarios, LateJoinsLoseContactAndReturn) {
   EXPECT_EQ(bravo.submaps, 45U);  // none is lost
   EXPECT_EQ(record.server.components, 1U);
   EXPECT_EQ(bravo.component, record.robots[0].component);
-  EXPECT_LT(*record.server.joint.rmse_m, 0.3);
+  EXPECT_LT(*record.server.joint.rmse_m, 0.2);  // 0.13
+  expect_repaired(record, "late");
 }
 
-TEST(Scenarios, ParametersNeverUsedForTuningAreSettings) {
-  const auto same = [](const Recording& a, const Recording& b) {
-    return a.reference == b.reference && a.odometry == b.odometry;
+// Other worlds, ways and errors than those of missions/ (docs/simulation.md).
+TEST(Scenarios, OtherParametersAreRepairedAsWell) {
+  const std::string robot = "simulation.robots.0.", world = "simulation.world.";
+  const auto expect = [](const std::string& name, const std::vector<std::string>& assignments, double least_onboard_m,
+                         double most_server_m) {
+    const MissionRecord record = run(scenario(name, assignments), 1001);
+    expect_repaired(record, name);
+    EXPECT_GT(*record.robots[0].onboard.rmse_m, least_onboard_m) << name;
+    EXPECT_LT(*record.server.joint.rmse_m, most_server_m) << name;
   };
-  const std::string robot = "simulation.robots.0.";
-  const Recording as_it_is = recording(scenario("degenerate"));
-  for (const std::string& assignment : std::vector<std::string>{
-           "simulation.world.network.block_m=30", "simulation.world.network.max_slope=0.15",
-           robot + "walk.min_speed_mps=0.3", robot + "walk.length_m=400", robot + "odometry.yaw_drift_deg_per_m=0.05",
-           robot + "odometry.scale_percent=2", robot + "odometry.degeneracy.slide_percent=8",
-           robot + "odometry.slips_per_km=10", robot + "odometry.scripted=[{after_m: 100, length_m: 20, yaw_deg: 8}]"})
-    EXPECT_FALSE(same(recording(scenario("degenerate", {assignment})), as_it_is)) << assignment;
+  // With the seeds 1001 to 1003: onboard at least 3.59, 0.97, 1.21 m; server at most 0.062, 0.070, 0.82 m (with 1001
+  // 0.35 m); corrected at most 1.04 times the server.
+  expect("spin",
+         {world + "network.block_m=24", robot + "walk.length_m=384", robot + "walk.duration_s=510",
+          robot + "odometry.scripted.0.yaw_deg=-12"},
+         2.5, 0.1);
+  expect("height",
+         {world + "ramp_rise_m=1.5", robot + "odometry.scripted.0.up_m=-2", robot + "odometry.scripted.0.length_m=8"},
+         0.7, 0.1);
+  expect("degenerate",
+         {robot + "odometry.yaw_drift_deg_per_m=0.05", robot + "odometry.scale_percent=1",
+          robot + "odometry.slips_per_km=4", robot + "odometry.slip_deg=5"},
+         0.8, 0.5);
 }
 
+// Measured: joint server RMSE 0.29 to 0.32 m (05) and 0.48 to 0.97 m (07), seeds 1 to 3; 0.30 and 0.59 m with seed 1.
 TEST(Scenarios, KittiHalvesBecomeOneMap) {
   TUTTI_REQUIRE_SHARED("data/kitti");
-  for (const std::string name : {"kitti_05_halves", "kitti_07_halves"}) {
-    const MissionRecord record = run(scenario(name));
-    EXPECT_EQ(record.server.components, 1U) << name;
-    EXPECT_EQ(record.server.closure_check->wrong, 0U) << name;
-    EXPECT_LT(*record.server.joint.rmse_m, 1.0) << name;
-  }
+  const MissionRecord halves_of_05 = run(scenario("kitti_05_halves"));
+  expect_repaired(halves_of_05, "05");
+  EXPECT_LT(*halves_of_05.server.joint.rmse_m, 0.45);
+  for (const RobotRecord& robot : halves_of_05.robots)
+    EXPECT_LT(*robot.policies.front().accuracy.rmse_m, 0.5 * *robot.onboard.rmse_m) << robot.name;
+  const MissionRecord halves_of_07 = run(scenario("kitti_07_halves"));
+  expect_repaired(halves_of_07, "07");
+  EXPECT_LT(*halves_of_07.server.joint.rmse_m, 0.88);
 }
 
 }  // namespace
