@@ -10,7 +10,7 @@ import sys
 
 # (what an #include looks like, which files may have it, in words)
 CONFINED = [
-    (r"yaml-cpp/", r"base/config\.cpp$", "base/config.cpp"),
+    (r"yaml-cpp/", r"base/config_io\.cpp$", "base/config_io.cpp"),
     (r"google/protobuf|.*\.pb\.h$", r"(wire|bus)/", "wire/ and bus/"),
     (r"ceres/", r"(estimation/.*\.cpp|.*_test\.cpp)$", "estimation/*.cpp and tests"),
     (r"Spectra/", r"spectral/.*\.cpp$", "spectral/*.cpp"),

@@ -10,6 +10,7 @@
 
 #include "number_checks.hpp"
 #include "own_folder.hpp"
+#include "tutti/base/config_io.hpp"
 #include "tutti/mission/report/files.hpp"
 #include "tutti/mission/report/text.hpp"
 #include "tutti/mission/runner.hpp"

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/base/config_io.hpp"
 #include "tutti/mission/mission_config.hpp"
 
 namespace tutti::app {

@@ -9,7 +9,7 @@
 
 #include <cstdio>
 
-#include "tutti/base/config.hpp"
+#include "tutti/base/config_io.hpp"
 
 namespace {
 

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "lidar_hku_samples.hpp"
+#include "tutti/base/config_io.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/perception/lidar/candidates.hpp"

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "lidar_hku_samples.hpp"
+#include "tutti/base/config_io.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 #include "tutti/robot/submap_builder.hpp"
 #include "tutti/simulation/bvh.hpp"

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
-#include <stdexcept>
 #include <string>
 
 namespace tutti::internal {
 
-[[noreturn]] inline void check_failed(const char* condition, const char* file, int line, const std::string& message) {
-  throw std::logic_error(fmt::format("{}:{}: check failed: {} {}", file, line, condition, message));
-}
+[[noreturn]] void check_failed(const char* condition, const char* file, int line, const std::string& message);
 
 }  // namespace tutti::internal
 

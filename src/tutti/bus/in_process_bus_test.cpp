@@ -10,6 +10,8 @@
 #include <set>
 #include <string>
 
+#include "tutti/base/config_io.hpp"
+
 namespace tutti::bus {
 namespace {
 

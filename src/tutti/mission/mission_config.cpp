@@ -4,6 +4,7 @@
 #include <functional>
 #include <set>
 
+#include "tutti/base/config_io.hpp"
 #include "tutti/consistency/policy.hpp"
 #include "tutti/mission/demo_mission.hpp"
 

@@ -11,6 +11,7 @@
 #include <set>
 #include <thread>
 
+#include "tutti/base/config_io.hpp"
 #include "tutti/bus/in_process_bus.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/disk_cloud_store.hpp"

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tutti/base/config_io.hpp"
+
 namespace tutti::simulation {
 namespace {
 

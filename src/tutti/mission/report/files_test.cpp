@@ -8,7 +8,7 @@
 #include <set>
 #include <sstream>
 
-#include "tutti/base/config.hpp"
+#include "tutti/base/config_io.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/tum.hpp"

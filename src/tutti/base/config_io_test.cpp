@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/base/config.hpp"
+#include "tutti/base/config_io.hpp"
 
 #include <gtest/gtest.h>
 // gtest first

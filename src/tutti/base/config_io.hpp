@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fmt/format.h>
+
+#include <concepts>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
+
+/// Reads, writes and documents the settings structs of base/config.hpp. Only loaders include this: it is long to
+/// compile.
+namespace tutti {
+
+/// A parsed YAML document without any YAML library in the interface. Scalars keep their text.
+struct ConfigNode {
+  enum class Kind { null, scalar, list, map };
+  Kind kind = Kind::null;
+  std::string scalar;
+  std::vector<ConfigNode> list;
+  std::vector<std::pair<std::string, ConfigNode>> map;  ///< In file order.
+  int line = 0;                                         ///< 1-based; 0 = from the command line.
+
+  [[nodiscard]] const ConfigNode* find(std::string_view key) const;
+};
+
+/// Parses YAML text; `name` appears in messages.
+Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name);
+Result<ConfigNode> load_yaml(const std::string& path);
+std::string to_yaml(const ConfigNode& node);
+/// Applies "a.b.0.c=value" (list elements by index; a missing map key is created; the value is parsed as YAML).
+Status apply_override(ConfigNode& root, const std::string& assignment);
+
+namespace config_internal {
+
+template <class T>
+struct is_optional : std::false_type {};
+template <class T>
+struct is_optional<std::optional<T>> : std::true_type {};
+template <class T>
+struct is_vector : std::false_type {};
+template <class T>
+struct is_vector<std::vector<T>> : std::true_type {};
+template <class T>
+concept Scalar = std::is_arithmetic_v<T> || std::same_as<T, std::string>;
+
+bool parse_scalar(const std::string& text, bool& out);
+bool parse_scalar(const std::string& text, int& out);
+bool parse_scalar(const std::string& text, std::uint64_t& out);
+bool parse_scalar(const std::string& text, double& out);
+bool parse_scalar(const std::string& text, std::string& out);
+std::string print_scalar(bool value);
+std::string print_scalar(int value);
+std::string print_scalar(std::uint64_t value);
+std::string print_scalar(double value);  // shortest text that reads back the same
+std::string print_scalar(const std::string& value);
+std::string type_name(const bool&);
+std::string type_name(const int&);
+std::string type_name(const std::uint64_t&);
+std::string type_name(const double&);
+std::string type_name(const std::string&);
+/// What stands there, for messages: "'2.5'", "a list", "a map", "nothing".
+std::string show(const ConfigNode& node);
+/// Empty when the value is inside; otherwise "must be > 0".
+std::string violation(const Bound& bound, double value);
+std::string violation(const Bound& bound, const std::string& value);
+std::string describe_bound(const Bound& bound);
+
+template <class T>
+std::string check_bound(const Bound& bound, const T& value) {
+  if constexpr (std::same_as<T, std::string>)
+    return violation(bound, value);
+  else
+    return violation(bound, static_cast<double>(value));
+}
+
+/// Reads a node into a struct; collects every problem.
+class Loader {
+ public:
+  Loader(const ConfigNode& node, std::string path, std::vector<std::string>& problems)
+      : node_(node), path_(std::move(path)), problems_(problems) {}
+
+  template <class T>
+  void field(std::string_view name, T& value, const Bound& bound = {}, std::string_view = {}) {
+    known_.emplace_back(name);
+    const ConfigNode* child = node_.find(name);
+    const std::string path = path_.empty() ? std::string(name) : path_ + "." + std::string(name);
+    if (child == nullptr || child->kind == ConfigNode::Kind::null) return;
+    read(*child, path, value, bound);
+  }
+  /// Call after describe(): reports keys nobody asked for.
+  void finish();
+
+ private:
+  template <class T>
+  void read(const ConfigNode& node, const std::string& path, T& value, const Bound& bound) {
+    if constexpr (Scalar<T>) {
+      if (node.kind != ConfigNode::Kind::scalar || !parse_scalar(node.scalar, value)) {
+        complain(node, path, fmt::format("expected {}, got {}", type_name(value), show(node)));
+        return;
+      }
+      if (auto text = check_bound(bound, value); !text.empty())
+        complain(node, path, fmt::format("is {}, {}", node.scalar, text));
+    } else if constexpr (is_optional<T>::value) {
+      typename T::value_type inner{};
+      read(node, path, inner, bound);
+      value = inner;
+    } else if constexpr (is_vector<T>::value) {
+      if (node.kind != ConfigNode::Kind::list) {
+        complain(node, path, "expected a list");
+        return;
+      }
+      value.clear();
+      for (std::size_t i = 0; i < node.list.size(); ++i) {
+        typename T::value_type element{};
+        read(node.list[i], path + "." + std::to_string(i), element, bound);
+        value.push_back(std::move(element));
+      }
+    } else {
+      if (node.kind != ConfigNode::Kind::map) {
+        complain(node, path, "expected a map of settings");
+        return;
+      }
+      Loader nested(node, path, problems_);
+      value.describe(nested);
+      nested.finish();
+    }
+  }
+  void complain(const ConfigNode& node, const std::string& path, const std::string& text);
+
+  const ConfigNode& node_;
+  std::string path_;
+  std::vector<std::string>& problems_;
+  std::vector<std::string> known_;
+};
+
+/// Writes a struct into a node.
+class Dumper {
+ public:
+  template <class T>
+  void field(std::string_view name, T& value, const Bound& = {}, std::string_view = {}) {
+    node.map.emplace_back(std::string(name), write(value));
+  }
+  ConfigNode node{.kind = ConfigNode::Kind::map};
+
+ private:
+  template <class T>
+  static ConfigNode write(T& value) {
+    if constexpr (Scalar<T>) {
+      return {.kind = ConfigNode::Kind::scalar, .scalar = print_scalar(value)};
+    } else if constexpr (is_optional<T>::value) {
+      return value ? write(*value) : ConfigNode{};
+    } else if constexpr (is_vector<T>::value) {
+      ConfigNode out{.kind = ConfigNode::Kind::list};
+      for (auto& element : value) out.list.push_back(write(element));
+      return out;
+    } else {
+      Dumper nested;
+      value.describe(nested);
+      return nested.node;
+    }
+  }
+};
+
+/// Lists path, type, default, range and help of every field.
+struct FieldDoc {
+  std::string path, type, default_value, range, help;
+};
+class Documenter {
+ public:
+  Documenter(std::string path, std::vector<FieldDoc>& out) : path_(std::move(path)), out_(out) {}
+  template <class T>
+  void field(std::string_view name, T& value, const Bound& bound = {}, std::string_view help = {}) {
+    const std::string path = path_.empty() ? std::string(name) : path_ + "." + std::string(name);
+    if constexpr (Scalar<T>) {
+      out_.push_back({path, type_name(value), print_scalar(value), describe_bound(bound), std::string(help)});
+    } else if constexpr (is_optional<T>::value) {
+      typename T::value_type inner{};
+      out_.push_back({path, type_name(inner), "none", describe_bound(bound), std::string(help)});
+    } else if constexpr (is_vector<T>::value) {
+      using E = typename T::value_type;
+      out_.push_back({path, "list", "", "", std::string(help)});
+      if constexpr (!Scalar<E>) {
+        E element{};
+        Documenter nested(path + "[]", out_);
+        element.describe(nested);
+      }
+    } else {
+      Documenter nested(path, out_);
+      value.describe(nested);
+    }
+  }
+
+ private:
+  std::string path_;
+  std::vector<FieldDoc>& out_;
+};
+
+Status to_status(const std::string& name, const std::vector<std::string>& problems);
+
+}  // namespace config_internal
+
+/// Fills `config` from a node; every violation is in the one message.
+template <class T>
+Status load_config(const ConfigNode& node, T& config, const std::string& name) {
+  std::vector<std::string> problems;
+  config_internal::Loader loader(node, "", problems);
+  config.describe(loader);
+  loader.finish();
+  return config_internal::to_status(name, problems);
+}
+
+template <class T>
+ConfigNode dump_config(T config) {
+  config_internal::Dumper dumper;
+  config.describe(dumper);
+  return dumper.node;
+}
+
+template <class T>
+std::vector<config_internal::FieldDoc> document_config(T config) {
+  std::vector<config_internal::FieldDoc> out;
+  config_internal::Documenter documenter("", out);
+  config.describe(documenter);
+  return out;
+}
+
+}  // namespace tutti
