@@ -12,15 +12,32 @@ if(CMAKE_GENERATOR MATCHES "Ninja|Makefiles" AND NOT DEFINED CMAKE_CXX_COMPILER_
   endif()
 endif()
 
+# A faster linker than GNU's when there is one: GCC's flag for it, or nothing.
+find_program(TUTTI_MOLD mold)
+find_program(TUTTI_LLD ld.lld)
+mark_as_advanced(TUTTI_MOLD TUTTI_LLD)
+if(TUTTI_MOLD)
+  set(TUTTI_LINKER -fuse-ld=mold)
+elseif(TUTTI_LLD)
+  set(TUTTI_LINKER -fuse-ld=lld)
+else()
+  set(TUTTI_LINKER "")
+endif()
+
 function(tutti_target_options target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wno-sign-conversion -Wno-missing-field-initializers
                                            $<$<BOOL:${TUTTI_WERROR}>:-Werror>)
+  target_link_options(${target} PRIVATE ${TUTTI_LINKER})
   if(TUTTI_SANITIZE)
-    target_compile_options(${target} PRIVATE -fsanitize=${TUTTI_SANITIZE} -fno-omit-frame-pointer
-                                             -fno-sanitize-recover=all)
     target_link_options(${target} PUBLIC -fsanitize=${TUTTI_SANITIZE})
+    if(NOT TUTTI_SANITIZE_ONLY OR target IN_LIST TUTTI_SANITIZE_ONLY)
+      # Without UBSan's checks of every pointer, which double the time to compile: ASan finds null and wild ones, and
+      # nothing here reads through a cast pointer.
+      target_compile_options(${target} PRIVATE -fsanitize=${TUTTI_SANITIZE} -fno-omit-frame-pointer
+                                               -fno-sanitize=null,alignment,object-size -fno-sanitize-recover=all)
+    endif()
   endif()
 endfunction()
 
@@ -43,26 +60,57 @@ function(tutti_add_library module)
   add_library(tutti::${module} ALIAS ${target})
 endfunction()
 
-# tutti_add_test(<module> <file>_test.cpp [LIBS libs..] [LABELS labels..]) makes one executable and ctest "module/file".
-function(tutti_add_test module source)
+# tutti_add_tests(<module> TESTS a internal/b.. [NOT_SANITIZED c..] [LIBS libs..] [LABEL label] [TIMEOUT seconds])
+# makes one executable test_<module> of a_test.cpp, internal/b_test.cpp.. and one ctest entry "module/a" for each file.
+# NOT_SANITIZED: files that would only repeat under a sanitizer what others have run there. A file that includes
+# RapidCheck is labelled `property`, any other `unit`, unless LABEL says otherwise.
+function(tutti_add_tests module)
   if(NOT TUTTI_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(ARG "" "TIMEOUT" "LIBS;LABELS" ${ARGN})
-  get_filename_component(name ${source} NAME_WE)
-  string(REGEX REPLACE "_test$" "" name ${name})
-  set(target test_${module}_${name})
-  add_executable(${target} ${source})
-  target_link_libraries(${target} PRIVATE ${ARG_LIBS} tutti_test_main)
-  target_compile_definitions(${target} PRIVATE TUTTI_SHARED_DIR="${TUTTI_SHARED_DIR}")
-  tutti_target_options(${target})
-  add_test(NAME ${module}/${name} COMMAND ${target})
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "TESTS;NOT_SANITIZED;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
-  # One BLAS thread, as the program has: on a busy machine OpenBLAS's own made who_is_wrong take 281 s instead of 7.
-  set_tests_properties(${module}/${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}"
-                       ENVIRONMENT "OPENBLAS_NUM_THREADS=1" SKIP_REGULAR_EXPRESSION "TUTTI_ALL_SKIPPED")
+  set(target test_${module})
+  add_executable(${target})
+  target_link_libraries(${target} PRIVATE ${ARG_LIBS} tutti_test_support)
+  tutti_target_options(${target})
+  # What a test computes is in the libraries; its own file is compiled once for every time it runs.
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  foreach(test IN LISTS ARG_TESTS ARG_NOT_SANITIZED)
+    set(source "${CMAKE_CURRENT_SOURCE_DIR}/${test}_test.cpp")
+    set_property(GLOBAL APPEND PROPERTY TUTTI_TEST_FILES "${source}")
+    if(TUTTI_SANITIZE AND test IN_LIST ARG_NOT_SANITIZED)
+      continue()
+    endif()
+    target_sources(${target} PRIVATE "${source}")
+    file(STRINGS "${source}" property_test REGEX "#include <rapidcheck" LIMIT_COUNT 1)
+    if(ARG_LABEL)
+      set(label ${ARG_LABEL})
+    elseif(property_test)
+      set(label property)
+    else()
+      set(label unit)
+    endif()
+    get_filename_component(name ${test} NAME)
+    file(RELATIVE_PATH file "${PROJECT_SOURCE_DIR}" "${source}")
+    add_test(NAME ${module}/${name} COMMAND ${target} --tutti_file=${file})
+    # One BLAS thread, as the program has: on a busy machine OpenBLAS's own made who_is_wrong take 281 s instead of 7.
+    set_tests_properties(${module}/${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${label}
+                         ENVIRONMENT "OPENBLAS_NUM_THREADS=1" SKIP_REGULAR_EXPRESSION "TUTTI_ALL_SKIPPED")
+  endforeach()
+endfunction()
+
+# Every *_test.cpp is in some list: a forgotten one would never fail.
+function(tutti_check_all_tests_listed)
+  file(GLOB_RECURSE found CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/src/*_test.cpp" "${PROJECT_SOURCE_DIR}/tests/*_test.cpp")
+  get_property(listed GLOBAL PROPERTY TUTTI_TEST_FILES)
+  list(REMOVE_ITEM found ${listed})
+  if(found)
+    list(JOIN found "\n  " found)
+    message(FATAL_ERROR "in no list of tutti_add_tests:\n  ${found}")
+  endif()
 endfunction()
 
 # tutti_add_bench(<name> source.cpp LIBS libs..)

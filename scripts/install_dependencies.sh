@@ -13,7 +13,7 @@ packages=(
 )
 for option in "$@"; do
   case "$option" in
-    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev libceres-dev clang-format python3) ;;
+    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev libceres-dev clang-format python3 mold) ;;
     --bench) packages+=(libbenchmark-dev) ;;
     *)
       echo "usage: $0 [--tests] [--bench]" >&2

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "support/sanitized.hpp"
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {
@@ -13,7 +12,6 @@ namespace {
 /// Bounds: 1.5 times what was measured with this seed (87 closures, 60 of them between the robots, the worst 0.14 m and
 /// 0.45 degrees off; joint RMSE 0.185 m, map 0.068 m off the survey; RMSE below).
 TEST(LidarMission, HalfOfTheDemoIsMappedFromItsScans) {
-  if (test::kSanitized) GTEST_SKIP() << "takes minutes under a sanitizer; integration/cli runs a smaller one";
   const auto config = demo_mission({"duration_s=180"});
   ASSERT_TRUE(config.has_value()) << config.error().message;
   const auto run = run_mission(*config, {.seed = 1});

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "support/paths.hpp"
 #include "tutti/mission/report/json.hpp"
 #include "tutti/mission/runner.hpp"
 
@@ -122,8 +123,8 @@ TEST(Mission, ALoneRobotIsAMissionToo) {
 }
 
 TEST(Mission, TheReportNamesTheStretchWhereOdometryFailed) {
-  const auto config =
-      load_mission(TUTTI_SOURCE_DIR "/missions/terrace.yaml", {"simulation.sensors=none", "closures.finder=reference"});
+  const auto config = load_mission(test::source_path("missions/terrace.yaml"),
+                                   {"simulation.sensors=none", "closures.finder=reference"});
   ASSERT_TRUE(config.has_value()) << config.error().message;
   const MissionRecord record = run(*config);
   const RobotRecord& alpha = record.robots[0];

@@ -13,7 +13,7 @@ namespace tutti::mission {
 namespace {
 
 MissionConfig mission_file(const std::string& name) {
-  auto config = load_mission(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions" / (name + ".yaml"), {});
+  auto config = load_mission(test::source_path("missions/" + name + ".yaml"), {});
   EXPECT_TRUE(config.has_value()) << config.error().message;
   return config ? *config : MissionConfig{};
 }

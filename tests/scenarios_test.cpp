@@ -20,7 +20,7 @@ namespace tutti::mission {
 namespace {
 
 MissionConfig scenario(const std::string& name, const std::vector<std::string>& assignments = {}) {
-  auto config = load_mission(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions" / (name + ".yaml"), assignments);
+  auto config = load_mission(test::source_path("missions/" + name + ".yaml"), assignments);
   EXPECT_TRUE(config.has_value()) << config.error().message;
   return config ? *config : MissionConfig{};
 }
@@ -112,7 +112,7 @@ void expect_repaired(const MissionRecord& record, const std::string& what) {
 
 TEST(Scenarios, EveryMissionFileLoads) {
   int files = 0;
-  for (const auto& file : std::filesystem::directory_iterator(std::filesystem::path(TUTTI_SOURCE_DIR) / "missions")) {
+  for (const auto& file : std::filesystem::directory_iterator(test::source_path("missions"))) {
     if (file.path().extension() != ".yaml") continue;
     const auto config = load_mission(file.path(), {});
     ASSERT_TRUE(config.has_value()) << config.error().message;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 
 namespace tutti::test {
@@ -13,6 +15,13 @@ inline constexpr bool kSanitized = false;
 
 /// How often a test repeats itself with another seed (or input): `all` times, but at most twice under a sanitizer,
 /// which looks at the code that runs and learns nothing from the fiftieth run of it. The assertions stay.
-constexpr int seeds(int all) { return kSanitized ? std::min(all, 2) : all; }
+template <class T>
+constexpr T seeds(T all) {
+  return kSanitized ? std::min(all, T{2}) : all;
+}
 
 }  // namespace tutti::test
+
+/// First line of a test that counts over hundreds of seeds, which only a plain build does.
+#define TUTTI_STATISTIC() \
+  if (::tutti::test::kSanitized) GTEST_SKIP() << "a statistic: says nothing that a sanitizer could see"

@@ -167,7 +167,7 @@ TEST(CompareTrajectories, RefusesWhatCannotBeCompared) {
 TEST(CompareTrajectories, RealOdometryAgainstGroundTruth) {
   TUTTI_REQUIRE_SHARED("data/euroc/MH_03/groundtruth.tum");
   const auto read = [](const char* name) {
-    return formats::read_tum(std::string(TUTTI_SHARED_DIR) + "/data/euroc/MH_03/" + name).value();
+    return formats::read_tum(test::shared_path(std::string("data/euroc/MH_03/") + name)).value();
   };
   const auto c = compare_trajectories({"", read("groundtruth.tum"), {}}, {"", read("rpg_vio_mono.tum"), {}},
                                       {.tolerance_m = 0.01, .tolerance_deg = 0.2});

@@ -146,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(Golden, PyGsp, ::testing::Values("a_path12", "b_geo40",
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 TEST(OwnGolden, TwoComponentsAndAnIsolatedNode) {
-  const json golden = load(std::filesystem::path(TUTTI_TESTDATA_DIR) / "two_components.json");
+  const json golden = load(test::source_path("src/tutti/spectral/testdata/two_components.json"));
   std::vector<WeightedEdge> edges;
   for (const auto& edge : golden["edges"]) edges.push_back({edge[0], edge[1], edge[2]});
   const SparseMatrix L = laplacian(adjacency_from_edges(golden["nodes"], edges));

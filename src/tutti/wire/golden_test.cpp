@@ -9,13 +9,14 @@
 #include <sstream>
 #include <string>
 
+#include "support/paths.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::wire {
 namespace {
 
 std::string golden_bytes(const std::string& name, const std::string& current) {
-  const std::filesystem::path path = std::filesystem::path(TUTTI_WIRE_TESTDATA) / name;
+  const std::filesystem::path path = test::source_path("src/tutti/wire/testdata/" + name);
   if (std::getenv("TUTTI_WRITE_GOLDEN") != nullptr) std::ofstream(path, std::ios::binary) << current;
   std::ostringstream bytes;
   bytes << std::ifstream(path, std::ios::binary).rdbuf();
