@@ -1,36 +1,84 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Builds everything with warnings as errors and runs all tests; with --sanitize then once more under ASan and UBSan.
-# Release comes first: it is built faster and finds most mistakes.
-#   scripts/test.sh [--sanitize]
+# Builds everything with warnings as errors and runs all tests; with --sanitize then what has threads under TSan and
+# everything once more under ASan and UBSan. Release comes first: it is built faster and finds most mistakes.
+#   scripts/test.sh [--sanitize | --label LABEL | --module MODULE]
+# LABEL: unit, property, mission or system; MODULE: consistency, for example (only its tests are built).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-sanitize=no
-case "$*" in
-  '') ;;
-  --sanitize) sanitize=yes ;;
-  *)
-    echo "usage: $0 [--sanitize]" >&2
-    exit 2
-    ;;
-esac
-
-stage() { say "$* ($((SECONDS / 60)) min $((SECONDS % 60)) s since the start)"; }
-
-# build_and_test PRESET NAME
-build_and_test() {
-  configure "$1"
-  stage "build: $2"
-  build "$1"
-  stage "test: $2"
-  ctest --test-dir "$root/build/$1" --output-on-failure -j2
+usage() {
+  echo "usage: $0 [--sanitize | --label unit|property|mission|system | --module MODULE]" >&2
+  exit 2
 }
 
-"$root/scripts/install_dependencies.sh" --tests
-build_and_test ci Release
+sanitize=no targets=() tests=()
+case "$#:${1-}" in
+  0:) ;;
+  1:--sanitize) sanitize=yes ;;
+  2:--label)
+    case "$2" in unit | property | mission | system) tests=(-L "^$2\$") ;; *) usage ;; esac ;;
+  2:--module)
+    targets=("test_$2") tests=(-R "^$2/")
+    [ "$2" != integration ] || targets+=(tutti) # integration/cli runs the program
+    ;;
+  *) usage ;;
+esac
+
+summary="$(mktemp)"
+trap 'rm -f "$summary"' EXIT
+times=()
+started=0 current=''
+
+# stage [NAME]: ends the one before and begins this one, if any.
+stage() {
+  if [ -n "$current" ]; then
+    times+=("$(printf '%6d s  %s' $((SECONDS - started)) "$current")")
+  fi
+  started=$SECONDS current="$*"
+  if [ -n "$current" ]; then
+    say "$current ($((SECONDS / 60)) min $((SECONDS % 60)) s since the start)"
+  fi
+}
+
+# Runs ctest; its summary is shown by the next call or at the very end, below the times.
+run_tests() {
+  cat "$summary"
+  : >"$summary"
+  ctest --output-on-failure -j"$jobs" "$@" |
+    awk -v summary="$summary" '/^[0-9]+% tests passed/ {held = 1} held {print > summary; next} {print; fflush()}'
+}
+
+finish() {
+  local status=$?
+  stage
+  say "$((SECONDS / 60)) min $((SECONDS % 60)) s"
+  [ "${#times[@]}" -eq 0 ] || printf '%s\n' "${times[@]}"
+  cat "$summary"
+  rm -f "$summary"
+  exit "$status"
+}
+
+# build_and_test PRESET NAME [ctest arguments..]; builds $targets, or everything
+build_and_test() {
+  local preset="$1" name="$2"
+  shift 2
+  stage "build: $name"
+  configure "$preset"
+  build "$preset" "${targets[@]}"
+  stage "test: $name"
+  run_tests --test-dir "$root/build/$preset" "$@"
+}
+
+stage "packages"
+"$root/scripts/install_dependencies.sh" --tests --bench
+trap finish EXIT
+build_and_test ci Release "${tests[@]}"
 if [ "$sanitize" = yes ]; then
   export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
   export UBSAN_OPTIONS=print_stacktrace=1
+  targets=(test_bus test_mission test_integration)
+  build_and_test tsan TSan -R '^(bus|mission)/|^integration/mission$'
+  targets=()
   build_and_test asan "ASan + UBSan"
 fi

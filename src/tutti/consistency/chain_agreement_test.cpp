@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "support/sanitized.hpp"
 #include "tutti/consistency/testing/uncertainty.hpp"
 
 namespace tutti::consistency {
@@ -92,6 +93,7 @@ class Calibration : public testing::TestWithParam<const char*> {
 
 // The first look has half of the mission's rate: 0.2 of 0.4. Bounded from above by 2.5 binomial sigmas.
 TEST_P(Calibration, FalseAlarmsStayBelowWhatIsAsked) {
+  TUTTI_STATISTIC();
   AgreementConfig config = with_signal(GetParam());
   config.false_alarm_rate = 0.4;
   // Relative motion sees a position error that goes with a turn at the turn only; these errors are independent.
@@ -107,6 +109,7 @@ TEST_P(Calibration, FalseAlarmsStayBelowWhatIsAsked) {
 // And the thresholds are not much wider than need be: a map that is 1.4 times as wrong as it says is found out more
 // often than false alarms are asked for, one that is twice as wrong nearly always.
 TEST_P(Calibration, AMapThatIsLessSureThanItSaysIsFoundOut) {
+  TUTTI_STATISTIC();
   AgreementConfig config = with_signal(GetParam());
   config.false_alarm_rate = 0.4;
   const double slightly = false_alarms(usual_map(kNodes), config, 0.7);
@@ -127,6 +130,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_pairs(std::size_t no
 
 // As above, of ties alone: their third of the rate.
 TEST(Ties, FalseAlarmsStayBelowWhatIsAskedAndTooSureAMapIsFoundOut) {
+  TUTTI_STATISTIC();
   constexpr std::size_t kNodes = 200;
   constexpr int kSeeds = 300;
   AgreementConfig config;
@@ -211,6 +215,7 @@ TEST(Ties, EitherKindAlone) {
 
 // All looks of one mission together: the run grows, with it the number of updates.
 TEST(Mission, FalseAlarmsOfAllUpdatesTogetherStayBelowTheRate) {
+  TUTTI_STATISTIC();
   constexpr std::size_t kPerUpdate = 15, kUpdates = 16;
   constexpr int kSeeds = 100;
   AgreementConfig config;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "support/sanitized.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/server/graph_monitor.hpp"
@@ -70,7 +71,7 @@ std::size_t closures_between_good_robots(const MapEstimate& map) {
 }
 
 TEST(WildOdometry, OfOneRobotHarmsNoOther) {
-  constexpr std::size_t kSeeds = 100;
+  constexpr std::size_t kSeeds = test::seeds<std::size_t>(100);
   std::size_t informed = 0;
   std::size_t kept = 0;
   std::size_t without_it = 0;
