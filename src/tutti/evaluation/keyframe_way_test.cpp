@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/evaluation/keyframe_way.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::evaluation {
+namespace {
+
+/// A pose a second, each a metre on.
+Trajectory line(int first, int last, int step = 1) {
+  Trajectory out;
+  for (int i = first; i <= last; i += step)
+    out.push_back({Timestamp{} + 1.0 * i, {Eigen::Quaterniond::Identity(), {1.0 * i, 0, 0}}});
+  return out;
+}
+
+TEST(KeyframeWay, KeyframesTogetherStandForTheWholeWay) {
+  const Trajectory way = line(0, 100);
+  for (const Trajectory& keyframes : {way, line(3, 93, 10), line(40, 40)})
+    EXPECT_DOUBLE_EQ(KeyframeWay(way, keyframes).part_m(keyframes), 100.0);
+}
+
+TEST(KeyframeWay, APieceStandsForItsWayToHalfWayBeyond) {
+  const KeyframeWay way(line(0, 100), line(0, 100, 10));
+  EXPECT_DOUBLE_EQ(way.part_m(line(30, 50, 10)), 30.0);
+  EXPECT_DOUBLE_EQ(way.part_m(line(90, 100, 10)), 15.0);
+  EXPECT_DOUBLE_EQ(way.part_m(line(0, 20, 20)), 15.0);    // without the one between them
+  EXPECT_DOUBLE_EQ(way.part_m(line(35, 65, 10)), 0.0);    // no keyframes
+  EXPECT_DOUBLE_EQ(way.part_m(line(30, 140, 10)), 75.0);  // and more than there are
+}
+
+TEST(KeyframeWay, StandingStillCountsNothing) {
+  Trajectory way = line(0, 50);
+  for (int i = 0; i < 50; ++i) way.push_back({Timestamp{} + 51.0 + i, way.back().pose});
+  const KeyframeWay shared(way, way);
+  EXPECT_DOUBLE_EQ(shared.part_m(line(0, 50)), 50.0);
+  EXPECT_DOUBLE_EQ(shared.part_m(line(51, 100)), 0.0);
+}
+
+TEST(KeyframeWay, NothingToShareOut) {
+  EXPECT_EQ(KeyframeWay({}, line(0, 5)).part_m(line(0, 5)), 0.0);
+  EXPECT_EQ(KeyframeWay(line(0, 5), {}).part_m(line(0, 5)), 0.0);
+  EXPECT_EQ(KeyframeWay(line(0, 5), {}).whole_m(), 5.0);
+}
+
+}  // namespace
+}  // namespace tutti::evaluation
