@@ -14,6 +14,7 @@
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/server/map_components.hpp"
 #include "tutti/server/odometry_honesty.hpp"
 #include "tutti/server/shape_ties.hpp"
 #include "tutti/server/shape_uncertainty.hpp"
@@ -23,12 +24,12 @@ namespace {
 
 /// Indices of the nodes of each robot that become proxy nodes, in time order.
 std::map<RobotId, std::vector<std::size_t>> choose_nodes(const MapEstimate& map) {
+  const MapComponents components = choose_components(map);
   std::map<RobotId, std::vector<std::size_t>> chosen;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const MapNode& node = map.nodes[i];
-    auto& nodes = chosen[node.id.robot];
-    const bool attached = nodes.empty() || map.nodes[nodes.front()].component == node.component;
-    if (attached && node.representative) nodes.push_back(i);
+    if (node.representative && node.component == components.of_robot.at(node.id.robot))
+      chosen[node.id.robot].push_back(i);
   }
   return chosen;
 }

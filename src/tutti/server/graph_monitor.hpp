@@ -11,9 +11,10 @@
 namespace tutti::server {
 
 /// Reads the latest estimate of the representative nodes into a proxy graph, with each node's uncertainty relative to
-/// the robot's previous one and its support. A robot's nodes that hang together with nothing (a submap before them is
-/// missing) are left out until they do. Over failed odometry the covariances are equal shares of what the closures make
-/// of the whole stretch. Says how sure it is of each robot's shape, unless the map does not determine its poses.
+/// the robot's previous one and its support. Of a robot's nodes only those of its component count (map_components.hpp);
+/// the others (submaps between them are missing) are left out until closures join them. Over failed odometry the
+/// covariances are equal shares of what the closures make of the whole stretch. Says how sure it is of each robot's
+/// shape, unless the map does not determine its poses.
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config);
 
 /// How many independent closures support the stretch between consecutive chosen nodes of one robot: the closures of the

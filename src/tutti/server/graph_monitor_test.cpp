@@ -8,6 +8,7 @@
 
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/server/map_components.hpp"
 #include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
@@ -115,6 +116,59 @@ TEST(MonitorGraph, ARobotWhosePosesAreOpenIsLeftOutAlone) {
     EXPECT_EQ(of(graph.shapes, robot), 1);
   }
   for (const ProxyNode& node : graph.nodes) EXPECT_TRUE(node.covariance.allFinite());
+}
+
+// Of nine submaps the second never arrives, so that the robot's way is in two pieces that nothing joins.
+TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerPiece) {
+  SubmapSet submaps;
+  for (const std::uint32_t robot : {0U, 1U})
+    for (Submap& submap : test::make_submaps(RobotId{robot}, {}, Rng(robot)))
+      submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
+  submaps.erase({RobotId{0}, 1});
+  const MapEstimate map = estimate_map(submaps, {}, {});
+  const ProxyGraph graph = monitor_graph(map, 1, {});
+  const auto nodes_of = [&](std::uint32_t robot) {
+    return std::ranges::count_if(graph.nodes, [&](const ProxyNode& node) { return node.robot == RobotId{robot}; });
+  };
+  EXPECT_EQ(nodes_of(0), 36);  // keyframes 20 .. 90, every other one
+  EXPECT_EQ(nodes_of(1), 46);
+  EXPECT_EQ(graph.nodes.front().stamp, submaps.at({RobotId{0}, 2})->keyframes.front().stamp);
+  ASSERT_EQ(graph.components.size(), 2U);
+  EXPECT_EQ(graph.components[0].component, 1U);  // component 0 is the piece left out
+  // Closures join the pieces: both are sent.
+  const ProxyGraph joined = monitor_graph(estimate_map(submaps, verdicts_of(submaps, test::TestFinder(1)), {}), 2, {});
+  EXPECT_EQ(std::ranges::count_if(joined.nodes, [](const ProxyNode& n) { return n.robot == RobotId{0}; }), 36 + 6);
+}
+
+/// `count` nodes of a robot after those it has, of which every `of_each`th is representative.
+void append(MapEstimate& map, std::uint32_t robot, std::uint32_t component, int count, int of_each) {
+  for (int k = 0; k < count; ++k) {
+    const auto index = static_cast<std::uint32_t>(map.nodes.size());
+    map.nodes.push_back({.id = {RobotId{robot}, index},
+                         .stamp = {1'000'000'000LL * index},
+                         .representative = k % of_each == 0,
+                         .component = component});
+  }
+}
+
+TEST(ChooseComponents, MostRepresentativeNodesThenMostNodesThenTheNewest) {
+  MapEstimate map;
+  append(map, 0, 0, 10, 5);
+  append(map, 0, 1, 3, 1);
+  append(map, 1, 2, 4, 2);
+  append(map, 1, 3, 4, 2);
+  append(map, 2, 4, 6, 3);
+  append(map, 2, 5, 4, 2);
+  const MapComponents chosen = choose_components(map);
+  EXPECT_EQ(chosen.of_robot.at(RobotId{0}), 1U);  // 3 of 3 against 2 of 10
+  EXPECT_EQ(chosen.of_robot.at(RobotId{1}), 3U);  // equal: the newest
+  EXPECT_EQ(chosen.of_robot.at(RobotId{2}), 4U);  // 2 of 6 and 2 of 4
+  EXPECT_EQ(chosen.largest, 1U);
+  append(map, 3, 2, 1, 1);  // robot 1's smaller piece does not count, though with robot 3 it has three
+  EXPECT_EQ(choose_components(map).largest, 1U);
+  append(map, 3, 3, 2, 1);  // with robot 1's 2 of 4
+  EXPECT_EQ(choose_components(map).largest, 3U);
+  EXPECT_TRUE(choose_components({}).of_robot.empty());
 }
 
 TEST(MonitorGraph, ShapesAreThoseOfTheNodesSent) {
