@@ -26,7 +26,7 @@ def section(report):
         cells = []
         for policy in policies:
             own = robot["policies"][policy]
-            error = own["rmse_m"] if own["rmse_m"] is not None else own["agreement_rmse_m"]
+            error = own["rmse_m"] if own["scored_share"] is not None else own["agreement_rmse_m"]
             cells.append(f"{metres(error)} ({own['constraints']})")
         lines.append(row(robot["name"], metres(robot["onboard_rmse_m"]), metres(robot["server_rmse_m"]), *cells))
     server, check = report["server"], report["server"].get("closure_check")

@@ -49,7 +49,11 @@ def metres(value):
 
 
 def improvement(onboard, corrected):
-    return f"{100 * (1 - corrected / onboard):.0f} %"
+    return "-" if onboard is None or corrected is None else f"{100 * (1 - corrected / onboard):.0f} %"
+
+
+def times(error, of):
+    return "-" if error is None or of is None else f"{error / of:.2f}x"
 
 
 def update_ms(timing, robot, policy):
@@ -80,7 +84,7 @@ def table(key, report, timing):
     for title, name, policy in rows:
         own = policies[policy]
         lines.append(row(title, *(paper_cells(name) if name else ("", "", "")), metres(own["rmse_m"]),
-                         improvement(onboard, own["rmse_m"]), f"{own['rmse_m'] / robot['server_rmse_m']:.2f}x",
+                         improvement(onboard, own["rmse_m"]), times(own["rmse_m"], robot["server_rmse_m"]),
                          update_ms(timing, robot["name"], policy),
                          f"+{own['constraints']} ({100 * own['constraints'] / robot['odometry_factors']:.2f} %)"))
     lines.append(row("server", f"{theirs['server']:.2f}", "", "", metres(robot["server_rmse_m"]),
@@ -163,6 +167,8 @@ def seeds_table(runs, seeds):
             own = [r["policies"][report["default_policy"]] for r, report in zip(robots, reports)]
 
             def spread(values):
+                if None in values:
+                    return "-"
                 return f"{statistics.median(values):.3f} ({min(values):.3f} - {max(values):.3f})"
             lines.append(row(mission, robots[0]["name"], spread([r["onboard_rmse_m"] for r in robots]),
                              spread([r["server_rmse_m"] for r in robots]), spread([p["rmse_m"] for p in own]),

@@ -6,22 +6,42 @@ import subprocess
 import tempfile
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
+ERRORS = ("rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg")
+
+
+def without_partial(report):
+    """The report without the errors that were scored on too little of the way (docs/report.md): no table has them."""
+    def drop(figures, prefix=""):
+        if figures.get(f"{prefix}partial"):
+            for key in figures:
+                if key.startswith(prefix) and key[len(prefix):] in ERRORS:
+                    figures[key] = None
+
+    drop(report["server"])
+    for robot in report["robots"]:
+        for prefix in ("onboard_", "server_"):
+            drop(robot, prefix)
+        for policy in robot["policies"].values():
+            drop(policy)
+            drop(policy, "agreement_")
+    return report
 
 
 def report_of(*command):
-    """report.json of one call of the program; its output folder is thrown away."""
+    """report.json of one call of the program, without partial figures; its output folder is thrown away."""
     with tempfile.TemporaryDirectory() as out:
         subprocess.run([str(part) for part in command] + ["--out", out], check=True, capture_output=True)
-        return json.loads((pathlib.Path(out) / "report.json").read_text())
+        return without_partial(json.loads((pathlib.Path(out) / "report.json").read_text()))
 
 
 def outcome_of(out, *command):
-    """(report.json, timing.json) of one call, its files kept in the folder `out`; a finished one is not run again."""
+    """(report.json without partial figures, timing.json) of one call, its files kept in the folder `out`; a finished one is not run again."""
     out = pathlib.Path(out)
     if not (out / "timing.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         subprocess.run([str(part) for part in command] + ["--out", str(out)], check=True, capture_output=True)
-    return [json.loads((out / name).read_text()) for name in ("report.json", "timing.json")]
+    report, timing = [json.loads((out / name).read_text()) for name in ("report.json", "timing.json")]
+    return [without_partial(report), timing]
 
 
 def compare(*policies):

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,12 +23,15 @@ struct RobotOutcome {
   std::string default_policy;
   std::vector<std::pair<std::string, const robot::RobotAgent*>> agents;  ///< By policy; the default one is among them.
   std::size_t replayed = 0;  ///< Odometry poses of the recording, from the first; a mission may end before the rest.
+
+  [[nodiscard]] std::span<const StampedPose> way() const { return {recording->recording.odometry.data(), replayed}; }
 };
 
 /// Fill in what is measured at the end, in this order: accuracy of every estimate; the final map, its closures and the
 /// transforms between robots; the clouds. Accuracy: ATE after one rigid alignment (SE(3), no scale), RPE over 1 s and
-/// over 10 m, at keyframes; kink of every correction; the server's joint figure over all robots of its largest
-/// component with one alignment. Agreement: ATE of a robot's estimate with the server's in the role of the reference.
+/// over 10 m, at keyframes, each beside the share of the way it was scored on; kink of every correction; the server's
+/// joint figure over all robots of its largest component with one alignment. Agreement: ATE of a robot's estimate with
+/// the server's in the role of the reference.
 /// Robots whose reference is not for scoring get no accuracy.
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const evaluation::AssociationConfig& association, MissionRecord& record);

@@ -2,25 +2,39 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <span>
 
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/evaluation/ate.hpp"
+#include "tutti/evaluation/keyframe_way.hpp"
 #include "tutti/evaluation/kink.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/mission/evaluate.hpp"
+#include "tutti/server/map_components.hpp"
 
 namespace tutti::mission {
 namespace {
 
-Accuracy accuracy_of(const Trajectory& estimate, const MissionRecording& robot,
-                     const evaluation::AssociationConfig& association) {
+/// One robot, and what its estimates are scored against.
+struct Scoring {
+  const MissionRecording& robot;
+  const evaluation::AssociationConfig& association;
+  evaluation::KeyframeWay way;
+};
+
+/// The share of the robot's whole way that some of its keyframes stand for; of a robot that never moved, all.
+template <class Poses>
+double share_of(const evaluation::KeyframeWay& way, const Poses& poses) {
+  return way.whole_m() > 0.0 ? way.part_m(poses) / way.whole_m() : 1.0;
+}
+
+Accuracy accuracy_of(const Trajectory& estimate, const Scoring& scoring) {
   Accuracy out;
-  if (!robot.score_against_reference) return out;
-  const auto pairs = evaluation::associate(estimate, robot.recording.reference, association);
+  if (!scoring.robot.score_against_reference) return out;
+  const auto pairs = evaluation::associate(estimate, scoring.robot.recording.reference, scoring.association);
   if (const auto ate = evaluation::ate(pairs)) {
     out.rmse_m = ate->rmse_m;
     out.max_error_m = ate->max_m;
+    out.scored_share = share_of(scoring.way, pairs);
   }
   if (const auto rpe = evaluation::rpe_over_time(pairs, kRpeInterval_s)) {
     out.rpe_m = rpe->rmse_m;
@@ -33,13 +47,16 @@ Accuracy accuracy_of(const Trajectory& estimate, const MissionRecording& robot,
   return out;
 }
 
-/// Only of the first node's component: a chain with a gap may lie in several, and their frames are unrelated. How many
+/// Only of the robot's component: a chain with a gap may lie in several, and their frames are unrelated. How many
 /// keyframes are left out.
-std::size_t read_server_estimate(const server::MapEstimate& map, RobotRecord& out) {
+std::size_t read_server_estimate(const server::MapEstimate& map, const server::MapComponents& components,
+                                 RobotRecord& out) {
+  const auto component = components.of_robot.find(out.id);
+  if (component == components.of_robot.end()) return 0;
+  out.component = component->second;
   std::size_t left_out = 0;
   for (const server::MapNode& node : map.nodes) {
     if (node.id.robot != out.id) continue;
-    if (out.server_estimate.empty()) out.component = node.component;
     if (node.component == out.component)
       out.server_estimate.push_back({node.stamp, node.T_world_body});
     else
@@ -48,11 +65,10 @@ std::size_t read_server_estimate(const server::MapEstimate& map, RobotRecord& ou
   return left_out;
 }
 
-PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& agent, const MissionRecording& robot,
-                           const Trajectory& raw, const Trajectory& server,
-                           const evaluation::AssociationConfig& association) {
+PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& agent, const Scoring& scoring,
+                           const Trajectory& raw, const Trajectory& server) {
   PolicyRecord out{.name = name, .corrected = agent.corrected()};
-  out.accuracy = accuracy_of(out.corrected, robot, association);
+  out.accuracy = accuracy_of(out.corrected, scoring);
   if (const auto agreement = evaluation::agreement(out.corrected, server)) out.agreement_rmse_m = agreement->rmse_m;
   out.jumps = agent.repaired_jumps();
   out.kink = evaluation::kink(raw, out.corrected, out.jumps);
@@ -62,18 +78,10 @@ PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& age
   return out;
 }
 
-double path_length(std::span<const StampedPose> trajectory) {
-  double length = 0.0;
-  for (std::size_t i = 1; i < trajectory.size(); ++i)
-    length += (trajectory[i].pose.translation - trajectory[i - 1].pose.translation).norm();
-  return length;
-}
-
-/// Way, time and where odometry went wrong, as far as the robot came.
+/// Time and where odometry went wrong, as far as the robot came.
 void read_run(const RobotOutcome& robot, RobotRecord& out) {
   const Recording& recording = robot.recording->recording;
-  const std::span<const StampedPose> replayed(recording.odometry.data(), robot.replayed);
-  out.distance_m = path_length(replayed);
+  const auto replayed = robot.way();
   out.start_s = robot.recording->start_s;
   if (replayed.empty()) return;
   out.duration_s = replayed.back().stamp - replayed.front().stamp;
@@ -85,6 +93,7 @@ void read_run(const RobotOutcome& robot, RobotRecord& out) {
 
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const evaluation::AssociationConfig& association, MissionRecord& record) {
+  const server::MapComponents components = server::choose_components(map);
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const RobotOutcome& robot = robots[i];
     const MissionRecording& recording = *robot.recording;
@@ -97,19 +106,21 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     out.odometry_factors = agent->second->odometry_factors();
     out.keyframes = agent->second->keyframes().size();
     for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
-    if (const std::size_t left_out = read_server_estimate(map, out); left_out > 0)
+    const Scoring scoring{recording, association, evaluation::KeyframeWay(robot.way(), out.odometry)};
+    out.distance_m = scoring.way.whole_m();
+    if (const std::size_t left_out = read_server_estimate(map, components, out); left_out > 0)
       record.notes.push_back(
-          fmt::format("{}: the server holds pieces of its way that nothing joins; {} of {} keyframes "
-                      "are not in the piece with the first and left out of its figures",
+          fmt::format("{}: the server holds pieces of its way that nothing joins; {} of {} keyframes are not in the "
+                      "largest and left out of its figures",
                       out.name, left_out, left_out + out.server_estimate.size()));
+    if (!out.server_estimate.empty()) out.mapped_share = share_of(scoring.way, out.server_estimate);
     if (const auto factor = map.rotation_factors.find(out.id); factor != map.rotation_factors.end())
       out.rotation_factor = factor->second;
     if (recording.score_against_reference) out.reference = recording.recording.reference;
-    out.onboard = accuracy_of(out.odometry, recording, association);
-    out.server = accuracy_of(out.server_estimate, recording, association);
+    out.onboard = accuracy_of(out.odometry, scoring);
+    out.server = accuracy_of(out.server_estimate, scoring);
     for (const auto& [name, policy_agent] : robot.agents)
-      out.policies.push_back(
-          policy_record(name, *policy_agent, recording, out.odometry, out.server_estimate, association));
+      out.policies.push_back(policy_record(name, *policy_agent, scoring, out.odometry, out.server_estimate));
     for (const robot::Whereabouts& other : agent->second->whereabouts())
       out.whereabouts.push_back({other.robot, other.stamp, other.T_map_body});
   }

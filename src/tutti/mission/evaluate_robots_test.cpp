@@ -33,9 +33,19 @@ class EvaluateRobots : public ::testing::Test {
     for (const Keyframe& keyframe : agent_.keyframes())
       map_.nodes.push_back({.id = {RobotId{0}, index++},
                             .stamp = keyframe.stamp,
+                            .representative = keyframe.representative,
                             .T_odom_body = keyframe.T_odom_body,
                             .T_world_body = T_world_reference_ * keyframe.T_odom_body});
     map_.components = 1;
+  }
+  /// The server's map of nodes [first, last) is in a frame of its own.
+  void put_elsewhere(std::size_t first, std::size_t last) {
+    const Pose3 T_elsewhere_world{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {100, 0, 0}};
+    for (std::size_t i = first; i < last; ++i) {
+      map_.nodes[i].component = map_.components;
+      map_.nodes[i].T_world_body = T_elsewhere_world * map_.nodes[i].T_world_body;
+    }
+    ++map_.components;
   }
   const RobotRecord& evaluate() {
     record_.robots.resize(1);
@@ -56,16 +66,49 @@ TEST_F(EvaluateRobots, AWholeChainIsScoredWhole) {
   EXPECT_EQ(robot.server_estimate.size(), map_.nodes.size());
   EXPECT_LT(*robot.server.rmse_m, 1e-9);
   EXPECT_TRUE(record_.notes.empty());
+  EXPECT_DOUBLE_EQ(*robot.onboard.scored_share, 1.0);
+  EXPECT_DOUBLE_EQ(*robot.server.scored_share, 1.0);
+  EXPECT_DOUBLE_EQ(robot.mapped_share, 1.0);
+}
+
+// The first keyframes are a piece of their own: the rest is what counts.
+TEST_F(EvaluateRobots, TheLargestPieceIsScoredAndItsShareSaid) {
+  put_elsewhere(0, 11);
+  const RobotRecord& robot = evaluate();
+  EXPECT_EQ(robot.component, 0U);
+  EXPECT_EQ(robot.server_estimate.size(), 30U);
+  EXPECT_EQ(robot.server_estimate.front().stamp, at(11));
+  EXPECT_LT(*robot.server.rmse_m, 1e-9);
+  EXPECT_NEAR(*robot.server.scored_share, 29.5 / 40.0, 1e-9);
+  EXPECT_NEAR(robot.mapped_share, 29.5 / 40.0, 1e-9);
+  EXPECT_TRUE(is_partial(robot.server.scored_share));
+  EXPECT_FALSE(is_partial(robot.onboard.scored_share));
+  EXPECT_FALSE(is_partial(robot.policies[0].accuracy.scored_share));
+  EXPECT_NE(record_.notes.at(0).find("11 of 41 keyframes"), std::string::npos) << record_.notes[0];
+}
+
+TEST_F(EvaluateRobots, KeyframesThatNeverCameAreNotScored) {
+  map_.nodes.erase(map_.nodes.begin() + 5, map_.nodes.begin() + 15);
+  const RobotRecord& robot = evaluate();
+  EXPECT_NEAR(*robot.server.scored_share, 0.75, 1e-9);
+  EXPECT_DOUBLE_EQ(*robot.onboard.scored_share, 1.0);
+}
+
+TEST_F(EvaluateRobots, AReferenceOfHalfTheWayScoresHalf) {
+  recording_.recording.reference.resize(21);
+  const RobotRecord& robot = evaluate();
+  for (const auto& share :
+       {robot.onboard.scored_share, robot.server.scored_share, robot.policies[0].accuracy.scored_share})
+    EXPECT_NEAR(*share, 20.5 / 40.0, 1e-9);
+  EXPECT_DOUBLE_EQ(robot.mapped_share, 1.0);
+  record_ = {};
+  recording_.score_against_reference = false;
+  EXPECT_FALSE(evaluate().onboard.scored_share.has_value());
 }
 
 TEST_F(EvaluateRobots, PosesOfAnotherComponentAreNotCompared) {
-  const Pose3 T_elsewhere_world{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ())), {100, 0, 0}};
   const std::size_t first = map_.nodes.size() - 10;
-  for (std::size_t i = first; i < map_.nodes.size(); ++i) {
-    map_.nodes[i].component = 1;
-    map_.nodes[i].T_world_body = T_elsewhere_world * map_.nodes[i].T_world_body;
-  }
-  map_.components = 2;
+  put_elsewhere(first, map_.nodes.size());
   const RobotRecord& robot = evaluate();
   EXPECT_EQ(robot.component, 0U);
   EXPECT_EQ(robot.server_estimate.size(), first);

@@ -3,41 +3,38 @@
 #include <map>
 
 #include "tutti/evaluation/ate.hpp"
+#include "tutti/evaluation/keyframe_way.hpp"
 #include "tutti/evaluation/transform_error.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/evaluate.hpp"
+#include "tutti/server/map_components.hpp"
 
 namespace tutti::mission {
 namespace {
 
-/// The component with most nodes.
-std::uint32_t largest_component(const server::MapEstimate& map) {
-  std::map<std::uint32_t, std::size_t> size;
-  for (const server::MapNode& node : map.nodes) ++size[node.component];
-  const auto largest =
-      std::max_element(size.begin(), size.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  return largest == size.end() ? 0 : largest->first;
-}
-
 /// All robots of the largest component together, one alignment.
 void measure_joint_map(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
-                       const evaluation::AssociationConfig& association, ServerRecord& out) {
+                       const server::MapComponents& components, const evaluation::AssociationConfig& association,
+                       MissionRecord& record) {
+  ServerRecord& out = record.server;
   out.components = map.components;
-  out.largest_component = largest_component(map);
+  out.largest_component = components.largest;
   std::vector<evaluation::PosePair> all;
-  for (const RobotOutcome& robot : robots) {
-    if (!robot.recording->score_against_reference) continue;
-    Trajectory estimate;
-    for (const server::MapNode& node : map.nodes)
-      if (node.id.robot == robot.recording->recording.robot && node.component == out.largest_component)
-        estimate.push_back({node.stamp, node.T_world_body});
-    const auto pairs = evaluation::associate(estimate, robot.recording->recording.reference, association);
+  double scored_m = 0.0, whole_m = 0.0;
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    const MissionRecording& robot = *robots[i].recording;
+    const evaluation::KeyframeWay way(robots[i].way(), record.robots[i].odometry);
+    whole_m += way.whole_m();
+    if (!robot.score_against_reference || record.robots[i].component != components.largest) continue;
+    const auto pairs = evaluation::associate(record.robots[i].server_estimate, robot.recording.reference, association);
+    scored_m += way.part_m(pairs);
     all.insert(all.end(), pairs.begin(), pairs.end());
   }
   if (const auto ate = evaluation::ate(all)) {
     out.joint.rmse_m = ate->rmse_m;
     out.joint.max_error_m = ate->max_m;
+    out.joint.scored_share = whole_m > 0.0 ? scored_m / whole_m : 1.0;
     out.T_reference_world = ate->T_reference_estimate;
   }
 }
@@ -51,9 +48,10 @@ std::string without_values(const std::string& reason) {
 
 void judge_closures(const server::MapServer& server, MissionRecord& record) {
   std::map<std::string, RejectionRecord> refused;
-  const auto count = [&](const std::string& reason, RobotId a, RobotId b) {
+  const auto count = [&](const std::string& reason, const std::string& with_values, RobotId a, RobotId b) {
     RejectionRecord& entry = refused[reason];
     entry.reason = reason;
+    if (entry.example.empty()) entry.example = with_values;
     ++(a == b ? entry.intra : entry.inter);
   };
   for (const server::JudgedClosure& judged : server.map().closures) {
@@ -61,10 +59,11 @@ void judge_closures(const server::MapServer& server, MissionRecord& record) {
     if (judged.accepted)
       record.server.closures.push_back({from, to});
     else
-      count("inconsistent with the others", from.robot, to.robot);
+      count("inconsistent with the others", "", from.robot, to.robot);
   }
   for (const auto& [pair, verdict] : server.state().verdicts)
-    if (verdict.closures.empty()) count(without_values(verdict.reason), pair.first.robot, pair.second.robot);
+    if (verdict.closures.empty())
+      count(without_values(verdict.reason), verdict.reason, pair.first.robot, pair.second.robot);
   for (auto& [reason, entry] : refused) record.server.rejections.push_back(std::move(entry));
 }
 
@@ -113,14 +112,11 @@ void check_closures(const std::vector<RobotOutcome>& robots, const server::MapSe
 
 /// T_odom-of-robot <- world, from the server's and the raw poses of the robot's keyframes: the rigid motion that fits
 /// the whole trajectory best.
-std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& map) {
+std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& map, std::uint32_t component) {
   std::vector<Eigen::Vector3d> odom;
   std::vector<Eigen::Vector3d> world;
-  std::optional<std::uint32_t> component;
   for (const server::MapNode& node : map.nodes) {
-    if (node.id.robot != robot) continue;
-    if (!component) component = node.component;
-    if (node.component != *component) continue;
+    if (node.id.robot != robot || node.component != component) continue;
     odom.push_back(node.T_odom_body.translation);
     world.push_back(node.T_world_body.translation);
   }
@@ -129,9 +125,8 @@ std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& m
 }
 
 /// Where every robot's odometry frame lies in that of the first robot of its component.
-void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map, MissionRecord& record) {
-  std::map<RobotId, std::uint32_t> component;
-  for (const server::MapNode& node : map.nodes) component.try_emplace(node.id.robot, node.component);
+void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
+                   const std::map<RobotId, std::uint32_t>& component, MissionRecord& record) {
   for (std::size_t i = 0; i < robots.size(); ++i)
     for (std::size_t j = i + 1; j < robots.size(); ++j) {
       const MissionRecording& a = *robots[i].recording;
@@ -139,8 +134,8 @@ void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEst
       const auto of_a = component.find(a.recording.robot);
       const auto of_b = component.find(b.recording.robot);
       if (of_a == component.end() || of_b == component.end() || of_a->second != of_b->second) continue;
-      const auto T_a_world = odom_from_world(a.recording.robot, map);
-      const auto T_b_world = odom_from_world(b.recording.robot, map);
+      const auto T_a_world = odom_from_world(a.recording.robot, map, of_a->second);
+      const auto T_b_world = odom_from_world(b.recording.robot, map, of_b->second);
       if (!T_a_world || !T_b_world) continue;
       TransformRecord transform{a.recording.name, b.recording.name, *T_a_world * T_b_world->inverse(), {}, {}};
       const auto& way = b.recording.odometry;
@@ -159,13 +154,14 @@ void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEst
 
 void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
                      const evaluation::AssociationConfig& association, MissionRecord& record) {
-  measure_joint_map(robots, server.map(), association, record.server);
+  const server::MapComponents components = server::choose_components(server.map());
+  measure_joint_map(robots, server.map(), components, association, record);
   judge_closures(server, record);
   name_failures(server.map(), record.server);
   check_closures(robots, server, association, record);
   record.server.graph = server.map().graph;
   for (const server::MapNode& node : server.map().nodes) record.server.nodes.push_back({node.id, node.stamp});
-  relate_robots(robots, server.map(), record);
+  relate_robots(robots, server.map(), components.of_robot, record);
   evaluate_map(server, association, record);
 }
 

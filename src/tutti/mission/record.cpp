@@ -5,6 +5,14 @@
 
 namespace tutti::mission {
 
+bool is_partial(std::optional<double> scored_share) { return scored_share && *scored_share < kPartialBelow; }
+
+bool is_tied(const MissionRecord& record, RobotId robot) {
+  return std::ranges::any_of(record.server.closures, [robot](const ClosureRecord& closure) {
+    return closure.from.robot == robot || closure.to.robot == robot;
+  });
+}
+
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name) {
   for (const auto& policy : robot.policies)
     if (policy.name == name) return &policy;

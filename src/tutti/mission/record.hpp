@@ -26,6 +26,9 @@
 /// not be measured is std::nullopt (or an empty vector). docs/report.md defines every figure.
 namespace tutti::mission {
 
+/// A figure that was scored on less of the way than this is partial: shown, marked as such, and never a headline.
+inline constexpr double kPartialBelow = 0.95;
+
 /// One estimate of one robot against the reference, after one rigid alignment (SE(3), no scale).
 struct Accuracy {
   std::optional<double> rmse_m;       ///< ATE, root mean square.
@@ -34,6 +37,9 @@ struct Accuracy {
   std::optional<double> rpe_deg;      ///< The same, of the rotation.
   std::optional<double> rpe_10m_m;    ///< RPE over a way of 10 m.
   std::optional<double> rpe_10m_deg;
+  /// Which share of its whole way, replayed, these figures were scored on, 0 to 1 (of the joint map: of all robots'
+  /// ways together). Nothing when nothing was scored.
+  std::optional<double> scored_share;
 };
 
 /// A constraint that a robot holds at the end of the mission, between two of its own keyframes.
@@ -47,11 +53,12 @@ struct ConstraintRecord {
 struct PolicyRecord {
   std::string name;
   Accuracy accuracy;
-  std::optional<double> agreement_rmse_m;  ///< ATE of the corrected estimate with the server's as the reference.
-  std::vector<RepairedJump> jumps;         ///< Where the correction takes back what odometry jumped by.
-  std::optional<evaluation::Kink> kink;    ///< What it does to other short motions of the raw odometry.
-  std::size_t constraints_added = 0;       ///< Held at the end of the mission.
-  Trajectory corrected;                    ///< T_map_body at keyframes.
+  /// ATE of the corrected estimate with the server's as the reference; scored on RobotRecord::mapped_share of the way.
+  std::optional<double> agreement_rmse_m;
+  std::vector<RepairedJump> jumps;       ///< Where the correction takes back what odometry jumped by.
+  std::optional<evaluation::Kink> kink;  ///< What it does to other short motions of the raw odometry.
+  std::size_t constraints_added = 0;     ///< Held at the end of the mission.
+  Trajectory corrected;                  ///< T_map_body at keyframes.
   std::vector<ConstraintRecord> constraints;
 };
 
@@ -121,9 +128,10 @@ struct RobotRecord {
   std::size_t keyframes = 0;
   std::size_t submaps = 0;
   std::size_t proxy_nodes = 0;  ///< Of this robot in the last broadcast.
-  std::uint32_t component = 0;  ///< Robots of one component share the server's world frame.
+  std::uint32_t component = 0;  ///< Robots of one component share the server's world frame (map_components.hpp).
   Trajectory odometry;          ///< T_odom_body at keyframes.
   Trajectory server_estimate;   ///< T_world_body at keyframes, those of `component`.
+  double mapped_share = 0.0;    ///< Share of its way, 0 to 1, that `server_estimate` covers.
   Trajectory reference;         ///< T_reference_body, one frame for all robots; empty when there is none.
   std::vector<UpdateRecord> updates;
   std::vector<AlertRecord> alerts;                      ///< By start; see follow_alerts().
@@ -145,6 +153,8 @@ struct ClosureRecord {
 /// How many candidate closures were refused for one reason.
 struct RejectionRecord {
   std::string reason;
+  std::string example;    ///< A pair's, with its values: "too short: 3.0 s, at least 5.0 s needed"; empty for closures
+                          ///< that contradict the others.
   std::size_t intra = 0;  ///< Both ends on one robot.
   std::size_t inter = 0;
 };
@@ -184,7 +194,7 @@ struct ServerRecord {
   std::vector<ClosureRecord> closures;  ///< Accepted.
   std::vector<RejectionRecord> rejections;
   std::optional<ClosureCheckRecord> closure_check;
-  std::uint32_t largest_component = 0;                 ///< Most keyframes.
+  std::uint32_t largest_component = 0;                 ///< Most representative nodes (map_components.hpp).
   Accuracy joint;                                      ///< All robots of the largest component together, one alignment.
   std::optional<Pose3> T_reference_world;              ///< That alignment.
   std::optional<evaluation::CloudDistance> map_error;  ///< The joint map against the survey, same robots and alignment.
@@ -248,8 +258,9 @@ struct TimingRecord {
 struct MissionRecord {
   std::string mission;
   std::string description;
-  std::string input;               ///< "real recordings", "real odometry, closures from the reference", "simulated"...
-  std::vector<std::string> notes;  ///< Plain words about input and limits, one sentence or two each.
+  std::string input;  ///< "real recordings", "real odometry, closures from the reference", "simulated"...
+  std::vector<std::string> warnings;  ///< What makes the figures mean little, one sentence each: read first of all.
+  std::vector<std::string> notes;     ///< Plain words about input and limits, one sentence or two each.
   std::uint64_t seed = 0;
   std::string default_policy;
   double duration_s = 0.0;                    ///< Mission time.
@@ -264,6 +275,9 @@ struct MissionRecord {
   TimingRecord timing;
 };
 
+bool is_partial(std::optional<double> scored_share);
+/// Whether an accepted closure ties one of the robot's keyframes to anything: otherwise the map of it is its odometry.
+bool is_tied(const MissionRecord& record, RobotId robot);
 /// By name; null when there is none.
 const PolicyRecord* find_policy(const RobotRecord& robot, const std::string& name);
 const PolicyTiming* find_timing(const MissionRecord& record, const std::string& robot, const std::string& policy);

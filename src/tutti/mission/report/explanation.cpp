@@ -329,6 +329,12 @@ std::string format_disagreement(const Explanation& e, const PictureClock& clock)
                             significant(way.translation_m), significant(way.rotation_rad / kRadPerDeg));
 }
 
+std::string format_comparison(const MissionRecord& record, const RobotRecord& robot) {
+  if (!robot.explanation->disagrees() && !is_tied(record, robot.id))
+    return "there was nothing to compare odometry with: no loop closure ties its map";
+  return format_disagreement(*robot.explanation, mission_clock(robot));
+}
+
 std::string format_scale(const Explanation& explanation, int scale) {
   if (scale < 0 || static_cast<std::size_t>(scale) >= explanation.scale_length_m.size()) return "-";
   const double length_m = explanation.scale_length_m[static_cast<std::size_t>(scale)];

@@ -69,6 +69,9 @@ std::string format_jump(const RepairedJump& jump, const PictureClock& clock);
 /// "odometry and map part by up to 12 x the threshold", and the way that odometry misses by most, if any; or that they
 /// agree.
 std::string format_disagreement(const consistency::Explanation& explanation, const PictureClock& clock);
+/// The same of a robot's last update, whose explanation is there; or that there was nothing to compare with, where the
+/// map of it is its own odometry.
+std::string format_comparison(const MissionRecord& record, const RobotRecord& robot);
 /// The scale an origin stands out at, as a length: "16 m"; "-" when the explanation does not have it.
 std::string format_scale(const consistency::Explanation& explanation, int scale);
 /// "62.0 s - 72.0 s"

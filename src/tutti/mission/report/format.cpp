@@ -23,6 +23,40 @@ std::string format_metres(std::optional<double> value_m) {
   return value_m && std::isfinite(*value_m) ? fmt::format("{:.3f} m", *value_m) : "-";
 }
 
+std::string format_error(std::optional<double> value_m, std::optional<double> scored_share) {
+  const std::string value = format_metres(value_m);
+  return is_partial(scored_share) && value != "-" ? "(" + value + ")" : value;
+}
+
+std::string format_scored(std::optional<double> scored_share) {
+  if (!scored_share || !std::isfinite(*scored_share)) return "-";
+  const double percent = 100.0 * *scored_share;
+  return fmt::format("{:.0f} %", is_partial(scored_share) ? std::floor(percent) : percent);
+}
+
+std::string format_rmse(const Accuracy& accuracy) {
+  const std::string rmse = format_metres(accuracy.rmse_m);
+  if (!is_partial(accuracy.scored_share)) return rmse;
+  return fmt::format("({}, partial: on {})", rmse, format_scored(accuracy.scored_share));
+}
+
+std::optional<double> for_headline(std::optional<double> value_m, std::optional<double> scored_share) {
+  return is_partial(scored_share) ? std::nullopt : value_m;
+}
+
+std::optional<double> server_share(const RobotRecord& robot) {
+  if (robot.server.scored_share || robot.server_estimate.empty()) return robot.server.scored_share;
+  return robot.mapped_share;
+}
+
+bool has_partial_figures(const MissionRecord& record) {
+  const auto partial = [](const Accuracy& accuracy) { return is_partial(accuracy.scored_share); };
+  return std::ranges::any_of(record.robots, [&](const RobotRecord& robot) {
+    return is_partial(server_share(robot)) || partial(robot.onboard) ||
+           std::ranges::any_of(robot.policies, [&](const PolicyRecord& policy) { return partial(policy.accuracy); });
+  });
+}
+
 std::string format_distance(double value_m) {
   if (!std::isfinite(value_m)) return "-";
   return value_m < 999.5 ? fmt::format("{:.0f} m", value_m) : fmt::format("{:.2f} km", value_m / 1000.0);
@@ -95,7 +129,8 @@ std::string format_mapped_robots(const MissionRecord& record) {
   if (record.server.components <= 1) return "all robots";
   std::vector<std::string> names;
   for (const RobotRecord& robot : record.robots)
-    if (robot.component == record.server.largest_component) names.push_back(robot.name);
+    if (robot.component == record.server.largest_component && !robot.server_estimate.empty())
+      names.push_back(robot.name);
   std::string out;
   for (std::size_t i = 0; i < names.size(); ++i)
     out += (i == 0 ? "" : i + 1 < names.size() ? ", " : " and ") + names[i];

@@ -14,6 +14,18 @@ namespace tutti::mission {
 
 /// Three decimals with the unit, "-" when not measured or not finite: "0.013 m".
 std::string format_metres(std::optional<double> value_m);
+/// An error and the share of the way that it was scored on; in brackets when that makes it partial: "(0.013 m)".
+std::string format_error(std::optional<double> value_m, std::optional<double> scored_share);
+/// "100 %"; a partial share is rounded down; "-" when nothing was scored.
+std::string format_scored(std::optional<double> scored_share);
+/// An RMSE in a sentence: "0.013 m"; partial: "(0.013 m, partial: on 62 %)".
+std::string format_rmse(const Accuracy& accuracy);
+/// The same error, unless it is partial: then nothing, for a headline.
+std::optional<double> for_headline(std::optional<double> value_m, std::optional<double> scored_share);
+/// What the server's figures of a robot were scored on; without a reference, what the robot's distance to it was.
+std::optional<double> server_share(const RobotRecord& robot);
+/// Whether a figure of the report is in brackets.
+bool has_partial_figures(const MissionRecord& record);
 /// Long distances: "46 m", "1.21 km".
 std::string format_distance(double value_m);
 /// Three significant digits: "0.42 ms", "12.3 ms", "1.20 s".

@@ -138,9 +138,9 @@ std::string timeline(const MissionRecord& record, const RobotRecord& robot, cons
   const PolicyRecord* policy = find_policy(robot, record.default_policy);
   std::string figures;
   if (g.has_reference)
-    figures = fmt::format("RMSE onboard {}, corrected {}, server {}; ", format_metres(robot.onboard.rmse_m),
-                          format_metres(policy != nullptr ? policy->accuracy.rmse_m : std::nullopt),
-                          format_metres(robot.server.rmse_m));
+    figures = "RMSE onboard " + format_rmse(robot.onboard) + ", corrected " +
+              (policy != nullptr ? format_rmse(policy->accuracy) : "-") + ", server " + format_rmse(robot.server) +
+              "; ";
   return figure(svg.str(), robot.name,
                 figures + fmt::format("{} constraints", policy != nullptr ? policy->constraints_added : 0), true);
 }

@@ -48,7 +48,7 @@ std::string verdict(const MissionRecord& record, const RobotRecord& robot) {
   const consistency::Explanation& e = *robot.explanation;
   const PolicyRecord* policy = find_policy(robot, record.default_policy);
   const std::size_t held = policy != nullptr ? policy->constraints_added : 0;
-  std::string text = format_disagreement(e, mission_clock(robot));
+  std::string text = format_comparison(record, robot);
   text += fmt::format("; {} after one rigid alignment", format_metres(e.aligned_rmse_m));
   if (e.expected_rmse_m > 0.0)
     text += fmt::format(", the server expects {} of itself", format_metres(e.expected_rmse_m));

@@ -33,6 +33,25 @@ std::string from_to(std::optional<double> onboard_m, std::optional<double> corre
                      format_metres(corrected_m));
 }
 
+std::optional<double> headline_rmse(const Accuracy& accuracy) {
+  return for_headline(accuracy.rmse_m, accuracy.scored_share);
+}
+
+/// What is no headline, because it was scored on too little of the robot's way; empty when nothing is.
+std::string partial_figures(const RobotRecord& robot, const PolicyRecord* policy) {
+  std::string out;
+  const auto add = [&](std::string_view what, std::optional<double> rmse_m, std::optional<double> share) {
+    if (rmse_m && is_partial(share))
+      out += fmt::format("<br>partial, scored on {} of its way only: {} {}", format_scored(share), what,
+                         format_error(rmse_m, share));
+  };
+  add("onboard", robot.onboard.rmse_m, robot.onboard.scored_share);
+  if (policy != nullptr) add("corrected", policy->accuracy.rmse_m, policy->accuracy.scored_share);
+  add("server", robot.server.rmse_m, robot.server.scored_share);
+  if (policy != nullptr) add("to the server", policy->agreement_rmse_m, robot.mapped_share);
+  return out;
+}
+
 /// What was corrected with how little.
 Card robot_card(const MissionRecord& record, const RobotRecord& robot) {
   const PolicyRecord* policy = find_policy(robot, record.default_policy);
@@ -42,16 +61,18 @@ Card robot_card(const MissionRecord& record, const RobotRecord& robot) {
       fmt::format("<span class=\"swatch {}\"></span>{} <small>{} in {}</small>", robot_class(record, robot.id),
                   escape_xml(robot.name), format_distance(robot.distance_m), format_mission_time(robot.duration_s));
   if (robot.onboard.rmse_m && policy != nullptr)
-    card.value = from_to(robot.onboard.rmse_m, policy->accuracy.rmse_m) +
-                 fmt::format(" <small>server {}</small>", format_metres(robot.server.rmse_m));
+    card.value = from_to(headline_rmse(robot.onboard), headline_rmse(policy->accuracy)) +
+                 fmt::format(" <small>server {}</small>", format_metres(headline_rmse(robot.server)));
   else
     card.value =
-        format_metres(policy != nullptr ? policy->agreement_rmse_m : std::nullopt) + " <small>from the server</small>";
+        format_metres(policy != nullptr ? for_headline(policy->agreement_rmse_m, robot.mapped_share) : std::nullopt) +
+        " <small>from the server</small>";
   card.detail =
       fmt::format("<b>{}</b> constraints beside {} odometry factors ({}); <b>{}</b> received ({}), {} sent ({})",
                   constraints, robot.odometry_factors, format_share(constraints, robot.odometry_factors),
                   format_bytes(static_cast<double>(robot.bytes_down)), rate(robot.bytes_down, robot.duration_s),
                   format_bytes(static_cast<double>(robot.bytes_up)), rate(robot.bytes_up, robot.duration_s));
+  card.detail += partial_figures(robot, policy);
   if (const auto& [onboard, corrected] = robot.map_error; onboard && corrected)
     card.detail += fmt::format("<br>its map, mean distance to the survey: <b>{} → {}</b>",
                                format_metres(onboard->mean_m), format_metres(corrected->mean_m));
@@ -77,13 +98,23 @@ std::vector<Card> map_cards(const MissionRecord& record) {
   const ServerRecord& server = record.server;
   const std::string whose = escape_xml(format_mapped_robots(record));
   std::vector<Card> cards;
+  const bool partial = is_partial(server.joint.scored_share);
+  const auto add = [&](const std::string& what, double figure_m, const std::string& detail) {
+    const std::string figure = format_metres(figure_m);
+    if (partial)
+      cards.push_back({what, "-",
+                       fmt::format("partial, scored on {} of all robots' way only: ({}), {}",
+                                   format_scored(server.joint.scored_share), figure, detail)});
+    else
+      cards.push_back({what, figure, detail});
+  };
   if (server.joint.rmse_m)
-    cards.push_back({"Error of the server's map, RMSE", format_metres(server.joint.rmse_m),
-                     whose + " in one alignment; largest " + format_metres(server.joint.max_error_m)});
+    add("Error of the server's map, RMSE", *server.joint.rmse_m,
+        whose + " in one alignment; largest " + format_metres(server.joint.max_error_m));
   if (server.map_error)
-    cards.push_back({"Joint map off the survey, mean", format_metres(server.map_error->mean_m),
-                     fmt::format("{}; 95 % of {} points within {}", whose, server.map_error->points,
-                                 format_metres(server.map_error->p95_m))});
+    add("Joint map off the survey, mean", server.map_error->mean_m,
+        fmt::format("{}; 95 % of {} points within {}", whose, server.map_error->points,
+                    format_metres(server.map_error->p95_m)));
   const ClosureCounts closures = count_closures(server);
   cards.push_back({"Loop closures in the map", std::to_string(closures.accepted()),
                    fmt::format("{} between robots; {} refused", closures.accepted_inter, closures.rejected())});
@@ -95,6 +126,12 @@ std::vector<Card> map_cards(const MissionRecord& record) {
     cards.push_back({"A robot's answer to a broadcast", format_duration_ms(update->median),
                      fmt::format("median of {}; slowest {}", update->count, format_duration_ms(update->max))});
   return cards;
+}
+
+std::string warnings_html(const MissionRecord& record) {
+  std::string list;
+  for (const std::string& warning : record.warnings) list += "<li><b>Warning:</b> " + escape_xml(warning) + "</li>\n";
+  return list.empty() ? "" : "<ul class=\"alerts\">\n" + list + "</ul>\n";
 }
 
 std::string header_html(const MissionRecord& record) {
@@ -120,7 +157,8 @@ std::string header_html(const MissionRecord& record) {
 }  // namespace
 
 std::string headline_html(const MissionRecord& record) {
-  return header_html(record) + alerts_html(record) + robots_html(record) + cards_html(map_cards(record), "cards");
+  return header_html(record) + warnings_html(record) + alerts_html(record) + robots_html(record) +
+         cards_html(map_cards(record), "cards");
 }
 
 }  // namespace tutti::mission

@@ -28,6 +28,12 @@ std::string robot_cell(const MissionRecord& record, const RobotRecord& robot) {
   return fmt::format("<span class=\"swatch {}\"></span>{}", robot_class(record, robot.id), escape_xml(robot.name));
 }
 
+/// With a bar as long as its share of `largest`, unless the error is partial.
+std::string error_cell(std::optional<double> error_m, std::optional<double> scored_share, double largest,
+                       std::string_view css_class) {
+  return is_partial(scored_share) ? format_error(error_m, scored_share) : with_bar(error_m, largest, css_class);
+}
+
 /// Rows of one robot: onboard, every policy, server. The bar shows RMSE, or agreement without a reference.
 void add_policy_rows(const MissionRecord& record, const RobotRecord& robot, std::string& body) {
   const bool referenced = robot.onboard.rmse_m.has_value();
@@ -41,24 +47,34 @@ void add_policy_rows(const MissionRecord& record, const RobotRecord& robot, std:
     body += "</tr>\n";
   };
   body +=
-      fmt::format("<tr class=\"group\"><td class=\"left\" colspan=\"10\">{}</td></tr>\n", robot_cell(record, robot));
-  row("",
-      {"onboard (raw odometry)", with_bar(robot.onboard.rmse_m, largest, "onboard"), metres(robot.onboard.max_error_m),
-       metres(robot.onboard.rpe_m), metres(robot.onboard.rpe_10m_m), "", "", "", "", ""});
+      fmt::format("<tr class=\"group\"><td class=\"left\" colspan=\"11\">{}</td></tr>\n", robot_cell(record, robot));
+  // RMSE with a bar, largest error, RPE twice, and the share that they were scored on.
+  const auto errors = [&](std::string name, const Accuracy& accuracy, std::optional<double> share,
+                          std::string_view bar) {
+    std::vector<std::string> cells{std::move(name), error_cell(accuracy.rmse_m, share, largest, bar)};
+    cells.insert(cells.end(), {format_error(accuracy.max_error_m, share), metres(accuracy.rpe_m),
+                               metres(accuracy.rpe_10m_m), format_scored(share)});
+    return cells;
+  };
+  const auto without_policy = [&](std::vector<std::string> cells) {
+    cells.insert(cells.end(), {"", "", "", "", ""});
+    row("", cells);
+  };
+  without_policy(errors("onboard (raw odometry)", robot.onboard, robot.onboard.scored_share, "onboard"));
   for (const auto& policy : robot.policies) {
     const bool chosen = policy.name == record.default_policy;
     const std::string_view bar = chosen ? "" : "other";
     const PolicyTiming* timing = find_timing(record, robot.name, policy.name);
-    row(chosen ? "chosen" : "",
-        {escape_xml(policy.name), referenced ? with_bar(policy.accuracy.rmse_m, largest, bar) : "-",
-         metres(policy.accuracy.max_error_m), metres(policy.accuracy.rpe_m), metres(policy.accuracy.rpe_10m_m),
-         policy.kink ? metres(policy.kink->translation_m) : "-",
-         referenced ? metres(policy.agreement_rmse_m) : with_bar(policy.agreement_rmse_m, largest, bar),
-         std::to_string(policy.constraints_added), format_share(policy.constraints_added, robot.odometry_factors),
-         timing != nullptr ? format_spread(timing->update_ms) : "-"});
+    auto cells = errors(escape_xml(policy.name), policy.accuracy, policy.accuracy.scored_share, bar);
+    cells.insert(cells.end(), {policy.kink ? metres(policy.kink->translation_m) : "-",
+                               referenced ? format_error(policy.agreement_rmse_m, robot.mapped_share)
+                                          : error_cell(policy.agreement_rmse_m, robot.mapped_share, largest, bar),
+                               std::to_string(policy.constraints_added),
+                               format_share(policy.constraints_added, robot.odometry_factors),
+                               timing != nullptr ? format_spread(timing->update_ms) : "-"});
+    row(chosen ? "chosen" : "", cells);
   }
-  row("", {"server", with_bar(robot.server.rmse_m, largest, "server"), metres(robot.server.max_error_m),
-           metres(robot.server.rpe_m), metres(robot.server.rpe_10m_m), "", "", "", "", ""});
+  without_policy(errors("server", robot.server, server_share(robot), "server"));
 }
 
 /// What the mission took of the server, as if in real time; empty when not measured.
@@ -96,20 +112,22 @@ std::string policies_html(const MissionRecord& record) {
   if (record.robots.empty()) return "";
   std::string body =
       "<div class=\"scroll\"><table>\n<thead><tr><th class=\"left\">estimate or policy</th><th>RMSE</th><th>largest "
-      "error</th><th>RPE</th><th>RPE, 10 m</th><th>kink</th><th>RMSE to server</th><th>constraints</th><th>of "
+      "error</th><th>RPE</th><th>RPE, 10 m</th><th>scored</th><th>kink</th><th>RMSE to "
+      "server</th><th>constraints</th><th>of "
       "odometry</th><th>update, ms</th>"
       "</tr></thead>\n<tbody>\n";
   for (const auto& robot : record.robots) add_policy_rows(record, robot, body);
   const bool several = compares_policies(record);
   return section(
       several ? "Policies side by side" : "Each robot in figures",
-      fmt::format("{} RMSE and largest error at keyframes after one rigid alignment, without scale{}. Kink: the most "
-                  "that correcting changed any motion over 1 s, but for jumps taken back. Update: median / largest.",
-                  several
-                      ? fmt::format("Every policy answers the very same broadcasts; {} is the one the robot follows.",
-                                    record.default_policy)
-                      : fmt::format("Corrected by the policy {}.", record.default_policy),
-                  record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
+      fmt::format(
+          "{} RMSE and largest error at keyframes after one rigid alignment, without scale{}. Scored: the share "
+          "of the way that these figures were scored on; below 95 % they are partial, in brackets. Kink: the "
+          "most that correcting changed any motion over 1 s, but for jumps taken back. Update: median / largest.",
+          several ? fmt::format("Every policy answers the very same broadcasts; {} is the one the robot follows.",
+                                record.default_policy)
+                  : fmt::format("Corrected by the policy {}.", record.default_policy),
+          record.rpe_interval.empty() ? "" : "; RPE over " + record.rpe_interval),
       body + "</tbody></table></div>\n");
 }
 

@@ -229,13 +229,13 @@ TEST(ReportHtml, EscapesEveryText) {
   const std::string evil = "</title><b>&\"'";
   record.mission = record.description = record.input = record.version = evil;
   record.effective_config_yaml = record.timing.machine = record.rpe_interval = evil;
-  record.notes = {evil};
+  record.notes = record.warnings = {evil};
   record.default_policy = evil;
   for (auto& robot : record.robots) {
     robot.name = evil + robot.name;
     robot.policies[2].name = evil;
   }
-  record.server.rejections = {{evil, 1, 2}};
+  record.server.rejections = {{evil, evil, 1, 2}};
   record.transforms[0].from = record.transforms[0].to = evil;
   for (auto& timing : record.timing.policies) timing.robot = timing.policy = evil;
   record.timing.load = {{evil, 0.5, 12.0}};
@@ -323,6 +323,37 @@ TEST(ReportHtml, FiguresOfOneOfSeveralMapsNameItsRobots) {
                             "<td class=\"left\">alpha and charlie</td>", "The joint map of alpha and charlie is"})
     EXPECT_NE(apart.find(words), std::string::npos) << words;
   EXPECT_EQ(apart.find("all robots"), std::string::npos) << apart.substr(apart.find("all robots") - 100, 200);
+}
+
+TEST(ReportHtml, APartialFigureIsMarkedAndNoHeadline) {
+  MissionRecord record = test::example_record({.robots = 1, .survey = true});
+  const auto headline = [](const std::string& html) { return html.substr(0, html.find("The joint map")); };
+  const std::string whole = report_html(record);
+  EXPECT_EQ(whole.find("(0.017 m)"), std::string::npos);
+  EXPECT_NE(headline(whole).find("<small>server 0.017 m</small>"), std::string::npos);
+  EXPECT_NE(headline(whole).find("<p class=\"value\">0.018 m</p>"), std::string::npos);
+  record.server.joint.scored_share = record.robots[0].server.scored_share = record.robots[0].mapped_share = 0.0699;
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_NE(headline(html).find("<small>server -</small>"), std::string::npos);
+  EXPECT_NE(headline(html).find("partial, scored on 6 % of its way only: server (0.017 m)"), std::string::npos);
+  for (const char* figure : {"0.018 m", "0.050 m"}) {  // of the joint map: RMSE, and mean distance to the survey
+    EXPECT_EQ(headline(html).find(std::string("<p class=\"value\">") + figure), std::string::npos) << figure;
+    EXPECT_NE(headline(html).find(std::string("of all robots' way only: (") + figure), std::string::npos) << figure;
+  }
+  EXPECT_NE(html.find("server (0.017 m, partial: on 6 %)"), std::string::npos) << "over the curves";
+  EXPECT_NE(html.find("<td class=\"left\">server</td><td>(0.017 m)</td>"), std::string::npos) << "in the table";
+  record.robots[0].onboard = record.robots[0].server = {};  // no reference: the distance to the server is the headline
+  for (PolicyRecord& policy : record.robots[0].policies) policy.accuracy = {};
+  EXPECT_NE(headline(report_html(record)).find("to the server (0.020 m)"), std::string::npos);
+}
+
+TEST(ReportHtml, WarningsAreInTheHeadline) {
+  MissionRecord record = test::example_record();
+  record.warnings = {"alpha & the rest"};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_LT(html.find("<b>Warning:</b> alpha &amp; the rest"), html.find("Error of every robot"));
 }
 
 TEST(ReportHtml, LongMissionStaysSmall) {

@@ -40,6 +40,12 @@ Json drift_json(const RobotRecord& robot) {
   return out;
 }
 
+/// The share of the way that the figures behind `prefix` were scored on, and what that makes of them.
+void add_scored(Json& out, const std::string& prefix, std::optional<double> share) {
+  out[prefix + "scored_share"] = number(share);
+  out[prefix + "partial"] = is_partial(share);
+}
+
 /// Keys of one estimate's figures, each behind `prefix`.
 void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy) {
   out[prefix + "rmse_m"] = number(accuracy.rmse_m);
@@ -48,6 +54,7 @@ void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy
   out[prefix + "rpe_deg"] = number(accuracy.rpe_deg);
   out[prefix + "rpe_10m_m"] = number(accuracy.rpe_10m_m);
   out[prefix + "rpe_10m_deg"] = number(accuracy.rpe_10m_deg);
+  add_scored(out, prefix, accuracy.scored_share);
 }
 
 Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
@@ -60,6 +67,7 @@ Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
   out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
   out["kink_deg"] = policy.kink ? number(policy.kink->rotation_deg) : Json(nullptr);
   out["agreement_rmse_m"] = number(policy.agreement_rmse_m);
+  add_scored(out, "agreement_", policy.agreement_rmse_m ? std::optional(robot.mapped_share) : std::nullopt);
   out["constraints"] = policy.constraints_added;
   return out;
 }
@@ -135,7 +143,7 @@ Json traffic_json(const std::vector<TrafficRecord>& traffic) {
   return rows;
 }
 
-Json robot_json(const RobotRecord& robot) {
+Json robot_json(const RobotRecord& robot, bool tied) {
   Json policies = Json::object();
   for (const auto& policy : robot.policies) policies[policy.name] = policy_json(robot, policy);
   Json out{{"name", robot.name},
@@ -146,7 +154,9 @@ Json robot_json(const RobotRecord& robot) {
            {"rotation_variance_factor", number(robot.rotation_factor)},
            {"keyframes", robot.keyframes},
            {"submaps", robot.submaps},
-           {"component", robot.component}};
+           {"component", robot.component},
+           {"mapped_share", number(robot.mapped_share)},
+           {"tied", tied}};
   add_accuracy(out, "onboard_", robot.onboard);
   add_accuracy(out, "server_", robot.server);
   out.update({{"map_error",
@@ -185,20 +195,22 @@ Json server_json(const MissionRecord& record) {
         failed.push_back(stretch_json(
             robot, stretch,
             {{"robot", robot.name}, {"error_m", number(stretch.error_m)}, {"error_rad", number(stretch.error_rad)}}));
-  return {{"components", server.components},
-          {"closures_accepted", counts.accepted()},
-          {"closures_accepted_intra", counts.accepted_intra},
-          {"closures_accepted_inter", counts.accepted_inter},
-          {"closures_rejected", counts.rejected()},
-          {"rejections", std::move(rejections)},
-          {"closure_check", std::move(check)},
-          {"rmse_m", number(server.joint.rmse_m)},
-          {"max_error_m", number(server.joint.max_error_m)},
-          {"rpe_m", number(server.joint.rpe_m)},
-          {"T_reference_world", server.T_reference_world ? pose_json(*server.T_reference_world) : Json(nullptr)},
-          {"map_error", map_error_json(server.map_error)},
-          {"survey_covered", number(server.survey_covered)},
-          {"failed_odometry", std::move(failed)}};
+  Json out{{"components", server.components},
+           {"closures_accepted", counts.accepted()},
+           {"closures_accepted_intra", counts.accepted_intra},
+           {"closures_accepted_inter", counts.accepted_inter},
+           {"closures_rejected", counts.rejected()},
+           {"rejections", std::move(rejections)},
+           {"closure_check", std::move(check)},
+           {"rmse_m", number(server.joint.rmse_m)},
+           {"max_error_m", number(server.joint.max_error_m)},
+           {"rpe_m", number(server.joint.rpe_m)},
+           {"T_reference_world", server.T_reference_world ? pose_json(*server.T_reference_world) : Json(nullptr)},
+           {"map_error", map_error_json(server.map_error)},
+           {"survey_covered", number(server.survey_covered)},
+           {"failed_odometry", std::move(failed)}};
+  add_scored(out, "", server.joint.scored_share);
+  return out;
 }
 
 Json transform_json(const TransformRecord& transform) {
@@ -234,12 +246,13 @@ std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error
 
 std::string report_json(const MissionRecord& record) {
   Json robots = Json::array();
-  for (const auto& robot : record.robots) robots.push_back(robot_json(robot));
+  for (const auto& robot : record.robots) robots.push_back(robot_json(robot, is_tied(record, robot.id)));
   Json transforms = Json::array();
   for (const auto& transform : record.transforms) transforms.push_back(transform_json(transform));
   return dump(Json{{"mission", record.mission},
                    {"description", record.description},
                    {"input", record.input},
+                   {"warnings", record.warnings},
                    {"notes", record.notes},
                    {"seed", record.seed},
                    {"default_policy", record.default_policy},

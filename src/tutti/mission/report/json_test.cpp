@@ -42,7 +42,8 @@ TEST(ReportJson, HasTheDocumentedKeys) {
     for (const auto& policy : robot["policies"])
       EXPECT_EQ(keys(policy),
                 (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg", "jumps",
-                                       "kink_m", "kink_deg", "agreement_rmse_m", "constraints"}));
+                                       "kink_m", "kink_deg", "agreement_rmse_m", "constraints", "scored_share",
+                                       "partial", "agreement_scored_share", "agreement_partial"}));
   }
   expect_keys(report["server"], {"components", "closures_accepted", "closures_rejected", "rmse_m"});
   for (const auto& transform : report["transforms"])
@@ -152,6 +153,29 @@ TEST(ReportJson, DriftIsInMissionTime) {
   EXPECT_DOUBLE_EQ(failed["error_rad"], 0.35);
 }
 
+TEST(ReportJson, SaysOnWhichShareOfTheWayEveryRmseWasScored) {
+  MissionRecord record = test::example_record();
+  record.robots[1].server.scored_share = record.robots[1].mapped_share = 0.07;
+  record.server.joint.scored_share = 0.535;
+  record.warnings = {"a warning"};
+  record.server.closures = {{{record.robots[0].id, 3}, {record.robots[0].id, 40}}};
+  const json report = json::parse(report_json(record));
+  const json& robot = report["robots"][1];
+  EXPECT_DOUBLE_EQ(robot["server_scored_share"], 0.07);
+  EXPECT_EQ(robot["server_partial"], true);
+  EXPECT_DOUBLE_EQ(robot["onboard_scored_share"], 1.0);
+  EXPECT_EQ(robot["onboard_partial"], false);
+  EXPECT_DOUBLE_EQ(robot["mapped_share"], 0.07);
+  EXPECT_EQ(robot["policies"]["spectral"]["partial"], false);
+  EXPECT_DOUBLE_EQ(robot["policies"]["spectral"]["agreement_scored_share"], 0.07);
+  EXPECT_EQ(robot["policies"]["spectral"]["agreement_partial"], true);
+  EXPECT_DOUBLE_EQ(report["server"]["scored_share"], 0.535);
+  EXPECT_EQ(report["server"]["partial"], true);
+  EXPECT_EQ(report["warnings"], json{"a warning"});
+  EXPECT_EQ(report["robots"][0]["tied"], true);
+  EXPECT_EQ(robot["tied"], false);
+}
+
 TEST(ReportJson, NotMeasuredIsNull) {
   MissionRecord record = test::example_record({.reference = false});
   record.robots[0].policies[0].agreement_rmse_m = std::numeric_limits<double>::quiet_NaN();
@@ -160,6 +184,8 @@ TEST(ReportJson, NotMeasuredIsNull) {
   const json& robot = report["robots"][0];
   EXPECT_TRUE(robot["onboard_rmse_m"].is_null());
   EXPECT_TRUE(robot["server_rmse_m"].is_null());
+  EXPECT_TRUE(robot["server_scored_share"].is_null());
+  EXPECT_EQ(robot["server_partial"], false);
   EXPECT_TRUE(robot["distance_m"].is_null());
   EXPECT_TRUE(robot["policies"]["every_node"]["rmse_m"].is_null());
   EXPECT_TRUE(robot["policies"]["every_node"]["agreement_rmse_m"].is_null());

@@ -22,29 +22,30 @@ std::string plural(std::size_t count, const std::string& noun) {
 
 std::string robots_table(const MissionRecord& record) {
   TextTable table(2);
-  table.add({"robot", "estimate", "RMSE", "max", "RPE", "RPE 10 m", "to server", "constraints", "update ms"});
+  table.add({"robot", "estimate", "RMSE", "max", "RPE", "RPE 10 m", "scored", "to server", "constr.", "update ms"});
   for (const auto& robot : record.robots) {
     table.rule();
     const auto row = [&](const std::string& left, const std::string& estimate, const Accuracy& accuracy,
-                         std::vector<std::string> rest) {
+                         std::optional<double> share, std::vector<std::string> rest) {
       std::vector<std::string> cells{left,
                                      estimate,
-                                     format_metres(accuracy.rmse_m),
-                                     format_metres(accuracy.max_error_m),
+                                     format_error(accuracy.rmse_m, share),
+                                     format_error(accuracy.max_error_m, share),
                                      format_metres(accuracy.rpe_m),
                                      format_metres(accuracy.rpe_10m_m)};
+      cells.push_back(format_scored(share));
       cells.insert(cells.end(), rest.begin(), rest.end());
       table.add(std::move(cells));
     };
-    row(robot.name, "onboard", robot.onboard, {});
+    row(robot.name, "onboard", robot.onboard, robot.onboard.scored_share, {});
     const PolicyRecord* policy = find_policy(robot, record.default_policy);
     const PolicyTiming* timing = find_timing(record, robot.name, record.default_policy);
     const std::string size = format_distance(robot.distance_m);
     if (policy != nullptr)
-      row(size, "corrected", policy->accuracy,
-          {format_metres(policy->agreement_rmse_m), std::to_string(policy->constraints_added),
+      row(size, "corrected", policy->accuracy, policy->accuracy.scored_share,
+          {format_error(policy->agreement_rmse_m, robot.mapped_share), std::to_string(policy->constraints_added),
            timing != nullptr ? format_spread(timing->update_ms) : "-"});
-    row(policy != nullptr ? "" : size, "server", robot.server, {});
+    row(policy != nullptr ? "" : size, "server", robot.server, server_share(robot), {});
   }
   return table.str();
 }
@@ -76,7 +77,8 @@ std::string policies_table(const MissionRecord& record, std::size_t first, std::
       if (policy == nullptr)
         cells.insert(cells.end(), {"-", "-", "-", "-"});
       else
-        cells.insert(cells.end(), {format_metres(policy->accuracy.rmse_m), format_metres(policy->agreement_rmse_m),
+        cells.insert(cells.end(), {format_error(policy->accuracy.rmse_m, policy->accuracy.scored_share),
+                                   format_error(policy->agreement_rmse_m, robot.mapped_share),
                                    std::to_string(policy->constraints_added),
                                    timing != nullptr ? format_spread(timing->update_ms) : "-"});
     }
@@ -106,9 +108,14 @@ std::string server_lines(const MissionRecord& record) {
   std::string text = fmt::format("{} of {}, {} ({} between robots), {} refused", plural(server.components, "map"),
                                  plural(record.robots.size(), "robot"), plural(closures.accepted(), "loop closure"),
                                  closures.accepted_inter, closures.rejected());
-  if (server.joint.rmse_m)
-    text += fmt::format(", RMSE {} over {} at once (max {})", format_metres(server.joint.rmse_m),
-                        format_mapped_robots(record), format_metres(server.joint.max_error_m));
+  if (is_partial(server.joint.scored_share))
+    text += fmt::format("; partial: RMSE ({}) over {} at once is scored on {} of all robots' way",
+                        format_metres(server.joint.rmse_m), format_mapped_robots(record),
+                        format_scored(server.joint.scored_share));
+  else if (server.joint.rmse_m)
+    text += fmt::format(", RMSE {} over {} at once (max {}; scored on {} of the way)",
+                        format_metres(server.joint.rmse_m), format_mapped_robots(record),
+                        format_metres(server.joint.max_error_m), format_scored(server.joint.scored_share));
   if (const auto& check = server.closure_check)
     text += fmt::format(". Of {} closures checked against the reference {} wrong (largest error {}, {:.2f} deg)",
                         check->checked, check->wrong == 1 ? "1 is" : fmt::format("{} are", check->wrong),
@@ -161,7 +168,7 @@ std::string explanation_lines(const MissionRecord& record) {
     if (robot.explanation && !robot.explanation->stamps.empty()) {
       const consistency::Explanation& e = *robot.explanation;
       const auto drift = std::count_if(e.origins.begin(), e.origins.end(), [](const auto& o) { return !o.alert; });
-      std::string text = robot.name + ": " + format_disagreement(e, mission_clock(robot));
+      std::string text = robot.name + ": " + format_comparison(record, robot);
       if (drift > 0)
         text += fmt::format("; {} of drift that odometry's covariance allows for",
                             plural(static_cast<std::size_t>(drift), "suspected origin"));
@@ -177,6 +184,7 @@ std::string explanation_lines(const MissionRecord& record) {
 
 std::string report_text(const MissionRecord& record, const std::string& report_html_path) {
   std::string out = "\n";
+  for (const auto& warning : record.warnings) out += wrap("Warning: " + warning, "");
   out +=
       wrap(record.description.empty() ? record.mission : fmt::format("{}: {}", record.mission, record.description), "");
   out += wrap(fmt::format("{}Seed {}, {} of mission time.",
@@ -194,7 +202,10 @@ std::string report_text(const MissionRecord& record, const std::string& report_h
                   "  RMSE, max: against the reference, after one rigid alignment per robot. RPE: over {} and 10 m.\n",
                   record.rpe_interval)
             : std::string("  No reference: only the distance of corrected to server could be measured.\n");
-    out += "  to server: RMSE of corrected against server. update ms: median / max, wall clock.\n";
+    out += "  scored: share of the way that these figures were scored on.";
+    if (has_partial_figures(record))
+      out += fmt::format(" In brackets: partial, below {:.0f} %.", 100.0 * kPartialBelow);
+    out += "\n  to server: RMSE of corrected against server. update ms: median / max, wall clock.\n";
     out += "\n";
     if (compares_policies(record)) {
       out += "  Policies side by side, on the same broadcasts (* = corrected above)\n";

@@ -123,6 +123,45 @@ TEST(ReportText, FiguresOfOneOfSeveralMapsNameItsRobots) {
   EXPECT_EQ(format_mapped_robots(record), "bravo");
 }
 
+TEST(ReportText, APartialFigureIsMarkedAndNoHeadline) {
+  MissionRecord record = test::example_record();
+  const std::string whole = report_text(record, "x");
+  EXPECT_EQ(whole.find("partial"), std::string::npos) << whole;
+  EXPECT_NE(unwrapped(whole).find("server 0.017 m 0.050 m 0.024 m 0.026 m 100 %"), std::string::npos) << whole;
+  EXPECT_NE(unwrapped(whole).find("at once (max 0.061 m; scored on 100 % of the way)"), std::string::npos);
+  record.robots[1].server.scored_share = record.robots[1].mapped_share = 0.0699;
+  record.server.joint.scored_share = 0.5349;
+  const std::string text = report_text(record, "x");
+  expect_readable(text);
+  EXPECT_NE(unwrapped(text).find("server (0.017 m) (0.050 m) 0.024 m 0.026 m 6 %"), std::string::npos) << text;
+  EXPECT_NE(text.find("In brackets: partial, below 95 %."), std::string::npos);
+  EXPECT_NE(line_with(text, "spectral *").find("(0.020 m)"), std::string::npos) << "bravo's distance to the server";
+  EXPECT_NE(
+      unwrapped(text).find("partial: RMSE (0.018 m) over all robots at once is scored on 53 % of all robots' way"),
+      std::string::npos)
+      << text;
+  record.robots[1].server.scored_share = kPartialBelow;
+  EXPECT_EQ(report_text(record, "x").find("(0.017 m)"), std::string::npos);
+}
+
+TEST(ReportText, WarningsComeFirst) {
+  MissionRecord record = test::example_record();
+  record.warnings = {"the server's map is odometry alone: no two submaps were compared"};
+  const std::string text = report_text(record, "x");
+  expect_readable(text);
+  EXPECT_TRUE(text.starts_with("\nWarning: the server's map is odometry alone")) << text;
+}
+
+TEST(ReportText, NothingToCompareWithIsNoAgreement) {
+  MissionRecord record = test::example_record({.robots = 1});
+  record.robots[0].explanation = test::example_explanation(record.robots[0].server_estimate, {});
+  EXPECT_NE(report_text(record, "x").find("odometry and map agree"), std::string::npos);
+  record.server.closures.clear();
+  const std::string alone = report_text(record, "x");
+  EXPECT_EQ(alone.find("agree"), std::string::npos) << alone;
+  EXPECT_NE(alone.find("there was nothing to compare odometry with"), std::string::npos) << alone;
+}
+
 TEST(ReportText, EmptyMission) { expect_readable(report_text(MissionRecord{}, "x")); }
 
 TEST(ReportText, AMissionNeedNotSayWhatItsInputIs) {

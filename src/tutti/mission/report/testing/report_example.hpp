@@ -104,6 +104,7 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
   }
   robot.odometry = drifting(truth, index % 2 == 0 ? 0.0015 : -0.002);
   robot.server_estimate = moved(example_T_world_truth(), noisy(truth, 0.01, rng.fork("server")));
+  robot.mapped_share = 1.0;
   if (options.reference) robot.reference = truth;
   robot.duration_s = truth.empty() ? 0.0 : truth.back().stamp - truth.front().stamp;
   robot.distance_m = 0.7 * robot.duration_s;
@@ -139,7 +140,7 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
     policy.corrected = moved(T_map_truth, noisy(truth, quality[p], rng.fork(p)));
     policy.constraints_added = p == 0 ? options.keyframes - 1 : p == 1 ? 2 * options.keyframes - 3 : 24;
     if (options.reference)
-      policy.accuracy = {quality[p] * 1.7, quality[p] * 4.0, quality[p] * 0.8, 0.11, quality[p] * 1.1, 0.3};
+      policy.accuracy = {quality[p] * 1.7, quality[p] * 4.0, quality[p] * 0.8, 0.11, quality[p] * 1.1, 0.3, 1.0};
     policy.kink = evaluation::Kink{0.5 * quality[p], 20.0 * quality[p], {}, {}};
     policy.agreement_rmse_m = quality[p];
     if (p == 2)
@@ -155,8 +156,8 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
     robot.policies.push_back(std::move(policy));
   }
   if (options.reference) {
-    robot.onboard = {0.712 + 0.1 * static_cast<double>(index), 1.4, 0.021, 0.12, 0.095, 0.41};
-    robot.server = {0.0173, 0.05, 0.024, 0.13, 0.026, 0.14};
+    robot.onboard = {0.712 + 0.1 * static_cast<double>(index), 1.4, 0.021, 0.12, 0.095, 0.41, 1.0};
+    robot.server = {0.0173, 0.05, 0.024, 0.13, 0.026, 0.14, 1.0};
   }
   for (std::uint64_t u = 1; 20.0 * static_cast<double>(u) <= robot.duration_s; ++u)
     robot.updates.push_back(example_update(20.0 * static_cast<double>(u), u, rng.fork(100 + u)));
@@ -166,7 +167,7 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
 inline ServerRecord example_server(const std::vector<RobotRecord>& robots, const ExampleOptions& options, Rng rng) {
   ServerRecord server{.components = robots.empty() ? 0U : 1U};
   if (options.reference && !robots.empty()) {
-    server.joint = {0.0182, 0.061, 0.024};
+    server.joint = {.rmse_m = 0.0182, .max_error_m = 0.061, .rpe_m = 0.024, .scored_share = 1.0};
     server.T_reference_world = example_T_world_truth().inverse();
   }
   for (const auto& robot : robots) {
@@ -190,7 +191,8 @@ inline ServerRecord example_server(const std::vector<RobotRecord>& robots, const
     for (std::size_t b = a + 20; b < n; b += 7)
       if ((server.graph.poses[a].translation - server.graph.poses[b].translation).norm() < 3.0)
         server.closures.push_back({server.nodes[a].id, server.nodes[b].id});
-  server.rejections = {{"too little overlap", 31, 55}, {"slides along one direction", 4, 9}, {"inconsistent", 0, 3}};
+  server.rejections = {
+      {"too little overlap", "", 31, 55}, {"slides along one direction", "", 4, 9}, {"inconsistent", "", 0, 3}};
   if (options.reference) server.closure_check = {server.closures.size(), 0, 0.041, 0.4};
   return server;
 }
