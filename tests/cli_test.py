@@ -151,11 +151,18 @@ class CommandLine(unittest.TestCase):
         (self.path / "scans" / "000000.pcd").write_text(
             "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
             "DATA ascii\n1 2 3\n")
-        self.expect(run(), 0)
+        result = run()
+        self.expect(result, 0)
+        self.assertTrue(result.stdout.startswith("\nWarning: the server's map is odometry alone: "), result.stdout)
+        self.assertNotIn("odometry and map agree", result.stdout)
         report = json.loads((self.path / "out" / "report.json").read_text())
+        self.assertEqual(len(report["warnings"]), 1)
+        self.assertFalse(report["robots"][0]["tied"])
         note, = [note for note in report["notes"] if "keyframes without a scan" in note]
         self.assertEqual(int(note.split()[1]), report["robots"][0]["keyframes"] - 1, note)
         self.assertIn(".pcd: is not there", note)
+        (self.path / "scans" / "000000.pcd").write_text("no point cloud")
+        self.expect(run(), 1, "robot a: not one scan could be read", "000000.pcd")
 
     def test_settings_say_what_can_be_set(self):
         self.expect(tutti("settings"), 0, "closures.finder = ", "simulation.robots[].start_s = 0")

@@ -3,9 +3,46 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mission {
+namespace {
+
+/// Why no closure ties anything; the map has none.
+std::string why_odometry_alone(const std::vector<RejectionRecord>& rejections) {
+  const auto pairs = [](const RejectionRecord& rejection) { return rejection.intra + rejection.inter; };
+  if (rejections.empty()) return "no two submaps were compared";
+  std::size_t refused = 0;
+  for (const RejectionRecord& rejection : rejections) {
+    if (rejection.example.empty()) return "the closures found contradict each other";
+    refused += pairs(rejection);
+  }
+  const RejectionRecord& most = *std::ranges::max_element(rejections, {}, pairs);
+  return fmt::format("all {} pairs of submaps that were compared were refused, {} because: {}", refused,
+                     pairs(most) == refused ? "all" : std::to_string(pairs(most)), most.example);
+}
+
+}  // namespace
+
+std::vector<std::string> warnings_of(const MissionRecord& record) {
+  std::vector<std::string> out;
+  std::size_t submaps = 0;
+  for (const RobotRecord& robot : record.robots) {
+    submaps += robot.submaps;
+    if (robot.submaps == 0 && robot.keyframes > 0)
+      out.push_back(fmt::format("{}: none of its submaps reached the server", robot.name));
+  }
+  const bool tied = !record.server.closures.empty();
+  if (!tied && submaps > 1)
+    out.push_back(fmt::format("the server's map is odometry alone: {}", why_odometry_alone(record.server.rejections)));
+  for (const RobotRecord& robot : record.robots)
+    if (tied && !robot.server_estimate.empty() && robot.component != record.server.largest_component)
+      out.push_back(
+          fmt::format("{}: no closure joins it with the largest map; it lies in a frame of its own", robot.name));
+  return out;
+}
 
 void note_undelivered(const std::map<bus::InProcessBus::Topic, std::size_t>& undelivered, MissionRecord& record) {
   const auto name = [&](const bus::Endpoint& end) {

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "tutti/bus/in_process_bus.hpp"
 #include "tutti/mission/record.hpp"
@@ -16,5 +18,9 @@ namespace tutti::mission {
 void note_undelivered(const std::map<bus::InProcessBus::Topic, std::size_t>& undelivered, MissionRecord& record);
 /// Submaps that are not in the map, and closures that were not judged.
 void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record);
+
+/// What makes a finished record's figures mean little: a map that no closure ties together and why, robots that are not
+/// in it. One plain sentence each.
+std::vector<std::string> warnings_of(const MissionRecord& record);
 
 }  // namespace tutti::mission

@@ -65,7 +65,8 @@ void RobotActor::feed_scan(std::size_t sample) {
   if (!*scan) return;
   const CpuScope cpu(cpu_s_);
   const auto ok = default_agent().add_scan(**scan);
-  if (!ok) note(refused_scans_, ok.error().message);
+  if (!ok) return note(refused_scans_, ok.error().message);
+  ++taken_scans_;
 }
 
 void RobotActor::receive(const ProxyGraphMessage& message, double time_s) {
@@ -138,6 +139,12 @@ std::vector<std::string> RobotActor::troubles() const {
   add(refused_scans_, "keyframes without a scan");
   add(failed_updates_, "updates without a correction");
   return out;
+}
+
+Status RobotActor::check_scans() const {
+  if (taken_scans_ > 0 || refused_scans_.count == 0) return {};
+  return fail(ErrorCode::invalid, "robot {}: not one scan could be read: {} of {} failed, the first because: {}",
+              recording_.recording.name, refused_scans_.count, refused_scans_.count, refused_scans_.first);
 }
 
 }  // namespace tutti::mission

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/recordings.hpp"
@@ -45,6 +46,8 @@ class RobotActor {
   /// What went wrong (bad samples or scans refused, updates without a correction): one line per kind with a count and
   /// the first case.
   [[nodiscard]] std::vector<std::string> troubles() const;
+  /// Fails when scans were asked for and all of them failed.
+  [[nodiscard]] Status check_scans() const;
 
  private:
   struct Member {
@@ -71,6 +74,7 @@ class RobotActor {
   double cpu_s_ = 0.0;
   Trouble refused_odometry_;
   Trouble refused_scans_;
+  std::size_t taken_scans_ = 0;
   Trouble failed_updates_;
 };
 

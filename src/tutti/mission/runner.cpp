@@ -103,6 +103,12 @@ class MissionRun {
     }
   }
 
+  /// Fails when a robot was to have scans and not one could be taken.
+  [[nodiscard]] Status check_scans() const {
+    for (const auto& robot : robots_)
+      if (auto ok = robot->check_scans(); !ok) return ok;
+    return {};
+  }
   MissionRecord record() const;
 
  private:
@@ -338,9 +344,8 @@ MissionRecord MissionRun::record() const {
         static_cast<std::size_t>(std::count_if(proxy_graph_.nodes.begin(), proxy_graph_.nodes.end(),
                                                [&](const ProxyNode& node) { return node.robot == robot.id; }));
     for (const auto& [id, submap] : server_.state().submaps) robot.submaps += id.robot == robot.id ? 1 : 0;
-    for (const RobotComponent& entry : proxy_graph_.components)
-      if (entry.robot == robot.id) robot.component = entry.component;
   }
+  record.warnings = warnings_of(record);
   record_timing(record);
   return record;
 }
@@ -368,6 +373,7 @@ Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions&
   if (!clouds) return tl::unexpected(clouds.error());
   MissionRun mission(config, options, std::move(*input), std::move(*clouds));
   mission.run();
+  if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());
   return mission.record();
 }
 

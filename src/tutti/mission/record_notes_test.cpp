@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/record_notes.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::mission {
+namespace {
+
+/// Two robots of six submaps each, joined by a closure.
+MissionRecord joined() {
+  MissionRecord record;
+  for (std::uint32_t r = 0; r < 2; ++r) {
+    RobotRecord& robot = record.robots.emplace_back(RobotRecord{.id = {r}, .name = r == 0 ? "alpha" : "bravo"});
+    robot.keyframes = 60;
+    robot.submaps = 6;
+    robot.server_estimate = {{Timestamp{5}, Pose3{}}};
+  }
+  record.server.components = 1;
+  record.server.closures = {{{RobotId{0}, 3}, {RobotId{1}, 7}}};
+  record.server.rejections = {{"too unlike from above", "too unlike from above", 9, 30}};
+  return record;
+}
+
+TEST(Warnings, NoneForAMapThatIsTied) { EXPECT_TRUE(warnings_of(joined()).empty()); }
+
+TEST(Warnings, EveryPairRefusedByOneGate) {
+  MissionRecord record = joined();
+  record.server.closures.clear();
+  record.server.rejections = {{"too short", "too short: 3.0 s, at least 5.0 s needed", 10, 30}};
+  EXPECT_EQ(warnings_of(record),
+            std::vector<std::string>{"the server's map is odometry alone: all 40 pairs of submaps that were compared "
+                                     "were refused, all because: too short: 3.0 s, at least 5.0 s needed"});
+  record.server.rejections[0].inter = 29;
+  record.server.rejections.push_back({"too small", "too small: 12 points, at least 300 needed", 1, 0});
+  EXPECT_NE(warnings_of(record).at(0).find("refused, 39 because: too short: 3.0 s"), std::string::npos)
+      << warnings_of(record)[0];
+}
+
+TEST(Warnings, NothingWasCompared) {
+  MissionRecord record = joined();
+  record.server = {};
+  EXPECT_NE(warnings_of(record).at(0).find("no two submaps were compared"), std::string::npos);
+  record.robots.resize(1);
+  record.robots[0].submaps = 1;  // nothing to compare it with
+  EXPECT_TRUE(warnings_of(record).empty());
+}
+
+TEST(Warnings, ClosuresThatContradictEachOther) {
+  MissionRecord record = joined();
+  record.server.closures.clear();
+  record.server.rejections.push_back({"inconsistent with the others", "", 1, 0});
+  EXPECT_NE(warnings_of(record).at(0).find("contradict each other"), std::string::npos) << warnings_of(record)[0];
+}
+
+TEST(Warnings, RobotsThatAreNotInTheMap) {
+  MissionRecord record = joined();
+  record.robots[1].component = 1;
+  EXPECT_EQ(warnings_of(record).at(0),
+            "bravo: no closure joins it with the largest map; it lies in a frame of its own");
+  record.robots[0].submaps = 0;
+  record.robots[0].server_estimate.clear();
+  EXPECT_EQ(warnings_of(record).at(0), "alpha: none of its submaps reached the server");
+}
+
+}  // namespace
+}  // namespace tutti::mission
