@@ -96,9 +96,8 @@ function(tutti_add_tests module)
     get_filename_component(name ${test} NAME)
     file(RELATIVE_PATH file "${PROJECT_SOURCE_DIR}" "${source}")
     add_test(NAME ${module}/${name} COMMAND ${target} --tutti_file=${file})
-    # One BLAS thread, as the program has: on a busy machine OpenBLAS's own made who_is_wrong take 281 s instead of 7.
     set_tests_properties(${module}/${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${label}
-                         ENVIRONMENT "OPENBLAS_NUM_THREADS=1" SKIP_REGULAR_EXPRESSION "TUTTI_ALL_SKIPPED")
+                         SKIP_REGULAR_EXPRESSION "TUTTI_ALL_SKIPPED")
   endforeach()
 endfunction()
 

@@ -3,7 +3,6 @@
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 jobs="$(nproc)"
-export OPENBLAS_NUM_THREADS=1 # faster inside CHOLMOD, and the same bits on every machine
 
 say() { printf '\n== %s\n' "$*"; }
 

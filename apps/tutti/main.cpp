@@ -12,11 +12,7 @@
 #include "settings_command.hpp"
 #include "world_command.hpp"
 
-/// OpenBLAS. Small matrices are faster without its threads, and results must not depend on their number.
-extern "C" void openblas_set_num_threads(int threads);
-
 int main(int argc, char** argv) {
-  openblas_set_num_threads(1);
   CLI::App app{
       "tutti: collaborative robot mapping by spectral graph analysis.\n"
       "Several robots map the same place; a server joins their maps and sends back, in kilobytes, what each robot "

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/single_thread.hpp"
 #include "tutti/spectral/internal/lanczos.hpp"
 #include "tutti/spectral/internal/row_blocks.hpp"
 
@@ -47,6 +48,7 @@ Spectrum dense_spectrum(const SparseMatrix& laplacian) {
   const auto n = static_cast<lapack_int>(laplacian.rows());
   Spectrum out{.eigenvalues = Eigen::VectorXd(n), .eigenvectors = Eigen::MatrixXd(laplacian)};
   if (n == 0) return out;
+  const SingleThread single_thread;
   const lapack_int info =
       LAPACKE_dsyevd(LAPACK_COL_MAJOR, 'V', 'L', n, out.eigenvectors.data(), n, out.eigenvalues.data());  // eq. (4)
   TUTTI_CHECK(info == 0, "dsyevd: info {} (a Laplacian with NaN?)", info);

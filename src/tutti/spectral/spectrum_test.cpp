@@ -10,6 +10,8 @@
 
 #include "tutti/spectral/testing/graphs.hpp"
 
+extern "C" void openblas_set_num_threads(int threads);
+
 namespace tutti::spectral {
 namespace {
 
@@ -45,6 +47,17 @@ TEST(Spectrum, OfPathCycleCompleteAndStar) {
     star[1] = n;
     expect_eigenvalues(testing::star(n), star);
   }
+}
+
+TEST(Spectrum, HasTheSameBitsWhateverBlasIsSetTo) {
+  const SparseMatrix L = testing::cycle(300);
+  openblas_set_num_threads(1);
+  const Spectrum one = dense_spectrum(L);
+  openblas_set_num_threads(3);
+  const Spectrum three = dense_spectrum(L);
+  openblas_set_num_threads(1);
+  EXPECT_EQ(three.eigenvalues, one.eigenvalues);
+  EXPECT_EQ(three.eigenvectors, one.eigenvectors);
 }
 
 RC_GTEST_PROP(Spectrum, DiagonalisesTheLaplacian, (std::uint64_t seed)) {

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "tutti/base/check.hpp"
-#include "tutti/estimation/internal/single_thread.hpp"
+#include "tutti/base/single_thread.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
@@ -159,6 +159,7 @@ void BlockCholesky::solve(Eigen::Ref<Eigen::MatrixXd> b) {
   rhs.x = b.data();
   rhs.xtype = CHOLMOD_REAL;
   rhs.dtype = CHOLMOD_DOUBLE;
+  const SingleThread single_thread;
   cholmod_solve2(CHOLMOD_A, c.factor, &rhs, nullptr, &c.solution, nullptr, &c.work_y, &c.work_e, &c.common);
   const auto* x = static_cast<const double*>(c.solution->x);
   b = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(x, b.rows(), b.cols(),

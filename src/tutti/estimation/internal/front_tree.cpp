@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "tutti/base/single_thread.hpp"
 #include "tutti/estimation/internal/dissection.hpp"
 
 namespace tutti::estimation::internal {
@@ -226,6 +227,7 @@ bool FrontTree::compute(Front& front, const Assemble& assemble) {
 }
 
 bool FrontTree::factorise(const Assemble& assemble) {
+  const SingleThread single_thread;
   computed_ = 0;
   for (Front& front : fronts_) {
     if (!front.stale) continue;

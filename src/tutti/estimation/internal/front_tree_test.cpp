@@ -12,6 +12,9 @@
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/internal/dissection.hpp"
 
+extern "C" void openblas_set_num_threads(int threads);
+extern "C" int openblas_get_num_threads();
+
 namespace tutti::estimation::internal {
 namespace {
 
@@ -158,6 +161,24 @@ TEST(FrontTree, ComputesLittleAfterASmallChange) {
   ASSERT_TRUE(tree.factorise(m.assemble()));
   EXPECT_LE(tree.computed(), 40);
   EXPECT_LT(error_of(tree, m, rng), 1e-12);
+}
+
+/// Whoever uses the library may have set BLAS to anything: its threads are slower on fronts of our size, and other
+/// bits.
+TEST(FrontTree, FactorisesOnOneThread) {
+  Rng rng(3);
+  const Changing m = ladder(rng, 20);
+  FrontTree tree;
+  tree.restructure(40, {}, std::vector<char>(40, 1), m.pairs());
+  openblas_set_num_threads(3);
+  int most = 0;
+  ASSERT_TRUE(tree.factorise([&, assemble = m.assemble()](int variable, FrontTree::Column& column) {
+    most = std::max(most, openblas_get_num_threads());
+    assemble(variable, column);
+  }));
+  EXPECT_EQ(most, 1);
+  EXPECT_EQ(openblas_get_num_threads(), 3);
+  openblas_set_num_threads(1);
 }
 
 /// Fronts large enough for BLAS, whose size is no multiple of anything.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/single_thread.hpp"
 
 namespace tutti::spectral::internal {
 namespace {
@@ -28,6 +29,7 @@ TopRitz top_of_tridiagonal(std::vector<double> diagonal, std::vector<double> off
   std::array<double, 2> values{};
   std::vector<double> vectors(2 * diagonal.size());
   std::array<lapack_int, 4> support{};
+  const SingleThread single_thread;
   const lapack_int info = LAPACKE_dstevr(LAPACK_COL_MAJOR, 'V', 'I', n, diagonal.data(), off_diagonal.data(), 0.0, 0.0,
                                          n - 1, n, 0.0, &found, values.data(), vectors.data(), n, support.data());
   TUTTI_CHECK(info == 0 && found == 2, "dstevr: info {}, {} eigenvalues", info, found);
