@@ -81,7 +81,8 @@ std::vector<Seen> walk_one(const simulation::CorridorWorld& world, std::shared_p
       if (const auto ok = builder.add_scan(*scan); !ok) fmt::print(stderr, "{}\n", ok.error().message);
     }
   }
-  keep(builder.finish());
+  builder.finish();
+  keep(builder.take_submap());
   return out;
 }
 

@@ -57,6 +57,11 @@ void RobotActor::replay_next() {
   if (++next_ == recording.odometry.size()) default_agent().finish();
 }
 
+std::vector<SubmapMessage> RobotActor::take_outgoing() {
+  const CpuScope cpu(cpu_s_);
+  return default_agent().take_outgoing();
+}
+
 void RobotActor::feed_scan(std::size_t sample) {
   const Recording& recording = recording_.recording;
   if (!recording.scans || !default_agent().wants_scan()) return;  // only keyframes need one

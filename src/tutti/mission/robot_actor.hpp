@@ -31,7 +31,7 @@ class RobotActor {
   /// Closes the last submap before the recording ends.
   void finish() { default_agent().finish(); }
   /// Submaps of the default agent that are ready to be sent.
-  std::vector<SubmapMessage> take_outgoing() { return default_agent().take_outgoing(); }
+  std::vector<SubmapMessage> take_outgoing();
   /// The budget of policies that need one is what the policy `spectral` holds after the same broadcast.
   void receive(const ProxyGraphMessage& message, double time_s);
 

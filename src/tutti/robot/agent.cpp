@@ -70,22 +70,20 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given,
     if ((*keyframe)->representative)
       state_.node_odometry.push_back(std::exchange(state_.since_node, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
   }
-  if (auto submap_done = submaps_.take_submap()) send(std::move(*submap_done));
   return {};
 }
 
 Status RobotAgent::add_scan(const Scan& scan) { return submaps_.add_scan(scan); }
 
-void RobotAgent::finish() {
-  if (auto last = submaps_.finish()) send(std::move(*last));
-}
+void RobotAgent::finish() { submaps_.finish(); }
 
-void RobotAgent::send(Submap submap) {
-  state_.outgoing.push_back({.header = {.robot = robot_, .session = state_.session, .sequence = state_.sequence++},
-                             .submap = std::move(submap)});
+std::vector<SubmapMessage> RobotAgent::take_outgoing() {
+  std::vector<SubmapMessage> out;
+  while (auto submap = submaps_.take_submap())
+    out.push_back({.header = {.robot = robot_, .session = state_.session, .sequence = state_.sequence++},
+                   .submap = std::move(*submap)});
+  return out;
 }
-
-std::vector<SubmapMessage> RobotAgent::take_outgoing() { return std::exchange(state_.outgoing, {}); }
 
 std::vector<consistency::RobotNode> RobotAgent::nodes() const {
   std::vector<consistency::RobotNode> nodes;

@@ -85,7 +85,6 @@ struct AgentState {
   std::vector<RelativePose> node_odometry;  ///< Raw, between representative keyframes; [k] ends at the k-th.
   RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   std::optional<Pose3> last_odometry;
-  std::vector<SubmapMessage> outgoing;
   std::vector<Whereabouts> whereabouts;
 };
 
@@ -111,7 +110,8 @@ class RobotAgent {
   [[nodiscard]] bool wants_scan() const { return submaps_.wants_scan(); }
   /// Ends the run: the last, shorter submap becomes an outgoing message.
   void finish();
-  /// Submaps ready to be sent, oldest first; taken once.
+  /// Submaps ready to be sent, oldest first; taken once. Their scans are merged here, which add_odometry() and
+  /// add_scan() need not wait for: until then they are kept whole, so ask regularly.
   std::vector<SubmapMessage> take_outgoing();
 
   /// Compares the server's graph with the own one and adds the constraints it takes. An older revision than the newest
@@ -132,7 +132,6 @@ class RobotAgent {
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:
-  void send(Submap submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
   estimation::Termination optimise();
   [[nodiscard]] bool leads_astray(const ProxyGraph& graph) const;

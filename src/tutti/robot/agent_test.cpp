@@ -17,7 +17,7 @@ const Matrix6d kStepCovariance = Vector6d(1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-4).as
 Timestamp at(int sample) { return Timestamp{1'700'000'000'000'000'000LL} + 0.5 * sample; }
 
 /// A loop of 40 m radius, half a metre a sample.
-Pose3 true_pose(int sample) {
+Pose3 true_pose(double sample) {
   const double angle = 0.0125 * sample;
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle + std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
           {40.0 * std::cos(angle), 40.0 * std::sin(angle), 0.0}};
@@ -45,7 +45,7 @@ ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revision, con
   message.graph.revision = revision;
   for (const Keyframe& k : agent.keyframes()) {
     if (!k.representative) continue;
-    const int sample = static_cast<int>(std::lround((k.stamp - at(0)) / 0.5));
+    const double sample = (k.stamp - at(0)) / 0.5;
     message.graph.nodes.push_back({.robot = agent.robot(),
                                    .stamp = k.stamp,
                                    .T_world_body = T_world_true * true_pose(sample),

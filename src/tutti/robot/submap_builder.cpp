@@ -71,7 +71,7 @@ Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, con
   state_.odometry.push_back(state_.since_keyframe);
   state_.since_keyframe = {.T_a_b = {}, .covariance = Matrix6d::Zero()};
   if (keyframe.stamp - state_.keyframes.front().stamp >= config_.duration_s) {
-    state_.finished = close_submap();
+    close_submap();
     start_submap(keyframe);
   }
   return std::optional(keyframe);
@@ -96,21 +96,26 @@ void SubmapBuilder::start_submap(const Keyframe& first) {
   state_.scans.clear();
 }
 
-Submap SubmapBuilder::close_submap() {
-  Submap submap{.id = {robot_, state_.next_submap++}, .keyframes = state_.keyframes, .odometry = state_.odometry};
-  if (!state_.scans.empty())
-    submap.cloud = std::make_shared<const PointCloud>(
-        lidar::merge_scans(state_.scans, config_.voxel_m, {config_.min_range_m, config_.max_range_m}));
-  return submap;
+void SubmapBuilder::close_submap() {
+  state_.finished.push_back(
+      {{.id = {robot_, state_.next_submap++}, .keyframes = state_.keyframes, .odometry = state_.odometry},
+       std::move(state_.scans)});
 }
 
-std::optional<Submap> SubmapBuilder::take_submap() { return std::exchange(state_.finished, std::nullopt); }
+std::optional<Submap> SubmapBuilder::take_submap() {
+  if (state_.finished.empty()) return std::nullopt;
+  FinishedSubmap next = std::move(state_.finished.front());
+  state_.finished.erase(state_.finished.begin());
+  if (!next.scans.empty())
+    next.submap.cloud = std::make_shared<const PointCloud>(
+        lidar::merge_scans(next.scans, config_.voxel_m, {config_.min_range_m, config_.max_range_m}));
+  return std::move(next.submap);
+}
 
-std::optional<Submap> SubmapBuilder::finish() {
-  if (state_.keyframes.size() < 2) return std::nullopt;
-  Submap last = close_submap();
+void SubmapBuilder::finish() {
+  if (state_.keyframes.size() < 2) return;
+  close_submap();
   start_submap(state_.keyframes.back());
-  return last;
 }
 
 }  // namespace tutti::robot

@@ -36,13 +36,19 @@ struct SubmapConfig {
   }
 };
 
+/// A submap that has ended, and the scans that are still to be merged into its cloud.
+struct FinishedSubmap {
+  Submap submap;
+  std::vector<lidar::PosedCloud> scans;
+};
+
 /// All that a builder knows.
 struct SubmapBuilderState {
   std::uint32_t next_submap = 0;
   std::vector<Keyframe> keyframes;     ///< Of the open submap.
   std::vector<RelativePose> odometry;  ///< Between them.
   std::vector<lidar::PosedCloud> scans;
-  std::optional<Submap> finished;
+  std::vector<FinishedSubmap> finished;  ///< Not taken yet, oldest first.
   RelativePose since_keyframe{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   Trajectory recent;                       ///< Raw odometry that covers the longest sweep ending now.
   double distance_m = 0.0;                 ///< Travelled so far.
@@ -69,10 +75,11 @@ class SubmapBuilder {
     return !state_.keyframes.empty() && state_.keyframes.back().stamp == state_.recent.back().stamp;
   }
 
-  /// The submap that the last keyframe completed, once.
+  /// The oldest finished submap that was not taken yet. Merges its scans, which takes long where they are large: adding
+  /// odometry or a scan never does.
   std::optional<Submap> take_submap();
-  /// Closes the last, shorter submap; nothing when no keyframe was added since the previous one.
-  std::optional<Submap> finish();
+  /// Ends the last, shorter submap; nothing ends when no keyframe was added since the previous one.
+  void finish();
 
   static constexpr double kSweepHistoryS = 0.5;  ///< Longest sweep that can be undistorted.
 
@@ -83,7 +90,7 @@ class SubmapBuilder {
   void remember(Timestamp stamp, const Pose3& T_odom_body);
   void start_submap(const Keyframe& first);
   [[nodiscard]] bool is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const;
-  Submap close_submap();
+  void close_submap();
 
   RobotId robot_;
   SubmapConfig config_;

@@ -24,9 +24,9 @@ std::vector<Submap> drive(SubmapBuilder& builder, double seconds, bool with_scan
     if (with_scans) {
       EXPECT_TRUE(builder.add_scan({at(t), cloud}).has_value());
     }
-    if (auto submap = builder.take_submap()) out.push_back(std::move(*submap));
   }
-  if (auto last = builder.finish()) out.push_back(std::move(*last));
+  builder.finish();
+  while (auto submap = builder.take_submap()) out.push_back(std::move(*submap));
   return out;
 }
 
@@ -69,6 +69,24 @@ TEST(SubmapBuilder, RepresentativeKeyframesComeAboutEveryMetre) {
   ASSERT_GT(positions.size(), 20U);  // 30 m
   EXPECT_EQ(positions.front(), 0.0);
   for (std::size_t i = 1; i < positions.size(); ++i) EXPECT_NEAR(positions[i] - positions[i - 1], 1.2, 0.25);
+}
+
+// A point that is changed after its submap has ended, and before it is taken, is changed in the cloud.
+TEST(SubmapBuilder, MergingScansIsLeftToWhoTakesTheSubmap) {
+  SubmapBuilder builder(RobotId{0}, {});
+  const auto cloud = std::make_shared<PointCloud>(PointCloud{{{5.0F, 0.0F, 1.0F}}});
+  for (int i = 0; i <= 45; ++i) {
+    ASSERT_TRUE(builder.add_odometry(at(0.5 * i), ahead(0.0), kStepCovariance));
+    ASSERT_TRUE(builder.add_scan({at(0.5 * i), cloud}));
+  }
+  cloud->points[0].y() = 2.0F;
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    const auto submap = builder.take_submap();
+    ASSERT_TRUE(submap && submap->cloud);
+    EXPECT_EQ(submap->id.index, i);
+    EXPECT_EQ(submap->cloud->points, cloud->points);
+  }
+  EXPECT_FALSE(builder.take_submap().has_value());
 }
 
 TEST(SubmapBuilder, CloudIsInTheSubmapFrame) {
@@ -153,9 +171,12 @@ TEST(SubmapBuilder, BadInputIsRefusedAndChangesNothing) {
   EXPECT_NE(message(builder.add_scan({at(0), std::make_shared<PointCloud>()})).find("empty"), std::string::npos);
   EXPECT_NE(message(builder.add_scan({at(5), std::make_shared<PointCloud>()})).find("no odometry"), std::string::npos);
   ASSERT_TRUE(builder.add_odometry(at(1), ahead(1), kStepCovariance).has_value());
-  const auto last = builder.finish();
+  builder.finish();
+  const auto last = builder.take_submap();
   ASSERT_TRUE(last.has_value());
   EXPECT_EQ(last->keyframes.size(), 2U);
+  builder.finish();  // nothing since
+  EXPECT_FALSE(builder.take_submap().has_value());
 }
 
 }  // namespace
