@@ -6,6 +6,7 @@
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/way.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
 
 namespace tutti::robot {
@@ -70,7 +71,7 @@ Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, con
   state_.keyframes.push_back(keyframe);
   state_.odometry.push_back(state_.since_keyframe);
   state_.since_keyframe = {.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  if (keyframe.stamp - state_.keyframes.front().stamp >= config_.duration_s) {
+  if (is_full()) {
     close_submap();
     start_submap(keyframe);
   }
@@ -94,6 +95,12 @@ void SubmapBuilder::start_submap(const Keyframe& first) {
   state_.keyframes = {first};
   state_.odometry.clear();
   state_.scans.clear();
+}
+
+/// Travel is counted between keyframes: from sample to sample, noise alone would add up to metres.
+bool SubmapBuilder::is_full() const {
+  return state_.keyframes.back().stamp - state_.keyframes.front().stamp >= config_.duration_s ||
+         way_m(state_.odometry) >= config_.distance_m;
 }
 
 void SubmapBuilder::close_submap() {

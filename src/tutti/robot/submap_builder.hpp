@@ -14,7 +14,8 @@
 namespace tutti::robot {
 
 struct SubmapConfig {
-  double duration_s = 10.0;                ///< A submap is closed at the first keyframe this long after its start.
+  double duration_s = 10.0;                ///< A submap is closed at the first keyframe this long after its start,
+  double distance_m = 20.0;                ///< or this much travel, whichever comes first: odometry bends over both.
   double keyframe_distance_m = 0.3;        ///< A keyframe after this much travel,
   double keyframe_angle_deg = 15.0;        ///< or this much rotation,
   double keyframe_time_s = 1.0;            ///< or this much time, whichever comes first.
@@ -24,7 +25,8 @@ struct SubmapConfig {
   double max_range_m = 60.0;               ///< Scan points farther than this are not used.
   template <class V>
   void describe(V& v) {
-    v.field("duration_s", duration_s, greater_than(0.0), "Length of a submap.");
+    v.field("duration_s", duration_s, greater_than(0.0), "Longest submap in time.");
+    v.field("distance_m", distance_m, greater_than(0.0), "Longest submap in travel, from keyframe to keyframe.");
     v.field("keyframe_distance_m", keyframe_distance_m, greater_than(0.0), "Travel that makes a keyframe.");
     v.field("keyframe_angle_deg", keyframe_angle_deg, greater_than(0.0), "Rotation that makes a keyframe.");
     v.field("keyframe_time_s", keyframe_time_s, greater_than(0.0), "Time that makes a keyframe.");
@@ -90,6 +92,7 @@ class SubmapBuilder {
   void remember(Timestamp stamp, const Pose3& T_odom_body);
   void start_submap(const Keyframe& first);
   [[nodiscard]] bool is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const;
+  [[nodiscard]] bool is_full() const;
   void close_submap();
 
   RobotId robot_;

@@ -5,6 +5,9 @@
 
 #include <limits>
 
+#include "tutti/base/random.hpp"
+#include "tutti/model/way.hpp"
+
 namespace tutti::robot {
 namespace {
 
@@ -69,6 +72,36 @@ TEST(SubmapBuilder, RepresentativeKeyframesComeAboutEveryMetre) {
   ASSERT_GT(positions.size(), 20U);  // 30 m
   EXPECT_EQ(positions.front(), 0.0);
   for (std::size_t i = 1; i < positions.size(); ++i) EXPECT_NEAR(positions[i] - positions[i - 1], 1.2, 0.25);
+}
+
+/// Straight ahead for 60 s, 200 samples a second that are off by a centimetre each.
+std::vector<Submap> travel(double speed_mps, const SubmapConfig& config) {
+  SubmapBuilder builder(RobotId{0}, config);
+  Rng rng(1);
+  for (int i = 0; i <= 12'000; ++i) {
+    const double t = 0.005 * i;
+    EXPECT_TRUE(builder.add_odometry(at(t), ahead(speed_mps * t + rng.normal(0.01)), kStepCovariance));
+  }
+  std::vector<Submap> out;
+  while (auto submap = builder.take_submap()) out.push_back(std::move(*submap));
+  return out;
+}
+
+// 10 s by car are 70 m, over which odometry bends.
+TEST(SubmapBuilder, ByCarTheWayEndsASubmap) {
+  const std::vector<Submap> submaps = travel(7.0, {});
+  EXPECT_NEAR(static_cast<double>(submaps.size()), 60.0 * 7.0 / 20.0, 1.0);
+  for (const Submap& submap : submaps) {
+    EXPECT_GE(way_m(submap.odometry), 20.0);
+    EXPECT_LT(way_m(submap.odometry), 20.5);  // at the keyframe after 20 m
+  }
+}
+
+TEST(SubmapBuilder, OnFootOnlyTimeEndsASubmap) {
+  const std::vector<Submap> submaps = travel(1.4, {}), by_time = travel(1.4, {.distance_m = 1e9});
+  ASSERT_EQ(submaps.size(), by_time.size());
+  EXPECT_GE(submaps.size(), 5U);
+  for (std::size_t i = 0; i < submaps.size(); ++i) EXPECT_EQ(submaps[i].keyframes, by_time[i].keyframes);
 }
 
 // A point that is changed after its submap has ended, and before it is taken, is changed in the cloud.

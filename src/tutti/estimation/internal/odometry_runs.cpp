@@ -5,6 +5,7 @@
 
 #include "tutti/estimation/internal/chain_run.hpp"
 #include "tutti/estimation/jump.hpp"
+#include "tutti/model/way.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
@@ -16,12 +17,11 @@ OdometryRun compound(std::size_t begin, std::size_t end, std::span<const Relativ
   const RunSum sum = sum_odometry(steps);
   const Matrix6d to_end = adjoint(sum.T_a_b.inverse());
   const Matrix6d covariance = to_end * sum.covariance * to_end.transpose();
-  OdometryRun run{.begin = begin,
-                  .end = end,
-                  .T_begin_end = sum.T_a_b,
-                  .information = covariance.llt().solve(Matrix6d::Identity())};
-  for (const auto& step : steps) run.length_m += step.T_a_b.translation.norm();
-  return run;
+  return {.begin = begin,
+          .end = end,
+          .T_begin_end = sum.T_a_b,
+          .information = covariance.llt().solve(Matrix6d::Identity()),
+          .length_m = way_m(steps)};
 }
 
 bool same_shape(const OdometryRun& run, const Vector6d& closing) {

@@ -79,7 +79,8 @@ struct CandidateConfig {
 
 /// From two submap clouds to a loop closure or a refusal. Every gate is a physical quantity.
 struct LidarClosureConfig {
-  double min_duration_s = 5.0;  ///< Shorter submaps saw too little: they gave wrong closures.
+  double min_duration_s = 5.0;  ///< Shorter submaps saw too little, on foot: they gave wrong closures.
+  double min_way_m = 10.0;      ///< But they are used when they come as far as this: by car that is 1.4 s.
   int min_keyframes = 6;
   int min_points = 500;
   double voxel_m = 0.3;  ///< Clouds are thinned to this; denser ones cost time and gain nothing.
@@ -108,7 +109,9 @@ struct LidarClosureConfig {
   double max_forward_backward_deg = 0.5;
   template <class V>
   void describe(V& v) {
-    v.field("min_duration_s", min_duration_s, at_least(0.0), "Shorter submaps are not used.");
+    v.field("min_duration_s", min_duration_s, at_least(0.0),
+            "Submaps shorter than this and than min_way_m are not used.");
+    v.field("min_way_m", min_way_m, at_least(0.0), "Travel from which a submap may take less than min_duration_s.");
     v.field("min_keyframes", min_keyframes, at_least(1), "Submaps with fewer keyframes are not used.");
     v.field("min_points", min_points, at_least(10), "Submaps with fewer points are not used.");
     v.field("voxel_m", voxel_m, greater_than(0.0), "Clouds are thinned to voxels of this edge.");

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <span>
 
+#include "tutti/model/way.hpp"
 #include "tutti/perception/lidar/levelling.hpp"
 #include "tutti/perception/lidar/registration.hpp"
 #include "tutti/perception/lidar/submap_middle.hpp"
@@ -23,8 +24,10 @@ std::string why_unusable(const Submap& submap, std::size_t points, const LidarCl
   if (submap.keyframes.size() < static_cast<std::size_t>(config.min_keyframes))
     return fmt::format("too short: {} keyframes, at least {} needed", submap.keyframes.size(), config.min_keyframes);
   const double duration = submap.keyframes.back().stamp - submap.keyframes.front().stamp;
-  if (duration < config.min_duration_s)
-    return fmt::format("too short: {:.1f} s, at least {:.1f} s needed", duration, config.min_duration_s);
+  const double way = way_m(submap.odometry);
+  if (duration < config.min_duration_s && way < config.min_way_m)
+    return fmt::format("too short: {:.1f} s and {:.1f} m, at least {:.1f} s or {:.1f} m needed", duration, way,
+                       config.min_duration_s, config.min_way_m);
   return {};
 }
 

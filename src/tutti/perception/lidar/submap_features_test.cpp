@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tutti/model/way.hpp"
 #include "tutti/perception/lidar/levelling.hpp"
 #include "tutti/perception/lidar/testing/rooms.hpp"
 
@@ -87,7 +88,17 @@ TEST(ExtractFeatures, saysWhyASubmapIsNotUsable) {
             "too short: 4 keyframes, at least 6 needed");
   bad = good;
   for (auto& keyframe : bad.keyframes) keyframe.stamp.ns /= 4;
-  EXPECT_EQ(reason(bad), "too short: 2.5 s, at least 5.0 s needed");
+  EXPECT_EQ(reason(bad), "too short: 2.5 s and 4.5 m, at least 5.0 s or 10.0 m needed");
+}
+
+// By car a submap ends by its way after 3 s. What short submaps lack is having moved.
+TEST(ExtractFeatures, AFewSecondsAreEnoughWhereTheyLeadFar) {
+  Submap fast = make_submap(kId, furnished_room(), {}, Rng(1));
+  for (auto& keyframe : fast.keyframes) keyframe.stamp.ns /= 4;
+  EXPECT_FALSE(extract_features(fast, {}).usable);
+  LidarClosureConfig config;
+  config.min_way_m = way_m(fast.odometry);
+  EXPECT_TRUE(extract_features(fast, config).usable);
 }
 
 }  // namespace

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+
+#include "tutti/model/relative_pose.hpp"
+
+namespace tutti {
+
+/// Length of a path of such steps, metres.
+inline double way_m(std::span<const RelativePose> steps) {
+  double sum = 0.0;
+  for (const RelativePose& step : steps) sum += step.T_a_b.translation.norm();
+  return sum;
+}
+
+}  // namespace tutti
