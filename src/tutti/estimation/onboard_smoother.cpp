@@ -50,7 +50,8 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
     : OnboardSmoother(config, state.first) {
   state_.odometry.reserve(state.odometry.size());
   poses_.reserve(state.odometry.size() + 1);
-  for (const auto& step : state.odometry) append(step);
+  for (std::size_t k = 0; k < state.odometry.size(); ++k)
+    append(state.odometry[k], state.duration_s.empty() ? 1.0 : state.duration_s[k]);
   state_.jumps = std::move(state.jumps);
   set_constraints(std::move(state.constraints));
 }
@@ -61,8 +62,9 @@ OnboardSmoother& OnboardSmoother::operator=(OnboardSmoother&&) noexcept = defaul
 
 std::size_t OnboardSmoother::stored_runs() const { return runs_->all().size(); }
 
-std::size_t OnboardSmoother::append(const RelativePose& odometry) {
+std::size_t OnboardSmoother::append(const RelativePose& odometry, double duration_s) {
   state_.odometry.push_back(odometry);
+  state_.duration_s.push_back(duration_s);
   poses_.push_back(poses_.back() * odometry.T_a_b);
   return poses_.size() - 1;
 }
@@ -118,7 +120,7 @@ bool OnboardSmoother::judge_jumps(std::span<const std::size_t> nodes) {
     const bool was_repaired = inside != believed.end() && inside->step < end;  // then the run is not odometry's
     const internal::OdometryRun& run = runs_->all()[static_cast<std::size_t>(node - nodes.begin())];
     if (!was_repaired && !internal::is_implausible(run, begin_end.T_a_b)) continue;
-    const auto jump = find_jump(state_.odometry, begin, end, begin_end);
+    const auto jump = find_jump(state_.odometry, begin, end, begin_end, state_.duration_s);
     if (jump && std::ranges::find(state_.jumps, jump->step, &OdometryJump::step) == state_.jumps.end())
       state_.jumps.push_back(*jump);
   }

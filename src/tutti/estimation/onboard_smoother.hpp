@@ -76,6 +76,7 @@ struct SmootherState {
   std::vector<RelativePose> odometry;  ///< As believed.
   std::vector<ChainConstraint> constraints;
   std::vector<OdometryJump> jumps;  ///< Steps where odometry said something else, and what; in order.
+  std::vector<double> duration_s;   ///< Of every step; empty when all took the same.
   friend bool operator==(const SmootherState&, const SmootherState&) = default;
 };
 
@@ -102,8 +103,9 @@ class OnboardSmoother {
   OnboardSmoother& operator=(OnboardSmoother&&) noexcept;
 
   /// Adds a node by odometry from the last one and returns its position; its pose is composed until solve().
-  /// Its covariance must be positive definite.
-  std::size_t append(const RelativePose& odometry);
+  /// Its covariance must be positive definite. `duration_s`: what the step took, in any unit common to all; jumps are
+  /// told by it.
+  std::size_t append(const RelativePose& odometry, double duration_s = 1.0);
   /// Nodes: one more than odometry steps.
   [[nodiscard]] std::size_t size() const { return poses_.size(); }
   /// The full current set, replacing the previous one; nodes must exist. from == to is ignored.

@@ -53,24 +53,23 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given,
   const Matrix6d covariance =
       invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
   const std::uint32_t submap = submaps_.current_submap();
-  const auto keyframe = submaps_.add_odometry(stamp, T_odom_body, covariance);
-  if (!keyframe) return tl::unexpected(keyframe.error());
-  if (state_.last_odometry) {
-    const RelativePose step{state_.last_odometry->inverse() * T_odom_body, covariance};
-    smoother_.append(step);
-    state_.since_node = compound(state_.since_node, step);
-  } else {
-    smoother_.set_first_pose(T_odom_body);
-  }
-  state_.last_odometry = T_odom_body;
-  if (*keyframe) {
-    state_.keyframes.push_back(**keyframe);
-    state_.chain_index.push_back(smoother_.size() - 1);
-    state_.submap_of.push_back(submap);
-    if ((*keyframe)->representative)
-      state_.node_odometry.push_back(std::exchange(state_.since_node, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
-  }
+  const auto step = submaps_.add_odometry(stamp, T_odom_body, covariance);
+  if (!step) return tl::unexpected(step.error());
+  if (*step) add_keyframe(**step, submap);
   return {};
+}
+
+void RobotAgent::add_keyframe(const KeyframeStep& step, std::uint32_t submap) {
+  if (state_.keyframes.empty()) {
+    smoother_.set_first_pose(step.keyframe.T_odom_body);
+  } else {
+    smoother_.append(step.odometry, step.keyframe.stamp - state_.keyframes.back().stamp);
+    state_.since_node = compound(state_.since_node, step.odometry);
+  }
+  state_.keyframes.push_back(step.keyframe);
+  state_.submap_of.push_back(submap);
+  if (step.keyframe.representative)
+    state_.node_odometry.push_back(std::exchange(state_.since_node, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
 }
 
 Status RobotAgent::add_scan(const Scan& scan) { return submaps_.add_scan(scan); }
@@ -90,8 +89,8 @@ std::vector<consistency::RobotNode> RobotAgent::nodes() const {
   for (std::size_t k = 0; k < state_.keyframes.size(); ++k) {
     if (!state_.keyframes[k].representative) continue;
     nodes.push_back({.stamp = state_.keyframes[k].stamp,
-                     .T_map_body = smoother_.pose(state_.chain_index[k]),
-                     .chain_index = state_.chain_index[k],
+                     .T_map_body = smoother_.pose(k),
+                     .chain_index = k,
                      .odometry = state_.node_odometry[nodes.size()],
                      .submap = state_.submap_of[k]});
   }
@@ -205,19 +204,15 @@ AgentState RobotAgent::state() const {
 Trajectory RobotAgent::corrected() const {
   Trajectory out;
   for (std::size_t k = 0; k < state_.keyframes.size(); ++k)
-    out.push_back({state_.keyframes[k].stamp, smoother_.pose(state_.chain_index[k])});
+    out.push_back({state_.keyframes[k].stamp, smoother_.pose(k)});
   return out;
 }
 
 std::vector<RepairedJump> RobotAgent::repaired_jumps() const {
   std::vector<RepairedJump> out;
-  for (const auto& [step, said] : smoother_.state().jumps) {
-    const auto after = std::ranges::upper_bound(state_.chain_index, step);
-    if (after == state_.chain_index.begin() || after == state_.chain_index.end()) continue;
-    const auto k = static_cast<std::size_t>(after - state_.chain_index.begin());
-    out.push_back(repaired_jump(state_.keyframes[k - 1].stamp, state_.keyframes[k].stamp, said.T_a_b,
+  for (const auto& [step, said] : smoother_.state().jumps)
+    out.push_back(repaired_jump(state_.keyframes[step].stamp, state_.keyframes[step + 1].stamp, said.T_a_b,
                                 smoother_.pose(step).inverse() * smoother_.pose(step + 1)));
-  }
   return out;
 }
 

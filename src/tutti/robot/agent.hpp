@@ -79,12 +79,10 @@ struct AgentState {
   SubmapBuilderState submaps;
   estimation::SmootherState smoother;
   consistency::Ledger ledger;
-  std::vector<Keyframe> keyframes;
-  std::vector<std::size_t> chain_index;     ///< Of each keyframe in the odometry chain.
+  std::vector<Keyframe> keyframes;          ///< Nodes of the smoother's chain.
   std::vector<std::uint32_t> submap_of;     ///< Of each keyframe: the submap it was first in.
   std::vector<RelativePose> node_odometry;  ///< Raw, between representative keyframes; [k] ends at the k-th.
   RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  std::optional<Pose3> last_odometry;
   std::vector<Whereabouts> whereabouts;
 };
 
@@ -124,6 +122,7 @@ class RobotAgent {
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return state_.keyframes; }
   [[nodiscard]] const consistency::Ledger& ledger() const { return state_.ledger; }
   [[nodiscard]] const consistency::ConstraintPolicy& policy() const { return *policy_; }
+  /// Of the own chain: one per keyframe but the first.
   [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - 1; }
   /// T_map_body at the keyframes; `map` starts where `odom` does.
   [[nodiscard]] Trajectory corrected() const;
@@ -132,6 +131,7 @@ class RobotAgent {
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:
+  void add_keyframe(const KeyframeStep& step, std::uint32_t submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
   estimation::Termination optimise();
   [[nodiscard]] bool leads_astray(const ProxyGraph& graph) const;

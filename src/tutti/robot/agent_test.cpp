@@ -273,6 +273,60 @@ TEST(Agent, TakesBackAJumpWhereItWas) {
   }
 }
 
+/// As drifting_odometry(), in steps of a tenth: half a metre in ten samples.
+Trajectory fine_odometry(int samples) {
+  const Trajectory coarse = drifting_odometry(samples);
+  Trajectory out;
+  for (int i = 0; i < 10 * (samples - 1); ++i) {
+    const Pose3 step = coarse[i / 10].pose.inverse() * coarse[i / 10 + 1].pose;
+    out.push_back(
+        {at(i / 10) + 0.05 * (i % 10), coarse[i / 10].pose * retract(Pose3{}, 0.1 * (i % 10) * local(Pose3{}, step))});
+  }
+  return out;
+}
+
+// The step that jumped ends at a keyframe, which a jump makes at once, so it is a short one.
+TEST(Agent, TakesBackAJumpWithinAStepFromKeyframeToKeyframe) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  const Pose3 slip{so3_exp(Eigen::Vector3d(0, 0, 0.35)), Eigen::Vector3d::Zero()};
+  Trajectory odometry = fine_odometry(120);
+  for (std::size_t i = 605; i < odometry.size(); ++i) {
+    const Pose3 seen_from = odometry[604].pose;
+    odometry[i].pose = seen_from * slip * seen_from.inverse() * odometry[i].pose;
+  }
+  feed(agent, odometry);
+  agent.receive(broadcast(agent, 1, kWorld));
+  ASSERT_EQ(agent.repaired_jumps().size(), 1U);
+  const RepairedJump jump = agent.repaired_jumps()[0];
+  EXPECT_EQ(jump.until, odometry[605].stamp);
+  EXPECT_LT(jump.until - jump.from, 0.31);  // keyframes are 0.3 m apart, at 1 m/s
+  EXPECT_NEAR(jump.rotation_rad, 0.35, 0.01);
+}
+
+// 300 MB an hour otherwise, at 200 Hz.
+TEST(Agent, KeepsKeyframesNotSamples) {
+  const auto kept_after = [](int rate_hz, double seconds) {
+    RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+    for (int i = 0; i <= static_cast<int>(seconds * rate_hz); ++i) {
+      const double t = static_cast<double>(i) / rate_hz;
+      const Pose3 pose{Eigen::Quaterniond::Identity(), {std::min(0.6 * t, 60.0), 0.0, 0.0}};  // stands at last
+      EXPECT_TRUE(agent.add_odometry(at(0) + t, pose, kStepCovariance / rate_hz));
+      agent.take_outgoing();
+    }
+    const AgentState state = agent.state();
+    EXPECT_EQ(state.smoother.odometry.size(), agent.keyframes().size() - 1);
+    EXPECT_EQ(agent.odometry_factors(), agent.keyframes().size() - 1);
+    EXPECT_LE(state.submaps.recent.size(), static_cast<std::size_t>(SubmapBuilder::kSweepHistoryS * rate_hz) + 2);
+    EXPECT_LE(state.submaps.keyframes.size(), 40U);
+    EXPECT_TRUE(state.submaps.finished.empty());
+    return state.smoother.odometry.size() + state.smoother.jumps.size() + state.smoother.constraints.size() +
+           state.keyframes.size() + state.submap_of.size() + state.node_odometry.size();
+  };
+  const std::size_t slow = kept_after(10, 200.0), fast = kept_after(200, 200.0);
+  EXPECT_NEAR(static_cast<double>(fast), static_cast<double>(slow), 0.1 * static_cast<double>(slow));
+  EXPECT_LT(fast, 3U * (200U + 100U + 2U) + 200U);  // a keyframe per 0.3 m or second
+}
+
 TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {
   AgentConfig config;
   config.policy.name = "every_node";
@@ -297,7 +351,7 @@ TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {
     EXPECT_EQ(a[i].submap.odometry, b[i].submap.odometry);
   }
   EXPECT_EQ(alone.corrected().size(), alone.keyframes().size());
-  EXPECT_EQ(alone.odometry_factors(), 239U);
+  EXPECT_EQ(alone.odometry_factors(), alone.keyframes().size() - 1);
 }
 
 TEST(Agent, WhatItTakesTheServerTakes) {

@@ -43,8 +43,8 @@ void SubmapBuilder::remember(Timestamp stamp, const Pose3& T_odom_body) {
   state_.recent.erase(state_.recent.begin(), state_.recent.begin() + static_cast<std::ptrdiff_t>(old));
 }
 
-Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body,
-                                                            const Matrix6d& increment_covariance) {
+Result<std::optional<KeyframeStep>> SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body,
+                                                                const Matrix6d& increment_covariance) {
   if (auto ok = check_sample(robot_, stamp, T_odom_body, increment_covariance); !ok) return tl::unexpected(ok.error());
   if (!state_.recent.empty()) {
     const StampedPose& last = state_.recent.back();
@@ -56,7 +56,7 @@ Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, con
     state_.since_keyframe = compound(state_.since_keyframe, {step, increment_covariance});
   }
   remember(stamp, T_odom_body);
-  if (!is_keyframe(stamp, T_odom_body)) return std::optional<Keyframe>{};
+  if (!is_keyframe(stamp, T_odom_body)) return std::optional<KeyframeStep>{};
 
   const bool first = state_.keyframes.empty();
   Keyframe keyframe{first ? 0 : state_.keyframes.back().index + 1, stamp, T_odom_body};
@@ -66,16 +66,16 @@ Result<std::optional<Keyframe>> SubmapBuilder::add_odometry(Timestamp stamp, con
   }
   if (first) {
     start_submap(keyframe);
-    return std::optional(keyframe);
+    return std::optional(KeyframeStep{keyframe});
   }
+  const KeyframeStep out{keyframe, std::exchange(state_.since_keyframe, KeyframeStep{}.odometry)};
   state_.keyframes.push_back(keyframe);
-  state_.odometry.push_back(state_.since_keyframe);
-  state_.since_keyframe = {.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  state_.odometry.push_back(out.odometry);
   if (is_full()) {
     close_submap();
     start_submap(keyframe);
   }
-  return std::optional(keyframe);
+  return std::optional(out);
 }
 
 Status SubmapBuilder::add_scan(const Scan& scan) {

@@ -38,6 +38,12 @@ struct SubmapConfig {
   }
 };
 
+/// A keyframe, and the raw odometry that leads to it from the previous one (the identity, exactly, for the first).
+struct KeyframeStep {
+  Keyframe keyframe;
+  RelativePose odometry{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+};
+
 /// A submap that has ended, and the scans that are still to be merged into its cloud.
 struct FinishedSubmap {
   Submap submap;
@@ -67,8 +73,8 @@ class SubmapBuilder {
   /// increase; poses must be finite with unit quaternions, covariances what check_covariance() says (geometry/
   /// covariance.hpp): otherwise an error, and nothing changes. Returns the
   /// keyframe this sample became, if it did.
-  Result<std::optional<Keyframe>> add_odometry(Timestamp stamp, const Pose3& T_odom_body,
-                                               const Matrix6d& increment_covariance);
+  Result<std::optional<KeyframeStep>> add_odometry(Timestamp stamp, const Pose3& T_odom_body,
+                                                   const Matrix6d& increment_covariance);
   /// A scan that ends at the latest odometry sample's stamp; points in the body frame. A sweep with ages is undistorted
   /// by the odometry; it must not begin before the first sample, nor more than `kSweepHistoryS` ago.
   Status add_scan(const Scan& scan);
