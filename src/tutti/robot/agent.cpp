@@ -55,6 +55,7 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given,
   const std::uint32_t submap = submaps_.current_submap();
   const auto step = submaps_.add_odometry(stamp, T_odom_body, covariance);
   if (!step) return tl::unexpected(step.error());
+  state_.T_odom_body = T_odom_body;
   if (*step) add_keyframe(**step, submap);
   return {};
 }
@@ -136,6 +137,8 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
       optimise();
     }
   }
+  state_.T_map_odom =
+      state_.ledger.size() == 0 ? Pose3{} : smoother_.poses().back() * state_.keyframes.back().T_odom_body.inverse();
   locate_others(message.graph, own, comparison.pairs);
   ended(UpdateStage::optimise);
 

@@ -83,6 +83,8 @@ struct AgentState {
   std::vector<std::uint32_t> submap_of;     ///< Of each keyframe: the submap it was first in.
   std::vector<RelativePose> node_odometry;  ///< Raw, between representative keyframes; [k] ends at the k-th.
   RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  Pose3 T_odom_body;  ///< Newest sample.
+  Pose3 T_map_odom;
   std::vector<Whereabouts> whereabouts;
 };
 
@@ -126,6 +128,10 @@ class RobotAgent {
   [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - 1; }
   /// T_map_body at the keyframes; `map` starts where `odom` does.
   [[nodiscard]] Trajectory corrected() const;
+  /// Takes odometry into the corrected map. Only receive() changes it; the identity while nothing is corrected.
+  [[nodiscard]] const Pose3& T_map_odom() const { return state_.T_map_odom; }
+  /// The corrected pose at the newest odometry sample: T_map_odom * T_odom_body. It jumps when receive() corrects.
+  [[nodiscard]] Pose3 T_map_body() const { return state_.T_map_odom * state_.T_odom_body; }
   /// Where `corrected()` takes back what odometry jumped by, between neighbouring keyframes.
   [[nodiscard]] std::vector<RepairedJump> repaired_jumps() const;
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }

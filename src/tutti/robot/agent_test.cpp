@@ -327,6 +327,30 @@ TEST(Agent, KeepsKeyframesNotSamples) {
   EXPECT_LT(fast, 3U * (200U + 100U + 2U) + 200U);  // a keyframe per 0.3 m or second
 }
 
+TEST(Agent, SaysWhereTheRobotIsNow) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  EXPECT_EQ(agent.T_map_body(), Pose3{});
+  Pose3 T_map_odom;
+  std::uint64_t revision = 0;
+  const Trajectory odometry = fine_odometry(240);
+  for (std::size_t i = 0; i < odometry.size(); ++i) {
+    ASSERT_TRUE(agent.add_odometry(odometry[i].stamp, odometry[i].pose, kStepCovariance));
+    EXPECT_EQ(agent.T_map_odom(), T_map_odom);  // to the bit
+    EXPECT_LT(local(agent.T_map_odom() * odometry[i].pose, agent.T_map_body()).norm(), 1e-12);
+    if (agent.wants_scan()) {  // a keyframe
+      EXPECT_LT(local(agent.corrected().back().pose, agent.T_map_body()).norm(), 1e-9);
+    }
+    if (i % 800 != 799) continue;
+    agent.receive(broadcast(agent, ++revision, kWorld));
+    EXPECT_GT(agent.ledger().size(), 0U);
+    EXPECT_GT((agent.T_map_odom() * odometry[i].pose).translation.norm(), 0.0);
+    EXPECT_GT(local(agent.T_map_odom(), T_map_odom).norm(), 1e-3);
+    T_map_odom = agent.T_map_odom();
+    EXPECT_EQ(RobotAgent(RobotId{1}, {}, Rng(1), agent.state()).T_map_body(), agent.T_map_body());
+  }
+  EXPECT_EQ(revision, 2U);
+}
+
 TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {
   AgentConfig config;
   config.policy.name = "every_node";
