@@ -79,16 +79,30 @@ Eigen::MatrixXd disagreement(const SparseMatrix& L_server, const Eigen::MatrixXd
   return d;
 }
 
+namespace {
+
+Comparison synchronised(const Synchronisation& sync) {
+  return {.pairs = sync.pairs,
+          .disagreement = {},
+          .rotation_disagreement = {},
+          .unmatched_proxy = sync.unmatched_proxy,
+          .unmatched_robot = sync.unmatched_robot,
+          .missing_eliminated = sync.missing_eliminated};
+}
+
+}  // namespace
+
+Comparison synchronised(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes) {
+  return synchronised(synchronise(graph, robot, nodes));
+}
+
 Comparison compare(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
                    const CompareConfig& config) {
   const auto signal = make_signal(config.signal);
   TUTTI_CHECK(signal.has_value(), "signal '{}' is unknown", config.signal);
 
   const Synchronisation sync = synchronise(graph, robot, nodes);
-  Comparison out{.pairs = sync.pairs,
-                 .unmatched_proxy = sync.unmatched_proxy,
-                 .unmatched_robot = sync.unmatched_robot,
-                 .missing_eliminated = sync.missing_eliminated};
+  Comparison out = synchronised(sync);
   out.disagreement = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sync.pairs.size()), config.scales);
   out.rotation_disagreement = out.disagreement;
   if (sync.pairs.size() < 2) return out;

@@ -38,11 +38,15 @@ struct CompareConfig {
 struct Comparison {
   std::vector<NodePair> pairs;   ///< The synchronised nodes in time order: row r of `disagreement` is pairs[r].
   Eigen::MatrixXd disagreement;  ///< pairs x scales, d^s of eq. (8) over the columns in metres; scale 0 = largest.
+                                 ///< Empty when only synchronised.
   Eigen::MatrixXd rotation_disagreement;  ///< The same over the columns in radians; zero if the signal has none.
   double lambda_max = 0.0;                ///< Common to both filter banks: the larger of the two graphs'. 0 = no edges.
   int order = 0;                          ///< Of the Chebyshev polynomials (the larger of the two); 0 = exact.
   std::size_t unmatched_proxy = 0, unmatched_robot = 0, missing_eliminated = 0;  ///< See Synchronisation.
 };
+
+/// Step 4 of the paper's section III alone: what most policies need, and a hundredth of the work.
+Comparison synchronised(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes);
 
 /// Section III of the paper, steps 4 and 5: synchronise, build the robot's own graph by the server's rule, filter both
 /// signals, d^s.

@@ -22,7 +22,7 @@ struct PolicyInput {
   const ProxyGraph& graph;
   RobotId robot;
   std::span<const RobotNode> nodes;
-  const Comparison& comparison;
+  const Comparison& comparison;  ///< Only synchronised unless needs_disagreement().
   /// How many constraints the robot may hold after this update; existing ones are counted, never taken away by a policy
   /// that adds to them. None: the policy's own rule.
   std::optional<std::size_t> budget;
@@ -43,6 +43,8 @@ class ConstraintPolicy {
   [[nodiscard]] virtual std::string name() const = 0;
   /// Spends whatever it is given; the others know when to stop.
   [[nodiscard]] virtual bool needs_budget() const { return false; }
+  /// Looks at PolicyInput::comparison.disagreement, which is costly: others go without.
+  [[nodiscard]] virtual bool needs_disagreement() const { return false; }
   [[nodiscard]] virtual Selection choose(const PolicyInput& input) const = 0;
 };
 

@@ -26,7 +26,9 @@ RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConf
   for (const std::string& policy : ordered) {
     robot::AgentConfig own = config;
     own.policy.name = policy;
-    own.explain = config.explain && policy == config.policy.name;  // shadows are not shown
+    const bool is_shown = policy == config.policy.name;  // shadows are not
+    own.explain = config.explain && is_shown;
+    own.always_compare = config.always_compare && is_shown;
     members_.push_back({policy,
                         robot::RobotAgent(recording.recording.robot, 1, own, rng.fork(policy)),
                         {.robot = recording.recording.name, .policy = policy}});

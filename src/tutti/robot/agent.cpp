@@ -109,7 +109,9 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   };
 
   const std::vector<consistency::RobotNode> own = nodes();
-  const auto comparison = consistency::compare(message.graph, robot_, own, config_.compare);
+  const auto comparison = config_.always_compare || policy_->needs_disagreement()
+                              ? consistency::compare(message.graph, robot_, own, config_.compare)
+                              : consistency::synchronised(message.graph, robot_, own);
   ended(UpdateStage::compare);
 
   const std::size_t withdrawn = state_.ledger.withdraw_unknown(message.graph, robot_);

@@ -30,6 +30,7 @@ struct AgentConfig {
   estimation::OnboardSmootherConfig smoother{.polishing_steps =
                                                  1};  ///< Few links, long runs: one step gives them back millimetres.
   bool explain = true;
+  bool always_compare = false;
   template <class V>
   void describe(V& v) {
     v.field("submap", submap);
@@ -37,7 +38,10 @@ struct AgentConfig {
     v.field("policy", policy);
     v.field("ledger", ledger);
     v.field("smoother", smoother);
-    v.field("explain", explain, any(), "Say after every comparison where and when odometry and map part.");
+    v.field("explain", explain, any(), "Say after every update where and when odometry and map part.");
+    v.field("always_compare", always_compare, any(),
+            "Compute the paper's disagreement of the graph signals at every update, even for a policy that does not "
+            "look at it: the page then shows it over time. It takes tens of milliseconds for 1000 nodes.");
   }
 };
 
@@ -51,12 +55,13 @@ struct Whereabouts {
 /// What one proxy graph changed.
 struct UpdateSummary {
   std::uint64_t revision = 0;
-  std::size_t synchronised = 0;       ///< Pairs of nodes compared.
-  std::size_t proposed = 0;           ///< Constraints the policy chose.
-  std::size_t constraints = 0;        ///< In the ledger afterwards.
-  Eigen::VectorXd mean_disagreement;  ///< Per scale, before the correction, in the signal's unit.
+  std::size_t synchronised = 0;  ///< Pairs of nodes compared.
+  std::size_t proposed = 0;      ///< Constraints the policy chose.
+  std::size_t constraints = 0;   ///< In the ledger afterwards.
+  /// Per scale, before the correction, in the signal's unit; empty unless the policy looks at it or `always_compare`.
+  Eigen::VectorXd mean_disagreement;
   Eigen::VectorXd max_disagreement;
-  int order = 0;                     ///< Of the Chebyshev transform; 0 = exact.
+  int order = 0;                     ///< Of the Chebyshev transform; 0 = exact or not computed.
   consistency::LedgerUpdate ledger;  ///< What became of the constraints.
   /// How the optimisation with them ended.
   estimation::Termination optimised = estimation::Termination::not_run;
@@ -114,7 +119,7 @@ class RobotAgent {
   /// add_scan() need not wait for: until then they are kept whole, so ask regularly.
   std::vector<SubmapMessage> take_outgoing();
 
-  /// Compares the server's graph with the own one and adds the constraints it takes. An older revision than the newest
+  /// Compares the server's map with the own one and adds the constraints it takes. An older revision than the newest
   /// seen changes nothing (synchronised = 0). `budget` limits policies that need one.
   UpdateSummary receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget = std::nullopt,
                         const StageObserver& stage_ended = {});

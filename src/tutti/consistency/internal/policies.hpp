@@ -35,6 +35,7 @@ class SpectralPolicy final : public ConstraintPolicy {
  public:
   explicit SpectralPolicy(const PolicyConfig& config) : config_(config) {}
   [[nodiscard]] std::string name() const override { return "spectral"; }
+  [[nodiscard]] bool needs_disagreement() const override { return true; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
  private:

@@ -3,6 +3,7 @@
 #include <array>
 #include <limits>
 
+#include "tutti/base/check.hpp"
 #include "tutti/consistency/internal/links.hpp"
 #include "tutti/consistency/internal/policies.hpp"
 
@@ -72,6 +73,9 @@ Labels label_top(const Eigen::MatrixX3d& sums, const PolicyConfig& config) {
 }  // namespace
 
 Selection SpectralPolicy::choose(const PolicyInput& input) const {
+  const auto rows = static_cast<std::size_t>(input.comparison.disagreement.rows());
+  TUTTI_CHECK(rows == input.comparison.pairs.size(), "disagreement of {} of {} pairs", rows,
+              input.comparison.pairs.size());
   LinkCollector collector(input, config_.constraint, false);
   const Eigen::MatrixX3d sums = group_sums(input.comparison.disagreement);
   const Labels labels = config_.classifier == "top" ? label_top(sums, config_) : label_by_thresholds(sums, config_);

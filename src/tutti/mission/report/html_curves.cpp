@@ -49,6 +49,13 @@ std::vector<Column> columns(const std::vector<UpdateRecord>& updates, double end
   return out;
 }
 
+/// The paper's disagreement was computed at some update.
+bool is_measured(const MissionRecord& record) {
+  return std::ranges::any_of(record.robots, [](const RobotRecord& robot) {
+    return std::ranges::any_of(robot.updates, [](const UpdateRecord& u) { return u.mean_disagreement_m.size() > 0; });
+  });
+}
+
 /// Logarithmic colour scale common to all robots: from 0.1 mm (or the smallest) to the largest mean disagreement.
 struct HeatScale {
   double low = -4.0;
@@ -104,7 +111,10 @@ std::string disagreement_figure(const MissionRecord& record, const RobotRecord& 
   const double bottom = strip_top + kStrip_px;
   const Axis x = Axis::linear(time, kLeft_px, kWidth_px - kRight_px, 8, false);
   const Axis y = Axis::linear(held, bottom, strip_top, 3, true);
-  Svg svg(kWidth_px, bottom + 40.0, fmt::format("Disagreement of {} with the server per scale over time", robot.name));
+  Svg svg(
+      kWidth_px, bottom + 40.0,
+      fmt::format(scales > 0 ? "Disagreement of {} with the server per scale over time" : "Constraints of {} over time",
+                  robot.name));
   for (Eigen::Index s = 0; s < scales; ++s)
     svg.text({kLeft_px - 8.0, kTop_px + kRow_px * (static_cast<double>(s) + 0.5) + 4.0},
              s == 0            ? "large 0"
@@ -140,15 +150,23 @@ std::string disagreement_html(const MissionRecord& record) {
   if (std::all_of(record.robots.begin(), record.robots.end(), [](const RobotRecord& r) { return r.updates.empty(); }))
     return "";
   const HeatScale scale(record);
-  std::string body = "<div class=\"colourbar\">" + colour_bar(scale) + "</div>\n<div class=\"figures\">\n";
+  std::string body = "<div class=\"figures\">\n";
   for (const auto& robot : record.robots)
     if (!robot.updates.empty()) body += disagreement_figure(record, robot, scale);
+  body += "</div>\n";
+  if (!is_measured(record))
+    return section("What the robots hold",
+                   fmt::format("Constraints of every robot after each broadcast, by policy {}. That policy does not "
+                               "look at the paper's disagreement of the graph signals; to see it here over time, set "
+                               "agent.always_compare.",
+                               record.default_policy),
+                   body);
   return section(
       "Where and when the maps disagree",
       fmt::format("At every broadcast each robot compares its map with the server's, scale by scale, before it "
                   "corrects itself with policy {}. Below: the constraints it then holds.",
                   record.default_policy),
-      body + "</div>\n");
+      "<div class=\"colourbar\">" + colour_bar(scale) + "</div>\n" + body);
 }
 
 }  // namespace tutti::mission

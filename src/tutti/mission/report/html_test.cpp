@@ -132,6 +132,17 @@ TEST(ReportHtml, ShowsTheMapBesideTheSurvey) {
   EXPECT_EQ(pictures, 11U);
 }
 
+TEST(ReportHtml, SaysWhereThePapersDisagreementWasNotAskedFor) {
+  MissionRecord record = test::example_record();
+  for (RobotRecord& robot : record.robots)
+    for (UpdateRecord& update : robot.updates) update.mean_disagreement_m = update.max_disagreement_m = {};
+  const std::string html = report_html(record);
+  expect_good_page(html);
+  EXPECT_EQ(html.find("Where and when the maps disagree"), std::string::npos);
+  EXPECT_NE(html.find("What the robots hold"), std::string::npos);
+  EXPECT_NE(html.find("agent.always_compare"), std::string::npos);
+}
+
 TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
   MissionRecord record = test::example_record();
   std::string html = report_html(record);
