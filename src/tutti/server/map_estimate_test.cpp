@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 
 #include "tutti/geometry/alignment.hpp"
@@ -183,6 +184,22 @@ TEST(MapEstimate, DivergedOdometryOfOneRobotHarmsNoOther) {
     });
     expect_unharmed(in, fmt::format("diverged to {} m", farthest_m));
   }
+}
+
+// Numbers that nobody can solve, of the robot after which there is none.
+TEST(MapEstimate, TheLastRobotThereCanBeIsLeftOutLikeAnyOther) {
+  Inputs in = make_inputs(2, TestFinder(2), 2);
+  constexpr RobotId kLast{std::numeric_limits<std::uint32_t>::max()};
+  for (const Submap& submap : test::make_submaps({2}, {}, Rng(2).fork(2))) {
+    Submap wild = submap;
+    wild.id.robot = kLast;
+    for (RelativePose& step : wild.odometry) step.T_a_b.translation *= 1e160;
+    in.submaps[wild.id] = std::make_shared<const Submap>(std::move(wild));
+  }
+  expect_unharmed(in, "the last robot");
+  const auto left_out = estimate_map(in.submaps, in.verdicts, {}).left_out;
+  ASSERT_EQ(left_out.size(), 10U);
+  EXPECT_EQ(left_out.front().robot, kLast);
 }
 
 TEST(MapEstimate, SubmapsThatContradictEarlierOnesAreLeftOut) {
