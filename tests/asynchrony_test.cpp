@@ -115,7 +115,7 @@ TEST(Asynchrony, AHundredDisorderlyDeliveriesEndInTheSameMap) {
   ASSERT_EQ(expected.components, 1U);
   ASSERT_GT(accepted(expected).size(), 10U);
   ASSERT_LT(accepted(expected).size(), expected.closures.size());  // there is something to reject
-  for (std::uint64_t seed = 0; seed < test::seeds(100U); ++seed) {
+  for (std::uint64_t seed = 0; seed < tutti::seeds(100U); ++seed) {
     const server::MapEstimate map = map_in_disorder(mission, Rng(seed));
     ASSERT_EQ(accepted(map), accepted(expected)) << "seed " << seed;
     ASSERT_EQ(map.nodes.size(), expected.nodes.size()) << "seed " << seed;

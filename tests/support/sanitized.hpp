@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace tutti::test {
+namespace tutti {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kSanitized = true;
@@ -20,8 +20,8 @@ constexpr T seeds(T all) {
   return kSanitized ? std::min(all, T{2}) : all;
 }
 
-}  // namespace tutti::test
+}  // namespace tutti
 
 /// First line of a test that counts over hundreds of seeds, which only a plain build does.
 #define TUTTI_STATISTIC() \
-  if (::tutti::test::kSanitized) GTEST_SKIP() << "a statistic: says nothing that a sanitizer could see"
+  if (::tutti::kSanitized) GTEST_SKIP() << "a statistic: says nothing that a sanitizer could see"

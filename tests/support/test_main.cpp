@@ -49,7 +49,7 @@ bool all_in_test_files() {
 
 int main(int argc, char** argv) {
   // RapidCheck; 0 = do not override the user's
-  setenv("RC_PARAMS", tutti::test::kSanitized ? "seed=2026 max_success=20" : "seed=2026", 0);
+  setenv("RC_PARAMS", tutti::kSanitized ? "seed=2026 max_success=20" : "seed=2026", 0);
   ::testing::InitGoogleTest(&argc, argv);
   if (!all_in_test_files()) return 1;
   constexpr std::string_view kFile = "--tutti_file=";

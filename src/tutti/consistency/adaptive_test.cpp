@@ -62,7 +62,7 @@ Scene drifting(std::uint64_t seed) {
 }
 
 TEST(Adaptive, AddsNothingWhileTheTwoAgree) {
-  for (std::uint64_t seed = 0; seed < test::seeds(40U); ++seed) {
+  for (std::uint64_t seed = 0; seed < tutti::seeds(40U); ++seed) {
     Scene scene = agreeing(seed);
     for (int i = 0; i < 2; ++i) scene.receive();
     EXPECT_EQ(scene.ledger.size(), 0U) << "seed " << seed;
@@ -70,7 +70,7 @@ TEST(Adaptive, AddsNothingWhileTheTwoAgree) {
 }
 
 TEST(Adaptive, AddsAFewOnceItDrifts) {
-  for (std::uint64_t seed = 0; seed < test::seeds(10U); ++seed) {
+  for (std::uint64_t seed = 0; seed < tutti::seeds(10U); ++seed) {
     Scene scene = drifting(seed);
     EXPECT_GT(scene.receive().added, 0U) << "seed " << seed;
     EXPECT_LE(scene.ledger.size(), kNodes / 5) << "seed " << seed;
@@ -85,7 +85,7 @@ TEST(Adaptive, LinksAreAChainFromEarlierToLater) {
 }
 
 TEST(Adaptive, HoldsOnWhileNothingChanges) {
-  for (std::uint64_t seed = 0; seed < test::seeds(3U); ++seed) {
+  for (std::uint64_t seed = 0; seed < tutti::seeds(3U); ++seed) {
     Scene scene = drifting(seed);
     const std::size_t links = scene.receive().added;
     ASSERT_GT(links, 0U);

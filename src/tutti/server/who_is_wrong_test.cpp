@@ -39,7 +39,7 @@ double seconds_of(const MapEstimate& map, RobotId robot, std::uint32_t index) {
 }
 
 TEST(WhoIsWrong, ThirtyPercentWrongClosuresCostLittle) {
-  for (std::uint64_t seed = 1; seed <= test::seeds(4U); ++seed) {
+  for (std::uint64_t seed = 1; seed <= tutti::seeds(4U); ++seed) {
     CorridorRunConfig config;
     const CorridorRun right = corridor_run(config, seed);
     config.closures.wrong_share = 0.3;
@@ -74,7 +74,7 @@ TEST(WhoIsWrong, FailedOdometryIsRepairedAmongWrongClosures) {
 }
 
 TEST(WhoIsWrong, FailedOdometryWithoutClosuresAroundIsRepaired) {
-  for (std::uint64_t seed = 1; seed <= test::seeds(3U); ++seed) {
+  for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;
     config.closures.wrong_share = 0.1;
     config.failures = {failure(0, 165, 195, -1.5, 1.0, -15)};
@@ -104,7 +104,7 @@ TEST(WhoIsWrong, SeveralFailuresAreRepaired) {
 // shared out over the few steps around it.
 TEST(WhoIsWrong, ASlipIsConvictedAtItsVeryStep) {
   std::size_t single = 0;
-  for (std::uint64_t seed = 1; seed <= test::seeds(5U); ++seed) {
+  for (std::uint64_t seed = 1; seed <= tutti::seeds(5U); ++seed) {
     CorridorRunConfig config;
     config.keyframe_m = 0.2;
     config.closures.wrong_share = 0.1;
@@ -126,7 +126,7 @@ TEST(WhoIsWrong, ASlipIsConvictedAtItsVeryStep) {
     EXPECT_LT(off.head<3>().norm(), 0.03) << seed;
     EXPECT_LT(off.tail<3>().norm(), 0.5 * kRadPerDeg) << seed;
   }
-  EXPECT_GE(single + 1U, test::seeds(5U));
+  EXPECT_GE(single + 1U, tutti::seeds(5U));
 }
 
 /// Odometry that climbs, little by little, three metres that are not there.
@@ -137,7 +137,7 @@ Failure climb(double from_s, double until_s) {
 }
 
 TEST(WhoIsWrong, AFailureLittleByLittleIsConvictedWhereItHappened) {
-  for (std::uint64_t seed = 1; seed <= test::seeds(3U); ++seed) {
+  for (std::uint64_t seed = 1; seed <= tutti::seeds(3U); ++seed) {
     CorridorRunConfig config;
     config.closures.wrong_share = 0.1;
     config.failures = {climb(230, 270)};
