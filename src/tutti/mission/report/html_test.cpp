@@ -107,9 +107,9 @@ TEST(ReportHtml, PoliciesSideBySideAreThoseOfTheRecord) {
   EXPECT_EQ(first_cells(several), expected);
   const auto rows = rows_of(several);
   EXPECT_EQ(rows.at(1), (std::vector<std::string>{"onboard (raw odometry)", "0.712 m", "1.400 m", "0.021 m", "0.095 m",
-                                                  "", "", "", "", ""}));
-  EXPECT_EQ(rows.at(4), (std::vector<std::string>{"spectral", "0.034 m", "0.080 m", "0.016 m", "0.022 m", "0.010 m",
-                                                  "0.020 m", "24", "20.2 %", "11.2 / 31.0"}));
+                                                  "100 %", "", "", "", "", ""}));
+  EXPECT_EQ(rows.at(4), (std::vector<std::string>{"spectral", "0.034 m", "0.080 m", "0.016 m", "0.022 m", "100 %",
+                                                  "0.010 m", "0.020 m", "24", "20.2 %", "11.2 / 31.0"}));
 
   test::keep_the_default_policy(record);
   const std::string html = report_html(record);
