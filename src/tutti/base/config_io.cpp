@@ -93,22 +93,55 @@ void forget_lines(ConfigNode& node) {
   for (auto& [key, value] : node.map) forget_lines(value);
 }
 
+/// One step of a path: a key, or (`is_index`: written in brackets) an element of a list and nothing else.
+struct PathStep {
+  std::string name;
+  bool is_index = false;
+};
+
+/// "a[0].b" and "a.0.b" lead to the same place.
+Result<std::vector<PathStep>> split_path(const std::string& key, const std::string& assignment) {
+  std::vector<PathStep> steps;
+  for (std::size_t begin = 0; begin <= key.size();) {
+    const std::size_t end = std::min(key.find('.', begin), key.size());
+    const std::string step = key.substr(begin, end - begin);
+    begin = end + 1;
+    std::size_t bracket = std::min(step.find_first_of("[]"), step.size());
+    if (bracket == 0) return fail(ErrorCode::configuration, "--set {}: empty step in the key", assignment);
+    steps.push_back({step.substr(0, bracket)});
+    while (bracket < step.size()) {
+      const std::size_t close = step.find(']', bracket);
+      const std::string index = close == std::string::npos ? "" : step.substr(bracket + 1, close - bracket - 1);
+      if (step[bracket] != '[' || index.empty() || index.find_first_not_of("0123456789") != std::string::npos)
+        return fail(ErrorCode::configuration, "--set {}: '{}' names no element, expected its number: {}[0]", assignment,
+                    step, step.substr(0, step.find_first_of("[]")));
+      steps.push_back({index, true});
+      bracket = close + 1;
+    }
+  }
+  return steps;
+}
+
 /// The child of a map (created when missing) or list that one step of a path names.
-Result<ConfigNode*> step_into(ConfigNode& node, const std::string& step, const std::string& assignment) {
+Result<ConfigNode*> step_into(ConfigNode& node, const PathStep& step, const std::string& assignment) {
+  const auto& name = step.name;
   if (node.kind == ConfigNode::Kind::list) {
     std::size_t index = 0;
-    const auto [end, error] = std::from_chars(step.data(), step.data() + step.size(), index);
-    if (error != std::errc{} || end != step.data() + step.size() || index >= node.list.size())
-      return fail(ErrorCode::configuration, "--set {}: '{}' is no element of the list, which has {}", assignment, step,
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), index);
+    if (error != std::errc{} || end != name.data() + name.size() || index >= node.list.size())
+      return fail(ErrorCode::configuration, "--set {}: '{}' is no element of the list, which has {}", assignment, name,
                   node.list.size());
     return &node.list[index];
   }
+  if (step.is_index)
+    return fail(ErrorCode::configuration, "--set {}: [{}] stands behind {}, expected a list that the file has",
+                assignment, name, config_internal::show(node));
   if (node.kind == ConfigNode::Kind::scalar)
     return fail(ErrorCode::configuration, "--set {}: nothing can be below '{}'", assignment, node.scalar);
   node.kind = ConfigNode::Kind::map;
   for (auto& [key, value] : node.map)
-    if (key == step) return &value;
-  return &node.map.emplace_back(step, ConfigNode{}).second;
+    if (key == name) return &value;
+  return &node.map.emplace_back(name, ConfigNode{}).second;
 }
 
 /// Levenshtein's distance: how many letters to insert, delete or replace.
@@ -188,13 +221,11 @@ Status apply_override(ConfigNode& root, const std::string& assignment) {
   forget_lines(*value);
 
   const std::string key = assignment.substr(0, equals);
+  const auto path = split_path(key, assignment);
+  if (!path) return tl::unexpected(path.error());
   ConfigNode changed = root;  // so that a bad path leaves the root alone
   ConfigNode* node = &changed;
-  for (std::size_t begin = 0; begin <= key.size();) {
-    const std::size_t end = std::min(key.find('.', begin), key.size());
-    const std::string step = key.substr(begin, end - begin);
-    begin = end + 1;
-    if (step.empty()) return fail(ErrorCode::configuration, "--set {}: empty step in the key", assignment);
+  for (const PathStep& step : *path) {
     auto child = step_into(*node, step, assignment);
     if (!child) return tl::unexpected(child.error());
     node = *child;

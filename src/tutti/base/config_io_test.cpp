@@ -197,6 +197,38 @@ TEST(Config, OverridesReachEverything) {
   EXPECT_EQ(settings.base.name, "bravo");
 }
 
+/// `tutti settings` lists robots[].voxel_m: with a number in its brackets, that is a key.
+TEST(Config, ElementsOfListsMayBeNamedInBrackets) {
+  for (const auto& [bracketed, dotted] :
+       std::vector<std::pair<std::string, std::string>>{{"robots[1].voxel_m=0.5", "robots.1.voxel_m=0.5"},
+                                                        {"robots[0].offset_m[2]=7", "robots.0.offset_m.2=7"},
+                                                        {"robots[1]={name: alpha}", "robots.1={name: alpha}"}}) {
+    const ConfigNode before = parse("robots: [{name: alpha, offset_m: [1, 2, 3]}, {name: bravo}]\n");
+    ConfigNode a = before, b = before;
+    ASSERT_TRUE(apply_override(a, bracketed)) << apply_override(a, bracketed).error().message;
+    ASSERT_TRUE(apply_override(b, dotted)) << dotted;
+    EXPECT_EQ(to_yaml(a), to_yaml(b));
+    EXPECT_NE(to_yaml(a), to_yaml(before)) << bracketed;
+  }
+}
+
+TEST(Config, BadBracketsSayWhatIsExpected) {
+  const auto message = [](const std::string& assignment) {
+    ConfigNode root = parse("robots: [{name: alpha}]\nseed: 3\n");
+    const std::string before = to_yaml(root);
+    const auto status = apply_override(root, assignment);
+    EXPECT_EQ(to_yaml(root), before) << assignment;
+    return status ? "no error" : status.error().message;
+  };
+  for (const char* key : {"robots[]", "robots[x]", "robots[0", "robots]0[", "robots[-1]", "robots[0]x", "robots[0]]"})
+    EXPECT_EQ(message(fmt::format("{}.name=x", key)),
+              fmt::format("--set {}.name=x: '{}' names no element, expected its number: robots[0]", key, key));
+  EXPECT_EQ(message("[0].name=x"), "--set [0].name=x: empty step in the key");
+  EXPECT_EQ(message("robots[1].name=x"), "--set robots[1].name=x: '1' is no element of the list, which has 1");
+  EXPECT_EQ(message("seed[0]=x"), "--set seed[0]=x: [0] stands behind '3', expected a list that the file has");
+  EXPECT_EQ(message("robot[0]=x"), "--set robot[0]=x: [0] stands behind nothing, expected a list that the file has");
+}
+
 TEST(Config, BadOverridesSayWhyAndChangeNothing) {
   ConfigNode root = parse("robots: [{name: alpha}]\nseed: 3\n");
   const std::string before = to_yaml(root);
