@@ -11,8 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "tutti/estimation/gnc.hpp"
-#include "tutti/estimation/pose_graph_solver.hpp"
+#include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 
@@ -38,18 +37,19 @@ struct Outcome {
   double time_s = 0.0;
 };
 
-Outcome optimise(PoseGraph graph, const OptimiseOptions& options) {
+Outcome optimise(const formats::G2oFile& file, const OptimiseOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   Outcome out;
+  PoseGraph graph = file.graph;
   out.chi2_before = chi2(graph);
   const auto roles = roles_from_numbering(graph);
   SolverConfig config{.max_iterations = options.max_iterations, .initialisation = options.initialisation};
   if (options.loss == "gnc") {
-    out.solution = solve_pose_graph_gnc(graph, {.solver = config}, roles).solution;
+    out.solution = solve_pose_graph_gnc(graph, {.solver = config}, roles, file.fixed).solution;
   } else {
     config.loss = options.loss;
     config.loss_scale = 3.0;  // standard deviations
-    out.solution = solve_pose_graph(graph, config, roles);
+    out.solution = solve_pose_graph(graph, config, roles, file.fixed);
   }
   graph.poses = out.solution.poses;
   out.chi2_after = chi2(graph);
@@ -58,12 +58,16 @@ Outcome optimise(PoseGraph graph, const OptimiseOptions& options) {
   return out;
 }
 
-void print(const PoseGraph& graph, const Outcome& outcome, const OptimiseOptions& options) {
+void print(const formats::G2oFile& file, const Outcome& outcome, const OptimiseOptions& options) {
+  const PoseGraph& graph = file.graph;
   const auto& summary = outcome.solution.summary;
   if (options.json) {
     const nlohmann::ordered_json json{{"nodes", graph.poses.size()},
                                       {"edges", graph.edges.size()},
                                       {"components", summary.components},
+                                      {"fixed_vertices", file.fixed.size()},
+                                      {"indefinite_edges", file.indefinite_edges},
+                                      {"worst_indefinite_share", file.worst_indefinite_share},
                                       {"chi2_before", outcome.chi2_before},
                                       {"chi2_after", outcome.chi2_after},
                                       {"downweighted_edges", outcome.rejected},
@@ -75,6 +79,12 @@ void print(const PoseGraph& graph, const Outcome& outcome, const OptimiseOptions
   }
   fmt::print("nodes        {}\nedges        {}\ncomponents   {}\n", graph.poses.size(), graph.edges.size(),
              summary.components);
+  if (!file.fixed.empty()) fmt::print("fixed        {} vertices (FIX)\n", file.fixed.size());
+  if (file.indefinite_edges > 0)
+    fmt::print(
+        "information  {} of {} matrices are not positive semidefinite (worst: {:.2g} of its largest eigenvalue "
+        "below zero); the nearest ones that are were taken\n",
+        file.indefinite_edges, graph.edges.size(), file.worst_indefinite_share);
   fmt::print("chi2         {:.6g} -> {:.6g}\n", outcome.chi2_before, outcome.chi2_after);
   if (options.loss != "none") fmt::print("down-weighted edges {}\n", outcome.rejected);
   fmt::print("iterations   {}\ntime         {:.1f} ms\ntermination  {}\n", summary.iterations, 1e3 * outcome.time_s,
@@ -98,8 +108,8 @@ int run(const OptimiseOptions& options) {
     fmt::print(stderr, "tutti optimise: {}\n", file.error().message);
     return 1;
   }
-  const Outcome outcome = optimise(file->graph, options);
-  print(file->graph, outcome, options);
+  const Outcome outcome = optimise(*file, options);
+  print(*file, outcome, options);
   const auto termination = outcome.solution.summary.termination;
   if (!is_usable(termination)) {
     fmt::print(stderr, "tutti optimise: {}: {}; nothing written\n", options.input,
@@ -123,7 +133,10 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<OptimiseOptions>();
   auto* command = app.add_subcommand("optimise", "Optimise one pose graph, from g2o file to g2o file.");
   command->footer(
-      "Gauss-Newton on sparse Cholesky; the first vertex of every connected component stays where it is.\n"
+      "Gauss-Newton on sparse Cholesky. Vertices of FIX lines stay where they are, or else the first of a connected\n"
+      "component. Information matrices that are not positive semidefinite give way to the nearest ones that are, and "
+      "the\n"
+      "summary counts them; numbers that are not finite, or no positive eigenvalue, are an error.\n"
       "SE(2) graphs are optimised lifted to SE(3). With a robust loss or gnc, edges between vertices that follow each\n"
       "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
       "IN_stamps.csv, if it is there, is copied beside the output.\n"

@@ -8,6 +8,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/chi_square.hpp"
+#include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/estimation/internal/chain_reduction.hpp"
 #include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
@@ -37,13 +38,14 @@ double squared_error(const PoseGraphEdge& edge, const std::vector<Pose3>& poses)
 bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
 
 /// The re-weighting itself. Without anything to reject, the plain optimum.
-GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles) {
+GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles,
+                   std::span<const std::size_t> fixed) {
   const std::size_t edges = graph.edges.size();
   GncResult out;
   out.inlier_weight.assign(edges, 1.0);
   SolverConfig inner = config.solver;
   inner.loss = "none";
-  out.solution = solve_pose_graph(graph, inner, roles);
+  out.solution = solve_pose_graph(graph, inner, roles, fixed);
   if (!is_usable(out.solution.summary.termination)) return out;
 
   const auto is_robust = [&](std::size_t e) { return roles.empty() || roles[e] == EdgeRole::robust; };
@@ -53,7 +55,7 @@ GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<co
     if (is_robust(e)) worst = std::max(worst, squared_error(graph.edges[e], out.solution.poses));
   if (worst <= c2) return out;  // nothing to reject
 
-  const auto structure = internal::analyse_blocks(graph);
+  const auto structure = internal::analyse_blocks(graph, {}, fixed);
   internal::GraphEquations equations(graph, structure);
   std::vector<double> scale(edges, 1.0);
   const internal::EdgeCosts costs{.loss = {}, .roles = roles, .scale = scale};
@@ -80,15 +82,24 @@ GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<co
 }  // namespace
 
 GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles) {
+  return solve_pose_graph_gnc(graph, config, roles, {});
+}
+
+GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles,
+                               std::span<const std::size_t> fixed) {
   TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
               graph.edges.size());
-  if (!internal::is_finite(graph)) return reweight(graph, config, roles);  // says so
-  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles);
-  if (reduced.runs.empty()) return reweight(graph, config, roles);
+  if (!internal::is_finite(graph)) return reweight(graph, config, roles, fixed);  // says so
+  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles, fixed);
+  if (reduced.runs.empty()) return reweight(graph, config, roles, fixed);
 
   // The runs bend little, so the reduced graph decides the same, at a fraction of the cost; then the full one is solved
   // with the decided weights from where the reduced one ended.
-  GncResult out = reweight(reduced.graph, config, reduced.roles);
+  std::vector<std::size_t> reduced_fixed;
+  for (const std::size_t i : fixed)
+    reduced_fixed.push_back(
+        static_cast<std::size_t>(std::ranges::lower_bound(reduced.nodes, i) - reduced.nodes.begin()));
+  GncResult out = reweight(reduced.graph, config, reduced.roles, reduced_fixed);
   const std::vector<double> reduced_weight =
       std::exchange(out.inlier_weight, std::vector<double>(graph.edges.size(), 1.0));
   const std::vector<Pose3> reduced_poses = std::exchange(out.solution.poses, graph.poses);
@@ -102,7 +113,7 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
   }
   out.solution.weights = out.inlier_weight;
   internal::expand_chains(graph, reduced, reduced_poses, out.solution.poses);
-  const auto structure = internal::analyse_blocks(graph);
+  const auto structure = internal::analyse_blocks(graph, {}, fixed);
   internal::GraphEquations equations(graph, structure);
   out.solution.summary =
       internal::minimise(equations, out.solution.poses, {.loss = {}, .roles = roles, .scale = scale}, config.solver);

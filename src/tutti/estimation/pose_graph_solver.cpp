@@ -3,6 +3,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
@@ -30,6 +31,11 @@ double chi2(const PoseGraph& graph) {
 
 PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& config,
                                    std::span<const EdgeRole> roles) {
+  return solve_pose_graph(graph, config, roles, {});
+}
+
+PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& config, std::span<const EdgeRole> roles,
+                                   std::span<const std::size_t> fixed) {
   TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
               graph.edges.size());
   PoseGraphSolution solution{.poses = graph.poses, .weights = std::vector<double>(graph.edges.size(), 1.0)};
@@ -37,7 +43,7 @@ PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& c
     solution.summary.termination = Termination::invalid_input;
     return solution;
   }
-  const auto structure = internal::analyse_blocks(graph);
+  const auto structure = internal::analyse_blocks(graph, {}, fixed);
   solution.summary.components = structure.components;
   if (config.initialisation == "chordal" && !internal::chordal(graph, structure, solution.poses)) {
     solution.summary.termination = Termination::singular;

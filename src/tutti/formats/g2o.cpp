@@ -21,7 +21,8 @@ namespace {
 using internal::LineReader;
 using internal::shown;
 
-constexpr double kSemiDefiniteTolerance = 1e-6;
+constexpr double kRounding = 1e-12;   // an eigenvalue this far below zero, as a share of the largest, is zero
+constexpr double kLeastShare = 1e-9;  // of the largest eigenvalue, that takes the place of a negative one
 constexpr std::array<int, 3> kPlanarAxes = {0, 1, 5};  // x y theta within [tx ty tz rx ry rz]
 
 struct Vertex {
@@ -36,10 +37,16 @@ struct IdEdge {
   Matrix6d information;
   int line = 0;
 };
+/// Information matrices that were not positive semidefinite.
+struct Repairs {
+  std::size_t count = 0;
+  double worst_share = 0.0;
+};
 struct Lines {
   std::vector<Vertex> vertices;
   std::vector<IdEdge> edges;
   std::vector<std::int64_t> fixed;
+  Repairs repairs;
   bool has_2d = false;
   bool has_3d = false;
 };
@@ -62,36 +69,44 @@ Result<Pose3> read_pose(const LineReader& line, std::size_t first, bool is_2d) {
   return Pose3{*q, {v[0], v[1], v[2]}};
 }
 
-Status check_semi_definite(const LineReader& line, const Matrix6d& information) {
+/// The nearest positive semidefinite matrix (Frobenius norm): negative eigenvalues become 0, but for the share that
+/// keeps the solver's equations regular. `information` is symmetric; unchanged when it is semidefinite to rounding.
+Status make_semidefinite(const LineReader& line, Eigen::MatrixXd& information, Repairs& repairs) {
   if (information.llt().info() == Eigen::Success) return {};  // positive definite, the usual case
-  const Vector6d eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Matrix6d>(information, Eigen::EigenvaluesOnly).eigenvalues();
-  if (eigenvalues.minCoeff() >= -kSemiDefiniteTolerance * eigenvalues.cwiseAbs().maxCoeff()) return {};
-  return line.fail(ErrorCode::invalid,
-                   "smallest eigenvalue of the information is {:.3g}, expected it not to be negative",
-                   eigenvalues.minCoeff());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  const Eigen::VectorXd& values = eigen.eigenvalues();  // ascending
+  const double least = values(0), largest = values(values.size() - 1);
+  if (least >= -kRounding * largest) return {};
+  if (!(largest > 0.0) || !values.allFinite())
+    return line.fail(ErrorCode::invalid, "eigenvalues of the information are {:.3g} to {:.3g}, expected a positive one",
+                     least, largest);
+  information =
+      eigen.eigenvectors() * values.cwiseMax(kLeastShare * largest).asDiagonal() * eigen.eigenvectors().transpose();
+  information = (0.5 * (information + information.transpose())).eval();
+  ++repairs.count;
+  repairs.worst_share = std::max(repairs.worst_share, -least / largest);
+  return {};
 }
 
 /// Upper triangle, row by row, from column `first` on.
-Result<Matrix6d> read_information(const LineReader& line, std::size_t first, bool is_2d) {
-  Matrix6d information = Matrix6d::Zero();
+Result<Matrix6d> read_information(const LineReader& line, std::size_t first, bool is_2d, Repairs& repairs) {
   std::array<double, 21> upper{};
-  const int size = is_2d ? 3 : 6;
   if (auto ok = line.numbers(first, std::span(upper).first(is_2d ? 6 : 21)); !ok) return tl::unexpected(ok.error());
+  Eigen::MatrixXd given(is_2d ? 3 : 6, is_2d ? 3 : 6);
   std::size_t next = 0;
-  for (int row = 0; row < size; ++row) {
-    for (int column = row; column < size; ++column) {
-      const int i = is_2d ? kPlanarAxes[static_cast<std::size_t>(row)] : row;
-      const int j = is_2d ? kPlanarAxes[static_cast<std::size_t>(column)] : column;
-      information(i, j) = information(j, i) = upper[next++];
-    }
-  }
-  if (is_2d) {
-    const auto or_one = [](double value) { return value > 0.0 ? value : 1.0; };
-    information(2, 2) = or_one(0.5 * information(0, 0) + 0.5 * information(1, 1));
-    information(3, 3) = information(4, 4) = or_one(information(5, 5));
-  }
-  if (auto ok = check_semi_definite(line, information); !ok) return tl::unexpected(ok.error());
+  for (int row = 0; row < given.rows(); ++row)
+    for (int column = row; column < given.cols(); ++column) given(row, column) = given(column, row) = upper[next++];
+  if (auto ok = make_semidefinite(line, given, repairs); !ok) return tl::unexpected(ok.error());
+  if (!is_2d) return Matrix6d(given);
+
+  Matrix6d information = Matrix6d::Zero();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      information(kPlanarAxes[static_cast<std::size_t>(row)], kPlanarAxes[static_cast<std::size_t>(column)]) =
+          given(row, column);
+  const auto or_one = [](double value) { return value > 0.0 ? value : 1.0; };
+  information(2, 2) = or_one(0.5 * information(0, 0) + 0.5 * information(1, 1));
+  information(3, 3) = information(4, 4) = or_one(information(5, 5));
   return information;
 }
 
@@ -117,7 +132,7 @@ Status read_edge(const LineReader& line, bool is_2d, Lines& lines) {
   if (*from == *to) return line.fail(ErrorCode::invalid, "edge from vertex {} to itself", *from);
   const auto pose = read_pose(line, 3, is_2d);
   if (!pose) return tl::unexpected(pose.error());
-  const auto information = read_information(line, is_2d ? 6 : 10, is_2d);
+  const auto information = read_information(line, is_2d ? 6 : 10, is_2d, lines.repairs);
   if (!information) return tl::unexpected(information.error());
   lines.edges.push_back({*from, *to, *pose, *information, line.line()});
   return {};
@@ -183,8 +198,15 @@ Result<G2oFile> assemble(const Lines& lines, const std::string& name) {
   file.has_vertices = !lines.vertices.empty();
   file.is_2d = lines.has_2d;
   const Positions positions(file.vertex_ids);
-  for (const std::int64_t id : lines.fixed)
-    if (const auto found = positions.of(id, name + ": FIX"); !found) return tl::unexpected(found.error());
+  file.indefinite_edges = lines.repairs.count;
+  file.worst_indefinite_share = lines.repairs.worst_share;
+  for (const std::int64_t id : lines.fixed) {
+    const auto found = positions.of(id, name + ": FIX");
+    if (!found) return tl::unexpected(found.error());
+    file.fixed.push_back(*found);
+  }
+  std::sort(file.fixed.begin(), file.fixed.end());
+  file.fixed.erase(std::unique(file.fixed.begin(), file.fixed.end()), file.fixed.end());
   file.graph.edges.reserve(lines.edges.size());
   for (const IdEdge& edge : lines.edges) {
     const std::string where = fmt::format("{}:{}: edge", name, edge.line);
@@ -250,6 +272,7 @@ std::string to_g2o(const G2oFile& file) {
     write_pose(out, poses[i], file.is_2d);
     out += '\n';
   }
+  for (const std::size_t i : file.fixed) fmt::format_to(std::back_inserter(out), "FIX {}\n", file.vertex_ids.at(i));
   for (const PoseGraphEdge& edge : edges) {
     fmt::format_to(std::back_inserter(out), "{} {} {}", file.is_2d ? "EDGE_SE2" : "EDGE_SE3:QUAT",
                    file.vertex_ids.at(edge.from), file.vertex_ids.at(edge.to));

@@ -5,6 +5,8 @@
 // RapidCheck after gtest.
 #include <rapidcheck/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include "support/shared_data.hpp"
 #include "tutti/formats/testing/mutations.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -30,6 +32,7 @@ G2oFile any_file() {
     file.vertex_ids.push_back(id);
     file.graph.poses.push_back(any_pose());
     if (i > 0) file.graph.edges.push_back({i, i - 1, any_pose(), any_information()});
+    if (*rc::gen::inRange(0, 3) == 0) file.fixed.push_back(i);
   }
   return file;
 }
@@ -39,7 +42,7 @@ bool same(const G2oFile& a, const G2oFile& b) {
     return x.from == y.from && x.to == y.to && x.T_from_to == y.T_from_to && x.information == y.information;
   };
   return a.vertex_ids == b.vertex_ids && a.is_2d == b.is_2d && a.has_vertices == b.has_vertices &&
-         a.graph.poses == b.graph.poses &&
+         a.graph.poses == b.graph.poses && a.fixed == b.fixed &&
          std::equal(a.graph.edges.begin(), a.graph.edges.end(), b.graph.edges.begin(), b.graph.edges.end(), same_edge);
 }
 
@@ -205,6 +208,7 @@ TEST(G2o, WithVertexLinesSeveralComponentsAndFixAreFine) {
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ(file->vertex_ids, (std::vector<std::int64_t>{2, 5}));
   EXPECT_EQ(file->graph.poses[0].translation, Eigen::Vector3d(3, 4, 0));
+  EXPECT_EQ(file->fixed, (std::vector<std::size_t>{0, 1}));
 }
 
 TEST(G2o, ErrorsSayWhereAndWhat) {
@@ -222,10 +226,12 @@ TEST(G2o, ErrorsSayWhereAndWhat) {
   EXPECT_EQ(message_of("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1"),
             "g.g2o:2: edge: names vertex 1, which is not in the file");
   EXPECT_EQ(message_of("EDGE_SE2 3 3 1 0 0 1 0 0 1 0 1"), "g.g2o:1: edge from vertex 3 to itself");
-  EXPECT_EQ(message_of("EDGE_SE2 0 1 1 0 0 1 0 0 -1 0 1"),
-            "g.g2o:1: smallest eigenvalue of the information is -1, expected it not to be negative");
-  EXPECT_EQ(message_of("EDGE_SE2 0 1 1 0 0 1 2 0 1 0 1"),
-            "g.g2o:1: smallest eigenvalue of the information is -1, expected it not to be negative");
+  const std::string positive = ", expected a positive one";
+  EXPECT_EQ(message_of("EDGE_SE2 0 1 1 0 0 -1 0 0 -3 0 -2"),
+            "g.g2o:1: eigenvalues of the information are -3 to -1" + positive);
+  EXPECT_EQ(message_of("EDGE_SE2 0 1 1 0 0 0 0 0 0 0 -1"),
+            "g.g2o:1: eigenvalues of the information are -1 to 0" + positive);
+  EXPECT_EQ(message_of("EDGE_SE2 0 1 1 0 0 1 nan 0 1 0 1"), "g.g2o:1: column 8 is 'nan', expected a finite number");
   EXPECT_EQ(
       message_of("EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 2 3 1 0 0 1 0 0 1 0 1\nEDGE_SE2 5 4 1 0 0 1 0 0 1 0 1"),
       "g.g2o: no VERTEX lines and 3 connected components, expected 1 to chain poses in");
@@ -239,6 +245,37 @@ TEST(G2o, SingularInformationIsFine) {
   const auto file = parse_g2o("EDGE_SE2 0 1 1 0 0 1 1 0 1 0 0", "g");
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ(file->graph.edges[0].information.diagonal(), (Vector6d() << 1, 1, 1, 1, 1, 0).finished());
+}
+
+/// Published graphs have such matrices. Of all semidefinite ones the nearest is taken: nothing is nearer, whatever the
+/// direction one goes in from there.
+RC_GTEST_PROP(G2o, IndefiniteInformationBecomesTheNearestSemidefinite, ()) {
+  const bool is_2d = *rc::gen::arbitrary<bool>();
+  const int size = is_2d ? 3 : 6;
+  Eigen::MatrixXd given(size, size);
+  for (int i = 0; i < given.size(); ++i) given(i) = any_double(1.0);
+  given = (given + given.transpose()).eval();
+  given(0, 0) = given(1, 1) = 1.0;  // so that its eigenvalues reach from -1 or less to 3 or more
+  given(0, 1) = given(1, 0) = 2.0 + std::abs(given(0, 1));
+  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(given).eigenvalues();
+  std::string text = is_2d ? "EDGE_SE2 0 1 1 0 0" : "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1";
+  for (int i = 0; i < size; ++i)
+    for (int j = i; j < size; ++j) text += fmt::format(" {}", given(i, j));
+  const auto file = parse_g2o(text, "g");
+  RC_ASSERT(file.has_value());
+  RC_ASSERT(file->indefinite_edges == 1U);
+  RC_ASSERT(std::abs(file->worst_indefinite_share + values(0) / values(size - 1)) < 1e-9);
+  Eigen::MatrixXd taken = file->graph.edges[0].information;
+  if (is_2d) {
+    const std::array<int, 3> plane = {0, 1, 5};
+    taken = Eigen::MatrixXd(taken(plane, plane));
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(taken);
+  RC_ASSERT(eigen.eigenvalues().minCoeff() > 0.0);  // the solver wants every direction determined
+  RC_ASSERT(std::abs((taken - given).norm() - values.cwiseMin(0.0).norm()) < 1e-7 * values.norm());
+  const auto again = parse_g2o(to_g2o(*file), "g");
+  RC_ASSERT(again.has_value());
+  RC_ASSERT(again->indefinite_edges == 0U);
 }
 
 TEST(G2o, SurvivesAnyBytes) {

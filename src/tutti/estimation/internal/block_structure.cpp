@@ -16,7 +16,7 @@ namespace {
 
 using Pair = std::pair<int, int>;  // column < row
 
-/// Component of every node, numbered by first node (which is its anchor).
+/// Component of every node, numbered by first node.
 int find_components(const PoseGraph& graph, std::vector<int>& component) {
   std::vector<std::size_t> parent(graph.poses.size());
   std::iota(parent.begin(), parent.end(), std::size_t{0});
@@ -36,6 +36,20 @@ int find_components(const PoseGraph& graph, std::vector<int>& component) {
     component[i] = r == i ? count++ : component[r];
   }
   return count;
+}
+
+/// Per node: fixed, or the first of a component without a fixed one.
+std::vector<bool> anchors(const BlockStructure& s, std::span<const std::size_t> fixed) {
+  std::vector<bool> anchored(s.component.size(), false);
+  std::vector<bool> held(s.components, false);  // per component
+  const auto anchor = [&](std::size_t i) { anchored[i] = held[s.component[i]] = true; };
+  for (const std::size_t i : fixed) {
+    TUTTI_CHECK(i < anchored.size(), "fixed node {} of {} nodes", i, anchored.size());
+    anchor(i);
+  }
+  for (std::size_t i = 0; i < anchored.size(); ++i)
+    if (!held[s.component[i]]) anchor(i);
+  return anchored;
 }
 
 /// Nested dissection costs several times what minimum degree costs and pays back, over the factorisations of one solve,
@@ -101,19 +115,17 @@ void sort_unique(std::vector<Pair>& pairs) {
 
 }  // namespace
 
-BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<std::size_t, std::size_t>> extra) {
+BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<std::size_t, std::size_t>> extra,
+                              std::span<const std::size_t> fixed) {
   const std::size_t nodes = graph.poses.size();
   for (const auto& edge : graph.edges)
     TUTTI_CHECK(edge.from < nodes && edge.to < nodes, "edge {} -> {} of {} nodes", edge.from, edge.to, nodes);
   BlockStructure s;
   s.components = find_components(graph, s.component);
+  const std::vector<bool> anchored = anchors(s, fixed);
   s.variable.assign(nodes, -1);
-  for (std::size_t i = 0, seen = 0; i < nodes; ++i) {
-    if (s.component[i] == static_cast<int>(seen))
-      ++seen;  // the first node of its component
-    else
-      s.variable[i] = s.variables++;
-  }
+  for (std::size_t i = 0; i < nodes; ++i)
+    if (!anchored[i]) s.variable[i] = s.variables++;
 
   std::vector<Pair> pairs;
   pairs.reserve(graph.edges.size() + extra.size());

@@ -18,8 +18,9 @@ struct EdgeSlot {
   bool row_is_from = false;  ///< The block's row is `from`, its column `to`; else the other way round.
 };
 
-/// Sparsity of the normal equations of a pose graph, in blocks, in elimination order; the first node of every connected
-/// component is anchored and is no variable. Lower triangle by columns; each column starts with its diagonal block.
+/// Sparsity of the normal equations of a pose graph, in blocks, in elimination order. Fixed nodes, and the first node
+/// of every connected component without any, are anchored and are no variables. Lower triangle by columns; each column
+/// starts with its diagonal block.
 struct BlockStructure {
   int components = 0;
   std::vector<int> component;  ///< Per node.
@@ -31,7 +32,8 @@ struct BlockStructure {
 };
 
 /// `extra` pairs of nodes get a (structurally zero) block too; pairs across components are ignored.
-BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<std::size_t, std::size_t>> extra = {});
+BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<std::size_t, std::size_t>> extra = {},
+                              std::span<const std::size_t> fixed = {});
 
 /// Everything finite and every rotation a unit quaternion within 1e-3.
 bool is_finite(const PoseGraph& graph);

@@ -42,8 +42,10 @@ RelativePose step_of(const PoseGraphEdge& edge) { return {edge.T_from_to, invers
 
 }  // namespace
 
-ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles) {
-  const std::vector<Passage> nodes = passages(graph, roles);
+ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles,
+                           std::span<const std::size_t> fixed) {
+  std::vector<Passage> nodes = passages(graph, roles);
+  for (const std::size_t i : fixed) nodes[i].other = true;
   ReducedGraph out;
   std::vector<std::size_t> position(nodes.size(), kNone);
   for (std::size_t i = 0; i < nodes.size(); ++i) {

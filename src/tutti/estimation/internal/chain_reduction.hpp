@@ -27,8 +27,10 @@ struct ReducedGraph {
   std::vector<Run> runs;
 };
 
-/// Only steps with from < to are compounded. `roles`: per edge, or empty: all robust, so nothing is.
-ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles);
+/// Only steps with from < to are compounded; `fixed` nodes stay. `roles`: per edge, or empty: all robust, so nothing
+/// is.
+ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles,
+                           std::span<const std::size_t> fixed = {});
 
 /// Poses of all nodes of the original from those of the reduced graph: every run is bent to meet its ends.
 void expand_chains(const PoseGraph& graph, const ReducedGraph& reduced, std::span<const Pose3> reduced_poses,
