@@ -165,11 +165,17 @@ class CommandLine(unittest.TestCase):
         self.expect(run(), 1, "robot a: not one scan could be read", "000000.pcd")
 
     def test_settings_say_what_can_be_set(self):
-        self.expect(tutti("settings"), 0, "closures.finder = ", "simulation.robots[].start_s = 0")
+        few = tutti("settings")
+        self.expect(few, 0, "server.update_period_s = ", "closures.finder = ", "link.loss = 0", "--all")
+        self.assertLess(len(few.stdout.splitlines()), 35, few.stdout)
+        everything = tutti("settings", "--all")
+        self.expect(everything, 0, "closures.finder = ", "simulation.robots[].start_s = 0")
+        self.assertGreater(len(everything.stdout.splitlines()), 500)
         one = tutti("settings", "agreement", "alarm")
         self.expect(one, 0, "agent.policy.adaptive.agreement.false_alarm_rate = 0.01   (a number, ")
-        self.assertEqual(len(one.stdout.splitlines()), 2, one.stdout)
-        self.expect(tutti("settings", "dance"), 1, "no key contains 'dance'")
+        self.assertEqual(len(one.stdout.splitlines()), 4, one.stdout)  # and the one whose meaning names it
+        self.expect(tutti("settings", "transmissions", "lost"), 0, "link.loss = 0")  # words of its meaning
+        self.expect(tutti("settings", "dance"), 1, "no key or meaning contains 'dance'")
 
     def test_world_writes_the_walls_of_a_simulated_mission(self):
         mission = self.mission("source: simulation\nclosures: {finder: reference}\n")
@@ -284,6 +290,30 @@ class CommandLine(unittest.TestCase):
         (self.path / "better_stamps.csv").unlink()
         (self.path / "better_stamps.csv").mkdir()
         self.expect(tutti("optimise", graph, "-o", self.path / "better.g2o"), 1, "better_stamps.csv")
+
+    def test_optimise_takes_graphs_as_published(self):
+        """Information that is not semidefinite, a vertex that hangs on such an edge alone, and fixed vertices."""
+        good, indefinite = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1", "2 0 0 3 0 0 2 0 0 0 0 2 0 0 0 2 0 0 2 0 2"
+        graph, better = self.path / "published.g2o", self.path / "better.g2o"
+        lines = ["VERTEX_SE3:QUAT %d %s 0 0 0 0 1" % (i, x) for i, x in enumerate(("0.5 0", "1 0.25", "2 0.5", "3 9"))]
+        lines += ["FIX 2", "FIX 1"]
+        lines += ["EDGE_SE3:QUAT %d %d 1 0 0 0 0 0 1 %s" % (i, i + 1, indefinite if i == 2 else good) for i in range(3)]
+        graph.write_text("\n".join(lines) + "\n")
+        self.expect(tutti("optimise", graph, "-o", better), 0, "1 of 3 matrices are not positive semidefinite",
+                    "worst: 0.2 ", "2 vertices (FIX)")
+        written = [line.split() for line in better.read_text().splitlines()]
+        for i in (1, 2):
+            self.assertEqual(written[i], lines[i].split())
+        self.assertAlmostEqual(float(written[0][2]), 0.0, places=6)  # free: where its edge puts it
+        for value, there in zip(written[3][2:5], (3.0, 0.5, 0.0)):
+            self.assertAlmostEqual(float(value), there, places=6)
+        self.assertEqual([line[1] for line in written if line[0] == "FIX"], ["1", "2"])
+        summary = json.loads(tutti("optimise", graph, "-o", better, "--loss", "gnc", "--json").stdout)
+        self.assertEqual((summary["indefinite_edges"], summary["fixed_vertices"]), (1, 2))
+        self.assertAlmostEqual(summary["worst_indefinite_share"], 0.2)
+        for bad in (good.replace("1", "-1"), good.replace("1", "inf")):
+            graph.write_text("EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 %s\n" % bad)
+            self.expect(tutti("optimise", graph, "-o", better), 1, "published.g2o:1", "expected a")
 
     def test_compare_says_what_is_wrong(self):
         truth = self.write_way("truth.tum")

@@ -8,33 +8,52 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/operator_settings.hpp"
 
 namespace tutti::app {
 namespace {
 
-std::string words_of(const config_internal::FieldDoc& field) {
+using config_internal::FieldDoc;
+
+std::string words_of(const FieldDoc& field, std::string_view meaning) {
   std::string out = field.path;
   if (!field.default_value.empty()) out += " = " + field.default_value;
   out += fmt::format("   ({}{}{})\n", field.type, field.range.empty() ? "" : ", ", field.range);
-  return field.help.empty() ? out : out + "    " + field.help + "\n";
+  return meaning.empty() ? out : out + fmt::format("    {}\n", meaning);
 }
 
-int run(const std::vector<std::string>& parts) {
-  const auto defaults = std::make_unique<const mission::MissionConfig>();
+/// The operator's settings, in their own words.
+void list_operators(const std::vector<FieldDoc>& fields) {
+  for (const auto& [key, meaning] : mission::operator_settings())
+    if (const auto field = std::ranges::find(fields, key, &FieldDoc::path); field != fields.end())
+      fmt::print("{}", words_of(*field, meaning));
+  fmt::print(
+      "These are what an operator sets; tutti settings --all lists all {}, tutti settings WORD what contains it.\n",
+      fields.size());
+}
+
+int run(const std::vector<std::string>& parts, bool all) {
+  const auto fields = document_config(*std::make_unique<const mission::MissionConfig>());
+  if (parts.empty() && !all) {
+    list_operators(fields);
+    return 0;
+  }
   std::size_t shown = 0;
-  for (const auto& field : document_config(*defaults)) {
-    const auto contains = [&](const std::string& part) { return field.path.find(part) != std::string::npos; };
+  for (const auto& field : fields) {
+    const auto contains = [&](const std::string& part) {
+      return field.path.find(part) != std::string::npos || field.help.find(part) != std::string::npos;
+    };
     if (!std::ranges::all_of(parts, contains)) continue;
-    fmt::print("{}", words_of(field));
+    fmt::print("{}", words_of(field, field.help));
     ++shown;
   }
   if (shown > 0) return 0;
-  fmt::print(stderr, "tutti settings: no key contains '{}'; without an argument all are listed\n",
-             fmt::join(parts, "' and '"));
+  fmt::print(stderr, "tutti settings: no key or meaning contains '{}'; --all lists all\n", fmt::join(parts, "' and '"));
   return 1;
 }
 
@@ -42,13 +61,18 @@ int run(const std::vector<std::string>& parts) {
 
 void add_settings_command(CLI::App& app, int& exit_code) {
   const auto parts = std::make_shared<std::vector<std::string>>();
-  auto* command = app.add_subcommand("settings", "List what a mission can set: key, default, bounds and meaning.");
+  const auto all = std::make_shared<bool>(false);
+  auto* command = app.add_subcommand(
+      "settings", "List what an operator sets: key, default, bounds and meaning; --all: all there is to set.");
   command->footer(
-      "A mission file sets them as YAML, tutti run with --set KEY=VALUE; robots[] stands for robots.0, robots.1, ...\n"
+      "A mission file sets them as YAML, tutti run with --set KEY=VALUE; robots[] stands for robots[0], robots[1], "
+      "...\n"
       "What one mission has: tutti run MISSION.yaml --print-config\n"
       "Example: tutti settings agreement\n");
-  command->add_option("part", *parts, "Only keys that contain this; of several, all of them.")->type_name("PART");
-  command->callback([parts, &exit_code] { exit_code = run(*parts); });
+  command->add_option("word", *parts, "Only what has this in its key or meaning; of several words, all of them.")
+      ->type_name("WORD");
+  command->add_flag("--all", *all, "Not only what an operator sets.");
+  command->callback([parts, all, &exit_code] { exit_code = run(*parts, *all); });
 }
 
 }  // namespace tutti::app
