@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/internal/chain_reduction.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
 
@@ -61,6 +63,52 @@ Pull pull_of(std::size_t e, const PoseGraphEdge& edge, std::span<const Pose3> po
   return {e, std::sqrt(std::max(0.0, w.dot(own * w))), whitened.transpose() * w};
 }
 
+/// An edge in the units of its own standard deviations.
+struct Whitened {
+  EdgeSlot slot;
+  Vector6d residual;
+  Matrix6d J_from;
+  Matrix6d J_to;
+};
+
+Whitened whiten(const PoseGraphEdge& edge, const EdgeSlot& slot, std::span<const Pose3> poses) {
+  const BetweenLinearisation factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
+  const Matrix6d upper = edge.information.llt().matrixU();
+  return {slot, upper * factor.residual, upper * factor.J_i, upper * factor.J_j};
+}
+
+/// J_a H^-1 J_b^T of two edges.
+Matrix6d known_together(const Whitened& a, const Whitened& b, const SelectedInverse& inverse) {
+  Matrix6d out = Matrix6d::Zero();
+  for (const auto& [i, J_i] : {std::pair(a.slot.from, &a.J_from), std::pair(a.slot.to, &a.J_to)})
+    for (const auto& [j, J_j] : {std::pair(b.slot.from, &b.J_from), std::pair(b.slot.to, &b.J_to)})
+      if (i >= 0 && j >= 0) out += *J_i * inverse.block(i, j) * J_j->transpose();
+  return out;
+}
+
+double misfit(const std::vector<Whitened>& group, const SelectedInverse& inverse) {
+  const auto edges = static_cast<Eigen::Index>(group.size());
+  Eigen::MatrixXd K(6 * edges, 6 * edges);
+  Eigen::VectorXd residual(6 * edges);
+  for (Eigen::Index a = 0; a < edges; ++a) {
+    residual.segment<6>(6 * a) = group[static_cast<std::size_t>(a)].residual;
+    for (Eigen::Index b = 0; b < edges; ++b)
+      K.block<6, 6>(6 * a, 6 * b) =
+          known_together(group[static_cast<std::size_t>(a)], group[static_cast<std::size_t>(b)], inverse);
+  }
+  Eigen::MatrixXd others = -0.5 * (K + K.transpose());
+  others.diagonal().array() += 1.0 + kAlone;
+  const Eigen::Index middle = 6 * (edges / 2);
+  Eigen::MatrixXd right(6 * edges, 7);  // (I - K)^-1 of the residuals, and of K's columns at the middle edge
+  right << residual, K.middleCols<6>(middle);
+  const Eigen::LDLT<Eigen::MatrixXd> factor(others);
+  if (factor.info() != Eigen::Success || !factor.isPositive()) return 0.0;
+  const Eigen::MatrixXd solved = factor.solve(right);
+  const Vector6d moved = K.middleRows<6>(middle) * solved.col(0);
+  const Matrix6d covariance = solved.middleRows<6>(middle).rightCols<6>();
+  return std::max(0.0, moved.dot(Matrix6d(0.5 * (covariance + covariance.transpose())).ldlt().solve(moved)));
+}
+
 }  // namespace
 
 std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
@@ -100,6 +148,39 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
         influence.shift.segment<6>(static_cast<Eigen::Index>(6 * node)) =
             shifts.col(static_cast<Eigen::Index>(k)).segment<6>(6 * v);
     out.push_back(std::move(influence));
+  }
+  return out;
+}
+
+std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
+                                  std::span<const std::vector<std::size_t>> groups) {
+  std::vector<double> out(groups.size(), 0.0);
+  if (groups.empty()) return out;
+  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles);
+  std::vector<Pose3> at;
+  for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
+  const auto edge_of = [&](std::size_t e) {
+    TUTTI_CHECK(e < graph.edges.size() && reduced.edge[e], "edge {} of {}", e, graph.edges.size());
+    return *reduced.edge[e];
+  };
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;  // every end of a group with every other
+  for (const auto& group : groups)
+    for (const std::size_t a : group)
+      for (const std::size_t b : group) {
+        const PoseGraphEdge& x = reduced.graph.edges[edge_of(a)];
+        const PoseGraphEdge& y = reduced.graph.edges[edge_of(b)];
+        pairs.insert(pairs.end(), {{x.from, y.from}, {x.from, y.to}, {x.to, y.to}});
+      }
+  const BlockStructure structure = internal::analyse_blocks(reduced.graph, pairs);
+  internal::GraphEquations equations(reduced.graph, structure);
+  equations.linearise(at, {}, true);
+  if (structure.variables == 0 || !equations.hessian().factorise()) return out;
+  const SelectedInverse inverse(equations.hessian().factor());
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    std::vector<Whitened> group;
+    for (const std::size_t e : groups[g])
+      group.push_back(whiten(reduced.graph.edges[edge_of(e)], structure.edges[edge_of(e)], at));
+    if (!group.empty()) out[g] = misfit(group, inverse);
   }
   return out;
 }

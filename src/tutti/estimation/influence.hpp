@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/model/pose_graph.hpp"
 
 namespace tutti::estimation {
@@ -29,5 +30,16 @@ struct Influence {
 std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
                                           std::span<const std::size_t> candidates, std::size_t count,
                                           double least_distance = 0.0);
+
+/// Per group of edges, what taking all of it away changes where it is, for what the rest knows of it: with x the
+/// relative pose between the ends of the group's middle edge, at the optimum `poses` and at that of the graph without
+/// the group, and P its covariance in the latter,
+///   (x_with - x_without)^T P^-1 (x_with - x_without),
+/// below chi-square with 6 degrees of freedom if the group's edges and all others are right: all edges of a group count
+/// as one witness. Zero where the rest knows nothing. First order, and exact then: with K what the group knows of its
+/// own edges (whitened, J H^-1 J^T, at most 1) and r their residuals, the move is K (I - K)^-1 r, its covariance
+/// K (I - K)^-1. One selected inverse serves all groups. Zeros for a graph that does not determine its poses.
+std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
+                                  std::span<const std::vector<std::size_t>> groups);
 
 }  // namespace tutti::estimation

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/marginals.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/estimation/testing/random_graphs.hpp"
 
@@ -93,6 +94,67 @@ TEST(Influence, AnEdgeThatAloneHoldsItsEndsTogetherMovesNothing) {
     EXPECT_LT(influence.shift.norm(), 1e-6);
   }
   EXPECT_TRUE(largest_influences(graph, poses, steps, 3, 1e-3).empty());
+}
+
+using Groups = std::vector<std::vector<std::size_t>>;
+
+TEST(GroupMisfits, AreWhatTakingTheGroupAwayDoes) {
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
+    Rng rng(seed);
+    PoseGraph graph = random_graph(rng, 40, 9, 0.1).graph;
+    for (std::size_t e = 39; e < 42; ++e) graph.edges[e].T_from_to.translation.y() += 0.05;
+    const std::vector<Pose3> poses = optimum(graph);
+    const Groups groups = {{39, 40, 41}, {44, 46}, {47}};
+    const auto misfits = group_misfits(graph, poses, roles_from_numbering(graph), groups);  // its chain is compounded
+    ASSERT_EQ(misfits.size(), groups.size());
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      PoseGraph less = graph;
+      for (auto e = groups[g].rbegin(); e != groups[g].rend(); ++e) less = without(less, *e);
+      const std::vector<Pose3> moved = optimum(less);
+      const PoseGraphEdge& middle = graph.edges[groups[g][groups[g].size() / 2]];
+      const auto relative = [&](const std::vector<Pose3>& p) { return p[middle.from].inverse() * p[middle.to]; };
+      const std::vector<std::pair<std::size_t, std::size_t>> pair = {{middle.from, middle.to}};
+      const Vector6d by = local(relative(moved), relative(poses));
+      const double expected = by.dot(relative_covariances(less, moved, pair)[0].ldlt().solve(by));
+      EXPECT_NEAR(misfits[g], expected, 0.05 * expected + 1e-3) << seed << " group " << g;
+    }
+  }
+}
+
+/// Each of five agrees with the odometry of a ring, and so do all of them: many say no more than one.
+TEST(GroupMisfits, DoNotGrowWithTheGroup) {
+  PoseGraph graph;
+  constexpr std::size_t kSteps = 60;
+  const Pose3 step{Eigen::Quaterniond(Eigen::AngleAxisd(2 * M_PI / kSteps, Eigen::Vector3d::UnitZ())), {1, 0, 0}};
+  for (std::size_t k = 0; k < kSteps; ++k) graph.poses.push_back(k == 0 ? Pose3{} : graph.poses.back() * step);
+  for (std::size_t k = 1; k < kSteps; ++k) graph.edges.push_back({k - 1, k, step, 400.0 * Matrix6d::Identity()});
+  const Pose3 wrong{Eigen::Quaterniond::Identity(), {0, 0, 5.0}};  // about what 59 steps add up to
+  std::vector<std::size_t> group;
+  double one = 0.0;
+  for (std::size_t k = 0; k < 5; ++k) {
+    const std::size_t from = k, to = kSteps - 1 - k;
+    group.push_back(graph.edges.size());
+    graph.edges.push_back(
+        {from, to, graph.poses[from].inverse() * wrong * graph.poses[to], 1e4 * Matrix6d::Identity()});
+    const double misfit = group_misfits(graph, optimum(graph), roles_from_numbering(graph), Groups{group}).front();
+    if (k == 0) one = misfit;
+    EXPECT_GT(misfit, 0.5 * one);
+    EXPECT_LT(misfit, 1.5 * one) << k;
+  }
+  EXPECT_GT(one, 1.0);
+  // One by one they look harmless: the other four hold.
+  const Groups one_by_one = {{group[2]}};
+  EXPECT_LT(group_misfits(graph, optimum(graph), {}, one_by_one).front(), 0.5);
+}
+
+TEST(GroupMisfits, AGroupThatAloneHoldsItsEndsTogetherContradictsNothing) {
+  Rng rng(3);
+  PoseGraph graph = random_graph(rng, 20, 3, 0.3).graph;
+  std::erase_if(graph.edges, [](const PoseGraphEdge& e) { return (e.from < 10) != (e.to < 10); });
+  graph.edges.push_back({3, 15, random_pose(rng)});
+  const Groups groups = {{graph.edges.size() - 1}};
+  EXPECT_LT(group_misfits(graph, optimum(graph), {}, groups)[0], 1e-3);
+  EXPECT_TRUE(group_misfits(graph, optimum(graph), {}, {}).empty());
 }
 
 TEST(Influence, NothingToSay) {

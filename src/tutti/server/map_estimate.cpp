@@ -10,7 +10,10 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "tutti/estimation/chi_square.hpp"
+#include "tutti/estimation/influence.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/server/closure_groups.hpp"
 #include "tutti/server/relocate_failures.hpp"
 #include "tutti/server/rotation_honesty.hpp"
 #include "tutti/server/spare_pairs.hpp"
@@ -116,6 +119,9 @@ constexpr double kFreeRotation = 3.0;
 constexpr int kRelocations = 2;
 /// ... which must fit as many closures, or this share of them when what is convicted is half as long or less.
 constexpr double kAlmostAll = 0.95;
+
+/// How many groups of closures can be refused as lone witnesses against all the rest.
+constexpr int kRefusals = 5;
 
 /// Chi-square (6 dof, 0.999) below which the odometry of a stretch agrees with the map after all.
 constexpr double kRightAfterAll = 22.46;
@@ -230,6 +236,7 @@ class Judgement {
       if (!next.explains_better_than(best)) break;
       best = std::move(next);
     }
+    for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
     return best;
   }
 
@@ -252,6 +259,31 @@ class Judgement {
     for (std::size_t e = map_.odometry_edges; e < out.graph.edges.size(); ++e)
       if (out.robust.inlier_weight[e] >= 0.5) out.fitting.push_back(e);
     return out;
+  }
+
+  /// Takes back the group of closures at one pair of places that contradicts all the rest of the map most, if it does
+  /// beyond chance: as a lone closure against odometry, a lone group convicts itself. False if there is none.
+  [[nodiscard]] bool refuse_lone_witness(Optimum& best) const {
+    if (!estimation::is_usable(best.robust.solution.summary.termination)) return false;
+    PoseGraph fitted{.poses = {},
+                     .edges = {best.graph.edges.begin(),
+                               best.graph.edges.begin() + static_cast<std::ptrdiff_t>(map_.odometry_edges)}};
+    fitted.poses = best.graph.poses;
+    for (const std::size_t e : best.fitting) fitted.edges.push_back(best.graph.edges[e]);
+    std::vector<std::size_t> closures(best.fitting.size());
+    std::iota(closures.begin(), closures.end(), map_.odometry_edges);
+    std::vector<estimation::EdgeRole> roles(fitted.edges.size(), estimation::EdgeRole::robust);
+    std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
+    const auto groups = closure_groups(map_.nodes, fitted.edges, closures);
+    const auto misfits = estimation::group_misfits(fitted, best.robust.solution.poses, roles, groups);
+    const auto worst = std::ranges::max_element(misfits);
+    if (worst == misfits.end() || *worst <= estimation::chi_square_6_quantile(config_.trial.confidence)) return false;
+    std::vector<bool> accepted(closures_.size(), false);
+    for (const std::size_t closure : best.closure_of_edge) accepted[closure] = true;
+    for (const std::size_t e : groups[static_cast<std::size_t>(worst - misfits.begin())])
+      accepted[best.closure_of_edge[best.fitting[e - map_.odometry_edges] - map_.odometry_edges]] = false;
+    best = optimise(accepted, std::move(best.failed));
+    return true;
   }
 
   /// The map with the failures of another one moved to where that says they are.

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/server/closure_groups.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tutti::server {
+namespace {
+
+constexpr double kNear_s = 10.0;     // what a submap saw
+constexpr double kLongest_s = 30.0;  // as seen by three submaps in a row
+constexpr std::size_t kMost = 24;    // more cost more than they are worth
+
+/// When the ends of a closure were seen, the robot with the smaller id first; of one robot the earlier end.
+struct Ends {
+  RobotId robots[2];
+  Timestamp stamps[2];
+};
+
+Ends ends_of(const std::vector<MapNode>& nodes, const PoseGraphEdge& edge) {
+  const MapNode* first = &nodes[edge.from];
+  const MapNode* second = &nodes[edge.to];
+  if (second->id < first->id) std::swap(first, second);
+  return {{first->id.robot, second->id.robot}, {first->stamp, second->stamp}};
+}
+
+bool is_near(const Ends& a, const Ends& b, double most_s) {
+  for (const int end : {0, 1})
+    if (a.robots[end] != b.robots[end] || std::abs(a.stamps[end] - b.stamps[end]) > most_s) return false;
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::vector<std::size_t>> closure_groups(const std::vector<MapNode>& nodes,
+                                                     std::span<const PoseGraphEdge> edges,
+                                                     std::span<const std::size_t> closures) {
+  std::vector<Ends> ends;
+  for (const std::size_t e : closures) ends.push_back(ends_of(nodes, edges[e]));
+  std::vector<bool> taken(closures.size(), false);
+  std::vector<std::vector<std::size_t>> out;
+  for (std::size_t first = 0; first < closures.size(); ++first) {
+    if (taken[first]) continue;
+    std::vector<std::size_t> group = {first};  // positions in `closures`
+    taken[first] = true;
+    for (std::size_t k = 0; k < group.size(); ++k)
+      for (std::size_t other = first + 1; other < closures.size(); ++other)
+        if (!taken[other] && is_near(ends[group[k]], ends[other], kNear_s)) {
+          taken[other] = true;
+          group.push_back(other);
+        }
+    const auto is_long = [&](std::size_t a) {
+      return std::ranges::any_of(group, [&](std::size_t b) { return !is_near(ends[a], ends[b], kLongest_s); });
+    };
+    if (group.size() > kMost || std::ranges::any_of(group, is_long)) continue;
+    std::ranges::sort(group);
+    for (std::size_t& k : group) k = closures[k];
+    out.push_back(std::move(group));
+  }
+  return out;
+}
+
+}  // namespace tutti::server
