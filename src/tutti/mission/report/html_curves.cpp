@@ -111,10 +111,9 @@ std::string disagreement_figure(const MissionRecord& record, const RobotRecord& 
   const double bottom = strip_top + kStrip_px;
   const Axis x = Axis::linear(time, kLeft_px, kWidth_px - kRight_px, 8, false);
   const Axis y = Axis::linear(held, bottom, strip_top, 3, true);
-  Svg svg(
-      kWidth_px, bottom + 40.0,
-      fmt::format(scales > 0 ? "Disagreement of {} with the server per scale over time" : "Constraints of {} over time",
-                  robot.name));
+  Svg svg(kWidth_px, bottom + 40.0,
+          scales > 0 ? fmt::format("Disagreement of {} with the server per scale over time", robot.name)
+                     : fmt::format("Constraints of {} over time", robot.name));
   for (Eigen::Index s = 0; s < scales; ++s)
     svg.text({kLeft_px - 8.0, kTop_px + kRow_px * (static_cast<double>(s) + 0.5) + 4.0},
              s == 0            ? "large 0"
