@@ -88,7 +88,7 @@ TEST(ExtractFeatures, saysWhyASubmapIsNotUsable) {
             "too short: 4 keyframes, at least 6 needed");
   bad = good;
   for (auto& keyframe : bad.keyframes) keyframe.stamp.ns /= 4;
-  EXPECT_EQ(reason(bad), "too short: 2.5 s and 4.5 m, at least 5.0 s or 10.0 m needed");
+  EXPECT_EQ(reason(bad), "too short: 2.5 s and 4.0 m, at least 5.0 s or 10.0 m needed");
 }
 
 // By car a submap ends by its way after 3 s. What short submaps lack is having moved.
