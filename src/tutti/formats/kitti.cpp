@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 
+#include "tutti/formats/internal/points.hpp"
 #include "tutti/formats/internal/text.hpp"
 #include "tutti/geometry/so3.hpp"
 
@@ -88,6 +89,19 @@ Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::str
 
 Result<std::vector<Timestamp>> read_times(const std::string& path) {
   return internal::read_file(path).and_then([&](const std::string& text) { return parse_times(text, path); });
+}
+
+Result<PointCloud> parse_kitti_scan(std::string_view bytes, const std::string& name) {
+  internal::RecordLayout layout{.stride = 4 * sizeof(float)};
+  for (std::size_t axis = 0; axis < 3; ++axis) layout.xyz[axis] = {.found = true, .offset = axis * sizeof(float)};
+  if (bytes.size() % layout.stride != 0)
+    return fail(ErrorCode::parse, "{}: {} bytes, expected {} for every point (x, y, z, intensity)", name, bytes.size(),
+                layout.stride);
+  return PointCloud{internal::binary_points(bytes, bytes.size() / layout.stride, layout).points};
+}
+
+Result<PointCloud> read_kitti_scan(const std::string& path) {
+  return internal::read_file(path).and_then([&](const std::string& bytes) { return parse_kitti_scan(bytes, path); });
 }
 
 Result<Trajectory> with_times(Trajectory poses, std::span<const Timestamp> times) {

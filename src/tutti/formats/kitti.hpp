@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
+#include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 
 /// KITTI odometry files: a pose is 12 numbers a line, the row-major 3x4 matrix [R t] of T_world_body; there are no
@@ -25,6 +26,11 @@ Result<Pose3> read_transform(const std::string& path);
 /// One stamp in seconds a line, strictly increasing, read exactly.
 Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::string& name);
 Result<std::vector<Timestamp>> read_times(const std::string& path);
+
+/// KITTI's scans: x, y, z and intensity of every point as little-endian floats, nothing else. Points with a non-finite
+/// coordinate are dropped.
+Result<PointCloud> parse_kitti_scan(std::string_view bytes, const std::string& name);
+Result<PointCloud> read_kitti_scan(const std::string& path);
 
 /// The same poses with other stamps; as many stamps as poses, strictly increasing.
 Result<Trajectory> with_times(Trajectory poses, std::span<const Timestamp> times);

@@ -5,7 +5,11 @@
 // RapidCheck after gtest.
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
+#include <limits>
+
 #include "support/shared_data.hpp"
+#include "tutti/formats/internal/points.hpp"
 #include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
@@ -98,6 +102,19 @@ TEST(Kitti, ATransformIsFourRowsOfARigidMotion) {
   EXPECT_EQ(problem("1 0 0 0 m\n").find("t.txt:1: row has 5 columns"), 0U);
   EXPECT_EQ(problem("1 0 0 0\n0 nan 0 0\n").find("t.txt:2: column 2"), 0U);
   EXPECT_EQ(problem("1 0 0 0\n0 1 0 0\n"), "t.txt: 2 rows, expected the 4 of a 4x4 transform");
+}
+
+TEST(Kitti, ScansAreFourFloatsAPoint) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::string bytes;
+  for (const float value : {1.0F, 2.0F, 3.0F, 0.5F, nan, 0.0F, 0.0F, 0.5F, 4.0F, 5.0F, 6.0F, nan})
+    internal::put(bytes, value);
+  EXPECT_EQ(parse_kitti_scan(bytes, "s.bin").value(), (PointCloud{{{1, 2, 3}, {4, 5, 6}}}));
+  EXPECT_EQ(parse_kitti_scan(bytes + "x", "s.bin").error().message,
+            "s.bin: 49 bytes, expected 16 for every point (x, y, z, intensity)");
+  internal::expect_survives<PointCloud>(bytes, parse_kitti_scan, [](const PointCloud& cloud) {
+    return std::ranges::all_of(cloud.points, [](const auto& p) { return p.allFinite(); });
+  });
 }
 
 TEST(Kitti, RealFiles) {

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/pcd.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cstring>
 #include <span>
 #include <vector>
 
+#include "tutti/formats/internal/lzf.hpp"
 #include "tutti/formats/internal/points.hpp"
 
 namespace tutti::formats {
@@ -11,6 +15,9 @@ namespace {
 
 using internal::LineReader;
 using internal::shown;
+
+constexpr std::array<std::string_view, 8> kTimeNames = {"t",     "time",        "timestamp",   "time_stamp",
+                                                        "stamp", "offset_time", "time_offset", "relative_time"};
 
 struct Field {
   std::string_view name;
@@ -94,7 +101,12 @@ Result<internal::RecordLayout> layout_of(const Header& header, const std::string
         return fail(ErrorCode::unsupported, "{}: field {} is {} x {}{}, expected one F4 or F8", name, field.name,
                     field.count, field.type, field.size);
       layout.xyz[static_cast<std::size_t>(field.name[0] - 'x')] = {true, layout.stride, layout.columns,
-                                                                   field.size == 8};
+                                                                   static_cast<std::size_t>(field.size)};
+    }
+    const bool is_time = std::ranges::find(kTimeNames, field.name) != kTimeNames.end();
+    if (is_time && !layout.time.found && field.size >= 4 && field.count == 1) {
+      layout.time = {true, layout.stride, layout.columns, static_cast<std::size_t>(field.size), field.type[0]};
+      layout.time_name = field.name;
     }
     layout.stride += static_cast<std::size_t>(field.size * field.count);
     layout.columns += static_cast<std::size_t>(field.count);
@@ -107,14 +119,63 @@ Result<internal::RecordLayout> layout_of(const Header& header, const std::string
   return layout;
 }
 
+/// The records of a compressed file, which holds two sizes and then all values of one field after those of another.
+Result<std::string> decompress(std::string_view data, std::size_t count, const Header& header,
+                               const internal::RecordLayout& layout, const std::string& name) {
+  std::array<std::uint32_t, 2> sizes{};  // compressed, decompressed
+  if (data.size() < sizeof sizes)
+    return fail(ErrorCode::parse, "{}: {} bytes of data, expected the two sizes of compressed data", name, data.size());
+  std::memcpy(sizes.data(), data.data(), sizeof sizes);
+  data.remove_prefix(sizeof sizes);
+  if (data.size() < sizes[0])
+    return fail(ErrorCode::parse, "{}: {} bytes of compressed data, expected {}", name, data.size(), sizes[0]);
+  if (sizes[1] / layout.stride != count || sizes[1] % layout.stride != 0)
+    return fail(ErrorCode::parse, "{}: {} bytes of decompressed data, expected {} points of {} bytes", name, sizes[1],
+                count, layout.stride);
+  const auto values = internal::lzf_decode(data.substr(0, sizes[0]), sizes[1]);
+  if (!values) return fail(ErrorCode::parse, "{}: compressed data are damaged, expected {} bytes", name, sizes[1]);
+  std::string records(values->size(), '\0');
+  const char* value = values->data();
+  std::size_t offset = 0;
+  for (const Field& field : header.fields) {
+    const auto size = static_cast<std::size_t>(field.size * field.count);
+    for (std::size_t i = 0; i < count; ++i, value += size)
+      std::copy_n(value, size, records.data() + i * layout.stride + offset);
+    offset += size;
+  }
+  return records;
+}
+
+Result<internal::Records> read_records(LineReader& line, std::size_t count, const Header& header,
+                                       const internal::RecordLayout& layout) {
+  if (header.data == "ascii") {
+    auto records = ascii_points(line, count, layout);
+    if (records && line.next())
+      return line.fail(ErrorCode::parse, "more lines than the {} points of the header", count);
+    return records;
+  }
+  if (header.data == "binary") {
+    // Divided, not multiplied: the header may say anything.
+    if (line.rest().size() / layout.stride < count)
+      return fail(ErrorCode::parse, "{}: {} bytes of data, expected {} points of {} bytes", line.name(),
+                  line.rest().size(), count, layout.stride);
+    return binary_points(line.rest(), count, layout);
+  }
+  if (count == 0) return internal::Records{};
+  const auto records = decompress(line.rest(), count, header, layout, line.name());
+  if (!records) return tl::unexpected(records.error());
+  return binary_points(*records, count, layout);
+}
+
 }  // namespace
 
-Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name) {
+Result<TimedCloud> parse_timed_pcd(std::string_view bytes, const std::string& name) {
   LineReader line(bytes, name);
   const auto header = read_header(line);
   if (!header) return tl::unexpected(header.error());
-  if (header->data != "ascii" && header->data != "binary")
-    return line.fail(ErrorCode::unsupported, "DATA is {}, expected ascii or binary", shown(header->data));
+  if (header->data != "ascii" && header->data != "binary" && header->data != "binary_compressed")
+    return line.fail(ErrorCode::unsupported, "DATA is {}, expected ascii, binary or binary_compressed",
+                     shown(header->data));
   const auto layout = layout_of(*header, name);
   if (!layout) return tl::unexpected(layout.error());
   const std::int64_t size = header->width < 0 ? header->points : header->width * header->height;
@@ -122,22 +183,23 @@ Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name) {
   if (header->points >= 0 && header->points != size)
     return fail(ErrorCode::parse, "{}: POINTS is {}, expected WIDTH x HEIGHT = {}", name, header->points, size);
 
-  const auto count = static_cast<std::size_t>(size);
-  if (header->data == "ascii") {
-    auto points = ascii_points(line, count, *layout);
-    if (!points) return tl::unexpected(points.error());
-    if (line.next()) return line.fail(ErrorCode::parse, "more lines than the {} points of the header", count);
-    return PointCloud{std::move(*points)};
-  }
-  // Divided, not multiplied: the header may say anything.
-  if (line.rest().size() / layout->stride != count || line.rest().size() % layout->stride != 0)
-    return fail(ErrorCode::parse, "{}: {} bytes of data, expected {} points of {} bytes", name, line.rest().size(),
-                count, layout->stride);
-  return PointCloud{binary_points(line.rest(), count, *layout)};
+  auto records = read_records(line, static_cast<std::size_t>(size), *header, *layout);
+  if (!records) return tl::unexpected(records.error());
+  return TimedCloud{.cloud = {std::move(records->points)},
+                    .time_field = std::string(layout->time_name),
+                    .times = std::move(records->times)};
+}
+
+Result<TimedCloud> read_timed_pcd(const std::string& path) {
+  return internal::read_file(path).and_then([&](const std::string& bytes) { return parse_timed_pcd(bytes, path); });
+}
+
+Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name) {
+  return parse_timed_pcd(bytes, name).map([](TimedCloud&& timed) { return std::move(timed.cloud); });
 }
 
 Result<PointCloud> read_pcd(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& bytes) { return parse_pcd(bytes, path); });
+  return read_timed_pcd(path).map([](TimedCloud&& timed) { return std::move(timed.cloud); });
 }
 
 std::string to_pcd(const PointCloud& cloud) {

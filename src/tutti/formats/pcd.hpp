@@ -3,16 +3,29 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tutti/base/result.hpp"
 #include "tutti/model/point_cloud.hpp"
 
-/// Point Cloud Data files v0.7 (PCL), `DATA ascii` and `DATA binary` (little endian). x, y, z are float or double at
-/// any position; other fields are skipped; VIEWPOINT is not applied; points with a non-finite coordinate are dropped.
-/// The header's sizes must agree with each other and with the length of the data; an empty cloud is a valid one.
-/// `binary_compressed` is ErrorCode::unsupported.
+/// Point Cloud Data files v0.7 (PCL), `DATA ascii`, `binary` (little endian) and `binary_compressed`. x, y, z are float
+/// or double at any position; of the other fields only a time is read; VIEWPOINT is not applied; points with a
+/// non-finite coordinate are dropped. The header's sizes must agree with each other and the points must all be there;
+/// bytes after the last of them are passed over unless the file is ascii (PCL fills binary files up to a whole page).
+/// An empty cloud is a valid one.
 namespace tutti::formats {
 
+/// Points and when each of them was measured: numbers of the first field called t, time, timestamp, time_stamp, stamp,
+/// offset_time, time_offset or relative_time, as they stand there. Unit and zero are for the caller to find out.
+struct TimedCloud {
+  PointCloud cloud;
+  std::string time_field;     ///< Empty: the file has no times.
+  std::vector<double> times;  ///< One per point, or empty.
+};
+
+Result<TimedCloud> parse_timed_pcd(std::string_view bytes, const std::string& name);
+Result<TimedCloud> read_timed_pcd(const std::string& path);
+/// The points alone.
 Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name);
 Result<PointCloud> read_pcd(const std::string& path);
 

@@ -48,7 +48,7 @@ Status add_property(const LineReader& line, Element& element) {
     if (!is_real && element.name == "vertex")
       return line.fail(ErrorCode::unsupported, "property {} is {}, expected float or double", name, type);
     element.layout.xyz[static_cast<std::size_t>(name[0] - 'x')] = {true, element.layout.stride, element.layout.columns,
-                                                                   size == 8};
+                                                                   size};
   }
   element.layout.stride += size;
   ++element.layout.columns;
@@ -123,14 +123,14 @@ Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name) {
       if (!coordinate.found)
         return fail(ErrorCode::parse, "{}: vertex properties x, y and z expected, at least one is not there", name);
     if (ascii) {
-      auto points = ascii_points(line, element.count, layout);
-      if (!points) return tl::unexpected(points.error());
-      return PointCloud{std::move(*points)};
+      auto records = ascii_points(line, element.count, layout);
+      if (!records) return tl::unexpected(records.error());
+      return PointCloud{std::move(records->points)};
     }
     if (data.size() / layout.stride < element.count)
       return fail(ErrorCode::parse, "{}: {} bytes of data, expected {} vertices of {} bytes", name, data.size(),
                   element.count, layout.stride);
-    return PointCloud{binary_points(data, element.count, layout)};
+    return PointCloud{binary_points(data, element.count, layout).points};
   }
   return fail(ErrorCode::parse, "{}: no element vertex in the header", name);
 }

@@ -12,15 +12,28 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary point files are little endian");
 
-float coordinate_of(const char* record, const Coordinate& coordinate) {
-  if (!coordinate.is_double) {
-    float value = 0.0F;
-    std::memcpy(&value, record + coordinate.offset, sizeof value);
-    return value;
-  }
-  double value = 0.0;
-  std::memcpy(&value, record + coordinate.offset, sizeof value);
-  return to_float(value);
+template <class T>
+double read_as(const char* bytes) {
+  T value{};
+  std::memcpy(&value, bytes, sizeof value);
+  return static_cast<double>(value);
+}
+
+double number_in(const char* record, const NumberField& field) {
+  const char* bytes = record + field.offset;
+  if (field.type == 'F') return field.size == 8 ? read_as<double>(bytes) : read_as<float>(bytes);
+  if (field.type == 'I') return field.size == 8 ? read_as<std::int64_t>(bytes) : read_as<std::int32_t>(bytes);
+  return field.size == 8 ? read_as<std::uint64_t>(bytes) : read_as<std::uint32_t>(bytes);
+}
+
+/// `number` of a field.
+template <class Number>
+void append(Records& records, const RecordLayout& layout, const Number& number) {
+  const Eigen::Vector3f p(to_float(number(layout.xyz[0])), to_float(number(layout.xyz[1])),
+                          to_float(number(layout.xyz[2])));
+  if (!p.allFinite()) return;
+  records.points.push_back(p);
+  if (layout.time.found) records.times.push_back(number(layout.time));
 }
 
 }  // namespace
@@ -31,37 +44,35 @@ float to_float(double value) {
   return static_cast<float>(value);
 }
 
-std::vector<Eigen::Vector3f> binary_points(std::string_view data, std::size_t count, const RecordLayout& layout) {
-  std::vector<Eigen::Vector3f> points;
-  points.reserve(count);
+Records binary_points(std::string_view data, std::size_t count, const RecordLayout& layout) {
+  Records records;
+  records.points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const char* record = data.data() + i * layout.stride;
-    const Eigen::Vector3f p(coordinate_of(record, layout.xyz[0]), coordinate_of(record, layout.xyz[1]),
-                            coordinate_of(record, layout.xyz[2]));
-    if (p.allFinite()) points.push_back(p);
+    append(records, layout, [record](const NumberField& field) { return number_in(record, field); });
   }
-  return points;
+  return records;
 }
 
-Result<std::vector<Eigen::Vector3f>> ascii_points(LineReader& line, std::size_t count, const RecordLayout& layout) {
-  std::vector<Eigen::Vector3f> points;
-  points.reserve(std::min(count, line.rest().size()));
+Result<Records> ascii_points(LineReader& line, std::size_t count, const RecordLayout& layout) {
+  Records records;
+  records.points.reserve(std::min(count, line.rest().size()));
   for (std::size_t i = 0; i < count; ++i) {
     if (!line.next())
       return fail(ErrorCode::parse, "{}: ends after {} points, expected {} as its header says", line.name(), i, count);
     if (line.columns().size() != layout.columns)
       return line.fail(ErrorCode::parse, "point has {} columns, expected {} as the header says", line.columns().size(),
                        layout.columns);
-    Eigen::Vector3f p;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::string_view text = line.columns()[layout.xyz[static_cast<std::size_t>(axis)].column];
-      const auto value = parse_number(text);
-      if (!value) return line.fail(ErrorCode::parse, "coordinate is {}, expected a number", shown(text));
-      p[axis] = to_float(*value);
-    }
-    if (p.allFinite()) points.push_back(p);
+    std::string_view no_number;
+    append(records, layout, [&](const NumberField& field) {
+      const auto value = parse_number(line.columns()[field.column]);
+      if (!value) no_number = line.columns()[field.column];
+      return value.value_or(0.0);
+    });
+    if (!no_number.empty())
+      return line.fail(ErrorCode::parse, "a coordinate or time is {}, expected a number", shown(no_number));
   }
-  return points;
+  return records;
 }
 
 }  // namespace tutti::formats::internal

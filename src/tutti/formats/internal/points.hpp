@@ -16,27 +16,36 @@ namespace tutti::formats::internal {
 /// Bound on one header number, so that products of two fit an int64 and nonsense is refused before it is allocated.
 inline constexpr std::int64_t kMaxCount = std::int64_t{1} << 31;
 
-/// One coordinate within a record.
-struct Coordinate {
+/// One number within a record.
+struct NumberField {
   bool found = false;
   std::size_t offset = 0;  ///< Bytes, in binary files.
   std::size_t column = 0;  ///< In ascii files.
-  bool is_double = false;
+  std::size_t size = 4;    ///< Bytes, in binary files: 4 or 8.
+  char type = 'F';         ///< Float, I: signed or U: unsigned integer.
 };
 
 struct RecordLayout {
-  std::array<Coordinate, 3> xyz;
-  std::size_t stride = 0;   ///< Bytes a record.
-  std::size_t columns = 0;  ///< Columns a record.
+  std::array<NumberField, 3> xyz;
+  NumberField time;            ///< When a point was measured, if the file says so;
+  std::string_view time_name;  ///< and what it calls that.
+  std::size_t stride = 0;      ///< Bytes a record.
+  std::size_t columns = 0;     ///< Columns a record.
 };
 
 /// Infinite where the value is beyond a float's range (a plain cast would be undefined).
 float to_float(double value);
 
-/// The points of the `count` records in `data` that are finite.
-std::vector<Eigen::Vector3f> binary_points(std::string_view data, std::size_t count, const RecordLayout& layout);
-/// The same from the next `count` lines.
-Result<std::vector<Eigen::Vector3f>> ascii_points(LineReader& line, std::size_t count, const RecordLayout& layout);
+/// Points that are finite, and the times of these, if the layout has any, as they stand in the file.
+struct Records {
+  std::vector<Eigen::Vector3f> points;
+  std::vector<double> times;
+};
+
+/// From `count` binary records.
+Records binary_points(std::string_view data, std::size_t count, const RecordLayout& layout);
+/// From the next `count` lines.
+Result<Records> ascii_points(LineReader& line, std::size_t count, const RecordLayout& layout);
 
 /// Appends the bytes of a little-endian number.
 template <class T>
