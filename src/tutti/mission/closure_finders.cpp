@@ -12,8 +12,8 @@
 namespace tutti::mission {
 
 LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap,
-                                       std::size_t kept_in_memory)
-    : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), kept_in_memory_(kept_in_memory) {}
+                                       std::size_t cache_bytes)
+    : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
 
 bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
   return first.id.robot != second.id.robot || second.id.index - first.id.index >= min_submap_gap_;  // first < second
@@ -35,22 +35,13 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
 
 Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
     const Submap& submap, const server::CloudStore& clouds) const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (const auto found = features_.find(submap.id); found != features_.end()) return found->second;
-    if (auto found = recent_.find(submap.id)) return found;
-  }
-  auto cloud = clouds.get(submap.id);
-  if (!cloud) return tl::unexpected(cloud.error());
-  Submap seen = submap;
-  seen.cloud = std::move(*cloud);
-  // Computed outside the lock; two threads may do it twice, with the same result.
-  auto features = std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(seen, config_));
-  const std::lock_guard lock(mutex_);
-  if (features_.size() < kept_in_memory_ || features_.contains(submap.id))
-    return features_.try_emplace(submap.id, std::move(features)).first->second;
-  recent_.keep(submap.id, features);
-  return features;
+  return cache_.get(submap.id, [&]() -> Result<FeatureCache::Features> {
+    auto cloud = clouds.get(submap.id);
+    if (!cloud) return tl::unexpected(cloud.error());
+    Submap seen = submap;
+    seen.cloud = std::move(*cloud);
+    return std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(seen, config_));
+  });
 }
 
 namespace {
@@ -96,7 +87,8 @@ std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureCo
                                                                  std::uint64_t seed) {
   std::shared_ptr<const server::ClosureFinder> finder;
   if (config.finder == "lidar")
-    finder = std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap);
+    finder = std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap,
+                                                  static_cast<std::size_t>(config.feature_cache_mb * 1e6));
   else
     finder = make_reference_finder(config, recordings, seed);
   if (config.wrong_share == 0.0) return finder;

@@ -2,28 +2,26 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
 #include <memory>
-#include <mutex>
 
+#include "tutti/mission/feature_cache.hpp"
 #include "tutti/mission/mission_config.hpp"
-#include "tutti/mission/recently_used.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
 #include "tutti/server/closure_finder.hpp"
 
 namespace tutti::mission {
 
-/// From the submap clouds alone. Features, up to 1.5 MB a submap, stay in memory of the first `kept_in_memory` submaps;
-/// of the others those used last, and else they are computed again. (Each new submap meets all others in turn: were
-/// those used last kept of all, hardly any would still be there when it is wanted.)
+/// From the submap clouds alone. Features stay in memory of the newest submaps that fit into `cache_bytes`; those of
+/// others are computed again for every pair, with the same result.
 class LidarClosureFinder final : public server::ClosureFinder {
  public:
-  LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t kept_in_memory = 1000);
+  LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
   [[nodiscard]] bool needs_clouds() const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::CloudStore& clouds) const override;
+  [[nodiscard]] const FeatureCache& cache() const { return cache_; }
 
  private:
   [[nodiscard]] Result<std::shared_ptr<const lidar::SubmapFeatures>> features_of(
@@ -31,10 +29,7 @@ class LidarClosureFinder final : public server::ClosureFinder {
 
   lidar::LidarClosureConfig config_;
   std::uint32_t min_submap_gap_;
-  std::size_t kept_in_memory_;
-  mutable std::mutex mutex_;  // guards features_ and recent_
-  mutable std::map<SubmapId, std::shared_ptr<const lidar::SubmapFeatures>> features_;
-  mutable RecentlyUsed<lidar::SubmapFeatures> recent_{16};  // of submaps that are not in features_
+  mutable FeatureCache cache_;
 };
 
 /// For recordings without sensor data: true relative poses plus noise and a share of wrong ones.

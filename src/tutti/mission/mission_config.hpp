@@ -75,6 +75,7 @@ struct ClosureConfig {
   std::string finder = "lidar";
   int min_submap_gap =
       2;  ///< lidar: submaps of one robot nearer than this are not compared; neighbours overlap anyway.
+  double feature_cache_mb = 1000.0;  ///< lidar: about 2,400 submaps of 5,000 points.
   lidar::LidarClosureConfig lidar;
   simulation::ReferenceClosureConfig reference;
   double wrong_share = 0.0;
@@ -86,6 +87,10 @@ struct ClosureConfig {
             "lidar: from the submap clouds; reference: true relative poses plus noise and a share of wrong ones.");
     v.field("min_submap_gap", min_submap_gap, at_least(1.0),
             "lidar: submaps of one robot nearer than this are not compared.");
+    v.field(
+        "feature_cache_mb", feature_cache_mb, between(16.0, 1e6),
+        "lidar: memory for what was computed of the newest submaps, about 0.4 MB each; where it is full, every pair "
+        "with an older one takes tens of milliseconds instead of less than one.");
     v.field("lidar", lidar);
     v.field("reference", reference);
     v.field("wrong_share", wrong_share, between(0.0, 0.9),

@@ -75,6 +75,10 @@ NeighbourIndex::~NeighbourIndex() = default;
 
 const std::vector<Eigen::Vector3f>& NeighbourIndex::points() const { return tree_->source.points; }
 
+std::size_t NeighbourIndex::bytes() const {
+  return sizeof(Tree) + points().capacity() * sizeof(Eigen::Vector3f) + tree_->kd_tree.usedMemory(tree_->kd_tree);
+}
+
 std::int32_t NeighbourIndex::nearest(const Eigen::Vector3f& query, float max_distance) const {
   if (points().empty()) return kNone;
   NearestWithin result(max_distance * max_distance);

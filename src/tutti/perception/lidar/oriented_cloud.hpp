@@ -27,6 +27,7 @@ class NeighbourIndex {
   [[nodiscard]] std::int32_t nearest(const Eigen::Vector3f& query, float max_distance) const;
   /// The (at most) out.size() nearest points, nearest first; returns how many there are.
   std::size_t nearest_k(const Eigen::Vector3f& query, std::span<std::int32_t> out) const;
+  [[nodiscard]] std::size_t bytes() const;  ///< Of memory held.
 
  private:
   struct Tree;

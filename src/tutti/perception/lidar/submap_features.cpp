@@ -105,4 +105,19 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
   return features;
 }
 
+std::size_t bytes_of(const SubmapFeatures& features) {
+  const auto of_elements = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
+  std::size_t bytes = sizeof features + features.reason.capacity() + of_elements(features.view.walls) +
+                      of_elements(features.view.floors);
+  if (features.cloud.index) bytes += features.cloud.index->bytes();
+  if (features.cloud.normals) bytes += of_elements(*features.cloud.normals);
+  if (features.cloud.roughness) bytes += of_elements(*features.cloud.roughness);
+  if (features.turned_views)
+    for (const TurnedView& view : *features.turned_views)
+      bytes += sizeof view + of_elements(view.spectrum.re) + of_elements(view.spectrum.im);
+  if (features.panoramas)
+    for (const DepthPanorama& panorama : *features.panoramas) bytes += panorama.bytes();
+  return bytes;
+}
+
 }  // namespace tutti::lidar

@@ -31,4 +31,7 @@ struct SubmapFeatures {
 /// Pure and deterministic. A submap that is too short, too small or without a cloud comes back with usable = false.
 SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& config);
 
+/// Memory held, what copies share included.
+std::size_t bytes_of(const SubmapFeatures& features);
+
 }  // namespace tutti::lidar
