@@ -147,7 +147,7 @@ class CommandLine(unittest.TestCase):
         mission = self.mission("robots: [{name: a, odometry: {file: a.tum}, scans: scans}]\nclosures: {finder: lidar}\n")
         run = lambda: tutti("run", mission, "--data", self.path, "--out", self.path / "out")
         (self.path / "scans" / "0.pcd").write_text("named otherwise")
-        self.expect(run(), 1, "robot a", "scans: holds none of 000000.pcd to 000100.pcd")
+        self.expect(run(), 1, "robot a", "scans: holds none of 000000.pcd (or .bin) to 000100.pcd")
         (self.path / "scans" / "000000.pcd").write_text(
             "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
             "DATA ascii\n1 2 3\n")

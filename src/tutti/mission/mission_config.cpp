@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/mission_config.hpp"
 
+#include <cmath>
 #include <functional>
 #include <set>
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/consistency/policy.hpp"
+#include "tutti/geometry/so3.hpp"
 #include "tutti/mission/demo_mission.hpp"
 
 namespace tutti::mission {
@@ -13,6 +15,7 @@ namespace {
 
 constexpr double kShortestUpdate_s = 0.001;
 constexpr std::size_t kLongestName = 64;
+constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm, as in trajectory files
 
 using Problem = std::function<void(std::string)>;
 
@@ -47,6 +50,8 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
     if (robot.odometry.file.empty()) problem(path + ".odometry.file: missing");
     if (!robot.reference_offset_m.empty() && robot.reference_offset_m.size() != 3)
       problem(fmt::format("{}.reference_offset_m: {} numbers, expected 3", path, robot.reference_offset_m.size()));
+    if (const auto T_body_lidar = to_pose(robot.T_body_lidar); !T_body_lidar)
+      problem(fmt::format("{}.T_body_lidar.{}", path, T_body_lidar.error().message));
     if (robot.from_share >= robot.to_share)
       problem(fmt::format("{}: from_share {} is not below to_share {}", path, robot.from_share, robot.to_share));
     if (config.closures.finder == "reference" && robot.reference.file.empty())
@@ -97,7 +102,41 @@ Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std
   return config;
 }
 
+/// As many finite numbers as wanted, or none.
+Status check_numbers(const std::vector<double>& numbers, std::size_t count, const char* name) {
+  if (!numbers.empty() && numbers.size() != count)
+    return fail(ErrorCode::configuration, "{}: {} numbers, expected {}", name, numbers.size(), count);
+  for (const double number : numbers)
+    if (!(std::abs(number) <= kMaxCoordinate_m))
+      return fail(ErrorCode::configuration, "{}: holds {}, expected at most {:g} either way", name, number,
+                  kMaxCoordinate_m);
+  return {};
+}
+
 }  // namespace
+
+Result<Pose3> to_pose(const LidarPoseConfig& config) {
+  const auto& [translation_m, xyzw, rpy_deg] = config;
+  if (auto ok = check_numbers(translation_m, 3, "translation_m"); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_numbers(xyzw, 4, "quaternion_xyzw"); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_numbers(rpy_deg, 3, "rpy_deg"); !ok) return tl::unexpected(ok.error());
+  if (!xyzw.empty() && !rpy_deg.empty())
+    return fail(ErrorCode::configuration, "rpy_deg: given, and quaternion_xyzw too, expected one of them");
+  Pose3 pose;
+  if (!translation_m.empty()) pose.translation = Eigen::Vector3d(translation_m.data());
+  if (!xyzw.empty()) {
+    const Eigen::Quaterniond q(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
+    if (!(std::abs(q.norm() - 1.0) <= kUnitTolerance))
+      return fail(ErrorCode::configuration, "quaternion_xyzw: norm is {:.6g}, expected 1 within {}", q.norm(),
+                  kUnitTolerance);
+    pose.rotation = q.normalized();
+  }
+  if (!rpy_deg.empty())
+    pose.rotation = so3_exp(rpy_deg[2] * kRadPerDeg * Eigen::Vector3d::UnitZ()) *
+                    so3_exp(rpy_deg[1] * kRadPerDeg * Eigen::Vector3d::UnitY()) *
+                    so3_exp(rpy_deg[0] * kRadPerDeg * Eigen::Vector3d::UnitX());
+  return pose;
+}
 
 Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments) {
   auto root = load_yaml(file.string());

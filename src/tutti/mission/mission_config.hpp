@@ -36,6 +36,21 @@ struct TrajectoryFile {
   }
 };
 
+/// Where the LiDAR sits on the robot's body: its points times this are in the body frame.
+struct LidarPoseConfig {
+  std::vector<double> translation_m;    ///< x, y, z; empty = zero.
+  std::vector<double> quaternion_xyzw;  ///< Hamilton; empty = none.
+  std::vector<double> rpy_deg;          ///< Instead: roll, pitch, yaw about the body's fixed x, y, z, as ROS has them.
+  template <class V>
+  void describe(V& v) {
+    v.field("translation_m", translation_m, any(), "x, y, z of the LiDAR in the body frame.");
+    v.field("quaternion_xyzw", quaternion_xyzw, any(), "Its rotation to the body frame, of norm 1 within 0.001.");
+    v.field("rpy_deg", rpy_deg, any(), "Instead: roll, pitch, yaw about the body's fixed axes, as ROS has them.");
+  }
+};
+/// The pose, or what is wrong with it.
+Result<Pose3> to_pose(const LidarPoseConfig& config);
+
 /// One robot whose recording is replayed.
 struct RobotConfig {
   std::string name;
@@ -45,8 +60,12 @@ struct RobotConfig {
   std::vector<double> reference_offset_m;  ///< x, y, z; recordings of different places share no frame: put them apart.
   bool score_against_reference = true;     ///< false: the reference only judges closures and transforms.
   std::string scans;                       ///< Folder of NNNNNN.pcd, one per odometry pose; empty = no scans.
-  double start_s = 0.0;                    ///< Mission time of its first sample.
-  double from_share = 0.0;                 ///< Part of the recording to replay.
+  LidarPoseConfig T_body_lidar;
+  std::string scans_deskewed = "auto";
+  std::string scan_time_unit = "auto";
+  std::string scan_pose_at = "end";
+  double start_s = 0.0;     ///< Mission time of its first sample.
+  double from_share = 0.0;  ///< Part of the recording to replay.
   double to_share = 1.0;
   bool random_frame = false;  ///< Draw the odometry frame from the seed: any yaw, tilt, shift.
   simulation::DegradeConfig degrade;
@@ -61,7 +80,16 @@ struct RobotConfig {
             "x, y, z added to the reference: recordings of different places share no frame, put them apart.");
     v.field("score_against_reference", score_against_reference, any(),
             "false: the reference judges only closures and transforms, not trajectories.");
-    v.field("scans", scans, any(), "Folder with one PCD per odometry pose, numbered 000000.pcd up.");
+    v.field("scans", scans, any(),
+            "Folder with one PCD (or KITTI .bin) per odometry pose, numbered 000000.pcd up, in the LiDAR's frame.");
+    v.field("T_body_lidar", T_body_lidar, any(), "Where the LiDAR sits on the body; the identity by default.");
+    v.field("scans_deskewed", scans_deskewed, one_of({"auto", "yes", "no"}),
+            "no: points carry the time of their measurement, by which they are deskewed; yes: they need none; auto: as "
+            "the files are.");
+    v.field("scan_time_unit", scan_time_unit, one_of({"auto", "s", "ms", "us", "ns"}),
+            "Of the points' times; auto: the one in which a scan lasts 1 to 500 ms.");
+    v.field("scan_pose_at", scan_pose_at, one_of({"end", "begin"}),
+            "Of which moment of a sweep its odometry pose is, unless points have times of the odometry's clock.");
     v.field("start_s", start_s, between(0.0, simulation::kLongest_s), "Mission time of the first sample.");
     v.field("from_share", from_share, between(0.0, 1.0), "First part of the recording to replay.");
     v.field("to_share", to_share, between(0.0, 1.0), "Last part of the recording to replay.");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/mission_config.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -53,6 +54,30 @@ TEST(MissionConfig, RobotsAreCalledWhatFilesCanBeCalled) {
     EXPECT_NE(problem(name).find("simulation.robots.1.name: is '" + name + "', expected at most 64 letters"),
               std::string::npos)
         << problem(name);
+}
+
+TEST(MissionConfig, WhereTheLidarSitsIsAPose) {
+  const auto problem = [](const std::string& T_body_lidar) {
+    return problem_with(kGood, {"robots.0.T_body_lidar={" + T_body_lidar + "}"});
+  };
+  EXPECT_EQ(problem("translation_m: [0.1, 0, 0.4], quaternion_xyzw: [0, 0, 0.7071068, 0.7071068]"), "");
+  EXPECT_EQ(problem("rpy_deg: [0, 0, 90]"), "");
+  EXPECT_NE(problem("translation_m: [0.1, 0]").find("robots.0.T_body_lidar.translation_m: 2 numbers, expected 3"),
+            std::string::npos)
+      << problem("translation_m: [0.1, 0]");
+  EXPECT_NE(problem("quaternion_xyzw: [0, 0, 1, 1]").find("norm is 1.41421, expected 1 within 0.001"),
+            std::string::npos)
+      << problem("quaternion_xyzw: [0, 0, 1, 1]");
+  for (const char* value : {"nan", "inf", "1e300"})
+    for (const char* name : {"translation_m", "rpy_deg"})
+      EXPECT_NE(problem(fmt::format("{}: [0, {}, 0]", name, value)), "") << name << value;
+  EXPECT_NE(problem("quaternion_xyzw: [nan, 0, 0, 1]"), "");
+  EXPECT_NE(problem("quaternion_xyzw: [0, 0, 0, 1], rpy_deg: [0, 0, 0]").find("expected one of them"),
+            std::string::npos);
+  // Roll, pitch and yaw about fixed axes: z is turned by the roll, then by the pitch, then by the yaw.
+  const Pose3 T = to_pose({.translation_m = {}, .quaternion_xyzw = {}, .rpy_deg = {90.0, 90.0, 90.0}}).value();
+  EXPECT_LT((T.rotation * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((T.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-12);
 }
 
 TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {

@@ -6,13 +6,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 #include "tutti/base/random.hpp"
 #include "tutti/formats/euroc_csv.hpp"
 #include "tutti/formats/kitti.hpp"
-#include "tutti/formats/pcd.hpp"
 #include "tutti/formats/tum.hpp"
+#include "tutti/mission/scan_folder.hpp"
 #include "tutti/simulation/surface.hpp"
 
 namespace tutti::mission {
@@ -33,66 +33,11 @@ Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path&
   return formats::with_times(*poses, *times);
 }
 
-/// The samples between two shares of a recording, and which they were.
-template <class T>
-std::vector<T> part(const std::vector<T>& all, double from_share, double to_share) {
-  const auto n = static_cast<double>(all.size());
-  const auto from = static_cast<std::ptrdiff_t>(std::floor(from_share * n));
-  const auto to = static_cast<std::ptrdiff_t>(std::ceil(to_share * n));
-  if (from >= to) return {};
-  return {all.begin() + from, all.begin() + to};
-}
-
-/// A folder with one PCD per odometry pose, NNNNNN.pcd, points already undistorted to the pose's stamp.
-class ScanFolder final : public ScanSource {
- public:
-  /// `numbers`: of the files, one per odometry pose.
-  ScanFolder(fs::path folder, std::vector<std::size_t> numbers, std::vector<Timestamp> stamps)
-      : folder_(std::move(folder)), numbers_(std::move(numbers)), stamps_(std::move(stamps)) {}
-
-  /// Fails when the folder holds none of the files: they are named otherwise.
-  [[nodiscard]] Status check() const {
-    for (std::size_t sample = 0; sample < numbers_.size(); ++sample)
-      if (is_there(sample)) return {};
-    return fail(ErrorCode::io, "{}: holds none of {} to {}, expected one per odometry pose", folder_.string(),
-                file_name(0), file_name(numbers_.size() - 1));
-  }
-
-  /// Asked for at keyframes: those that have none are counted among the mission's notes.
-  [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
-    if (!is_there(sample))
-      return fail(ErrorCode::io, "{}: is not there", (folder_.filename() / file_name(sample)).string());
-    auto cloud = formats::read_pcd((folder_ / file_name(sample)).string());
-    if (!cloud) return tl::unexpected(cloud.error());
-    return Scan{.stamp = stamps_[sample], .cloud = std::make_shared<const PointCloud>(std::move(*cloud)), .age_s = {}};
-  }
-
- private:
-  [[nodiscard]] std::string file_name(std::size_t sample) const { return fmt::format("{:06d}.pcd", numbers_[sample]); }
-  [[nodiscard]] bool is_there(std::size_t sample) const {
-    std::error_code failure;
-    return fs::exists(folder_ / file_name(sample), failure);
-  }
-
-  fs::path folder_;
-  std::vector<std::size_t> numbers_;
-  std::vector<Timestamp> stamps_;
-};
-
-/// `count`: odometry poses of the whole recording.
-Result<std::shared_ptr<const ScanSource>> scans_of(const RobotConfig& robot, const fs::path& data, std::size_t count,
-                                                   const Trajectory& replayed) {
-  const fs::path folder = data / robot.scans;
-  std::error_code failure;
-  if (!fs::is_directory(folder, failure)) return fail(ErrorCode::io, "{}: no such folder of scans", folder.string());
-  std::vector<std::size_t> numbers(count);
-  std::iota(numbers.begin(), numbers.end(), std::size_t{0});
-  std::vector<Timestamp> stamps;
-  for (const StampedPose& sample : replayed) stamps.push_back(sample.stamp);
-  const auto scans =
-      std::make_shared<ScanFolder>(folder, part(numbers, robot.from_share, robot.to_share), std::move(stamps));
-  if (auto ok = scans->check(); !ok) return tl::unexpected(ok.error());
-  return scans;
+/// The samples to replay of a recording of so many: the first, and the one behind the last.
+std::pair<std::size_t, std::size_t> part_of(std::size_t count, const RobotConfig& robot) {
+  const auto n = static_cast<double>(count);
+  const auto from = static_cast<std::size_t>(std::floor(robot.from_share * n));
+  return {from, std::max(from, static_cast<std::size_t>(std::ceil(robot.to_share * n)))};
 }
 
 bool is_degraded(const simulation::DegradeConfig& degrade) {
@@ -118,20 +63,23 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
     out.recording.reference = std::move(*reference);
     if (robot.reference.file == robot.odometry.file) out.T_common_odom = T_common_reference;
   }
-  Trajectory raw = part(*odometry, robot.from_share, robot.to_share);
+  const auto [from, until] = part_of(odometry->size(), robot);
+  Trajectory raw(odometry->begin() + static_cast<std::ptrdiff_t>(from),
+                 odometry->begin() + static_cast<std::ptrdiff_t>(until));
   if (raw.size() < 2) return fail(ErrorCode::invalid, "{} odometry poses to replay, expected at least 2", raw.size());
   if (is_degraded(robot.degrade)) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
-  if (!robot.scans.empty()) {
-    auto scans = scans_of(robot, data, odometry->size(), raw);
-    if (!scans) return tl::unexpected(scans.error());
-    out.recording.scans = std::move(*scans);
-  }
   raw = simulation::degrade_odometry(raw, robot.degrade);
   if (robot.random_frame) {
     out.T_odom_recorded = simulation::random_frame(rng, config.max_tilt_deg, config.max_shift_m);
     raw = simulation::move_frame(raw, out.T_odom_recorded);
   }
   if (out.T_common_odom) out.T_common_odom = *out.T_common_odom * out.T_odom_recorded.inverse();
+  if (!robot.scans.empty()) {
+    const auto scans = ScanFolder::open(data / robot.scans, from, raw, robot);
+    if (!scans) return tl::unexpected(scans.error());
+    out.notes.push_back(fmt::format("{}: {}", robot.name, (*scans)->note()));
+    out.recording.scans = *scans;
+  }
   out.recording.increment_covariance = simulation::increment_covariances(raw, robot.covariance);
   out.recording.odometry = std::move(raw);
   return out;

@@ -24,6 +24,7 @@ struct MissionRecording {
   /// Where this robot's odometry frame lies in the common reference frame, when the reference is the recorded odometry
   /// itself (so it is exact up to the reference's own error).
   std::optional<Pose3> T_common_odom;
+  std::vector<std::string> notes;  ///< What was taken for granted of it, for the report.
 };
 
 struct MissionInput {

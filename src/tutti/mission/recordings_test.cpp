@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/recordings.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -118,12 +119,25 @@ TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
   EXPECT_NE(problem().find("nowhere: no such folder"), std::string::npos) << problem();
 }
 
+TEST_F(Recordings, OfWhichNoScanCanBeReadAreRefused) {
+  config_.robots[0].scans = std::string("scans");
+  for (int number = 0; number < 100; ++number)
+    std::ofstream(folder_ / "scans" / fmt::format("{:06d}.pcd", number)) << std::string(kOnePoint, 35);
+  EXPECT_NE(problem().find("robot a: "), std::string::npos) << problem();
+  EXPECT_NE(problem().find("000000.pcd: no DATA line"), std::string::npos) << problem();
+  std::ofstream(folder_ / "scans" / "000001.pcd") << kOnePoint;
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_TRUE(input.has_value()) << input.error().message;
+  EXPECT_EQ(input->robots[0].notes,
+            (std::vector<std::string>{"a: scans are taken as deskewed to the stamps of their poses"}));
+}
+
 TEST_F(Recordings, ScansOfOtherNamesAreNotPassedOver) {
   config_.robots[0].scans = std::string("scans");
   config_.robots[0].from_share = 0.1;
   for (const char* name : {"13.pcd", "scan_000012.pcd", "000012.PCD", "000009.pcd"})  // the last is out of range
     std::ofstream(folder_ / "scans" / name) << kOnePoint;
-  EXPECT_NE(problem().find("scans: holds none of 000010.pcd to 000099.pcd"), std::string::npos) << problem();
+  EXPECT_NE(problem().find("scans: holds none of 000010.pcd (or .bin) to 000099.pcd"), std::string::npos) << problem();
   std::ofstream(folder_ / "scans" / "000099.pcd") << kOnePoint;
   EXPECT_EQ(problem(), "");
 }

@@ -324,6 +324,7 @@ MissionRecord MissionRun::record() const {
   std::vector<RobotOutcome> outcomes;
   for (const auto& robot : robots_) {
     outcomes.push_back(robot->outcome());
+    record.notes.insert(record.notes.end(), robot->recording().notes.begin(), robot->recording().notes.end());
     for (std::string& trouble : robot->troubles()) record.notes.push_back(std::move(trouble));
   }
   if (!refusals_.empty())

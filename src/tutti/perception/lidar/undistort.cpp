@@ -28,11 +28,11 @@ Status check_sweep(const Scan& scan, std::span<const StampedPose> samples) {
   if (ages.empty()) return {};
   if (samples.empty() || samples.back().stamp < scan.stamp)
     return fail(ErrorCode::invalid, "scan at {} ns: odometry ends before it", scan.stamp.ns);
-  const double known_s = scan.stamp - samples.front().stamp;
+  const double known_s = scan.stamp - samples.front().stamp, ahead_s = scan.stamp - samples.back().stamp;
   for (std::size_t i = 0; i < ages.size(); ++i)
-    if (!(ages[i] >= 0.0F && ages[i] <= known_s))  // also NaN
-      return fail(ErrorCode::invalid, "scan at {} ns: point {} is {} s old, expected 0 to {} s, the known odometry",
-                  scan.stamp.ns, i, ages[i], known_s);
+    if (!(ages[i] >= ahead_s && ages[i] <= known_s))  // also NaN
+      return fail(ErrorCode::invalid, "scan at {} ns: point {} is {} s old, expected {} to {} s, the known odometry",
+                  scan.stamp.ns, i, ages[i], ahead_s, known_s);
   return {};
 }
 
@@ -51,7 +51,8 @@ Result<Scan> undistort(const Scan& scan, std::span<const StampedPose> T_odom_bod
   for (std::size_t i = 0; i < scan.cloud->points.size(); ++i) {
     if ((*scan.age_s)[i] != age_s) {
       age_s = (*scan.age_s)[i];
-      const Timestamp then = std::max(T_odom_body.front().stamp, scan.stamp - double{age_s});
+      const Timestamp then =
+          std::clamp(scan.stamp - double{age_s}, T_odom_body.front().stamp, T_odom_body.back().stamp);
       const Pose3 T_end_then = T_end_odom * pose_at(T_odom_body, then);
       R_end_then = T_end_then.rotation.toRotationMatrix().cast<float>();
       t_end_then = T_end_then.translation.cast<float>();

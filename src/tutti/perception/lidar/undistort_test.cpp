@@ -64,6 +64,24 @@ RC_GTEST_PROP(Undistort, FixedPointsComeBackWhereTheyAreWhateverTheOdometryFrame
     RC_ASSERT((undistorted->cloud->points[i].cast<double>() - T_end_start * fixed[i]).norm() < 1e-4);
 }
 
+TEST(Undistort, PointsMayBeYoungerThanTheStamp) {
+  const Eigen::Vector3d speed(1.0, 0.2, 0.0), turn(0.0, 0.0, 0.5);
+  const Trajectory odometry = drive(speed, turn, {}, 0.125, 4);
+  Scan scan = sweep({{10.0, 0.0, 0.0}, {3.0, 4.0, 1.0}}, odometry[2].stamp, 0.125, speed, turn);
+  const Pose3 T_end_begin = odometry[2].pose.inverse() * odometry[1].pose;
+  const auto at_end = undistort(scan, odometry);
+  auto younger = std::make_shared<std::vector<float>>(*scan.age_s);
+  for (float& age_s : *younger) age_s -= 0.125F;
+  scan.stamp = odometry[1].stamp;  // of the same sweep's begin
+  scan.age_s = younger;
+  const auto at_begin = undistort(scan, odometry);
+  ASSERT_TRUE(at_end && at_begin);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_LT(
+        (T_end_begin * at_begin->cloud->points[i].cast<double>() - at_end->cloud->points[i].cast<double>()).norm(),
+        1e-5);
+}
+
 TEST(Undistort, WithoutItAMovingSweepIsBent) {
   const Eigen::Vector3d speed(1.0, 0.0, 0.0), turn(0.0, 0.0, 0.5);
   const Trajectory odometry = drive(speed, turn, {}, 0.125, 4);

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/scan_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <ranges>
+#include <system_error>
+#include <utility>
+
+#include "tutti/formats/kitti.hpp"
+#include "tutti/formats/pcd.hpp"
+#include "tutti/perception/lidar/undistort.hpp"
+
+namespace tutti::mission {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kTried = 5;  // scans that may be unreadable before the folder is refused
+constexpr std::array<const char*, 2> kExtensions = {".pcd", ".bin"};
+
+std::string stem_of(std::size_t number) { return fmt::format("{:06d}", number); }
+
+Result<formats::TimedCloud> read(const fs::path& file) {
+  auto scan = file.extension() == ".bin" ? formats::read_kitti_scan(file.string()).map([](PointCloud&& cloud) {
+    return formats::TimedCloud{.cloud = std::move(cloud), .time_field = {}, .times = {}};
+  })
+                                         : formats::read_timed_pcd(file.string());
+  if (scan && scan->cloud.points.empty()) return fail(ErrorCode::invalid, "{}: holds no points", file.string());
+  return scan;
+}
+
+/// Poses that go on from the first of a trajectory, away from the others, as these went on for a moment: for as long as
+/// a point may be from its pose.
+template <class Samples>
+Trajectory gone_on(const Samples& samples) {
+  constexpr double kMoment_s = 0.01;
+  StampedPose from = *samples.begin();
+  const auto far = [&](const StampedPose& other) { return std::abs(other.stamp - from.stamp) >= kMoment_s; };
+  const auto found = std::find_if(samples.begin(), samples.end(), far);
+  const StampedPose& other = found == samples.end() ? *std::prev(found) : *found;
+  const double step_s =
+      std::copysign(std::max(kMoment_s, std::abs(from.stamp - other.stamp)), from.stamp - other.stamp);
+  const Pose3 step = other.pose.inverse() * from.pose;
+  Trajectory out;
+  for (double reached_s = 0.0; reached_s < kLongestAge_s; reached_s += std::abs(step_s)) {
+    from = {from.stamp + step_s, from.pose * step};
+    out.push_back(from);
+  }
+  return out;
+}
+
+}  // namespace
+
+ScanFolder::ScanFolder(fs::path folder, std::size_t first, const Trajectory& odometry)
+    : folder_(std::move(folder)), first_(first), samples_(odometry.size()) {
+  odometry_ = gone_on(odometry);  // the first sweep began before the odometry
+  std::ranges::reverse(odometry_);
+  before_ = odometry_.size();
+  odometry_.insert(odometry_.end(), odometry.begin(), odometry.end());
+  const Trajectory after = gone_on(std::views::reverse(odometry));
+  odometry_.insert(odometry_.end(), after.begin(), after.end());
+}
+
+Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, std::size_t first,
+                                                           const Trajectory& odometry, const RobotConfig& robot) {
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure)) return fail(ErrorCode::io, "{}: no such folder of scans", folder.string());
+  const auto T_body_lidar = to_pose(robot.T_body_lidar);
+  if (!T_body_lidar) return in_context("T_body_lidar", T_body_lidar.error());
+  const std::shared_ptr<ScanFolder> scans(new ScanFolder(std::move(folder), first, odometry));
+  scans->T_body_lidar_ = *T_body_lidar;
+  if (auto ok = scans->look_into(robot); !ok) return tl::unexpected(ok.error());
+  return scans;
+}
+
+Status ScanFolder::look_into(const RobotConfig& robot) {
+  Result<std::optional<PointTimes>> found = no_scans();
+  std::size_t tried = 0;
+  for (std::size_t sample = 0; sample < samples_ && tried < kTried; ++sample) {
+    if (!file_of(sample)) continue;
+    auto times = times_of(sample, robot);
+    if (times || tried++ == 0) found = std::move(times);
+    if (found) break;
+  }
+  if (!found && tried > 0)
+    return in_context(fmt::format("not one scan could be read: {} of {} tried failed, the first because", tried, tried),
+                      found.error());
+  if (!found) return tl::unexpected(found.error());
+  // Half way a clock that starts with the odometry at 0 can be told from the time since the sweep's begin.
+  const auto later = times_of(samples_ / 2, robot);
+  times_ = later ? *later : *found;
+  return {};
+}
+
+Result<std::optional<PointTimes>> ScanFolder::times_of(std::size_t sample, const RobotConfig& robot) const {
+  const auto file = file_of(sample);
+  if (!file) return no_scans();
+  const auto scan = read(*file);
+  if (!scan) return tl::unexpected(scan.error());
+  auto times = find_point_times(*scan, odometry_[before_ + sample].stamp, robot);
+  if (!times) return in_context(file->string(), times.error());
+  return times;
+}
+
+tl::unexpected<Error> ScanFolder::no_scans() const {
+  return fail(ErrorCode::io, "{}: holds none of {}.pcd (or .bin) to {}.pcd, expected one per odometry pose",
+              folder_.string(), stem_of(first_), stem_of(first_ + samples_ - 1));
+}
+
+std::optional<fs::path> ScanFolder::file_of(std::size_t sample) const {
+  for (const char* extension : kExtensions) {
+    const fs::path file = folder_ / (stem_of(first_ + sample) + extension);
+    std::error_code failure;
+    if (fs::exists(file, failure)) return file;
+  }
+  return std::nullopt;
+}
+
+Result<std::optional<Scan>> ScanFolder::scan(std::size_t sample) const {
+  const auto file = file_of(sample);
+  if (!file)
+    return fail(ErrorCode::io, "{}.pcd: is not there", (folder_.filename() / stem_of(first_ + sample)).string());
+  auto read_scan = read(*file);
+  if (!read_scan) return tl::unexpected(read_scan.error());
+  Scan scan{.stamp = odometry_[before_ + sample].stamp, .cloud = nullptr, .age_s = nullptr};
+  if (times_) {
+    auto ages = point_ages(*read_scan, scan.stamp, *times_);
+    if (!ages) return in_context(file->string(), ages.error());
+    scan.age_s = std::make_shared<const std::vector<float>>(std::move(*ages));
+  }
+  const Eigen::Matrix3f R_body_lidar = T_body_lidar_.rotation.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f p_body_lidar = T_body_lidar_.translation.cast<float>();
+  for (Eigen::Vector3f& point : read_scan->cloud.points) point = R_body_lidar * point + p_body_lidar;
+  scan.cloud = std::make_shared<const PointCloud>(std::move(read_scan->cloud));
+  auto deskewed = lidar::undistort(scan, odometry_);
+  if (!deskewed) return in_context(file->string(), deskewed.error());
+  return std::optional(std::move(*deskewed));
+}
+
+std::string ScanFolder::note() const { return in_words(times_); }
+
+}  // namespace tutti::mission
