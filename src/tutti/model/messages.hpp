@@ -9,8 +9,6 @@
 
 namespace tutti {
 
-inline constexpr std::uint32_t kProtocolVersion = 4;
-
 /// In front of every message; (robot, session, sequence) identifies it. Duplicates are recognised by what is inside:
 /// a submap's id, a proxy graph's revision.
 struct MessageHeader {

@@ -12,12 +12,13 @@
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/wire/message_kind.hpp"
 
-/// Messages as bytes and back. Every message is one frame: "TU", protocol version (2 bytes, little endian), kind (1
+/// Messages as bytes and back. Every message is one frame: "TU", version of the kind (2 bytes, little endian), kind (1
 /// byte), then one zstd frame (with content size and checksum) around a protobuf message of proto/tutti/v1.
 ///
 /// Encoding expects a message that validate() accepts (else std::logic_error) and is deterministic. Decoding accepts
-/// any bytes: it returns an error or a message that validate() accepts, and never takes more memory than the limits of
-/// limits.hpp allow. Encoding what was decoded, with the same settings, and decoding that changes nothing.
+/// any bytes, of every version in versions(kind): it returns an error or a message that validate() accepts, and never
+/// takes more memory than the limits of limits.hpp allow. Encoding what was decoded, with the same settings, and
+/// decoding that changes nothing.
 namespace tutti::wire {
 
 /// Points are rounded to a grid of voxel_m / 2^offset_bits: an error of at most half a cell per axis (defaults: 4.7 mm,

@@ -4,9 +4,9 @@
 #include <zstd.h>
 
 #include <memory>
+#include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/model/messages.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/limits.hpp"
 
@@ -16,7 +16,6 @@ namespace {
 constexpr std::string_view kMagic = "TU";
 constexpr std::size_t kHeaderBytes = 5;
 constexpr int kCompressionLevel = 9;
-static_assert(kProtocolVersion <= 0xffff);
 
 }  // namespace
 
@@ -34,24 +33,54 @@ const char* name(MessageKind kind) {
   return "unknown";
 }
 
-Result<MessageKind> peek_kind(std::string_view bytes) {
+// What changed: submap, verdict: nothing but the number, which all kinds shared up to 4. Proxy graph: 1 had no range
+// coder, 2 landed with two codings that cannot be told apart, 3 had no ties. Cloud: came with 2, the same since.
+Versions versions(MessageKind kind) {
+  switch (kind) {
+    case MessageKind::submap:
+    case MessageKind::verdict:
+      return {.oldest = 1, .current = 4};
+    case MessageKind::proxy_graph:
+      return {.oldest = 3, .current = 4};
+    case MessageKind::cloud:
+      return {.oldest = 2, .current = 4};
+  }
+  return {};
+}
+
+namespace {
+
+struct Header {
+  MessageKind kind{};
+  std::uint16_t version = 0;
+};
+
+Result<Header> read_header(std::string_view bytes) {
   if (bytes.size() < kHeaderBytes)
     return fail(ErrorCode::parse, "frame: {} bytes, a header alone has {}", bytes.size(), kHeaderBytes);
   if (!bytes.starts_with(kMagic)) return fail(ErrorCode::parse, "frame: does not begin with \"{}\"", kMagic);
   const auto byte = [&](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(bytes[i])); };
-  const unsigned version = byte(2) | (byte(3) << 8U);
-  if (version != kProtocolVersion)
-    return fail(ErrorCode::unsupported, "frame: protocol version {}, this program speaks version {}", version,
-                kProtocolVersion);
   if (byte(4) < 1 || byte(4) > 4) return fail(ErrorCode::unsupported, "frame: unknown message kind {}", byte(4));
-  return static_cast<MessageKind>(byte(4));
+  const Header header{static_cast<MessageKind>(byte(4)), static_cast<std::uint16_t>(byte(2) | (byte(3) << 8U))};
+  const auto [oldest, current] = versions(header.kind);
+  if (header.version < oldest || header.version > current)
+    return fail(ErrorCode::unsupported, "frame: a {} of version {}, this program reads versions {} to {}",
+                name(header.kind), header.version, oldest, current);
+  return header;
+}
+
+}  // namespace
+
+Result<MessageKind> peek_kind(std::string_view bytes) {
+  return read_header(bytes).map([](const Header& header) { return header.kind; });
 }
 
 std::string pack_frame(MessageKind kind, std::string_view payload) {
   TUTTI_CHECK(payload.size() <= kMaxMessageBytes, "message of {} bytes", payload.size());
   std::string frame(kMagic);
-  frame.push_back(static_cast<char>(kProtocolVersion & 0xffU));
-  frame.push_back(static_cast<char>(kProtocolVersion >> 8U));
+  const unsigned version = versions(kind).current;
+  frame.push_back(static_cast<char>(version & 0xffU));
+  frame.push_back(static_cast<char>(version >> 8U));
   frame.push_back(static_cast<char>(kind));
   frame.resize(kHeaderBytes + ZSTD_compressBound(payload.size()));
 
@@ -65,10 +94,11 @@ std::string pack_frame(MessageKind kind, std::string_view payload) {
   return frame;
 }
 
-Result<std::string> unpack_frame(MessageKind kind, std::string_view frame) {
-  const Result<MessageKind> found = peek_kind(frame);
+Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame) {
+  const Result<Header> found = read_header(frame);
   if (!found) return tl::unexpected(found.error());
-  if (*found != kind) return fail(ErrorCode::parse, "frame: carries a {}, expected a {}", name(*found), name(kind));
+  if (found->kind != kind)
+    return fail(ErrorCode::parse, "frame: carries a {}, expected a {}", name(found->kind), name(kind));
 
   const std::string_view body = frame.substr(kHeaderBytes);
   const unsigned long long size = ZSTD_getFrameContentSize(body.data(), body.size());
@@ -85,7 +115,7 @@ Result<std::string> unpack_frame(MessageKind kind, std::string_view frame) {
     return fail(ErrorCode::parse, "frame: cannot be decompressed: {}", ZSTD_getErrorName(written));
   if (written != payload.size())
     return fail(ErrorCode::parse, "frame: {} bytes decompressed, {} announced", written, payload.size());
-  return payload;
+  return Unpacked{found->version, std::move(payload)};
 }
 
 }  // namespace tutti::wire

@@ -1,20 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 #include "tutti/base/result.hpp"
 #include "tutti/wire/message_kind.hpp"
 
-/// A frame: "TU", protocol version (2 bytes, little endian), kind (1 byte), one zstd frame with content size and
+/// A frame: "TU", version of the kind (2 bytes, little endian), kind (1 byte), one zstd frame with content size and
 /// checksum, nothing after it.
 namespace tutti::wire {
 
-/// `payload` is at most kMaxMessageBytes.
+/// Of the kind's current version. `payload` is at most kMaxMessageBytes.
 std::string pack_frame(MessageKind kind, std::string_view payload);
 
-/// Payload of a frame of this kind. Wrong magic, version, kind, size, checksum, or anything left over is an error.
-Result<std::string> unpack_frame(MessageKind kind, std::string_view frame);
+struct Unpacked {
+  std::uint16_t version = 0;  ///< One of versions(kind).
+  std::string payload;
+};
+
+/// What a frame of this kind holds. Wrong magic, kind, size, checksum, a version that cannot be read, or anything left
+/// over is an error.
+Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame);
 
 }  // namespace tutti::wire

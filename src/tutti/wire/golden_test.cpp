@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bytes of earlier builds must stay readable. When the format changes on purpose: raise kProtocolVersion, then write
-// new files with TUTTI_WRITE_GOLDEN=1 and commit them alone.
+// Bytes of earlier builds stay readable, or are refused by their version. When the coding of a kind changes on purpose:
+// raise its version in frame.cpp, write its new file with TUTTI_WRITE_GOLDEN=1 and keep the old ones.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -15,12 +17,35 @@
 namespace tutti::wire {
 namespace {
 
-std::string golden_bytes(const std::string& name, const std::string& current) {
-  const std::filesystem::path path = test::source_path("src/tutti/wire/testdata/" + name);
-  if (std::getenv("TUTTI_WRITE_GOLDEN") != nullptr) std::ofstream(path, std::ios::binary) << current;
+std::string golden_bytes(MessageKind kind, unsigned version, const std::string& current) {
+  std::string file = fmt::format("{}_v{}.bin", name(kind), version);
+  std::ranges::replace(file, ' ', '_');
+  const std::filesystem::path path = test::source_path("src/tutti/wire/testdata/" + file);
+  if (version == versions(kind).current && std::getenv("TUTTI_WRITE_GOLDEN") != nullptr)
+    std::ofstream(path, std::ios::binary) << current;
   std::ostringstream bytes;
   bytes << std::ifstream(path, std::ios::binary).rdbuf();
+  EXPECT_FALSE(bytes.view().empty()) << path << ": every version that ever landed has its bytes here";
   return bytes.str();
+}
+
+/// Hands check(decoded, version) what every version that can be read holds; the others must be refused by name.
+template <class Decode, class Check>
+void for_every_version(MessageKind kind, const std::string& current, Decode decode, Check check) {
+  const auto [oldest, newest] = versions(kind);
+  for (unsigned version = 1; version <= newest; ++version) {
+    SCOPED_TRACE(fmt::format("{} of version {}", name(kind), version));
+    const auto decoded = decode(golden_bytes(kind, version, current));
+    if (version >= oldest) {
+      ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+      check(*decoded, version);
+      continue;
+    }
+    ASSERT_FALSE(decoded.has_value());
+    EXPECT_EQ(decoded.error().code, ErrorCode::unsupported);
+    EXPECT_EQ(decoded.error().message, fmt::format("frame: a {} of version {}, this program reads versions {} to {}",
+                                                   name(kind), version, oldest, newest));
+  }
 }
 
 const Eigen::Quaterniond kQuarterTurn(Eigen::AngleAxisd(1.5707963267948966, Eigen::Vector3d::UnitZ()));
@@ -39,25 +64,25 @@ TEST(Golden, Submap) {
                               {161, {1'577'836'981'199'104'651}, {kQuarterTurn, {2, 2, 3}}, false}};
   message.submap.odometry = {{{kQuarterTurn, {1, 0, 0}}, diagonal(4e-4, 1e-4)}};
   message.submap.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}});
-  const auto decoded = decode_submap(golden_bytes("submap_v4.bin", encode(message)));
-  ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
-  const Submap& submap = decoded->submap;
-  EXPECT_EQ(decoded->header, message.header);
-  EXPECT_EQ(submap.id, message.submap.id);
-  ASSERT_EQ(submap.keyframes.size(), 2U);
-  EXPECT_EQ(submap.keyframes[1].index, 161U);
-  EXPECT_EQ(submap.keyframes[1].stamp.ns, 1'577'836'981'199'104'651);
-  EXPECT_TRUE(submap.keyframes[0].representative);
-  EXPECT_FALSE(submap.keyframes[1].representative);
-  EXPECT_LT(local(submap.keyframes[1].T_odom_body, {kQuarterTurn, {2, 2, 3}}).norm(), 1e-5);
-  EXPECT_LT(local(submap.odometry[0].T_a_b, {kQuarterTurn, {1, 0, 0}}).norm(), 1e-5);
-  EXPECT_NEAR(submap.odometry[0].covariance(0, 0), 4e-4, 4e-6);
-  EXPECT_NEAR(submap.odometry[0].covariance(5, 5), 1e-4, 1e-6);
-  ASSERT_EQ(submap.cloud->points.size(), 3U);  // along the Morton curve: z, y, x from the highest bit
-  double nearest = 1.0;
-  for (const auto& point : submap.cloud->points)
-    nearest = std::min(nearest, static_cast<double>((point - Eigen::Vector3f(10, -7, 0)).norm()));
-  EXPECT_LT(nearest, 0.0083);
+  for_every_version(MessageKind::submap, encode(message), decode_submap, [&](const SubmapMessage& decoded, unsigned) {
+    const Submap& submap = decoded.submap;
+    EXPECT_EQ(decoded.header, message.header);
+    EXPECT_EQ(submap.id, message.submap.id);
+    ASSERT_EQ(submap.keyframes.size(), 2U);
+    EXPECT_EQ(submap.keyframes[1].index, 161U);
+    EXPECT_EQ(submap.keyframes[1].stamp.ns, 1'577'836'981'199'104'651);
+    EXPECT_TRUE(submap.keyframes[0].representative);
+    EXPECT_FALSE(submap.keyframes[1].representative);
+    EXPECT_LT(local(submap.keyframes[1].T_odom_body, {kQuarterTurn, {2, 2, 3}}).norm(), 1e-5);
+    EXPECT_LT(local(submap.odometry[0].T_a_b, {kQuarterTurn, {1, 0, 0}}).norm(), 1e-5);
+    EXPECT_NEAR(submap.odometry[0].covariance(0, 0), 4e-4, 4e-6);
+    EXPECT_NEAR(submap.odometry[0].covariance(5, 5), 1e-4, 1e-6);
+    ASSERT_EQ(submap.cloud->points.size(), 3U);  // along the Morton curve: z, y, x from the highest bit
+    double nearest = 1.0;
+    for (const auto& point : submap.cloud->points)
+      nearest = std::min(nearest, static_cast<double>((point - Eigen::Vector3f(10, -7, 0)).norm()));
+    EXPECT_LT(nearest, 0.0083);
+  });
 }
 
 TEST(Golden, ProxyGraph) {
@@ -76,51 +101,68 @@ TEST(Golden, ProxyGraph) {
   graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
   graph.shapes = {{RobotId{0}, {0.25, 0.0}, {}, {}},
                   {RobotId{7}, {0.5, 0.01}, {{{0.03, 0.002}}}, {{0, 8, {0.05, 0.004}}}}};
-  const auto decoded = decode_proxy_graph(golden_bytes("proxy_graph_v4.bin", encode(message)));
-  ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
-  EXPECT_EQ(decoded->header, message.header);
-  EXPECT_EQ(decoded->graph.revision, 42U);
-  EXPECT_EQ(decoded->graph.radius_m, 7.0);
-  EXPECT_EQ(decoded->graph.components, graph.components);
-  ASSERT_EQ(decoded->graph.edges.size(), 1U);
-  EXPECT_EQ(decoded->graph.edges[0].a, 0U);
-  EXPECT_EQ(decoded->graph.edges[0].b, 1U);
-  EXPECT_NEAR(decoded->graph.edges[0].weight, 0.625, 2e-4);
-  EXPECT_EQ(decoded->graph.eliminated, graph.eliminated);
-  ASSERT_EQ(decoded->graph.shapes.size(), 2U);
-  EXPECT_EQ(decoded->graph.shapes[0].robot, RobotId{0});
-  EXPECT_NEAR(decoded->graph.shapes[0].whole.position_m, 0.25, 0.0125);
-  EXPECT_EQ(decoded->graph.shapes[0].whole.rotation_rad, 0.0);
-  EXPECT_TRUE(decoded->graph.shapes[0].sag.empty());
-  EXPECT_EQ(decoded->graph.shapes[1].robot, RobotId{7});
-  ASSERT_EQ(decoded->graph.shapes[1].sag.size(), 1U);
-  ASSERT_EQ(decoded->graph.shapes[1].sag[0].size(), 1U);
-  EXPECT_NEAR(decoded->graph.shapes[1].sag[0][0].position_m, 0.03, 0.0015);
-  EXPECT_NEAR(decoded->graph.shapes[1].sag[0][0].rotation_rad, 0.002, 0.0001);
-  EXPECT_TRUE(decoded->graph.shapes[0].ties.empty());
-  ASSERT_EQ(decoded->graph.shapes[1].ties.size(), 1U);
-  EXPECT_EQ(decoded->graph.shapes[1].ties[0].a, 0U);
-  EXPECT_EQ(decoded->graph.shapes[1].ties[0].b, 8U);
-  EXPECT_NEAR(decoded->graph.shapes[1].ties[0].sigma.position_m, 0.05, 0.0025);
-  EXPECT_NEAR(decoded->graph.shapes[1].ties[0].sigma.rotation_rad, 0.004, 0.0002);
-  ASSERT_EQ(decoded->graph.nodes.size(), graph.nodes.size());
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-    EXPECT_EQ(decoded->graph.nodes[i].robot, graph.nodes[i].robot);
-    EXPECT_EQ(decoded->graph.nodes[i].stamp, graph.nodes[i].stamp);
-    EXPECT_EQ(decoded->graph.nodes[i].support, graph.nodes[i].support);
-    EXPECT_LT(local(decoded->graph.nodes[i].T_world_body, graph.nodes[i].T_world_body).norm(), 5e-4);
-  }
-  EXPECT_EQ(decoded->graph.nodes[0].covariance, Matrix6d::Zero().eval());
-  EXPECT_NEAR(decoded->graph.nodes[1].covariance(2, 2), 1e-4, 8e-6);
+  const auto check = [&](const ProxyGraphMessage& decoded, unsigned version) {
+    EXPECT_EQ(decoded.header, message.header);
+    EXPECT_EQ(decoded.graph.revision, 42U);
+    EXPECT_EQ(decoded.graph.radius_m, 7.0);
+    EXPECT_EQ(decoded.graph.components, graph.components);
+    ASSERT_EQ(decoded.graph.edges.size(), 1U);
+    EXPECT_EQ(decoded.graph.edges[0].a, 0U);
+    EXPECT_EQ(decoded.graph.edges[0].b, 1U);
+    EXPECT_NEAR(decoded.graph.edges[0].weight, 0.625, 2e-4);
+    EXPECT_EQ(decoded.graph.eliminated, graph.eliminated);
+    ASSERT_EQ(decoded.graph.shapes.size(), 2U);
+    EXPECT_EQ(decoded.graph.shapes[0].robot, RobotId{0});
+    EXPECT_NEAR(decoded.graph.shapes[0].whole.position_m, 0.25, 0.0125);
+    EXPECT_EQ(decoded.graph.shapes[0].whole.rotation_rad, 0.0);
+    EXPECT_TRUE(decoded.graph.shapes[0].sag.empty());
+    EXPECT_EQ(decoded.graph.shapes[1].robot, RobotId{7});
+    ASSERT_EQ(decoded.graph.shapes[1].sag.size(), 1U);
+    ASSERT_EQ(decoded.graph.shapes[1].sag[0].size(), 1U);
+    EXPECT_NEAR(decoded.graph.shapes[1].sag[0][0].position_m, 0.03, 0.0015);
+    EXPECT_NEAR(decoded.graph.shapes[1].sag[0][0].rotation_rad, 0.002, 0.0001);
+    EXPECT_TRUE(decoded.graph.shapes[0].ties.empty());
+    ASSERT_EQ(decoded.graph.shapes[1].ties.size(), version < 4 ? 0U : 1U);
+    for (const ShapeTie& tie : decoded.graph.shapes[1].ties) {
+      EXPECT_EQ(tie.a, 0U);
+      EXPECT_EQ(tie.b, 8U);
+      EXPECT_NEAR(tie.sigma.position_m, 0.05, 0.0025);
+      EXPECT_NEAR(tie.sigma.rotation_rad, 0.004, 0.0002);
+    }
+    ASSERT_EQ(decoded.graph.nodes.size(), graph.nodes.size());
+    for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+      EXPECT_EQ(decoded.graph.nodes[i].robot, graph.nodes[i].robot);
+      EXPECT_EQ(decoded.graph.nodes[i].stamp, graph.nodes[i].stamp);
+      EXPECT_EQ(decoded.graph.nodes[i].support, graph.nodes[i].support);
+      EXPECT_LT(local(decoded.graph.nodes[i].T_world_body, graph.nodes[i].T_world_body).norm(), 5e-4);
+    }
+    EXPECT_EQ(decoded.graph.nodes[0].covariance, Matrix6d::Zero().eval());
+    EXPECT_NEAR(decoded.graph.nodes[1].covariance(2, 2), 1e-4, 8e-6);
+  };
+  for_every_version(MessageKind::proxy_graph, encode(message), decode_proxy_graph, check);
 }
 
 TEST(Golden, Verdict) {
   const ClosureVerdict verdict{
       .pair = {{RobotId{0}, 3}, {RobotId{1}, 4}},
       .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}}};
-  const auto decoded = decode_verdict(golden_bytes("verdict_v4.bin", encode(verdict)));
-  ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
-  EXPECT_EQ(*decoded, verdict);
+  for_every_version(MessageKind::verdict, encode(verdict), decode_verdict,
+                    [&](const ClosureVerdict& decoded, unsigned) { EXPECT_EQ(decoded, verdict); });
+}
+
+// A cloud alone came with version 2; no bytes of 2 and 3 were kept, but only the number differs from 4.
+TEST(Golden, Cloud) {
+  const PointCloud cloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}};
+  const std::string bytes = golden_bytes(MessageKind::cloud, 4, encode(cloud));
+  for (char version = 1; version <= 4; ++version) {
+    std::string frame = bytes;
+    frame.at(2) = version;
+    const auto decoded = decode_cloud(frame);
+    ASSERT_EQ(decoded.has_value(), version >= 2);
+    if (decoded) {
+      EXPECT_EQ(**decoded, **decode_cloud(encode(cloud)));
+    }
+  }
 }
 
 }  // namespace

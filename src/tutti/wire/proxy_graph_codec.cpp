@@ -349,7 +349,7 @@ std::string encode(const ProxyGraphMessage& message) {
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes) {
   const auto parsed = parse_frame<v1::ProxyGraph>(MessageKind::proxy_graph, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::ProxyGraph& in = *parsed;
+  const v1::ProxyGraph& in = parsed->message;
 
   ProxyGraphMessage message;
   message.header = {RobotId{in.header().robot()}, in.header().session(), in.header().sequence()};

@@ -102,7 +102,7 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
 Result<SubmapMessage> decode_submap(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Submap>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::Submap& in = *parsed;
+  const v1::Submap& in = parsed->message;
 
   SubmapMessage message;
   message.header = {RobotId{in.header().robot()}, in.header().session(), in.header().sequence()};

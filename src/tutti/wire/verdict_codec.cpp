@@ -52,7 +52,7 @@ std::string encode(const ClosureVerdict& verdict) {
 Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Verdict>(MessageKind::verdict, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::Verdict& in = *parsed;
+  const v1::Verdict& in = parsed->message;
   ClosureVerdict verdict{
       .pair = {{RobotId{in.first_robot()}, in.first_index()}, {RobotId{in.second_robot()}, in.second_index()}}};
   for (const v1::LoopClosure& closure : in.closure()) {

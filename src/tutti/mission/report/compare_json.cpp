@@ -122,7 +122,8 @@ std::string compare_json(const CompareReport& report) {
     disagree = disagree || c.explanation.disagrees();
     robots.push_back(robot_json(c));
   }
-  const Json out{{"a", report.a},
+  const Json out{{"format", 1},  // raised when a key changes its meaning or goes
+                 {"a", report.a},
                  {"b", report.b},
                  {"disagree", disagree},
                  {"tolerance_m", number(report.config.tolerance_m)},

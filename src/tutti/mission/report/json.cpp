@@ -239,6 +239,9 @@ Json load_json(const ServerLoadRecord& load) {
           {"peak_memory_mb", load.peak_memory_mb > 0.0 ? number(load.peak_memory_mb) : Json(nullptr)}};
 }
 
+/// Of report.json and timing.json; keys are added without a new one.
+constexpr int kFormat = 1;
+
 /// Foreign text with broken UTF-8 must not make the writer throw.
 std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
@@ -249,7 +252,8 @@ std::string report_json(const MissionRecord& record) {
   for (const auto& robot : record.robots) robots.push_back(robot_json(robot, is_tied(record, robot.id)));
   Json transforms = Json::array();
   for (const auto& transform : record.transforms) transforms.push_back(transform_json(transform));
-  return dump(Json{{"mission", record.mission},
+  return dump(Json{{"format", kFormat},
+                   {"mission", record.mission},
                    {"description", record.description},
                    {"input", record.input},
                    {"warnings", record.warnings},
@@ -282,7 +286,8 @@ std::string timing_json(const MissionRecord& record) {
     load.push_back({{"name", entry.name},
                     {"cpu_share", number(entry.cpu_share)},
                     {"worst_latency_ms", number(entry.worst_latency_ms)}});
-  return dump(Json{{"mission", record.mission},
+  return dump(Json{{"format", kFormat},
+                   {"mission", record.mission},
                    {"seed", record.seed},
                    {"version", record.version},
                    {"machine", timing.machine},

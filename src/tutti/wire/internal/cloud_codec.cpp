@@ -149,8 +149,7 @@ std::string encode(const PointCloud& cloud, const CloudCodec& codec) {
 Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Cloud>(MessageKind::cloud, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::Cloud& in = *parsed;
-  return decode_cloud(in);
+  return decode_cloud(parsed->message);
 }
 
 }  // namespace tutti::wire

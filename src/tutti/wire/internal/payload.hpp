@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
+#include <cstdint>
 #include <string_view>
 
 #include "tutti/base/result.hpp"
@@ -14,16 +14,22 @@ namespace tutti::wire {
 /// they have bytes. Looks at tags and lengths and takes no memory.
 Status check_counts(MessageKind kind, std::string_view payload);
 
+template <class Message>
+struct Parsed {
+  std::uint16_t version = 0;  ///< Of the kind; what the message means may depend on it.
+  Message message;
+};
+
 /// The protobuf message in a frame of this kind.
 template <class Message>
-Result<Message> parse_frame(MessageKind kind, std::string_view bytes) {
-  const Result<std::string> payload = unpack_frame(kind, bytes);
-  if (!payload) return tl::unexpected(payload.error());
-  if (auto ok = check_counts(kind, *payload); !ok) return in_context(name(kind), ok.error());
-  Message message;
-  if (!message.ParseFromString(*payload))
+Result<Parsed<Message>> parse_frame(MessageKind kind, std::string_view bytes) {
+  const Result<Unpacked> frame = unpack_frame(kind, bytes);
+  if (!frame) return tl::unexpected(frame.error());
+  if (auto ok = check_counts(kind, frame->payload); !ok) return in_context(name(kind), ok.error());
+  Parsed<Message> parsed{.version = frame->version, .message = {}};
+  if (!parsed.message.ParseFromString(frame->payload))
     return fail(ErrorCode::parse, "{}: not the protobuf message expected", name(kind));
-  return message;
+  return parsed;
 }
 
 }  // namespace tutti::wire
