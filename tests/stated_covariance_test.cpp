@@ -68,7 +68,7 @@ server::MapEstimate map_of(robot::RobotAgent& agent) {
       const RelativePose measured{retract(T, sigma.unaryExpr([&](double s) { return rng.normal(s); })),
                                   sigma.cwiseAbs2().asDiagonal()};
       verdicts[{a->first, b->first}] = {
-          {a->first, b->first}, {{{kRobot, from.index}, {kRobot, to.index}, measured}}, ""};
+          {a->first, b->first}, {{{kRobot, from.index}, {kRobot, to.index}, measured}}, {}};
     }
   return server::estimate_map(submaps, verdicts, {});
 }

@@ -84,7 +84,7 @@ void print(const Judgement& j) {
   if (v.accepted)
     fmt::print(" ACCEPTED {:.3f} m {:.2f} deg{}\n", j.error_m, j.error_deg, j.wrong ? " WRONG" : "");
   else
-    fmt::print(" refused: {}\n", v.reason);
+    fmt::print(" refused: {}\n", to_string(*v.refusal));
 }
 
 /// RMSE of the joint pose graph's positions after one rigid alignment to the reference, m.

@@ -15,6 +15,8 @@ LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, 
                                        std::size_t cache_bytes)
     : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
 
+std::uint32_t LidarClosureFinder::version() const { return lidar::kFinderVersion; }
+
 bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
   return first.id.robot != second.id.robot || second.id.index - first.id.index >= min_submap_gap_;  // first < second
 }
@@ -27,9 +29,11 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
   if (!features_b) return tl::unexpected(features_b.error());
   const auto& a = *features_a;
   const auto& b = *features_b;
-  if (!a->usable || !b->usable) return ClosureVerdict{{first.id, second.id}, {}, a->usable ? b->reason : a->reason};
-  if (!lidar::plausible_pair(*a, *b, config_))
-    return ClosureVerdict{{first.id, second.id}, {}, "too unlike from above"};
+  const auto refuse = [&](const std::optional<Refusal>& refusal) {
+    return ClosureVerdict{{first.id, second.id}, {}, refusal, version()};
+  };
+  if (!a->usable || !b->usable) return refuse(a->usable ? b->refusal : a->refusal);
+  if (!lidar::plausible_pair(*a, *b, config_)) return refuse(Refusal{RefusalReason::unlike_from_above});
   return lidar::to_verdict(first, second, lidar::verify_pair(*a, *b, config_));
 }
 

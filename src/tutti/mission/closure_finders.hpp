@@ -17,6 +17,7 @@ namespace tutti::mission {
 class LidarClosureFinder final : public server::ClosureFinder {
  public:
   LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
+  [[nodiscard]] std::uint32_t version() const override;
   [[nodiscard]] bool needs_clouds() const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
@@ -37,6 +38,7 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
  public:
   explicit ReferenceClosureFinder(std::shared_ptr<const simulation::ReferenceClosures> closures)
       : closures_(std::move(closures)) {}
+  [[nodiscard]] std::uint32_t version() const override { return simulation::ReferenceClosures::kVersion; }
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return closures_->is_candidate(first, second);

@@ -144,6 +144,7 @@ TEST_F(DiskCloudStoreTest, SeveralThreadsAtOnce) {
 /// Looks at each cloud once, as a finder does that keeps features, and only at pairs of neighbours.
 class NeighbourFinder final : public server::ClosureFinder {
  public:
+  [[nodiscard]] std::uint32_t version() const override { return 1; }
   [[nodiscard]] bool needs_clouds() const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return second.id.index - first.id.index == 1;
@@ -152,7 +153,7 @@ class NeighbourFinder final : public server::ClosureFinder {
                                               const server::CloudStore& clouds) const override {
     const auto cloud = clouds.get(first.id);
     if (!cloud) return tl::unexpected(cloud.error());
-    return ClosureVerdict{{first.id, second.id}, {}, fmt::format("{} points", (*cloud)->points.size())};
+    return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::no_alignment}, version()};
   }
 };
 
@@ -206,7 +207,7 @@ TEST_F(DiskCloudStoreTest, AServerOf700SubmapsHoldsOnlyAFewCloudsAndGoesOnAfterA
     EXPECT_TRUE(restored.receive(*verdict).has_value());
   }
   EXPECT_EQ(unanswered, 1U);
-  EXPECT_EQ(restored.state().verdicts.size(), kSubmaps - 2U);
+  EXPECT_EQ(restored.refusals().at(RefusalReason::no_alignment).intra, kSubmaps - 2U);
   EXPECT_EQ(restored.state().submaps.size(), kSubmaps);
 }
 

@@ -39,32 +39,17 @@ void measure_joint_map(const std::vector<RobotOutcome>& robots, const server::Ma
   }
 }
 
-/// "overlap 0.16, at least 0.3 needed" -> "overlap": what is counted is the kind of reason.
-std::string without_values(const std::string& reason) {
-  std::string kind = reason.substr(0, reason.find_first_of("0123456789:"));
-  while (!kind.empty() && kind.back() == ' ') kind.pop_back();
-  return kind;
-}
-
 void judge_closures(const server::MapServer& server, MissionRecord& record) {
-  std::map<std::string, RejectionRecord> refused;
-  const auto count = [&](const std::string& reason, const std::string& with_values, RobotId a, RobotId b) {
-    RejectionRecord& entry = refused[reason];
-    entry.reason = reason;
-    if (entry.example.empty()) entry.example = with_values;
-    ++(a == b ? entry.intra : entry.inter);
-  };
+  server::RefusalCounts refused = server.refusals();
   for (const server::JudgedClosure& judged : server.map().closures) {
     const auto& [from, to, measurement] = judged.closure;
     if (judged.accepted)
       record.server.closures.push_back({from, to});
     else
-      count("inconsistent with the others", "", from.robot, to.robot);
+      server::count_refusal({RefusalReason::inconsistent}, from.robot, to.robot, refused);
   }
-  for (const auto& [pair, verdict] : server.state().verdicts)
-    if (verdict.closures.empty())
-      count(without_values(verdict.reason), verdict.reason, pair.first.robot, pair.second.robot);
-  for (auto& [reason, entry] : refused) record.server.rejections.push_back(std::move(entry));
+  for (const auto& [reason, count] : refused)
+    record.server.rejections.push_back({reason, count.intra, count.inter, count.nearest});
 }
 
 /// Stretches of odometry that the server convicted, with the times the report wants.

@@ -11,6 +11,7 @@ namespace {
 /// No submap is compared with any other.
 class NoClosures final : public server::ClosureFinder {
  public:
+  [[nodiscard]] std::uint32_t version() const override { return 1; }
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return false; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap&, const Submap&, const server::CloudStore&) const override {

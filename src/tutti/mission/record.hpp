@@ -19,6 +19,7 @@
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/recording.hpp"
+#include "tutti/model/refusal.hpp"
 #include "tutti/model/repaired_jump.hpp"
 #include "tutti/model/trajectory.hpp"
 
@@ -152,11 +153,10 @@ struct ClosureRecord {
 
 /// How many candidate closures were refused for one reason.
 struct RejectionRecord {
-  std::string reason;
-  std::string example;    ///< A pair's, with its values: "too short: 3.0 s, at least 5.0 s needed"; empty for closures
-                          ///< that contradict the others.
+  RefusalReason reason = RefusalReason::other;
   std::size_t intra = 0;  ///< Both ends on one robot.
   std::size_t inter = 0;
+  Refusal nearest;  ///< The one that missed its limit by least, where something is measured.
 };
 
 /// A node of ServerRecord::graph.
@@ -190,9 +190,9 @@ struct FailedOdometryRecord {
 };
 
 struct ServerRecord {
-  std::size_t components = 0;           ///< Groups of robots that share a frame.
-  std::vector<ClosureRecord> closures;  ///< Accepted.
-  std::vector<RejectionRecord> rejections;
+  std::size_t components = 0;               ///< Groups of robots that share a frame.
+  std::vector<ClosureRecord> closures;      ///< Accepted.
+  std::vector<RejectionRecord> rejections;  ///< By reason.
   std::optional<ClosureCheckRecord> closure_check;
   std::uint32_t largest_component = 0;                 ///< Most representative nodes (map_components.hpp).
   Accuracy joint;                                      ///< All robots of the largest component together, one alignment.

@@ -16,12 +16,12 @@ std::string why_odometry_alone(const std::vector<RejectionRecord>& rejections) {
   if (rejections.empty()) return "no two submaps were compared";
   std::size_t refused = 0;
   for (const RejectionRecord& rejection : rejections) {
-    if (rejection.example.empty()) return "the closures found contradict each other";
+    if (rejection.reason == RefusalReason::inconsistent) return "the closures found contradict each other";
     refused += pairs(rejection);
   }
   const RejectionRecord& most = *std::ranges::max_element(rejections, {}, pairs);
   return fmt::format("all {} pairs of submaps that were compared were refused, {} because: {}", refused,
-                     pairs(most) == refused ? "all" : std::to_string(pairs(most)), most.example);
+                     pairs(most) == refused ? "all" : std::to_string(pairs(most)), to_string(most.nearest));
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ MissionRecord joined() {
   }
   record.server.components = 1;
   record.server.closures = {{{RobotId{0}, 3}, {RobotId{1}, 7}}};
-  record.server.rejections = {{"too unlike from above", "too unlike from above", 9, 30}};
+  record.server.rejections = {{RefusalReason::unlike_from_above, 9, 30, {RefusalReason::unlike_from_above}}};
   return record;
 }
 
@@ -26,12 +26,12 @@ TEST(Warnings, NoneForAMapThatIsTied) { EXPECT_TRUE(warnings_of(joined()).empty(
 TEST(Warnings, EveryPairRefusedByOneGate) {
   MissionRecord record = joined();
   record.server.closures.clear();
-  record.server.rejections = {{"too short", "too short: 3.0 s, at least 5.0 s needed", 10, 30}};
+  record.server.rejections = {{RefusalReason::too_short, 10, 30, {RefusalReason::too_short, 3.0, 5.0}}};
   EXPECT_EQ(warnings_of(record),
             std::vector<std::string>{"the server's map is odometry alone: all 40 pairs of submaps that were compared "
-                                     "were refused, all because: too short: 3.0 s, at least 5.0 s needed"});
+                                     "were refused, all because: too short: 3.0 s, at least 5.0 needed"});
   record.server.rejections[0].inter = 29;
-  record.server.rejections.push_back({"too small", "too small: 12 points, at least 300 needed", 1, 0});
+  record.server.rejections.push_back({RefusalReason::too_small, 1, 0, {RefusalReason::too_small, 12.0, 300.0}});
   EXPECT_NE(warnings_of(record).at(0).find("refused, 39 because: too short: 3.0 s"), std::string::npos)
       << warnings_of(record)[0];
 }
@@ -48,7 +48,7 @@ TEST(Warnings, NothingWasCompared) {
 TEST(Warnings, ClosuresThatContradictEachOther) {
   MissionRecord record = joined();
   record.server.closures.clear();
-  record.server.rejections.push_back({"inconsistent with the others", "", 1, 0});
+  record.server.rejections.push_back({RefusalReason::inconsistent, 1, 0, {RefusalReason::inconsistent}});
   EXPECT_NE(warnings_of(record).at(0).find("contradict each other"), std::string::npos) << warnings_of(record)[0];
 }
 

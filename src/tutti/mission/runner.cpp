@@ -168,6 +168,7 @@ class MissionRun {
 
   void receive_submap(const std::string& bytes) {
     if (const Status taken = take_submap(bytes); !taken) return refusals_.push_back(taken.error().message);
+    for (const Error& error : server_.take_late_errors()) refusals_.push_back(error.message);
     const double before_s = load_.verification_cpu_s;
     std::vector<server::VerificationJob> jobs = server_.take_jobs();
     const auto verdicts = verify(jobs);

@@ -112,7 +112,7 @@ Result<ClosureVerdict> PlantedClosureFinder::verify(const Submap& first, const S
                                                     const server::CloudStore& clouds) const {
   const auto planted = planted_in(first, second);
   if (!planted) return inner_->verify(first, second, clouds);
-  return ClosureVerdict{{first.id, second.id}, {*planted}, std::string()};
+  return ClosureVerdict{{first.id, second.id}, {*planted}, std::nullopt, version()};
 }
 
 }  // namespace tutti::mission

@@ -36,6 +36,7 @@ class SpoiledClosureFinder final : public server::ClosureFinder {
  public:
   SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                        const SpoiledClosureConfig& config, std::uint64_t seed);
+  [[nodiscard]] std::uint32_t version() const override { return inner_->version(); }
   [[nodiscard]] bool needs_clouds() const override { return inner_->needs_clouds(); }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
@@ -86,6 +87,7 @@ class PlantedClosureFinder final : public server::ClosureFinder {
   PlantedClosureFinder(std::shared_ptr<const server::ClosureFinder> inner,
                        std::shared_ptr<const simulation::ReferenceClosures> truth, std::vector<PlantedClosure> planted,
                        const Matrix6d& covariance);
+  [[nodiscard]] std::uint32_t version() const override { return inner_->version(); }
   [[nodiscard]] bool needs_clouds() const override { return inner_->needs_clouds(); }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,

@@ -25,6 +25,7 @@ Submap submap(std::uint32_t robot, std::uint32_t index) {
 /// Finds every pair, between the middle keyframes, exactly.
 class Perfect final : public server::ClosureFinder {
  public:
+  [[nodiscard]] std::uint32_t version() const override { return 7; }
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
@@ -35,7 +36,8 @@ class Perfect final : public server::ClosureFinder {
                           {{{first.id.robot, a.index},
                             {second.id.robot, b.index},
                             {a.T_odom_body.inverse() * b.T_odom_body, Matrix6d::Identity()}}},
-                          std::string()};
+                          std::nullopt,
+                          version()};
   }
 };
 
@@ -105,11 +107,12 @@ class Planted : public testing::Test {
   }
   class Nothing final : public server::ClosureFinder {
    public:
+    [[nodiscard]] std::uint32_t version() const override { return 7; }
     [[nodiscard]] bool needs_clouds() const override { return false; }
     [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return false; }
     [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                 const server::CloudStore&) const override {
-      return ClosureVerdict{{first.id, second.id}, {}, std::string("nothing there")};
+      return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::distant}, version()};
     }
   };
   const Pose3 error_{so3_exp({0.0, 0.0, 0.1}), {1.5, -0.5, 0.0}};
@@ -123,7 +126,8 @@ TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
     for (std::uint32_t j = 0; j < 20; ++j) {
       const auto verdict = finder_->verify(submap(0, i), submap(1, j), clouds_);
       EXPECT_EQ(finder_->is_candidate(submap(0, i), submap(1, j)), !verdict->closures.empty());
-      EXPECT_EQ(verdict->reason.empty(), !verdict->closures.empty());
+      EXPECT_EQ(verdict->refusal.has_value(), verdict->closures.empty());
+      EXPECT_EQ(verdict->finder_version, 7U);
       if (verdict->closures.empty()) continue;
       ++found;
       const LoopClosure& closure = verdict->closures.front();

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
+#include "tutti/model/refusal.hpp"
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti {
@@ -24,12 +26,13 @@ struct SubmapPair {
   friend auto operator<=>(const SubmapPair&, const SubmapPair&) = default;
 };
 
-/// Outcome of verifying one pair. A verdict depends on the two submaps alone, never on the map's state, so that the map
-/// is a function of the set of submaps and verdicts.
+/// Outcome of verifying one pair: closures or a refusal, never both. A verdict depends on the two submaps and the
+/// finder's version alone, never on the map's state, so that the map is a function of the set of submaps and verdicts.
 struct ClosureVerdict {
   SubmapPair pair;
-  std::vector<LoopClosure> closures;  ///< Empty = refused.
-  std::string reason;                 ///< Why refused; empty when accepted.
+  std::vector<LoopClosure> closures;  ///< From keyframes of pair.first to keyframes of pair.second.
+  std::optional<Refusal> refusal;     ///< When there are none.
+  std::uint32_t finder_version = 0;   ///< server::ClosureFinder::version; 0: of a program that did not say.
   friend bool operator==(const ClosureVerdict&, const ClosureVerdict&) = default;
 };
 

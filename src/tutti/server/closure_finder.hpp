@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+
 #include "tutti/base/result.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/submap.hpp"
@@ -14,6 +16,12 @@ namespace tutti::server {
 class ClosureFinder {
  public:
   virtual ~ClosureFinder() = default;
+  /// The number of what this finder makes of two submaps; every verdict carries it, and one of a larger number replaces
+  /// one of a smaller. Raised by hand in the commit that changes gates, methods or which pairs are candidates, and by
+  /// whoever changes a deployed finder's settings so that old answers no longer hold: a server restored from a state
+  /// with smaller numbers asks every pair again, and keeps the old closures until they are answered. Nothing notices a
+  /// change that leaves it as it was. A finder that takes another's place has a larger number than it had. At least 1.
+  [[nodiscard]] virtual std::uint32_t version() const = 0;
   /// Does verify() look at clouds? Then submaps that have none are in no pair.
   [[nodiscard]] virtual bool needs_clouds() const = 0;
   /// Cheap: is the pair worth a verification?

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/server/map_server.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -54,6 +55,53 @@ Status check_submap(const Submap& submap) {
 
 SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : SubmapPair{b, a}; }
 
+std::string name_of(const ClosureVerdict& verdict) {
+  const auto& [first, second] = verdict.pair;
+  return fmt::format("verdict on submaps {}/{} and {}/{}", first.robot.value, first.index, second.robot.value,
+                     second.index);
+}
+
+/// What can be said of a verdict before its submaps are there.
+Status check_alone(const ClosureVerdict& verdict, const std::set<RobotId>& robots) {
+  const auto& [first, second] = verdict.pair;
+  const std::string where = name_of(verdict);
+  if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where);
+  for (const SubmapId id : {first, second})
+    if (!robots.contains(id.robot))
+      return fail(ErrorCode::unknown_robot, "{}: robot {} is none of the mission's {}", where, id.robot.value,
+                  robots.size());
+  if (verdict.closures.empty() != verdict.refusal.has_value())
+    return fail(ErrorCode::invalid, "{}: {} closures {} a refusal, expected one of the two", where,
+                verdict.closures.size(), verdict.refusal ? "and" : "without");
+  for (const LoopClosure& closure : verdict.closures) {
+    if (closure.from.robot != first.robot || closure.to.robot != second.robot)
+      return fail(ErrorCode::invalid, "{}: its closure is from robot {} to robot {}", where, closure.from.robot.value,
+                  closure.to.robot.value);
+    if (!is_valid(closure.measurement.T_a_b)) return fail(ErrorCode::invalid, "{}: its closure is no pose", where);
+    if (auto ok = check_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
+  }
+  return {};
+}
+
+/// Of two verdicts of one version on one pair, does `a` hold, whichever came first? In doubt there is no closure.
+bool holds_over(const ClosureVerdict& a, const ClosureVerdict& b) {
+  if (a.closures.empty() || b.closures.empty()) return a.closures.empty() && !b.closures.empty();
+  const auto numbers = [](const ClosureVerdict& verdict) {
+    std::vector<double> out;
+    for (const auto& [from, to, measured] : verdict.closures) {
+      out.insert(out.end(), {static_cast<double>(from.index), static_cast<double>(to.index)});
+      const auto append = [&out](const auto& matrix) {
+        out.insert(out.end(), matrix.data(), matrix.data() + matrix.size());
+      };
+      append(measured.T_a_b.translation);
+      append(measured.T_a_b.rotation.coeffs());
+      append(measured.covariance);
+    }
+    return out;
+  };
+  return numbers(a) < numbers(b);
+}
+
 }  // namespace
 
 MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
@@ -68,8 +116,16 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
       config_(config),
       state_(std::move(state)) {
   TUTTI_CHECK(finder_ != nullptr && clouds_ != nullptr, "no finder or no store of clouds");
-  for (const auto& [pair, verdict] : state_.verdicts) asked_.insert(pair);
-  for (const auto& [id, submap] : state_.submaps) plan_verifications(submap);
+  TUTTI_CHECK(finder_->version() > 0, "a finder without a version");
+  if (state_.finder_version < finder_->version()) {
+    state_.finder_version = finder_->version();
+    state_.answered.forget_answers();
+    state_.refused.clear();
+  }
+  for (const auto& [id, submap] : state_.submaps) state_.answered.add_submap(id);
+  for (auto first = state_.submaps.begin(); first != state_.submaps.end(); ++first)
+    for (auto second = std::next(first); second != state_.submaps.end(); ++second)
+      plan_verification({first->first, second->first});
   news_ = !state_.submaps.empty();
 }
 
@@ -93,8 +149,11 @@ Status MapServer::receive(const SubmapMessage& message) {
   }
   Submap submap = message.submap;
   submap.cloud.reset();
-  const auto& kept = state_.submaps[id] = std::make_shared<const Submap>(std::move(submap));
-  plan_verifications(kept);
+  state_.submaps[id] = std::make_shared<const Submap>(std::move(submap));
+  state_.answered.add_submap(id);
+  judge_waiting();
+  for (const auto& [other, there] : state_.submaps)
+    if (other != id) plan_verification(ordered(id, other));
   news_ = true;
   return {};
 }
@@ -111,39 +170,100 @@ bool MapServer::may_be_verified(SubmapId id) const {
   return !finder_->needs_clouds() || state_.cloud_sizes.contains(id);
 }
 
-void MapServer::plan_verifications(const std::shared_ptr<const Submap>& submap) {
-  if (!may_be_verified(submap->id)) return;
-  for (const auto& [id, other] : state_.submaps) {
-    if (id == submap->id || !may_be_verified(id)) continue;
-    const SubmapPair pair = ordered(id, submap->id);
-    if (asked_.contains(pair)) continue;
-    const auto& first = id < submap->id ? other : submap;
-    const auto& second = id < submap->id ? submap : other;
-    if (!finder_->is_candidate(*first, *second)) continue;
-    asked_.insert(pair);
-    jobs_.push_back({pair, first, second});
+bool MapServer::is_asked(const SubmapPair& pair) const {
+  const auto first = state_.submaps.find(pair.first);
+  const auto second = state_.submaps.find(pair.second);
+  return first != state_.submaps.end() && second != state_.submaps.end() && may_be_verified(pair.first) &&
+         may_be_verified(pair.second) && finder_->is_candidate(*first->second, *second->second);
+}
+
+std::optional<std::uint32_t> MapServer::answered_by(const SubmapPair& pair) const {
+  if (const auto found = state_.verdicts.find(pair); found != state_.verdicts.end())
+    return found->second.finder_version;
+  return state_.answered.contains(pair) ? std::optional(state_.finder_version) : std::nullopt;
+}
+
+void MapServer::plan_verification(const SubmapPair& pair) {
+  if (answered_by(pair) < finder_->version()) {
+    if (is_asked(pair)) return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
+    state_.verdicts.erase(pair);  // of an older finder, which asked
   }
+  state_.answered.insert(pair);
 }
 
 std::vector<VerificationJob> MapServer::take_jobs() { return std::exchange(jobs_, {}); }
 
 void MapServer::give_back(VerificationJob job) {
-  if (asked_.contains(job.pair) && !state_.verdicts.contains(job.pair)) jobs_.push_back(std::move(job));
+  if (answered_by(job.pair) < finder_->version() && is_asked(job.pair)) jobs_.push_back(std::move(job));
 }
 
 Status MapServer::receive(const ClosureVerdict& verdict) {
-  const auto& [pair, closures, reason] = verdict;
-  const std::string where = fmt::format("verdict on submaps {}/{} and {}/{}", pair.first.robot.value, pair.first.index,
-                                        pair.second.robot.value, pair.second.index);
-  if (!state_.submaps.contains(pair.first) || !state_.submaps.contains(pair.second))
-    return fail(ErrorCode::invalid, "{}: not both are in the map", where);
-  for (const LoopClosure& closure : closures) {
-    if (!is_valid(closure.measurement.T_a_b)) return fail(ErrorCode::invalid, "{}: its closure is no pose", where);
-    if (auto ok = check_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
-  }
-  const auto [entry, is_new] = state_.verdicts.try_emplace(pair, verdict);
-  if (is_new && !closures.empty()) news_ = true;
+  if (auto ok = check_alone(verdict, robots_); !ok) return ok;
+  if (!has_submaps_of(verdict)) return wait_for_submaps(verdict);
+  if (auto ok = check_against_submaps(verdict); !ok) return ok;
+  take(verdict);
   return {};
+}
+
+bool MapServer::has_submaps_of(const ClosureVerdict& verdict) const {
+  return state_.submaps.contains(verdict.pair.first) && state_.submaps.contains(verdict.pair.second);
+}
+
+Status MapServer::check_against_submaps(const ClosureVerdict& verdict) const {
+  const auto& [first, second] = verdict.pair;
+  if (!is_asked(verdict.pair)) return fail(ErrorCode::invalid, "{}: the pair was not asked for", name_of(verdict));
+  const auto check = [&](SubmapId id, std::uint32_t keyframe) -> Status {
+    const auto& keyframes = state_.submaps.at(id)->keyframes;
+    if (keyframes.front().index <= keyframe && keyframe <= keyframes.back().index) return {};
+    return fail(ErrorCode::invalid, "{}: its closure is at keyframe {}, expected one of {} to {} of submap {}/{}",
+                name_of(verdict), keyframe, keyframes.front().index, keyframes.back().index, id.robot.value, id.index);
+  };
+  for (const LoopClosure& closure : verdict.closures) {
+    if (auto ok = check(first, closure.from.index); !ok) return ok;
+    if (auto ok = check(second, closure.to.index); !ok) return ok;
+  }
+  return {};
+}
+
+Status MapServer::wait_for_submaps(const ClosureVerdict& verdict) {
+  if (std::ranges::find(waiting_, verdict) != waiting_.end()) return {};
+  if (waiting_.size() == kMostWaiting)
+    return fail(ErrorCode::invalid, "{}: its submaps have not come, and {} verdicts wait already", name_of(verdict),
+                waiting_.size());
+  waiting_.push_back(verdict);
+  return {};
+}
+
+void MapServer::judge_waiting() {
+  const auto ready = std::ranges::stable_partition(waiting_, [&](const auto& v) { return !has_submaps_of(v); });
+  const std::vector<ClosureVerdict> verdicts(ready.begin(), ready.end());
+  waiting_.erase(ready.begin(), ready.end());
+  for (const ClosureVerdict& verdict : verdicts)
+    if (auto ok = receive(verdict); !ok) late_errors_.push_back(std::move(ok.error()));
+}
+
+void MapServer::take(const ClosureVerdict& verdict) {
+  const auto& pair = verdict.pair;
+  const auto known = answered_by(pair);
+  const auto kept = state_.verdicts.find(pair);
+  const bool is_kept = kept != state_.verdicts.end();
+  if (known > verdict.finder_version) return;
+  if (known == verdict.finder_version && !(is_kept && holds_over(verdict, kept->second))) return;
+  if (!verdict.closures.empty() || (is_kept && !kept->second.closures.empty())) news_ = true;
+  if (verdict.finder_version >= finder_->version()) state_.answered.insert(pair);
+  if (verdict.refusal && verdict.finder_version == state_.finder_version) {
+    count_refusal(*verdict.refusal, pair.first.robot, pair.second.robot, state_.refused);
+    state_.verdicts.erase(pair);
+  } else {
+    state_.verdicts.insert_or_assign(pair, verdict);
+  }
+}
+
+RefusalCounts MapServer::refusals() const {
+  RefusalCounts counts = state_.refused;
+  for (const auto& [pair, verdict] : state_.verdicts)
+    if (verdict.refusal) count_refusal(*verdict.refusal, pair.first.robot, pair.second.robot, counts);
+  return counts;
 }
 
 ProxyGraphMessage MapServer::optimise() {

@@ -2,17 +2,22 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/result.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/model/messages.hpp"
+#include "tutti/server/answered_pairs.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/server/cloud_store.hpp"
 #include "tutti/server/map_estimate.hpp"
+#include "tutti/server/refusal_counts.hpp"
 
 namespace tutti::server {
 
@@ -42,7 +47,12 @@ struct VerificationJob {
 struct MapServerState {
   SubmapSet submaps;                            ///< Without their clouds.
   std::map<SubmapId, std::size_t> cloud_sizes;  ///< Points of each submap's cloud; of those that have one.
+  /// Those with closures. Refusals are only counted: a pair that is answered and not among these is refused by
+  /// `finder_version`. Refusals by other versions, which are few, stand here too.
   VerdictSet verdicts;
+  std::uint32_t finder_version = 0;
+  AnsweredPairs answered;  ///< By a finder at least as new as the server's, or not to be asked.
+  RefusalCounts refused;   ///< By `finder_version`.
   std::uint64_t revision = 0;
 };
 
@@ -51,7 +61,8 @@ class MapServer {
  public:
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
             const ServerConfig& config);
-  /// Goes on from a saved state; verifications that had no verdict yet become jobs again.
+  /// Goes on from a saved state; verifications that had no verdict yet become jobs again. All of them when the finder
+  /// is newer than the state's: what older ones found stays in the map until it is answered.
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
             const ServerConfig& config, MapServerState state);
 
@@ -59,8 +70,15 @@ class MapServer {
   /// mapped stays. So is one whose cloud the store cannot keep; it may be sent again. One that comes again puts its
   /// cloud back if the store has lost it.
   Status receive(const SubmapMessage& message);
-  /// The answer to a job, in any order, any number of times.
+  /// The answer to a job, in any order, any number of times. Closures join a keyframe of pair.first to one of
+  /// pair.second, and the finder would ask for the pair; anything else is an error and changes nothing. Of two verdicts
+  /// on one pair that of the newer finder holds; of one version a refusal, then the closures with the smaller numbers:
+  /// the map is the same whatever came first. A verdict that comes before its submaps waits for them and is judged
+  /// then; it is an error when kMostWaiting wait already, and costs only that the pair is asked again.
   Status receive(const ClosureVerdict& verdict);
+  static constexpr std::size_t kMostWaiting = 1000;
+  /// Why verdicts that had waited were no good when their submaps came, since the last call.
+  std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }
   /// Verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
   /// A job that had an error instead of an answer: the next take_jobs() hands it out again.
@@ -73,21 +91,35 @@ class MapServer {
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
   [[nodiscard]] const MapServerState& state() const { return state_; }
+  /// Pairs by the reason they were refused for. One that a newer finder than the server's has refused again counts
+  /// twice.
+  [[nodiscard]] RefusalCounts refusals() const;
   [[nodiscard]] const CloudStore& clouds() const { return *clouds_; }
 
  private:
   /// If it is the cloud that was there.
   Status replace_lost_cloud(const Submap& duplicate);
   [[nodiscard]] bool may_be_verified(SubmapId id) const;
-  void plan_verifications(const std::shared_ptr<const Submap>& submap);
+  /// Both submaps are there and the finder wants the pair.
+  [[nodiscard]] bool is_asked(const SubmapPair& pair) const;
+  /// The version of the finder whose answer holds, if there is one.
+  [[nodiscard]] std::optional<std::uint32_t> answered_by(const SubmapPair& pair) const;
+  void plan_verification(const SubmapPair& pair);
+  [[nodiscard]] bool has_submaps_of(const ClosureVerdict& verdict) const;
+  [[nodiscard]] Status check_against_submaps(const ClosureVerdict& verdict) const;
+  Status wait_for_submaps(const ClosureVerdict& verdict);
+  void judge_waiting();
+  /// What is good.
+  void take(const ClosureVerdict& verdict);
 
   std::set<RobotId> robots_;
   std::shared_ptr<const ClosureFinder> finder_;
   std::shared_ptr<CloudStore> clouds_;
   ServerConfig config_;
   MapServerState state_;
-  std::set<SubmapPair> asked_;
   std::vector<VerificationJob> jobs_;
+  std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are asked when the submaps come
+  std::vector<Error> late_errors_;
   MapEstimate map_;
   bool news_ = false;
 };

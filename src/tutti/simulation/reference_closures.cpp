@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/simulation/reference_closures.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -73,7 +71,7 @@ struct ReferenceClosures::PlacedSubmap {
 struct ReferenceClosures::Assessment {
   std::vector<Match> overlaps;
   bool distant = false;
-  std::string refusal;  ///< When neither.
+  std::optional<Refusal> refusal;  ///< When neither.
 };
 
 ReferenceClosures::ReferenceClosures(std::map<RobotId, Trajectory> reference, const ReferenceClosureConfig& config,
@@ -122,14 +120,13 @@ ReferenceClosures::PlacedSubmap ReferenceClosures::place(const Submap& submap) c
 }
 
 ReferenceClosures::Assessment ReferenceClosures::assess(const PlacedSubmap& first, const PlacedSubmap& second) const {
-  const auto refuse = [](std::string reason) { return Assessment{.refusal = std::move(reason)}; };
+  const auto refuse = [](const Refusal& refusal) { return Assessment{.refusal = refusal}; };
   const bool same_robot = first.id.robot == second.id.robot;
   if (same_robot && second.id.index - first.id.index < static_cast<std::uint32_t>(config_.min_submap_gap))
-    return refuse(
-        fmt::format("{} submaps apart, at least {} wanted", second.id.index - first.id.index, config_.min_submap_gap));
+    return refuse({RefusalReason::neighbours, static_cast<double>(second.id.index - first.id.index),
+                   static_cast<double>(config_.min_submap_gap)});
   for (const PlacedSubmap* submap : {&first, &second})
-    if (submap->places.empty())
-      return refuse(fmt::format("no reference pose at submap {}/{}", submap->id.robot.value, submap->id.index));
+    if (submap->places.empty()) return refuse({RefusalReason::no_reference});
 
   Assessment result;
   const double between = (first.centre - second.centre).norm();
@@ -147,7 +144,7 @@ ReferenceClosures::Assessment ReferenceClosures::assess(const PlacedSubmap& firs
       if (heading_difference(a.T_reference_body, b.T_reference_body) > config_.max_heading_deg * kRadPerDeg) continue;
       result.overlaps.push_back({i, j, distance});
     }
-  if (result.overlaps.empty()) return refuse(fmt::format("no keyframes within {:.1f} m", config_.radius_m));
+  if (result.overlaps.empty()) return refuse({RefusalReason::no_keyframes_near});
   return result;
 }
 
@@ -211,25 +208,25 @@ std::optional<Pose3> ReferenceClosures::draw_error(const SubmapPair& pair, bool 
   return error;
 }
 
-bool ReferenceClosures::is_candidate(const Submap& a, const Submap& b) const { return verify(a, b).reason.empty(); }
+bool ReferenceClosures::is_candidate(const Submap& a, const Submap& b) const { return !verify(a, b).refusal; }
 
 ClosureVerdict ReferenceClosures::verify(const Submap& a, const Submap& b) const {
   const bool in_order = a.id < b.id;
   const PlacedSubmap first = place(in_order ? a : b);
   const PlacedSubmap second = place(in_order ? b : a);
-  ClosureVerdict verdict{.pair = {first.id, second.id}};
+  ClosureVerdict verdict{.pair = {first.id, second.id}, .finder_version = kVersion};
   if (first.id == second.id) {
-    verdict.reason = "one and the same submap";
+    verdict.refusal = Refusal{RefusalReason::same_submap};
     return verdict;
   }
   Assessment assessment = assess(first, second);
-  verdict.reason = assessment.refusal;
-  if (!verdict.reason.empty()) return verdict;
+  verdict.refusal = assessment.refusal;
+  if (verdict.refusal) return verdict;
 
   const bool overlap = !assessment.overlaps.empty();
   const std::optional<Pose3> error = draw_error(verdict.pair, overlap);
   if (!overlap && !error) {
-    verdict.reason = "distant places";
+    verdict.refusal = Refusal{RefusalReason::distant};
     return verdict;
   }
   Rng rng = pair_rng(seed_, "noise", first.id, second.id);

@@ -84,7 +84,7 @@ TEST(ReferenceClosures, TheAskedShareIsWrongAndTheRestIsAsGoodAsItsCovariance) {
   for (std::uint64_t seed = 0; seed < 5; ++seed) {
     const ReferenceClosures finder(mission.reference, config, seed);
     for (const ClosureVerdict& verdict : all_verdicts(finder, mission.submaps)) {
-      ASSERT_EQ(verdict.closures.empty(), !verdict.reason.empty());
+      ASSERT_EQ(verdict.closures.empty(), verdict.refusal.has_value());
       if (verdict.closures.empty()) continue;
       ASSERT_EQ(verdict.closures.size(), 1U);
       const LoopClosure& closure = verdict.closures.front();
@@ -201,7 +201,8 @@ TEST(ReferenceClosures, GateHeadingAndTime) {
   EXPECT_FALSE(ReferenceClosures(reference, config, 1).is_candidate(submaps[0], submaps[1]));
   config.min_time_gap_s = 80.0;
   config.min_submap_gap = 9;
-  EXPECT_NE(ReferenceClosures(reference, config, 1).verify(submaps[0], submaps[1]).reason, "");
+  EXPECT_EQ(ReferenceClosures(reference, config, 1).verify(submaps[0], submaps[1]).refusal,
+            (Refusal{RefusalReason::neighbours, 8.0, 9.0}));
 }
 
 TEST(ReferenceClosures, MissingReferenceRefusesInsteadOfGuessing) {
@@ -217,11 +218,11 @@ TEST(ReferenceClosures, MissingReferenceRefusesInsteadOfGuessing) {
     if (submap.id.robot != bravo || submap.id.index != 2) continue;  // 20 .. 30 s
     const ClosureVerdict verdict = finder.verify(alpha, submap);
     EXPECT_TRUE(verdict.closures.empty());
-    EXPECT_EQ(verdict.reason, "no reference pose at submap 1/2");
+    EXPECT_EQ(verdict.refusal, Refusal{RefusalReason::no_reference});
   }
   EXPECT_FALSE(finder.true_relative_pose(RobotId{0}, {1'000'000'000}, RobotId{7}, {1'000'000'000}).has_value());
-  EXPECT_FALSE(finder.verify(alpha, alpha).reason.empty());
-  EXPECT_FALSE(finder.verify(alpha, Submap{.id = {RobotId{9}, 5}}).reason.empty());
+  EXPECT_EQ(finder.verify(alpha, alpha).refusal, Refusal{RefusalReason::same_submap});
+  EXPECT_EQ(finder.verify(alpha, Submap{.id = {RobotId{9}, 5}}).refusal, Refusal{RefusalReason::no_reference});
 }
 
 TEST(ReferenceClosures, InterpolatesBetweenReferenceStamps) {

@@ -341,7 +341,16 @@ TEST(Validate, Verdict) {
                            {"closure from robot", [](M& m) { m.closures[1].from.robot.value = 9; }},
                            {"not finite", [](M& m) { m.closures[1].measurement.T_a_b.translation.x() = kNan; }},
                            {"symmetric", [](M& m) { m.closures[1].measurement.covariance(0, 1) += 1e3; }},
-                           {"reason", [](M& m) { m.reason.assign(kMaxReasonBytes + 1, '!'); }}});
+                           {"1 closures and a refusal",
+                            [](M& m) {
+                              m.closures.pop_back();
+                              m.refusal.emplace();
+                            }},
+                           {"0 closures without", [](M& m) { m.closures.clear(); }},
+                           {"finite", [](M& m) {
+                              m.closures.clear();
+                              m.refusal = Refusal{RefusalReason::overlap, kNan, 0.3};
+                            }}});
 }
 
 }  // namespace

@@ -33,13 +33,15 @@ const char* name(MessageKind kind) {
   return "unknown";
 }
 
-// What changed: submap, verdict: nothing but the number, which all kinds shared up to 4. Proxy graph: 1 had no range
-// coder, 2 landed with two codings that cannot be told apart, 3 had no ties. Cloud: came with 2, the same since.
+// What changed: submap: nothing but the number, which all kinds shared up to 4. Verdict: the same up to 4, which said
+// why a pair was refused in words only, and not by which version of the finder. Proxy graph: 1 had no range coder, 2
+// landed with two codings that cannot be told apart, 3 had no ties. Cloud: came with 2, the same since.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
-    case MessageKind::verdict:
       return {.oldest = 1, .current = 4};
+    case MessageKind::verdict:
+      return {.oldest = 1, .current = 5};
     case MessageKind::proxy_graph:
       return {.oldest = 3, .current = 4};
     case MessageKind::cloud:

@@ -10,9 +10,11 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "support/paths.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
 
 namespace tutti::wire {
 namespace {
@@ -143,11 +145,41 @@ TEST(Golden, ProxyGraph) {
 }
 
 TEST(Golden, Verdict) {
-  const ClosureVerdict verdict{
+  ClosureVerdict verdict{
       .pair = {{RobotId{0}, 3}, {RobotId{1}, 4}},
-      .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}}};
+      .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}},
+      .finder_version = 3};
   for_every_version(MessageKind::verdict, encode(verdict), decode_verdict,
-                    [&](const ClosureVerdict& decoded, unsigned) { EXPECT_EQ(decoded, verdict); });
+                    [&](const ClosureVerdict& decoded, unsigned version) {
+                      verdict.finder_version = version < 5 ? 0 : 3;
+                      EXPECT_EQ(decoded, verdict);
+                    });
+}
+
+// No refusals of version 4 were kept: first_index 3, second_robot 1, second_index 4 and the reason, as protobuf has
+// them.
+TEST(Golden, TheWordsOfAVerdictOfVersion4BecomeAReason) {
+  const std::pair<std::string, RefusalReason> said[] = {
+      {"overlap 0.12, at least 0.3 needed", RefusalReason::overlap},
+      {"too short: 2.5 s, at least 5.0 s needed", RefusalReason::too_short},
+      {"ambiguous: another alignment is 0.97 as good, at most 0.9 allowed", RefusalReason::ambiguous},
+      {"ambiguous: slid along it is 0.97 as good, at most 0.9 allowed", RefusalReason::ambiguous_along},
+      {"no alignment comes near", RefusalReason::no_alignment},
+      {"bad weather", RefusalReason::other},
+      {"", RefusalReason::other}};
+  for (const auto& [words, reason] : said) {
+    std::string payload("\x10\x03\x18\x01\x20\x04", 6);
+    payload.push_back('\x32');
+    payload.push_back(static_cast<char>(words.size()));
+    payload.append(words);
+    std::string frame = pack_frame(MessageKind::verdict, payload);
+    EXPECT_FALSE(decode_verdict(frame).has_value());  // neither closures nor a refusal, in version 5
+    frame.at(2) = 4;
+    const auto decoded = decode_verdict(frame);
+    ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+    const ClosureVerdict expected{{{RobotId{0}, 3}, {RobotId{1}, 4}}, {}, Refusal{reason}, 0};
+    EXPECT_EQ(*decoded, expected) << words;
+  }
 }
 
 // A cloud alone came with version 2; no bytes of 2 and 3 were kept, but only the number differs from 4.

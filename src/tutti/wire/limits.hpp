@@ -14,7 +14,6 @@ inline constexpr std::size_t kMaxProxyEdges = 1'000'000;
 inline constexpr std::size_t kMaxTies = 1'000;  ///< Per robot.
 inline constexpr std::size_t kMaxRobots = 1'000;
 inline constexpr std::size_t kMaxClosures = 1'000;  ///< Per verdict.
-inline constexpr std::size_t kMaxReasonBytes = 1'000;
 
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.
 inline constexpr double kMaxVariance = 1e20;

@@ -198,8 +198,12 @@ Status validate(const ClosureVerdict& verdict) {
                                         second.robot.value, second.index);
   if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where);
   if (auto ok = at_most(verdict.closures.size(), kMaxClosures, "closures"); !ok) return in_context(where, ok.error());
-  if (auto ok = at_most(verdict.reason.size(), kMaxReasonBytes, "bytes of reason"); !ok)
-    return in_context(where, ok.error());
+  if (verdict.closures.empty() != verdict.refusal.has_value())
+    return fail(ErrorCode::invalid, "{}: {} closures {} a refusal, expected one of the two", where,
+                verdict.closures.size(), verdict.refusal ? "and" : "without");
+  if (verdict.refusal && !(std::isfinite(verdict.refusal->value) && std::isfinite(verdict.refusal->limit)))
+    return fail(ErrorCode::invalid, "{}: refused for a value of {} at a limit of {}, expected finite ones", where,
+                verdict.refusal->value, verdict.refusal->limit);
   for (const LoopClosure& closure : verdict.closures) {
     if (closure.from.robot != first.robot || closure.to.robot != second.robot)
       return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where, closure.from.robot.value,

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <optional>
+#include <string_view>
+#include <utility>
+
 #include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
@@ -34,6 +38,41 @@ Result<LoopClosure> read(const v1::LoopClosure& in) {
   return closure;
 }
 
+/// Up to version 4 words said why, with the values among them.
+RefusalReason reason_of_words(std::string_view words) {
+  using enum RefusalReason;
+  static constexpr std::pair<std::string_view, RefusalReason> kBeginnings[] = {
+      {"too small", too_small},
+      {"too short", too_short},
+      {"too unlike from above", unlike_from_above},
+      {"no alignment", no_alignment},
+      {"overlap", overlap},
+      {"plane RMSE", plane_rmse},
+      {"misfit", misfit},
+      {"free to slide", free_to_slide},
+      {"viewpoints", viewpoints},
+      {"registered both ways", both_ways_distance},
+      {"contradicted", contradicted},
+      {"ambiguous: slid", ambiguous_along},
+      {"ambiguous", ambiguous},
+      {"one and the same", same_submap},
+      {"no reference", no_reference},
+      {"no keyframes within", no_keyframes_near},
+      {"distant", distant}};
+  for (const auto& [beginning, reason] : kBeginnings)
+    if (words.starts_with(beginning)) return reason;
+  return other;
+}
+
+Result<std::optional<Refusal>> read_refusal(const v1::Verdict& in, unsigned version) {
+  if (version <= 4 && in.closure().empty()) return Refusal{reason_of_words(in.reason())};
+  if (version <= 4 || !in.refused()) return std::nullopt;
+  if (in.refusal() >= kRefusalKinds.size())
+    return fail(ErrorCode::invalid, "refused for reason {}, at most {} is known", in.refusal(),
+                kRefusalKinds.size() - 1);
+  return Refusal{static_cast<RefusalReason>(in.refusal()), in.value(), in.limit()};
+}
+
 }  // namespace
 
 std::string encode(const ClosureVerdict& verdict) {
@@ -45,7 +84,13 @@ std::string encode(const ClosureVerdict& verdict) {
   out.set_second_robot(verdict.pair.second.robot.value);
   out.set_second_index(verdict.pair.second.index);
   for (const LoopClosure& closure : verdict.closures) write(closure, *out.add_closure());
-  out.set_reason(verdict.reason);
+  if (verdict.refusal) {
+    out.set_refused(true);
+    out.set_refusal(static_cast<std::uint32_t>(verdict.refusal->reason));
+    out.set_value(verdict.refusal->value);
+    out.set_limit(verdict.refusal->limit);
+  }
+  out.set_finder_version(verdict.finder_version);
   return pack_frame(MessageKind::verdict, out.SerializeAsString());
 }
 
@@ -60,7 +105,10 @@ Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
     if (!read_closure) return in_context("verdict", read_closure.error());
     verdict.closures.push_back(*read_closure);
   }
-  verdict.reason = in.reason();
+  verdict.finder_version = in.finder_version();
+  const auto refusal = read_refusal(in, parsed->version);
+  if (!refusal) return in_context("verdict", refusal.error());
+  verdict.refusal = *refusal;
   if (auto ok = validate(verdict); !ok) return tl::unexpected(ok.error());
   return verdict;
 }

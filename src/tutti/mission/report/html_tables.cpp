@@ -141,7 +141,7 @@ std::string closures_html(const MissionRecord& record) {
   };
   add("<b>accepted</b>", counts.accepted_intra, counts.accepted_inter);
   for (const auto& rejection : server.rejections)
-    add("refused: " + escape_xml(rejection.reason), rejection.intra, rejection.inter);
+    add(fmt::format("refused: {}", kind_of(rejection.reason).words), rejection.intra, rejection.inter);
   std::string lead = "What the server took into the map, and why it refused the rest.";
   if (const auto& check = server.closure_check)
     lead += fmt::format(

@@ -246,7 +246,6 @@ TEST(ReportHtml, EscapesEveryText) {
     robot.name = evil + robot.name;
     robot.policies[2].name = evil;
   }
-  record.server.rejections = {{evil, evil, 1, 2}};
   record.transforms[0].from = record.transforms[0].to = evil;
   for (auto& timing : record.timing.policies) timing.robot = timing.policy = evil;
   record.timing.load = {{evil, 0.5, 12.0}};

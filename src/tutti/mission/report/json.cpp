@@ -180,8 +180,15 @@ Json server_json(const MissionRecord& record) {
   const ServerRecord& server = record.server;
   const ClosureCounts counts = count_closures(server);
   Json rejections = Json::array();
-  for (const auto& rejection : server.rejections)
-    rejections.push_back({{"reason", rejection.reason}, {"intra", rejection.intra}, {"inter", rejection.inter}});
+  for (const auto& [reason, intra, inter, nearest] : server.rejections) {
+    const auto measured = [&](double value) { return is_measured(nearest) ? number(value) : Json(nullptr); };
+    rejections.push_back({{"reason", kind_of(reason).words},
+                          {"intra", intra},
+                          {"inter", inter},
+                          {"nearest", measured(nearest.value)},
+                          {"limit", measured(nearest.limit)},
+                          {"unit", kind_of(reason).unit}});
+  }
   Json check = nullptr;
   if (server.closure_check)
     check = {{"checked", server.closure_check->checked},

@@ -61,6 +61,10 @@ TEST(ReportJson, CarriesTheRecordsFigures) {
   EXPECT_EQ(report["server"]["closures_accepted"], record.server.closures.size());
   EXPECT_EQ(report["server"]["closure_check"]["wrong"], 0);
   EXPECT_EQ(report["server"]["closures_rejected"], 31 + 55 + 4 + 9 + 0 + 3);
+  const json overlap{{"reason", "overlap"}, {"intra", 31},  {"inter", 55},
+                     {"nearest", 0.29},     {"limit", 0.3}, {"unit", ""}};
+  EXPECT_EQ(report["server"]["rejections"][0], overlap);
+  EXPECT_TRUE(report["server"]["rejections"][2]["nearest"].is_null());
   EXPECT_EQ(
       report["server"]["closures_accepted_intra"].get<int>() + report["server"]["closures_accepted_inter"].get<int>(),
       report["server"]["closures_accepted"].get<int>());

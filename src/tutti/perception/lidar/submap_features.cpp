@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/lidar/submap_features.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -18,17 +16,16 @@ namespace {
 
 constexpr double kPriorPreference = 1.25;  // how much better the body's up must fit than the odometry's
 
-std::string why_unusable(const Submap& submap, std::size_t points, const LidarClosureConfig& config) {
+std::optional<Refusal> why_unusable(const Submap& submap, std::size_t points, const LidarClosureConfig& config) {
   if (points < static_cast<std::size_t>(config.min_points))
-    return fmt::format("too small: {} points, at least {} needed", points, config.min_points);
+    return Refusal{RefusalReason::too_small, static_cast<double>(points), static_cast<double>(config.min_points)};
   if (submap.keyframes.size() < static_cast<std::size_t>(config.min_keyframes))
-    return fmt::format("too short: {} keyframes, at least {} needed", submap.keyframes.size(), config.min_keyframes);
-  const double duration = submap.keyframes.back().stamp - submap.keyframes.front().stamp;
-  const double way = way_m(submap.odometry);
-  if (duration < config.min_duration_s && way < config.min_way_m)
-    return fmt::format("too short: {:.1f} s and {:.1f} m, at least {:.1f} s or {:.1f} m needed", duration, way,
-                       config.min_duration_s, config.min_way_m);
-  return {};
+    return Refusal{RefusalReason::too_few_keyframes, static_cast<double>(submap.keyframes.size()),
+                   static_cast<double>(config.min_keyframes)};
+  const double duration_s = submap.keyframes.back().stamp - submap.keyframes.front().stamp;
+  if (duration_s < config.min_duration_s && way_m(submap.odometry) < config.min_way_m)
+    return Refusal{RefusalReason::too_short, duration_s, config.min_duration_s};
+  return std::nullopt;
 }
 
 std::vector<Pose3> poses_in_submap(const Submap& submap) {
@@ -86,8 +83,8 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
   SubmapFeatures features{.id = submap.id};
   // Finite points in Morton order, whatever the submap came with.
   auto points = submap.cloud ? voxel_downsample(*submap.cloud, config.voxel_m).points : std::vector<Eigen::Vector3f>{};
-  features.reason = why_unusable(submap, points.size(), config);
-  if (!features.reason.empty()) return features;
+  features.refusal = why_unusable(submap, points.size(), config);
+  if (features.refusal) return features;
   const auto poses = poses_in_submap(submap);
   std::vector<Eigen::Vector3f> viewpoints;
   for (const auto& pose : poses) viewpoints.push_back(pose.translation.cast<float>());

@@ -3,9 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <memory>
-#include <string>
+#include <optional>
 #include <vector>
 
+#include "tutti/model/refusal.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/perception/lidar/birds_eye_view.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
@@ -18,8 +19,8 @@ namespace tutti::lidar {
 struct SubmapFeatures {
   SubmapId id;
   bool usable = false;
-  std::string reason;   ///< Why not usable.
-  OrientedCloud cloud;  ///< Submap frame, Morton order.
+  std::optional<Refusal> refusal;  ///< Why not usable.
+  OrientedCloud cloud;             ///< Submap frame, Morton order.
   /// Turns the submap frame so that z points up, yaw left alone (a rotation about a horizontal axis).
   Eigen::Quaterniond R_level_submap = Eigen::Quaterniond::Identity();
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Where the robot was half way, submap frame.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/lidar/verify.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <numbers>
 #include <optional>
@@ -139,32 +137,26 @@ double allowed_misfit(double min_eigenvalue, const LidarClosureConfig& c) {
   return 1.0 + (c.max_misfit - 1.0) * min_eigenvalue / c.sure_eigenvalue;
 }
 
-/// Empty when every gate is passed.
-std::string why_refused(const PairVerification& v, const LidarClosureConfig& c) {
-  if (v.overlap < c.min_overlap) return fmt::format("overlap {:.2f}, at least {} needed", v.overlap, c.min_overlap);
-  if (v.plane_rmse_m > c.max_plane_rmse_m)
-    return fmt::format("plane RMSE {:.3f} m, at most {} m allowed", v.plane_rmse_m, c.max_plane_rmse_m);
-  const double max_misfit = allowed_misfit(v.min_eigenvalue, c);
-  if (v.misfit > max_misfit) return fmt::format("misfit {:.2f}, at most {:.2f} allowed", v.misfit, max_misfit);
-  if (v.min_eigenvalue < c.min_eigenvalue)
-    return fmt::format("free to slide: eigenvalue {:.3f}, at least {} needed", v.min_eigenvalue, c.min_eigenvalue);
-  if (v.viewpoint_distance_m > c.max_viewpoint_distance_m)
-    return fmt::format("viewpoints {:.1f} m apart, at most {} m allowed", v.viewpoint_distance_m,
-                       c.max_viewpoint_distance_m);
-  if (v.forward_backward_m > c.max_forward_backward_m || v.forward_backward_deg > c.max_forward_backward_deg)
-    return fmt::format("registered both ways: {:.3f} m and {:.2f} deg apart, at most {} m and {} deg allowed",
-                       v.forward_backward_m, v.forward_backward_deg, c.max_forward_backward_m,
-                       c.max_forward_backward_deg);
-  if (v.contradiction > c.max_contradiction)
-    return fmt::format("contradicted by what was seen through: {:.2f}, at most {} allowed", v.contradiction,
-                       c.max_contradiction);
-  if (v.rival_ratio > c.max_rival_ratio)
-    return fmt::format("ambiguous: another alignment is {:.2f} as good, at most {} allowed", v.rival_ratio,
-                       c.max_rival_ratio);
-  if (v.slid_ratio > c.max_slid_ratio)
-    return fmt::format("ambiguous: slid along it is {:.2f} as good, at most {} allowed", v.slid_ratio,
-                       c.max_slid_ratio);
-  return {};
+/// Nothing when every gate is passed.
+std::optional<Refusal> why_refused(const PairVerification& v, const LidarClosureConfig& c) {
+  using enum RefusalReason;
+  const auto below = [](RefusalReason reason, double value, double least) {
+    return value < least ? std::optional(Refusal{reason, value, least}) : std::nullopt;
+  };
+  const auto above = [](RefusalReason reason, double value, double most) {
+    return value > most ? std::optional(Refusal{reason, value, most}) : std::nullopt;
+  };
+  for (const auto& refusal :
+       {below(overlap, v.overlap, c.min_overlap), above(plane_rmse, v.plane_rmse_m, c.max_plane_rmse_m),
+        above(misfit, v.misfit, allowed_misfit(v.min_eigenvalue, c)),
+        below(free_to_slide, v.min_eigenvalue, c.min_eigenvalue),
+        above(viewpoints, v.viewpoint_distance_m, c.max_viewpoint_distance_m),
+        above(both_ways_distance, v.forward_backward_m, c.max_forward_backward_m),
+        above(both_ways_angle, v.forward_backward_deg, c.max_forward_backward_deg),
+        above(contradicted, v.contradiction, c.max_contradiction), above(ambiguous, v.rival_ratio, c.max_rival_ratio),
+        above(ambiguous_along, v.slid_ratio, c.max_slid_ratio)})
+    if (refusal) return refusal;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -180,14 +172,13 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   TUTTI_CHECK(!config.registration.levels.empty(), "a registration needs at least one level");
   PairVerification out;
   if (!a.usable || !b.usable) {
-    out.reason = fmt::format("submap {}/{} is not usable: {}", (a.usable ? b : a).id.robot.value,
-                             (a.usable ? b : a).id.index, (a.usable ? b : a).reason);
+    out.refusal = (a.usable ? b : a).refusal;
     return out;
   }
   if (b.id < a.id) return inverse(verify_pair(b, a, config));
   const auto ranked = contenders(a, b, config);
   if (ranked.empty()) {
-    out.reason = "no alignment comes near";
+    out.refusal = Refusal{RefusalReason::no_alignment};
     return out;
   }
   out.correlation_score = ranked.front().score;
@@ -198,13 +189,13 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   refine(a, b, ranked.front().T_a_b, config, out, weakest_b);
   out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
   out.contradiction = contradiction(a, b, out.T_a_b, config);
-  out.reason = why_refused(out, config);
-  if (out.reason.empty()) {  // worth another look
+  out.refusal = why_refused(out, config);
+  if (!out.refusal) {  // worth another look
     const double slid = best_slid_quality(a, b, out.T_a_b, weakest_b, config);
     out.slid_ratio = slid / ranked.front().quality;
-    out.reason = why_refused(out, config);
+    out.refusal = why_refused(out, config);
   }
-  out.accepted = out.reason.empty();
+  out.accepted = !out.refusal;
   return out;
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
+#include <cstdint>
+#include <optional>
 
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/loop_closure.hpp"
@@ -10,10 +11,14 @@
 
 namespace tutti::lidar {
 
+/// Of what extract_features, plausible_pair, verify_pair and to_verdict make of two submaps. Raised by hand in the
+/// commit that changes it, be it by a gate's default: servers then ask again what older versions answered.
+inline constexpr std::uint32_t kFinderVersion = 1;
+
 /// What comparing two submaps found. The measured quantities are those of the best alignment, also when refused.
 struct PairVerification {
   bool accepted = false;
-  std::string reason;                          ///< Why refused: which quantity, its value, its bound.
+  std::optional<Refusal> refusal;              ///< When not accepted.
   Pose3 T_a_b;                                 ///< Between the submap frames.
   Matrix6d covariance = Matrix6d::Identity();  ///< Right perturbation of T_a_b.
   double overlap = 0.0;                        ///< Mean of both directions.

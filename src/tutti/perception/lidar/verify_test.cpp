@@ -33,7 +33,7 @@ const Walk kWalkB{.from = {10, 4.5, 1.5},
 TEST(VerifyPair, acceptsTheSameRoomAndFindsThePose) {
   const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1), b = see({{1}, 0}, furnished_room(), kWalkB, 2);
   const auto v = verify_pair(a.features, b.features, kConfig);
-  ASSERT_TRUE(v.accepted) << v.reason;
+  ASSERT_TRUE(v.accepted) << to_string(*v.refusal);
   const Vector6d error = local(true_relative(kWalkA, kWalkB), v.T_a_b);
   EXPECT_LT(error.head<3>().norm(), 0.02);
   EXPECT_LT(error.tail<3>().norm(), 0.002);
@@ -44,7 +44,7 @@ TEST(VerifyPair, acceptsTheSameRoomAndFindsThePose) {
 TEST(VerifyPair, swappingTheSubmapsInvertsTheResult) {
   const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1), b = see({{1}, 0}, furnished_room(), kWalkB, 2);
   const auto ab = verify_pair(a.features, b.features, kConfig), ba = verify_pair(b.features, a.features, kConfig);
-  ASSERT_TRUE(ab.accepted && ba.accepted) << ab.reason << ba.reason;
+  ASSERT_TRUE(ab.accepted && ba.accepted);
   EXPECT_LT(local(ab.T_a_b, ba.T_a_b.inverse()).norm(), 1e-12);
   const PairVerification back = inverse(ba);
   EXPECT_TRUE(back.covariance.isApprox(ab.covariance, 1e-9));
@@ -66,7 +66,7 @@ TEST(VerifyPair, refusesAnotherRoom) {
     const Side b = see({{1}, 0}, other_room(), walk, seed);
     const auto v = verify_pair(a.features, b.features, kConfig);
     EXPECT_FALSE(v.accepted);
-    EXPECT_FALSE(v.reason.empty());
+    EXPECT_TRUE(v.refusal.has_value());
   }
 }
 
@@ -120,8 +120,8 @@ TEST(VerifyPair, refusesACorridorWithNothingButAFarEndAsAmbiguous) {
 TEST(VerifyPair, refusesUnusableSubmapsWithTheirReason) {
   const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1);
   Side b = see({{1}, 7}, furnished_room(), {.keyframes = 3}, 1);
-  EXPECT_EQ(verify_pair(a.features, b.features, kConfig).reason,
-            "submap 1/7 is not usable: too short: 3 keyframes, at least 6 needed");
+  EXPECT_EQ(verify_pair(a.features, b.features, kConfig).refusal,
+            (Refusal{RefusalReason::too_few_keyframes, 3.0, 6.0}));
 }
 
 TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {
@@ -130,7 +130,7 @@ TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {
   const auto ba = to_verdict(b.submap, a.submap, verify_pair(b.features, a.features, kConfig));
   for (const auto& verdict : {ab, ba}) {
     EXPECT_EQ(verdict.pair, (SubmapPair{{{0}, 2}, {{1}, 1}}));
-    ASSERT_EQ(verdict.closures.size(), 1U) << verdict.reason;
+    ASSERT_EQ(verdict.closures.size(), 1U) << to_string(*verdict.refusal);
     EXPECT_EQ(verdict.closures[0].from, (KeyframeId{{0}, 205}));
     EXPECT_EQ(verdict.closures[0].to, (KeyframeId{{1}, 105}));
     const Pose3 truth = pose_on(kWalkA, 5).inverse() * pose_on(kWalkB, 5);
@@ -153,9 +153,12 @@ TEST(ToVerdict, odometryNoiseInsideTheSubmapsEnlargesTheCovariance) {
 
 TEST(ToVerdict, aRefusalCarriesItsReason) {
   const Submap a = make_submap({{0}, 0}, {}, {}, Rng(1)), b = make_submap({{1}, 0}, {}, {}, Rng(1));
-  const auto verdict = to_verdict(b, a, {.accepted = false, .reason = "overlap 0.1"});
+  const Refusal refusal{RefusalReason::overlap, 0.1, 0.3};
+  const auto verdict = to_verdict(b, a, {.refusal = refusal});
   EXPECT_TRUE(verdict.closures.empty());
-  EXPECT_EQ(verdict.reason, "overlap 0.1");
+  EXPECT_EQ(verdict.refusal, refusal);
+  EXPECT_EQ(to_string(refusal), "overlap: 0.10, at least 0.30 needed");
+  EXPECT_EQ(verdict.finder_version, kFinderVersion);
   EXPECT_LT(verdict.pair.first, verdict.pair.second);
 }
 

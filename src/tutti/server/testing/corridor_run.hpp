@@ -103,7 +103,7 @@ inline void add_look_alikes(CorridorRun& run, const CorridorRunConfig& config, R
         const Pose3 T = truth_at(a.robot, i.stamp).inverse() * moved * truth_at(b.robot, j.stamp);
         Vector6d variance = Vector6d::Constant(1e-4);
         run.verdicts[{a, b}] = {
-            {a, b}, {{{a.robot, i.index}, {b.robot, j.index}, {retract(T, noise), variance.asDiagonal()}}}, ""};
+            {a, b}, {{{a.robot, i.index}, {b.robot, j.index}, {retract(T, noise), variance.asDiagonal()}}}, {}};
       }
   }
 }

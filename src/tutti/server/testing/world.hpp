@@ -69,8 +69,10 @@ inline std::vector<Submap> make_submaps(RobotId robot, const TestWorldConfig& co
 /// reporting pair is wrong by 3 m.
 class TestFinder final : public ClosureFinder {
  public:
-  explicit TestFinder(std::uint64_t seed, std::uint32_t wrong_every = 0) : seed_(seed), wrong_every_(wrong_every) {}
+  explicit TestFinder(std::uint64_t seed, std::uint32_t wrong_every = 0, std::uint32_t version = 1)
+      : seed_(seed), wrong_every_(wrong_every), version_(version) {}
 
+  [[nodiscard]] std::uint32_t version() const override { return version_; }
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     if (first.id.robot == second.id.robot && second.id.index - first.id.index < 3) return false;
@@ -86,7 +88,7 @@ class TestFinder final : public ClosureFinder {
     Pose3 T = retract(true_pose(a.robot, a.index).inverse() * true_pose(b.robot, b.index), draw(rng, 0.02, 0.005));
     if (wrong_every_ > 0 && rng.index(wrong_every_) == 0)
       T.translation += Eigen::Vector3d(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized() * 3.0;
-    return ClosureVerdict{{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, ""};
+    return ClosureVerdict{{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, {}, version()};
   }
   static bool is_wrong(const LoopClosure& closure) {
     const Pose3 truth =
@@ -103,6 +105,7 @@ class TestFinder final : public ClosureFinder {
   }
   std::uint64_t seed_;
   std::uint32_t wrong_every_;
+  std::uint32_t version_;
 };
 
 }  // namespace tutti::server::test

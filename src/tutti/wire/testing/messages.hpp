@@ -132,7 +132,8 @@ inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
     verdict.closures.push_back({{RobotId{0}, static_cast<std::uint32_t>(rng.index(1000))},
                                 {RobotId{1}, static_cast<std::uint32_t>(rng.index(1000))},
                                 {any_pose(rng, 5.0), any_covariance(rng)}});
-  if (closures == 0) verdict.reason = "overlap 0.12, at least 0.30 wanted";
+  if (closures == 0) verdict.refusal = Refusal{RefusalReason::overlap, rng.uniform(0.0, 0.3), 0.3};
+  verdict.finder_version = static_cast<std::uint32_t>(rng.index(3));
   return verdict;
 }
 

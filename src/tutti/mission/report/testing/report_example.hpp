@@ -191,8 +191,9 @@ inline ServerRecord example_server(const std::vector<RobotRecord>& robots, const
     for (std::size_t b = a + 20; b < n; b += 7)
       if ((server.graph.poses[a].translation - server.graph.poses[b].translation).norm() < 3.0)
         server.closures.push_back({server.nodes[a].id, server.nodes[b].id});
-  server.rejections = {
-      {"too little overlap", "", 31, 55}, {"slides along one direction", "", 4, 9}, {"inconsistent", "", 0, 3}};
+  server.rejections = {{RefusalReason::overlap, 31, 55, {RefusalReason::overlap, 0.29, 0.3}},
+                       {RefusalReason::free_to_slide, 4, 9, {RefusalReason::free_to_slide, 0.01, 0.02}},
+                       {RefusalReason::inconsistent, 0, 3}};
   if (options.reference) server.closure_check = {server.closures.size(), 0, 0.041, 0.4};
   return server;
 }

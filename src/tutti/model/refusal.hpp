@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace tutti {
+
+/// Why a pair of submaps, or a closure, was refused. The numbers travel and are stored: they are never reused.
+enum class RefusalReason : std::uint8_t {
+  other = 0,  ///< As an older program said it, in words that this one does not know.
+  // Of a submap, whatever it is compared with.
+  too_small = 1,
+  too_few_keyframes = 2,
+  too_short = 3,  ///< In time, and not far enough either.
+  // Of two clouds.
+  unlike_from_above = 4,
+  no_alignment = 5,
+  overlap = 6,
+  plane_rmse = 7,
+  misfit = 8,
+  free_to_slide = 9,
+  viewpoints = 10,
+  both_ways_distance = 11,
+  both_ways_angle = 12,
+  contradicted = 13,
+  ambiguous = 14,
+  ambiguous_along = 15,
+  // Of reference closures.
+  same_submap = 16,
+  neighbours = 17,
+  no_reference = 18,
+  no_keyframes_near = 19,
+  distant = 20,
+  // Of a closure that a finder found, by the joint map.
+  inconsistent = 21,
+};
+
+/// What is measured for a reason, and the words for people and for report.json.
+struct RefusalKind {
+  enum class Bound { none, at_least, at_most };
+  const char* words;
+  Bound bound = Bound::none;
+  const char* unit = "";
+  int digits = 0;  ///< Behind the point, in text.
+};
+
+inline constexpr std::array<RefusalKind, 22> kRefusalKinds = {{
+    {"other"},
+    {"too small", RefusalKind::Bound::at_least, "points"},
+    {"too few keyframes", RefusalKind::Bound::at_least, "keyframes"},
+    {"too short", RefusalKind::Bound::at_least, "s", 1},
+    {"too unlike from above"},
+    {"no alignment comes near"},
+    {"overlap", RefusalKind::Bound::at_least, "", 2},
+    {"plane RMSE", RefusalKind::Bound::at_most, "m", 3},
+    {"misfit", RefusalKind::Bound::at_most, "", 2},
+    {"free to slide", RefusalKind::Bound::at_least, "", 3},
+    {"viewpoints", RefusalKind::Bound::at_most, "m", 1},
+    {"registered both ways", RefusalKind::Bound::at_most, "m", 3},
+    {"registered both ways, angle", RefusalKind::Bound::at_most, "deg", 2},
+    {"contradicted by what was seen through", RefusalKind::Bound::at_most, "", 2},
+    {"ambiguous", RefusalKind::Bound::at_most, "", 2},
+    {"ambiguous along it", RefusalKind::Bound::at_most, "", 2},
+    {"one and the same submap"},
+    {"neighbours", RefusalKind::Bound::at_least, "submaps apart"},
+    {"no reference pose"},
+    {"no keyframes near each other"},
+    {"distant places"},
+    {"inconsistent with the others"},
+}};
+
+constexpr const RefusalKind& kind_of(RefusalReason reason) {
+  return kRefusalKinds[static_cast<std::size_t>(reason) < kRefusalKinds.size() ? static_cast<std::size_t>(reason) : 0];
+}
+
+struct Refusal {
+  RefusalReason reason = RefusalReason::other;
+  double value = 0.0;  ///< In the reason's unit; 0, as the limit, when nothing is measured.
+  double limit = 0.0;
+  friend bool operator==(const Refusal&, const Refusal&) = default;
+};
+
+/// A value on its limit is never refused.
+constexpr bool is_measured(const Refusal& refusal) {
+  return kind_of(refusal.reason).bound != RefusalKind::Bound::none && refusal.value != refusal.limit;
+}
+
+/// "overlap: 0.16, at least 0.30 needed"
+inline std::string to_string(const Refusal& refusal) {
+  const auto& [words, bound, unit, digits] = kind_of(refusal.reason);
+  if (!is_measured(refusal)) return words;
+  const std::string_view after = *unit == '\0' ? "" : " ";
+  return fmt::format("{}: {:.{}f}{}{}, {} {:.{}f} {}", words, refusal.value, digits, after, unit,
+                     bound == RefusalKind::Bound::at_least ? "at least" : "at most", refusal.limit, digits,
+                     bound == RefusalKind::Bound::at_least ? "needed" : "allowed");
+}
+
+}  // namespace tutti

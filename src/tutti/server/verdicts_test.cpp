@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What MapServer makes of verdicts: which it believes, in which order, and what it keeps of them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "tutti/server/map_server.hpp"
+#include "tutti/server/testing/world.hpp"
+
+namespace tutti::server {
+namespace {
+
+using test::TestFinder;
+
+const std::set<RobotId> kRobots{RobotId{0}, RobotId{1}};
+
+SubmapMessage message_of(const Submap& submap) { return {.header = {.robot = submap.id.robot}, .submap = submap}; }
+
+/// Wants all pairs that are not neighbours and refuses them.
+class Refuser final : public ClosureFinder {
+ public:
+  explicit Refuser(std::uint32_t version = 1) : version_(version) {}
+  [[nodiscard]] std::uint32_t version() const override { return version_; }
+  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return first.id.robot != second.id.robot || second.id.index - first.id.index > 1;
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const CloudStore&) const override {
+    return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::overlap, 0.1, 0.3}, version_};
+  }
+
+ private:
+  std::uint32_t version_;
+};
+
+MapServer make_server(std::shared_ptr<const ClosureFinder> finder, MapServerState state = {}) {
+  return {kRobots, std::move(finder), std::make_shared<MemoryCloudStore>(), {}, std::move(state)};
+}
+
+/// Two keyframes a submap, the second that of the next one.
+Submap small_submap(RobotId robot, std::uint32_t index) {
+  Submap submap{.id = {robot, index}};
+  submap.keyframes = {{index, {1'000'000'000LL * (index + 1)}, {}, true},
+                      {index + 1, {1'000'000'000LL * (index + 2)}, {}, true}};
+  submap.odometry = {RelativePose{}};
+  return submap;
+}
+
+void send_small_submaps(MapServer& server, std::uint32_t from, std::uint32_t until) {
+  for (std::uint32_t i = from; i < until; ++i)
+    for (const RobotId robot : kRobots) ASSERT_TRUE(server.receive(message_of(small_submap(robot, i))).has_value());
+}
+
+ClosureVerdict answer(const ClosureFinder& finder, const VerificationJob& job) {
+  return *finder.verify(*job.first, *job.second, MemoryCloudStore());
+}
+
+std::set<SubmapPair> pairs_of(const std::vector<VerificationJob>& jobs) {
+  std::set<SubmapPair> pairs;
+  for (const VerificationJob& job : jobs) pairs.insert(job.pair);
+  return pairs;
+}
+
+std::size_t total(const RefusalCounts& counts) {
+  std::size_t sum = 0;
+  for (const auto& [reason, count] : counts) sum += count.intra + count.inter;
+  return sum;
+}
+
+template <class T>
+void shuffle(std::vector<T>& list, Rng& rng) {
+  for (std::size_t i = list.size(); i > 1; --i) std::swap(list[i - 1], list[rng.index(i)]);
+}
+
+class Verdicts : public testing::Test {
+ protected:
+  Verdicts() {
+    for (const RobotId robot : kRobots)
+      for (const Submap& submap : test::make_submaps(robot, {}, Rng(1).fork(robot.value))) submaps_.push_back(submap);
+    for (const Submap& submap : submaps_) EXPECT_TRUE(server_.receive(message_of(submap)).has_value());
+    jobs_ = server_.take_jobs();
+    good_ = answer(*finder_, jobs_.front());
+  }
+  std::shared_ptr<const TestFinder> finder_ = std::make_shared<const TestFinder>(1);
+  MapServer server_ = make_server(finder_);
+  std::vector<Submap> submaps_;
+  std::vector<VerificationJob> jobs_;
+  ClosureVerdict good_;
+};
+
+TEST_F(Verdicts, ThatDoNotBelongToTheirPairAreErrorsAndChangeNothing) {
+  server_.optimise();
+  const auto refused = [&](const char* word, auto corrupt) {
+    ClosureVerdict bad = good_;
+    corrupt(bad);
+    const Status status = server_.receive(bad);
+    ASSERT_FALSE(status.has_value()) << word;
+    EXPECT_NE(status.error().message.find(word), std::string::npos) << status.error().message;
+    EXPECT_FALSE(server_.has_news());
+    EXPECT_TRUE(server_.state().verdicts.empty());
+  };
+  using V = ClosureVerdict;
+  refused("first to be the smaller", [](V& v) { std::swap(v.pair.first, v.pair.second); });
+  refused("first to be the smaller", [](V& v) { v.pair.second = v.pair.first; });
+  refused("robot 7", [](V& v) { v.pair.second.robot = v.closures[0].to.robot = RobotId{7}; });
+  refused("from robot", [](V& v) { v.closures[0].from.robot = RobotId{7}; });
+  refused("to robot", [](V& v) { v.closures[0].to.robot = RobotId{7}; });
+  refused("keyframe 4711", [](V& v) { v.closures[0].from.index = 4711; });
+  refused("expected one of", [&](V& v) { v.closures[0].to.index = jobs_.front().second->keyframes.back().index + 1; });
+  refused("no pose", [](V& v) { v.closures[0].measurement.T_a_b.translation.x() = std::nan(""); });
+  refused("negative variance", [](V& v) { v.closures[0].measurement.covariance(3, 3) = -1.0; });
+  refused("not asked", [](V& v) { v = {{{RobotId{0}, 3}, {RobotId{0}, 4}}, {}, Refusal{}, 1}; });
+  refused("1 closures and a refusal", [](V& v) { v.refusal.emplace(); });
+  refused("0 closures without", [](V& v) { v.closures.clear(); });
+  ASSERT_TRUE(server_.receive(good_).has_value());
+  EXPECT_TRUE(server_.has_news());
+
+  MapServer restored = make_server(finder_, server_.state());
+  EXPECT_EQ(restored.take_jobs().size(), jobs_.size() - 1);  // the bad ones answered nothing
+}
+
+TEST_F(Verdicts, ANewerFinderReplacesAnOlderWhateverComesFirst) {
+  ClosureVerdict other = good_;
+  other.closures[0].measurement.T_a_b.translation.z() += 0.01;
+  const Refusal refusal{RefusalReason::misfit, 1.5, 1.2};
+  const auto of_version = [](ClosureVerdict verdict, std::uint32_t version) {
+    verdict.finder_version = version;
+    return verdict;
+  };
+  const ClosureVerdict no{good_.pair, {}, refusal, 2};
+  // The last one holds, however they are shuffled; the server's own finder is of version 2.
+  const std::vector<std::vector<ClosureVerdict>> cases = {
+      {of_version(other, 1), of_version(good_, 2)},
+      {of_version(good_, 2), of_version(other, 3)},
+      {of_version(good_, 1), no},
+      {no, of_version(good_, 3)},
+      {of_version(good_, 2), of_version(no, 3)},
+      {of_version(no, 1), of_version(other, 2), of_version(good_, 2)},  // of equals the one with smaller numbers
+      {of_version(good_, 2), of_version(other, 2), no},                 // and in doubt none
+      {of_version(good_, 3), of_version(other, 3), of_version(no, 3)},
+      {of_version(good_, 1), of_version(no, 2), of_version(no, 3), of_version(other, 4)}};
+  const auto finder = std::make_shared<const TestFinder>(1, 0, 2);
+  for (std::size_t c = 0; c < cases.size(); ++c) {
+    const ClosureVerdict& holds = cases[c].back();
+    for (std::uint64_t seed = 0; seed < 12; ++seed) {
+      Rng rng(seed);
+      std::vector<ClosureVerdict> order = cases[c];
+      order.push_back(order[rng.index(order.size())]);  // one of them twice
+      shuffle(order, rng);
+      MapServer server = make_server(finder);
+      for (const Submap& submap : submaps_) ASSERT_TRUE(server.receive(message_of(submap)).has_value());
+      for (const ClosureVerdict& verdict : order) ASSERT_TRUE(server.receive(verdict).has_value());
+      std::vector<LoopClosure> kept;
+      for (const auto& [pair, verdict] : server.state().verdicts)
+        kept.insert(kept.end(), verdict.closures.begin(), verdict.closures.end());
+      EXPECT_EQ(kept, holds.closures) << "case " << c << ", seed " << seed;
+      MapServer restored = make_server(finder, server.state());
+      EXPECT_FALSE(pairs_of(restored.take_jobs()).contains(good_.pair));
+    }
+  }
+}
+
+TEST_F(Verdicts, ThatOvertakeTheirSubmapsWaitForThem) {
+  MapServer in_order = make_server(finder_);
+  for (const Submap& submap : submaps_) ASSERT_TRUE(in_order.receive(message_of(submap)).has_value());
+  for (const VerificationJob& job : jobs_) ASSERT_TRUE(in_order.receive(answer(*finder_, job)).has_value());
+
+  MapServer overtaken = make_server(finder_);
+  ClosureVerdict bad = answer(*finder_, jobs_.back());
+  bad.closures[0].from.index = 4711;
+  for (const VerificationJob& job : jobs_)
+    ASSERT_TRUE(overtaken.receive(job.pair == bad.pair ? bad : answer(*finder_, job)).has_value());
+  EXPECT_TRUE(overtaken.state().verdicts.empty());
+  for (const Submap& submap : submaps_) ASSERT_TRUE(overtaken.receive(message_of(submap)).has_value());
+  const std::vector<Error> errors = overtaken.take_late_errors();
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_NE(errors.front().message.find("keyframe 4711"), std::string::npos) << errors.front().message;
+  const auto asked_again = overtaken.take_jobs();
+  ASSERT_EQ(pairs_of(asked_again), std::set{bad.pair});
+  ASSERT_TRUE(overtaken.receive(answer(*finder_, asked_again.front())).has_value());
+  EXPECT_EQ(overtaken.state().verdicts, in_order.state().verdicts);
+  EXPECT_EQ(overtaken.optimise().graph, in_order.optimise().graph);
+}
+
+TEST_F(Verdicts, NoMoreThanSoManyWait) {
+  ClosureVerdict early{{{RobotId{0}, 0}, {RobotId{1}, 10'000}}, {}, Refusal{}, 1};
+  for (std::size_t i = 0; i < MapServer::kMostWaiting; ++i, ++early.pair.second.index) {
+    ASSERT_TRUE(server_.receive(early).has_value());
+    ASSERT_TRUE(server_.receive(early).has_value());  // does not wait twice
+  }
+  const Status status = server_.receive(early);
+  ASSERT_FALSE(status.has_value());
+  EXPECT_NE(status.error().message.find("1000 verdicts wait"), std::string::npos) << status.error().message;
+  EXPECT_TRUE(server_.receive(good_).has_value());  // whose submaps are there
+}
+
+TEST(VerdictState, ARestoredServerAsksExactlyWhatWasNotAnswered) {
+  const auto finder = std::make_shared<const Refuser>();
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Rng rng(seed);
+    MapServer server = make_server(finder);
+    std::vector<VerificationJob> open;
+    for (std::uint32_t i = 0; i < 12; ++i) {
+      send_small_submaps(server, i, i + 1);
+      std::ranges::move(server.take_jobs(), std::back_inserter(open));
+      shuffle(open, rng);
+      const std::size_t left = rng.index(open.size() + 1);
+      for (; open.size() > left; open.pop_back()) ASSERT_TRUE(server.receive(answer(*finder, open.back())).has_value());
+    }
+    MapServer restored = make_server(finder, server.state());
+    EXPECT_EQ(pairs_of(restored.take_jobs()), pairs_of(open));
+    EXPECT_EQ(restored.refusals(), server.refusals());
+    const std::size_t pairs = 24 * 23 / 2 - 2 * 11;
+    EXPECT_EQ(total(restored.refusals()), pairs - open.size());
+  }
+}
+
+TEST(VerdictState, AnHoursRefusalsAreAFewNumbersPerSubmap) {
+  const auto finder = std::make_shared<const Refuser>();
+  MapServer server = make_server(finder);
+  std::size_t answered = 0;
+  for (std::uint32_t i = 0; i < 350; ++i) {
+    send_small_submaps(server, i, i + 1);
+    for (const VerificationJob& job : server.take_jobs()) {
+      ASSERT_TRUE(server.receive(answer(*finder, job)).has_value());
+      ++answered;
+    }
+  }
+  EXPECT_EQ(answered, 700U * 699U / 2U - 2U * 349U);  // 243,952
+  const MapServerState& state = server.state();
+  EXPECT_EQ(state.verdicts.size(), 0U);
+  EXPECT_EQ(state.answered.stretches_beyond(), 0U);
+  EXPECT_EQ(state.answered.watermark({RobotId{1}, 349}), 699U);
+  EXPECT_EQ(state.refused.at(RefusalReason::overlap).intra, 2U * (350U * 349U / 2U - 349U));
+  EXPECT_EQ(total(server.refusals()), answered);
+  EXPECT_TRUE(make_server(finder, state).take_jobs().empty());
+}
+
+TEST_F(Verdicts, ANewerFinderAsksAgainAndReplacesWhatTheOlderFound) {
+  const ClosureVerdict once_refused{jobs_[1].pair, {}, Refusal{RefusalReason::misfit, 1.5, 1.2}, 1};
+  ASSERT_TRUE(server_.receive(once_refused).has_value());
+  for (const VerificationJob& job : jobs_) ASSERT_TRUE(server_.receive(answer(*finder_, job)).has_value());
+  EXPECT_EQ(total(server_.refusals()), 1U);
+  const auto newer = std::make_shared<const TestFinder>(2, 0, 2);
+  MapServer restored = make_server(newer, server_.state());
+  EXPECT_EQ(restored.state().verdicts, server_.state().verdicts);  // the map stays as it was
+  EXPECT_TRUE(restored.refusals().empty());
+  auto again = restored.take_jobs();
+  EXPECT_EQ(pairs_of(again), pairs_of(jobs_));
+  for (const VerificationJob& job : jobs_) ASSERT_TRUE(restored.receive(answer(*finder_, job)).has_value());  // late
+  for (std::size_t i = 1; i < again.size(); ++i) ASSERT_TRUE(restored.receive(answer(*newer, again[i])).has_value());
+  MapServer twice = make_server(newer, restored.state());
+  EXPECT_EQ(pairs_of(twice.take_jobs()), std::set{again[0].pair});
+  const ClosureVerdict refusal{again[0].pair, {}, Refusal{RefusalReason::no_alignment}, 2};
+  ASSERT_TRUE(twice.receive(refusal).has_value());
+  EXPECT_FALSE(twice.state().verdicts.contains(again[0].pair));
+  for (const auto& [pair, verdict] : twice.state().verdicts) EXPECT_EQ(verdict.finder_version, 2U);
+  EXPECT_EQ(total(twice.refusals()), 1U);
+
+  const auto older = make_server(finder_, twice.state());  // and back: the newer answers stay
+  EXPECT_EQ(MapServer(older).take_jobs().size(), 0U);
+  EXPECT_EQ(older.state().verdicts, twice.state().verdicts);
+}
+
+}  // namespace
+}  // namespace tutti::server
