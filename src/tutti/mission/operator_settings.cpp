@@ -6,7 +6,7 @@
 namespace tutti::mission {
 
 std::span<const OperatorSetting> operator_settings() {
-  static constexpr std::array<OperatorSetting, 14> kSettings = {{
+  static constexpr std::array<OperatorSetting, 15> kSettings = {{
       {"duration_s", "The mission ends after this time, or with the last sample if 0."},
       {"association.max_difference_s",
        "An estimate is scored on the reference pose nearest in time, no farther from it than this."},
@@ -15,6 +15,7 @@ std::span<const OperatorSetting> operator_settings() {
        "wrong."},
       {"robots[].covariance.rotation_deg_per_sqrt_m", "The same in rotation."},
       {"agent.submap.duration_s", "A submap is sent after this time; odometry must not bend within it."},
+      {"agent.submap.distance_m", "... or after this way, whichever comes first."},
       {"agent.submap.voxel_m", "Clouds of submaps are thinned to voxels of this edge; it decides the bytes uplink."},
       {"agent.submap.max_range_m", "LiDAR points farther away than this are dropped."},
       {"agent.policy.name", "The rule by which a robot chooses constraints from the server's proxy graph."},

@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 
+#include "tutti/base/config_io.hpp"
 #include "tutti/mission/mission_config.hpp"
 
 namespace tutti::mission {
