@@ -104,8 +104,7 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
 
 std::size_t bytes_of(const SubmapFeatures& features) {
   const auto of_elements = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
-  std::size_t bytes = sizeof features + features.reason.capacity() + of_elements(features.view.walls) +
-                      of_elements(features.view.floors);
+  std::size_t bytes = sizeof features + of_elements(features.view.walls) + of_elements(features.view.floors);
   if (features.cloud.index) bytes += features.cloud.index->bytes();
   if (features.cloud.normals) bytes += of_elements(*features.cloud.normals);
   if (features.cloud.roughness) bytes += of_elements(*features.cloud.roughness);
