@@ -35,7 +35,7 @@ SmallMission make_mission() {
   EXPECT_TRUE(world.has_value());
   for (Recording& recording : world->recordings) {
     out.robots.insert(recording.robot);
-    robot::RobotAgent agent(recording.robot, 1, {}, Rng(1));
+    robot::RobotAgent agent(recording.robot, 0, {}, Rng(1));
     for (std::size_t i = 0; i < recording.odometry.size(); ++i)
       EXPECT_TRUE(agent
                       .add_odometry(recording.odometry[i].stamp, recording.odometry[i].pose,
@@ -59,7 +59,7 @@ server::MapEstimate final_map(server::MapServer& server) {
 
 /// Every message once, in order, verdicts at once.
 server::MapEstimate map_in_order(const SmallMission& mission) {
-  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {});
+  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {}, 1);
   for (const std::string& bytes : mission.uploads) {
     EXPECT_TRUE(server.receive(*wire::decode_submap(bytes)).has_value());
     for (const auto& job : server.take_jobs())
@@ -78,7 +78,7 @@ server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
     if (rng.bernoulli(0.2)) uploads.push_back(bytes);
   shuffle(uploads);
 
-  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {});
+  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {}, 1);
   std::vector<ClosureVerdict> late;
   const auto hand_in = [&](double share) {
     shuffle(late);

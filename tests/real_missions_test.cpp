@@ -30,8 +30,9 @@ const PolicyRecord& corrected(const MissionRecord& record, const RobotRecord& ro
 }
 
 std::size_t inter_robot(const MissionRecord& record) {
-  return static_cast<std::size_t>(std::count_if(record.server.closures.begin(), record.server.closures.end(),
-                                                [](const ClosureRecord& c) { return c.from.robot != c.to.robot; }));
+  return static_cast<std::size_t>(
+      std::count_if(record.server.closures.begin(), record.server.closures.end(),
+                    [](const ClosureRecord& c) { return c.from.chain.robot != c.to.chain.robot; }));
 }
 
 TEST(RealMissions, HkuTwoSessionsAreJoinedFromTheirScans) {

@@ -72,8 +72,8 @@ struct Difference {
 Difference difference_over_uncertainty(const MissionRecord& record, const RobotRecord& robot) {
   Trajectory server;
   for (const ProxyNode& node : record.server.proxy.nodes)
-    if (node.robot == robot.id) server.push_back({node.stamp, node.T_world_body});
-  const auto shape = std::ranges::find(record.server.proxy.shapes, robot.id, &ShapeUncertainty::robot);
+    if (node.chain.robot == robot.id) server.push_back({node.stamp, node.T_world_body});
+  const auto shape = std::ranges::find(record.server.proxy.shapes, ChainId(robot.id), &ShapeUncertainty::chain);
   const auto pairs = evaluation::associate(server, robot.odometry);
   const auto aligned = evaluation::ate(pairs);
   if (shape == record.server.proxy.shapes.end() || !aligned || pairs.size() != server.size()) {

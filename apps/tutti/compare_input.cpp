@@ -108,7 +108,7 @@ Result<CompareSide> load_g2o(const std::string& path, const std::string& stamps_
     edge_of.try_emplace({file->graph.edges[e].from, file->graph.edges[e].to}, e);
   std::map<RobotId, std::map<Timestamp, std::size_t>> robots;  // vertex by stamp
   for (std::size_t v = 0; v < stamps->size(); ++v)
-    if (!robots[(*stamps)[v].keyframe.robot].try_emplace((*stamps)[v].stamp, v).second)
+    if (!robots[(*stamps)[v].keyframe.chain.robot].try_emplace((*stamps)[v].stamp, v).second)
       return fail(ErrorCode::invalid, "{}: vertex {} has the stamp of another one of its robot", path,
                   file->vertex_ids[v]);
   if (robots.empty()) return fail(ErrorCode::invalid, "{}: holds no vertex, expected at least one", path);

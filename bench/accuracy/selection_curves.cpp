@@ -62,7 +62,7 @@ class Replay {
  public:
   Replay(const mission::MissionRecording& robot, robot::AgentConfig config, const std::string& policy,
          std::uint64_t seed)
-      : robot_(robot), agent_(robot.recording.robot, 1, named(config, policy), Rng(seed).fork(policy)) {}
+      : robot_(robot), agent_(robot.recording.robot, 0, named(config, policy), Rng(seed).fork(policy)) {}
 
   /// Everything up to this mission time; `with_scans` for the one whose submaps the server gets.
   void until(double time_s, bool with_scans) {
@@ -110,7 +110,7 @@ class Server {
       : voxel_m_(config.agent.submap.voxel_m),
         finder_(mission::make_closure_finder(config.closures, robots, seed)),
         clouds_(std::make_shared<server::MemoryCloudStore>()),
-        server_(ids(robots), finder_, clouds_, config.server) {}
+        server_(ids(robots), finder_, clouds_, config.server, 1) {}
 
   void receive(const std::vector<SubmapMessage>& messages) {
     for (const SubmapMessage& message : messages)
@@ -140,7 +140,7 @@ class Server {
 Trajectory server_estimate(const server::MapEstimate& map, RobotId robot) {
   Trajectory out;
   for (const auto& node : map.nodes)
-    if (node.id.robot == robot) out.push_back({node.stamp, node.T_world_body});
+    if (node.id.chain.robot == robot) out.push_back({node.stamp, node.T_world_body});
   return out;
 }
 
@@ -157,7 +157,7 @@ std::size_t wrong_closures(const server::MapEstimate& map, const std::vector<mis
   for (const auto& robot : robots) {
     std::map<Timestamp, KeyframeId> by_stamp;
     for (const auto& node : map.nodes)
-      if (node.id.robot == robot.recording.robot) by_stamp[node.stamp] = node.id;
+      if (node.id.chain.robot == robot.recording.robot) by_stamp[node.stamp] = node.id;
     for (const auto& pair :
          evaluation::associate(server_estimate(map, robot.recording.robot), robot.recording.reference, association))
       truth[by_stamp.at(pair.stamp)] = pair.reference;

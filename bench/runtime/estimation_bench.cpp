@@ -64,7 +64,7 @@ void odometry_trial(benchmark::State& state) {
   std::vector<OdometryChain> chains(2);
   std::vector<std::vector<Pose3>> truth(2);
   for (std::uint32_t robot = 0; robot < 2; ++robot) {
-    chains[robot] = {.robot = {robot}, .first_index = 0, .T_odom_body = {Pose3{}}, .step_covariance = {}};
+    chains[robot] = {.id = RobotId{robot}, .first_index = 0, .T_odom_body = {Pose3{}}, .step_covariance = {}};
     for (std::size_t k = 0; k <= kSteps; ++k) {
       const double angle = 4.0 * M_PI * static_cast<double>(k) / kSteps + robot;
       truth[robot].push_back({Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
@@ -82,8 +82,9 @@ void odometry_trial(benchmark::State& state) {
     const auto j = static_cast<std::size_t>(rng.index(kSteps));
     Pose3 T = retract(truth[0][i].inverse() * truth[1][j], noise(rng, 0.03, 0.01));
     if (k % 2 == 1) T = retract(T, noise(rng, 3.0, 0.5));
-    closures.push_back(
-        {{{0}, static_cast<std::uint32_t>(i)}, {{1}, static_cast<std::uint32_t>(j)}, {T, covariance(0.03, 0.01)}});
+    closures.push_back({{RobotId{0}, static_cast<std::uint32_t>(i)},
+                        {RobotId{1}, static_cast<std::uint32_t>(j)},
+                        {T, covariance(0.03, 0.01)}});
   }
   OdometryVerdict result;
   for (auto _ : state) result = try_odometry(chains, closures, {});

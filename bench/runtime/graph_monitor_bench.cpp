@@ -28,7 +28,7 @@ server::MapEstimate tunnel_map() {
   server::MapEstimate map = server::estimate_map(run.submaps, run.verdicts, {});
   const server::MapNode* last = nullptr;
   for (server::MapNode& node : map.nodes) {
-    node.representative = last == nullptr || last->id.robot != node.id.robot ||
+    node.representative = last == nullptr || last->id.chain != node.id.chain ||
                           (node.T_odom_body.translation - last->T_odom_body.translation).norm() >= 0.7;
     if (node.representative) last = &node;
   }

@@ -22,8 +22,8 @@ const LidarClosureConfig kConfig;
 const Walk kWalkA, kWalkB{.from = {10, 4.5, 1.5}, .to = {6, 4.5, 1.5}, .yaw_rad = 2.5, .tilt_rad = 0.15};
 
 struct Pair {
-  Submap a = make_submap({{0}, 0}, furnished_room(), kWalkA, Rng(1));
-  Submap b = make_submap({{1}, 0}, furnished_room(), kWalkB, Rng(2));
+  Submap a = make_submap({RobotId{0}, 0}, furnished_room(), kWalkA, Rng(1));
+  Submap b = make_submap({RobotId{1}, 0}, furnished_room(), kWalkB, Rng(2));
   SubmapFeatures features_a = extract_features(a, kConfig), features_b = extract_features(b, kConfig);
   Pose3 T_a_b = true_relative(kWalkA, kWalkB);
 };
@@ -101,7 +101,7 @@ void verify_same_room(benchmark::State& state) {
 BENCHMARK(verify_same_room)->Unit(benchmark::kMillisecond);
 
 void verify_other_room(benchmark::State& state) {
-  const auto other = extract_features(make_submap({{1}, 1}, other_room(), {.yaw_rad = 1.0}, Rng(4)), kConfig);
+  const auto other = extract_features(make_submap({RobotId{1}, 1}, other_room(), {.yaw_rad = 1.0}, Rng(4)), kConfig);
   PairVerification v;
   for (auto _ : state) benchmark::DoNotOptimize(v = verify_pair(pair().features_a, other, kConfig));
   state.counters["accepted"] = v.accepted;  // must be 0

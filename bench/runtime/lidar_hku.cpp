@@ -52,8 +52,10 @@ struct Judgement {
 };
 
 Judgement judge(const Sample& a, const Sample& b, const Options& options) {
-  const auto id = [](const Sample& s) { return fmt::format("{}/{}", s.submap.id.robot.value, s.submap.id.index); };
-  Judgement out{.name = id(a) + " " + id(b), .inter = a.submap.id.robot != b.submap.id.robot};
+  const auto id = [](const Sample& s) {
+    return fmt::format("{}/{}", s.submap.id.chain.robot.value, s.submap.id.index);
+  };
+  Judgement out{.name = id(a) + " " + id(b), .inter = a.submap.id.chain != b.submap.id.chain};
   out.overlaps = 0.5 * (true_overlap(a, b) + true_overlap(b, a)) > 0.3;
   const double start = cpu_ms();
   lidar::propose_alignments(a.features, b.features, options.config);
@@ -97,12 +99,12 @@ double joint_rmse(const std::vector<Sample>& samples, const std::vector<Judgemen
   };
   for (const auto& sample : samples)
     for (std::size_t k = 0; k < sample.submap.keyframes.size(); ++k) {
-      const KeyframeId id{sample.submap.id.robot, sample.submap.keyframes[k].index};
+      const KeyframeId id{sample.submap.id.chain, sample.submap.keyframes[k].index};
       if (node.try_emplace(id, graph.poses.size()).second) {  // else the previous submap's last
         graph.poses.push_back(sample.submap.keyframes[k].T_odom_body);
         reference.push_back(sample.reference[k].translation);
       }
-      if (k > 0) add({id.robot, id.index - 1}, id, sample.submap.odometry[k - 1]);
+      if (k > 0) add({id.chain, id.index - 1}, id, sample.submap.odometry[k - 1]);
     }
   std::vector<estimation::EdgeRole> roles(graph.edges.size(), estimation::EdgeRole::trusted);
   for (const auto& judgement : judgements)
@@ -170,7 +172,7 @@ void judge_pairs(const std::vector<Sample>& samples, const Session& bravo, const
   for (std::size_t i = 0; i < samples.size(); ++i)
     for (std::size_t j = i + 1; j < samples.size(); ++j) {
       const auto &a = samples[i], &b = samples[j];
-      if (a.submap.id.robot == b.submap.id.robot && j - i < 2) continue;
+      if (a.submap.id.chain == b.submap.id.chain && j - i < 2) continue;
       if (!a.features.usable || !b.features.usable) continue;
       all.push_back(judge(a, b, options));
       if (options.list) print(all.back());
@@ -214,8 +216,8 @@ void judge_negatives(const std::vector<Sample>& samples, bool mirror, const Opti
       const auto half_a = part(a, n, mirror ? kEverything : offset + kGap, false, options);
       const auto half_b = part(b, -n, mirror ? kEverything : -offset + kGap, mirror, options);
       if (!half_a.usable || !half_b.usable) continue;
-      Judgement judgement{.name = fmt::format("{}/{} {}/{}", a.submap.id.robot.value, a.submap.id.index,
-                                              b.submap.id.robot.value, b.submap.id.index)};
+      Judgement judgement{.name = fmt::format("{}/{} {}/{}", a.submap.id.chain.robot.value, a.submap.id.index,
+                                              b.submap.id.chain.robot.value, b.submap.id.index)};
       const double start = cpu_ms();
       judgement.verification = lidar::verify_pair(half_a, half_b, options.config);
       ms.push_back(judgement.verify_ms = cpu_ms() - start);

@@ -153,7 +153,7 @@ void run(const WorldOptions& options) {
   int far = 0;
   for (std::size_t i = 0; i < all.size(); ++i)
     for (std::size_t j = i + 1; j < all.size(); ++j)
-      if (all[i].submap.id.robot != all[j].submap.id.robot || j - i >= 2) judge(all[i], all[j], options, far, tally);
+      if (all[i].submap.id.chain != all[j].submap.id.chain || j - i >= 2) judge(all[i], all[j], options, far, tally);
   fmt::print("pairs {}: accepted {}, wrong {}; of those within 3 m {} of {}\n", tally.pairs, tally.accepted,
              tally.wrong, tally.near_accepted, tally.near);
   fmt::print("error median {:.3f} m {:.3f} deg, 95 % {:.3f} m {:.3f} deg; NEES median {:.1f} (5.3 when exact)\n",

@@ -357,7 +357,7 @@ TEST(Thresholds, OfShortRunsComeFromTheWhole) {
 }
 
 TEST(Thresholds, FewerThanTwoNodesNeverDisagree) {
-  const ShapeUncertainty shape{.robot = kAlpha, .whole = {0.01, 0.001}};
+  const ShapeUncertainty shape{.chain = kAlpha, .whole = {0.01, 0.001}};
   for (const std::size_t nodes : {0U, 1U}) {
     const auto poses = test::corridor(nodes);
     const ChainAgreement agreement(all_of(nodes), &shape, 1, {});

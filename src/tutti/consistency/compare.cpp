@@ -92,16 +92,16 @@ Comparison synchronised(const Synchronisation& sync) {
 
 }  // namespace
 
-Comparison synchronised(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes) {
-  return synchronised(synchronise(graph, robot, nodes));
+Comparison synchronised(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes) {
+  return synchronised(synchronise(graph, chain, nodes));
 }
 
-Comparison compare(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                    const CompareConfig& config) {
   const auto signal = make_signal(config.signal);
   TUTTI_CHECK(signal.has_value(), "signal '{}' is unknown", config.signal);
 
-  const Synchronisation sync = synchronise(graph, robot, nodes);
+  const Synchronisation sync = synchronise(graph, chain, nodes);
   Comparison out = synchronised(sync);
   out.disagreement = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sync.pairs.size()), config.scales);
   out.rotation_disagreement = out.disagreement;

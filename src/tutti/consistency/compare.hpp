@@ -46,7 +46,7 @@ struct Comparison {
 };
 
 /// Step 4 of the paper's section III alone: what most policies need, and a hundredth of the work.
-Comparison synchronised(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes);
+Comparison synchronised(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes);
 
 /// Section III of the paper, steps 4 and 5: synchronise, build the robot's own graph by the server's rule, filter both
 /// signals, d^s.
@@ -58,7 +58,7 @@ Comparison synchronised(const ProxyGraph& graph, RobotId robot, std::span<const 
 /// the gap in every scale, all along in the large ones. `missing_eliminated` and `unmatched_proxy` say so. Fewer than
 /// two pairs: disagreement is 0 for the pairs there are. Nodes without edges keep their whole signal in scale 0.
 /// `config.signal` must be known (checked).
-Comparison compare(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                    const CompareConfig& config);
 
 /// The core: two graphs over the same n nodes (Laplacians) with a signal each (n x d) -> n x scales. `lambda_max` must

@@ -23,35 +23,35 @@ double distrust(std::uint32_t support, const ConstraintConfig& config) {
   return std::pow(config.doubt, 1.0 - earned) * std::pow(config.trust, earned);
 }
 
-ConstraintMaker::ConstraintMaker(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+ConstraintMaker::ConstraintMaker(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                                  std::span<const NodePair> pairs, const ConstraintConfig& config)
     : revision_(graph.revision), config_(config) {
-  std::vector<std::size_t> chain;  // this robot's proxy nodes in time order
+  std::vector<std::size_t> own;  // this chain's proxy nodes in time order
   for (std::size_t i = 0; i < graph.nodes.size(); ++i)
-    if (graph.nodes[i].robot == robot) chain.push_back(i);
-  std::stable_sort(chain.begin(), chain.end(),
+    if (graph.nodes[i].chain == chain) own.push_back(i);
+  std::stable_sort(own.begin(), own.end(),
                    [&](std::size_t a, std::size_t b) { return graph.nodes[a].stamp < graph.nodes[b].stamp; });
   nodes_.reserve(pairs.size());
-  if (chain.empty()) return;
+  if (own.empty()) return;
 
   // In the frame of the first proxy node the stretches' covariances simply add; make() moves the difference of two sums
   // to the frame of the constraint. Equal to compounding from node to node, without the loop.
-  const Pose3 T_start_world = graph.nodes[chain[0]].T_world_body.inverse();
+  const Pose3 T_start_world = graph.nodes[own[0]].T_world_body.inverse();
   Matrix6d sum = Matrix6d::Zero();
   std::size_t pair = 0;
-  for (std::size_t rank = 0; rank < chain.size(); ++rank) {
-    const ProxyNode& node = graph.nodes[chain[rank]];
+  for (std::size_t rank = 0; rank < own.size(); ++rank) {
+    const ProxyNode& node = graph.nodes[own[rank]];
     const Pose3 T_start_body = T_start_world * node.T_world_body;
     const double factor = distrust(node.support, config);
     if (rank > 0) sum += moved(T_start_body, factor * factor * node.covariance);
     support_.push_back(node.support);
-    if (pair < pairs.size() && pairs[pair].proxy == chain[rank]) {
+    if (pair < pairs.size() && pairs[pair].proxy == own[rank]) {
       nodes_.push_back({node.stamp, nodes[pairs[pair].robot].chain_index, T_start_body, sum, rank});
       ++pair;
     }
   }
   TUTTI_CHECK(pair == pairs.size(), "{} of {} pairs are nodes of robot {} in time order", pair, pairs.size(),
-              robot.value);
+              to_string(chain));
 }
 
 Constraint ConstraintMaker::make(std::size_t a, std::size_t b, ConstraintKind kind) const {

@@ -73,7 +73,7 @@ inline bool is_doubtful(const Constraint& constraint, const ConstraintConfig& co
 /// constraint after O(n) preparation, but for the least support. Keeps copies only; the arguments may go.
 class ConstraintMaker {
  public:
-  ConstraintMaker(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+  ConstraintMaker(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                   std::span<const NodePair> pairs, const ConstraintConfig& config);
 
   /// Between pairs a and b (positions in `pairs`), a != b; the result runs from the earlier to the later.

@@ -27,12 +27,12 @@ int scale_of(const ChainAgreement& test, double nodes) {
 
 }  // namespace
 
-Explanation explain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+Explanation explain(const ProxyGraph& graph, const ChainId& id, std::span<const RobotNode> nodes,
                     std::span<const NodePair> pairs, std::uint64_t update, const AgreementConfig& config) {
   Explanation out;
   if (pairs.size() < 2) return out;
-  const internal::TimeChain chain = internal::time_chain(graph, robot, nodes, pairs);
-  const ShapeUncertainty* shape = internal::shape_of(graph, robot);
+  const internal::TimeChain chain = internal::time_chain(graph, id, nodes, pairs);
+  const ShapeUncertainty* shape = internal::shape_of(graph, id);
   const ChainAgreement test(chain.ranks, shape, update, config);
   const std::vector<Pose3> odometry = composed(chain.odometry);
   ChainDisagreement raw = test.compare(chain.server, odometry);

@@ -64,7 +64,7 @@ struct Explanation {
 
 /// Compares raw odometry with the server's map along the synchronised nodes `pairs` (ChainAgreement) and looks for
 /// where the difference was born. `update` counts from 1. Fewer than 2 pairs: empty.
-Explanation explain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+Explanation explain(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                     std::span<const NodePair> pairs, std::uint64_t update, const AgreementConfig& config);
 
 }  // namespace tutti::consistency

@@ -98,7 +98,7 @@ TEST(Explanation, TranslationAndRotationAreThoseOfTheRelativePose) {
       for (const RobotNode& node : s.nodes)
         if (node.stamp > origin.from && node.stamp <= origin.until) T_from_until = T_from_until * node.odometry.T_a_b;
       for (const ProxyNode& node : s.graph.nodes) {
-        if (node.robot != test::kBravo || node.stamp < origin.from || node.stamp > origin.until) continue;
+        if (node.chain.robot != test::kBravo || node.stamp < origin.from || node.stamp > origin.until) continue;
         if (node.stamp == origin.from) from = &node.T_world_body;
         if (node.stamp == origin.until) until = &node.T_world_body;
         if (last != nullptr) length += (node.T_world_body.translation - last->translation).norm();

@@ -77,12 +77,12 @@ LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& 
   return counts;
 }
 
-std::size_t Ledger::withdraw_unknown(const ProxyGraph& graph, RobotId robot) {
+std::size_t Ledger::withdraw_unknown(const ProxyGraph& graph, const ChainId& chain) {
   std::set<Timestamp> known;
   for (const ProxyNode& node : graph.nodes)
-    if (node.robot == robot) known.insert(node.stamp);
+    if (node.chain == chain) known.insert(node.stamp);
   for (const EliminatedNode& node : graph.eliminated)
-    if (node.robot == robot) known.insert(node.stamp);
+    if (node.chain == chain) known.insert(node.stamp);
   return std::erase_if(
       constraints_, [&](const Constraint& c) { return !known.contains(c.from_stamp) || !known.contains(c.to_stamp); });
 }

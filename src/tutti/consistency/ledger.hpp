@@ -53,7 +53,7 @@ class Ledger {
 
   /// Withdraws every constraint with an end that this proxy graph does not know of (any more): neither among its nodes
   /// nor among those that its reduction removed. Returns how many.
-  std::size_t withdraw_unknown(const ProxyGraph& graph, RobotId robot);
+  std::size_t withdraw_unknown(const ProxyGraph& graph, const ChainId& chain);
 
   friend bool operator==(const Ledger&, const Ledger&) = default;
 

@@ -106,7 +106,7 @@ TEST(Ledger, ReplacingAllRemovesWhatIsNotChosenAndKeepsWhatIs) {
 ProxyGraph graph_of(const std::vector<std::size_t>& kept, const std::vector<std::size_t>& eliminated,
                     RobotId robot = test::kAlpha) {
   ProxyGraph graph;
-  for (const std::size_t n : kept) graph.nodes.push_back({.robot = robot, .stamp = test::stamp_of(n)});
+  for (const std::size_t n : kept) graph.nodes.push_back({.chain = robot, .stamp = test::stamp_of(n)});
   for (const std::size_t n : eliminated) graph.eliminated.push_back({robot, test::stamp_of(n)});
   return graph;
 }

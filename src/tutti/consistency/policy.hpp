@@ -20,7 +20,7 @@ namespace tutti::consistency {
 /// Everything a policy may look at. References live only for the call.
 struct PolicyInput {
   const ProxyGraph& graph;
-  RobotId robot;
+  ChainId chain;
   std::span<const RobotNode> nodes;
   const Comparison& comparison;  ///< Only synchronised unless needs_disagreement().
   /// How many constraints the robot may hold after this update; existing ones are counted, never taken away by a policy

@@ -20,7 +20,7 @@ struct RobotRange {
 std::vector<RobotRange> robot_ranges(const std::vector<ServerNode>& nodes) {
   std::vector<RobotRange> ranges;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (i == 0 || nodes[i].robot != nodes[i - 1].robot) ranges.push_back({i, i});
+    if (i == 0 || nodes[i].chain != nodes[i - 1].chain) ranges.push_back({i, i});
     ranges.back().end = i + 1;
   }
   return ranges;
@@ -78,11 +78,11 @@ void append_reduced(ProxyGraph& graph, const std::vector<ServerNode>& nodes, Rob
     }
     if (next < kept.size() && kept[next] == i) {
       ++next;
-      graph.nodes.push_back({node.robot, node.stamp, node.T_world_body, covariance, i > 0 ? support : node.support});
+      graph.nodes.push_back({node.chain, node.stamp, node.T_world_body, covariance, i > 0 ? support : node.support});
       covariance = Matrix6d::Zero();
       support = ~0U;
     } else {
-      graph.eliminated.push_back({node.robot, node.stamp});
+      graph.eliminated.push_back({node.chain, node.stamp});
     }
   }
   for (int column = 0; column < reduced.outerSize(); ++column)
@@ -95,15 +95,15 @@ void append_reduced(ProxyGraph& graph, const std::vector<ServerNode>& nodes, Rob
 }  // namespace
 
 ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
-                             std::vector<RobotComponent> components, const ProxyGraphConfig& config) {
+                             std::vector<ChainComponent> components, const ProxyGraphConfig& config) {
   std::sort(nodes.begin(), nodes.end(), [](const ServerNode& a, const ServerNode& b) {
-    return std::pair(a.robot, a.stamp) < std::pair(b.robot, b.stamp);
+    return std::pair(a.chain, a.stamp) < std::pair(b.chain, b.stamp);
   });
   for (std::size_t i = 1; i < nodes.size(); ++i)
-    TUTTI_CHECK(nodes[i - 1].robot != nodes[i].robot || nodes[i - 1].stamp != nodes[i].stamp, "robot {} stamp {} twice",
-                nodes[i].robot.value, nodes[i].stamp.ns);
+    TUTTI_CHECK(nodes[i - 1].chain != nodes[i].chain || nodes[i - 1].stamp != nodes[i].stamp, "robot {} stamp {} twice",
+                to_string(nodes[i].chain), nodes[i].stamp.ns);
   std::sort(components.begin(), components.end(),
-            [](const RobotComponent& a, const RobotComponent& b) { return a.robot < b.robot; });
+            [](const ChainComponent& a, const ChainComponent& b) { return a.chain < b.chain; });
 
   ProxyGraph graph{.revision = revision, .radius_m = config.radius_m, .sigma_m = config.sigma_m};
   graph.components = std::move(components);
@@ -113,7 +113,7 @@ ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nod
   const auto budget = static_cast<std::size_t>(config.node_budget);
   if (budget == 0 || nodes.size() <= budget) {
     for (const ServerNode& node : nodes)
-      graph.nodes.push_back({node.robot, node.stamp, node.T_world_body, node.covariance, node.support});
+      graph.nodes.push_back({node.chain, node.stamp, node.T_world_body, node.covariance, node.support});
     return graph;
   }
   graph.reduced = true;

@@ -12,10 +12,10 @@ namespace tutti::consistency {
 
 /// A representative node that the server keeps a reference to, with its latest estimate.
 struct ServerNode {
-  RobotId robot;
+  ChainId chain;
   Timestamp stamp;
   Pose3 T_world_body;
-  /// Of this pose relative to the same robot's previous ServerNode (right tangent); ignored for the first.
+  /// Of this pose relative to the same chain's previous ServerNode (right tangent); ignored for the first.
   Matrix6d covariance = Matrix6d::Zero();
   std::uint32_t support = 0;  ///< Independent closures that support the stretch from the previous node to this one.
 };
@@ -55,14 +55,14 @@ struct ProxyGraphConfig {
   }
 };
 
-/// What the graph monitor broadcasts: nodes sorted by (robot, stamp); whatever order `nodes` came in, the result is the
-/// same. A repeated (robot, stamp) is our own mistake (checked).
+/// What the graph monitor broadcasts: nodes sorted by (chain, stamp); whatever order `nodes` came in, the result is the
+/// same. A repeated (chain, stamp) is our own mistake (checked).
 ///
-/// Reduction (only above the budget) is done per robot on the subgraph induced by that robot's nodes, so that the robot
+/// Reduction (only above the budget) is done per chain on the subgraph induced by that chain's nodes, so that the robot
 /// can repeat it on its own estimate: Schur complement of the Laplacian (eq. 3), then sparsified. The budget is shared
-/// between the robots in proportion to their nodes, at least two each (one if the robot has one node). The covariance
+/// between the chains in proportion to their nodes, at least two each (one if the chain has one node). The covariance
 /// of a kept node is compounded over the removed nodes before it, its support the smallest of them.
 ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
-                             std::vector<RobotComponent> components, const ProxyGraphConfig& config);
+                             std::vector<ChainComponent> components, const ProxyGraphConfig& config);
 
 }  // namespace tutti::consistency

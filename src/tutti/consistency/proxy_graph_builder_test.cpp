@@ -21,8 +21,8 @@ std::vector<ServerNode> two_robots(std::size_t alpha, std::size_t bravo) {
 }
 
 std::size_t nodes_of(const ProxyGraph& graph, RobotId robot) {
-  return static_cast<std::size_t>(
-      std::count_if(graph.nodes.begin(), graph.nodes.end(), [&](const ProxyNode& n) { return n.robot == robot; }));
+  return static_cast<std::size_t>(std::count_if(graph.nodes.begin(), graph.nodes.end(),
+                                                [&](const ProxyNode& n) { return n.chain.robot == robot; }));
 }
 
 TEST(ProxyGraphBuilder, EmptyAndSingle) {
@@ -59,8 +59,9 @@ RC_GTEST_PROP(ProxyGraphBuilder, MeetsTheBudgetAndKeepsTheEnds, ()) {
     RC_ASSERT(static_cast<double>(kept) <=
               static_cast<double>(expected * all) / static_cast<double>(alpha + bravo) + 2);
     for (const std::size_t end : {std::size_t{0}, all - 1})
-      RC_ASSERT(std::any_of(graph.nodes.begin(), graph.nodes.end(),
-                            [&](const ProxyNode& n) { return n.robot == robot && n.stamp == test::stamp_of(end); }));
+      RC_ASSERT(std::any_of(graph.nodes.begin(), graph.nodes.end(), [&](const ProxyNode& n) {
+        return n.chain.robot == robot && n.stamp == test::stamp_of(end);
+      }));
   }
 }
 
@@ -82,7 +83,7 @@ TEST(ProxyGraphBuilder, EdgesStayWithinARobotAndArePositive) {
   for (const ProxyEdge& edge : graph.edges) {
     EXPECT_LT(edge.a, edge.b);
     ASSERT_LT(edge.b, graph.nodes.size());
-    EXPECT_EQ(graph.nodes[edge.a].robot, graph.nodes[edge.b].robot);
+    EXPECT_EQ(graph.nodes[edge.a].chain, graph.nodes[edge.b].chain);
     EXPECT_GT(edge.weight, 0.0);
   }
 }
@@ -112,7 +113,7 @@ TEST(ProxyGraphBuilder, ThePapersReducerKeepsTheEndsToo) {
   EXPECT_FALSE(graph.eliminated.empty());
   for (const RobotId robot : {kAlpha, kBravo})
     EXPECT_TRUE(std::any_of(graph.nodes.begin(), graph.nodes.end(), [&](const ProxyNode& n) {
-      return n.robot == robot && n.stamp == test::stamp_of(robot == kAlpha ? 79 : 59);
+      return n.chain.robot == robot && n.stamp == test::stamp_of(robot == kAlpha ? 79 : 59);
     }));
 }
 

@@ -40,10 +40,10 @@ std::vector<Stamped> merge(const std::vector<Stamped>& a, const std::vector<Stam
 
 }  // namespace
 
-Synchronisation synchronise(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes) {
-  const auto of_robot = [robot](const auto& node) { return node.robot == robot; };
-  const auto proxy = by_stamp(graph.nodes, of_robot);
-  const auto removed = by_stamp(graph.eliminated, of_robot);
+Synchronisation synchronise(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes) {
+  const auto of_chain = [&chain](const auto& node) { return node.chain == chain; };
+  const auto proxy = by_stamp(graph.nodes, of_chain);
+  const auto removed = by_stamp(graph.eliminated, of_chain);
   const auto ours = by_stamp(nodes, [](const RobotNode&) { return true; });
 
   Synchronisation out;

@@ -27,6 +27,6 @@ struct Synchronisation {
 
 /// Chronological matching by (robot, stamp), stamps exactly equal: the robot makes the stamps and they travel
 /// unchanged. A stamp that occurs more than once on a side is matched once per occurrence on the other, first to first.
-Synchronisation synchronise(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes);
+Synchronisation synchronise(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes);
 
 }  // namespace tutti::consistency

@@ -17,7 +17,7 @@ using test::kAlpha, test::kBravo;
 
 ProxyGraph graph_with(const std::vector<std::pair<RobotId, std::int64_t>>& stamps) {
   ProxyGraph graph;
-  for (const auto& [robot, ns] : stamps) graph.nodes.push_back({.robot = robot, .stamp = {ns}});
+  for (const auto& [robot, ns] : stamps) graph.nodes.push_back({.chain = robot, .stamp = {ns}});
   return graph;
 }
 

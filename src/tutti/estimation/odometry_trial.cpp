@@ -51,8 +51,8 @@ class OdometryTrial::Implementation {
     for (std::size_t c = 0; c < chains_.size(); ++c) {
       const OdometryChain& chain = chains_[c];
       std::vector<Cut> cuts;
-      for (const auto& [robot, from, to] : failed)
-        if (robot == chain.robot && from >= chain.first_index && from - chain.first_index < chain.T_odom_body.size())
+      for (const auto& [id, from, to] : failed)
+        if (id == chain.id && from >= chain.first_index && from - chain.first_index < chain.T_odom_body.size())
           cuts.push_back({from - chain.first_index, to - chain.first_index});
       std::ranges::sort(cuts);
       if (cuts != cells_.cuts(c)) cells_.set_cuts(c, std::move(cuts));
@@ -63,7 +63,7 @@ class OdometryTrial::Implementation {
     for (const std::size_t position : accepted()) verdict.accepted[position] = true;
     for (std::size_t c = 0; c < chains_.size(); ++c)
       for (const Cut& cut : cells_.cuts(c))
-        verdict.failed.push_back({chains_[c].robot, chains_[c].first_index + static_cast<std::uint32_t>(cut.from),
+        verdict.failed.push_back({chains_[c].id, chains_[c].first_index + static_cast<std::uint32_t>(cut.from),
                                   chains_[c].first_index + static_cast<std::uint32_t>(cut.to)});
     std::ranges::sort(verdict.failed);
     return verdict;
@@ -140,7 +140,7 @@ class OdometryTrial::Implementation {
   [[nodiscard]] bool is_ambiguous(const Charge& charge, const Evidence& found,
                                   const std::vector<Charge>& charges) const {
     return std::ranges::any_of(charges, [&](const Charge& other) {
-      if (chains_[other.chain].robot == chains_[charge.chain].robot) return false;
+      if (chains_[other.chain].id == chains_[charge.chain].id) return false;
       Charge measured = other;
       prosecution_.measure_jump(measured);
       const Evidence rival = prosecution_.evidence(measured);

@@ -14,9 +14,9 @@
 
 namespace tutti::estimation {
 
-/// Odometry of one robot without a gap. A robot may have several, which do not overlap.
+/// Odometry of one chain without a gap: a piece of it. A chain may have several, which do not overlap.
 struct OdometryChain {
-  RobotId robot;
+  ChainId id;
   std::uint32_t first_index = 0;          ///< KeyframeId::index of T_odom_body[0]; the others count up from it.
   std::vector<Pose3> T_odom_body;         ///< Raw odometry.
   std::vector<Matrix6d> step_covariance;  ///< Of keyframe k -> k + 1 (right tangent); one fewer than poses.
@@ -61,9 +61,9 @@ struct OdometryTrialConfig {
 /// Size of a failure in metres: 0.2 rad count as one.
 inline double failure_size(double translation_m, double rotation_rad) { return translation_m + 5.0 * rotation_rad; }
 
-/// Odometry between two keyframes of one robot that is not to be believed.
+/// Odometry between two keyframes of one chain that is not to be believed.
 struct OdometryStretch {
-  RobotId robot;
+  ChainId chain;
   std::uint32_t from = 0;  ///< KeyframeId::index
   std::uint32_t to = 0;
   friend auto operator<=>(const OdometryStretch&, const OdometryStretch&) = default;
@@ -71,7 +71,7 @@ struct OdometryStretch {
 
 struct OdometryVerdict {
   std::vector<bool> accepted;           ///< Per closure.
-  std::vector<OdometryStretch> failed;  ///< By (robot, from).
+  std::vector<OdometryStretch> failed;  ///< By (chain, from).
 };
 
 /// Decides between closures and odometry that contradict each other (docs/math.md, "Who is wrong?").
@@ -82,7 +82,7 @@ struct OdometryVerdict {
 /// the odometry between their ends. A stretch of odometry is convicted when letting it go makes enough more closures,
 /// at enough different places, agree; the two pieces then are chains of their own. Stretches are convicted one after
 /// the other, the one that explains most first.
-/// Does not depend on the order of the input. Closures that name an unknown robot or keyframe, or carry NaN or a
+/// Does not depend on the order of the input. Closures that name an unknown chain or keyframe, or carry NaN or a
 /// covariance that is not positive definite, are never accepted.
 class OdometryTrial {
  public:

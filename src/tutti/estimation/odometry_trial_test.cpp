@@ -25,7 +25,7 @@ struct RobotRun {
 /// A robot on a circle of 8 m, twice round, with random-walk odometry; its odom frame is anywhere.
 RobotRun drifting_run(Rng& rng, RobotId robot, std::size_t steps, double sigma_m, double sigma_rad) {
   RobotRun run{.truth = {},
-               .chain = {.robot = robot, .first_index = 10, .T_odom_body = {random_pose(rng)}, .step_covariance = {}}};
+               .chain = {.id = robot, .first_index = 10, .T_odom_body = {random_pose(rng)}, .step_covariance = {}}};
   const double phase = rng.uniform(0.0, 6.0);
   for (std::size_t k = 0; k <= steps; ++k) {
     const double angle = phase + 4.0 * 3.14159265358979 * static_cast<double>(k) / static_cast<double>(steps);
@@ -45,8 +45,8 @@ LoopClosure closure(Rng& rng, const RobotRun& a, std::size_t i, const RobotRun& 
                     const Pose3& wrong_by = {}) {
   const Matrix6d covariance = random_covariance(rng, 0.03, 0.01);
   const Pose3 exact = a.truth[i].inverse() * b.truth[j] * wrong_by;
-  return {.from = {a.chain.robot, static_cast<std::uint32_t>(10 + i)},
-          .to = {b.chain.robot, static_cast<std::uint32_t>(10 + j)},
+  return {.from = {a.chain.id, static_cast<std::uint32_t>(10 + i)},
+          .to = {b.chain.id, static_cast<std::uint32_t>(10 + j)},
           .measurement = {retract(exact, sample(rng, covariance)), covariance}};
 }
 
@@ -151,7 +151,7 @@ TEST(OdometryTrial, LeavesOutWhatItCannotUse) {
   const RobotRun a = drifting_run(rng, kAlpha, 20, 0.01, 0.001);
   const RobotRun b = drifting_run(rng, kBravo, 20, 0.01, 0.001);
   std::vector<LoopClosure> closures(6, closure(rng, a, 3, b, 4));
-  closures[1].to.robot = RobotId{77};
+  closures[1].to.chain = RobotId{77};
   closures[2].to.index = 500;
   closures[3].measurement.T_a_b.translation.x() = std::numeric_limits<double>::quiet_NaN();
   closures[4].measurement.covariance(2, 2) = -1.0;
@@ -164,7 +164,7 @@ TEST(OdometryTrial, LeavesOutWhatItCannotUse) {
 
 /// One robot walks 20 m squares; from step 100 on its odometry is off by 2 m and 20 degrees and does not know.
 RobotRun failing_run(Rng& rng) {
-  RobotRun run{.truth = {}, .chain = {.robot = kAlpha, .first_index = 10}};
+  RobotRun run{.truth = {}, .chain = {.id = kAlpha, .first_index = 10}};
   const Matrix6d covariance = random_covariance(rng, 0.01, 0.001);
   for (int k = 0; k <= 200; ++k) {
     const double s = std::fmod(k, 80.0);
@@ -201,7 +201,7 @@ TEST(OdometryTrial, ALoneClosureConvictsItselfManyConvictTheOdometry) {
 
   const auto many = try_odometry(chains, closures_over(rng, run, 12), {});
   ASSERT_EQ(many.failed.size(), 1U);
-  EXPECT_EQ(many.failed[0].robot, kAlpha);
+  EXPECT_EQ(many.failed[0].chain, ChainId(kAlpha));
   EXPECT_LE(many.failed[0].from, 10U + 100U);
   EXPECT_GE(many.failed[0].to, 10U + 101U);
   EXPECT_LE(many.failed[0].to - many.failed[0].from, 30U);

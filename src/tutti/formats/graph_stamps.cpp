@@ -43,7 +43,7 @@ Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const
     if (!stamp_ns) return tl::unexpected(stamp_ns.error());
     if (!internal::is_in_range({*stamp_ns}))
       return line.fail(ErrorCode::invalid, "stamp_ns is {}, expected at most 2^61 either way", *stamp_ns);
-    out.push_back({*id, {{*robot}, *keyframe}, {*stamp_ns}});
+    out.push_back({*id, {RobotId{*robot}, *keyframe}, {*stamp_ns}});
   }
   return out;
 }

@@ -10,8 +10,8 @@ TEST(GraphStamps, ReadsWhatAMissionWrites) {
   const auto stamps = parse_graph_stamps("id,robot,keyframe,stamp_ns\n0,1,0,1700000000123456789\n7,2,3,-5\n", "x");
   ASSERT_TRUE(stamps) << stamps.error().message;
   ASSERT_EQ(stamps->size(), 2U);
-  EXPECT_EQ((*stamps)[0], (VertexStamp{0, {{1}, 0}, {1'700'000'000'123'456'789}}));
-  EXPECT_EQ((*stamps)[1], (VertexStamp{7, {{2}, 3}, {-5}}));
+  EXPECT_EQ((*stamps)[0], (VertexStamp{0, {RobotId{1}, 0}, {1'700'000'000'123'456'789}}));
+  EXPECT_EQ((*stamps)[1], (VertexStamp{7, {RobotId{2}, 3}, {-5}}));
   EXPECT_TRUE(parse_graph_stamps("", "x")->empty());
 }
 

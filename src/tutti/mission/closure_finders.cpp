@@ -18,7 +18,7 @@ LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, 
 std::uint32_t LidarClosureFinder::version() const { return lidar::kFinderVersion; }
 
 bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  return first.id.robot != second.id.robot || second.id.index - first.id.index >= min_submap_gap_;  // first < second
+  return first.id.chain != second.id.chain || second.id.index - first.id.index >= min_submap_gap_;  // first < second
 }
 
 Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Submap& second,

@@ -102,13 +102,13 @@ ProxyGraph proxy_graph(const std::vector<Node>& nodes, const CompareTrajectories
   covariance.diagonal().tail<3>().setConstant(share * sigma.rotation_rad * sigma.rotation_rad);
   ProxyGraph graph{.revision = 1};
   for (const Node& node : nodes)
-    graph.nodes.push_back({.robot = kRobot,
+    graph.nodes.push_back({.chain = kRobot,
                            .stamp = node.pair.stamp,
                            .T_world_body = node.pair.reference,
                            .covariance = graph.nodes.empty() ? Matrix6d(Matrix6d::Zero()) : covariance,
                            .support = kFullySupported});
   graph.components = {{kRobot, 0}};
-  ShapeUncertainty shape{.robot = kRobot, .whole = sigma, .sag = {}};
+  ShapeUncertainty shape{.chain = kRobot, .whole = sigma, .sag = {}};
   while (const std::size_t count = ShapeUncertainty::stretches(nodes.size(), shape.sag.size()))
     shape.sag.emplace_back(count, sigma);
   graph.shapes = {shape};

@@ -40,11 +40,13 @@ Result<std::shared_ptr<DiskCloudStore>> DiskCloudStore::open(const fs::path& fol
 }
 
 fs::path DiskCloudStore::file_of(SubmapId id) const {
-  return folder_ / fmt::format("{}_{}.cloud", id.robot.value, id.index);
+  const auto& [robot, session] = id.chain;
+  return folder_ / (session == 0 ? fmt::format("{}_{}.cloud", robot.value, id.index)
+                                 : fmt::format("{}_{}_{}.cloud", robot.value, session, id.index));
 }
 
 Status DiskCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) {
-  TUTTI_CHECK(cloud != nullptr, "submap {}/{} without a cloud", id.robot.value, id.index);
+  TUTTI_CHECK(cloud != nullptr, "submap {} without a cloud", to_string(id));
   if (const Status valid = wire::validate(*cloud); !valid) return valid;
   const std::string bytes = wire::encode(*cloud, codec_);
   const fs::path file = file_of(id);
@@ -71,7 +73,7 @@ Result<std::shared_ptr<const PointCloud>> DiskCloudStore::get(SubmapId id) const
     if (auto found = recent_.find(id)) return found;
   }
   const fs::path file = file_of(id);
-  const std::string what = fmt::format("cloud of submap {}/{}: {}", id.robot.value, id.index, file.string());
+  const std::string what = fmt::format("cloud of submap {}: {}", to_string(id), file.string());
   std::ifstream in(file, std::ios::binary);
   if (!in) return fail(ErrorCode::io, "{}: cannot be opened", what);
   std::ostringstream bytes;

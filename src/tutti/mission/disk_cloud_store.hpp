@@ -13,7 +13,8 @@
 
 namespace tutti::mission {
 
-/// Clouds as files of one folder, "<robot>_<index>.cloud", in the coding of the wire: a cloud that came over the wire
+/// Clouds as files of one folder, "<robot>_<index>.cloud" of session 0 and
+/// "<robot>_<session>_<index>.cloud" of others, in the coding of the wire: a cloud that came over the wire
 /// with the same CloudCodec comes back to the bit. Files are written aside, brought to disk and renamed, so that what
 /// is there is whole, and what put() has taken is there, even when the machine stops. Of the clouds used last a few
 /// stay in memory.

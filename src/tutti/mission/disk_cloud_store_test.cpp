@@ -73,6 +73,13 @@ TEST_F(DiskCloudStoreTest, GivesBackTheSamePointsFromMemoryAndFromAnotherProcess
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
 }
 
+TEST_F(DiskCloudStoreTest, KeepsTheSessionsOfARobotApart) {
+  const std::vector<SubmapId> ids{{RobotId{1}, 23}, {{RobotId{1}, 2}, 3}, {{RobotId{1}, 23}, 0}, {RobotId{12}, 3}};
+  const auto store = open(1);
+  for (std::size_t i = 0; i < ids.size(); ++i) ASSERT_TRUE(store->put(ids[i], some_cloud(i, i + 1)).has_value());
+  for (std::size_t i = 0; i < ids.size(); ++i) EXPECT_EQ((*open()->get(ids[i]))->points.size(), i + 1);
+}
+
 TEST_F(DiskCloudStoreTest, MissingTruncatedAndForeignFilesAreErrorsThatNameTheSubmap) {
   const auto store = open(0);
   const auto complains = [&] {
@@ -172,7 +179,7 @@ TEST_F(DiskCloudStoreTest, AServerOf700SubmapsHoldsOnlyAFewCloudsAndGoesOnAfterA
   const auto finder = std::make_shared<const NeighbourFinder>();
   const auto store = open(kKept);
   const std::set<RobotId> robots{RobotId{0}};
-  auto server = std::make_unique<server::MapServer>(robots, finder, store, server::ServerConfig{});
+  auto server = std::make_unique<server::MapServer>(robots, finder, store, server::ServerConfig{}, 1);
   std::vector<std::weak_ptr<const PointCloud>> all;
   std::size_t most = 0;
   for (std::uint32_t i = 0; i < kSubmaps; ++i) {
@@ -198,7 +205,7 @@ TEST_F(DiskCloudStoreTest, AServerOf700SubmapsHoldsOnlyAFewCloudsAndGoesOnAfterA
   server.reset();
   fs::remove(folder_ / "0_500.cloud");
   const auto reopened = open(kKept);
-  server::MapServer restored(robots, finder, reopened, {}, state);
+  server::MapServer restored(robots, finder, reopened, {}, 2, state);
   std::size_t unanswered = 0;
   for (const auto& job : restored.take_jobs()) {
     const auto verdict = finder->verify(*job.first, *job.second, *reopened);

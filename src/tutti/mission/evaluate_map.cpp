@@ -66,7 +66,7 @@ RobotMaps put_together(const server::MapServer& server, const RobotRecord& robot
   const bool want_corrected = record.survey && policy != nullptr;  // it is only measured
   RobotMaps out;
   for (const auto& [id, submap] : server.state().submaps) {
-    if (id.robot != robot.id) continue;
+    if (id.chain.robot != robot.id) continue;
     const auto cloud = cloud_of(server, id, record);
     if (!cloud) continue;
     const auto add = [&](ThinnedCloud& map, const Trajectory& estimate) {

@@ -58,10 +58,10 @@ class EvaluateMap : public ::testing::Test {
     const Keyframe& middle = open.keyframes[open.keyframes.size() / 2];
     open.cloud = std::make_shared<const PointCloud>(posts(first.T_odom_body.inverse() * middle.T_odom_body));
     seen_.emplace_back(middle.index);
-    const SubmapMessage message{.header = {.robot = open.id.robot}, .submap = open};
+    const SubmapMessage message{.header = {.robot = open.id.chain.robot}, .submap = open};
     const auto taken = server_.receive(message);
     ASSERT_TRUE(taken) << taken.error().message;
-    open = {.id = {open.id.robot, open.id.index + 1}, .keyframes = {open.keyframes.back()}};
+    open = {.id = {open.id.chain, open.id.index + 1}, .keyframes = {open.keyframes.back()}};
   }
   void evaluate() { evaluate_map(server_, {}, record_); }
 
@@ -71,7 +71,7 @@ class EvaluateMap : public ::testing::Test {
   const Pose3 T_reference_world_{Eigen::Quaterniond(Eigen::AngleAxisd(-0.7, Eigen::Vector3d::UnitX())),
                                  {100.0, 20.0, 3.0}};
   server::MapServer server_{robots_, std::make_shared<const server::test::TestFinder>(1),
-                            std::make_shared<server::MemoryCloudStore>(), server::ServerConfig{}};
+                            std::make_shared<server::MemoryCloudStore>(), server::ServerConfig{}, 1};
   std::vector<std::uint32_t> seen_;
   MissionRecord record_;
 };

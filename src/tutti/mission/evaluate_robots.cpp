@@ -56,7 +56,7 @@ std::size_t read_server_estimate(const server::MapEstimate& map, const server::M
   out.component = component->second;
   std::size_t left_out = 0;
   for (const server::MapNode& node : map.nodes) {
-    if (node.id.robot != out.id) continue;
+    if (node.id.chain.robot != out.id) continue;
     if (node.component == out.component)
       out.server_estimate.push_back({node.stamp, node.T_world_body});
     else

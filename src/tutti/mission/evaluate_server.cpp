@@ -46,7 +46,7 @@ void judge_closures(const server::MapServer& server, MissionRecord& record) {
     if (judged.accepted)
       record.server.closures.push_back({from, to});
     else
-      server::count_refusal({RefusalReason::inconsistent}, from.robot, to.robot, refused);
+      server::count_refusal({RefusalReason::inconsistent}, from.chain.robot, to.chain.robot, refused);
   }
   for (const auto& [reason, count] : refused)
     record.server.rejections.push_back({reason, count.intra, count.inter, count.nearest});
@@ -57,9 +57,9 @@ void name_failures(const server::MapEstimate& map, ServerRecord& out) {
   std::map<KeyframeId, Timestamp> stamp;
   for (const server::MapNode& node : map.nodes) stamp[node.id] = node.stamp;
   for (const server::FailedOdometry& failed : map.failed_odometry)
-    out.failed_odometry.push_back({.robot = failed.robot,
-                                   .from = stamp.at({failed.robot, failed.from}),
-                                   .until = stamp.at({failed.robot, failed.to}),
+    out.failed_odometry.push_back({.robot = failed.chain.robot,
+                                   .from = stamp.at({failed.chain, failed.from}),
+                                   .until = stamp.at({failed.chain, failed.to}),
                                    .error_m = failed.jump_m,
                                    .error_rad = failed.jump_rad});
 }
@@ -73,7 +73,7 @@ void check_closures(const std::vector<RobotOutcome>& robots, const server::MapSe
     std::map<Timestamp, KeyframeId> by_stamp;
     Trajectory estimate;
     for (const server::MapNode& node : server.map().nodes)
-      if (node.id.robot == id) {
+      if (node.id.chain.robot == id) {
         by_stamp[node.stamp] = node.id;
         estimate.push_back({node.stamp, node.T_world_body});
       }
@@ -101,7 +101,7 @@ std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& m
   std::vector<Eigen::Vector3d> odom;
   std::vector<Eigen::Vector3d> world;
   for (const server::MapNode& node : map.nodes) {
-    if (node.id.robot != robot || node.component != component) continue;
+    if (node.id.chain.robot != robot || node.component != component) continue;
     odom.push_back(node.T_odom_body.translation);
     world.push_back(node.T_world_body.translation);
   }

@@ -47,7 +47,7 @@ class EvaluateServer : public ::testing::Test {
           {&run.recording, "adaptive", {{"adaptive", &run.agent}}, run.recording.recording.odometry.size()});
     }
     server::MapServer server(ids, std::make_shared<const NoClosures>(), std::make_shared<server::MemoryCloudStore>(),
-                             server::ServerConfig{});
+                             server::ServerConfig{}, 1);
     for (const SubmapMessage& message : messages_) EXPECT_TRUE(server.receive(message));
     server.optimise();
     record_.robots.resize(runs_.size());

@@ -9,7 +9,7 @@ bool is_partial(std::optional<double> scored_share) { return scored_share && *sc
 
 bool is_tied(const MissionRecord& record, RobotId robot) {
   return std::ranges::any_of(record.server.closures, [robot](const ClosureRecord& closure) {
-    return closure.from.robot == robot || closure.to.robot == robot;
+    return closure.from.chain.robot == robot || closure.to.chain.robot == robot;
   });
 }
 

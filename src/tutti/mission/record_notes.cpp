@@ -61,7 +61,7 @@ void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& reco
     record.notes.push_back(fmt::format(
         "{} submaps are not in the map, because they contradict earlier ones of their robot or keep the map from being "
         "solved; the first is {} of {}",
-        map.left_out.size(), first.index, record.robots[first.robot.value].name));
+        map.left_out.size(), first.index, record.robots[first.chain.robot.value].name));
   }
   if (map.spare_pairs > 0)
     record.notes.push_back(

@@ -30,7 +30,7 @@ RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConf
     own.explain = config.explain && is_shown;
     own.always_compare = config.always_compare && is_shown;
     members_.push_back({policy,
-                        robot::RobotAgent(recording.recording.robot, 1, own, rng.fork(policy)),
+                        robot::RobotAgent(recording.recording.robot, 0, own, rng.fork(policy)),
                         {.robot = recording.recording.name, .policy = policy}});
     if (policy == config.policy.name) default_ = members_.size() - 1;
   }

@@ -29,6 +29,7 @@ namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kPatience_s = 86400.0;  // after the end, for what is still under way
+constexpr std::uint64_t kEpoch = 1;      // the server starts once
 constexpr Timestamp kMissionStart{0};    // virtual time; robots' own stamps are never compared with it
 
 /// Keeps virtual time in step with the wall clock, when asked to.
@@ -61,7 +62,7 @@ class MissionRun {
         survey_(std::move(input.survey)),
         finder_(make_closure_finder(config.closures, recordings_, options.seed)),
         clouds_(std::move(clouds)),
-        server_(robot_ids(recordings_), finder_, clouds_, config.server),
+        server_(robot_ids(recordings_), finder_, clouds_, config.server, kEpoch),
         bus_(kMissionStart, config.link, options.seed),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                      : std::max(1U, std::thread::hardware_concurrency())),
@@ -344,8 +345,8 @@ MissionRecord MissionRun::record() const {
     robot.explanation = robots_[robot.id.value]->explanation();
     robot.proxy_nodes =
         static_cast<std::size_t>(std::count_if(proxy_graph_.nodes.begin(), proxy_graph_.nodes.end(),
-                                               [&](const ProxyNode& node) { return node.robot == robot.id; }));
-    for (const auto& [id, submap] : server_.state().submaps) robot.submaps += id.robot == robot.id ? 1 : 0;
+                                               [&](const ProxyNode& node) { return node.chain.robot == robot.id; }));
+    for (const auto& [id, submap] : server_.state().submaps) robot.submaps += id.chain.robot == robot.id ? 1 : 0;
   }
   record.warnings = warnings_of(record);
   record_timing(record);

@@ -16,16 +16,14 @@ namespace {
 
 constexpr std::uint32_t kBlock = 2;  // submaps of each robot that share one look-alike
 
-std::uint64_t packed(SubmapId id) { return (std::uint64_t{id.robot.value} << 32U) | id.index; }
-
 Rng pair_rng(std::uint64_t seed, std::string_view purpose, SubmapId first, SubmapId second) {
-  return Rng(seed).fork(purpose).fork(packed(first)).fork(packed(second));
+  return Rng(seed).fork(purpose).fork(packed(first.chain, first.index)).fork(packed(second.chain, second.index));
 }
 
 /// Where the second submap is claimed to be, from where it is, in the frame of the block's shared keyframe.
 std::optional<Pose3> draw_error(const SubmapPair& pair, double wrong_share, const SpoiledClosureConfig& config,
                                 std::uint64_t seed) {
-  const auto block = [](SubmapId id) { return SubmapId{id.robot, id.index / kBlock}; };
+  const auto block = [](SubmapId id) { return SubmapId{id.chain, id.index / kBlock}; };
   const double in_block = wrong_share * config.agreeing_share;
   const double alone = (wrong_share - in_block) / (1.0 - in_block);  // together: exactly wrong_share
   Rng rng = pair_rng(seed, "spoiled block", block(pair.first), block(pair.second));
@@ -49,7 +47,8 @@ const Pose3& block_anchor(const Submap& submap) {
 /// The keyframe next to a moment within this robot's submap; neighbouring submaps share no moment.
 const Keyframe* keyframe_at(const Submap& submap, RobotId robot, Timestamp stamp) {
   const auto& keyframes = submap.keyframes;
-  if (submap.id.robot != robot || stamp < keyframes.front().stamp || keyframes.back().stamp <= stamp) return nullptr;
+  if (submap.id.chain.robot != robot || stamp < keyframes.front().stamp || keyframes.back().stamp <= stamp)
+    return nullptr;
   return &*std::ranges::min_element(keyframes, {}, [&](const Keyframe& k) { return std::abs(k.stamp - stamp); });
 }
 
@@ -93,7 +92,7 @@ std::optional<LoopClosure> PlantedClosureFinder::planted_in(const Submap& first,
     const auto T_a_b = truth_->true_relative_pose(planted.other, a->stamp, planted.robot, b->stamp);
     if (!T_a_b) return std::nullopt;
     return LoopClosure{
-        {planted.other, a->index}, {planted.robot, b->index}, {planted.T_claimed_true * *T_a_b, covariance_}};
+        {from.id.chain, a->index}, {to.id.chain, b->index}, {planted.T_claimed_true * *T_a_b, covariance_}};
   };
   for (const PlantedClosure& planted : planted_) {
     if (const auto found = claim(planted, first, second)) return found;

@@ -33,8 +33,8 @@ class Perfect final : public server::ClosureFinder {
     const Keyframe& a = first.keyframes[1];
     const Keyframe& b = second.keyframes[1];
     return ClosureVerdict{{first.id, second.id},
-                          {{{first.id.robot, a.index},
-                            {second.id.robot, b.index},
+                          {{{first.id.chain, a.index},
+                            {second.id.chain, b.index},
                             {a.T_odom_body.inverse() * b.T_odom_body, Matrix6d::Identity()}}},
                           std::nullopt,
                           version()};

@@ -10,10 +10,10 @@
 namespace tutti {
 
 /// In front of every message; (robot, session, sequence) identifies it. Duplicates are recognised by what is inside:
-/// a submap's id, a proxy graph's revision.
+/// a submap's id, a proxy graph's epoch and revision.
 struct MessageHeader {
   RobotId robot;              ///< Sender; of a server's message: unused, 0.
-  std::uint64_t session = 0;  ///< Changes when the sender restarts.
+  std::uint64_t session = 0;  ///< Of a robot: of its chain of odometry. Of the server: its epoch.
   std::uint64_t sequence = 0;
   friend bool operator==(const MessageHeader&, const MessageHeader&) = default;
 };

@@ -2,6 +2,7 @@
 #include "tutti/robot/agent.hpp"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -32,11 +33,11 @@ constexpr double kRoundedQuaternion = 1e-3;
 RobotAgent::RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng)
     : RobotAgent(robot, config, std::move(rng), AgentState{.session = session}) {}
 RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentState state)
-    : robot_(robot),
+    : chain_(robot, state.session),
       config_(config),
       rng_(std::move(rng)),
       policy_(known_policy(config.policy)),
-      submaps_(robot, config.submap, std::move(state.submaps)),
+      submaps_(chain_, config.submap, std::move(state.submaps)),
       smoother_(config.smoother, std::move(state.smoother)),
       state_(std::move(state)) {
   if (!smoother_.state().constraints.empty()) smoother_.solve();
@@ -49,7 +50,7 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given,
   Pose3 T_odom_body = T_odom_body_given;
   if (is_valid(T_odom_body, kRoundedQuaternion)) T_odom_body.rotation.normalize();
   if (auto ok = check_covariance(increment_covariance); !ok)
-    return in_context(fmt::format("robot {}: odometry at {} ns", robot_.value, stamp.ns), ok.error());
+    return in_context(fmt::format("robot {}: odometry at {} ns", chain_.robot.value, stamp.ns), ok.error());
   const Matrix6d covariance =
       invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
   const std::uint32_t submap = submaps_.current_submap();
@@ -80,7 +81,7 @@ void RobotAgent::finish() { submaps_.finish(); }
 std::vector<SubmapMessage> RobotAgent::take_outgoing() {
   std::vector<SubmapMessage> out;
   while (auto submap = submaps_.take_submap())
-    out.push_back({.header = {.robot = robot_, .session = state_.session, .sequence = state_.sequence++},
+    out.push_back({.header = {.robot = chain_.robot, .session = chain_.session, .sequence = state_.sequence++},
                    .submap = std::move(*submap)});
   return out;
 }
@@ -102,22 +103,22 @@ std::vector<consistency::RobotNode> RobotAgent::nodes() const {
 UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget,
                                   const StageObserver& stage_ended) {
   UpdateSummary summary{.revision = message.graph.revision, .constraints = state_.ledger.size()};
-  if (message.graph.revision <= state_.revision) return summary;  // late or repeated
-  state_.revision = message.graph.revision;
+  if (message.graph.age() <= std::pair(state_.epoch, state_.revision)) return summary;  // late or repeated
+  std::tie(state_.epoch, state_.revision) = message.graph.age();
   const auto ended = [&](UpdateStage stage) {
     if (stage_ended) stage_ended(stage);
   };
 
   const std::vector<consistency::RobotNode> own = nodes();
   const auto comparison = config_.always_compare || policy_->needs_disagreement()
-                              ? consistency::compare(message.graph, robot_, own, config_.compare)
-                              : consistency::synchronised(message.graph, robot_, own);
+                              ? consistency::compare(message.graph, chain_, own, config_.compare)
+                              : consistency::synchronised(message.graph, chain_, own);
   ended(UpdateStage::compare);
 
-  const std::size_t withdrawn = state_.ledger.withdraw_unknown(message.graph, robot_);
+  const std::size_t withdrawn = state_.ledger.withdraw_unknown(message.graph, chain_);
   const consistency::Ledger held = state_.ledger;
   const auto selection = policy_->choose({.graph = message.graph,
-                                          .robot = robot_,
+                                          .chain = chain_,
                                           .nodes = own,
                                           .comparison = comparison,
                                           .budget = budget,
@@ -145,7 +146,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   ended(UpdateStage::optimise);
 
   if (config_.explain)
-    summary.explanation = consistency::explain(message.graph, robot_, own, comparison.pairs, state_.comparisons,
+    summary.explanation = consistency::explain(message.graph, chain_, own, comparison.pairs, state_.comparisons,
                                                config_.policy.adaptive.agreement);
   summary.synchronised = comparison.pairs.size();
   summary.proposed = selection.constraints.size();
@@ -173,7 +174,7 @@ estimation::Termination RobotAgent::optimise() {
 bool RobotAgent::leads_astray(const ProxyGraph& graph) const {
   Trajectory odometry;
   for (const Keyframe& keyframe : state_.keyframes) odometry.push_back({keyframe.stamp, keyframe.T_odom_body});
-  const Trajectory map = trajectory_of(graph, robot_);
+  const Trajectory map = trajectory_of(graph, chain_);
   const auto by_odometry = evaluation::agreement(odometry, map);
   const auto by_constraints = evaluation::agreement(corrected(), map);
   return by_odometry && by_constraints && by_constraints->rmse_m > by_odometry->rmse_m + kAstray_m;
@@ -186,16 +187,17 @@ void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consiste
   if (pairs.empty()) return;
   const Pose3& T_map_newest = smoother_.pose(own[pairs.back().robot].chain_index);  // as corrected now
   const Pose3 T_map_world = T_map_newest * graph.nodes[pairs.back().proxy].T_world_body.inverse();
-  const auto component_of = [&](RobotId robot) -> std::optional<std::uint32_t> {
-    for (const RobotComponent& entry : graph.components)
-      if (entry.robot == robot) return entry.component;
+  const auto component_of = [&](const ChainId& chain) -> std::optional<std::uint32_t> {
+    for (const ChainComponent& entry : graph.components)
+      if (entry.chain == chain) return entry.component;
     return std::nullopt;
   };
   for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
     const ProxyNode& node = graph.nodes[i];
-    const bool last = i + 1 == graph.nodes.size() || graph.nodes[i + 1].robot != node.robot;
-    if (!last || node.robot == robot_ || component_of(node.robot) != component_of(robot_)) continue;
-    state_.whereabouts.push_back({node.robot, node.stamp, T_map_world * node.T_world_body});
+    const RobotId robot = node.chain.robot;
+    const bool last = i + 1 == graph.nodes.size() || graph.nodes[i + 1].chain.robot != robot;
+    if (!last || robot == chain_.robot || component_of(node.chain) != component_of(chain_)) continue;
+    state_.whereabouts.push_back({robot, node.stamp, T_map_world * node.T_world_body});
   }
 }
 

@@ -45,7 +45,7 @@ struct AgentConfig {
   }
 };
 
-/// Where another robot was last known to be, in this robot's `map` frame.
+/// Where another robot was last known to be, in its newest session, in this robot's `map` frame.
 struct Whereabouts {
   RobotId robot;
   Timestamp stamp;
@@ -77,9 +77,10 @@ using StageObserver = std::function<void(UpdateStage)>;
 
 /// An agent's whole state, by value: restart it from this and it goes on as if nothing had happened.
 struct AgentState {
-  std::uint64_t session = 0;
-  std::uint64_t sequence = 0;     ///< Of the next message.
-  std::uint64_t revision = 0;     ///< Of the newest proxy graph seen.
+  std::uint64_t session = 0;   ///< ChainId::session; goes on with the state.
+  std::uint64_t sequence = 0;  ///< Of the next message.
+  std::uint64_t epoch = 0;     ///< Of the newest proxy graph seen: ProxyGraph::age().
+  std::uint64_t revision = 0;
   std::uint64_t comparisons = 0;  ///< Proxy graphs compared.
   SubmapBuilderState submaps;
   estimation::SmootherState smoother;
@@ -98,8 +99,9 @@ struct AgentState {
 class RobotAgent {
  public:
   /// `config.policy.name` must be a known policy (checked: throws on our own mistake; validate user input before).
+  /// `session` is larger than in any start of this robot before, such as the time of the start (ChainId).
   RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng);
-  /// Goes on from a saved state, with the same configuration and randomness as then.
+  /// Goes on from a saved state and its session, with the same configuration and randomness as then.
   RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentState state);
   ~RobotAgent();
   RobotAgent(RobotAgent&&) noexcept;
@@ -125,7 +127,8 @@ class RobotAgent {
                         const StageObserver& stage_ended = {});
 
   [[nodiscard]] AgentState state() const;
-  [[nodiscard]] RobotId robot() const { return robot_; }
+  [[nodiscard]] RobotId robot() const { return chain_.robot; }
+  [[nodiscard]] const ChainId& chain() const { return chain_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return state_.keyframes; }
   [[nodiscard]] const consistency::Ledger& ledger() const { return state_.ledger; }
   [[nodiscard]] const consistency::ConstraintPolicy& policy() const { return *policy_; }
@@ -149,7 +152,7 @@ class RobotAgent {
   void locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                      std::span<const consistency::NodePair> pairs);
 
-  RobotId robot_;
+  ChainId chain_;
   AgentConfig config_;
   Rng rng_;
   std::unique_ptr<consistency::ConstraintPolicy> policy_;

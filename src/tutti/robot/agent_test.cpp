@@ -46,14 +46,14 @@ ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revision, con
   for (const Keyframe& k : agent.keyframes()) {
     if (!k.representative) continue;
     const double sample = (k.stamp - at(0)) / 0.5;
-    message.graph.nodes.push_back({.robot = agent.robot(),
+    message.graph.nodes.push_back({.chain = agent.chain(),
                                    .stamp = k.stamp,
                                    .T_world_body = T_world_true * true_pose(sample),
                                    .covariance = message.graph.nodes.empty() ? Matrix6d::Zero() : covariance,
                                    .support = 5});
   }
-  message.graph.nodes.push_back({.robot = RobotId{9}, .stamp = at(3), .T_world_body = T_world_true * true_pose(7)});
-  message.graph.components = {{agent.robot(), 0}, {RobotId{9}, 0}};
+  message.graph.nodes.push_back({.chain = RobotId{9}, .stamp = at(3), .T_world_body = T_world_true * true_pose(7)});
+  message.graph.components = {{agent.chain(), 0}, {RobotId{9}, 0}};
   return message;
 }
 
@@ -142,12 +142,12 @@ TEST(Agent, WhatCannotBeSolvedIsTakenBack) {
   ProxyGraphMessage message{.graph = {.revision = 1}};
   for (const Keyframe& k : agent.keyframes())
     if (k.representative)
-      message.graph.nodes.push_back({.robot = RobotId{1},
+      message.graph.nodes.push_back({.chain = agent.chain(),
                                      .stamp = k.stamp,
                                      .T_world_body = on_circle(static_cast<int>(std::lround((k.stamp - at(0)) / 0.5))),
                                      .covariance = Matrix6d::Zero(),
                                      .support = 5});
-  message.graph.components = {{RobotId{1}, 0}};
+  message.graph.components = {{agent.chain(), 0}};
   const auto summary = agent.receive(message, 2);
   ASSERT_FALSE(estimation::is_usable(summary.optimised)) << to_string(summary.optimised);
   EXPECT_TRUE(summary.taken_back);
@@ -190,6 +190,62 @@ TEST(Agent, AnOlderBroadcastChangesNothing) {
   EXPECT_EQ(agent.receive(broadcast(agent, 5, kWorld)).synchronised, 0U);  // a duplicate
   EXPECT_EQ(agent.corrected(), corrected);
   EXPECT_EQ(agent.ledger(), ledger);
+}
+
+// Back from an older snapshot, the server counts revisions again that the robot has heard.
+TEST(Agent, HearsAServerThatStartedAgainAtOnceAndNothingOfTheOldOneAfter) {
+  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  feed(agent, drifting_odometry(240));
+  const auto synchronised = [](RobotAgent& of, std::uint64_t epoch, std::uint64_t revision) {
+    ProxyGraphMessage message = broadcast(of, revision, kWorld);
+    message.graph.epoch = epoch;
+    return of.receive(message).synchronised;
+  };
+  EXPECT_GT(synchronised(agent, 1, 20), 0U);
+  EXPECT_GT(synchronised(agent, 2, 13), 0U);
+  EXPECT_EQ(synchronised(agent, 1, 21), 0U);  // late
+  EXPECT_EQ(synchronised(agent, 2, 13), 0U);  // repeated
+  RobotAgent restored(RobotId{1}, {}, Rng(1), agent.state());
+  EXPECT_EQ(synchronised(restored, 1, 22), 0U);
+  EXPECT_EQ(synchronised(restored, 2, 12), 0U);
+  EXPECT_GT(synchronised(restored, 2, 14), 0U);
+  EXPECT_GT(synchronised(restored, 1'700'000'000, 1), 0U);
+}
+
+// Its older session has nodes of the same stamps, elsewhere, and so has another robot's.
+TEST(Agent, SynchronisesWithItsOwnSessionAndSeesTheOthersInTheirNewest) {
+  RobotAgent agent(RobotId{1}, 5, {}, Rng(1));
+  feed(agent, drifting_odometry(240));
+  agent.finish();
+  for (const SubmapMessage& sent : agent.take_outgoing()) {
+    EXPECT_EQ(sent.header.session, 5U);
+    EXPECT_EQ(sent.submap.id.chain, (ChainId{RobotId{1}, 5}));
+  }
+  ProxyGraphMessage message = broadcast(agent, 1, kWorld);
+  std::vector<ProxyNode> older = message.graph.nodes;
+  older.pop_back();  // robot 9
+  for (ProxyNode& node : older) {
+    node.chain.session = 4;
+    node.T_world_body = kWorld * Pose3{Eigen::Quaterniond::Identity(), {1000, 0, 0}} * node.T_world_body;
+  }
+  ProxyNode newest = message.graph.nodes.back();
+  newest.chain.session = 3;
+  newest.stamp = at(2);  // its newest session, whatever the stamps say
+  newest.T_world_body = kWorld * true_pose(11);
+  ProxyGraphMessage both = message;
+  both.graph.nodes.insert(both.graph.nodes.begin(), older.begin(), older.end());
+  both.graph.nodes.push_back(newest);
+  both.graph.components = {{{RobotId{1}, 4}, 0}, {agent.chain(), 0}, {RobotId{9}, 1}, {newest.chain, 0}};
+
+  RobotAgent alone(RobotId{1}, {}, Rng(1), agent.state());
+  const UpdateSummary expected = alone.receive(message), update = agent.receive(both);
+  EXPECT_GT(expected.synchronised, 70U);
+  EXPECT_EQ(update.synchronised, expected.synchronised);
+  EXPECT_EQ(agent.corrected(), alone.corrected());
+  EXPECT_EQ(agent.ledger(), alone.ledger());
+  ASSERT_EQ(agent.whereabouts().size(), 1U);
+  EXPECT_EQ(agent.whereabouts()[0].robot, RobotId{9});
+  EXPECT_EQ(agent.whereabouts()[0].stamp, at(2));
 }
 
 /// Raw odometry without drift; a server whose map turns by `yaw_rad` at node `at_node`, as closures would have it. All
@@ -423,7 +479,7 @@ TEST(Agent, AnEmptyAgentTakesABroadcast) {
   RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
   ProxyGraphMessage message;
   message.graph.revision = 1;
-  message.graph.nodes.push_back({.robot = RobotId{1}, .stamp = at(0)});
+  message.graph.nodes.push_back({.chain = agent.chain(), .stamp = at(0)});
   EXPECT_EQ(agent.receive(message).synchronised, 0U);
   EXPECT_TRUE(agent.corrected().empty());
   EXPECT_EQ(agent.odometry_factors(), 0U);

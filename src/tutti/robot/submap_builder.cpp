@@ -23,8 +23,8 @@ Status check_sample(RobotId robot, Timestamp stamp, const Pose3& T_odom_body, co
 
 }  // namespace
 
-SubmapBuilder::SubmapBuilder(RobotId robot, const SubmapConfig& config, SubmapBuilderState state)
-    : robot_(robot), config_(config), state_(std::move(state)) {}
+SubmapBuilder::SubmapBuilder(const ChainId& chain, const SubmapConfig& config, SubmapBuilderState state)
+    : chain_(chain), config_(config), state_(std::move(state)) {}
 
 bool SubmapBuilder::is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const {
   if (state_.keyframes.empty()) return true;
@@ -45,12 +45,13 @@ void SubmapBuilder::remember(Timestamp stamp, const Pose3& T_odom_body) {
 
 Result<std::optional<KeyframeStep>> SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body,
                                                                 const Matrix6d& increment_covariance) {
-  if (auto ok = check_sample(robot_, stamp, T_odom_body, increment_covariance); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_sample(chain_.robot, stamp, T_odom_body, increment_covariance); !ok)
+    return tl::unexpected(ok.error());
   if (!state_.recent.empty()) {
     const StampedPose& last = state_.recent.back();
     if (stamp <= last.stamp)
-      return fail(ErrorCode::invalid, "robot {}: odometry stamp {} ns does not follow {} ns", robot_.value, stamp.ns,
-                  last.stamp.ns);
+      return fail(ErrorCode::invalid, "robot {}: odometry stamp {} ns does not follow {} ns", chain_.robot.value,
+                  stamp.ns, last.stamp.ns);
     const Pose3 step = last.pose.inverse() * T_odom_body;
     state_.distance_m += step.translation.norm();
     state_.since_keyframe = compound(state_.since_keyframe, {step, increment_covariance});
@@ -81,11 +82,11 @@ Result<std::optional<KeyframeStep>> SubmapBuilder::add_odometry(Timestamp stamp,
 Status SubmapBuilder::add_scan(const Scan& scan) {
   if (state_.recent.empty() || scan.stamp != state_.recent.back().stamp)
     return fail(ErrorCode::invalid, "robot {}: scan at {} ns has no odometry at its stamp (latest: {} ns)",
-                robot_.value, scan.stamp.ns, state_.recent.empty() ? 0 : state_.recent.back().stamp.ns);
+                chain_.robot.value, scan.stamp.ns, state_.recent.empty() ? 0 : state_.recent.back().stamp.ns);
   if (!scan.cloud || scan.cloud->points.empty())
-    return fail(ErrorCode::invalid, "robot {}: scan at {} ns is empty", robot_.value, scan.stamp.ns);
+    return fail(ErrorCode::invalid, "robot {}: scan at {} ns is empty", chain_.robot.value, scan.stamp.ns);
   const auto undistorted = lidar::undistort(scan, state_.recent);
-  if (!undistorted) return fail(ErrorCode::invalid, "robot {}: {}", robot_.value, undistorted.error().message);
+  if (!undistorted) return fail(ErrorCode::invalid, "robot {}: {}", chain_.robot.value, undistorted.error().message);
   state_.scans.push_back(
       {state_.keyframes.front().T_odom_body.inverse() * state_.recent.back().pose, undistorted->cloud});
   return {};
@@ -105,7 +106,7 @@ bool SubmapBuilder::is_full() const {
 
 void SubmapBuilder::close_submap() {
   state_.finished.push_back(
-      {{.id = {robot_, state_.next_submap++}, .keyframes = state_.keyframes, .odometry = state_.odometry},
+      {{.id = {chain_, state_.next_submap++}, .keyframes = state_.keyframes, .odometry = state_.odometry},
        std::move(state_.scans)});
 }
 

@@ -67,7 +67,7 @@ struct SubmapBuilderState {
 /// carries what the server said before.
 class SubmapBuilder {
  public:
-  SubmapBuilder(RobotId robot, const SubmapConfig& config, SubmapBuilderState state = {});
+  SubmapBuilder(const ChainId& chain, const SubmapConfig& config, SubmapBuilderState state = {});
 
   /// Raw pose with the covariance of the increment since the previous one (ignored for the first). Stamps must
   /// increase; poses must be finite with unit quaternions, covariances what check_covariance() says (geometry/
@@ -101,7 +101,7 @@ class SubmapBuilder {
   [[nodiscard]] bool is_full() const;
   void close_submap();
 
-  RobotId robot_;
+  ChainId chain_;
   SubmapConfig config_;
   SubmapBuilderState state_;
 };

@@ -12,9 +12,9 @@ constexpr double kNear_s = 10.0;     // what a submap saw
 constexpr double kLongest_s = 30.0;  // as seen by three submaps in a row
 constexpr std::size_t kMost = 24;    // more cost more than they are worth
 
-/// When the ends of a closure were seen, the robot with the smaller id first; of one robot the earlier end.
+/// When the ends of a closure were seen, the chain with the smaller id first; of one chain the earlier end.
 struct Ends {
-  RobotId robots[2];
+  ChainId chains[2];
   Timestamp stamps[2];
 };
 
@@ -22,12 +22,12 @@ Ends ends_of(const std::vector<MapNode>& nodes, const PoseGraphEdge& edge) {
   const MapNode* first = &nodes[edge.from];
   const MapNode* second = &nodes[edge.to];
   if (second->id < first->id) std::swap(first, second);
-  return {{first->id.robot, second->id.robot}, {first->stamp, second->stamp}};
+  return {{first->id.chain, second->id.chain}, {first->stamp, second->stamp}};
 }
 
 bool is_near(const Ends& a, const Ends& b, double most_s) {
   for (const int end : {0, 1})
-    if (a.robots[end] != b.robots[end] || std::abs(a.stamps[end] - b.stamps[end]) > most_s) return false;
+    if (a.chains[end] != b.chains[end] || std::abs(a.stamps[end] - b.stamps[end]) > most_s) return false;
   return true;
 }
 

@@ -14,7 +14,7 @@ std::vector<MapNode> two_robots() {
   std::vector<MapNode> out;
   for (const std::uint32_t robot : {0U, 1U})
     for (std::uint32_t k = 0; k < 200; ++k)
-      out.push_back({.id = {{robot}, k}, .stamp = Timestamp{std::int64_t{k} * 1'000'000'000}});
+      out.push_back({.id = {RobotId{robot}, k}, .stamp = Timestamp{std::int64_t{k} * 1'000'000'000}});
   return out;
 }
 

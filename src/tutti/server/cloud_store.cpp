@@ -6,7 +6,7 @@
 namespace tutti::server {
 
 Status MemoryCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) {
-  TUTTI_CHECK(cloud != nullptr, "submap {}/{} without a cloud", id.robot.value, id.index);
+  TUTTI_CHECK(cloud != nullptr, "submap {} without a cloud", to_string(id));
   const std::lock_guard lock(mutex_);
   clouds_[id] = cloud;
   return {};
@@ -15,8 +15,7 @@ Status MemoryCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud
 Result<std::shared_ptr<const PointCloud>> MemoryCloudStore::get(SubmapId id) const {
   const std::lock_guard lock(mutex_);
   const auto found = clouds_.find(id);
-  if (found == clouds_.end())
-    return fail(ErrorCode::io, "cloud of submap {}/{}: not in the store", id.robot.value, id.index);
+  if (found == clouds_.end()) return fail(ErrorCode::io, "cloud of submap {}: not in the store", to_string(id));
   return found->second;
 }
 

@@ -22,30 +22,30 @@
 namespace tutti::server {
 namespace {
 
-/// Indices of the nodes of each robot that become proxy nodes, in time order.
-std::map<RobotId, std::vector<std::size_t>> choose_nodes(const MapEstimate& map) {
+/// Indices of the nodes of each chain that become proxy nodes, in time order.
+std::map<ChainId, std::vector<std::size_t>> choose_nodes(const MapEstimate& map) {
   const MapComponents components = choose_components(map);
-  std::map<RobotId, std::vector<std::size_t>> chosen;
+  std::map<ChainId, std::vector<std::size_t>> chosen;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const MapNode& node = map.nodes[i];
-    if (node.representative && node.component == components.of_robot.at(node.id.robot))
-      chosen[node.id.robot].push_back(i);
+    if (node.representative && node.component == components.of_chain.at(node.id.chain))
+      chosen[node.id.chain].push_back(i);
   }
   return chosen;
 }
 
-/// Ranks among a robot's chosen nodes between which its odometry failed: the closures tell where `last` is seen from
+/// Ranks among a chain's chosen nodes between which its odometry failed: the closures tell where `last` is seen from
 /// `first`, but little of what lies between.
 struct Repair {
   std::size_t first = 0;
   std::size_t last = 0;
 };
 
-std::vector<Repair> repairs(const MapEstimate& map, RobotId robot, const std::vector<std::size_t>& chosen) {
+std::vector<Repair> repairs(const MapEstimate& map, const ChainId& chain, const std::vector<std::size_t>& chosen) {
   const auto index_of = [&](std::size_t node) { return map.nodes[node].id.index; };
   std::vector<Repair> out;
   for (const FailedOdometry& failed : map.failed_odometry) {
-    if (failed.robot != robot) continue;
+    if (failed.chain != chain) continue;
     const auto after = std::ranges::upper_bound(chosen, failed.from, {}, index_of);
     const auto last = std::ranges::lower_bound(chosen, failed.to, {}, index_of);
     if (after == chosen.begin() || last == chosen.end()) continue;
@@ -82,15 +82,15 @@ Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const std::vect
   return out;
 }
 
-/// Of every robot's nodes in the graph. The random numbers are always the same: the result is a function of the map.
+/// Of every chain's nodes in the graph. The random numbers are always the same: the result is a function of the map.
 std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& graph,
-                                     const std::map<RobotId, std::vector<std::size_t>>& chosen,
+                                     const std::map<ChainId, std::vector<std::size_t>>& chosen,
                                      const estimation::JointPosterior& posterior,
                                      const consistency::ProxyGraphConfig& config) {
   std::vector<std::size_t> kept;  // indices into map.nodes of graph.nodes
-  for (const auto& [robot, nodes] : chosen)
+  for (const auto& [chain, nodes] : chosen)
     for (const std::size_t i : nodes)
-      if (kept.size() < graph.nodes.size() && graph.nodes[kept.size()].robot == robot &&
+      if (kept.size() < graph.nodes.size() && graph.nodes[kept.size()].chain == chain &&
           graph.nodes[kept.size()].stamp == map.nodes[i].stamp)
         kept.push_back(i);
   TUTTI_CHECK(kept.size() == graph.nodes.size(), "{} of {} nodes found", kept.size(), graph.nodes.size());
@@ -100,16 +100,16 @@ std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& g
   if (!samples.allFinite()) return out;
   const Eigen::MatrixXd shifts = shifts_without_a_closure(map, kept, static_cast<std::size_t>(config.shape_deletions));
   for (std::size_t begin = 0, end = 0; begin < kept.size(); begin = end) {
-    const RobotId robot = graph.nodes[begin].robot;
+    const ChainId chain = graph.nodes[begin].chain;
     std::vector<Pose3> poses;
     std::vector<Matrix6d> steps;
-    for (; end < kept.size() && graph.nodes[end].robot == robot; ++end) {
+    for (; end < kept.size() && graph.nodes[end].chain == chain; ++end) {
       poses.push_back(graph.nodes[end].T_world_body);
       steps.push_back(graph.nodes[end].covariance);
     }
     const auto first = static_cast<Eigen::Index>(6 * begin), rows = static_cast<Eigen::Index>(6 * (end - begin));
     const Eigen::MatrixXd own_samples = samples.middleRows(first, rows), own_shifts = shifts.middleRows(first, rows);
-    out.push_back(shape_uncertainty(robot, poses, own_samples, own_shifts));
+    out.push_back(shape_uncertainty(chain, poses, own_samples, own_shifts));
     out.back().ties = shape_ties(poses, steps, own_samples, own_shifts, static_cast<std::size_t>(config.shape_ties));
   }
   return out;
@@ -117,10 +117,10 @@ std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& g
 
 /// Per edge: odometry counts as much as its closures show that it is worth.
 std::vector<double> honest_weights(const MapEstimate& map) {
-  const std::map<RobotId, double> factors = odometry_variance_factors(map);
+  const std::map<ChainId, double> factors = odometry_variance_factors(map);
   std::vector<double> out(map.graph.edges.size(), 1.0);
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
-    out[e] = 1.0 / factors.at(map.nodes[map.graph.edges[e].from].id.robot);
+    out[e] = 1.0 / factors.at(map.nodes[map.graph.edges[e].from].id.chain);
   return out;
 }
 
@@ -130,7 +130,7 @@ std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::ve
   const std::size_t n = chosen.size();
   std::vector<std::uint32_t> support(n, 0);
   if (n == 0) return support;
-  const RobotId robot = map.nodes[chosen.front()].id.robot;
+  const ChainId chain = map.nodes[chosen.front()].id.chain;
   // Stretch k runs from chosen[k - 1] to chosen[k]. A keyframe lies before the stretches above `after`, and after the
   // stretches up to `before`.
   struct Place {
@@ -144,16 +144,16 @@ std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::ve
     return Place{beyond == chosen.begin() ? 0 : static_cast<std::size_t>(beyond - chosen.begin()) - 1,
                  static_cast<std::size_t>(at_or_after - chosen.begin())};
   };
-  std::map<RobotId, std::vector<Place>> ends_with;  // per other robot: where its closures end on this one
+  std::map<ChainId, std::vector<Place>> ends_with;  // per other chain: where its closures end on this one
   for (const JudgedClosure& judged : map.closures) {
     if (!judged.accepted) continue;
     const auto& [from, to, measurement] = judged.closure;
-    if (from.robot == robot && to.robot == robot) {
+    if (from.chain == chain && to.chain == chain) {
       const auto& [first, last] = std::minmax({from, to});
       const std::size_t end = place(last).before;
       for (std::size_t k = place(first).after + 1; k <= end; ++k) ++support[k];
-    } else if (from.robot == robot || to.robot == robot) {
-      ends_with[from.robot == robot ? to.robot : from.robot].push_back(place(from.robot == robot ? from : to));
+    } else if (from.chain == chain || to.chain == chain) {
+      ends_with[from.chain == chain ? to.chain : from.chain].push_back(place(from.chain == chain ? from : to));
     }
   }
   for (const auto& [other, ends] : ends_with)
@@ -168,32 +168,32 @@ std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::ve
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config) {
   auto chosen = choose_nodes(map);
   std::vector<std::pair<std::size_t, std::size_t>> stretches;
-  for (const auto& [robot, nodes] : chosen) {
+  for (const auto& [chain, nodes] : chosen) {
     for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
-    for (const auto& [first, last] : repairs(map, robot, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
+    for (const auto& [first, last] : repairs(map, chain, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
   }
   const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches, honest_weights(map));
   const std::vector<Matrix6d> covariances = posterior.relative_covariances();
 
   std::vector<consistency::ServerNode> nodes;
-  std::vector<RobotComponent> components;
+  std::vector<ChainComponent> components;
   std::size_t stretch = 0;
-  for (auto& [robot, indices] : chosen) {
+  for (auto& [chain, indices] : chosen) {
     bool determined = true;
-    std::size_t next = stretch;  // after this robot's
-    for (; next < stretches.size() && map.nodes[stretches[next].first].id.robot == robot; ++next)
+    std::size_t next = stretch;  // after this chain's
+    for (; next < stretches.size() && map.nodes[stretches[next].first].id.chain == chain; ++next)
       determined = determined && check_covariance(covariances[next]);
     if (!determined) {  // its own edges leave its poses open, or nearly: it gets nothing, and the others do
       indices.clear();
       stretch = next;
     }
     if (indices.empty()) continue;
-    components.push_back({robot, map.nodes[indices.front()].component});
+    components.push_back({chain, map.nodes[indices.front()].component});
     const std::vector<std::uint32_t> support = closure_support(map, indices);
     const std::size_t first_node = nodes.size();
     for (std::size_t k = 0; k < indices.size(); ++k) {
       const MapNode& node = map.nodes[indices[k]];
-      nodes.push_back({.robot = robot,
+      nodes.push_back({.chain = chain,
                        .stamp = node.stamp,
                        .T_world_body = node.T_world_body,
                        .covariance = k == 0 ? Matrix6d::Zero() : covariances[stretch++],
@@ -201,7 +201,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     }
     // Where odometry failed, the steps' errors are large but must add up to what the closures say, so they undo each
     // other, which a covariance per step cannot express. Equal shares of the whole stretch's add up to the right sum.
-    for (const auto& [first, last] : repairs(map, robot, indices)) {
+    for (const auto& [first, last] : repairs(map, chain, indices)) {
       const Matrix6d share = covariances[stretch++] / static_cast<double>(last - first);
       const Pose3& T_world_last = nodes[first_node + last].T_world_body;
       for (std::size_t k = first + 1; k <= last; ++k) {

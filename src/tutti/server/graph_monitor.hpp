@@ -17,9 +17,9 @@ namespace tutti::server {
 /// shape, unless the map does not determine its poses.
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config);
 
-/// How many independent closures support the stretch between consecutive chosen nodes of one robot: the closures of the
-/// robot with itself that span it, plus for every other robot the smaller number of closures before and after it
-/// (closures on both sides make a cycle through the stretch). `chosen` are indices into map.nodes, all of one robot, in
+/// How many independent closures support the stretch between consecutive chosen nodes of one chain: the closures of the
+/// chain with itself that span it, plus for every other chain the smaller number of closures before and after it
+/// (closures on both sides make a cycle through the stretch). `chosen` are indices into map.nodes, all of one chain, in
 /// order; result[0] = 0.
 std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::vector<std::size_t>& chosen);
 

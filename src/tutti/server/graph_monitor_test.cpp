@@ -19,7 +19,7 @@ MapEstimate two_chains() {
   MapEstimate map;
   for (std::uint32_t r = 0; r < 2; ++r)
     for (std::uint32_t k = 0; k < 10; ++k)
-      map.nodes.push_back({.id = {{r}, k}, .stamp = {k}, .representative = true, .component = 0});
+      map.nodes.push_back({.id = {RobotId{r}, k}, .stamp = {k}, .representative = true, .component = 0});
   return map;
 }
 
@@ -104,10 +104,10 @@ TEST(MonitorGraph, ARobotWhosePosesAreOpenIsLeftOutAlone) {
   MapEstimate map = estimate_map(submaps, {}, {});
   const ProxyGraph all = monitor_graph(map, 1, {});
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
-    if (map.nodes[map.graph.edges[e].from].id.robot == RobotId{1}) map.graph.edges[e].information.setZero();
+    if (map.nodes[map.graph.edges[e].from].id.chain.robot == RobotId{1}) map.graph.edges[e].information.setZero();
   const ProxyGraph graph = monitor_graph(map, 1, {});
   const auto of = [](const auto& list, std::uint32_t robot) {
-    return std::ranges::count_if(list, [robot](const auto& entry) { return entry.robot == RobotId{robot}; });
+    return std::ranges::count_if(list, [robot](const auto& entry) { return entry.chain.robot == RobotId{robot}; });
   };
   EXPECT_EQ(of(graph.nodes, 1), 0);
   EXPECT_EQ(of(graph.components, 1), 0);
@@ -128,7 +128,8 @@ TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerPiece) {
   const MapEstimate map = estimate_map(submaps, {}, {});
   const ProxyGraph graph = monitor_graph(map, 1, {});
   const auto nodes_of = [&](std::uint32_t robot) {
-    return std::ranges::count_if(graph.nodes, [&](const ProxyNode& node) { return node.robot == RobotId{robot}; });
+    return std::ranges::count_if(graph.nodes,
+                                 [&](const ProxyNode& node) { return node.chain.robot == RobotId{robot}; });
   };
   EXPECT_EQ(nodes_of(0), 36);  // keyframes 20 .. 90, every other one
   EXPECT_EQ(nodes_of(1), 46);
@@ -137,7 +138,8 @@ TEST(MonitorGraph, AGapNearTheStartLeavesTheLargerPiece) {
   EXPECT_EQ(graph.components[0].component, 1U);  // component 0 is the piece left out
   // Closures join the pieces: both are sent.
   const ProxyGraph joined = monitor_graph(estimate_map(submaps, verdicts_of(submaps, test::TestFinder(1)), {}), 2, {});
-  EXPECT_EQ(std::ranges::count_if(joined.nodes, [](const ProxyNode& n) { return n.robot == RobotId{0}; }), 36 + 6);
+  EXPECT_EQ(std::ranges::count_if(joined.nodes, [](const ProxyNode& n) { return n.chain.robot == RobotId{0}; }),
+            36 + 6);
 }
 
 /// `count` nodes of a robot after those it has, of which every `of_each`th is representative.
@@ -160,15 +162,15 @@ TEST(ChooseComponents, MostRepresentativeNodesThenMostNodesThenTheNewest) {
   append(map, 2, 4, 6, 3);
   append(map, 2, 5, 4, 2);
   const MapComponents chosen = choose_components(map);
-  EXPECT_EQ(chosen.of_robot.at(RobotId{0}), 1U);  // 3 of 3 against 2 of 10
-  EXPECT_EQ(chosen.of_robot.at(RobotId{1}), 3U);  // equal: the newest
-  EXPECT_EQ(chosen.of_robot.at(RobotId{2}), 4U);  // 2 of 6 and 2 of 4
+  EXPECT_EQ(chosen.of_chain.at(RobotId{0}), 1U);  // 3 of 3 against 2 of 10
+  EXPECT_EQ(chosen.of_chain.at(RobotId{1}), 3U);  // equal: the newest
+  EXPECT_EQ(chosen.of_chain.at(RobotId{2}), 4U);  // 2 of 6 and 2 of 4
   EXPECT_EQ(chosen.largest, 1U);
   append(map, 3, 2, 1, 1);  // robot 1's smaller piece does not count, though with robot 3 it has three
   EXPECT_EQ(choose_components(map).largest, 1U);
   append(map, 3, 3, 2, 1);  // with robot 1's 2 of 4
   EXPECT_EQ(choose_components(map).largest, 3U);
-  EXPECT_TRUE(choose_components({}).of_robot.empty());
+  EXPECT_TRUE(choose_components({}).of_chain.empty());
 }
 
 TEST(MonitorGraph, ShapesAreThoseOfTheNodesSent) {
@@ -180,10 +182,10 @@ TEST(MonitorGraph, ShapesAreThoseOfTheNodesSent) {
   ASSERT_TRUE(reduced.reduced);
   ASSERT_EQ(reduced.shapes.size(), 2U);
   for (std::uint32_t r = 0; r < 2; ++r) {
-    EXPECT_EQ(whole.shapes[r].robot, RobotId{r});
+    EXPECT_EQ(whole.shapes[r].chain, ChainId(RobotId{r}));
     ASSERT_EQ(whole.shapes[r].sag.size(), 3U);  // 46 nodes
     EXPECT_EQ(whole.shapes[r].sag[0].size(), 5U);
-    EXPECT_EQ(reduced.shapes[r].robot, RobotId{r});
+    EXPECT_EQ(reduced.shapes[r].chain, ChainId(RobotId{r}));
     EXPECT_EQ(reduced.shapes[r].sag.size(), 2U);  // 20 nodes
     // The same trajectory, seen at fewer places.
     EXPECT_NEAR(reduced.shapes[r].whole.position_m, whole.shapes[r].whole.position_m,
@@ -201,7 +203,7 @@ TEST(MonitorGraph, TiesWhatClosuresHoldTogether) {
     EXPECT_LE(shape.ties.size(), 32U);
     const bool around =
         std::ranges::any_of(shape.ties, [](const ShapeTie& tie) { return tie.b - tie.a > 30 && tie.b < 46; });
-    EXPECT_TRUE(around) << "robot " << shape.robot.value;
+    EXPECT_TRUE(around) << "robot " << shape.chain.robot.value;
   }
   for (const ShapeUncertainty& shape : monitor_graph(map, 1, {.shape_ties = 0}).shapes) EXPECT_TRUE(shape.ties.empty());
 }
@@ -210,7 +212,7 @@ TEST(MonitorGraph, TiesWhatClosuresHoldTogether) {
 double moved_m(const MapEstimate& map, const MapEstimate& other, RobotId robot) {
   std::vector<Eigen::Vector3d> a, b;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (map.nodes[i].id.robot != robot || !map.nodes[i].representative) continue;
+    if (map.nodes[i].id.chain.robot != robot || !map.nodes[i].representative) continue;
     a.push_back(map.nodes[i].T_world_body.translation);
     b.push_back(other.nodes[i].T_world_body.translation);
   }
@@ -269,7 +271,7 @@ TrueErrors true_errors(const MapEstimate& map, RobotId robot) {
   std::vector<Eigen::Vector3d> true_points;
   std::vector<Eigen::Vector3d> points;
   for (const MapNode& node : map.nodes) {
-    if (node.id.robot != robot || !node.representative) continue;
+    if (node.id.chain.robot != robot || !node.representative) continue;
     truth.push_back(test::true_pose(robot, node.id.index));
     estimate.push_back(node.T_world_body);
     true_points.push_back(truth.back().translation);
@@ -301,7 +303,7 @@ TEST(MonitorGraph, TheExpectedErrorIsTheTrueOne) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const MapEstimate map = circle_map(seed);
     for (const ShapeUncertainty& shape : monitor_graph(map, 1, {.shape_samples = 128, .shape_deletions = 0}).shapes) {
-      const auto [x_m, x_rad] = true_errors(map, shape.robot);
+      const auto [x_m, x_rad] = true_errors(map, shape.chain.robot);
       for (std::size_t k = 0; k < x_m.size(); ++k) {
         whole_m.add(x_m[k], shape.whole.position_m);
         whole_rad.add(x_rad[k], shape.whole.rotation_rad);

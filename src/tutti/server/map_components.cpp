@@ -28,13 +28,18 @@ std::uint32_t largest(const Sizes& sizes) {
 }  // namespace
 
 MapComponents choose_components(const MapEstimate& map) {
+  std::map<ChainId, Sizes> by_chain;
   std::map<RobotId, Sizes> by_robot;
-  for (const MapNode& node : map.nodes) count(node, by_robot[node.id.robot]);
+  for (const MapNode& node : map.nodes) {
+    count(node, by_chain[node.id.chain]);
+    count(node, by_robot[node.id.chain.robot]);
+  }
   MapComponents out;
   for (const auto& [robot, sizes] : by_robot) out.of_robot[robot] = largest(sizes);
+  for (const auto& [chain, sizes] : by_chain) out.of_chain[chain] = largest(sizes);
   Sizes together;
   for (const MapNode& node : map.nodes)
-    if (node.component == out.of_robot.at(node.id.robot)) count(node, together);
+    if (node.component == out.of_chain.at(node.id.chain)) count(node, together);
   if (!together.empty()) out.largest = largest(together);
   return out;
 }

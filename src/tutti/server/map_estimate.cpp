@@ -32,17 +32,17 @@ Matrix6d information_of(const Matrix6d& covariance) {
   return 0.5 * (inverse + inverse.transpose());
 }
 
-/// The submap begins at its robot's last keyframe so far, or after it.
+/// The submap begins at its chain's last keyframe so far, or after it.
 bool continues(const Keyframe& last, const Keyframe& first) {
   return first.index == last.index ? first.stamp == last.stamp : first.index > last.index && first.stamp > last.stamp;
 }
 
-/// The submaps without those that contradict earlier ones of their robot. A function of the set: the smallest index is
+/// The submaps without those that contradict earlier ones of their chain. A function of the set: the smallest index is
 /// believed first, in whatever order they came.
 SubmapSet without_contradictions(const SubmapSet& submaps, std::vector<SubmapId>& left_out) {
   SubmapSet out;
   for (const auto& [id, submap] : submaps) {
-    const bool is_first = out.empty() || out.rbegin()->first.robot != id.robot;
+    const bool is_first = out.empty() || out.rbegin()->first.chain != id.chain;
     if (is_first || continues(out.rbegin()->second->keyframes.back(), submap->keyframes.front()))
       out.emplace_hint(out.end(), id, submap);
     else
@@ -56,7 +56,7 @@ SubmapSet without_contradictions(const SubmapSet& submaps, std::vector<SubmapId>
 NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
   for (const auto& [id, submap] : submaps)
     for (const Keyframe& k : submap->keyframes) {
-      const KeyframeId node{id.robot, k.index};
+      const KeyframeId node{id.chain, k.index};
       if (map.nodes.empty() || map.nodes.back().id < node)
         map.nodes.push_back({node, k.stamp, k.representative, k.T_odom_body, k.T_odom_body, 0});
     }
@@ -65,8 +65,8 @@ NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
   for (const MapNode& node : map.nodes) map.graph.poses.push_back(node.T_odom_body);
   for (const auto& [id, submap] : submaps)
     for (std::size_t k = 0; k < submap->odometry.size(); ++k)
-      map.graph.edges.push_back({.from = index.at({id.robot, submap->keyframes[k].index}),
-                                 .to = index.at({id.robot, submap->keyframes[k + 1].index}),
+      map.graph.edges.push_back({.from = index.at({id.chain, submap->keyframes[k].index}),
+                                 .to = index.at({id.chain, submap->keyframes[k + 1].index}),
                                  .T_from_to = submap->odometry[k].T_a_b,
                                  .information = information_of(bounded_covariance(submap->odometry[k].covariance))});
   map.odometry_edges = map.graph.edges.size();
@@ -78,7 +78,7 @@ std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, cons
   std::vector<std::optional<Matrix6d>> out(index.size());
   for (const auto& [id, submap] : submaps)
     for (std::size_t k = 0; k < submap->odometry.size(); ++k)
-      out[index.at({id.robot, submap->keyframes[k + 1].index})] = bounded_covariance(submap->odometry[k].covariance);
+      out[index.at({id.chain, submap->keyframes[k + 1].index})] = bounded_covariance(submap->odometry[k].covariance);
   return out;
 }
 
@@ -104,10 +104,10 @@ std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const Subm
 void see_through(MapEstimate& map, std::vector<estimation::OdometryChain>& chains) {
   for (estimation::OdometryChain& chain : chains)
     for (Matrix6d& covariance : chain.step_covariance)
-      covariance = scale_rotation(covariance, map.rotation_factors.at(chain.robot));
+      covariance = scale_rotation(covariance, map.rotation_factors.at(chain.id));
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     PoseGraphEdge& edge = map.graph.edges[e];
-    edge.information = scale_rotation(edge.information, 1.0 / map.rotation_factors.at(map.nodes[edge.from].id.robot));
+    edge.information = scale_rotation(edge.information, 1.0 / map.rotation_factors.at(map.nodes[edge.from].id.chain));
   }
 }
 
@@ -143,8 +143,8 @@ void weaken(PoseGraph& graph, const MapEstimate& map, std::size_t from, std::siz
 /// As it was judged: a step that jumped by what it was instead, else with a variance.
 void doubt(PoseGraph& graph, const MapEstimate& map, const NodeIndex& index, const DoubtedStretch& doubted,
            double sigma_m, double sigma_rad) {
-  const auto& [robot, from, to] = doubted.stretch;
-  const std::size_t a = index.at({robot, from}), b = index.at({robot, to});
+  const auto& [chain, from, to] = doubted.stretch;
+  const std::size_t a = index.at({chain, from}), b = index.at({chain, to});
   if (!doubted.motion) return weaken(graph, map, a, b, sigma_m, sigma_rad);
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
     if (graph.edges[e].from == a && graph.edges[e].to == b)
@@ -154,8 +154,8 @@ void doubt(PoseGraph& graph, const MapEstimate& map, const NodeIndex& index, con
 /// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A stretch that
 /// turns out to have been right, nearly or within its own doubt, is no failure.
 void record_failure(const DoubtedStretch& doubted, const NodeIndex& index, double min_jump_m, MapEstimate& map) {
-  const auto& [robot, from, to] = doubted.stretch;
-  const std::size_t a = index.at({robot, from}), b = index.at({robot, to});
+  const auto& [chain, from, to] = doubted.stretch;
+  const std::size_t a = index.at({chain, from}), b = index.at({chain, to});
   const auto raw = [&](std::size_t i, std::size_t j) {
     return map.nodes[i].T_odom_body.inverse() * map.nodes[j].T_odom_body;
   };
@@ -171,7 +171,7 @@ void record_failure(const DoubtedStretch& doubted, const NodeIndex& index, doubl
   const double jump_rad = jump.tail<3>().norm();
   if (estimation::failure_size(jump_m, jump_rad) < 0.5 * min_jump_m) return;
   if (jump.dot(covariance.llt().solve(jump)) < kRightAfterAll) return;
-  map.failed_odometry.push_back({robot, from, to, jump_m, jump_rad});
+  map.failed_odometry.push_back({chain, from, to, jump_m, jump_rad});
   doubt(map.graph, map, index, doubted, jump_m, jump_rad);
 }
 
@@ -202,7 +202,7 @@ struct Optimum {
 
   [[nodiscard]] std::size_t convicted() const {  ///< Steps of odometry.
     std::size_t steps = 0;
-    for (const auto& [robot, from, to] : failed | std::views::transform(&DoubtedStretch::stretch)) steps += to - from;
+    for (const auto& [chain, from, to] : failed | std::views::transform(&DoubtedStretch::stretch)) steps += to - from;
     return steps;
   }
   [[nodiscard]] bool explains_better_than(const Optimum& other) const {
@@ -323,7 +323,7 @@ std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode
     if (step_to[i])
       chains.back().step_covariance.push_back(*step_to[i]);
     else
-      chains.push_back({.robot = nodes[i].id.robot, .first_index = nodes[i].id.index});
+      chains.push_back({.id = nodes[i].id.chain, .first_index = nodes[i].id.index});
     chains.back().T_odom_body.push_back(nodes[i].T_odom_body);
     chains.back().stamps.push_back(nodes[i].stamp);
   }
@@ -358,19 +358,19 @@ MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdict
   std::vector<SubmapId> left_out;
   const SubmapSet submaps = without_contradictions(all_submaps, left_out);
   MapEstimate best = estimate_together(submaps, verdicts, config);
-  // One robot's numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
+  // One chain's numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
   std::vector<SubmapId> unsolvable;
-  for (auto robot = best.converged ? submaps.end() : submaps.begin(); robot != submaps.end();) {
-    const auto next = submaps.upper_bound({robot->first.robot, std::numeric_limits<std::uint32_t>::max()});
-    SubmapSet others(submaps.begin(), robot);
+  for (auto chain = best.converged ? submaps.end() : submaps.begin(); chain != submaps.end();) {
+    const auto next = submaps.upper_bound({chain->first.chain, std::numeric_limits<std::uint32_t>::max()});
+    SubmapSet others(submaps.begin(), chain);
     others.insert(next, submaps.end());
     MapEstimate without = estimate_together(others, verdicts, config);
     if (without.converged && (!best.converged || without.nodes.size() > best.nodes.size())) {
       best = std::move(without);
       unsolvable.clear();
-      for (auto it = robot; it != next; ++it) unsolvable.push_back(it->first);
+      for (auto it = chain; it != next; ++it) unsolvable.push_back(it->first);
     }
-    robot = next;
+    chain = next;
   }
   left_out.insert(left_out.end(), unsolvable.begin(), unsolvable.end());
   best.left_out = std::move(left_out);

@@ -35,9 +35,9 @@ struct JudgedClosure {
   bool accepted = false;
 };
 
-/// Odometry that the closures convicted: between these two keyframes of one robot it is not believed.
+/// Odometry that the closures convicted: between these two keyframes of one chain it is not believed.
 struct FailedOdometry {
-  RobotId robot;
+  ChainId chain;
   std::uint32_t from = 0;  ///< KeyframeId::index
   std::uint32_t to = 0;
   double jump_m = 0.0;  ///< By how much the map differs from the odometry between the two.
@@ -51,13 +51,12 @@ struct MapEstimate {
   PoseGraph graph;                              ///< Same order as nodes: odometry, then the accepted closures.
   std::size_t odometry_edges = 0;               ///< graph.edges[0 .. odometry_edges) are odometry.
   std::vector<JudgedClosure> closures;          ///< Sorted by (from, to).
-  std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (robot, from).
-  /// By which the variances of each robot's odometry count, in rotation (rotation_honesty.hpp); `graph` has them so.
-  std::map<RobotId, double> rotation_factors;
+  std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (chain, from).
+  /// By which the variances of each chain's odometry count, in rotation (rotation_honesty.hpp); `graph` has them so.
+  std::map<ChainId, double> rotation_factors;
   std::uint32_t components = 0;  ///< Connected components that contain a node.
-  /// Submaps that contradict earlier ones of their robot: keyframes that are there already, at other moments or out of
-  /// order. As after a restart without its state. And all of a robot without which the map can be solved, and with
-  /// which it cannot.
+  /// Submaps that contradict earlier ones of their chain: keyframes that are there already, at other moments or out of
+  /// order. And all of a chain without which the map can be solved, and with which it cannot.
   std::vector<SubmapId> left_out;
   std::size_t spare_pairs = 0;  ///< Of submaps whose closures were not judged (MapConfig::most_closed_pairs).
   bool converged = false;       ///< Otherwise no closure is accepted, and every robot's odometry stands alone.

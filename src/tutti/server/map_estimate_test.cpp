@@ -24,7 +24,7 @@ struct Inputs {
 Inputs make_inputs(std::uint32_t robots, const TestFinder& finder, std::uint64_t seed) {
   Inputs in;
   for (std::uint32_t r = 0; r < robots; ++r)
-    for (Submap& submap : test::make_submaps({r}, {}, Rng(seed).fork(r)))
+    for (Submap& submap : test::make_submaps(RobotId{r}, {}, Rng(seed).fork(r)))
       in.submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
   for (auto a = in.submaps.begin(); a != in.submaps.end(); ++a)
     for (auto b = std::next(a); b != in.submaps.end(); ++b)
@@ -38,8 +38,8 @@ double rmse(const MapEstimate& map, bool raw = false, std::optional<RobotId> rob
   std::vector<Eigen::Vector3d> truth;
   std::vector<Eigen::Vector3d> estimate;
   for (const MapNode& node : map.nodes) {
-    if (robot && node.id.robot != *robot) continue;
-    truth.push_back(test::true_pose(node.id.robot, node.id.index).translation);
+    if (robot && node.id.chain.robot != *robot) continue;
+    truth.push_back(test::true_pose(node.id.chain.robot, node.id.index).translation);
     estimate.push_back(raw ? node.T_odom_body.translation : node.T_world_body.translation);
   }
   const Pose3 T = align_points(truth, estimate);
@@ -109,7 +109,7 @@ TEST(MapEstimate, SeesThroughRotationsThatAreBetterThanStated) {
 TEST(MapEstimate, ALoneClosureDoesNotJoinTwoRobots) {
   Inputs in = make_inputs(2, TestFinder(3), 3);
   const auto inter = std::find_if(in.verdicts.begin(), in.verdicts.end(), [](const auto& entry) {
-    return entry.first.first.robot != entry.first.second.robot;
+    return entry.first.first.chain != entry.first.second.chain;
   });
   ASSERT_NE(inter, in.verdicts.end());
   const VerdictSet one{*inter};
@@ -134,14 +134,14 @@ void expect_unharmed(const Inputs& in, const std::string& what, double most_m = 
   EXPECT_TRUE(map.converged) << what;
   MapEstimate others;
   std::ranges::copy_if(map.nodes, std::back_inserter(others.nodes),
-                       [](const MapNode& n) { return n.id.robot.value < 2; });
+                       [](const MapNode& n) { return n.id.chain.robot.value < 2; });
   EXPECT_EQ(others.nodes.size(), 182U) << what;
   EXPECT_TRUE(std::ranges::all_of(others.nodes, [](const MapNode& n) { return n.component == 0; })) << what;
   EXPECT_LT(rmse(others), most_m) << what;
   const ProxyGraph graph = monitor_graph(map, 1, {});
   EXPECT_TRUE(std::ranges::all_of(graph.nodes, [](const ProxyNode& n) { return n.covariance.allFinite(); })) << what;
-  EXPECT_EQ(std::ranges::count(graph.nodes, RobotId{0}, &ProxyNode::robot), 46) << what;
-  EXPECT_EQ(std::ranges::count(graph.shapes, RobotId{0}, &ShapeUncertainty::robot), 1) << what;
+  EXPECT_EQ(std::ranges::count(graph.nodes, ChainId(RobotId{0}), &ProxyNode::chain), 46) << what;
+  EXPECT_EQ(std::ranges::count(graph.shapes, ChainId(RobotId{0}), &ShapeUncertainty::chain), 1) << what;
 }
 
 /// Changes what robot 2 sent.
@@ -149,7 +149,7 @@ template <class Change>
 Inputs changed(Change change) {
   Inputs in = make_inputs(3, TestFinder(2), 2);
   for (auto& [id, submap] : in.submaps) {
-    if (id.robot != RobotId{2}) continue;
+    if (id.chain.robot != RobotId{2}) continue;
     Submap copy = *submap;
     change(copy);
     submap = std::make_shared<const Submap>(std::move(copy));
@@ -190,16 +190,16 @@ TEST(MapEstimate, DivergedOdometryOfOneRobotHarmsNoOther) {
 TEST(MapEstimate, TheLastRobotThereCanBeIsLeftOutLikeAnyOther) {
   Inputs in = make_inputs(2, TestFinder(2), 2);
   constexpr RobotId kLast{std::numeric_limits<std::uint32_t>::max()};
-  for (const Submap& submap : test::make_submaps({2}, {}, Rng(2).fork(2))) {
+  for (const Submap& submap : test::make_submaps(RobotId{2}, {}, Rng(2).fork(2))) {
     Submap wild = submap;
-    wild.id.robot = kLast;
+    wild.id.chain.robot = kLast;
     for (RelativePose& step : wild.odometry) step.T_a_b.translation *= 1e160;
     in.submaps[wild.id] = std::make_shared<const Submap>(std::move(wild));
   }
   expect_unharmed(in, "the last robot");
   const auto left_out = estimate_map(in.submaps, in.verdicts, {}).left_out;
-  EXPECT_EQ(left_out.size(), test::make_submaps({2}, {}, Rng(2).fork(2)).size());
-  EXPECT_TRUE(std::ranges::all_of(left_out, [&](const SubmapId& id) { return id.robot == kLast; }));
+  EXPECT_EQ(left_out.size(), test::make_submaps(RobotId{2}, {}, Rng(2).fork(2)).size());
+  EXPECT_TRUE(std::ranges::all_of(left_out, [&](const SubmapId& id) { return id.chain.robot == kLast; }));
 }
 
 TEST(MapEstimate, SubmapsThatContradictEarlierOnesAreLeftOut) {
@@ -224,7 +224,7 @@ TEST(MapEstimate, SubmapsThatContradictEarlierOnesAreLeftOut) {
     ASSERT_EQ(map.left_out.size(), count) << what;
     EXPECT_EQ(map.left_out.front(), (SubmapId{RobotId{2}, 4})) << what;
     for (std::size_t i = 1; i < map.nodes.size(); ++i)
-      EXPECT_TRUE(map.nodes[i - 1].id.robot != map.nodes[i].id.robot || map.nodes[i - 1].stamp < map.nodes[i].stamp);
+      EXPECT_TRUE(map.nodes[i - 1].id.chain != map.nodes[i].id.chain || map.nodes[i - 1].stamp < map.nodes[i].stamp);
   };
   expect_left_out(changed(second_run), 1, "a second run");  // what follows it hangs on by closures alone
   expect_left_out(changed(overlapping), 1, "overlapping");

@@ -2,6 +2,7 @@
 #include "tutti/server/map_server.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -35,7 +36,7 @@ Status check_step(const Keyframe& from, const Keyframe& to, const RelativePose& 
 
 /// What the map relies on, also of callers who do not come by wire.
 Status check_submap(const Submap& submap) {
-  const std::string where = fmt::format("submap {}/{}", submap.id.robot.value, submap.id.index);
+  const std::string where = "submap " + to_string(submap.id);
   if (submap.keyframes.empty() || submap.odometry.size() + 1 != submap.keyframes.size())
     return fail(ErrorCode::invalid, "{}: {} keyframes and {} odometry factors, expected n and n - 1, n >= 1", where,
                 submap.keyframes.size(), submap.odometry.size());
@@ -57,8 +58,7 @@ SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : S
 
 std::string name_of(const ClosureVerdict& verdict) {
   const auto& [first, second] = verdict.pair;
-  return fmt::format("verdict on submaps {}/{} and {}/{}", first.robot.value, first.index, second.robot.value,
-                     second.index);
+  return fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second));
 }
 
 /// What can be said of a verdict before its submaps are there.
@@ -67,16 +67,16 @@ Status check_alone(const ClosureVerdict& verdict, const std::set<RobotId>& robot
   const std::string where = name_of(verdict);
   if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where);
   for (const SubmapId id : {first, second})
-    if (!robots.contains(id.robot))
-      return fail(ErrorCode::unknown_robot, "{}: robot {} is none of the mission's {}", where, id.robot.value,
+    if (!robots.contains(id.chain.robot))
+      return fail(ErrorCode::unknown_robot, "{}: robot {} is none of the mission's {}", where, id.chain.robot.value,
                   robots.size());
   if (verdict.closures.empty() != verdict.refusal.has_value())
     return fail(ErrorCode::invalid, "{}: {} closures {} a refusal, expected one of the two", where,
                 verdict.closures.size(), verdict.refusal ? "and" : "without");
   for (const LoopClosure& closure : verdict.closures) {
-    if (closure.from.robot != first.robot || closure.to.robot != second.robot)
-      return fail(ErrorCode::invalid, "{}: its closure is from robot {} to robot {}", where, closure.from.robot.value,
-                  closure.to.robot.value);
+    if (closure.from.chain != first.chain || closure.to.chain != second.chain)
+      return fail(ErrorCode::invalid, "{}: its closure is from robot {} to robot {}", where,
+                  to_string(closure.from.chain), to_string(closure.to.chain));
     if (!is_valid(closure.measurement.T_a_b)) return fail(ErrorCode::invalid, "{}: its closure is no pose", where);
     if (auto ok = check_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
   }
@@ -105,11 +105,12 @@ bool holds_over(const ClosureVerdict& a, const ClosureVerdict& b) {
 }  // namespace
 
 MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
-                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config)
-    : MapServer(std::move(robots), std::move(finder), std::move(clouds), config, MapServerState{}) {}
+                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config, std::uint64_t epoch)
+    : MapServer(std::move(robots), std::move(finder), std::move(clouds), config, epoch, MapServerState{}) {}
 
 MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
-                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config, MapServerState state)
+                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config, std::uint64_t epoch,
+                     MapServerState state)
     : robots_(std::move(robots)),
       finder_(std::move(finder)),
       clouds_(std::move(clouds)),
@@ -117,6 +118,7 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
       state_(std::move(state)) {
   TUTTI_CHECK(finder_ != nullptr && clouds_ != nullptr, "no finder or no store of clouds");
   TUTTI_CHECK(finder_->version() > 0, "a finder without a version");
+  state_.epoch = std::max(epoch, state_.epoch + 1);
   if (state_.finder_version < finder_->version()) {
     state_.finder_version = finder_->version();
     state_.answered.forget_answers();
@@ -131,17 +133,18 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
 
 Status MapServer::receive(const SubmapMessage& message) {
   const SubmapId id = message.submap.id;
-  if (!robots_.contains(message.header.robot) || message.header.robot != id.robot)
+  if (!robots_.contains(id.chain.robot) || message.header.robot != id.chain.robot ||
+      message.header.session != id.chain.session)
     return fail(ErrorCode::unknown_robot,
-                "submap {}/{} from robot {}: expected one of the mission's {} robots, as sender", id.robot.value,
-                id.index, message.header.robot.value, robots_.size());
+                "submap {} from robot {} in session {}: expected one of the mission's {} robots, as sender",
+                to_string(id), message.header.robot.value, message.header.session, robots_.size());
   if (auto ok = check_submap(message.submap); !ok) return ok;
   if (const auto known = state_.submaps.find(id); known != state_.submaps.end()) {
     if (known->second->keyframes == message.submap.keyframes) return replace_lost_cloud(message.submap);
-    return fail(ErrorCode::invalid,
-                "submap {}/{} differs from the one in the map: has robot {} restarted without its saved state?",
-                id.robot.value, id.index, id.robot.value);
+    return fail(ErrorCode::invalid, "submap {} differs from the one in the map: robot {} has used session {} before",
+                to_string(id), id.chain.robot.value, id.chain.session);
   }
+  if (auto ok = check_room_for(id.chain); !ok) return ok;
   const std::shared_ptr<const PointCloud>& cloud = message.submap.cloud;
   if (cloud != nullptr && !cloud->points.empty()) {
     if (auto ok = clouds_->put(id, cloud); !ok) return ok;
@@ -156,6 +159,20 @@ Status MapServer::receive(const SubmapMessage& message) {
     if (other != id) plan_verification(ordered(id, other));
   news_ = true;
   return {};
+}
+
+Status MapServer::check_room_for(const ChainId& chain) const {
+  const auto after = [&](const ChainId& known) {
+    return state_.submaps.upper_bound({known, std::numeric_limits<std::uint32_t>::max()});
+  };
+  std::size_t others = 0;
+  for (auto it = state_.submaps.begin(); it != state_.submaps.end(); it = after(it->first.chain)) {
+    if (it->first.chain == chain) return {};
+    ++others;
+  }
+  if (others < ProxyGraph::kMostChains) return {};
+  return fail(ErrorCode::invalid, "robot {} begins session {}, but the map has {} sessions of all robots already",
+              chain.robot.value, chain.session, others);
 }
 
 Status MapServer::replace_lost_cloud(const Submap& duplicate) {
@@ -215,8 +232,8 @@ Status MapServer::check_against_submaps(const ClosureVerdict& verdict) const {
   const auto check = [&](SubmapId id, std::uint32_t keyframe) -> Status {
     const auto& keyframes = state_.submaps.at(id)->keyframes;
     if (keyframes.front().index <= keyframe && keyframe <= keyframes.back().index) return {};
-    return fail(ErrorCode::invalid, "{}: its closure is at keyframe {}, expected one of {} to {} of submap {}/{}",
-                name_of(verdict), keyframe, keyframes.front().index, keyframes.back().index, id.robot.value, id.index);
+    return fail(ErrorCode::invalid, "{}: its closure is at keyframe {}, expected one of {} to {} of submap {}",
+                name_of(verdict), keyframe, keyframes.front().index, keyframes.back().index, to_string(id));
   };
   for (const LoopClosure& closure : verdict.closures) {
     if (auto ok = check(first, closure.from.index); !ok) return ok;
@@ -252,7 +269,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
   if (!verdict.closures.empty() || (is_kept && !kept->second.closures.empty())) news_ = true;
   if (verdict.finder_version >= finder_->version()) state_.answered.insert(pair);
   if (verdict.refusal && verdict.finder_version == state_.finder_version) {
-    count_refusal(*verdict.refusal, pair.first.robot, pair.second.robot, state_.refused);
+    count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state_.refused);
     state_.verdicts.erase(pair);
   } else {
     state_.verdicts.insert_or_assign(pair, verdict);
@@ -262,7 +279,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
 RefusalCounts MapServer::refusals() const {
   RefusalCounts counts = state_.refused;
   for (const auto& [pair, verdict] : state_.verdicts)
-    if (verdict.refusal) count_refusal(*verdict.refusal, pair.first.robot, pair.second.robot, counts);
+    if (verdict.refusal) count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, counts);
   return counts;
 }
 
@@ -270,8 +287,10 @@ ProxyGraphMessage MapServer::optimise() {
   news_ = false;
   map_ = estimate_map(state_.submaps, state_.verdicts, config_.map);
   ++state_.revision;
-  return {.header = {.robot = {}, .session = 0, .sequence = state_.revision},
-          .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};
+  ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
+                            .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};
+  message.graph.epoch = state_.epoch;
+  return message;
 }
 
 }  // namespace tutti::server

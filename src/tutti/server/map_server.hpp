@@ -51,24 +51,28 @@ struct MapServerState {
   /// `finder_version`. Refusals by other versions, which are few, stand here too.
   VerdictSet verdicts;
   std::uint32_t finder_version = 0;
-  AnsweredPairs answered;  ///< By a finder at least as new as the server's, or not to be asked.
-  RefusalCounts refused;   ///< By `finder_version`.
+  AnsweredPairs answered;   ///< By a finder at least as new as the server's, or not to be asked.
+  RefusalCounts refused;    ///< By `finder_version`.
+  std::uint64_t epoch = 0;  ///< Of the server that this is the state of.
   std::uint64_t revision = 0;
 };
 
 /// Submaps in; attach, close loops, optimise; proxy graphs out. No threads, sockets or clocks inside.
 class MapServer {
  public:
+  /// Whoever starts it gives the epoch: larger than at any start before, as the time of the start is. Robots drop what
+  /// an earlier epoch broadcast as late.
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
-            const ServerConfig& config);
+            const ServerConfig& config, std::uint64_t epoch);
   /// Goes on from a saved state; verifications that had no verdict yet become jobs again. All of them when the finder
-  /// is newer than the state's: what older ones found stays in the map until it is answered.
+  /// is newer than the state's: what older ones found stays in the map until it is answered. The epoch becomes larger
+  /// than the saved one if it is not; only the starter's number tells two starts from one saved state apart.
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
-            const ServerConfig& config, MapServerState state);
+            const ServerConfig& config, std::uint64_t epoch, MapServerState state);
 
-  /// A submap, in any order, any number of times. Unknown robots and malformed submaps are refused; what is already
-  /// mapped stays. So is one whose cloud the store cannot keep; it may be sent again. One that comes again puts its
-  /// cloud back if the store has lost it.
+  /// A submap, in any order, any number of times, of any session of a known robot. Unknown robots, malformed submaps
+  /// and sessions beyond ProxyGraph::kMostChains are refused; what is already mapped stays. So is one whose cloud the
+  /// store cannot keep; it may be sent again. One that comes again puts its cloud back if the store has lost it.
   Status receive(const SubmapMessage& message);
   /// The answer to a job, in any order, any number of times. Closures join a keyframe of pair.first to one of
   /// pair.second, and the finder would ask for the pair; anything else is an error and changes nothing. Of two verdicts
@@ -97,6 +101,7 @@ class MapServer {
   [[nodiscard]] const CloudStore& clouds() const { return *clouds_; }
 
  private:
+  [[nodiscard]] Status check_room_for(const ChainId& chain) const;
   /// If it is the cloud that was there.
   Status replace_lost_cloud(const Submap& duplicate);
   [[nodiscard]] bool may_be_verified(SubmapId id) const;

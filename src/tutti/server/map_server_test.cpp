@@ -14,7 +14,9 @@ using test::TestFinder;
 
 const std::set<RobotId> kRobots{RobotId{0}, RobotId{1}};
 
-SubmapMessage message_of(const Submap& submap) { return {.header = {.robot = submap.id.robot}, .submap = submap}; }
+SubmapMessage message_of(const Submap& submap) {
+  return {.header = {.robot = submap.id.chain.robot, .session = submap.id.chain.session}, .submap = submap};
+}
 
 void do_job(MapServer& server, const ClosureFinder& finder, const VerificationJob& job) {
   const auto verdict = finder.verify(*job.first, *job.second, server.clouds());
@@ -29,7 +31,7 @@ void do_jobs(MapServer& server, const ClosureFinder& finder) {
 std::shared_ptr<CloudStore> some_store() { return std::make_shared<MemoryCloudStore>(); }
 
 MapServer filled_server(const std::shared_ptr<const TestFinder>& finder) {
-  MapServer server(kRobots, finder, some_store(), {});
+  MapServer server(kRobots, finder, some_store(), {}, 1);
   for (const RobotId robot : kRobots)
     for (const Submap& submap : test::make_submaps(robot, {}, Rng(1).fork(robot.value)))
       EXPECT_TRUE(server.receive(message_of(submap)).has_value());
@@ -87,7 +89,7 @@ TEST(MapServer, RefusesStrangersAndMalformedSubmapsAndKeepsTheMap) {
   Submap good = test::make_submaps(RobotId{0}, {}, Rng(7)).front();
   good.id.index = 99;
   Submap stranger = good;
-  stranger.id.robot = RobotId{7};
+  stranger.id.chain = RobotId{7};
   refused(stranger, ErrorCode::unknown_robot, "robot 7");
   Submap nan = good;
   nan.keyframes[2].T_odom_body.translation.x() = std::numeric_limits<double>::quiet_NaN();
@@ -111,7 +113,7 @@ TEST(MapServer, RefusesStrangersAndMalformedSubmapsAndKeepsTheMap) {
   refused(nothing, ErrorCode::invalid, "0 keyframes");
 
   Submap restarted = test::make_submaps(RobotId{0}, {}, Rng(7)).front();  // other odometry, the same numbers
-  refused(restarted, ErrorCode::invalid, "restarted without its saved state");
+  refused(restarted, ErrorCode::invalid, "robot 0 has used session 0 before");
 
   SubmapMessage disguised = message_of(good);
   disguised.header.robot = RobotId{1};  // a robot may not write another's map
@@ -126,13 +128,96 @@ TEST(MapServer, GoesOnFromASavedState) {
   for (std::size_t i = 0; i < jobs.size() / 2; ++i) do_job(whole, *finder, jobs[i]);
   whole.optimise();
 
-  MapServer restored(kRobots, finder, some_store(), {}, whole.state());  // killed with half of the verdicts
+  MapServer restored(kRobots, finder, some_store(), {}, 2, whole.state());  // killed with half of the verdicts
   EXPECT_TRUE(restored.has_news());
   do_jobs(restored, *finder);
   for (std::size_t i = jobs.size() / 2; i < jobs.size(); ++i) do_job(whole, *finder, jobs[i]);
-  const ProxyGraphMessage a = whole.optimise();
+  ProxyGraphMessage a = whole.optimise();
   const ProxyGraphMessage b = restored.optimise();
+  EXPECT_GT(b.graph.age(), a.graph.age());
+  a.graph.epoch = b.graph.epoch;
   EXPECT_EQ(a.graph, b.graph);  // the same revision too
+}
+
+TEST(MapServer, EveryStartIsALaterEpochThanTheStateItGoesOnFrom) {
+  const auto finder = std::make_shared<const TestFinder>(1);
+  MapServer first(kRobots, finder, some_store(), {}, 1'700);
+  EXPECT_EQ(first.optimise().graph.age(), std::pair(std::uint64_t{1'700}, std::uint64_t{1}));
+  const MapServerState saved = first.state();
+  for (int i = 0; i < 20; ++i) first.optimise();  // lost
+  const auto epoch_of_start = [&](std::uint64_t given) {
+    MapServer again(kRobots, finder, some_store(), {}, given, saved);
+    const ProxyGraphMessage message = again.optimise();
+    EXPECT_GT(message.graph.age(), first.optimise().graph.age());
+    EXPECT_EQ(message.header.session, message.graph.epoch);
+    return message.graph.epoch;
+  };
+  EXPECT_EQ(epoch_of_start(1'800), 1'800U);  // two starts from one state: the starter's number orders them
+  EXPECT_EQ(epoch_of_start(1'900), 1'900U);
+  EXPECT_EQ(epoch_of_start(3), 1'701U);  // a clock that went back
+}
+
+/// Robot 0 loses its state and walks the same way again, with the same stamps and the same numbers.
+std::vector<Submap> second_session(std::uint64_t session) {
+  return test::make_submaps({RobotId{0}, session}, {}, Rng(99));
+}
+
+TEST(MapServer, ARobotThatStartsAgainBeginsAChainOfItsOwnAndLosesNothing) {
+  for (const std::uint64_t session : {std::uint64_t{1}, std::uint64_t{1'700'000'000'000'000'000}, ~std::uint64_t{0}}) {
+    const auto finder = std::make_shared<const TestFinder>(1);
+    MapServer server = filled_server(finder);
+    do_jobs(server, *finder);
+    server.optimise();
+    const MapEstimate before = server.map();
+    const std::vector<Submap> again = second_session(session);
+    ASSERT_TRUE(server.receive(message_of(again.front())).has_value());
+    server.optimise();  // no closure ties it to the map yet
+    EXPECT_EQ(server.map().components, 2U);
+    for (const MapNode& node : before.nodes) {
+      const auto now = std::ranges::find(server.map().nodes, node.id, &MapNode::id);
+      ASSERT_NE(now, server.map().nodes.end());
+      EXPECT_LT(local(node.T_world_body, now->T_world_body).norm(), 1e-6);
+    }
+    for (int copies = 0; copies < 2; ++copies)
+      for (const Submap& submap : again) ASSERT_TRUE(server.receive(message_of(submap)).has_value());
+    do_jobs(server, *finder);
+    const ProxyGraph graph = server.optimise().graph;
+    EXPECT_EQ(server.map().components, 1U);
+    EXPECT_TRUE(server.map().left_out.empty());
+    EXPECT_EQ(server.map().nodes.size(), 3U * 91U);
+    ASSERT_EQ(graph.components.size(), 3U);
+    EXPECT_EQ(graph.components[1].chain, (ChainId{RobotId{0}, session}));
+    EXPECT_EQ(graph.shapes.size(), 3U);
+    for (const ChainId& chain : {ChainId(RobotId{0}), ChainId{RobotId{0}, session}})
+      EXPECT_EQ(std::ranges::count(graph.nodes, chain, &ProxyNode::chain), 46);
+    for (const MapNode& node : server.map().nodes) {  // both sessions where they were
+      const auto first = std::ranges::find(server.map().nodes, KeyframeId{RobotId{0}, 0}, &MapNode::id);
+      const Pose3 T_world_true = first->T_world_body * test::true_pose(RobotId{0}, 0).inverse();
+      const Pose3 truth = T_world_true * test::true_pose(node.id.chain.robot, node.id.index);
+      EXPECT_LT((node.T_world_body.translation - truth.translation).norm(), 0.5);
+    }
+  }
+}
+
+TEST(MapServer, WithTwoSessionsTheMapIsAFunctionOfTheSet) {
+  const auto finder = std::make_shared<const TestFinder>(1, 5);
+  std::vector<Submap> submaps = second_session(7);
+  for (const RobotId robot : kRobots)
+    std::ranges::copy(test::make_submaps(robot, {}, Rng(1).fork(robot.value)), std::back_inserter(submaps));
+  const auto map_of = [&] {
+    MapServer server(kRobots, finder, some_store(), {}, 1);
+    for (const Submap& submap : submaps) EXPECT_TRUE(server.receive(message_of(submap)).has_value());
+    std::vector<VerificationJob> jobs = server.take_jobs();
+    if (submaps.front().id.index % 2 == 0) std::ranges::reverse(jobs);
+    for (const VerificationJob& job : jobs) do_job(server, *finder, job);
+    return server.optimise().graph;
+  };
+  const ProxyGraph expected = map_of();
+  Rng rng(3);
+  for (int round = 0; round < 3; ++round) {
+    for (std::size_t i = submaps.size(); i > 1; --i) std::swap(submaps[i - 1], submaps[rng.index(i)]);
+    EXPECT_EQ(map_of(), expected);
+  }
 }
 
 /// Verifies by looking at the clouds: as many points as the submap's number says, each at x = that number.
@@ -166,7 +251,7 @@ class BrokenStore final : public CloudStore {
     return inner_.put(id, cloud);
   }
   [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override {
-    if (lost.contains(id)) return fail(ErrorCode::io, "cloud of submap {}/{} is lost", id.robot.value, id.index);
+    if (lost.contains(id)) return fail(ErrorCode::io, "cloud of submap {}/{} is lost", id.chain.robot.value, id.index);
     return inner_.get(id);
   }
   bool is_full = false;
@@ -194,7 +279,7 @@ std::vector<SubmapMessage> submaps_with_some_clouds() {
 TEST(MapServer, KeepsCloudsInTheStoreOnlyAndHandsThemToTheFinder) {
   const auto finder = std::make_shared<const CloudReader>();
   const auto store = std::make_shared<BrokenStore>();
-  MapServer server(kRobots, finder, store, {});
+  MapServer server(kRobots, finder, store, {}, 1);
   for (const SubmapMessage& message : submaps_with_some_clouds()) ASSERT_TRUE(server.receive(message).has_value());
   for (const auto& [id, submap] : server.state().submaps) EXPECT_EQ(submap->cloud, nullptr);
   EXPECT_EQ(server.state().cloud_sizes.size(), 4U);  // of submaps 1, 3, 5, 7 of 0 ... 8
@@ -206,14 +291,14 @@ TEST(MapServer, KeepsCloudsInTheStoreOnlyAndHandsThemToTheFinder) {
   EXPECT_EQ(server.refusals().at(RefusalReason::too_small).nearest.value, 57.0);
 
   // All but one were not answered: after a restart they are asked again, from the same store.
-  MapServer restored(kRobots, finder, store, {}, server.state());
+  MapServer restored(kRobots, finder, store, {}, 2, server.state());
   EXPECT_EQ(restored.take_jobs().size(), 5U);
 }
 
 TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
   const auto finder = std::make_shared<const CloudReader>();
   const auto store = std::make_shared<BrokenStore>();
-  MapServer server(kRobots, finder, store, {});
+  MapServer server(kRobots, finder, store, {}, 1);
   const auto messages = submaps_with_some_clouds();
   store->is_full = true;
   EXPECT_TRUE(server.receive(messages[0]).has_value());  // has none
@@ -237,7 +322,7 @@ TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
 TEST(MapServer, ASubmapThatComesAgainReplacesItsLostCloud) {
   const auto finder = std::make_shared<const CloudReader>();
   const auto store = std::make_shared<BrokenStore>();
-  MapServer server(kRobots, finder, store, {});
+  MapServer server(kRobots, finder, store, {}, 1);
   const auto messages = submaps_with_some_clouds();
   for (const SubmapMessage& message : messages) ASSERT_TRUE(server.receive(message).has_value());
   const std::size_t puts = store->puts;
@@ -263,6 +348,25 @@ TEST(MapServer, ASubmapThatComesAgainReplacesItsLostCloud) {
   ASSERT_TRUE(store->get(id).has_value());
   EXPECT_EQ((*store->get(id))->points, messages[3].submap.cloud->points);
   EXPECT_EQ(server.state().submaps.size(), messages.size());
+}
+
+TEST(MapServer, RefusesSessionsBeyondWhatAGraphCanHold) {
+  const auto finder = std::make_shared<const CloudReader>();  // nothing to verify
+  MapServer server(kRobots, finder, some_store(), {}, 1);
+  const Submap all = test::make_submaps(RobotId{0}, {}, Rng(1)).front();
+  Submap one{.id = all.id, .keyframes = {all.keyframes.front()}};
+  for (std::uint64_t session = 0; session < ProxyGraph::kMostChains; ++session) {
+    one.id.chain.session = 3 * session;
+    ASSERT_TRUE(server.receive(message_of(one)).has_value()) << session;
+  }
+  one.id.chain.session = 1;
+  const Status refused = server.receive(message_of(one));
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().message.find("begins session 1, but the map has 1000"), std::string::npos)
+      << refused.error().message;
+  one.id.chain.session = 3;
+  ++one.id.index;
+  EXPECT_TRUE(server.receive(message_of(one)).has_value());
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ constexpr std::size_t kEnough = 8;
 
 bool is_failed(const MapEstimate& map, const KeyframeId& from, const KeyframeId& to) {
   return std::ranges::any_of(map.failed_odometry, [&](const FailedOdometry& failed) {
-    return failed.robot == from.robot && failed.from < to.index && from.index < failed.to;
+    return failed.chain == from.chain && failed.from < to.index && from.index < failed.to;
   });
 }
 
@@ -47,19 +47,19 @@ bool tells_of_position(const OdometryLoop& loop) {
 
 }  // namespace
 
-std::map<RobotId, double> odometry_variance_factors(const MapEstimate& map) {
+std::map<ChainId, double> odometry_variance_factors(const MapEstimate& map) {
   const auto chains = odometry_chains(map.nodes, steps_of(map));
-  std::map<RobotId, double> factors;
-  for (const auto& [robot, loops] : odometry_loops(chains, accepted_closures(map))) {
+  std::map<ChainId, double> factors;
+  for (const auto& [chain, loops] : odometry_loops(chains, accepted_closures(map))) {
     std::vector<double> squares;
     for (const OdometryLoop& loop : loops)
       if (tells_of_position(loop))
         squares.push_back(loop.missed.dot((loop.odometry + loop.closures).ldlt().solve(loop.missed)));
-    factors[robot] = 1.0;
+    factors[chain] = 1.0;
     if (squares.size() < kEnough) continue;
     const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
     std::nth_element(squares.begin(), middle, squares.end());
-    factors[robot] = std::clamp(*middle / kMedianChiSquare6, kLeast, 1.0);
+    factors[chain] = std::clamp(*middle / kMedianChiSquare6, kLeast, 1.0);
   }
   return factors;
 }

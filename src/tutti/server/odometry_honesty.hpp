@@ -15,6 +15,6 @@ namespace tutti::server {
 /// Front ends inflate their covariance to be on the safe side (and missions on recordings have to guess one); a map
 /// that believes them says it knows less than it does. Never above 1: odometry that misses its closures is the business
 /// of those who judge them (estimation/odometry_trial). Never below 1/25; 1 with fewer than 8 loops.
-std::map<RobotId, double> odometry_variance_factors(const MapEstimate& map);
+std::map<ChainId, double> odometry_variance_factors(const MapEstimate& map);
 
 }  // namespace tutti::server

@@ -17,7 +17,7 @@ class Ways {
  public:
   explicit Ways(std::span<const OdometryChain> chains) {
     for (const OdometryChain& chain : chains) {
-      Piece& piece = pieces_[{chain.robot, chain.first_index}];
+      Piece& piece = pieces_[{chain.id, chain.first_index}];
       piece.chain = &chain;
       piece.covariance.push_back(Matrix6d::Zero());
       for (std::size_t k = 0; k < chain.step_covariance.size(); ++k) {
@@ -33,7 +33,7 @@ class Ways {
     if (after == pieces_.begin()) return std::nullopt;
     const auto& [first, piece] = *std::prev(after);
     const std::size_t from = a.index - first.index, to = b.index - first.index;
-    if (first.robot != a.robot || first.robot != b.robot || std::max(from, to) >= piece.covariance.size())
+    if (first.chain != a.chain || first.chain != b.chain || std::max(from, to) >= piece.covariance.size())
       return std::nullopt;
     const Pose3 T_first_b = T_first_body(*piece.chain, to);
     const Matrix6d to_b = adjoint(T_first_b.inverse());
@@ -54,21 +54,22 @@ class Ways {
   std::map<KeyframeId, Piece> pieces_;  // by first keyframe
 };
 
-/// Closures between two robots, the end of `robot` first, in its order.
-std::vector<LoopClosure> closures_with(std::span<const LoopClosure> closures, RobotId robot, RobotId other) {
+/// Closures between two chains, the end of `one` first, in its order.
+std::vector<LoopClosure> closures_with(std::span<const LoopClosure> closures, const ChainId& one,
+                                       const ChainId& other) {
   std::vector<LoopClosure> out;
   for (LoopClosure closure : closures) {
-    if (closure.from.robot == other && closure.to.robot == robot) {
+    if (closure.from.chain == other && closure.to.chain == one) {
       closure.measurement = inverse(closure.measurement);
       std::swap(closure.from, closure.to);
     }
-    if (closure.from.robot == robot && closure.to.robot == other) out.push_back(closure);
+    if (closure.from.chain == one && closure.to.chain == other) out.push_back(closure);
   }
   std::ranges::stable_sort(out, {}, [](const LoopClosure& c) { return c.from.index; });
   return out;
 }
 
-/// One way by closure, then odometry of the second robot; the other by odometry of the first, then closure.
+/// One way by closure, then odometry of the second chain; the other by odometry of the first, then closure.
 OdometryLoop loop_of(const LoopClosure& first, const RelativePose& of_two, const RelativePose& of_one,
                      const LoopClosure& second) {
   const Matrix6d over_two = adjoint(of_two.T_a_b.inverse());
@@ -80,14 +81,14 @@ OdometryLoop loop_of(const LoopClosure& first, const RelativePose& of_two, const
 
 }  // namespace
 
-std::map<RobotId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
+std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
                                                             std::span<const LoopClosure> closures) {
   const Ways ways(chains);
-  std::map<RobotId, std::vector<OdometryLoop>> loops;
-  for (const OdometryChain& chain : chains) loops[chain.robot];
+  std::map<ChainId, std::vector<OdometryLoop>> loops;
+  for (const OdometryChain& chain : chains) loops[chain.id];
   for (const auto& [from, to, measurement] : closures)
     if (const auto odometry = ways.between(from, to))
-      loops.at(from.robot)
+      loops.at(from.chain)
           .push_back({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance});
   for (auto one = loops.begin(); one != loops.end(); ++one)
     for (auto two = std::next(one); two != loops.end(); ++two) {

@@ -23,7 +23,7 @@ struct OdometryLoop {
 /// every other robot pairs of closures, half their number apart, with both odometries between them, which tell of both
 /// robots. Half their number apart, because odometry, not the closures, is to be judged. Loops over a gap in odometry
 /// are left out.
-std::map<RobotId, std::vector<OdometryLoop>> odometry_loops(std::span<const estimation::OdometryChain> chains,
+std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const estimation::OdometryChain> chains,
                                                             std::span<const LoopClosure> closures);
 
 }  // namespace tutti::server

@@ -26,7 +26,7 @@ struct Walk {
 
   Walk(double sigma_m, double sigma_rad, Rng& rng) {
     for (const RobotId robot : {kOne, kTwo}) {
-      estimation::OdometryChain chain{.robot = robot};
+      estimation::OdometryChain chain{.id = robot};
       Pose3 T_world_body{Eigen::Quaterniond::Identity(), {0, 1.0 * robot.value, 0}};
       for (std::uint32_t k = 0; k < kKeyframes; ++k) {
         if (k > 0) {
@@ -45,7 +45,7 @@ struct Walk {
   }
 
   [[nodiscard]] LoopClosure closure(KeyframeId from, KeyframeId to, double sigma_m, double sigma_rad, Rng& rng) const {
-    const auto pose = [&](KeyframeId id) { return truth[id.robot.value * kKeyframes + id.index]; };
+    const auto pose = [&](KeyframeId id) { return truth[id.chain.robot.value * kKeyframes + id.index]; };
     return {from, to, measured(pose(from).inverse() * pose(to), sigma_m, sigma_rad, rng)};
   }
 };
@@ -89,7 +89,7 @@ TEST(OdometryLoops, NotOverAGap) {
   const std::vector<LoopClosure> closures{walk.closure({kOne, 5}, {kOne, 45}, 0.02, 0.01, rng),
                                           walk.closure({kOne, 35}, {kOne, 50}, 0.02, 0.01, rng)};
   estimation::OdometryChain& all = walk.chains.front();
-  estimation::OdometryChain late{.robot = kOne, .first_index = 30};
+  estimation::OdometryChain late{.id = kOne, .first_index = 30};
   late.T_odom_body.assign(all.T_odom_body.begin() + 30, all.T_odom_body.end());
   late.step_covariance.assign(all.step_covariance.begin() + 30, all.step_covariance.end());
   all.T_odom_body.resize(20);

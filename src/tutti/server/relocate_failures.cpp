@@ -33,7 +33,7 @@ struct Window {
   std::uint32_t to = 0;
 
   [[nodiscard]] bool contains(const KeyframeId& id) const {
-    return id.robot == chain->robot && id.index >= from && id.index <= to;
+    return id.chain == chain->id && id.index >= from && id.index <= to;
   }
   [[nodiscard]] std::size_t poses() const { return to - from + 1; }
   [[nodiscard]] std::size_t position(std::uint32_t index) const { return index - chain->first_index; }
@@ -47,7 +47,7 @@ std::uint32_t last_index(const OdometryChain& chain) {
 Window window_around(const OdometryStretch& stretch, std::span<const OdometryChain> chains, std::uint32_t least,
                      std::uint32_t most) {
   const auto chain = std::ranges::find_if(chains, [&](const OdometryChain& c) {
-    return c.robot == stretch.robot && stretch.from >= c.first_index && stretch.to <= last_index(c);
+    return c.id == stretch.chain && stretch.from >= c.first_index && stretch.to <= last_index(c);
   });
   TUTTI_CHECK(chain != chains.end(), "no chain from {} to {}", stretch.from, stretch.to);
   Window window{&*chain, stretch.from, stretch.to};
@@ -74,12 +74,11 @@ std::vector<PoseSighting> sightings_of(const Window& window, std::span<const Dou
                                        const std::function<Pose3(KeyframeId)>& T_world_body) {
   const auto is_known = [&](const KeyframeId& id) {
     return !window.contains(id) && std::ranges::none_of(failed, [&](const DoubtedStretch& f) {
-      return f.stretch.robot == id.robot && id.index > f.stretch.from && id.index < f.stretch.to;
+      return f.stretch.chain == id.chain && id.index > f.stretch.from && id.index < f.stretch.to;
     });
   };
   const auto end = [&](std::uint32_t index) {
-    return PoseSighting{index - window.from, T_world_body({window.chain->robot, index}),
-                        seen_from_map(Matrix6d::Zero())};
+    return PoseSighting{index - window.from, T_world_body({window.chain->id, index}), seen_from_map(Matrix6d::Zero())};
   };
   std::vector<PoseSighting> out{end(window.from)};
   for (const LoopClosure& closure : closures) {
@@ -107,7 +106,7 @@ std::optional<estimation::OdometryJump> jump_within(const Window& window,
     odometry.push_back({chain.T_odom_body[k].inverse() * chain.T_odom_body[k + 1], chain.step_covariance[k]});
     duration_s.push_back(chain.stamps[k + 1] - chain.stamps[k]);
   }
-  const Pose3 T_w_from = T_world_body({chain.robot, window.from}), T_w_to = T_world_body({chain.robot, window.to});
+  const Pose3 T_w_from = T_world_body({chain.id, window.from}), T_w_to = T_world_body({chain.id, window.to});
   return estimation::find_jump(odometry, 0, odometry.size(),
                                {T_w_from.inverse() * T_w_to, seen_from_map(Matrix6d::Zero())}, duration_s);
 }
@@ -121,14 +120,14 @@ std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> fa
   std::vector<DoubtedStretch> out;
   for (std::size_t f = 0; f < failed.size(); ++f) {
     const OdometryStretch& stretch = failed[f].stretch;
-    const bool follows = f > 0 && failed[f - 1].stretch.robot == stretch.robot;
-    const bool is_followed = f + 1 < failed.size() && failed[f + 1].stretch.robot == stretch.robot;
+    const bool follows = f > 0 && failed[f - 1].stretch.chain == stretch.chain;
+    const bool is_followed = f + 1 < failed.size() && failed[f + 1].stretch.chain == stretch.chain;
     const Window window = window_around(stretch, chains, follows ? out.back().stretch.to : 0,
                                         is_followed ? failed[f + 1].stretch.from : UINT32_MAX);
     const auto index = [&](std::size_t pose) { return window.from + static_cast<std::uint32_t>(pose); };
     DoubtedStretch& moved = out.emplace_back(failed[f]);
     if (const auto jump = jump_within(window, T_world_body)) {
-      moved.stretch = {stretch.robot, index(jump->step), index(jump->step + 1)};
+      moved.stretch = {stretch.chain, index(jump->step), index(jump->step + 1)};
       moved.motion = jump->motion;
       continue;
     }
@@ -138,7 +137,7 @@ std::vector<DoubtedStretch> relocate_failures(std::span<const DoubtedStretch> fa
                                    std::span(window.chain->step_covariance).subspan(first, window.poses() - 1),
                                    sightings_of(window, failed, closures, T_world_body));
     if (found)
-      moved = {{stretch.robot, index(found->from), index(found->to)},
+      moved = {{stretch.chain, index(found->from), index(found->to)},
                kDoubt * found->missed_m,
                kDoubt * found->missed_rad,
                std::nullopt};

@@ -61,11 +61,11 @@ double factor_of(const std::vector<Turn>& turns) {
 
 }  // namespace
 
-std::map<RobotId, double> rotation_variance_factors(std::span<const estimation::OdometryChain> chains,
+std::map<ChainId, double> rotation_variance_factors(std::span<const estimation::OdometryChain> chains,
                                                     std::span<const LoopClosure> closures) {
-  std::map<RobotId, double> out;
-  for (const auto& [robot, loops] : odometry_loops(chains, closures))
-    out[robot] = std::min(1.0, kMargin * factor_of(turns_of(loops)));
+  std::map<ChainId, double> out;
+  for (const auto& [chain, loops] : odometry_loops(chains, closures))
+    out[chain] = std::min(1.0, kMargin * factor_of(turns_of(loops)));
   return out;
 }
 

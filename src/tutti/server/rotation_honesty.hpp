@@ -17,7 +17,7 @@ namespace tutti::server {
 /// side; with more it is 1. 1 with fewer than 8 loops, too. Rotations only: by how far a loop misses in rotation is
 /// read off directly, and errors of rotation add up like a random walk. How odometry errs in translation depends on the
 /// length of the way (its scale), and short loops would belittle that.
-std::map<RobotId, double> rotation_variance_factors(std::span<const estimation::OdometryChain> chains,
+std::map<ChainId, double> rotation_variance_factors(std::span<const estimation::OdometryChain> chains,
                                                     std::span<const LoopClosure> closures);
 
 /// S C S, S = diag(1, 1, 1, s, s, s), s = sqrt(factor): a covariance (right tangent) with the variances of its

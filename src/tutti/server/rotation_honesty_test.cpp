@@ -27,7 +27,7 @@ struct Case {
 
 double factor(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
-  estimation::OdometryChain chain{.robot = kRobot};
+  estimation::OdometryChain chain{.id = kRobot};
   std::vector<Pose3> truth(1);
   chain.T_odom_body.resize(1);
   for (std::uint32_t k = 1; k < kKeyframes; ++k) {

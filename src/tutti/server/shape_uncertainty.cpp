@@ -96,7 +96,7 @@ class Doubt {
 
 }  // namespace
 
-ShapeUncertainty shape_uncertainty(RobotId robot, std::span<const Pose3> poses, const Eigen::MatrixXd& samples,
+ShapeUncertainty shape_uncertainty(const ChainId& chain, std::span<const Pose3> poses, const Eigen::MatrixXd& samples,
                                    const Eigen::MatrixXd& shifts) {
   const auto n = static_cast<Eigen::Index>(poses.size());
   TUTTI_CHECK(n > 0 && samples.rows() == 6 * n && samples.cols() > 0, "{} x {} samples of {} poses", samples.rows(),
@@ -127,7 +127,7 @@ ShapeUncertainty shape_uncertainty(RobotId robot, std::span<const Pose3> poses, 
     rotation.add_shift(x_rad);
   });
 
-  ShapeUncertainty out{.robot = robot, .whole = {position.whole(), rotation.whole()}, .sag = {}};
+  ShapeUncertainty out{.chain = chain, .whole = {position.whole(), rotation.whole()}, .sag = {}};
   for (std::size_t j = 0; const std::size_t count = ShapeUncertainty::stretches(poses.size(), j); ++j) {
     auto& stretches = out.sag.emplace_back();
     for (std::size_t i = 0; i < count; ++i) stretches.push_back({position.sag(j, i), rotation.sag(j, i)});

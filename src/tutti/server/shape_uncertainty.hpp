@@ -16,7 +16,7 @@ namespace tutti::server {
 /// First order: a sample's rigid motion is the small one that fits its displacements best. What the poses do not
 /// determine of it (a turn about the line they all lie on) moves none of them. Relative error of a sag: about
 /// 1 / sqrt(2 samples).
-ShapeUncertainty shape_uncertainty(RobotId robot, std::span<const Pose3> poses, const Eigen::MatrixXd& samples,
+ShapeUncertainty shape_uncertainty(const ChainId& chain, std::span<const Pose3> poses, const Eigen::MatrixXd& samples,
                                    const Eigen::MatrixXd& shifts = {});
 
 }  // namespace tutti::server

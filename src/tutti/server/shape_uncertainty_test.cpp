@@ -84,7 +84,7 @@ ShapeUncertainty exact_shape(const PoseGraph& graph) {
     const Eigen::Matrix3d covariance = rows * C * rows.transpose();
     return std::sqrt(covariance.selfadjointView<Eigen::Lower>().eigenvalues()(2));
   };
-  ShapeUncertainty out{.robot = kRobot};
+  ShapeUncertainty out{.chain = kRobot};
   out.whole = {std::sqrt((A_m * C * A_m.transpose()).trace() / static_cast<double>(n)),
                std::sqrt((A_rad * C * A_rad.transpose()).trace() / static_cast<double>(n))};
   for (Eigen::Index L = 4; 2 * L < n; L *= 2) {
@@ -216,7 +216,7 @@ TEST(ShapeUncertainty, TheLargestMoveWithoutAClosureCounts) {
 
 TEST(ShapeUncertainty, DegenerateShapes) {
   const ShapeUncertainty one = shape_of(chain(1, 0.02, 0.004, false), 10);
-  EXPECT_EQ(one.robot, kRobot);
+  EXPECT_EQ(one.chain, ChainId(kRobot));
   EXPECT_EQ(one.whole, ShapeSigma{});
   EXPECT_TRUE(one.sag.empty());
   EXPECT_TRUE(shape_of(chain(8, 0.02, 0.004, false), 10).sag.empty());

@@ -14,8 +14,7 @@ namespace {
 
 std::uint64_t place_in_line(const SubmapPair& pair) {
   std::uint64_t place = 0x9e3779b97f4a7c15ULL;
-  for (const SubmapId& id : {pair.first, pair.second})
-    place = mixed(place + ((std::uint64_t{id.robot.value} << 32U) | id.index));
+  for (const SubmapId& id : {pair.first, pair.second}) place = mixed(place + packed(id.chain, id.index));
   return place;
 }
 

@@ -20,12 +20,12 @@ struct Room {
 Room one_room(std::uint32_t submaps) {
   Room out;
   for (const std::uint32_t robot : {0U, 1U})
-    for (Submap& submap : test::make_submaps({robot}, {.keyframes = 10 * submaps + 1}, Rng(robot)))
+    for (Submap& submap : test::make_submaps(RobotId{robot}, {.keyframes = 10 * submaps + 1}, Rng(robot)))
       out.submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
   const test::TestFinder finder(1);
   for (auto a = out.submaps.begin(); a != out.submaps.end(); ++a)
     for (auto b = std::next(a); b != out.submaps.end(); ++b)
-      if (a->first.robot != b->first.robot || b->first.index > a->first.index + 1)
+      if (a->first.chain != b->first.chain || b->first.index > a->first.index + 1)
         out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
   return out;
 }
@@ -80,8 +80,8 @@ TEST(SparePairs, TheMapIsAsGoodWithoutThem) {
     for (const MapNode& node : map.nodes) {
       const MapNode& start = map.nodes.front();
       const Pose3 T = start.T_world_body.inverse() * node.T_world_body;
-      const Pose3 truth =
-          test::true_pose(start.id.robot, start.id.index).inverse() * test::true_pose(node.id.robot, node.id.index);
+      const Pose3 truth = test::true_pose(start.id.chain.robot, start.id.index).inverse() *
+                          test::true_pose(node.id.chain.robot, node.id.index);
       worst = std::max(worst, (T.translation - truth.translation).norm());
     }
     return worst;

@@ -15,7 +15,9 @@ using test::TestFinder;
 
 const std::set<RobotId> kRobots{RobotId{0}, RobotId{1}};
 
-SubmapMessage message_of(const Submap& submap) { return {.header = {.robot = submap.id.robot}, .submap = submap}; }
+SubmapMessage message_of(const Submap& submap) {
+  return {.header = {.robot = submap.id.chain.robot}, .submap = submap};
+}
 
 /// Wants all pairs that are not neighbours and refuses them.
 class Refuser final : public ClosureFinder {
@@ -24,7 +26,7 @@ class Refuser final : public ClosureFinder {
   [[nodiscard]] std::uint32_t version() const override { return version_; }
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
-    return first.id.robot != second.id.robot || second.id.index - first.id.index > 1;
+    return first.id.chain != second.id.chain || second.id.index - first.id.index > 1;
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const CloudStore&) const override {
@@ -36,7 +38,7 @@ class Refuser final : public ClosureFinder {
 };
 
 MapServer make_server(std::shared_ptr<const ClosureFinder> finder, MapServerState state = {}) {
-  return {kRobots, std::move(finder), std::make_shared<MemoryCloudStore>(), {}, std::move(state)};
+  return {kRobots, std::move(finder), std::make_shared<MemoryCloudStore>(), {}, 1, std::move(state)};
 }
 
 /// Two keyframes a submap, the second that of the next one.
@@ -104,9 +106,9 @@ TEST_F(Verdicts, ThatDoNotBelongToTheirPairAreErrorsAndChangeNothing) {
   using V = ClosureVerdict;
   refused("first to be the smaller", [](V& v) { std::swap(v.pair.first, v.pair.second); });
   refused("first to be the smaller", [](V& v) { v.pair.second = v.pair.first; });
-  refused("robot 7", [](V& v) { v.pair.second.robot = v.closures[0].to.robot = RobotId{7}; });
-  refused("from robot", [](V& v) { v.closures[0].from.robot = RobotId{7}; });
-  refused("to robot", [](V& v) { v.closures[0].to.robot = RobotId{7}; });
+  refused("robot 7", [](V& v) { v.pair.second.chain.robot = v.closures[0].to.chain.robot = RobotId{7}; });
+  refused("from robot", [](V& v) { v.closures[0].from.chain.robot = RobotId{7}; });
+  refused("to robot", [](V& v) { v.closures[0].to.chain.robot = RobotId{7}; });
   refused("keyframe 4711", [](V& v) { v.closures[0].from.index = 4711; });
   refused("expected one of", [&](V& v) { v.closures[0].to.index = jobs_.front().second->keyframes.back().index + 1; });
   refused("no pose", [](V& v) { v.closures[0].measurement.T_a_b.translation.x() = std::nan(""); });

@@ -63,7 +63,7 @@ TEST(WhoIsWrong, FailedOdometryIsRepairedAmongWrongClosures) {
       EXPECT_EQ(accepted_wrong(run, map), 0U) << seed;
       double turn = 0.0;  // a slow failure may be found in parts
       for (const FailedOdometry& failed : map.failed_odometry) {
-        EXPECT_EQ(failed.robot, RobotId{0});
+        EXPECT_EQ(failed.chain.robot, RobotId{0});
         EXPECT_LT(seconds_of(map, {0}, failed.from), 190.0);
         EXPECT_GT(seconds_of(map, {0}, failed.to), 170.0);
         turn += failed.jump_rad;
@@ -146,7 +146,7 @@ TEST(WhoIsWrong, AFailureLittleByLittleIsConvictedWhereItHappened) {
     ASSERT_FALSE(map.failed_odometry.empty()) << seed;
     double climbed = 0.0;  // in parts, maybe, one after the other
     for (const FailedOdometry& failed : map.failed_odometry) {
-      EXPECT_EQ(failed.robot, RobotId{0});
+      EXPECT_EQ(failed.chain.robot, RobotId{0});
       climbed += failed.jump_m;
     }
     EXPECT_NEAR(seconds_of(map, {0}, map.failed_odometry.front().from), 230.0, 8.0) << seed;
@@ -213,16 +213,16 @@ TEST(WhoIsWrong, BothSidesOfAMissingSubmapAreJudged) {
   CorridorRun run = corridor_run(config, 3);
   std::erase_if(run.verdicts, [](const auto& verdict) {
     const auto& [first, second] = verdict.first;
-    return first == SubmapId{{0}, 10} || second == SubmapId{{0}, 10};
+    return first == SubmapId{RobotId{0}, 10} || second == SubmapId{RobotId{0}, 10};
   });
-  run.submaps.erase({{0}, 10});
+  run.submaps.erase({RobotId{0}, 10});
   const MapEstimate map = judge(run);
   EXPECT_EQ(map.components, 1U);
   std::size_t before = 0;
   std::size_t after = 0;
-  const std::uint32_t gap = run.submaps.at({{0}, 9})->keyframes.back().index;
+  const std::uint32_t gap = run.submaps.at({RobotId{0}, 9})->keyframes.back().index;
   for (const JudgedClosure& c : map.closures)
-    if (c.accepted && c.closure.from.robot == RobotId{0}) ++(c.closure.from.index <= gap ? before : after);
+    if (c.accepted && c.closure.from.chain.robot == RobotId{0}) ++(c.closure.from.index <= gap ? before : after);
   EXPECT_GT(before, 20U);
   EXPECT_GT(after, 20U);
   EXPECT_EQ(accepted_wrong(run, map), 0U);
@@ -241,7 +241,7 @@ TEST(WhoIsWrong, TheProxyGraphIsAsSureOfARepairAsTheClosures) {
   std::uint32_t least_support = 1000;
   for (const ProxyNode& node : graph.nodes) {
     const double s = node.stamp - Timestamp{1'000'000'000};
-    if (node.robot != RobotId{0} || s < seconds_of(map, {0}, failed.from) || s > seconds_of(map, {0}, failed.to))
+    if (node.chain.robot != RobotId{0} || s < seconds_of(map, {0}, failed.from) || s > seconds_of(map, {0}, failed.to))
       continue;
     const Matrix6d to_world = adjoint(node.T_world_body);
     sum += to_world * node.covariance * to_world.transpose();

@@ -53,7 +53,7 @@ World wild_world(std::uint64_t seed) {
   const test::TestFinder finder(1);
   World out;
   for (std::uint32_t r = 0; r < 3; ++r) {
-    auto made = test::make_submaps({r}, {.keyframes = 71}, Rng(seed).fork(r));
+    auto made = test::make_submaps(RobotId{r}, {.keyframes = 71}, Rng(seed).fork(r));
     if (r == 2) make_wild(made, Rng(seed).fork(9));
     for (Submap& submap : made) out.submaps[submap.id] = std::make_shared<const Submap>(std::move(submap));
   }
@@ -66,7 +66,7 @@ World wild_world(std::uint64_t seed) {
 
 std::size_t closures_between_good_robots(const MapEstimate& map) {
   return static_cast<std::size_t>(std::ranges::count_if(map.closures, [](const JudgedClosure& c) {
-    return c.accepted && std::max(c.closure.from.robot, c.closure.to.robot) < RobotId{2};
+    return c.accepted && std::max(c.closure.from.chain.robot, c.closure.to.chain.robot) < RobotId{2};
   }));
 }
 
@@ -80,13 +80,13 @@ TEST(WildOdometry, OfOneRobotHarmsNoOther) {
     const MapEstimate map = estimate_map(world.submaps, world.verdicts, {});
     EXPECT_TRUE(map.converged) << seed;
     const ProxyGraph graph = monitor_graph(map, 1, {});
-    informed += std::ranges::count(graph.nodes, RobotId{0}, &ProxyNode::robot) > 30 &&
-                std::ranges::count(graph.nodes, RobotId{1}, &ProxyNode::robot) > 30;
+    informed += std::ranges::count(graph.nodes, ChainId(RobotId{0}), &ProxyNode::chain) > 30 &&
+                std::ranges::count(graph.nodes, ChainId(RobotId{1}), &ProxyNode::chain) > 30;
     EXPECT_TRUE(std::ranges::all_of(graph.nodes, [](const ProxyNode& node) {
       return check_covariance(node.covariance).has_value();
     })) << seed;
     kept += closures_between_good_robots(map);
-    std::erase_if(world.submaps, [](const auto& entry) { return entry.first.robot == RobotId{2}; });
+    std::erase_if(world.submaps, [](const auto& entry) { return entry.first.chain.robot == RobotId{2}; });
     without_it += closures_between_good_robots(estimate_map(world.submaps, world.verdicts, {}));
   }
   EXPECT_GT(without_it, 900U);

@@ -52,11 +52,10 @@ std::vector<Match> choose_matches(std::vector<Match> matches, std::size_t count)
 }
 
 Rng pair_rng(std::uint64_t seed, std::string_view purpose, SubmapId first, SubmapId second) {
-  const auto packed = [](SubmapId id) { return (std::uint64_t{id.robot.value} << 32U) | id.index; };
-  return Rng(seed).fork(purpose).fork(packed(first)).fork(packed(second));
+  return Rng(seed).fork(purpose).fork(packed(first.chain, first.index)).fork(packed(second.chain, second.index));
 }
 
-SubmapId block_of(SubmapId id) { return {id.robot, id.index / kAgreeingBlock}; }
+SubmapId block_of(SubmapId id) { return {id.chain, id.index / kAgreeingBlock}; }
 
 }  // namespace
 
@@ -107,8 +106,8 @@ std::optional<Pose3> ReferenceClosures::true_relative_pose(RobotId robot_a, Time
 ReferenceClosures::PlacedSubmap ReferenceClosures::place(const Submap& submap) const {
   PlacedSubmap placed{.id = submap.id};
   for (const Keyframe& keyframe : submap.keyframes)
-    if (const auto pose = pose_at(submap.id.robot, keyframe.stamp))
-      placed.places.push_back({{submap.id.robot, keyframe.index}, keyframe.stamp, *pose});
+    if (const auto pose = pose_at(submap.id.chain.robot, keyframe.stamp))
+      placed.places.push_back({{submap.id.chain, keyframe.index}, keyframe.stamp, *pose});
   if (placed.places.empty()) return placed;
   const bool even = submap.id.index % kAgreeingBlock == 0;
   placed.anchor = (even ? placed.places.back() : placed.places.front()).T_reference_body;
@@ -121,8 +120,8 @@ ReferenceClosures::PlacedSubmap ReferenceClosures::place(const Submap& submap) c
 
 ReferenceClosures::Assessment ReferenceClosures::assess(const PlacedSubmap& first, const PlacedSubmap& second) const {
   const auto refuse = [](const Refusal& refusal) { return Assessment{.refusal = refusal}; };
-  const bool same_robot = first.id.robot == second.id.robot;
-  if (same_robot && second.id.index - first.id.index < static_cast<std::uint32_t>(config_.min_submap_gap))
+  const bool same_chain = first.id.chain == second.id.chain;
+  if (same_chain && second.id.index - first.id.index < static_cast<std::uint32_t>(config_.min_submap_gap))
     return refuse({RefusalReason::neighbours, static_cast<double>(second.id.index - first.id.index),
                    static_cast<double>(config_.min_submap_gap)});
   for (const PlacedSubmap* submap : {&first, &second})
@@ -140,7 +139,7 @@ ReferenceClosures::Assessment ReferenceClosures::assess(const PlacedSubmap& firs
       const Place& b = second.places[j];
       const double distance = (a.T_reference_body.translation - b.T_reference_body.translation).norm();
       if (distance > config_.radius_m) continue;
-      if (same_robot && std::abs(a.stamp - b.stamp) < config_.min_time_gap_s) continue;
+      if (same_chain && std::abs(a.stamp - b.stamp) < config_.min_time_gap_s) continue;
       if (heading_difference(a.T_reference_body, b.T_reference_body) > config_.max_heading_deg * kRadPerDeg) continue;
       result.overlaps.push_back({i, j, distance});
     }

@@ -62,15 +62,15 @@ std::vector<ClosureVerdict> all_verdicts(const ReferenceClosures& finder, const 
 Timestamp stamp_of(const Mission& mission, KeyframeId id) {
   for (const Submap& submap : mission.submaps)
     for (const Keyframe& keyframe : submap.keyframes)
-      if (submap.id.robot == id.robot && keyframe.index == id.index) return keyframe.stamp;
-  ADD_FAILURE() << "no keyframe " << id.robot.value << "/" << id.index;
+      if (submap.id.chain == id.chain && keyframe.index == id.index) return keyframe.stamp;
+  ADD_FAILURE() << "no keyframe " << id.chain.robot.value << "/" << id.index;
   return {};
 }
 
 /// measured = true * error
 Pose3 error_of(const ReferenceClosures& finder, const Mission& mission, const LoopClosure& closure) {
-  const auto truth = finder.true_relative_pose(closure.from.robot, stamp_of(mission, closure.from), closure.to.robot,
-                                               stamp_of(mission, closure.to));
+  const auto truth = finder.true_relative_pose(closure.from.chain.robot, stamp_of(mission, closure.from),
+                                               closure.to.chain.robot, stamp_of(mission, closure.to));
   return truth->inverse() * closure.measurement.T_a_b;
 }
 
@@ -121,11 +121,11 @@ TEST(ReferenceClosures, WithoutWrongOnesAllOverlapsAndOnlyTheseAreReported) {
       EXPECT_LT(closure.measurement.T_a_b.translation.norm(), config.radius_m + 5.0 * config.sigma_m);
       EXPECT_TRUE(from.insert(closure.from.index).second);
       EXPECT_TRUE(to.insert(closure.to.index).second);
-      EXPECT_EQ(closure.from.robot, verdict.pair.first.robot);
-      EXPECT_EQ(closure.to.robot, verdict.pair.second.robot);
+      EXPECT_EQ(closure.from.chain.robot, verdict.pair.first.chain.robot);
+      EXPECT_EQ(closure.to.chain.robot, verdict.pair.second.chain.robot);
     }
     if (verdict.closures.empty()) continue;
-    ++(verdict.pair.first.robot == verdict.pair.second.robot ? of_one_robot : between_robots);
+    ++(verdict.pair.first.chain.robot == verdict.pair.second.chain.robot ? of_one_robot : between_robots);
   }
   EXPECT_GT(several, 20U);
   EXPECT_GT(between_robots, 20U);
@@ -146,11 +146,11 @@ TEST(ReferenceClosures, SomeWrongClosuresAgree) {
     const LoopClosure& closure = verdict.closures.front();
     if (!is_wrong(error_of(finder, mission, closure))) continue;
     const Pose3 from = *finder.true_relative_pose(RobotId{0}, mission.submaps.front().keyframes.front().stamp,
-                                                  closure.from.robot, stamp_of(mission, closure.from));
+                                                  closure.from.chain.robot, stamp_of(mission, closure.from));
     const Pose3 to = *finder.true_relative_pose(RobotId{0}, mission.submaps.front().keyframes.front().stamp,
-                                                closure.to.robot, stamp_of(mission, closure.to));
-    const SubmapId first{verdict.pair.first.robot, verdict.pair.first.index / 2};
-    const SubmapId second{verdict.pair.second.robot, verdict.pair.second.index / 2};
+                                                closure.to.chain.robot, stamp_of(mission, closure.to));
+    const SubmapId first{verdict.pair.first.chain.robot, verdict.pair.first.index / 2};
+    const SubmapId second{verdict.pair.second.chain.robot, verdict.pair.second.index / 2};
     claims[{first, second}].push_back(from * closure.measurement.T_a_b * to.inverse());
   }
   std::size_t groups = 0;
@@ -215,7 +215,7 @@ TEST(ReferenceClosures, MissingReferenceRefusesInsteadOfGuessing) {
   const ReferenceClosures finder(mission.reference, {}, 1);
   const Submap& alpha = mission.submaps.front();
   for (const Submap& submap : mission.submaps) {
-    if (submap.id.robot != bravo || submap.id.index != 2) continue;  // 20 .. 30 s
+    if (submap.id.chain.robot != bravo || submap.id.index != 2) continue;  // 20 .. 30 s
     const ClosureVerdict verdict = finder.verify(alpha, submap);
     EXPECT_TRUE(verdict.closures.empty());
     EXPECT_EQ(verdict.refusal, Refusal{RefusalReason::no_reference});

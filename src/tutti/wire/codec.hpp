@@ -39,8 +39,8 @@ struct CloudCodec {
 std::string encode(const SubmapMessage& message, const CloudCodec& cloud = {});
 Result<SubmapMessage> decode_submap(std::string_view bytes);
 
-/// Exact: ids, stamps, support, radius, sigma, edges' ends. Poses: 5e-4 m, 1e-4 rad. Covariance: 25 % of the variance
-/// in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4. Shape: 5 %.
+/// Exact: ids, epoch, stamps, support, radius, sigma, edges' ends. Poses: 5e-4 m, 1e-4 rad. Covariance: 25 % of the
+/// variance in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4. Shape: 5 %.
 std::string encode(const ProxyGraphMessage& message);
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
 

@@ -130,7 +130,7 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
   RC_ASSERT(out.nodes.size() == in.nodes.size());
   RC_ASSERT(out.edges.size() == in.edges.size());
   for (std::size_t i = 0; i < in.nodes.size(); ++i) {
-    RC_ASSERT(out.nodes[i].robot == in.nodes[i].robot);
+    RC_ASSERT(out.nodes[i].chain == in.nodes[i].chain);
     RC_ASSERT(out.nodes[i].stamp == in.nodes[i].stamp);
     RC_ASSERT(out.nodes[i].support == in.nodes[i].support);
     RC_ASSERT(near(in.nodes[i].T_world_body, out.nodes[i].T_world_body, 5e-4, 1e-4));
@@ -149,7 +149,7 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
            std::abs(a.rotation_rad - b.rotation_rad) <= 0.05 * a.rotation_rad;
   };
   for (std::size_t s = 0; s < in.shapes.size(); ++s) {
-    RC_ASSERT(out.shapes[s].robot == in.shapes[s].robot);
+    RC_ASSERT(out.shapes[s].chain == in.shapes[s].chain);
     RC_ASSERT(close(in.shapes[s].whole, out.shapes[s].whole));
     RC_ASSERT(out.shapes[s].sag.size() == in.shapes[s].sag.size());
     for (std::size_t j = 0; j < in.shapes[s].sag.size(); ++j)
@@ -251,6 +251,7 @@ TEST(Validate, Submap) {
   const SubmapMessage good = test::any_submap(rng, 5, 10);
   using M = SubmapMessage;
   expect_refused<M>(good, {{"robot", [](M& m) { m.header.robot.value += 1; }},
+                           {"session", [](M& m) { m.header.session += 1; }},
                            {"no keyframes", [](M& m) { m.submap.keyframes.clear(), m.submap.odometry.clear(); }},
                            {"one fewer", [](M& m) { m.submap.odometry.pop_back(); }},
                            {"consecutive", [](M& m) { m.submap.keyframes[2].index += 1; }},
@@ -282,7 +283,7 @@ TEST(Validate, ProxyGraph) {
                            {"eliminated node", [](M& m) { m.graph.eliminated[1] = m.graph.eliminated[0]; }},
                            {"node 3", [](M& m) { m.graph.nodes[3].covariance(0, 0) = kNan; }},
                            {"node 3", [](M& m) { m.graph.nodes[3].T_world_body.rotation.coeffs().setZero(); }},
-                           {"two components", [](M& m) { m.graph.components[1].robot = m.graph.components[0].robot; }},
+                           {"two components", [](M& m) { m.graph.components[1].chain = m.graph.components[0].chain; }},
                            {"joins nodes", [](M& m) { m.graph.edges[0].b = 1000; }},
                            {"joins nodes", [](M& m) { m.graph.edges[0].b = m.graph.edges[0].a; }},
                            {"joins robots",
@@ -304,7 +305,7 @@ TEST(Validate, Shapes) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   expect_refused<M>(good, {{"come after", [](M& m) { std::swap(m.graph.shapes[0], m.graph.shapes[1]); }},
                            {"come after", [](M& m) { m.graph.shapes[1] = m.graph.shapes[0]; }},
-                           {"robot has no nodes", [](M& m) { m.graph.shapes[1].robot.value += 1; }},
+                           {"robot has no nodes", [](M& m) { m.graph.shapes[1].chain.robot.value += 1; }},
                            {"finite", [](M& m) { m.graph.shapes[0].whole.position_m = kNan; }},
                            {"finite", [](M& m) { m.graph.shapes[0].whole.rotation_rad = -1e-9; }},
                            {"finite", [](M& m) { m.graph.shapes[1].sag[2][0].position_m = kInfinity; }},
@@ -338,7 +339,8 @@ TEST(Validate, Verdict) {
   const ClosureVerdict good = test::any_verdict(rng, 2);
   using M = ClosureVerdict;
   expect_refused<M>(good, {{"smaller", [](M& m) { m.pair.second = m.pair.first; }},
-                           {"closure from robot", [](M& m) { m.closures[1].from.robot.value = 9; }},
+                           {"closure from robot", [](M& m) { m.closures[1].from.chain.robot.value = 9; }},
+                           {"closure from robot", [](M& m) { m.closures[1].to.chain.session += 1; }},
                            {"not finite", [](M& m) { m.closures[1].measurement.T_a_b.translation.x() = kNan; }},
                            {"symmetric", [](M& m) { m.closures[1].measurement.covariance(0, 1) += 1e3; }},
                            {"1 closures and a refusal",

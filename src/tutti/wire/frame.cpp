@@ -33,17 +33,18 @@ const char* name(MessageKind kind) {
   return "unknown";
 }
 
-// What changed: submap: nothing but the number, which all kinds shared up to 4. Verdict: the same up to 4, which said
-// why a pair was refused in words only, and not by which version of the finder. Proxy graph: 1 had no range coder, 2
-// landed with two codings that cannot be told apart, 3 had no ties. Cloud: came with 2, the same since.
+// What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions. Verdict: the same up to 4,
+// which said why a pair was refused in words only, and not by which version of the finder; 6 has sessions. Proxy graph:
+// 1 had no range coder, 2 landed with two codings that cannot be told apart, 3 had no ties, 4 no epoch and no sessions.
+// Cloud: came with 2, the same since.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
-      return {.oldest = 1, .current = 4};
-    case MessageKind::verdict:
       return {.oldest = 1, .current = 5};
+    case MessageKind::verdict:
+      return {.oldest = 1, .current = 6};
     case MessageKind::proxy_graph:
-      return {.oldest = 3, .current = 4};
+      return {.oldest = 3, .current = 5};
     case MessageKind::cloud:
       return {.oldest = 2, .current = 4};
   }

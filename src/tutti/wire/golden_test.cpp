@@ -61,64 +61,71 @@ Matrix6d diagonal(double translation, double rotation) {
 TEST(Golden, Submap) {
   SubmapMessage message;
   message.header = {RobotId{2}, 1234567890123, 17};
-  message.submap.id = {RobotId{2}, 16};
+  message.submap.id = {{RobotId{2}, 1234567890123}, 16};
   message.submap.keyframes = {{160, {1'577'836'980'099'104'643}, {Eigen::Quaterniond::Identity(), {1, 2, 3}}, true},
                               {161, {1'577'836'981'199'104'651}, {kQuarterTurn, {2, 2, 3}}, false}};
   message.submap.odometry = {{{kQuarterTurn, {1, 0, 0}}, diagonal(4e-4, 1e-4)}};
   message.submap.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}});
-  for_every_version(MessageKind::submap, encode(message), decode_submap, [&](const SubmapMessage& decoded, unsigned) {
-    const Submap& submap = decoded.submap;
-    EXPECT_EQ(decoded.header, message.header);
-    EXPECT_EQ(submap.id, message.submap.id);
-    ASSERT_EQ(submap.keyframes.size(), 2U);
-    EXPECT_EQ(submap.keyframes[1].index, 161U);
-    EXPECT_EQ(submap.keyframes[1].stamp.ns, 1'577'836'981'199'104'651);
-    EXPECT_TRUE(submap.keyframes[0].representative);
-    EXPECT_FALSE(submap.keyframes[1].representative);
-    EXPECT_LT(local(submap.keyframes[1].T_odom_body, {kQuarterTurn, {2, 2, 3}}).norm(), 1e-5);
-    EXPECT_LT(local(submap.odometry[0].T_a_b, {kQuarterTurn, {1, 0, 0}}).norm(), 1e-5);
-    EXPECT_NEAR(submap.odometry[0].covariance(0, 0), 4e-4, 4e-6);
-    EXPECT_NEAR(submap.odometry[0].covariance(5, 5), 1e-4, 1e-6);
-    ASSERT_EQ(submap.cloud->points.size(), 3U);  // along the Morton curve: z, y, x from the highest bit
-    double nearest = 1.0;
-    for (const auto& point : submap.cloud->points)
-      nearest = std::min(nearest, static_cast<double>((point - Eigen::Vector3f(10, -7, 0)).norm()));
-    EXPECT_LT(nearest, 0.0083);
-  });
+  for_every_version(
+      MessageKind::submap, encode(message), decode_submap, [&](const SubmapMessage& decoded, unsigned version) {
+        const Submap& submap = decoded.submap;
+        const std::uint64_t session = version < 5 ? 0 : 1234567890123;  // before, it said nothing of the chain
+        EXPECT_EQ(decoded.header, (MessageHeader{RobotId{2}, session, 17}));
+        EXPECT_EQ(submap.id, (SubmapId{{RobotId{2}, session}, 16}));
+        ASSERT_EQ(submap.keyframes.size(), 2U);
+        EXPECT_EQ(submap.keyframes[1].index, 161U);
+        EXPECT_EQ(submap.keyframes[1].stamp.ns, 1'577'836'981'199'104'651);
+        EXPECT_TRUE(submap.keyframes[0].representative);
+        EXPECT_FALSE(submap.keyframes[1].representative);
+        EXPECT_LT(local(submap.keyframes[1].T_odom_body, {kQuarterTurn, {2, 2, 3}}).norm(), 1e-5);
+        EXPECT_LT(local(submap.odometry[0].T_a_b, {kQuarterTurn, {1, 0, 0}}).norm(), 1e-5);
+        EXPECT_NEAR(submap.odometry[0].covariance(0, 0), 4e-4, 4e-6);
+        EXPECT_NEAR(submap.odometry[0].covariance(5, 5), 1e-4, 1e-6);
+        ASSERT_EQ(submap.cloud->points.size(), 3U);  // along the Morton curve: z, y, x from the highest bit
+        double nearest = 1.0;
+        for (const auto& point : submap.cloud->points)
+          nearest = std::min(nearest, static_cast<double>((point - Eigen::Vector3f(10, -7, 0)).norm()));
+        EXPECT_LT(nearest, 0.0083);
+      });
 }
 
 TEST(Golden, ProxyGraph) {
   ProxyGraphMessage message;
   message.header = {RobotId{0}, 99, 3};
   ProxyGraph& graph = message.graph;
+  graph.epoch = 1'700'000'000'000'000'000;
   graph.revision = 42;
+  const ChainId seven{RobotId{7}, 1'700'000'123};
   graph.nodes = {{RobotId{0}, {1'000'000'001}, {Eigen::Quaterniond::Identity(), {0, 0, 0}}, Matrix6d::Zero(), 0},
                  {RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}, diagonal(1e-4, 1e-6), 5},
-                 {RobotId{7}, {2'000'000'000}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1}};
+                 {seven, {2'000'000'000}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1}};
   for (std::int64_t k = 1; k < 9; ++k)
-    graph.nodes.push_back({RobotId{7}, {2'000'000'000 + k}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1});
-  graph.components = {{RobotId{0}, 0}, {RobotId{7}, 1}};
+    graph.nodes.push_back({seven, {2'000'000'000 + k}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1});
+  graph.components = {{RobotId{0}, 0}, {seven, 1}};
   graph.reduced = true;
   graph.edges = {{0, 1, 0.625}};
   graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
-  graph.shapes = {{RobotId{0}, {0.25, 0.0}, {}, {}},
-                  {RobotId{7}, {0.5, 0.01}, {{{0.03, 0.002}}}, {{0, 8, {0.05, 0.004}}}}};
+  graph.shapes = {{RobotId{0}, {0.25, 0.0}, {}, {}}, {seven, {0.5, 0.01}, {{{0.03, 0.002}}}, {{0, 8, {0.05, 0.004}}}}};
   const auto check = [&](const ProxyGraphMessage& decoded, unsigned version) {
+    const auto chain_of = [&](const ChainId& chain) { return version < 5 ? ChainId(chain.robot) : chain; };
     EXPECT_EQ(decoded.header, message.header);
+    EXPECT_EQ(decoded.graph.epoch, version < 5 ? 0U : graph.epoch);
     EXPECT_EQ(decoded.graph.revision, 42U);
     EXPECT_EQ(decoded.graph.radius_m, 7.0);
-    EXPECT_EQ(decoded.graph.components, graph.components);
+    ASSERT_EQ(decoded.graph.components.size(), 2U);
+    EXPECT_EQ(decoded.graph.components[0], graph.components[0]);
+    EXPECT_EQ(decoded.graph.components[1], (ChainComponent{chain_of(seven), 1}));
     ASSERT_EQ(decoded.graph.edges.size(), 1U);
     EXPECT_EQ(decoded.graph.edges[0].a, 0U);
     EXPECT_EQ(decoded.graph.edges[0].b, 1U);
     EXPECT_NEAR(decoded.graph.edges[0].weight, 0.625, 2e-4);
     EXPECT_EQ(decoded.graph.eliminated, graph.eliminated);
     ASSERT_EQ(decoded.graph.shapes.size(), 2U);
-    EXPECT_EQ(decoded.graph.shapes[0].robot, RobotId{0});
+    EXPECT_EQ(decoded.graph.shapes[0].chain, ChainId(RobotId{0}));
     EXPECT_NEAR(decoded.graph.shapes[0].whole.position_m, 0.25, 0.0125);
     EXPECT_EQ(decoded.graph.shapes[0].whole.rotation_rad, 0.0);
     EXPECT_TRUE(decoded.graph.shapes[0].sag.empty());
-    EXPECT_EQ(decoded.graph.shapes[1].robot, RobotId{7});
+    EXPECT_EQ(decoded.graph.shapes[1].chain, chain_of(seven));
     ASSERT_EQ(decoded.graph.shapes[1].sag.size(), 1U);
     ASSERT_EQ(decoded.graph.shapes[1].sag[0].size(), 1U);
     EXPECT_NEAR(decoded.graph.shapes[1].sag[0][0].position_m, 0.03, 0.0015);
@@ -133,7 +140,7 @@ TEST(Golden, ProxyGraph) {
     }
     ASSERT_EQ(decoded.graph.nodes.size(), graph.nodes.size());
     for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-      EXPECT_EQ(decoded.graph.nodes[i].robot, graph.nodes[i].robot);
+      EXPECT_EQ(decoded.graph.nodes[i].chain, chain_of(graph.nodes[i].chain));
       EXPECT_EQ(decoded.graph.nodes[i].stamp, graph.nodes[i].stamp);
       EXPECT_EQ(decoded.graph.nodes[i].support, graph.nodes[i].support);
       EXPECT_LT(local(decoded.graph.nodes[i].T_world_body, graph.nodes[i].T_world_body).norm(), 5e-4);
@@ -145,14 +152,16 @@ TEST(Golden, ProxyGraph) {
 }
 
 TEST(Golden, Verdict) {
-  ClosureVerdict verdict{
-      .pair = {{RobotId{0}, 3}, {RobotId{1}, 4}},
-      .closures = {{{RobotId{0}, 31}, {RobotId{1}, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}},
-      .finder_version = 3};
-  for_every_version(MessageKind::verdict, encode(verdict), decode_verdict,
+  const auto of_session = [](std::uint64_t session, std::uint32_t finder_version) {
+    const ChainId one{RobotId{1}, session};
+    return ClosureVerdict{
+        .pair = {{RobotId{0}, 3}, {one, 4}},
+        .closures = {{{RobotId{0}, 31}, {one, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}},
+        .finder_version = finder_version};
+  };
+  for_every_version(MessageKind::verdict, encode(of_session(1'700'000'123, 3)), decode_verdict,
                     [&](const ClosureVerdict& decoded, unsigned version) {
-                      verdict.finder_version = version < 5 ? 0 : 3;
-                      EXPECT_EQ(decoded, verdict);
+                      EXPECT_EQ(decoded, of_session(version < 6 ? 0 : 1'700'000'123, version < 5 ? 0 : 3));
                     });
 }
 

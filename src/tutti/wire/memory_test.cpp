@@ -128,7 +128,7 @@ TEST(Memory, CountsUpToTheLimitsAreAcceptedAndNoMore) {
   const std::size_t covariances = 21 * kMaxKeyframes;
   for (const std::size_t more : {0U, 1U}) {
     EXPECT_EQ(accepted(MessageKind::verdict, repeated(kMaxClosures + more, field(5, ""))), more == 0);
-    EXPECT_EQ(accepted(MessageKind::proxy_graph, repeated(kMaxRobots + more, field(5, ""))), more == 0);
+    EXPECT_EQ(accepted(MessageKind::proxy_graph, repeated(ProxyGraph::kMostChains + more, field(5, ""))), more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(4, zeros(kMaxKeyframes + more))), more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(8, zeros(9) + repeated(covariances - 9 + more, "\xff\x01"))),
               more == 0);

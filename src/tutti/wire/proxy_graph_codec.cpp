@@ -23,15 +23,15 @@ namespace {
 
 constexpr double kLogWeightStep = 1.0 / 2048.0;
 
-/// The stamps of one robot are multiples of a step after an offset: sensors are regular. Differences wrap around.
+/// The stamps of one chain are multiples of a step after an offset: sensors are regular. Differences wrap around.
 struct Clock {
   std::uint64_t offset_ns = 0;
   std::uint64_t step_ns = 1;
 };
 
-/// One robot's part of the graph.
+/// One chain's part of the graph.
 struct Run {
-  RobotId robot;
+  ChainId chain;
   Clock clock;
   std::size_t nodes = 0;
   std::size_t eliminated = 0;
@@ -53,7 +53,7 @@ struct Reader {
   std::int64_t code(IntegerModel& model, std::int64_t) { return model.get(in); }
 };
 
-/// Stamps of one robot, each by its distance to the one before.
+/// Stamps of one chain, each by its distance to the one before.
 class StampColumn {
  public:
   void start_run() { previous_ = 0; }
@@ -69,7 +69,7 @@ class StampColumn {
   std::uint64_t previous_ = 0;
 };
 
-/// Nodes of one robot along its way. A pose is coded as the motion since the node before *as the receiver knows it*, so
+/// Nodes of one chain along its way. A pose is coded as the motion since the node before *as the receiver knows it*, so
 /// errors do not add up.
 class NodeColumns {
  public:
@@ -100,7 +100,7 @@ class NodeColumns {
     previous_support_ = support;
     T_world_previous_ = T_world_previous_ * *T_previous_body;
     if (T_world_previous_.translation.cwiseAbs().maxCoeff() > kMaxCoordinate_m + 1.0) return std::nullopt;
-    return ProxyNode{run.robot, stamp, T_world_previous_, *matrix, static_cast<std::uint32_t>(support)};
+    return ProxyNode{run.chain, stamp, T_world_previous_, *matrix, static_cast<std::uint32_t>(support)};
   }
 
  private:
@@ -148,7 +148,7 @@ class ShapeColumns {
   /// Nothing when a number is outside what encoding makes.
   template <class Coder>
   std::optional<ShapeUncertainty> code(Coder& coder, const Run& run, const ShapeUncertainty& shape) {
-    ShapeUncertainty out{.robot = run.robot};
+    ShapeUncertainty out{.chain = run.chain};
     SigmaCode first{};
     const auto whole = code(coder, whole_, shape.whole, first);
     if (!whole) return std::nullopt;
@@ -197,12 +197,12 @@ class ShapeColumns {
 };
 
 std::vector<Run> runs_of(const ProxyGraph& graph) {
-  std::map<RobotId, Run> runs;
+  std::map<ChainId, Run> runs;
   const auto add = [&](const auto& nodes, std::size_t Run::*count) {
     for (const auto& node : nodes) {
-      Run& run = runs[node.robot];
+      Run& run = runs[node.chain];
       const auto stamp = static_cast<std::uint64_t>(node.stamp.ns);
-      run.robot = node.robot;
+      run.chain = node.chain;
       if (run.nodes + run.eliminated == 0) run.clock = {stamp, 0};
       run.clock.step_ns = std::gcd(run.clock.step_ns, stamp - run.clock.offset_ns);
       ++(run.*count);
@@ -211,11 +211,11 @@ std::vector<Run> runs_of(const ProxyGraph& graph) {
   add(graph.nodes, &Run::nodes);
   add(graph.eliminated, &Run::eliminated);
   for (const ShapeUncertainty& shape : graph.shapes) {
-    runs[shape.robot].has_shape = true;
-    runs[shape.robot].ties = shape.ties.size();
+    runs[shape.chain].has_shape = true;
+    runs[shape.chain].ties = shape.ties.size();
   }
   std::vector<Run> out;
-  for (auto& [robot, run] : runs) {
+  for (auto& [chain, run] : runs) {
     run.clock.step_ns = std::max<std::uint64_t>(run.clock.step_ns, 1);
     out.push_back(run);
   }
@@ -236,7 +236,7 @@ Result<std::vector<Run>> read_runs(const v1::ProxyGraph& in) {
       return fail(ErrorCode::invalid, "robot {}: a step of 0 ns between stamps", run.robot());
     if (run.ties() > kMaxTies)
       return fail(ErrorCode::invalid, "robot {}: {} ties, at most {} are accepted", run.robot(), run.ties(), kMaxTies);
-    runs.push_back({RobotId{run.robot()},
+    runs.push_back({{RobotId{run.robot()}, run.session()},
                     {static_cast<std::uint64_t>(run.stamp_offset_ns()), run.stamp_step_ns()},
                     run.nodes(),
                     run.eliminated(),
@@ -258,7 +258,7 @@ void write_body(const ProxyGraph& graph, const std::vector<Run>& runs, v1::Proxy
     nodes.start_run();
     eliminated.start_run();
     for (std::size_t i = 0; i < run.nodes; ++i)
-      TUTTI_CHECK(nodes.code(writer, run, *node++).has_value(), "node {} of robot {}", i, run.robot.value);
+      TUTTI_CHECK(nodes.code(writer, run, *node++).has_value(), "node {} of robot {}", i, to_string(run.chain));
     for (std::size_t i = 0; i < run.eliminated; ++i) eliminated.code(writer, run.clock, (gone++)->stamp);
     if (run.has_shape) shapes.code(writer, run, *shape++);
   }
@@ -282,14 +282,14 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
     eliminated.start_run();
     for (std::size_t i = 0; i < run.nodes && !reader.in.overrun(); ++i) {
       const auto node = nodes.code(reader, run, {});
-      if (!node) return fail(ErrorCode::invalid, "node {} of robot {} is out of range", i, run.robot.value);
+      if (!node) return fail(ErrorCode::invalid, "node {} of robot {} is out of range", i, to_string(run.chain));
       graph.nodes.push_back(*node);
     }
     for (std::size_t i = 0; i < run.eliminated && !reader.in.overrun(); ++i)
-      graph.eliminated.push_back({run.robot, eliminated.code(reader, run.clock, {})});
+      graph.eliminated.push_back({run.chain, eliminated.code(reader, run.clock, {})});
     if (!run.has_shape || reader.in.overrun()) continue;
     auto shape = shapes.code(reader, run, {});
-    if (!shape) return fail(ErrorCode::invalid, "the shape of robot {} is out of range", run.robot.value);
+    if (!shape) return fail(ErrorCode::invalid, "the shape of robot {} is out of range", to_string(run.chain));
     graph.shapes.push_back(std::move(*shape));
   }
   EdgeColumns edges;
@@ -306,10 +306,14 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
 }
 
 Status read_components(const v1::ProxyGraph& in, ProxyGraph& graph) {
-  if (in.component_size() != in.component_robot_size())
-    return fail(ErrorCode::parse, "{} components for {} robots", in.component_size(), in.component_robot_size());
+  const bool sessions = in.component_session_size() > 0;  // none: all are 0
+  if (in.component_size() != in.component_robot_size() ||
+      (sessions && in.component_size() != in.component_session_size()))
+    return fail(ErrorCode::parse, "{} components for {} robots and {} sessions", in.component_size(),
+                in.component_robot_size(), in.component_session_size());
   for (int i = 0; i < in.component_size(); ++i)
-    graph.components.push_back({RobotId{in.component_robot(i)}, in.component(i)});
+    graph.components.push_back(
+        {{RobotId{in.component_robot(i)}, sessions ? in.component_session(i) : 0}, in.component(i)});
   return {};
 }
 
@@ -323,6 +327,7 @@ std::string encode(const ProxyGraphMessage& message) {
   out.mutable_header()->set_robot(message.header.robot.value);
   out.mutable_header()->set_session(message.header.session);
   out.mutable_header()->set_sequence(message.header.sequence);
+  out.set_epoch(graph.epoch);
   out.set_revision(graph.revision);
   out.set_radius_m(graph.radius_m);
   out.set_sigma_m(graph.sigma_m);
@@ -330,7 +335,8 @@ std::string encode(const ProxyGraphMessage& message) {
   const std::vector<Run> runs = runs_of(graph);
   for (const Run& run : runs) {
     v1::RobotRun& entry = *out.add_run();
-    entry.set_robot(run.robot.value);
+    entry.set_robot(run.chain.robot.value);
+    entry.set_session(run.chain.session);
     entry.set_nodes(static_cast<std::uint32_t>(run.nodes));
     entry.set_eliminated(static_cast<std::uint32_t>(run.eliminated));
     entry.set_stamp_offset_ns(static_cast<std::int64_t>(run.clock.offset_ns));
@@ -339,8 +345,10 @@ std::string encode(const ProxyGraphMessage& message) {
     entry.set_ties(static_cast<std::uint32_t>(run.ties));
   }
   write_body(graph, runs, out);
-  for (const RobotComponent& component : graph.components) {
-    out.add_component_robot(component.robot.value);
+  const bool sessions = std::ranges::any_of(graph.components, [](const auto& c) { return c.chain.session != 0; });
+  for (const ChainComponent& component : graph.components) {
+    out.add_component_robot(component.chain.robot.value);
+    if (sessions) out.add_component_session(component.chain.session);
     out.add_component(component.component);
   }
   return pack_frame(MessageKind::proxy_graph, out.SerializeAsString());
@@ -354,6 +362,7 @@ Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes) {
   ProxyGraphMessage message;
   message.header = {RobotId{in.header().robot()}, in.header().session(), in.header().sequence()};
   ProxyGraph& graph = message.graph;
+  graph.epoch = in.epoch();
   graph.revision = in.revision();
   graph.radius_m = in.radius_m();
   graph.sigma_m = in.sigma_m();

@@ -105,9 +105,11 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
   const v1::Submap& in = parsed->message;
 
   SubmapMessage message;
-  message.header = {RobotId{in.header().robot()}, in.header().session(), in.header().sequence()};
-  message.submap.id = {message.header.robot, in.index()};
-  const std::string where = fmt::format("submap {}/{}", in.header().robot(), in.index());
+  // Up to version 4 the session said nothing of the chain: each robot had one.
+  const ChainId chain{RobotId{in.header().robot()}, parsed->version < 5 ? 0 : in.header().session()};
+  message.header = {chain.robot, chain.session, in.header().sequence()};
+  message.submap.id = {chain, in.index()};
+  const std::string where = "submap " + to_string(message.submap.id);
   if (auto ok = read_keyframes(in, message.submap); !ok) return in_context(where, ok.error());
   if (auto ok = read_odometry(in, message.submap); !ok) return in_context(where, ok.error());
   if (in.has_cloud() && in.cloud().voxel_size() > 0) {

@@ -62,15 +62,15 @@ Status check_submap(const Submap& submap) {
   return submap.cloud == nullptr ? Status() : validate(*submap.cloud);
 }
 
-/// Strictly ascending by (robot, stamp).
+/// Strictly ascending by (chain, stamp).
 template <class Node>
 Status check_order(const std::vector<Node>& nodes, const char* what) {
   for (std::size_t i = 1; i < nodes.size(); ++i) {
     const Node& a = nodes[i - 1];
     const Node& b = nodes[i];
-    if (b.robot < a.robot || (b.robot == a.robot && b.stamp <= a.stamp))
+    if (b.chain < a.chain || (b.chain == a.chain && b.stamp <= a.stamp))
       return fail(ErrorCode::invalid, "{} {} (robot {}, {} ns) does not come after (robot {}, {} ns)", what, i,
-                  b.robot.value, b.stamp.ns, a.robot.value, a.stamp.ns);
+                  to_string(b.chain), b.stamp.ns, to_string(a.chain), a.stamp.ns);
   }
   return {};
 }
@@ -83,9 +83,9 @@ Status check_edges(const ProxyGraph& graph) {
     const ProxyEdge& edge = graph.edges[i];
     if (edge.a >= graph.nodes.size() || edge.b >= graph.nodes.size() || edge.a == edge.b)
       return fail(ErrorCode::invalid, "edge {} joins nodes {} and {} of {}", i, edge.a, edge.b, graph.nodes.size());
-    if (graph.nodes[edge.a].robot != graph.nodes[edge.b].robot)
-      return fail(ErrorCode::invalid, "edge {} joins robots {} and {}, expected one robot", i,
-                  graph.nodes[edge.a].robot.value, graph.nodes[edge.b].robot.value);
+    if (graph.nodes[edge.a].chain != graph.nodes[edge.b].chain)
+      return fail(ErrorCode::invalid, "edge {} joins robots {} and {}, expected one chain", i,
+                  to_string(graph.nodes[edge.a].chain), to_string(graph.nodes[edge.b].chain));
     if (!std::isfinite(static_cast<float>(edge.weight)) || edge.weight <= 0.0)
       return fail(ErrorCode::invalid, "edge {} has weight {}, expected a finite one > 0", i, edge.weight);
   }
@@ -136,13 +136,13 @@ Status check_shape(const ShapeUncertainty& shape, std::size_t nodes) {
 
 Status check_shapes(const ProxyGraph& graph) {
   for (std::size_t i = 0; i < graph.shapes.size(); ++i) {
-    const RobotId robot = graph.shapes[i].robot;
-    if (i > 0 && robot <= graph.shapes[i - 1].robot)
-      return fail(ErrorCode::invalid, "the shape of robot {} does not come after robot {}'s", robot.value,
-                  graph.shapes[i - 1].robot.value);
-    const auto nodes = std::ranges::equal_range(graph.nodes, robot, {}, &ProxyNode::robot);
+    const ChainId& chain = graph.shapes[i].chain;
+    if (i > 0 && chain <= graph.shapes[i - 1].chain)
+      return fail(ErrorCode::invalid, "the shape of robot {} does not come after robot {}'s", to_string(chain),
+                  to_string(graph.shapes[i - 1].chain));
+    const auto nodes = std::ranges::equal_range(graph.nodes, chain, {}, &ProxyNode::chain);
     if (auto ok = check_shape(graph.shapes[i], nodes.size()); !ok)
-      return in_context(fmt::format("shape of robot {}", robot.value), ok.error());
+      return in_context("shape of robot " + to_string(chain), ok.error());
   }
   return {};
 }
@@ -151,15 +151,15 @@ Status check_graph(const ProxyGraph& graph) {
   for (const auto& ok : {at_most(graph.nodes.size(), kMaxProxyNodes, "nodes"),
                          at_most(graph.eliminated.size(), kMaxProxyNodes, "eliminated nodes"),
                          at_most(graph.edges.size(), kMaxProxyEdges, "edges"),
-                         at_most(graph.components.size(), kMaxRobots, "components")})
+                         at_most(graph.components.size(), ProxyGraph::kMostChains, "components")})
     if (!ok) return ok;
   for (const double value : {graph.radius_m, graph.sigma_m})
     if (!std::isfinite(value) || value <= 0.0)
       return fail(ErrorCode::invalid, "radius {} m, sigma {} m, expected > 0", graph.radius_m, graph.sigma_m);
-  std::set<RobotId> robots;
-  for (const RobotComponent& component : graph.components)
-    if (!robots.insert(component.robot).second)
-      return fail(ErrorCode::invalid, "robot {} has two components", component.robot.value);
+  std::set<ChainId> chains;
+  for (const ChainComponent& component : graph.components)
+    if (!chains.insert(component.chain).second)
+      return fail(ErrorCode::invalid, "robot {} has two components", to_string(component.chain));
   if (auto ok = check_nodes(graph); !ok) return ok;
   if (auto ok = check_order(graph.eliminated, "eliminated node"); !ok) return ok;
   if (auto ok = check_shapes(graph); !ok) return ok;
@@ -170,9 +170,11 @@ Status check_graph(const ProxyGraph& graph) {
 
 Status validate(const SubmapMessage& message) {
   const SubmapId id = message.submap.id;
-  const std::string where = fmt::format("submap {}/{}", id.robot.value, id.index);
-  if (message.header.robot != id.robot)
-    return fail(ErrorCode::invalid, "{}: sent by robot {}, expected its own robot", where, message.header.robot.value);
+  const std::string where = "submap " + to_string(id);
+  const ChainId sender{message.header.robot, message.header.session};
+  if (sender != id.chain)
+    return fail(ErrorCode::invalid, "{}: sent by robot {}, expected its own robot and session", where,
+                to_string(sender));
   if (auto ok = check_submap(message.submap); !ok) return in_context(where, ok.error());
   return {};
 }
@@ -194,8 +196,7 @@ Status validate(const ProxyGraphMessage& message) {
 
 Status validate(const ClosureVerdict& verdict) {
   const auto& [first, second] = verdict.pair;
-  const std::string where = fmt::format("verdict on submaps {}/{} and {}/{}", first.robot.value, first.index,
-                                        second.robot.value, second.index);
+  const std::string where = fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second));
   if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where);
   if (auto ok = at_most(verdict.closures.size(), kMaxClosures, "closures"); !ok) return in_context(where, ok.error());
   if (verdict.closures.empty() != verdict.refusal.has_value())
@@ -205,9 +206,9 @@ Status validate(const ClosureVerdict& verdict) {
     return fail(ErrorCode::invalid, "{}: refused for a value of {} at a limit of {}, expected finite ones", where,
                 verdict.refusal->value, verdict.refusal->limit);
   for (const LoopClosure& closure : verdict.closures) {
-    if (closure.from.robot != first.robot || closure.to.robot != second.robot)
-      return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where, closure.from.robot.value,
-                  closure.to.robot.value);
+    if (closure.from.chain != first.chain || closure.to.chain != second.chain)
+      return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where, to_string(closure.from.chain),
+                  to_string(closure.to.chain));
     if (auto ok = check_pose(closure.measurement.T_a_b); !ok) return in_context(where, ok.error());
     if (auto ok = check_coded_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
   }

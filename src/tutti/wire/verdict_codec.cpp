@@ -13,9 +13,9 @@ namespace tutti::wire {
 namespace {
 
 void write(const LoopClosure& closure, v1::LoopClosure& out) {
-  out.set_from_robot(closure.from.robot.value);
+  out.set_from_robot(closure.from.chain.robot.value);
   out.set_from_index(closure.from.index);
-  out.set_to_robot(closure.to.robot.value);
+  out.set_to_robot(closure.to.chain.robot.value);
   out.set_to_index(closure.to.index);
   for (const double x : closure.measurement.T_a_b.translation) out.add_pose(x);
   for (const double q : closure.measurement.T_a_b.rotation.coeffs()) out.add_pose(q);
@@ -23,12 +23,13 @@ void write(const LoopClosure& closure, v1::LoopClosure& out) {
     for (int j = i; j < 6; ++j) out.add_covariance(closure.measurement.covariance(i, j));
 }
 
-Result<LoopClosure> read(const v1::LoopClosure& in) {
+/// `in` is of a verdict on this pair.
+Result<LoopClosure> read(const v1::LoopClosure& in, const SubmapPair& pair) {
   if (in.pose_size() != 7 || in.covariance_size() != 21)
     return fail(ErrorCode::parse, "closure with {} pose numbers and {} covariance numbers, expected 7 and 21",
                 in.pose_size(), in.covariance_size());
-  LoopClosure closure{.from = {RobotId{in.from_robot()}, in.from_index()},
-                      .to = {RobotId{in.to_robot()}, in.to_index()}};
+  LoopClosure closure{.from = {{RobotId{in.from_robot()}, pair.first.chain.session}, in.from_index()},
+                      .to = {{RobotId{in.to_robot()}, pair.second.chain.session}, in.to_index()}};
   for (int i = 0; i < 3; ++i) closure.measurement.T_a_b.translation(i) = in.pose(i);
   for (int i = 0; i < 4; ++i) closure.measurement.T_a_b.rotation.coeffs()(i) = in.pose(3 + i);
   int at = 0;
@@ -79,10 +80,12 @@ std::string encode(const ClosureVerdict& verdict) {
   const Status valid = validate(verdict);
   TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
   v1::Verdict out;
-  out.set_first_robot(verdict.pair.first.robot.value);
+  out.set_first_robot(verdict.pair.first.chain.robot.value);
   out.set_first_index(verdict.pair.first.index);
-  out.set_second_robot(verdict.pair.second.robot.value);
+  out.set_second_robot(verdict.pair.second.chain.robot.value);
   out.set_second_index(verdict.pair.second.index);
+  out.set_first_session(verdict.pair.first.chain.session);
+  out.set_second_session(verdict.pair.second.chain.session);
   for (const LoopClosure& closure : verdict.closures) write(closure, *out.add_closure());
   if (verdict.refusal) {
     out.set_refused(true);
@@ -98,10 +101,10 @@ Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Verdict>(MessageKind::verdict, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
   const v1::Verdict& in = parsed->message;
-  ClosureVerdict verdict{
-      .pair = {{RobotId{in.first_robot()}, in.first_index()}, {RobotId{in.second_robot()}, in.second_index()}}};
+  ClosureVerdict verdict{.pair = {{{RobotId{in.first_robot()}, in.first_session()}, in.first_index()},
+                                  {{RobotId{in.second_robot()}, in.second_session()}, in.second_index()}}};
   for (const v1::LoopClosure& closure : in.closure()) {
-    const Result<LoopClosure> read_closure = read(closure);
+    const Result<LoopClosure> read_closure = read(closure, verdict.pair);
     if (!read_closure) return in_context("verdict", read_closure.error());
     verdict.closures.push_back(*read_closure);
   }

@@ -126,10 +126,10 @@ Selection AdaptivePolicy::choose(const PolicyInput& input) const {
   ConstraintConfig constraint = config_.constraint;
   constraint.trust = config_.adaptive.trust;
   LinkCollector collector(input, constraint, true);
-  const TimeChain chain = time_chain(input.graph, input.robot, input.nodes, input.comparison.pairs);
+  const TimeChain chain = time_chain(input.graph, input.chain, input.nodes, input.comparison.pairs);
   const std::size_t nodes = chain.server.size();
   if (nodes < 2) return std::move(collector).take();
-  const ShapeUncertainty* shape = shape_of(input.graph, input.robot);
+  const ShapeUncertainty* shape = shape_of(input.graph, input.chain);
   const bool stated = shape != nullptr && config_.adaptive.agreement.thresholds == "server";
   const double expected = stated ? std::max(typical_rmse(*shape), kLeastRmse_m) : config_.adaptive.tolerance_m;
   const ChainAgreement test(chain.ranks, shape, input.update, config_.adaptive.agreement);

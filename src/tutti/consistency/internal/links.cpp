@@ -70,7 +70,7 @@ std::vector<Link> Neighbourhood::submap_links(std::size_t node) const {
 
 LinkCollector::LinkCollector(const PolicyInput& input, const ConstraintConfig& config, bool from_scratch)
     : input_(input),
-      maker_(input.graph, input.robot, input.nodes, input.comparison.pairs, config),
+      maker_(input.graph, input.chain, input.nodes, input.comparison.pairs, config),
       from_scratch_(from_scratch) {
   selection_.replaces_all = from_scratch && maker_.size() >= 2;
   if (from_scratch) return;

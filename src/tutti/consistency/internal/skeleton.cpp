@@ -69,7 +69,7 @@ Selection SkeletonPolicy::choose(const PolicyInput& input) const {
   LinkCollector collector(input, config_.constraint, true);
   const std::size_t nodes = input.comparison.pairs.size();
   if (nodes < 2) return std::move(collector).take();
-  const TimeChain chain = time_chain(input.graph, input.robot, input.nodes, input.comparison.pairs);
+  const TimeChain chain = time_chain(input.graph, input.chain, input.nodes, input.comparison.pairs);
   estimation::OnboardSmoother smoother = make_smoother(chain);
   std::vector<std::size_t> joints{0};
   const std::vector<double> raw = disagreements(chain, spread(smoother, chain, joints), false);

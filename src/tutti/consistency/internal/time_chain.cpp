@@ -8,22 +8,22 @@
 
 namespace tutti::consistency::internal {
 
-TimeChain time_chain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+TimeChain time_chain(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                      std::span<const NodePair> pairs) {
-  TimeChain chain;
-  if (pairs.empty()) return chain;
-  const auto first = std::ranges::find(graph.nodes, robot, &ProxyNode::robot) - graph.nodes.begin();
+  TimeChain out;
+  if (pairs.empty()) return out;
+  const auto first = std::ranges::find(graph.nodes, chain, &ProxyNode::chain) - graph.nodes.begin();
   const Pose3 T_start_world = graph.nodes[pairs.front().proxy].T_world_body.inverse();
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    chain.server.push_back(T_start_world * graph.nodes[pairs[k].proxy].T_world_body);
-    chain.robot.push_back(nodes[pairs[k].robot].T_map_body);
-    chain.ranks.push_back(pairs[k].proxy - static_cast<std::size_t>(first));
+    out.server.push_back(T_start_world * graph.nodes[pairs[k].proxy].T_world_body);
+    out.robot.push_back(nodes[pairs[k].robot].T_map_body);
+    out.ranks.push_back(pairs[k].proxy - static_cast<std::size_t>(first));
     RelativePose step{.covariance = Matrix6d::Zero()};
     for (std::size_t n = k == 0 ? pairs[k].robot : pairs[k - 1].robot; n < pairs[k].robot; ++n)
       step = compound(step, nodes[n + 1].odometry);
-    chain.odometry.push_back(step);
+    out.odometry.push_back(step);
   }
-  return chain;
+  return out;
 }
 
 double aligned_rmse(std::span<const Pose3> server, std::span<const Pose3> robot) {
@@ -31,8 +31,8 @@ double aligned_rmse(std::span<const Pose3> server, std::span<const Pose3> robot)
   return std::sqrt(off.leftCols<3>().squaredNorm() / static_cast<double>(server.size()));
 }
 
-const ShapeUncertainty* shape_of(const ProxyGraph& graph, RobotId robot) {
-  const auto found = std::ranges::find(graph.shapes, robot, &ShapeUncertainty::robot);
+const ShapeUncertainty* shape_of(const ProxyGraph& graph, const ChainId& chain) {
+  const auto found = std::ranges::find(graph.shapes, chain, &ShapeUncertainty::chain);
   return found == graph.shapes.end() ? nullptr : &*found;
 }
 

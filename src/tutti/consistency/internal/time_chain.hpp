@@ -17,13 +17,13 @@ struct TimeChain {
   std::vector<std::size_t> ranks;      ///< Among the robot's proxy nodes.
 };
 
-TimeChain time_chain(const ProxyGraph& graph, RobotId robot, std::span<const RobotNode> nodes,
+TimeChain time_chain(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                      std::span<const NodePair> pairs);
 
 /// Root mean square distance of the nodes after one rigid alignment, m; not empty.
 double aligned_rmse(std::span<const Pose3> server, std::span<const Pose3> robot);
 
 /// What the server says about this robot; null: nothing.
-const ShapeUncertainty* shape_of(const ProxyGraph& graph, RobotId robot);
+const ShapeUncertainty* shape_of(const ProxyGraph& graph, const ChainId& chain);
 
 }  // namespace tutti::consistency::internal

@@ -62,7 +62,7 @@ TEST(TimeChain, AlignedRmseIgnoresTheFrame) {
 
 TEST(TimeChain, TheServerMaySayNothingOfARobot) {
   ProxyGraph graph;
-  graph.shapes = {{.robot = kBravo, .whole = {0.5, 0.1}, .sag = {}}};
+  graph.shapes = {{.chain = kBravo, .whole = {0.5, 0.1}, .sag = {}}};
   EXPECT_EQ(shape_of(graph, kAlpha), nullptr);
   EXPECT_EQ(shape_of(graph, kBravo), &graph.shapes[0]);
 }
@@ -73,7 +73,7 @@ TEST(NodeAt, FindsSynchronisedNodesOnly) {
   comparison.pairs = run.pairs;
   const Ledger ledger;
   const PolicyInput input{.graph = run.graph,
-                          .robot = kBravo,
+                          .chain = kBravo,
                           .nodes = run.nodes,
                           .comparison = comparison,
                           .budget = {},

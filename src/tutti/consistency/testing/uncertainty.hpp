@@ -16,7 +16,7 @@ namespace tutti::consistency::test {
 /// Standard deviations of every stretch from those by rank and half-length: sag(rank of the middle, L) -> ShapeSigma.
 template <class Sag>
 ShapeUncertainty stretch_by_stretch(RobotId robot, std::size_t nodes, ShapeSigma whole, Sag sag) {
-  ShapeUncertainty out{.robot = robot, .whole = whole};
+  ShapeUncertainty out{.chain = robot, .whole = whole};
   for (std::size_t L = ShapeUncertainty::kShortest; 2 * L < nodes; L *= 2) {
     out.sag.emplace_back();
     for (std::size_t i = 0; i < (nodes - 1) / (2 * L); ++i) out.sag.back().push_back(sag(2 * L * i + L, L));

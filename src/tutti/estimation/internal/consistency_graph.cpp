@@ -184,7 +184,7 @@ class Placing {
  public:
   explicit Placing(std::span<const OdometryChain> chains) {
     for (const OdometryChain& chain : chains) {
-      position_.emplace(KeyframeId{chain.robot, chain.first_index}, chains_.size());
+      position_.emplace(KeyframeId{chain.id, chain.first_index}, chains_.size());
       chains_.emplace_back(chain);
     }
   }
@@ -230,7 +230,7 @@ class Placing {
     auto after = position_.upper_bound(id);
     if (after == position_.begin()) return std::nullopt;
     const auto& [start, position] = *std::prev(after);
-    if (start.robot != id.robot || !chains_[position].contains(id.index)) return std::nullopt;
+    if (start.chain != id.chain || !chains_[position].contains(id.index)) return std::nullopt;
     return position;
   }
   std::map<KeyframeId, std::size_t> position_;  // by first keyframe

@@ -73,7 +73,7 @@ Status write_graph(const ServerRecord& server, const fs::path& out_dir) {
   if (auto status = formats::write_g2o((out_dir / "graph.g2o").string(), server.graph); !status) return status;
   std::string csv = "id,robot,keyframe,stamp_ns\n";
   for (std::size_t i = 0; i < server.nodes.size(); ++i)
-    csv += fmt::format("{},{},{},{}\n", i, server.nodes[i].id.robot.value, server.nodes[i].id.index,
+    csv += fmt::format("{},{},{},{}\n", i, server.nodes[i].id.chain.robot.value, server.nodes[i].id.index,
                        server.nodes[i].stamp.ns);
   return write_text(out_dir / "graph_stamps.csv", csv);
 }

@@ -73,7 +73,7 @@ TEST_F(ReportFiles, WritesEverythingAndItReadsBack) {
   for (std::size_t i = 0; i < record.server.nodes.size(); ++i) {
     ASSERT_TRUE(std::getline(stamps, line));
     const auto& node = record.server.nodes[i];
-    EXPECT_EQ(line, fmt::format("{},{},{},{}", i, node.id.robot.value, node.id.index, node.stamp.ns));
+    EXPECT_EQ(line, fmt::format("{},{},{},{}", i, node.id.chain.robot.value, node.id.index, node.stamp.ns));
   }
 
   const auto cloud = formats::read_ply((dir_ / "map.ply").string());

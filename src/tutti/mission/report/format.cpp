@@ -117,7 +117,7 @@ std::string_view drift_name(DriftOrigin::Kind kind) {
 ClosureCounts count_closures(const ServerRecord& server) {
   ClosureCounts counts;
   for (const auto& closure : server.closures)
-    ++(closure.from.robot == closure.to.robot ? counts.accepted_intra : counts.accepted_inter);
+    ++(closure.from.chain.robot == closure.to.chain.robot ? counts.accepted_intra : counts.accepted_inter);
   for (const auto& rejection : server.rejections) {
     counts.rejected_intra += rejection.intra;
     counts.rejected_inter += rejection.inter;

@@ -136,7 +136,7 @@ std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const MissionRecord& re
   std::map<KeyframeId, Eigen::Vector3d> out;
   for (const RobotRecord& robot : record.robots)
     for (const NodeRecord& node : record.server.nodes)
-      if (node.id.robot == robot.id)
+      if (node.id.chain.robot == robot.id)
         if (const Eigen::Vector3d* position = find_position(robot.server_estimate, node.stamp))
           out[node.id] = *position;
   return out;

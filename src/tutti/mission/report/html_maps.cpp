@@ -70,8 +70,9 @@ void draw_closures(Svg& svg, const MissionRecord& record, const Pose3& T_display
   for (const auto& closure : record.server.closures) {
     const auto from = positions.find(closure.from);
     const auto to = positions.find(closure.to);
-    if (from == positions.end() || to == positions.end() || !is_member(record, robots, closure.from.robot)) continue;
-    (closure.from.robot == closure.to.robot ? intra : inter)
+    if (from == positions.end() || to == positions.end() || !is_member(record, robots, closure.from.chain.robot))
+      continue;
+    (closure.from.chain.robot == closure.to.chain.robot ? intra : inter)
         .emplace_back(view(ground(T_display_world * from->second)), view(ground(T_display_world * to->second)));
   }
   svg.segments(thinned(intra), "intra", fmt::format("{} loop closures within one robot", intra.size()));

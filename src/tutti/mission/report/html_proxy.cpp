@@ -48,9 +48,9 @@ Edges proxy_edges(const ProxyGraph& graph, const std::vector<std::uint32_t>& com
   return out;
 }
 
-std::uint32_t component_of(const ProxyGraph& graph, RobotId robot) {
+std::uint32_t component_of(const ProxyGraph& graph, const ChainId& chain) {
   for (const auto& entry : graph.components)
-    if (entry.robot == robot) return entry.component;
+    if (entry.chain == chain) return entry.component;
   return 0;
 }
 
@@ -83,7 +83,7 @@ struct Plan {
 Plan plan_of(const MissionRecord& record) {
   const ProxyGraph& graph = record.server.proxy;
   std::vector<std::uint32_t> component;
-  for (const auto& node : graph.nodes) component.push_back(component_of(graph, node.robot));
+  for (const auto& node : graph.nodes) component.push_back(component_of(graph, node.chain));
   const std::uint32_t shown = shown_component(component);
   const Pose3 T_display_world = record.server.T_reference_world.value_or(Pose3{});
   Points3d positions, box;
@@ -111,7 +111,7 @@ std::size_t draw_closures(Svg& svg, const Plan& plan, const MissionRecord& recor
     const auto from = keyframes.find(closure.from);
     const auto to = keyframes.find(closure.to);
     if (from != keyframes.end() && to != keyframes.end() &&
-        component_of(record.server.proxy, closure.from.robot) == plan.shown)
+        component_of(record.server.proxy, closure.from.chain) == plan.shown)
       strokes.emplace_back(plan(from->second), plan(to->second));
   }
   svg.segments(thinned(strokes), "closure", fmt::format("{} loop closures", strokes.size()));
@@ -147,7 +147,7 @@ void draw_nodes(Svg& svg, const Plan& plan, const MissionRecord& record) {
   for (const auto& robot : record.robots) {
     Points2d nodes;
     for (std::size_t i = 0; i < graph_nodes.size(); ++i)
-      if (graph_nodes[i].robot == robot.id && plan.component[i] == plan.shown) nodes.push_back(plan.pixels[i]);
+      if (graph_nodes[i].chain.robot == robot.id && plan.component[i] == plan.shown) nodes.push_back(plan.pixels[i]);
     svg.dots(nodes, "node " + robot_class(record, robot.id));
   }
 }

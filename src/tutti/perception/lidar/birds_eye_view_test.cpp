@@ -19,7 +19,7 @@ using namespace test;
 double apart_deg(double a, double b) { return std::abs(std::remainder(a - b, std::numbers::pi)) / kRadPerDeg; }
 
 SubmapFeatures look(const Walk& walk, std::uint64_t seed) {
-  return extract_features(make_submap({{0}, 0}, furnished_room(), walk, Rng(seed)), {});
+  return extract_features(make_submap({RobotId{0}, 0}, furnished_room(), walk, Rng(seed)), {});
 }
 
 TEST(WallDirections, areThoseOfTheRoomWhateverTheYaw) {

@@ -15,14 +15,14 @@ using namespace test;
 TEST(ProposeAlignments, findsYawShiftAndHeightWhateverTheTilt) {
   const LidarClosureConfig config;
   const Walk walk_a;
-  const auto a = extract_features(make_submap({{0}, 0}, furnished_room(), walk_a, Rng(1)), config);
+  const auto a = extract_features(make_submap({RobotId{0}, 0}, furnished_room(), walk_a, Rng(1)), config);
   Rng rng(7);
   for (int trial = 0; trial < 12; ++trial) {
     Walk walk_b{.from = {rng.uniform(2, 12), rng.uniform(4, 6), rng.uniform(0.8, 1.8)},
                 .yaw_rad = rng.uniform(-std::numbers::pi, std::numbers::pi),
                 .tilt_rad = rng.uniform(-0.3, 0.3)};
     walk_b.to = walk_b.from + Eigen::Vector3d(1, 0, 0);
-    const auto b = extract_features(make_submap({{1}, 0}, furnished_room(), walk_b, Rng(100 + trial)), config);
+    const auto b = extract_features(make_submap({RobotId{1}, 0}, furnished_room(), walk_b, Rng(100 + trial)), config);
     const auto guesses = propose_alignments(a, b, config);
     ASSERT_FALSE(guesses.empty());
     for (std::size_t i = 1; i < guesses.size(); ++i) EXPECT_LE(guesses[i].score, guesses[i - 1].score);
@@ -34,7 +34,7 @@ TEST(ProposeAlignments, findsYawShiftAndHeightWhateverTheTilt) {
 
 TEST(ProposeAlignments, proposeNothingForUnusableSubmaps) {
   const LidarClosureConfig config;
-  const auto good = extract_features(make_submap({{0}, 0}, furnished_room(), {}, Rng(1)), config);
+  const auto good = extract_features(make_submap({RobotId{0}, 0}, furnished_room(), {}, Rng(1)), config);
   EXPECT_TRUE(propose_alignments(good, SubmapFeatures{}, config).empty());
   EXPECT_TRUE(propose_alignments(SubmapFeatures{}, good, config).empty());
   EXPECT_FALSE(plausible_pair(good, SubmapFeatures{}, config));

@@ -15,7 +15,7 @@ namespace {
 using namespace test;
 
 OrientedCloud observe_oriented(const World& world, const Walk& walk, std::uint64_t seed) {
-  return extract_features(make_submap({{0}, 0}, world, walk, Rng(seed)), {}).cloud;
+  return extract_features(make_submap({RobotId{0}, 0}, world, walk, Rng(seed)), {}).cloud;
 }
 
 Vector6d offset(Rng& rng, double metres, double radians) {

@@ -16,7 +16,7 @@ namespace {
 
 using namespace test;
 constexpr double kDegree = 0.017453292519943295;
-constexpr SubmapId kId{{0}, 3};
+constexpr SubmapId kId{RobotId{0}, 3};
 
 /// Angle between what the features call up and the world's up, degrees.
 double tilt_error_deg(const SubmapFeatures& features, const Walk& walk) {

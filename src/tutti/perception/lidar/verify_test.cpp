@@ -31,7 +31,8 @@ const Walk kWalkB{.from = {10, 4.5, 1.5},
                   .T_odom_world = {so3_exp({-0.03, 0.02, -2.0}), {-40, 20, 0}}};
 
 TEST(VerifyPair, acceptsTheSameRoomAndFindsThePose) {
-  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1), b = see({{1}, 0}, furnished_room(), kWalkB, 2);
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1),
+             b = see({RobotId{1}, 0}, furnished_room(), kWalkB, 2);
   const auto v = verify_pair(a.features, b.features, kConfig);
   ASSERT_TRUE(v.accepted) << to_string(*v.refusal);
   const Vector6d error = local(true_relative(kWalkA, kWalkB), v.T_a_b);
@@ -42,7 +43,8 @@ TEST(VerifyPair, acceptsTheSameRoomAndFindsThePose) {
 }
 
 TEST(VerifyPair, swappingTheSubmapsInvertsTheResult) {
-  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1), b = see({{1}, 0}, furnished_room(), kWalkB, 2);
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1),
+             b = see({RobotId{1}, 0}, furnished_room(), kWalkB, 2);
   const auto ab = verify_pair(a.features, b.features, kConfig), ba = verify_pair(b.features, a.features, kConfig);
   ASSERT_TRUE(ab.accepted && ba.accepted);
   EXPECT_LT(local(ab.T_a_b, ba.T_a_b.inverse()).norm(), 1e-12);
@@ -51,19 +53,20 @@ TEST(VerifyPair, swappingTheSubmapsInvertsTheResult) {
 }
 
 TEST(VerifyPair, sameInputGivesTheSameBits) {
-  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1), b = see({{1}, 0}, furnished_room(), kWalkB, 2);
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1),
+             b = see({RobotId{1}, 0}, furnished_room(), kWalkB, 2);
   const auto one = verify_pair(a.features, b.features, kConfig), two = verify_pair(a.features, b.features, kConfig);
   EXPECT_EQ(one.T_a_b, two.T_a_b);
   EXPECT_EQ(one.covariance, two.covariance);
 }
 
 TEST(VerifyPair, refusesAnotherRoom) {
-  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1);
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1);
   for (std::uint64_t seed = 0; seed < 4; ++seed) {
     const Walk walk{.from = {2, 2 + 0.5 * static_cast<double>(seed), 1},
                     .to = {6, 3, 1},
                     .yaw_rad = 1.0 + 0.4 * static_cast<double>(seed)};
-    const Side b = see({{1}, 0}, other_room(), walk, seed);
+    const Side b = see({RobotId{1}, 0}, other_room(), walk, seed);
     const auto v = verify_pair(a.features, b.features, kConfig);
     EXPECT_FALSE(v.accepted);
     EXPECT_TRUE(v.refusal.has_value());
@@ -71,16 +74,16 @@ TEST(VerifyPair, refusesAnotherRoom) {
 }
 
 TEST(VerifyPair, refusesTheMirrorImage) {
-  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1);
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1);
   const Walk walk{.from = {-2, 5, 1.2}, .to = {-6, 5, 1.2}, .yaw_rad = 3.0};
-  const Side b = see({{1}, 0}, mirrored(furnished_room()), walk, 2);
+  const Side b = see({RobotId{1}, 0}, mirrored(furnished_room()), walk, 2);
   EXPECT_FALSE(verify_pair(a.features, b.features, kConfig).accepted);
 }
 
 TEST(VerifyPair, refusesACorridorAsFreeToSlide) {
-  const Side a = see({{0}, 0}, corridor(), {.from = {20, 1.3, 1.2}, .to = {24, 1.3, 1.2}}, 1);
+  const Side a = see({RobotId{0}, 0}, corridor(), {.from = {20, 1.3, 1.2}, .to = {24, 1.3, 1.2}}, 1);
   for (const double x : {22.0, 50.0}) {  // the same stretch, and another one that looks the same
-    const Side b = see({{1}, 0}, corridor(), {.from = {x, 1.3, 1.2}, .to = {x + 4, 1.3, 1.2}}, 2);
+    const Side b = see({RobotId{1}, 0}, corridor(), {.from = {x, 1.3, 1.2}, .to = {x + 4, 1.3, 1.2}}, 2);
     const auto v = verify_pair(a.features, b.features, kConfig);
     EXPECT_FALSE(v.accepted);
     EXPECT_LT(v.min_eigenvalue, kConfig.min_eigenvalue);
@@ -90,14 +93,15 @@ TEST(VerifyPair, refusesACorridorAsFreeToSlide) {
 TEST(VerifyPair, refusesAnEmptyRectangleAsAmbiguous) {
   World room;
   add_box(room, {0, 0, 0}, {14, 9, 3});  // half a turn maps it onto itself
-  const Side a = see({{0}, 0}, room, kWalkA, 1), b = see({{1}, 0}, room, kWalkB, 2);
+  const Side a = see({RobotId{0}, 0}, room, kWalkA, 1), b = see({RobotId{1}, 0}, room, kWalkB, 2);
   const auto v = verify_pair(a.features, b.features, kConfig);
   EXPECT_FALSE(v.accepted);
   EXPECT_GT(v.rival_ratio, kConfig.max_rival_ratio);
 }
 
 TEST(VerifyPair, refusesViewpointsFartherApartThanAskedFor) {
-  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1), b = see({{1}, 0}, furnished_room(), kWalkB, 2);
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1),
+             b = see({RobotId{1}, 0}, furnished_room(), kWalkB, 2);
   LidarClosureConfig config;
   const double apart = verify_pair(a.features, b.features, config).viewpoint_distance_m;
   EXPECT_NEAR(apart, (pose_on(kWalkA, 5).translation - pose_on(kWalkB, 5).translation).norm(), 0.05);
@@ -112,27 +116,28 @@ TEST(VerifyPair, refusesACorridorWithNothingButAFarEndAsAmbiguous) {
   world.push_back({{80, 0, 0}, {0, 2.6, 0}, {0, 0, 2.5}});  // the end wall
   LidarClosureConfig config;
   config.min_eigenvalue = 0.0;  // only sliding may refuse
-  const Side a = see({{0}, 0}, world, {.from = {20, 1.3, 1.2}, .to = {24, 1.3, 1.2}}, 1);
-  const Side b = see({{1}, 0}, world, {.from = {40, 1.3, 1.2}, .to = {44, 1.3, 1.2}}, 2);
+  const Side a = see({RobotId{0}, 0}, world, {.from = {20, 1.3, 1.2}, .to = {24, 1.3, 1.2}}, 1);
+  const Side b = see({RobotId{1}, 0}, world, {.from = {40, 1.3, 1.2}, .to = {44, 1.3, 1.2}}, 2);
   EXPECT_FALSE(verify_pair(a.features, b.features, config).accepted);
 }
 
 TEST(VerifyPair, refusesUnusableSubmapsWithTheirReason) {
-  const Side a = see({{0}, 0}, furnished_room(), kWalkA, 1);
-  Side b = see({{1}, 7}, furnished_room(), {.keyframes = 3}, 1);
+  const Side a = see({RobotId{0}, 0}, furnished_room(), kWalkA, 1);
+  Side b = see({RobotId{1}, 7}, furnished_room(), {.keyframes = 3}, 1);
   EXPECT_EQ(verify_pair(a.features, b.features, kConfig).refusal,
             (Refusal{RefusalReason::too_few_keyframes, 3.0, 6.0}));
 }
 
 TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {
-  const Side a = see({{0}, 2}, furnished_room(), kWalkA, 1), b = see({{1}, 1}, furnished_room(), kWalkB, 2);
+  const Side a = see({RobotId{0}, 2}, furnished_room(), kWalkA, 1),
+             b = see({RobotId{1}, 1}, furnished_room(), kWalkB, 2);
   const auto ab = to_verdict(a.submap, b.submap, verify_pair(a.features, b.features, kConfig));
   const auto ba = to_verdict(b.submap, a.submap, verify_pair(b.features, a.features, kConfig));
   for (const auto& verdict : {ab, ba}) {
-    EXPECT_EQ(verdict.pair, (SubmapPair{{{0}, 2}, {{1}, 1}}));
+    EXPECT_EQ(verdict.pair, (SubmapPair{{RobotId{0}, 2}, {RobotId{1}, 1}}));
     ASSERT_EQ(verdict.closures.size(), 1U) << to_string(*verdict.refusal);
-    EXPECT_EQ(verdict.closures[0].from, (KeyframeId{{0}, 205}));
-    EXPECT_EQ(verdict.closures[0].to, (KeyframeId{{1}, 105}));
+    EXPECT_EQ(verdict.closures[0].from, (KeyframeId{RobotId{0}, 205}));
+    EXPECT_EQ(verdict.closures[0].to, (KeyframeId{RobotId{1}, 105}));
     const Pose3 truth = pose_on(kWalkA, 5).inverse() * pose_on(kWalkB, 5);
     EXPECT_LT(local(truth, verdict.closures[0].measurement.T_a_b).norm(), 0.03);
   }
@@ -144,7 +149,7 @@ TEST(ToVerdict, odometryNoiseInsideTheSubmapsEnlargesTheCovariance) {
   Matrix6d last = Matrix6d::Zero();
   for (const double sigma : {0.0, 1e-3, 1e-2}) {
     walk.odometry_sigma = sigma;
-    const Submap a = make_submap({{0}, 0}, {}, walk, Rng(1)), b = make_submap({{1}, 0}, {}, walk, Rng(1));
+    const Submap a = make_submap({RobotId{0}, 0}, {}, walk, Rng(1)), b = make_submap({RobotId{1}, 0}, {}, walk, Rng(1));
     const Matrix6d C = to_verdict(a, b, v).closures.at(0).measurement.covariance;
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(C - last).eigenvalues()[0], 0.0) << sigma;
     last = C;
@@ -152,7 +157,7 @@ TEST(ToVerdict, odometryNoiseInsideTheSubmapsEnlargesTheCovariance) {
 }
 
 TEST(ToVerdict, aRefusalCarriesItsReason) {
-  const Submap a = make_submap({{0}, 0}, {}, {}, Rng(1)), b = make_submap({{1}, 0}, {}, {}, Rng(1));
+  const Submap a = make_submap({RobotId{0}, 0}, {}, {}, Rng(1)), b = make_submap({RobotId{1}, 0}, {}, {}, Rng(1));
   const Refusal refusal{RefusalReason::overlap, 0.1, 0.3};
   const auto verdict = to_verdict(b, a, {.refusal = refusal});
   EXPECT_TRUE(verdict.closures.empty());

@@ -89,7 +89,7 @@ inline void add_look_alikes(CorridorRun& run, const CorridorRunConfig& config, R
     const Pose3 moved = truth_at(alike.first, stamp_of(alike.first_from_s)) *
                         truth_at(alike.second, stamp_of(alike.second_from_s)).inverse();
     const auto within = [&](const SubmapId& id, const Keyframe& k, RobotId robot, double from_s) {
-      return id.robot == robot && seconds(k.stamp) >= from_s && seconds(k.stamp) <= from_s + alike.length_s;
+      return id.chain.robot == robot && seconds(k.stamp) >= from_s && seconds(k.stamp) <= from_s + alike.length_s;
     };
     for (const auto& [a, one] : run.submaps)
       for (const auto& [b, other] : run.submaps) {
@@ -100,10 +100,10 @@ inline void add_look_alikes(CorridorRun& run, const CorridorRunConfig& config, R
           continue;
         Vector6d noise;
         for (double& n : noise) n = rng.normal(0.01);
-        const Pose3 T = truth_at(a.robot, i.stamp).inverse() * moved * truth_at(b.robot, j.stamp);
+        const Pose3 T = truth_at(a.chain.robot, i.stamp).inverse() * moved * truth_at(b.chain.robot, j.stamp);
         Vector6d variance = Vector6d::Constant(1e-4);
         run.verdicts[{a, b}] = {
-            {a, b}, {{{a.robot, i.index}, {b.robot, j.index}, {retract(T, noise), variance.asDiagonal()}}}, {}};
+            {a, b}, {{{a.chain, i.index}, {b.chain, j.index}, {retract(T, noise), variance.asDiagonal()}}}, {}};
       }
   }
 }
@@ -145,7 +145,7 @@ inline CorridorRun corridor_run(const CorridorRunConfig& config, std::uint64_t s
   const simulation::ReferenceClosures finder(run.truth, config.closures, seed);
   const auto is_blind = [&](const Submap& submap) {
     return std::ranges::any_of(config.blind, [&](const Failure& f) {
-      return f.robot == submap.id.robot && submap.keyframes.back().stamp - Timestamp{1'000'000'000} > f.from_s &&
+      return f.robot == submap.id.chain.robot && submap.keyframes.back().stamp - Timestamp{1'000'000'000} > f.from_s &&
              submap.keyframes.front().stamp - Timestamp{1'000'000'000} < f.until_s;
     });
   };
@@ -164,7 +164,7 @@ inline double rmse(const CorridorRun& run, const MapEstimate& map, std::optional
   std::vector<Eigen::Vector3d> truth;
   std::vector<Eigen::Vector3d> estimate;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (only && map.nodes[i].id.robot != *only) continue;
+    if (only && map.nodes[i].id.chain.robot != *only) continue;
     truth.push_back(run.true_poses.at(map.nodes[i].id).translation);
     estimate.push_back(map.nodes[i].T_world_body.translation);
   }

@@ -44,14 +44,14 @@ inline Vector6d draw(Rng& rng, double sigma_m, double sigma_rad) {
   return xi;
 }
 
-/// Overlapping submaps of one robot with noisy odometry, in an odom frame of its own.
-inline std::vector<Submap> make_submaps(RobotId robot, const TestWorldConfig& config, Rng rng) {
+/// Overlapping submaps of one chain with noisy odometry, in an odom frame of its own.
+inline std::vector<Submap> make_submaps(const ChainId& chain, const TestWorldConfig& config, Rng rng) {
   std::vector<Submap> submaps;
-  Submap open{.id = {robot, 0}};
+  Submap open{.id = {chain, 0}};
   Pose3 T_odom_body = retract({}, draw(rng, 5.0, 1.0));
   for (std::uint32_t k = 0; k < config.keyframes; ++k) {
     if (k > 0) {
-      const Pose3 step = true_pose(robot, k - 1).inverse() * true_pose(robot, k);
+      const Pose3 step = true_pose(chain.robot, k - 1).inverse() * true_pose(chain.robot, k);
       const Pose3 measured = retract(step, draw(rng, config.sigma_m, config.sigma_rad));
       T_odom_body = T_odom_body * measured;
       open.odometry.push_back({measured, diagonal_covariance(config.sigma_m, config.sigma_rad)});
@@ -59,7 +59,7 @@ inline std::vector<Submap> make_submaps(RobotId robot, const TestWorldConfig& co
     open.keyframes.push_back({k, Timestamp{1'000'000'000LL * (k + 1)}, T_odom_body, k % 2 == 0});
     if (open.keyframes.size() > config.per_submap || k + 1 == config.keyframes) {
       submaps.push_back(open);
-      open = {.id = {robot, open.id.index + 1}, .keyframes = {open.keyframes.back()}};
+      open = {.id = {chain, open.id.index + 1}, .keyframes = {open.keyframes.back()}};
     }
   }
   return submaps;
@@ -75,31 +75,34 @@ class TestFinder final : public ClosureFinder {
   [[nodiscard]] std::uint32_t version() const override { return version_; }
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
-    if (first.id.robot == second.id.robot && second.id.index - first.id.index < 3) return false;
+    if (first.id.chain == second.id.chain && second.id.index - first.id.index < 3) return false;
     const auto [a, b] = middles(first, second);
-    return (true_pose(a.robot, a.index).translation - true_pose(b.robot, b.index).translation).norm() < 4.0;
+    return (true_pose(a.chain.robot, a.index).translation - true_pose(b.chain.robot, b.index).translation).norm() < 4.0;
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const CloudStore&) const override {
     const auto [a, b] = middles(first, second);
-    const std::uint64_t key = (std::uint64_t{first.id.robot.value} << 48U) ^ (std::uint64_t{first.id.index} << 32U) ^
-                              (std::uint64_t{second.id.robot.value} << 16U) ^ second.id.index;
+    const std::uint64_t key = (std::uint64_t{first.id.chain.robot.value} << 48U) ^
+                              (std::uint64_t{first.id.index} << 32U) ^
+                              (std::uint64_t{second.id.chain.robot.value} << 16U) ^ second.id.index ^
+                              (3 * first.id.chain.session + second.id.chain.session) << 40U;
     Rng rng = Rng(seed_).fork(key);
-    Pose3 T = retract(true_pose(a.robot, a.index).inverse() * true_pose(b.robot, b.index), draw(rng, 0.02, 0.005));
+    Pose3 T = retract(true_pose(a.chain.robot, a.index).inverse() * true_pose(b.chain.robot, b.index),
+                      draw(rng, 0.02, 0.005));
     if (wrong_every_ > 0 && rng.index(wrong_every_) == 0)
       T.translation += Eigen::Vector3d(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized() * 3.0;
     return ClosureVerdict{{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, {}, version()};
   }
   static bool is_wrong(const LoopClosure& closure) {
-    const Pose3 truth =
-        true_pose(closure.from.robot, closure.from.index).inverse() * true_pose(closure.to.robot, closure.to.index);
+    const Pose3 truth = true_pose(closure.from.chain.robot, closure.from.index).inverse() *
+                        true_pose(closure.to.chain.robot, closure.to.index);
     return local(truth, closure.measurement.T_a_b).head<3>().norm() > 0.5;
   }
 
  private:
   static std::pair<KeyframeId, KeyframeId> middles(const Submap& first, const Submap& second) {
     const auto middle = [](const Submap& s) {
-      return KeyframeId{s.id.robot, s.keyframes[s.keyframes.size() / 2].index};
+      return KeyframeId{s.id.chain, s.keyframes[s.keyframes.size() / 2].index};
     };
     return {middle(first), middle(second)};
   }

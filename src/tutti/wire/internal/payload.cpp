@@ -8,6 +8,7 @@
 #include <array>
 #include <span>
 
+#include "tutti/model/proxy_graph.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/limits.hpp"
 
@@ -26,6 +27,7 @@ struct Field {
 };
 
 using v1::Cloud, v1::ProxyGraph, v1::Submap, v1::Verdict;
+constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;
 
 constexpr std::array kCloud = {Field{Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
 constexpr std::array kSubmap = {
@@ -35,9 +37,11 @@ constexpr std::array kSubmap = {
     Field{Submap::kOdometryFieldNumber, 6 * kMaxKeyframes, "odometry numbers"},
     Field{Submap::kOdometryCovarianceFieldNumber, 21 * kMaxKeyframes, "covariance numbers"},
     Field{Submap::kCloudFieldNumber, 1, "clouds", true, kCloud}};  // several would be merged
-constexpr std::array kProxyGraph = {Field{ProxyGraph::kRunFieldNumber, kMaxRobots, "robots", true},
-                                    Field{ProxyGraph::kComponentRobotFieldNumber, kMaxRobots, "robots of components"},
-                                    Field{ProxyGraph::kComponentFieldNumber, kMaxRobots, "components"}};
+constexpr std::array kProxyGraph = {
+    Field{ProxyGraph::kRunFieldNumber, kMostChains, "chains", true},
+    Field{ProxyGraph::kComponentRobotFieldNumber, kMostChains, "robots of components"},
+    Field{ProxyGraph::kComponentSessionFieldNumber, kMostChains, "sessions of components"},
+    Field{ProxyGraph::kComponentFieldNumber, kMostChains, "components"}};
 constexpr std::array kVerdict = {Field{Verdict::kClosureFieldNumber, kMaxClosures, "closures", true}};
 
 std::span<const Field> fields_of(MessageKind kind) {

@@ -43,12 +43,15 @@ inline Matrix6d odometry_covariance(double metres, double turn_rad) {
   return covariance * metres;
 }
 
+/// Many chains are the first of their robot; other sessions have any number.
+inline std::uint64_t any_session(Rng& rng) { return rng.bernoulli(0.5) ? 0 : rng.index(~std::uint64_t{0}); }
+
 inline SubmapMessage any_submap(Rng& rng, std::size_t keyframes, std::size_t points) {
   SubmapMessage message;
-  const RobotId robot{static_cast<std::uint32_t>(rng.index(5))};
-  message.header = {robot, rng.index(1'000'000'000'000), rng.index(1000)};
+  const ChainId chain{RobotId{static_cast<std::uint32_t>(rng.index(5))}, any_session(rng)};
+  message.header = {chain.robot, chain.session, rng.index(1000)};
   Submap& submap = message.submap;
-  submap.id = {robot, static_cast<std::uint32_t>(rng.index(1000))};
+  submap.id = {chain, static_cast<std::uint32_t>(rng.index(1000))};
   Keyframe keyframe{static_cast<std::uint32_t>(rng.index(100'000)), {1'700'000'000'123'456'789}, any_pose(rng, 100.0)};
   for (std::size_t k = 0; k < keyframes; ++k) {
     if (k > 0) {
@@ -72,12 +75,12 @@ inline SubmapMessage any_submap(Rng& rng, std::size_t keyframes, std::size_t poi
 
 /// As estimated from 32 samples of a drifting trajectory with as many nodes, 32 of which are tied to others if there
 /// are as many.
-inline ShapeUncertainty any_shape(Rng& rng, RobotId robot, std::size_t nodes) {
+inline ShapeUncertainty any_shape(Rng& rng, const ChainId& chain, std::size_t nodes) {
   const auto sigma = [&](double length) {
     return ShapeSigma{0.002 * std::pow(length, 1.3) * std::exp(rng.normal(0.12)),
                       0.001 * std::sqrt(length) * std::exp(rng.normal(0.12))};
   };
-  ShapeUncertainty shape{.robot = robot, .whole = sigma(static_cast<double>(nodes))};
+  ShapeUncertainty shape{.chain = chain, .whole = sigma(static_cast<double>(nodes))};
   for (std::size_t L = ShapeUncertainty::kShortest; 2 * L < nodes; L *= 2) {
     auto& stretches = shape.sag.emplace_back();
     for (std::size_t i = 0; i < (nodes - 1) / (2 * L); ++i) stretches.push_back(sigma(static_cast<double>(L)));
@@ -91,17 +94,19 @@ inline ShapeUncertainty any_shape(Rng& rng, RobotId robot, std::size_t nodes) {
   return shape;
 }
 
-/// Nodes about every metre along each robot's way; of every other robot, beginning with the first, the shape is known.
-inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t robots, std::size_t nodes_each, bool reduced) {
+/// Nodes about every metre along each chain's way, two chains a robot; of every other chain, beginning with the first,
+/// the shape is known.
+inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t chains, std::size_t nodes_each, bool reduced) {
   ProxyGraphMessage message;
   message.header.session = rng.index(1'000'000'000'000);
   message.header.sequence = rng.index(1000);
   ProxyGraph& graph = message.graph;
+  graph.epoch = rng.index(1'000'000'000);
   graph.revision = rng.index(1000);
   graph.reduced = reduced;
-  for (std::size_t r = 0; r < robots; ++r) {
-    const RobotId robot{static_cast<std::uint32_t>(3 * r)};
-    graph.components.push_back({robot, static_cast<std::uint32_t>(rng.index(2))});
+  for (std::size_t r = 0; r < chains; ++r) {
+    const ChainId chain{RobotId{static_cast<std::uint32_t>(3 * (r / 2))}, r % 2 == 0 ? 0 : 1 + any_session(rng)};
+    graph.components.push_back({chain, static_cast<std::uint32_t>(rng.index(2))});
     Timestamp stamp{1'700'000'000'123'456'789 + static_cast<std::int64_t>(rng.index(1'000'000'000))};
     Pose3 T = any_pose(rng, 50.0);
     const std::size_t first = graph.nodes.size();
@@ -110,13 +115,13 @@ inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t robots, std::size
       const double turn = rng.normal(0.1);
       T = T * Pose3{so3_exp({rng.normal(0.01), rng.normal(0.01), turn}), {rng.uniform(0.9, 1.2), 0.0, 0.0}};
       if (reduced && k > 0 && k + 1 < nodes_each && rng.bernoulli(0.5)) {
-        graph.eliminated.push_back({robot, stamp});
+        graph.eliminated.push_back({chain, stamp});
         continue;
       }
       const Matrix6d covariance = k == 0 ? Matrix6d::Zero() : odometry_covariance(rng.uniform(0.9, 1.2), turn);
-      graph.nodes.push_back({robot, stamp, T, covariance, static_cast<std::uint32_t>(rng.index(20))});
+      graph.nodes.push_back({chain, stamp, T, covariance, static_cast<std::uint32_t>(rng.index(20))});
     }
-    if (r % 2 == 0) graph.shapes.push_back(any_shape(rng, robot, graph.nodes.size() - first));
+    if (r % 2 == 0) graph.shapes.push_back(any_shape(rng, chain, graph.nodes.size() - first));
     if (!reduced) continue;
     for (std::size_t a = first; a < graph.nodes.size(); ++a)
       for (std::size_t b = a + 1; b < std::min(a + 5, graph.nodes.size()); ++b)
@@ -126,11 +131,12 @@ inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t robots, std::size
 }
 
 inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
-  ClosureVerdict verdict{.pair = {{RobotId{0}, static_cast<std::uint32_t>(rng.index(1000))},
-                                  {RobotId{1}, static_cast<std::uint32_t>(rng.index(1000))}}};
+  const ChainId one{RobotId{0}, any_session(rng)}, two{RobotId{1}, any_session(rng)};
+  ClosureVerdict verdict{
+      .pair = {{one, static_cast<std::uint32_t>(rng.index(1000))}, {two, static_cast<std::uint32_t>(rng.index(1000))}}};
   for (std::size_t i = 0; i < closures; ++i)
-    verdict.closures.push_back({{RobotId{0}, static_cast<std::uint32_t>(rng.index(1000))},
-                                {RobotId{1}, static_cast<std::uint32_t>(rng.index(1000))},
+    verdict.closures.push_back({{one, static_cast<std::uint32_t>(rng.index(1000))},
+                                {two, static_cast<std::uint32_t>(rng.index(1000))},
                                 {any_pose(rng, 5.0), any_covariance(rng)}});
   if (closures == 0) verdict.refusal = Refusal{RefusalReason::overlap, rng.uniform(0.0, 0.3), 0.3};
   verdict.finder_version = static_cast<std::uint32_t>(rng.index(3));

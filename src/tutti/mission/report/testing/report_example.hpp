@@ -175,7 +175,7 @@ inline ServerRecord example_server(const std::vector<RobotRecord>& robots, const
       const auto& [stamp, pose] = robot.server_estimate[k];
       server.nodes.push_back({{robot.id, k}, stamp});
       server.graph.poses.push_back(pose);
-      server.proxy.nodes.push_back({.robot = robot.id, .stamp = stamp, .T_world_body = pose});
+      server.proxy.nodes.push_back({.chain = robot.id, .stamp = stamp, .T_world_body = pose});
       if (k > 0) {
         const std::size_t to = server.graph.poses.size() - 1;
         server.graph.edges.push_back({to - 1, to, server.graph.poses[to - 1].inverse() * pose});
