@@ -74,7 +74,8 @@ struct MapConfig {
     v.field("judge_rotation", judge_rotation, any(),
             "Odometry that turns better than it says counts as much as the closures show (off: as it says).");
     v.field("most_closed_pairs", most_closed_pairs, at_least(1),
-            "A submap that closures tie to more others than this does not have them all judged (spare_pairs.hpp).");
+            "A submap that closures tie to more submaps of one robot than this does not have all judged "
+            "(spare_pairs.hpp).");
   }
 };
 

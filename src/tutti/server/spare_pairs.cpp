@@ -2,6 +2,7 @@
 #include "tutti/server/spare_pairs.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <map>
 #include <utility>
@@ -18,30 +19,40 @@ std::uint64_t place_in_line(const SubmapPair& pair) {
   return place;
 }
 
+/// The closures of one submap with one chain.
+using Line = std::pair<SubmapId, ChainId>;
+
+std::array<Line, 2> lines_of(const SubmapPair& pair) {
+  return {Line{pair.first, pair.second.chain}, Line{pair.second, pair.first.chain}};
+}
+
 }  // namespace
 
 std::set<SubmapPair> spare_pairs(const VerdictSet& verdicts, const SubmapSet& submaps, std::size_t most) {
   std::vector<std::pair<SubmapPair, std::uint64_t>> closed;
-  std::map<SubmapId, std::vector<std::uint64_t>> lines;
+  std::map<Line, std::vector<std::uint64_t>> lines;
   for (const auto& [pair, verdict] : verdicts) {
     if (verdict.closures.empty() || !submaps.contains(pair.first) || !submaps.contains(pair.second)) continue;
     closed.emplace_back(pair, place_in_line(pair));
-    for (const SubmapId& submap : {pair.first, pair.second}) lines[submap].push_back(closed.back().second);
+    for (const Line& line : lines_of(pair)) lines[line].push_back(closed.back().second);
   }
-  std::map<SubmapId, std::uint64_t> last;  // that is judged, of submaps with too many
-  for (auto& [submap, line] : lines) {
-    if (line.size() <= most) continue;
-    const auto nth = line.begin() + static_cast<std::ptrdiff_t>(most - 1);
-    std::ranges::nth_element(line, nth);
-    last[submap] = *nth;
+  std::map<Line, std::uint64_t> last;  // that is judged, where there are too many
+  for (auto& [line, places] : lines) {
+    if (places.size() <= most) continue;
+    const auto nth = places.begin() + static_cast<std::ptrdiff_t>(most - 1);
+    std::ranges::nth_element(places, nth);
+    last[line] = *nth;
   }
-  const auto is_behind = [&](SubmapId submap, std::uint64_t place) {
-    const auto end = last.find(submap);
+  const auto is_behind = [&](const Line& line, std::uint64_t place) {
+    const auto end = last.find(line);
     return end != last.end() && place > end->second;
   };
   std::set<SubmapPair> spare;
-  for (const auto& [pair, place] : closed)
-    if (is_behind(pair.first, place) && is_behind(pair.second, place)) spare.insert(pair);
+  for (const auto& [pair, place] : closed) {
+    const auto lines_of_pair = lines_of(pair);
+    if (std::ranges::all_of(lines_of_pair, [&](const Line& line) { return is_behind(line, place); }))
+      spare.insert(pair);
+  }
   return spare;
 }
 
