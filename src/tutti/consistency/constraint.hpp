@@ -55,7 +55,7 @@ struct ConstraintConfig {
 /// Standard deviation of a stretch with `support` closures, as a factor on the one the server sent: from `doubt` for a
 /// single closure down to `trust` for `full_support` of them and more, evenly in the logarithm; 1 without any. At 1 the
 /// server weighs no more than the robot's own odometry (of which its estimate is then made), at `trust` it overrules it
-/// (DESIGN.md, "Who is wrong?"); a lone closure moves the robot by 1 / (1 + doubt^2) of what it asks for.
+/// (docs/math.md, "Constraints"); a lone closure moves the robot by 1 / (1 + doubt^2) of what it asks for.
 double distrust(std::uint32_t support, const ConstraintConfig& config);
 
 /// Fewer closures than earn full trust stand behind it somewhere on the way.

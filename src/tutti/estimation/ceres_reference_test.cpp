@@ -160,7 +160,7 @@ void expect_same_as_ceres(const std::string& name) {
   EXPECT_LT(largest_position_difference(ours.poses, theirs.poses), 1e-2);
 }
 
-// Published optima (SE-Sync, GTSAM conventions; DESIGN.md section 3).
+// Published optima, in the conventions of SE-Sync and GTSAM (docs/results/speed.md).
 TEST(PublicSets, Sphere2500) {
   TUTTI_REQUIRE_SHARED("data/g2o/sphere2500.g2o");
   expect_known_optimum("sphere2500.g2o", 1351.36, 0.01);

@@ -34,7 +34,7 @@ bool operator==(const Pose3& a, const Pose3& b);
 /// T (+) xi = (R Exp(theta), t + R rho): moves a pose by xi = [rho; theta] expressed in its own (right) frame.
 Pose3 retract(const Pose3& T, const Vector6d& xi);
 /// xi with retract(T, xi) == other: [R^T (t_other - t); Log(R^T R_other)]. This is also the residual of a relative pose
-/// `local(T_meas, T_ij)` as g2o, GTSAM and SE-Sync files mean it (DESIGN: translation first).
+/// `local(T_meas, T_ij)` as g2o, GTSAM and SE-Sync files mean it (docs/math.md, "Geometry").
 Vector6d local(const Pose3& T, const Pose3& other);
 /// Adjoint in this tangent order: xi_a = Ad(T_a_b) xi_b. First-order rule for moving covariances:
 /// cov(T_a_c) ~ Ad(T_b_c^-1) cov(T_a_b) Ad^T + cov(T_b_c).

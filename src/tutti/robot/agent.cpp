@@ -99,7 +99,7 @@ std::vector<consistency::RobotNode> RobotAgent::nodes() const {
   return nodes;
 }
 
-// The method of the paper, one step a line (DESIGN 2, steps 4 to 7).
+// The method of the paper, one step a line (docs/math.md, "Comparison and constraints").
 UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget,
                                   const StageObserver& stage_ended) {
   UpdateSummary summary{.revision = message.graph.revision, .constraints = state_.ledger.size()};
