@@ -161,18 +161,19 @@ Status MapServer::receive(const SubmapMessage& message) {
   return {};
 }
 
+/// Every robot has its share of the sessions that a graph can hold, so that none can take the others'.
 Status MapServer::check_room_for(const ChainId& chain) const {
-  const auto after = [&](const ChainId& known) {
-    return state_.submaps.upper_bound({known, std::numeric_limits<std::uint32_t>::max()});
-  };
+  const std::size_t most = std::max<std::size_t>(1, ProxyGraph::kMostChains / robots_.size());
   std::size_t others = 0;
-  for (auto it = state_.submaps.begin(); it != state_.submaps.end(); it = after(it->first.chain)) {
+  auto it = state_.submaps.lower_bound({ChainId(chain.robot), 0});
+  while (it != state_.submaps.end() && it->first.chain.robot == chain.robot) {
     if (it->first.chain == chain) return {};
     ++others;
+    it = state_.submaps.upper_bound({it->first.chain, std::numeric_limits<std::uint32_t>::max()});
   }
-  if (others < ProxyGraph::kMostChains) return {};
-  return fail(ErrorCode::invalid, "robot {} begins session {}, but the map has {} sessions of all robots already",
-              chain.robot.value, chain.session, others);
+  if (others < most) return {};
+  return fail(ErrorCode::invalid, "robot {} begins session {}, but has {} in the map already, expected at most {}",
+              chain.robot.value, chain.session, others, most);
 }
 
 Status MapServer::replace_lost_cloud(const Submap& duplicate) {

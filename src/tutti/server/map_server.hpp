@@ -71,8 +71,9 @@ class MapServer {
             const ServerConfig& config, std::uint64_t epoch, MapServerState state);
 
   /// A submap, in any order, any number of times, of any session of a known robot. Unknown robots, malformed submaps
-  /// and sessions beyond ProxyGraph::kMostChains are refused; what is already mapped stays. So is one whose cloud the
-  /// store cannot keep; it may be sent again. One that comes again puts its cloud back if the store has lost it.
+  /// and sessions beyond a robot's share of ProxyGraph::kMostChains are refused; what is already mapped stays. So is
+  /// one whose cloud the store cannot keep; it may be sent again. One that comes again puts its cloud back if the store
+  /// has lost it.
   Status receive(const SubmapMessage& message);
   /// The answer to a job, in any order, any number of times. Closures join a keyframe of pair.first to one of
   /// pair.second, and the finder would ask for the pair; anything else is an error and changes nothing. Of two verdicts

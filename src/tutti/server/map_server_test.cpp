@@ -350,20 +350,24 @@ TEST(MapServer, ASubmapThatComesAgainReplacesItsLostCloud) {
   EXPECT_EQ(server.state().submaps.size(), messages.size());
 }
 
-TEST(MapServer, RefusesSessionsBeyondWhatAGraphCanHold) {
+TEST(MapServer, RefusesSessionsBeyondARobotsShare) {
   const auto finder = std::make_shared<const CloudReader>();  // nothing to verify
   MapServer server(kRobots, finder, some_store(), {}, 1);
   const Submap all = test::make_submaps(RobotId{0}, {}, Rng(1)).front();
   Submap one{.id = all.id, .keyframes = {all.keyframes.front()}};
-  for (std::uint64_t session = 0; session < ProxyGraph::kMostChains; ++session) {
+  const std::size_t most = ProxyGraph::kMostChains / kRobots.size();
+  for (std::uint64_t session = 0; session < most; ++session) {
     one.id.chain.session = 3 * session;
     ASSERT_TRUE(server.receive(message_of(one)).has_value()) << session;
   }
   one.id.chain.session = 1;
   const Status refused = server.receive(message_of(one));
   ASSERT_FALSE(refused.has_value());
-  EXPECT_NE(refused.error().message.find("begins session 1, but the map has 1000"), std::string::npos)
+  EXPECT_NE(refused.error().message.find(fmt::format("begins session 1, but has {} in the map", most)),
+            std::string::npos)
       << refused.error().message;
+  Submap others = test::make_submaps(RobotId{1}, {}, Rng(1)).front();
+  EXPECT_TRUE(server.receive(message_of(others)).has_value());
   one.id.chain.session = 3;
   ++one.id.index;
   EXPECT_TRUE(server.receive(message_of(one)).has_value());
