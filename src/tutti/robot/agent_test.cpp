@@ -3,61 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/geometry/alignment.hpp"
-#include "tutti/geometry/so3.hpp"
+#include "tutti/robot/testing/drifting_robot.hpp"
 
 namespace tutti::robot {
 namespace {
 
-const Matrix6d kStepCovariance = Vector6d(1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-4).asDiagonal();
-
-Timestamp at(int sample) { return Timestamp{1'700'000'000'000'000'000LL} + 0.5 * sample; }
-
-/// A loop of 40 m radius, half a metre a sample.
-Pose3 true_pose(double sample) {
-  const double angle = 0.0125 * sample;
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle + std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
-          {40.0 * std::cos(angle), 40.0 * std::sin(angle), 0.0}};
-}
-
-/// Odometry that turns 0.1 degrees too much per step.
-Trajectory drifting_odometry(int samples) {
-  const Pose3 bend{Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ())),
-                   Eigen::Vector3d::Zero()};
-  Trajectory out{{at(0), {}}};
-  for (int i = 1; i < samples; ++i)
-    out.push_back({at(i), out.back().pose * (true_pose(i - 1).inverse() * true_pose(i)) * bend});
-  return out;
-}
-
-void feed(RobotAgent& agent, const Trajectory& odometry) {
-  for (const StampedPose& sample : odometry)
-    ASSERT_TRUE(agent.add_odometry(sample.stamp, sample.pose, kStepCovariance).has_value());
-}
-
-/// The server's view of what the agent uploaded: the truth, in a frame of its own, and another robot.
-ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revision, const Pose3& T_world_true,
-                            const Matrix6d& covariance = Matrix6d::Identity() * 1e-6) {
-  ProxyGraphMessage message;
-  message.graph.revision = revision;
-  for (const Keyframe& k : agent.keyframes()) {
-    if (!k.representative) continue;
-    const double sample = (k.stamp - at(0)) / 0.5;
-    message.graph.nodes.push_back({.chain = agent.chain(),
-                                   .stamp = k.stamp,
-                                   .T_world_body = T_world_true * true_pose(sample),
-                                   .covariance = message.graph.nodes.empty() ? Matrix6d::Zero() : covariance,
-                                   .support = 5});
-  }
-  message.graph.nodes.push_back({.chain = RobotId{9}, .stamp = at(3), .T_world_body = T_world_true * true_pose(7)});
-  message.graph.components = {{agent.chain(), 0}, {RobotId{9}, 0}};
-  return message;
-}
-
-const Pose3 kWorld{Eigen::Quaterniond(Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized())), {100, -50, 7}};
+using namespace test;  // NOLINT: the robot and server of these tests
 
 class AgentPolicies : public testing::TestWithParam<const char*> {};
 
@@ -246,117 +199,6 @@ TEST(Agent, SynchronisesWithItsOwnSessionAndSeesTheOthersInTheirNewest) {
   ASSERT_EQ(agent.whereabouts().size(), 1U);
   EXPECT_EQ(agent.whereabouts()[0].robot, RobotId{9});
   EXPECT_EQ(agent.whereabouts()[0].stamp, at(2));
-}
-
-/// Raw odometry without drift; a server whose map turns by `yaw_rad` at node `at_node`, as closures would have it. All
-/// covariances are odometry's.
-ProxyGraphMessage bent_broadcast(const RobotAgent& agent, double yaw_rad, std::size_t at_node, std::uint32_t support) {
-  ProxyGraphMessage message = broadcast(agent, 1, kWorld);
-  auto& nodes = message.graph.nodes;
-  nodes.pop_back();  // the other robot
-  const Pose3 pivot = nodes[at_node].T_world_body;
-  const Pose3 turn = pivot * Pose3{so3_exp(Eigen::Vector3d(0, 0, yaw_rad)), Eigen::Vector3d::Zero()} * pivot.inverse();
-  for (std::size_t k = 1; k < nodes.size(); ++k) {
-    nodes[k].covariance = 2.0 * kStepCovariance;  // two samples a node
-    nodes[k].support = support;
-    if (k > at_node) nodes[k].T_world_body = turn * nodes[k].T_world_body;
-  }
-  return message;
-}
-
-/// The share of what the server asks for by which the robot's last pose moves, seen from its first.
-double obeyed(const std::string& policy, double yaw_rad, std::uint32_t support, const std::string& loss = "cauchy") {
-  AgentConfig config;
-  config.smoother.loss = loss;
-  config.policy.name = policy;
-  RobotAgent agent(RobotId{1}, 1, config, Rng(1));
-  Trajectory odometry;
-  for (int i = 0; i < 120; ++i) odometry.push_back({at(i), true_pose(0).inverse() * true_pose(i)});
-  feed(agent, odometry);
-  const ProxyGraphMessage message = bent_broadcast(agent, yaw_rad, 30, support);
-  const auto& nodes = message.graph.nodes;
-  const Pose3 asked = nodes.front().T_world_body.inverse() * nodes.back().T_world_body;
-  std::size_t last = 0;
-  for (std::size_t k = 0; k < agent.keyframes().size(); ++k)
-    if (agent.keyframes()[k].representative) last = k;
-  const Pose3 before = agent.corrected()[last].pose;
-  const auto summary = agent.receive(message, 1);
-  EXPECT_GT(summary.constraints, 0U);
-  const Eigen::Vector3d wanted = asked.translation - before.translation;
-  return (agent.corrected()[last].pose.translation - before.translation).dot(wanted) / wanted.squaredNorm();
-}
-
-// "Who is wrong?": odometry's sigma over the run is 0.11 rad, so one link over it is weighed, 1 / (1 + doubt^2) at
-// most. Over the two nodes about the bend, where `adaptive` puts it, odometry can bear 0.014 rad.
-TEST(Agent, ALoneClosureMovesItLittleAndThreeMoveItFully) {
-  for (const char* policy : {"uniform", "adaptive"}) {
-    EXPECT_LT(std::abs(obeyed(policy, 0.3, 1)), 0.2) << policy;
-    EXPECT_NEAR(obeyed(policy, 0.3, 3), 1.0, 0.03) << policy;
-  }
-  EXPECT_GT(obeyed("uniform", 0.3, 1), 0.05);
-  EXPECT_GT(obeyed("uniform", 0.3, 2), obeyed("uniform", 0.3, 1) + 0.2);
-}
-
-// The robust loss is for the doubtful only: a large demand of a lone closure is let go, that of three is met.
-TEST(Agent, OnlyDoubtfulLinksHaveARobustLoss) {
-  for (const char* policy : {"uniform", "adaptive"}) {
-    EXPECT_LT(obeyed(policy, 1.5, 1, "cauchy"), 0.7 * obeyed(policy, 1.5, 1, "none")) << policy;
-    EXPECT_EQ(obeyed(policy, 1.5, 3, "cauchy"), obeyed(policy, 1.5, 3, "none")) << policy;
-  }
-}
-
-// 20 degrees in one sample: taken back there, and said so.
-TEST(Agent, TakesBackAJumpWhereItWas) {
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
-  Trajectory odometry{{at(0), {}}};
-  const Pose3 slip{so3_exp(Eigen::Vector3d(0, 0, 0.35)), Eigen::Vector3d::Zero()};
-  for (int i = 1; i < 120; ++i)
-    odometry.push_back(
-        {at(i), odometry.back().pose * (true_pose(i - 1).inverse() * true_pose(i)) * (i == 61 ? slip : Pose3{})});
-  feed(agent, odometry);
-  EXPECT_TRUE(agent.repaired_jumps().empty());
-  agent.receive(broadcast(agent, 1, kWorld));
-  ASSERT_EQ(agent.repaired_jumps().size(), 1U);
-  const RepairedJump jump = agent.repaired_jumps()[0];
-  EXPECT_LE(jump.from, at(60));
-  EXPECT_GE(jump.until, at(61));
-  EXPECT_LE(jump.until - jump.from, 1.0);
-  EXPECT_NEAR(jump.rotation_rad, 0.35, 0.01);
-  EXPECT_EQ(RobotAgent(RobotId{1}, {}, Rng(1), agent.state()).repaired_jumps().size(), 1U);
-  for (const StampedPose& pose : agent.corrected()) {
-    const int sample = static_cast<int>(std::lround((pose.stamp - at(0)) / 0.5));
-    EXPECT_LT((pose.pose.translation - (true_pose(0).inverse() * true_pose(sample)).translation).norm(), 0.05);
-  }
-}
-
-/// As drifting_odometry(), in steps of a tenth: half a metre in ten samples.
-Trajectory fine_odometry(int samples) {
-  const Trajectory coarse = drifting_odometry(samples);
-  Trajectory out;
-  for (int i = 0; i < 10 * (samples - 1); ++i) {
-    const Pose3 step = coarse[i / 10].pose.inverse() * coarse[i / 10 + 1].pose;
-    out.push_back(
-        {at(i / 10) + 0.05 * (i % 10), coarse[i / 10].pose * retract(Pose3{}, 0.1 * (i % 10) * local(Pose3{}, step))});
-  }
-  return out;
-}
-
-// The step that jumped ends at a keyframe, which a jump makes at once, so it is a short one.
-TEST(Agent, TakesBackAJumpWithinAStepFromKeyframeToKeyframe) {
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
-  const Pose3 slip{so3_exp(Eigen::Vector3d(0, 0, 0.35)), Eigen::Vector3d::Zero()};
-  Trajectory odometry = fine_odometry(120);
-  for (std::size_t i = 605; i < odometry.size(); ++i) {
-    const Pose3 seen_from = odometry[604].pose;
-    odometry[i].pose = seen_from * slip * seen_from.inverse() * odometry[i].pose;
-  }
-  feed(agent, odometry);
-  agent.receive(broadcast(agent, 1, kWorld));
-  ASSERT_EQ(agent.repaired_jumps().size(), 1U);
-  const RepairedJump jump = agent.repaired_jumps()[0];
-  EXPECT_EQ(jump.until, odometry[605].stamp);
-  EXPECT_LT(jump.until - jump.from, 0.31);  // keyframes are 0.3 m apart, at 1 m/s
-  EXPECT_NEAR(jump.rotation_rad, 0.35, 0.01);
 }
 
 // 300 MB an hour otherwise, at 200 Hz.
