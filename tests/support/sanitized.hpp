@@ -7,7 +7,8 @@
 
 namespace tutti {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+/// What the tests link was built with a sanitizer; their own files need not be (cmake/TuttiTargets.cmake).
+#ifdef TUTTI_SANITIZED
 inline constexpr bool kSanitized = true;
 #else
 inline constexpr bool kSanitized = false;
