@@ -51,6 +51,7 @@ def main():
         "robot follows. Where there is no reference, the figure is the RMSE to the server. Which part of the input is real",
         "is said in each line. `uniform`, `random` and `euclidean` have the budget of `spectral`. `tunnel` and `terrace` are in",
         f"`paper.md`. Every run: `--set {compare(*COMPETITORS)}`.", "",
+        "Terms are not equal yet: competitors' links are five times softer than the default's (`docs/limits.md`).", "",
     ]
     options = ["--seed", arguments.seed, "--set", compare(*COMPETITORS)]
     text += section(report_of(arguments.tutti, "demo", *options))

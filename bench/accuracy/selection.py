@@ -15,7 +15,6 @@ program.
 """
 import argparse
 import math
-import os
 import pathlib
 import tempfile
 
@@ -208,7 +207,6 @@ def main():
     parser.add_argument("--keep", metavar="FOLDER")
     parser.add_argument("--out", metavar="FOLDER", default=SOURCE / "out" / "selection", help="for the details")
     arguments = parser.parse_args()
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with tempfile.TemporaryDirectory() as scratch:
         runs = Runs(arguments, arguments.keep or scratch)
         results = runs.all()
