@@ -179,7 +179,7 @@ def introduction(runs):
             "map. RMSE is ATE",
             "after one rigid alignment without scale. RPE: of the translation, root mean square. Kink: the most that the "
             "correction changes",
-            "any motion over 1 s of the raw odometry, but for jumps taken back. A policy takes part at a budget when no "
+            "any motion over 1 s of the raw odometry. A policy takes part at a budget when no "
             "seed of it holds more.", "",
             "**Terms are not equal.** The default's links are five times stiffer than the competitors' where few closures "
             "support them",

@@ -241,7 +241,7 @@ void print_curves(const Task& task) {
         line["origins"] = origins_json(summary.explanation.origins, start);
         if (const auto agreement = evaluation::agreement(agent.corrected(), mapped))
           line["agreement_m"] = agreement->rmse_m;
-        if (const auto kink = evaluation::kink(keyframe_odometry(raw), agent.corrected(), agent.repaired_jumps()))
+        if (const auto kink = evaluation::kink(keyframe_odometry(raw), agent.corrected()))
           line["kink_m"] = kink->translation_m;
         std::printf("%s\n", line.dump().c_str());
       }

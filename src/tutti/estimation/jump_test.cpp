@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-#include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/estimation/testing/random_graphs.hpp"
 #include "tutti/geometry/so3.hpp"
 
@@ -154,105 +153,6 @@ TEST(FindJump, AtTheEndsOfTheChainAndInShortOnes) {
     walk.slip(0, turn(15.0));
     EXPECT_FALSE(find_jump(walk.odometry, 0, steps, walk.seen(0, steps)).has_value());
   }
-}
-
-class Repaired : public ::testing::Test {
- protected:
-  Repaired() { walk_.slip(130, turn(20.0)); }
-  [[nodiscard]] OnboardSmoother smoother(const OnboardSmootherConfig& config = {}) const {
-    OnboardSmoother out(config);
-    for (const RelativePose& step : walk_.odometry) out.append(step);
-    return out;
-  }
-  [[nodiscard]] ChainConstraint link(std::size_t a, std::size_t b) const {
-    const Matrix6d covariance = 1e-8 * Matrix6d::Identity();
-    return {a, b, {walk_.between(a, b), covariance}};
-  }
-  Rng rng_{5};
-  Walk walk_{rng_, 400};
-};
-
-// Spread over the link, the turn would leave inner poses 0.3 m off.
-TEST_F(Repaired, TheCorrectionGoesWhereItBelongs) {
-  for (const int polishing : {0, 1}) {
-    auto repaired = smoother({.polishing_steps = polishing});
-    repaired.set_constraints({link(20, 220)});
-    ASSERT_TRUE(is_usable(repaired.solve().termination));
-    ASSERT_EQ(repaired.state().jumps.size(), 1U);
-    EXPECT_EQ(repaired.state().jumps[0].step, 130U);
-    EXPECT_EQ(repaired.state().jumps[0].motion, walk_.odometry[130]);  // what odometry said
-    for (std::size_t k = 20; k <= 220; ++k)
-      EXPECT_LT((repaired.pose(k).translation - (repaired.pose(20) * walk_.between(20, k)).translation).norm(), 0.04)
-          << k;
-    EXPECT_LT(local(walk_.between(20, 220), repaired.pose(20).inverse() * repaired.pose(220)).norm(), 1e-3);
-  }
-}
-
-TEST_F(Repaired, IsTakenBackWithTheLink) {
-  auto changed = smoother();
-  const std::vector<Pose3> raw = changed.poses();
-  changed.set_constraints({link(20, 220)});
-  changed.solve();
-  changed.set_constraints({link(230, 300)});
-  changed.solve();
-  EXPECT_TRUE(changed.state().jumps.empty());
-  EXPECT_EQ(changed.state().odometry, walk_.odometry);
-  auto fresh = smoother();
-  fresh.set_constraints({link(230, 300)});
-  fresh.solve();
-  EXPECT_LT(largest_position_difference(changed.poses(), fresh.poses()), 1e-4);
-  EXPECT_LT(largest_position_difference({raw.begin(), raw.begin() + 230},
-                                        {fresh.poses().begin(), fresh.poses().begin() + 230}),
-            1e-9);
-}
-
-// Restored, or after other links came and went: the same.
-TEST_F(Repaired, HistoryDoesNotShow) {
-  auto lived = smoother();
-  for (const auto& links : std::vector<std::vector<ChainConstraint>>{{link(100, 140)},
-                                                                     {link(10, 300), link(300, 390)},
-                                                                     {link(10, 120), link(120, 390)},
-                                                                     {link(20, 125), link(125, 220), link(220, 350)}}) {
-    lived.set_constraints(links);
-    ASSERT_TRUE(is_usable(lived.solve().termination));
-    EXPECT_EQ(lived.state().jumps.size(), 1U);
-  }
-  auto fresh = smoother();
-  fresh.set_constraints(lived.state().constraints);
-  fresh.solve();
-  EXPECT_EQ(fresh.state(), lived.state());
-  EXPECT_LT(largest_position_difference(fresh.poses(), lived.poses()), 1e-4);
-  OnboardSmoother restored({}, lived.state());
-  restored.solve();
-  EXPECT_EQ(restored.state(), lived.state());
-  EXPECT_LT(largest_position_difference(restored.poses(), lived.poses()), 1e-4);
-}
-
-TEST_F(Repaired, NotUnlessAskedFor) {
-  auto sharing = smoother({.repair_jumps = false});
-  sharing.set_constraints({link(20, 220)});
-  sharing.solve();
-  EXPECT_TRUE(sharing.state().jumps.empty());
-  EXPECT_EQ(sharing.state().odometry, walk_.odometry);
-}
-
-// A doubtful link convicts nobody, and one that spans several runs does not say which.
-TEST_F(Repaired, OnlyByALinkThatKnows) {
-  auto doubting = smoother();
-  ChainConstraint doubtful = link(20, 220);
-  doubtful.doubtful = true;
-  doubting.set_constraints({doubtful});
-  doubting.solve();
-  EXPECT_TRUE(doubting.state().jumps.empty());
-  auto several = smoother();
-  several.set_constraints({link(20, 220), link(60, 300)});
-  several.solve();
-  EXPECT_TRUE(several.state().jumps.empty());
-  auto backwards = smoother();
-  const ChainConstraint forwards = link(20, 220);
-  backwards.set_constraints({{220, 20, inverse(forwards.measurement)}});
-  backwards.solve();
-  EXPECT_EQ(backwards.state().jumps.size(), 1U);
 }
 
 }  // namespace

@@ -50,9 +50,7 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
     : OnboardSmoother(config, state.first) {
   state_.odometry.reserve(state.odometry.size());
   poses_.reserve(state.odometry.size() + 1);
-  for (std::size_t k = 0; k < state.odometry.size(); ++k)
-    append(state.odometry[k], state.duration_s.empty() ? 1.0 : state.duration_s[k]);
-  state_.jumps = std::move(state.jumps);
+  for (const RelativePose& step : state.odometry) append(step);
   set_constraints(std::move(state.constraints));
 }
 
@@ -62,9 +60,8 @@ OnboardSmoother& OnboardSmoother::operator=(OnboardSmoother&&) noexcept = defaul
 
 std::size_t OnboardSmoother::stored_runs() const { return runs_->all().size(); }
 
-std::size_t OnboardSmoother::append(const RelativePose& odometry, double duration_s) {
+std::size_t OnboardSmoother::append(const RelativePose& odometry) {
   state_.odometry.push_back(odometry);
-  state_.duration_s.push_back(duration_s);
   poses_.push_back(poses_.back() * odometry.T_a_b);
   return poses_.size() - 1;
 }
@@ -87,7 +84,6 @@ SmootherSummary OnboardSmoother::solve() {
   SmootherSummary summary;
   auto nodes = internal::reduced_nodes(state_.constraints);
   summary.compounded_steps = runs_->update(nodes, state_.odometry);
-  if (judge_jumps(nodes)) summary.compounded_steps += runs_->update(nodes, state_.odometry);
   summary.analysed = problem_->update(std::move(nodes), runs_->all(), state_.constraints, state_.first);
   summary.reduced_nodes = problem_->graph().poses.size();
   summary.reduced_edges = problem_->graph().edges.size();
@@ -105,33 +101,6 @@ SmootherSummary OnboardSmoother::solve() {
   summary.loss_applied = result.loss_applied;
   if (is_usable(summary.termination)) place(reduced, result.loss_applied, summary);
   return summary;
-}
-
-/// A function of the constraints and of what odometry said, so that no history shows. True: some steps changed.
-bool OnboardSmoother::judge_jumps(std::span<const std::size_t> nodes) {
-  for (OdometryJump& jump : state_.jumps) std::swap(state_.odometry[jump.step], jump.motion);
-  const std::vector<OdometryJump> believed = std::exchange(state_.jumps, {});
-  for (const ChainConstraint& c : state_.constraints) {
-    const auto [begin, end] = std::minmax(c.from, c.to);
-    const auto node = std::ranges::lower_bound(nodes, begin);
-    if (!config_.repair_jumps || c.doubtful || begin == end || *(node + 1) != end) continue;
-    const RelativePose begin_end = c.from < c.to ? c.measurement : inverse(c.measurement);
-    const auto inside = std::ranges::lower_bound(believed, begin, {}, &OdometryJump::step);
-    const bool was_repaired = inside != believed.end() && inside->step < end;  // then the run is not odometry's
-    const internal::OdometryRun& run = runs_->all()[static_cast<std::size_t>(node - nodes.begin())];
-    if (!was_repaired && !internal::is_implausible(run, begin_end.T_a_b)) continue;
-    const auto jump = find_jump(state_.odometry, begin, end, begin_end, state_.duration_s);
-    if (jump && std::ranges::find(state_.jumps, jump->step, &OdometryJump::step) == state_.jumps.end())
-      state_.jumps.push_back(*jump);
-  }
-  std::ranges::sort(state_.jumps, {}, &OdometryJump::step);
-  const bool changed = state_.jumps != believed;
-  if (changed) {
-    for (const OdometryJump& jump : believed) runs_->forget(jump.step);
-    for (const OdometryJump& jump : state_.jumps) runs_->forget(jump.step);
-  }
-  for (OdometryJump& jump : state_.jumps) std::swap(state_.odometry[jump.step], jump.motion);
-  return changed;
 }
 
 /// From the last poses, or, when these are far off or lead nowhere, from raw odometry.

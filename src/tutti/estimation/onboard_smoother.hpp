@@ -3,12 +3,10 @@
 
 #include <cstddef>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "tutti/base/config.hpp"
-#include "tutti/estimation/jump.hpp"
 #include "tutti/estimation/termination.hpp"
 #include "tutti/model/relative_pose.hpp"
 
@@ -28,7 +26,6 @@ struct OnboardSmootherConfig {
   std::string loss = "cauchy";
   double loss_scale = 3.0;
   int polishing_steps = 0;
-  bool repair_jumps = true;
 
   template <class V>
   void describe(V& v) {
@@ -40,8 +37,6 @@ struct OnboardSmootherConfig {
     v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
     v.field("polishing_steps", polishing_steps, between(0, 10),
             "Gauss-Newton steps on the full graph after the reduced one, at most; none that raises its cost.");
-    v.field("repair_jumps", repair_jumps, any(),
-            "Correct a step of odometry that jumped where it is, instead of sharing the correction out.");
   }
 };
 
@@ -73,10 +68,8 @@ struct SmootherSummary {
 /// All that determines the estimate; enough to restore the smoother.
 struct SmootherState {
   Pose3 first;
-  std::vector<RelativePose> odometry;  ///< As believed.
+  std::vector<RelativePose> odometry;
   std::vector<ChainConstraint> constraints;
-  std::vector<OdometryJump> jumps;  ///< Steps where odometry said something else, and what; in order.
-  std::vector<double> duration_s;   ///< Of every step; empty when all took the same.
   friend bool operator==(const SmootherState&, const SmootherState&) = default;
 };
 
@@ -86,9 +79,6 @@ struct SmootherState {
 /// with fixed ends); what comes after the last constrained node is composed. A polishing step does the same about the
 /// current poses instead of the raw odometry, which makes it a Gauss-Newton step on the full graph; it is taken only
 /// when the full graph's cost does not rise. docs/math.md derives it.
-///
-/// Where a constraint that is not doubtful spans just one run and odometry jumped in it (find_jump()), the jump is not
-/// believed: the correction goes where it belongs and bends nothing else. Setting `repair_jumps`.
 ///
 /// Only doubtful constraints have a robust loss; the others hold, whatever their residual. A solve starts from the last
 /// one's poses and keeps what did not change: compounds, sparsity, the shape of runs. The estimate is still a function
@@ -103,9 +93,8 @@ class OnboardSmoother {
   OnboardSmoother& operator=(OnboardSmoother&&) noexcept;
 
   /// Adds a node by odometry from the last one and returns its position; its pose is composed until solve().
-  /// Its covariance must be positive definite. `duration_s`: what the step took, in any unit common to all; jumps are
-  /// told by it.
-  std::size_t append(const RelativePose& odometry, double duration_s = 1.0);
+  /// Its covariance must be positive definite.
+  std::size_t append(const RelativePose& odometry);
   /// Nodes: one more than odometry steps.
   [[nodiscard]] std::size_t size() const { return poses_.size(); }
   /// The full current set, replacing the previous one; nodes must exist. from == to is ignored.
@@ -124,7 +113,6 @@ class OnboardSmoother {
   [[nodiscard]] std::size_t stored_runs() const;
 
  private:
-  bool judge_jumps(std::span<const std::size_t> nodes);
   internal::DoubtingSummary minimise(std::vector<Pose3>& reduced);
   bool polish(const internal::EdgeCosts& costs);
   void place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary);

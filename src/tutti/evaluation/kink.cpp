@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/evaluation/kink.hpp"
 
-#include <algorithm>
-
 #include "tutti/base/check.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -29,23 +27,17 @@ void include(const PosePair& i, const PosePair& j, Kink& largest) {
 
 }  // namespace
 
-std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, std::span<const RepairedJump> jumps,
-                         double delta_s) {
+std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, double delta_s) {
   TUTTI_CHECK(delta_s > 0.0, "delta_s = {}", delta_s);
   const auto pairs = associate(corrected, raw, {.interpolate = false, .max_difference_s = 0.0});
   if (pairs.size() < 2) return std::nullopt;
   Kink largest{.translation_at = pairs.front().stamp, .rotation_at = pairs.front().stamp};
-  const auto consider = [&](const PosePair& i, const PosePair& j) {
-    const bool jumps_between = std::ranges::any_of(
-        jumps, [&](const RepairedJump& jump) { return i.stamp < jump.until && jump.from < j.stamp; });
-    if (!jumps_between) include(i, j, largest);
-  };
   std::size_t later = 0;
   for (std::size_t i = 0; i + 1 < pairs.size(); ++i) {
-    consider(pairs[i], pairs[i + 1]);
+    include(pairs[i], pairs[i + 1], largest);
     while (later < pairs.size() && pairs[later].stamp - pairs[i].stamp < delta_s) ++later;
     if (later < pairs.size() && pairs[later].stamp - pairs[i].stamp <= (1.0 + kMaxOvershoot) * delta_s)
-      consider(pairs[i], pairs[later]);
+      include(pairs[i], pairs[later], largest);
   }
   return largest;
 }

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <optional>
-#include <span>
 
-#include "tutti/model/repaired_jump.hpp"
 #include "tutti/model/trajectory.hpp"
 
 namespace tutti::evaluation {
@@ -12,8 +10,7 @@ namespace tutti::evaluation {
 /// The most that a correction changes short motions by, over pairs i, j of poses: j is the next pose after i, and the
 /// first at least `delta_s` later (left out where that overshoots by more than half, a gap). With R the raw and C the
 /// corrected estimate, R_ij = R_i^-1 R_j and C_ij likewise: |t(C_ij) - t(R_ij)| and the angle of rot(R_ij)^T rot(C_ij).
-/// No reference is in it: a good correction bends odometry gently, whatever it bends it to; but for motions over a jump
-/// that it repairs, which are left out.
+/// No reference is in it: a good correction bends odometry gently, whatever it bends it to.
 struct Kink {
   double translation_m = 0.0;
   double rotation_deg = 0.0;
@@ -22,7 +19,6 @@ struct Kink {
 };
 
 /// Poses pair up where their stamps are equal; delta_s > 0. Nothing with fewer than two common poses.
-std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, std::span<const RepairedJump> jumps = {},
-                         double delta_s = 1.0);
+std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, double delta_s = 1.0);
 
 }  // namespace tutti::evaluation

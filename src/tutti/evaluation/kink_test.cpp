@@ -39,7 +39,7 @@ TEST(Kink, ABendThatIsSpreadOutIsSmall) {
   Trajectory corrected = raw;  // 1 m sideways over 50 s
   for (std::size_t i = 0; i < corrected.size(); ++i) corrected[i].pose.translation.y() = 0.01 * static_cast<double>(i);
   EXPECT_NEAR(kink(raw, corrected)->translation_m, 0.02, 1e-12);  // two steps of 0.5 s
-  EXPECT_NEAR(kink(raw, corrected, {}, 5.0)->translation_m, 0.1, 1e-12);
+  EXPECT_NEAR(kink(raw, corrected, 5.0)->translation_m, 0.1, 1e-12);
 }
 
 TEST(Kink, NeighboursCountEvenWhereNoPairIsASecondApart) {
@@ -52,15 +52,6 @@ TEST(Kink, NeighboursCountEvenWhereNoPairIsASecondApart) {
   EXPECT_EQ(found->rotation_at, raw[2].stamp);
   // Seen from the turned pose, the next one is 2 m away in another direction.
   EXPECT_NEAR(found->translation_m, 4.0 * std::sin(0.05), 1e-9);
-}
-
-TEST(Kink, ARepairedJumpIsNoKink) {
-  const Trajectory raw = line(20, 0.5);
-  Trajectory corrected = moved_from(raw, 12, {Eigen::Quaterniond::Identity(), {0, 0.3, 0}});
-  const std::vector<RepairedJump> jumps{{raw[11].stamp, raw[12].stamp, 0.3, 0.0}};
-  EXPECT_NEAR(kink(raw, corrected, jumps)->translation_m, 0.0, 1e-12);
-  corrected = moved_from(corrected, 13, {Eigen::Quaterniond::Identity(), {0, 0, 0.2}});  // just beside it
-  EXPECT_NEAR(kink(raw, corrected, jumps)->translation_m, 0.2, 1e-12);
 }
 
 TEST(Kink, NeedsTwoCommonPoses) {

@@ -125,9 +125,6 @@ void correct(const std::vector<consistency::RobotNode>& nodes, TrajectoryCompari
   smoother.solve();
   out.corrected.clear();
   for (std::size_t i = 0; i < nodes.size(); ++i) out.corrected.push_back({nodes[i].stamp, smoother.pose(i)});
-  for (const auto& [step, said] : smoother.state().jumps)
-    out.jumps.push_back(repaired_jump(nodes[step].stamp, nodes[step + 1].stamp, said.T_a_b,
-                                      smoother.pose(step).inverse() * smoother.pose(step + 1)));
 }
 
 evaluation::AteResult lay_on(const Trajectory& judge, Trajectory& trajectory) {
@@ -189,7 +186,7 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
 
   out.corrected = out.judged;
   if (!out.constraints.empty()) correct(robot, out);
-  if (const auto kink = evaluation::kink(out.judged, out.corrected, out.jumps)) out.kink = *kink;
+  if (const auto kink = evaluation::kink(out.judged, out.corrected)) out.kink = *kink;
   out.before = lay_on(out.judge, out.judged);
   out.after = lay_on(out.judge, out.corrected);
   return out;

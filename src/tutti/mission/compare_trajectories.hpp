@@ -51,8 +51,7 @@ struct TrajectoryComparison {
   std::vector<consistency::Constraint> constraints;  ///< Relative poses of A that would fix B; the policy `adaptive`'s.
   evaluation::AteResult before;                      ///< B's nodes against A's.
   evaluation::AteResult after;                       ///< `corrected` against A's.
-  std::vector<RepairedJump> jumps;                   ///< Where correcting takes back what B jumped by.
-  evaluation::Kink kink;                             ///< What it does to B's nodes elsewhere.
+  evaluation::Kink kink;                             ///< What correcting does to B's short motions.
 };
 
 /// Fails when fewer than two poses of B have one of A at their time, or a covariance is not positive definite.

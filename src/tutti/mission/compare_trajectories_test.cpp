@@ -71,11 +71,6 @@ TEST(CompareTrajectories, FindsAFailureWhereItIsAndFixesIt) {
   EXPECT_LE(c->constraints.size(), 6U);
   EXPECT_GT(c->before.rmse_m, 1.0);
   EXPECT_LT(c->after.rmse_m, 0.05);
-  ASSERT_EQ(c->jumps.size(), 1U);  // and takes it back in the very step
-  EXPECT_LE(seconds_after_start(truth, c->jumps[0].from), 69.9);
-  EXPECT_GE(seconds_after_start(truth, c->jumps[0].until), 70.0);
-  EXPECT_NEAR(c->jumps[0].rotation_rad, 0.3, 0.02);
-  EXPECT_LT(c->kink.translation_m, 0.02);
   for (std::size_t i = 0; i < c->judge.size(); ++i) EXPECT_EQ(c->judge[i].stamp, c->judged[i].stamp);
 }
 

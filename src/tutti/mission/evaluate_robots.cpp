@@ -70,8 +70,7 @@ PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& age
   PolicyRecord out{.name = name, .corrected = agent.corrected()};
   out.accuracy = accuracy_of(out.corrected, scoring);
   if (const auto agreement = evaluation::agreement(out.corrected, server)) out.agreement_rmse_m = agreement->rmse_m;
-  out.jumps = agent.repaired_jumps();
-  out.kink = evaluation::kink(raw, out.corrected, out.jumps);
+  out.kink = evaluation::kink(raw, out.corrected);
   out.constraints_added = agent.ledger().size();
   for (const consistency::Constraint& c : agent.ledger().constraints())
     out.constraints.push_back({c.from_stamp, c.to_stamp, c.kind});

@@ -20,7 +20,6 @@
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/model/refusal.hpp"
-#include "tutti/model/repaired_jump.hpp"
 #include "tutti/model/trajectory.hpp"
 
 /// Everything a finished mission knows, as plain values: filled by the mission, read by the report writers. What could
@@ -56,8 +55,7 @@ struct PolicyRecord {
   Accuracy accuracy;
   /// ATE of the corrected estimate with the server's as the reference; scored on RobotRecord::mapped_share of the way.
   std::optional<double> agreement_rmse_m;
-  std::vector<RepairedJump> jumps;       ///< Where the correction takes back what odometry jumped by.
-  std::optional<evaluation::Kink> kink;  ///< What it does to other short motions of the raw odometry.
+  std::optional<evaluation::Kink> kink;  ///< What it does to short motions of the raw odometry.
   std::size_t constraints_added = 0;     ///< Held at the end of the mission.
   Trajectory corrected;                  ///< T_map_body at keyframes.
   std::vector<ConstraintRecord> constraints;

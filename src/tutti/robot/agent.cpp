@@ -65,7 +65,7 @@ void RobotAgent::add_keyframe(const KeyframeStep& step, std::uint32_t submap) {
   if (state_.keyframes.empty()) {
     smoother_.set_first_pose(step.keyframe.T_odom_body);
   } else {
-    smoother_.append(step.odometry, step.keyframe.stamp - state_.keyframes.back().stamp);
+    smoother_.append(step.odometry);
     state_.since_node = compound(state_.since_node, step.odometry);
   }
   state_.keyframes.push_back(step.keyframe);
@@ -212,14 +212,6 @@ Trajectory RobotAgent::corrected() const {
   Trajectory out;
   for (std::size_t k = 0; k < state_.keyframes.size(); ++k)
     out.push_back({state_.keyframes[k].stamp, smoother_.pose(k)});
-  return out;
-}
-
-std::vector<RepairedJump> RobotAgent::repaired_jumps() const {
-  std::vector<RepairedJump> out;
-  for (const auto& [step, said] : smoother_.state().jumps)
-    out.push_back(repaired_jump(state_.keyframes[step].stamp, state_.keyframes[step + 1].stamp, said.T_a_b,
-                                smoother_.pose(step).inverse() * smoother_.pose(step + 1)));
   return out;
 }
 

@@ -16,7 +16,6 @@
 #include "tutti/consistency/robot_node.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/model/messages.hpp"
-#include "tutti/model/repaired_jump.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/robot/submap_builder.hpp"
 
@@ -140,8 +139,6 @@ class RobotAgent {
   [[nodiscard]] const Pose3& T_map_odom() const { return state_.T_map_odom; }
   /// The corrected pose at the newest odometry sample: T_map_odom * T_odom_body. It jumps when receive() corrects.
   [[nodiscard]] Pose3 T_map_body() const { return state_.T_map_odom * state_.T_odom_body; }
-  /// Where `corrected()` takes back what odometry jumped by, between neighbouring keyframes.
-  [[nodiscard]] std::vector<RepairedJump> repaired_jumps() const;
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:

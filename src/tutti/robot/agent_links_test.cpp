@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How far links of little support move a robot, and what is made of odometry that jumps.
+// How far links of little support move a robot.
 #include <gtest/gtest.h>
-
-#include <cmath>
 
 #include "tutti/geometry/so3.hpp"
 #include "tutti/robot/agent.hpp"
@@ -68,48 +66,6 @@ TEST(Agent, OnlyDoubtfulLinksHaveARobustLoss) {
     EXPECT_LT(obeyed(policy, 1.5, 1, "cauchy"), 0.7 * obeyed(policy, 1.5, 1, "none")) << policy;
     EXPECT_EQ(obeyed(policy, 1.5, 3, "cauchy"), obeyed(policy, 1.5, 3, "none")) << policy;
   }
-}
-
-// 20 degrees in one sample: taken back there, and said so.
-TEST(Agent, TakesBackAJumpWhereItWas) {
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
-  Trajectory odometry{{at(0), {}}};
-  const Pose3 slip{so3_exp(Eigen::Vector3d(0, 0, 0.35)), Eigen::Vector3d::Zero()};
-  for (int i = 1; i < 120; ++i)
-    odometry.push_back(
-        {at(i), odometry.back().pose * (true_pose(i - 1).inverse() * true_pose(i)) * (i == 61 ? slip : Pose3{})});
-  feed(agent, odometry);
-  EXPECT_TRUE(agent.repaired_jumps().empty());
-  agent.receive(broadcast(agent, 1, kWorld));
-  ASSERT_EQ(agent.repaired_jumps().size(), 1U);
-  const RepairedJump jump = agent.repaired_jumps()[0];
-  EXPECT_LE(jump.from, at(60));
-  EXPECT_GE(jump.until, at(61));
-  EXPECT_LE(jump.until - jump.from, 1.0);
-  EXPECT_NEAR(jump.rotation_rad, 0.35, 0.01);
-  EXPECT_EQ(RobotAgent(RobotId{1}, {}, Rng(1), agent.state()).repaired_jumps().size(), 1U);
-  for (const StampedPose& pose : agent.corrected()) {
-    const int sample = static_cast<int>(std::lround((pose.stamp - at(0)) / 0.5));
-    EXPECT_LT((pose.pose.translation - (true_pose(0).inverse() * true_pose(sample)).translation).norm(), 0.05);
-  }
-}
-
-// The step that jumped ends at a keyframe, which a jump makes at once, so it is a short one.
-TEST(Agent, TakesBackAJumpWithinAStepFromKeyframeToKeyframe) {
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
-  const Pose3 slip{so3_exp(Eigen::Vector3d(0, 0, 0.35)), Eigen::Vector3d::Zero()};
-  Trajectory odometry = fine_odometry(120);
-  for (std::size_t i = 605; i < odometry.size(); ++i) {
-    const Pose3 seen_from = odometry[604].pose;
-    odometry[i].pose = seen_from * slip * seen_from.inverse() * odometry[i].pose;
-  }
-  feed(agent, odometry);
-  agent.receive(broadcast(agent, 1, kWorld));
-  ASSERT_EQ(agent.repaired_jumps().size(), 1U);
-  const RepairedJump jump = agent.repaired_jumps()[0];
-  EXPECT_EQ(jump.until, odometry[605].stamp);
-  EXPECT_LT(jump.until - jump.from, 0.31);  // keyframes are 0.3 m apart, at 1 m/s
-  EXPECT_NEAR(jump.rotation_rad, 0.35, 0.01);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace {
 
 /// The robot's raw chain as a smoother; each run of odometry is compounded once, however often the joints change.
 estimation::OnboardSmoother make_smoother(const TimeChain& chain) {
-  estimation::OnboardSmoother smoother({.repair_jumps = false});
+  estimation::OnboardSmoother smoother;
   for (std::size_t k = 1; k < chain.odometry.size(); ++k) smoother.append(chain.odometry[k]);
   return smoother;
 }

@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 
 #include "tutti/estimation/internal/chain_run.hpp"
-#include "tutti/estimation/jump.hpp"
 #include "tutti/model/way.hpp"
 
 namespace tutti::estimation::internal {
@@ -74,17 +73,8 @@ std::size_t OdometryRuns::place(std::span<const Pose3> nodes, std::span<const Re
   return bent;
 }
 
-void OdometryRuns::forget(std::size_t step) {
-  std::erase_if(runs_, [step](const OdometryRun& run) { return run.begin <= step && step < run.end; });
-}
-
 void OdometryRuns::forget_bends() {
   for (OdometryRun& run : runs_) run.bent.reset();
-}
-
-bool is_implausible(const OdometryRun& run, const Pose3& T_begin_end) {
-  const Vector6d gap = local(run.T_begin_end, T_begin_end);
-  return gap.dot(run.information * gap) > kJumpGap;
 }
 
 }  // namespace tutti::estimation::internal

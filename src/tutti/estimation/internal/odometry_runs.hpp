@@ -32,9 +32,6 @@ class OdometryRuns {
   /// within a micrometre over its length since it was bent is moved rigidly. Returns how many poses were bent.
   std::size_t place(std::span<const Pose3> nodes, std::span<const RelativePose> odometry, std::span<Pose3> poses);
 
-  /// The step is not what it was: compound its run again next time.
-  void forget(std::size_t step);
-
   /// Somebody else changed inner poses: bend every run next time.
   void forget_bends();
 
@@ -43,8 +40,5 @@ class OdometryRuns {
  private:
   std::vector<OdometryRun> runs_;
 };
-
-/// Whether odometry over the run is further from this motion than it can be by chance: find_jump() asks for it.
-bool is_implausible(const OdometryRun& run, const Pose3& T_begin_end);
 
 }  // namespace tutti::estimation::internal

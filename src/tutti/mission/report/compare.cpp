@@ -89,12 +89,9 @@ std::string robot_text(const CompareReport& report, const TrajectoryComparison& 
   out += wrap(fmt::format("With them B is off A by {} RMSE, {} at most.", format_metres(c.after.rmse_m),
                           format_metres(c.after.max_m)),
               "  ");
-  for (const RepairedJump& jump : c.jumps)
-    out += wrap(fmt::format("B jumped, {}: taken back there.", format_jump(jump, clock)), "  ");
-  return out +=
-         wrap(fmt::format("No {}motion over 1 s or between nodes changes by more than {} and {:.3f} deg.",
-                          c.jumps.empty() ? "" : "other ", format_metres(c.kink.translation_m), c.kink.rotation_deg),
-              "  ");
+  return out += wrap(fmt::format("No motion over 1 s or between nodes changes by more than {} and {:.3f} deg.",
+                                 format_metres(c.kink.translation_m), c.kink.rotation_deg),
+                     "  ");
 }
 
 }  // namespace

@@ -81,14 +81,12 @@ std::string constraints_html(const TrajectoryComparison& c, const PictureClock& 
 }
 
 /// What bending B by the constraints does to its own motion.
-std::string bent_html(const TrajectoryComparison& c, const PictureClock& clock) {
+std::string bent_html(const TrajectoryComparison& c) {
   if (c.constraints.empty()) return "";
-  std::string out = "<ul class=\"notes\">\n";
-  for (const RepairedJump& jump : c.jumps)
-    out += fmt::format("<li>B jumped, {}: taken back there.</li>\n", format_jump(jump, clock));
-  return out +
-         fmt::format("<li>No {}motion over 1 s or between nodes changes by more than {} and {:.3f}°.</li>\n</ul>\n",
-                     c.jumps.empty() ? "" : "other ", format_metres(c.kink.translation_m), c.kink.rotation_deg);
+  return fmt::format(
+      "<ul class=\"notes\">\n<li>No motion over 1 s or between nodes changes by more than {} and "
+      "{:.3f}°.</li>\n</ul>\n",
+      format_metres(c.kink.translation_m), c.kink.rotation_deg);
 }
 
 std::string lead_text(const TrajectoryComparison& c) {
@@ -125,7 +123,7 @@ std::string robot_html(const TrajectoryComparison& c) {
       legend_html(legend) + "<div class=\"figures\">\n" + figure(top_view(c, clock), "From above", "", true) +
           "</div>\n<br>\n" + significance_scale_html() + "<div class=\"figures\">\n" +
           figure(explanation_svg(picture, kWide_px), "Disagreement by time and scale", "", true) + "</div>\n" +
-          scales_html(c, clock) + origins_html(c, clock) + constraints_html(c, clock) + bent_html(c, clock));
+          scales_html(c, clock) + origins_html(c, clock) + constraints_html(c, clock) + bent_html(c));
 }
 
 }  // namespace

@@ -56,19 +56,6 @@ Json constraints_json(const TrajectoryComparison& c) {
   return out;
 }
 
-Json jumps_json(const TrajectoryComparison& c) {
-  Json out = Json::array();
-  for (const RepairedJump& jump : c.jumps) {
-    Json row = Json::object();
-    add_moment(row, "from", jump.from, c);
-    add_moment(row, "until", jump.until, c);
-    row["translation_m"] = number(jump.translation_m);
-    row["rotation_rad"] = number(jump.rotation_rad);
-    out.push_back(std::move(row));
-  }
-  return out;
-}
-
 /// The disagreement map: one row per node.
 Json map_json(const TrajectoryComparison& c) {
   const auto& e = c.explanation;
@@ -107,7 +94,6 @@ Json robot_json(const TrajectoryComparison& c) {
           {"origins", origins_json(c)},
           {"constraints", constraints_json(c)},
           {"fixed", mended ? ate_json(c.after) : Json(nullptr)},
-          {"jumps", jumps_json(c)},
           {"kink_m", mended ? number(c.kink.translation_m) : Json(nullptr)},
           {"kink_deg", mended ? number(c.kink.rotation_deg) : Json(nullptr)},
           {"map", map_json(c)}};

@@ -313,11 +313,6 @@ std::string format_motion_error(double translation_m, double rotation_rad) {
   return fmt::format("{}, {:.1f} deg", format_metres(translation_m), rotation_rad / kRadPerDeg);
 }
 
-std::string format_jump(const RepairedJump& jump, const PictureClock& clock) {
-  return fmt::format("{}, {}", format_motion_error(jump.translation_m, jump.rotation_rad),
-                     format_between(clock, jump.from, jump.until));
-}
-
 std::string format_disagreement(const Explanation& e, const PictureClock& clock) {
   if (!e.disagrees()) return "odometry and map agree within what the server is sure of";
   std::string text =

@@ -64,8 +64,6 @@ std::string format_origin(const consistency::SuspectedOrigin& origin, const Pict
 std::string format_place(const Eigen::Vector3d& place_m);
 /// "0.10 m, 20.3 deg"
 std::string format_motion_error(double translation_m, double rotation_rad);
-/// The same and when: "0.10 m, 20.3 deg, 162.1 s - 163.0 s"
-std::string format_jump(const RepairedJump& jump, const PictureClock& clock);
 /// "odometry and map part by up to 12 x the threshold", and the way that odometry misses by most, if any; or that they
 /// agree.
 std::string format_disagreement(const consistency::Explanation& explanation, const PictureClock& clock);

@@ -104,12 +104,6 @@ std::string alerts_html(const MissionRecord& record) {
                           format_origin(alert.origin, mission_clock(robot), robot.explanation),
                           format_moment(alert.known_since_s),
                           alert.withdrawn_s ? ", withdrawn at " + format_moment(*alert.withdrawn_s) : std::string());
-  for (const RobotRecord& robot : record.robots)
-    if (const PolicyRecord* policy = find_policy(robot, record.default_policy))
-      for (const RepairedJump& jump : policy->jumps)
-        list +=
-            fmt::format("<li class=\"repaired\"><b>Odometry jumped:</b> {}, {}: taken back there by the robot</li>\n",
-                        escape_xml(robot.name), format_jump(jump, mission_clock(robot)));
   for (const FailedOdometryRecord& failed : record.server.failed_odometry)
     for (const RobotRecord& robot : record.robots)
       if (robot.id == failed.robot)

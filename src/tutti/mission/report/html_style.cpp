@@ -120,7 +120,6 @@ rect.truth.slip { fill: var(--slip); } rect.truth.degeneracy { fill: var(--degen
 .alerts { list-style: none; padding: 0; margin: 0 0 18px; }
 .alerts li { border: 1px solid var(--failure); border-left-width: 6px; border-radius: 10px; padding: 8px 14px; margin: 6px 0;
   background: color-mix(in srgb, var(--failure) 8%, var(--card)); }
-.alerts li.repaired { border-color: var(--corrected); background: var(--card); }
 .alerts li.withdrawn { border-color: var(--line); background: var(--card); color: var(--soft); }
 .robots { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 14px; margin: 0 0 14px; }
 .robots .card { padding: 18px 22px; } .robots .what { font-size: 16px; font-weight: 650; color: var(--ink); }

@@ -123,7 +123,7 @@ std::string policies_html(const MissionRecord& record) {
       fmt::format(
           "{} RMSE and largest error at keyframes after one rigid alignment, without scale{}. Scored: the share "
           "of the way that these figures were scored on; below 95 % they are partial, in brackets. Kink: the "
-          "most that correcting changed any motion over 1 s, but for jumps taken back. Update: median / largest.",
+          "most that correcting changed any motion over 1 s. Update: median / largest.",
           several ? fmt::format("Every policy answers the very same broadcasts; {} is the one the robot follows.",
                                 record.default_policy)
                   : fmt::format("Corrected by the policy {}.", record.default_policy),

@@ -190,15 +190,6 @@ TEST(ReportHtml, DrawsTheWayThatOdometryMisses) {
   EXPECT_NE(html.find("part by up to 44 x the threshold: closures tie"), std::string::npos);
 }
 
-TEST(ReportHtml, NamesTheJumpsTakenBack) {
-  MissionRecord record = test::example_record();
-  EXPECT_EQ(report_html(record).find("Odometry jumped"), std::string::npos);
-  test::jump_back(record.robots[0], record.default_policy);
-  const std::string html = report_html(record);
-  expect_good_page(html);
-  EXPECT_NE(html.find("Odometry jumped:</b> alpha, 0.100 m, 20.1 deg, 12.0 s - 14.0 s"), std::string::npos);
-}
-
 TEST(ReportHtml, NamesOdometryThatIsBetterThanStated) {
   MissionRecord record = test::example_record();
   EXPECT_EQ(report_html(record).find("turns better"), std::string::npos);

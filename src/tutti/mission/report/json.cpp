@@ -60,10 +60,6 @@ void add_accuracy(Json& out, const std::string& prefix, const Accuracy& accuracy
 Json policy_json(const RobotRecord& robot, const PolicyRecord& policy) {
   Json out = Json::object();
   add_accuracy(out, "", policy.accuracy);
-  out["jumps"] = Json::array();
-  for (const RepairedJump& jump : policy.jumps)
-    out["jumps"].push_back(stretch_json(
-        robot, jump, {{"translation_m", number(jump.translation_m)}, {"rotation_rad", number(jump.rotation_rad)}}));
   out["kink_m"] = policy.kink ? number(policy.kink->translation_m) : Json(nullptr);
   out["kink_deg"] = policy.kink ? number(policy.kink->rotation_deg) : Json(nullptr);
   out["agreement_rmse_m"] = number(policy.agreement_rmse_m);

@@ -42,7 +42,7 @@ TEST(ReportJson, HasTheDocumentedKeys) {
     ASSERT_EQ(robot["policies"].size(), 6U);
     for (const auto& policy : robot["policies"])
       EXPECT_EQ(keys(policy),
-                (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg", "jumps",
+                (std::set<std::string>{"rmse_m", "max_error_m", "rpe_m", "rpe_deg", "rpe_10m_m", "rpe_10m_deg",
                                        "kink_m", "kink_deg", "agreement_rmse_m", "constraints", "scored_share",
                                        "partial", "agreement_scored_share", "agreement_partial"}));
   }
@@ -110,20 +110,6 @@ TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
   EXPECT_TRUE(alert["withdrawn_s"].is_null());
   EXPECT_DOUBLE_EQ(report["robots"][1]["onboard_rpe_10m_m"], 0.095);
   EXPECT_DOUBLE_EQ(report["robots"][1]["policies"]["spectral"]["kink_m"], 0.01);
-}
-
-TEST(ReportJson, JumpsThatAPolicyTakesBack) {
-  MissionRecord record = test::example_record();
-  record.robots[1].start_s = 300.0;
-  test::jump_back(record.robots[1], "spectral");
-  const json policies = json::parse(report_json(record))["robots"][1]["policies"];
-  EXPECT_TRUE(policies["uniform"]["jumps"].empty());
-  ASSERT_EQ(policies["spectral"]["jumps"].size(), 1U);
-  const json& jump = policies["spectral"]["jumps"][0];
-  EXPECT_DOUBLE_EQ(jump["from_s"], 312.0);
-  EXPECT_DOUBLE_EQ(jump["until_s"], 314.0);
-  EXPECT_DOUBLE_EQ(jump["translation_m"], 0.1);
-  EXPECT_DOUBLE_EQ(jump["rotation_rad"], 0.35);
 }
 
 TEST(ReportJson, MapErrorWhereThereIsASurvey) {

@@ -139,19 +139,12 @@ std::string server_lines(const MissionRecord& record) {
   return out;
 }
 
-/// Where the correction took back jumps, and how gently it bent all else.
+/// How gently the correction bent odometry.
 std::string correction_lines(const RobotRecord& robot, const PolicyRecord& policy) {
-  std::string out;
-  for (const RepairedJump& jump : policy.jumps)
-    out += wrap(
-        fmt::format("{}: odometry jumped, {}: taken back there.", robot.name, format_jump(jump, mission_clock(robot))),
-        "  jump     ");
-  if (policy.kink && policy.constraints_added > 0)
-    out += wrap(fmt::format("{}: correcting changed no {}motion over 1 s by more than {} and {:.3f} deg.", robot.name,
-                            policy.jumps.empty() ? "" : "other ", format_metres(policy.kink->translation_m),
-                            policy.kink->rotation_deg),
-                "  kink     ");
-  return out;
+  if (!policy.kink || policy.constraints_added == 0) return "";
+  return wrap(fmt::format("{}: correcting changed no motion over 1 s by more than {} and {:.3f} deg.", robot.name,
+                          format_metres(policy.kink->translation_m), policy.kink->rotation_deg),
+              "  kink     ");
 }
 
 /// Where odometry and map part, what the robots warned of, and how gently they were corrected.

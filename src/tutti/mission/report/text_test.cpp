@@ -82,13 +82,6 @@ TEST(ReportText, TellsOfAlertsAndKinks) {
   record.robots[1].rotation_factor = 0.25;
   EXPECT_NE(report_text(record, "x").find("odometry turns better than it says (at least: bravo 2.0"),
             std::string::npos);
-  ASSERT_EQ(text.find("jumped"), std::string::npos);
-  test::jump_back(record.robots[0], record.default_policy);
-  const std::string jumped = report_text(record, "x");
-  EXPECT_NE(jumped.find("jump     alpha: odometry jumped, 0.100 m, 20.1 deg, 12.0 s - 14.0 s: taken back there."),
-            std::string::npos)
-      << jumped;
-  EXPECT_NE(jumped.find("changed no other motion"), std::string::npos);
   test::miss_a_way(*record.robots[1].explanation);
   const std::string missed = report_text(record, "x");
   expect_readable(missed);

@@ -219,12 +219,6 @@ inline double mission_time_of(const RobotRecord& robot, Timestamp stamp) {
   return robot.start_s + (stamp - robot.odometry.front().stamp);
 }
 
-/// The policy takes back a jump of 0.1 m and 0.35 rad at 12 s.
-inline void jump_back(RobotRecord& robot, const std::string& policy_name) {
-  for (PolicyRecord& policy : robot.policies)
-    if (policy.name == policy_name) policy.jumps = {{robot.odometry[6].stamp, robot.odometry[7].stamp, 0.1, 0.35}};
-}
-
 /// As a mission that compares no policies records it.
 inline void keep_the_default_policy(MissionRecord& record) {
   const auto other = [&](const std::string& policy) { return policy != record.default_policy; };
