@@ -118,13 +118,6 @@ void update_from_scratch(const TunnelChain& chain, int repetitions) {
     poses = smoother.poses();
     row(polishing == 0 ? "onboard smoother" : "onboard smoother, one polishing step", times);
   }
-  TunnelChain doubting = chain;
-  for (std::size_t k = 3; k < doubting.constraints.size(); k += 10) doubting.constraints[k].doubtful = true;
-  OnboardSmoother smoother;
-  const Times times = measure(
-      repetitions, [&] { smoother = OnboardSmoother({}, doubting.state()); }, [&] { smoother.solve(); });
-  fmt::print("| {} | onboard smoother, every tenth constraint doubtful | {:.2f} | {:.2f} | {:.1f} | | |\n",
-             chain.constraints.size(), times.best, times.median, full.best / times.best);
 }
 
 enum class Batch { add, replace };

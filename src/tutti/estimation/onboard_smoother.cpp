@@ -9,8 +9,8 @@
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/internal/block_structure.hpp"
-#include "tutti/estimation/internal/doubt.hpp"
 #include "tutti/estimation/internal/full_step.hpp"
+#include "tutti/estimation/internal/gauss_newton.hpp"
 #include "tutti/estimation/internal/odometry_runs.hpp"
 #include "tutti/estimation/internal/reduced_problem.hpp"
 
@@ -19,22 +19,19 @@ namespace {
 
 /// Every solve ends with a step that moves no pose by more (m, rad), so that where it started does not show.
 constexpr double kStepTolerance = 1e-5;
-/// Of an edge's rotation: nearer than this to all measurements but the doubtful, the last poses lead to the minimum
-/// that raw odometry leads to.
+/// Of an edge's rotation: nearer than this to all measurements, the last poses lead to the minimum that raw odometry
+/// leads to.
 constexpr double kNearby_rad = 0.3;
 
 /// Chi-square by which rounding may seem to raise the cost of the full graph.
 constexpr double kCostTolerance = 1e-3;
 
-bool is_nearby(const PoseGraph& graph, std::span<const EdgeRole> roles, const std::vector<Pose3>& poses) {
+bool is_nearby(const PoseGraph& graph, const std::vector<Pose3>& poses) {
   const double least = std::cos(0.5 * kNearby_rad);
-  for (std::size_t e = 0; e < graph.edges.size(); ++e) {
-    const PoseGraphEdge& edge = graph.edges[e];
-    if (!roles.empty() && roles[e] == EdgeRole::robust) continue;
+  return std::ranges::all_of(graph.edges, [&](const PoseGraphEdge& edge) {
     const Eigen::Quaterniond predicted = poses[edge.from].rotation * edge.T_from_to.rotation;
-    if (!(std::abs(predicted.dot(poses[edge.to].rotation)) > least)) return false;
-  }
-  return true;
+    return std::abs(predicted.dot(poses[edge.to].rotation)) > least;
+  });
 }
 
 }  // namespace
@@ -71,7 +68,6 @@ void OnboardSmoother::set_constraints(std::vector<ChainConstraint> constraints) 
     TUTTI_CHECK(constraint.from < size() && constraint.to < size(), "constraint {} -> {}, {} nodes", constraint.from,
                 constraint.to, size());
   state_.constraints = std::move(constraints);
-  constraint_weights_.assign(state_.constraints.size(), 1.0);
 }
 
 void OnboardSmoother::set_first_pose(const Pose3& T_map_first) {
@@ -94,40 +90,35 @@ SmootherSummary OnboardSmoother::solve() {
 
   std::vector<Pose3> reduced;
   const auto result = minimise(reduced);
-  summary.termination = result.solve.termination;
-  summary.iterations = result.solve.iterations;
-  summary.initial_cost = result.solve.initial_cost;
-  summary.final_cost = result.solve.final_cost;
-  summary.loss_applied = result.loss_applied;
-  if (is_usable(summary.termination)) place(reduced, result.loss_applied, summary);
+  summary.termination = result.termination;
+  summary.iterations = result.iterations;
+  summary.initial_cost = result.initial_cost;
+  summary.final_cost = result.final_cost;
+  if (is_usable(summary.termination)) place(reduced, summary);
   return summary;
 }
 
 /// From the last poses, or, when these are far off or lead nowhere, from raw odometry.
-internal::DoubtingSummary OnboardSmoother::minimise(std::vector<Pose3>& reduced) {
-  const auto& nodes = problem_->reduced().nodes;
+SolveSummary OnboardSmoother::minimise(std::vector<Pose3>& reduced) {
   const PoseGraph& graph = problem_->graph();
-  const RobustLoss loss{loss_kind(config_.loss), config_.loss_scale};
-  std::span<const EdgeRole> roles;
-  if (loss.kind != LossKind::none) roles = problem_->reduced().roles;
   const auto minimise = [&] {
     const SolverConfig solver{.max_iterations = config_.max_iterations,
                               .relative_cost_tolerance = config_.relative_cost_tolerance};
-    return internal::minimise_doubting(*problem_, roles, loss, solver, {.step_tolerance = kStepTolerance}, reduced);
+    return internal::minimise(*problem_, reduced, {}, solver, {.step_tolerance = kStepTolerance});
   };
-  for (const std::size_t node : nodes) reduced.push_back(poses_[node]);
-  if (is_nearby(graph, roles, reduced))
-    if (const auto result = minimise(); result.solve.termination == Termination::converged) return result;
+  for (const std::size_t node : problem_->reduced().nodes) reduced.push_back(poses_[node]);
+  if (is_nearby(graph, reduced))
+    if (const auto result = minimise(); result.termination == Termination::converged) return result;
   reduced = graph.poses;
   return minimise();
 }
 
 /// A step on the full graph, unless it makes matters worse: where odometry knows little of some axes and much of
 /// others, Gauss-Newton can lead metres away from where it started.
-bool OnboardSmoother::polish(const internal::EdgeCosts& costs) {
+bool OnboardSmoother::polish() {
   std::vector<Pose3> polished = poses_;
-  if (!internal::full_step(*problem_, costs, state_.odometry, polished)) return false;
-  const double change = internal::full_cost_change(*problem_, costs, state_.odometry, poses_, polished);
+  if (!internal::full_step(*problem_, state_.odometry, polished)) return false;
+  const double change = internal::full_cost_change(*problem_, state_.odometry, poses_, polished);
   if (!(change < kCostTolerance)) return false;
   poses_.swap(polished);
   runs_->forget_bends();
@@ -135,16 +126,11 @@ bool OnboardSmoother::polish(const internal::EdgeCosts& costs) {
 }
 
 /// Makes every pose of the chain follow the reduced nodes.
-void OnboardSmoother::place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary) {
-  const internal::ChainGraph& reduced_graph = problem_->reduced();
-  const internal::EdgeCosts costs{
-      .loss = loss_applied ? RobustLoss{loss_kind(config_.loss), config_.loss_scale} : RobustLoss{},
-      .roles = reduced_graph.roles,
-      .scale = {}};
-  const std::size_t last = reduced_graph.nodes.back();
+void OnboardSmoother::place(const std::vector<Pose3>& reduced, SmootherSummary& summary) {
+  const std::size_t last = problem_->reduced().nodes.back();
   const Pose3 last_before = poses_[last];
   summary.bent_poses = runs_->place(reduced, state_.odometry, poses_);
-  for (int k = 0; k < config_.polishing_steps && polish(costs); ++k) ++summary.polishing_steps;
+  for (int k = 0; k < config_.polishing_steps && polish(); ++k) ++summary.polishing_steps;
   if (composed_from_ <= last) {
     const Pose3 motion = poses_[last] * last_before.inverse();
     for (std::size_t k = last + 1; k < poses_.size(); ++k) poses_[k] = motion * poses_[k];
@@ -152,13 +138,6 @@ void OnboardSmoother::place(const std::vector<Pose3>& reduced, bool loss_applied
     for (std::size_t k = last; k < state_.odometry.size(); ++k) poses_[k + 1] = poses_[k] * state_.odometry[k].T_a_b;
   }
   composed_from_ = last;
-  for (std::size_t c = 0; c < state_.constraints.size(); ++c) {
-    const auto& constraint = state_.constraints[c];
-    if (!loss_applied || constraint.from == constraint.to) continue;
-    const auto& edge = reduced_graph.graph.edges[reduced_graph.edges[c]];
-    const Vector6d r = between_residual(poses_[constraint.from], poses_[constraint.to], edge.T_from_to);
-    constraint_weights_[c] = costs.weight(reduced_graph.edges[c], r.dot(edge.information * r));
-  }
 }
 
 }  // namespace tutti::estimation

@@ -3,11 +3,10 @@
 
 #include <cstddef>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "tutti/base/config.hpp"
-#include "tutti/estimation/termination.hpp"
+#include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti::estimation {
@@ -16,25 +15,18 @@ namespace internal {
 class OdometryRuns;
 class ReducedProblem;
 struct ChainGraph;
-struct DoubtingSummary;
-struct EdgeCosts;
 }  // namespace internal
 
 struct OnboardSmootherConfig {
   int max_iterations = 20;
   double relative_cost_tolerance = 1e-6;
-  std::string loss = "cauchy";
-  double loss_scale = 3.0;
   int polishing_steps = 0;
 
   template <class V>
   void describe(V& v) {
-    v.field("max_iterations", max_iterations, at_least(1),
-            "Gauss-Newton steps on the reduced graph at most, per phase.");
+    v.field("max_iterations", max_iterations, at_least(1), "Gauss-Newton steps on the reduced graph at most.");
     v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
             "Converged when a step can lower the cost by less than this share of it.");
-    v.field("loss", loss, one_of({"none", "huber", "cauchy"}), "Robust loss on the doubtful constraints.");
-    v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
     v.field("polishing_steps", polishing_steps, between(0, 10),
             "Gauss-Newton steps on the full graph after the reduced one, at most; none that raises its cost.");
   }
@@ -45,17 +37,15 @@ struct ChainConstraint {
   std::size_t from = 0;
   std::size_t to = 0;
   RelativePose measurement;
-  bool doubtful = false;  ///< Subject to the robust loss.
   friend bool operator==(const ChainConstraint&, const ChainConstraint&) = default;
 };
 
 struct SmootherSummary {
   Termination termination = Termination::not_run;
-  int iterations = 0;          ///< On the reduced graph, of all phases.
-  double initial_cost = -1.0;  ///< Of the reduced graph: compounded odometry and the constraints not doubtful.
-  double final_cost = -1.0;    ///< Of the reduced graph, the doubtful constraints by their loss.
-  bool loss_applied = false;   ///< There are doubtful constraints, and a loss for them.
-  int polishing_steps = 0;     ///< Taken: one that would raise the cost of the full graph is not.
+  int iterations = 0;          ///< On the reduced graph.
+  double initial_cost = -1.0;  ///< Of the reduced graph: compounded odometry and the constraints.
+  double final_cost = -1.0;
+  int polishing_steps = 0;  ///< Taken: one that would raise the cost of the full graph is not.
   std::size_t reduced_nodes = 0;
   std::size_t reduced_edges = 0;
   /// What had to be done again since the last solve: odometry steps compounded, inner poses bent (the others moved
@@ -80,10 +70,10 @@ struct SmootherState {
 /// current poses instead of the raw odometry, which makes it a Gauss-Newton step on the full graph; it is taken only
 /// when the full graph's cost does not rise. docs/math.md derives it.
 ///
-/// Only doubtful constraints have a robust loss; the others hold, whatever their residual. A solve starts from the last
-/// one's poses and keeps what did not change: compounds, sparsity, the shape of runs. The estimate is still a function
-/// of state(), to a tolerance: the same calls give the same bits; another history of calls, or a restored state, the
-/// same poses to 0.1 mm (docs/math.md).
+/// Constraints hold, whatever their residual (docs/math.md says why). A solve starts from the last one's poses and
+/// keeps what did not change: compounds, sparsity, the shape of runs. The estimate is still a function of state(), to a
+/// tolerance: the same calls give the same bits; another history of calls, or a restored state, the same poses to 0.1
+/// mm (docs/math.md).
 class OnboardSmoother {
  public:
   explicit OnboardSmoother(const OnboardSmootherConfig& config = {}, const Pose3& first = {});
@@ -106,21 +96,18 @@ class OnboardSmoother {
 
   [[nodiscard]] const Pose3& pose(std::size_t node) const { return poses_[node]; }
   [[nodiscard]] const std::vector<Pose3>& poses() const { return poses_; }  ///< T_map_body per node.
-  /// Per constraint as set: robust weight at the last solve; 1 where the loss did not apply.
-  [[nodiscard]] const std::vector<double>& constraint_weights() const { return constraint_weights_; }
   [[nodiscard]] const SmootherState& state() const { return state_; }
   /// Compounded runs kept, all there is besides a pose per node, state() and the reduced graph of the last solve.
   [[nodiscard]] std::size_t stored_runs() const;
 
  private:
-  internal::DoubtingSummary minimise(std::vector<Pose3>& reduced);
-  bool polish(const internal::EdgeCosts& costs);
-  void place(const std::vector<Pose3>& reduced, bool loss_applied, SmootherSummary& summary);
+  SolveSummary minimise(std::vector<Pose3>& reduced);
+  bool polish();
+  void place(const std::vector<Pose3>& reduced, SmootherSummary& summary);
 
   OnboardSmootherConfig config_;
   SmootherState state_;
   std::vector<Pose3> poses_;
-  std::vector<double> constraint_weights_;
   std::unique_ptr<internal::OdometryRuns> runs_;
   std::unique_ptr<internal::ReducedProblem> problem_;  ///< Of the last solve.
   std::size_t composed_from_ = 0;                      ///< From here on, poses are raw odometry composed.

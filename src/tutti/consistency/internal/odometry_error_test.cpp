@@ -49,7 +49,7 @@ Eigen::MatrixXd smoothed(const NoisyRun& run, const std::vector<std::size_t>& he
   for (std::size_t k = 1; k < run.size(); ++k) smoother.append(run.odometry[k]);
   std::vector<estimation::ChainConstraint> links;
   for (std::size_t j = 1; j < held.size(); ++j)
-    links.push_back({held[j - 1], held[j], {at[j - 1].inverse() * at[j], 1e-16 * Matrix6d::Identity()}, false});
+    links.push_back({held[j - 1], held[j], {at[j - 1].inverse() * at[j], 1e-16 * Matrix6d::Identity()}});
   smoother.set_constraints(links);
   smoother.solve();
   const Pose3 T = at[0] * smoother.pose(held[0]).inverse();

@@ -15,18 +15,15 @@ void join(std::span<const ChainConstraint> constraints, ChainGraph& now) {
   for (std::size_t k = 0; k < now.nodes.size(); ++k) position[now.nodes[k]] = k;
   auto& edges = now.graph.edges;
   edges.resize(runs + constraints.size());
+  std::size_t e = runs;
   for (std::size_t k = 0; k < runs; ++k) edges[k].from = k, edges[k].to = k + 1;
-  now.roles.assign(runs, EdgeRole::trusted);
-  now.edges.clear();
   for (const auto& constraint : constraints) {
-    const std::size_t e = now.roles.size();
-    now.edges.push_back(e);
     if (constraint.from == constraint.to) continue;
     edges[e].from = position[constraint.from];
     edges[e].to = position[constraint.to];
-    now.roles.push_back(constraint.doubtful ? EdgeRole::robust : EdgeRole::trusted);
+    ++e;
   }
-  edges.resize(now.roles.size());
+  edges.resize(e);
   now.covariance.resize(edges.size() - runs);
 
   auto& start = now.incident_start;
@@ -35,7 +32,7 @@ void join(std::span<const ChainConstraint> constraints, ChainGraph& now) {
   std::partial_sum(start.begin(), start.end(), start.begin());
   now.incident.resize(2 * edges.size());
   std::vector<int> next(start.begin(), start.end() - 1);
-  for (std::size_t e = 0; e < edges.size(); ++e) {
+  for (e = 0; e < edges.size(); ++e) {
     const int from = static_cast<int>(edges[e].from);
     const int to = static_cast<int>(edges[e].to);
     now.incident[next[from]++] = {to, static_cast<int>(e)};
@@ -115,10 +112,10 @@ Carried reduce(std::vector<std::size_t> nodes, std::span<const OdometryRun> runs
     std::size_t& same = carried.edges[k];  // unless of other steps
     if (same != Carried::kNew && !(before.graph.edges[same].T_from_to == runs[k].T_begin_end)) same = Carried::kNew;
   }
-  for (std::size_t c = 0; c < constraints.size(); ++c) {
-    const auto& [from, to, measurement, doubtful] = constraints[c];
+  std::size_t next = runs.size();
+  for (const auto& [from, to, measurement] : constraints) {
     if (from == to) continue;
-    const std::size_t e = now.edges[c];
+    const std::size_t e = next++;
     edges[e].T_from_to = measurement.T_a_b;
     now.covariance[e - runs.size()] = measurement.covariance;
     std::size_t& same = carried.edges[e];

@@ -17,9 +17,7 @@ std::vector<std::size_t> reduced_nodes(std::span<const ChainConstraint> constrai
 /// The constrained nodes of a chain, joined by runs and constraints.
 struct ChainGraph {
   std::vector<std::size_t> nodes;
-  PoseGraph graph;                 ///< Node k is nodes[k], composed from raw odometry; edge k run k, then constraints.
-  std::vector<EdgeRole> roles;     ///< robust = doubtful.
-  std::vector<std::size_t> edges;  ///< Of each constraint; of one with from == to: meaningless.
+  PoseGraph graph;  ///< Node k is nodes[k], composed from raw odometry; edge k run k, then constraints.
   std::vector<Matrix6d> covariance;  ///< Of each edge that is no run.
 
   struct Incident {

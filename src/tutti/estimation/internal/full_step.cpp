@@ -8,8 +8,7 @@
 
 namespace tutti::estimation::internal {
 
-bool full_step(ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
-               std::span<Pose3> poses) {
+bool full_step(ReducedProblem& problem, std::span<const RelativePose> odometry, std::span<Pose3> poses) {
   const auto& nodes = problem.reduced().nodes;
   const auto& graph = problem.reduced().graph;
   const auto steps_of = [&](std::size_t k) { return odometry.subspan(nodes[k], nodes[k + 1] - nodes[k]); };
@@ -29,8 +28,7 @@ bool full_step(ReducedProblem& problem, const EdgeCosts& costs, std::span<const 
   for (std::size_t e = nodes.size() - 1; e < graph.edges.size(); ++e) {
     const auto& edge = graph.edges[e];
     const auto factor = linearise_between(poses[nodes[edge.from]], poses[nodes[edge.to]], edge.T_from_to);
-    const double weight = costs.weight(e, factor.residual.dot(edge.information * factor.residual));
-    problem.set_factor(e, factor, weight * edge.information);
+    problem.set_factor(e, factor, edge.information);
   }
   if (!problem.factorise()) return false;
   Eigen::VectorXd step = -problem.gradient();
@@ -47,7 +45,7 @@ bool full_step(ReducedProblem& problem, const EdgeCosts& costs, std::span<const 
   return true;
 }
 
-double full_cost_change(const ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
+double full_cost_change(const ReducedProblem& problem, std::span<const RelativePose> odometry,
                         std::span<const Pose3> before, std::span<const Pose3> after) {
   const auto& nodes = problem.reduced().nodes;
   const auto& graph = problem.reduced().graph;
@@ -63,7 +61,7 @@ double full_cost_change(const ReducedProblem& problem, const EdgeCosts& costs, s
   const auto cost = [&](std::size_t e, std::span<const Pose3> poses) {
     const PoseGraphEdge& edge = graph.edges[e];
     const Vector6d r = between_residual(poses[nodes[edge.from]], poses[nodes[edge.to]], edge.T_from_to);
-    return costs.cost(e, r.dot(edge.information * r));
+    return r.dot(edge.information * r);
   };
   for (std::size_t e = nodes.size() - 1; e < graph.edges.size(); ++e) change += cost(e, after) - cost(e, before);
   return change;

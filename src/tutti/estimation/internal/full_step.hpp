@@ -9,12 +9,11 @@ namespace tutti::estimation::internal {
 
 /// One Gauss-Newton step on the full graph of a chain, by eliminating the runs' inner poses about the current `poses`
 /// (one per node of the chain; those after the last reduced node stay). False when singular: nothing changed.
-bool full_step(ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
-               std::span<Pose3> poses);
+bool full_step(ReducedProblem& problem, std::span<const RelativePose> odometry, std::span<Pose3> poses);
 
 /// By how much the cost of the full graph is higher at `after` than at `before`: all odometry up to the last reduced
-/// node, and the constraints by their loss.
-double full_cost_change(const ReducedProblem& problem, const EdgeCosts& costs, std::span<const RelativePose> odometry,
+/// node, and the constraints.
+double full_cost_change(const ReducedProblem& problem, std::span<const RelativePose> odometry,
                         std::span<const Pose3> before, std::span<const Pose3> after);
 
 }  // namespace tutti::estimation::internal

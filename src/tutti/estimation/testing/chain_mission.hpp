@@ -48,7 +48,7 @@ inline OnboardSmoother smoother_of(const Mission& mission, const OnboardSmoother
   return smoother;
 }
 
-/// The optimum of the full graph, every constraint trusted.
+/// The optimum of the full graph.
 inline std::vector<Pose3> full_optimum(const Mission& mission, const std::vector<Pose3>& start) {
   PoseGraph graph{.poses = start, .edges = {}};
   for (std::size_t k = 0; k < mission.odometry.size(); ++k)
