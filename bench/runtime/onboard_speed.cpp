@@ -15,8 +15,7 @@
 
 #include "tunnel_chain.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
-#include "tutti/estimation/internal/odometry_runs.hpp"
-#include "tutti/estimation/internal/reduced_problem.hpp"
+#include "tutti/estimation/internal/reduced_chain.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #ifdef TUTTI_HAVE_CERES
 #include "ceres_solve.hpp"
@@ -136,42 +135,35 @@ std::vector<ChainConstraint> with_batch(const TunnelChain& chain, std::vector<Ch
   return out;
 }
 
-/// set_constraints() and solve() of a smoother that has solved the rest, from scratch and then `earlier` such batches.
-void batch_row(const TunnelChain& chain, int repetitions, Batch batch, int count, int earlier) {
+/// set_constraints() and solve() of a smoother that has solved the rest.
+void batch_row(const TunnelChain& chain, int repetitions, Batch batch, int count) {
   const Rng seed(11);
   OnboardSmoother smoother;
   int k = 0;
   std::vector<ChainConstraint> constraints;
-  double bent = 0.0;
   const auto prepare = [&] {
     Rng rng = seed.fork(static_cast<std::uint64_t>(k++));
     smoother = OnboardSmoother({}, chain.state());
     smoother.solve();
-    constraints = chain.constraints;
-    for (int e = 0; e <= earlier; ++e) {
-      if (e > 0) smoother.set_constraints(constraints), smoother.solve();
-      constraints = with_batch(chain, std::move(constraints), batch, count, rng);
-    }
+    constraints = with_batch(chain, chain.constraints, batch, count, rng);
   };
   const Times times = measure(repetitions, prepare, [&] {
     smoother.set_constraints(std::move(constraints));
-    bent += static_cast<double>(smoother.solve().bent_poses) / repetitions;
+    smoother.solve();
   });
   OnboardSmoother fresh;
   const Times scratch = measure(
       repetitions, [&] { fresh = OnboardSmoother({}, smoother.state()); }, [&] { fresh.solve(); });
   const double off = difference(smoother.poses(), fresh.poses()).max_mm;
-  fmt::print("| {} | {} {}{} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.0f} | {:.4f} |\n", chain.constraints.size(),
-             batch == Batch::add ? "add" : "replace", count, earlier == 0 ? ", the first" : "", times.best,
-             times.median, scratch.best, scratch.best / times.best, bent, off);
+  fmt::print("| {} | {} {} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.4f} |\n", chain.constraints.size(),
+             batch == Batch::add ? "add" : "replace", count, times.best, times.median, scratch.best,
+             scratch.best / times.best, off);
   std::fflush(stdout);
 }
 
 void batches(const TunnelChain& chain, int repetitions) {
-  for (const Batch batch : {Batch::add, Batch::replace}) {
-    batch_row(chain, repetitions, batch, 1, 0);
-    for (const int count : {1, 5, 25, 100}) batch_row(chain, repetitions, batch, count, 1);
-  }
+  for (const Batch batch : {Batch::add, Batch::replace})
+    for (const int count : {1, 5, 25, 100}) batch_row(chain, repetitions, batch, count);
 }
 
 /// From no constraint to all of them, one update per batch, each returning all poses.
@@ -210,42 +202,28 @@ void parts(const TunnelChain& chain, int repetitions) {
     fmt::print("| {} | {} | {:.2f} |\n", chain.constraints.size(), what, times.best);
   };
   const auto nodes = reduced_nodes(chain.constraints);
-  OdometryRuns runs;
+  std::vector<PoseGraphEdge> runs;
   row("compound all odometry", [&] {
-    runs = {};
-    runs.update(nodes, chain.odometry);
+    runs.clear();
+    update_runs(nodes, chain.odometry, runs);
   });
-  const auto update = [&](ReducedProblem& problem) {
-    problem.update(nodes, runs.all(), chain.constraints, chain.truth.front());
-  };
-  ReducedProblem problem;
-  row("build the reduced graph and order it", [&] { problem = {}, update(problem); });
-  row("build the same again", [&] { update(problem); });
-  std::vector<Pose3> reduced = problem.graph().poses;
-  minimise(problem, reduced, {}, {});
-  const std::vector<Pose3> raw = problem.graph().poses;
-  bool moved = false;
-  const auto all_anew = [&] {
-    moved = !moved;
-    const auto& poses = moved ? raw : reduced;
-    (void)problem.cost(poses, {});
-    problem.linearise(poses, {}, true);
-  };
-  row("residuals and Jacobians", all_anew);
-  row("residuals, Jacobians and Cholesky factor of all", [&] { all_anew(), (void)problem.factorise(); });
-  row("the same where nothing changed", [&] {
-    (void)problem.cost(raw, {});
-    problem.linearise(raw, {}, true);
-    (void)problem.factorise();
+  PoseGraph graph;
+  row("build the reduced graph", [&] { graph = reduced_graph(nodes, runs, chain.constraints, chain.truth.front()); });
+  row("order it", [&] {
+    const auto structure = analyse_blocks(graph);
+    const GraphEquations equations(graph, structure);
   });
+  const auto structure = analyse_blocks(graph);
+  GraphEquations equations(graph, structure);
+  std::vector<Pose3> reduced = graph.poses;
+  minimise(equations, reduced, {}, {});
+  row("residuals and Jacobians", [&] { equations.linearise(reduced, {}, true); });
+  row("Cholesky factor", [&] { (void)equations.factorise(); });
   Eigen::VectorXd b = Eigen::VectorXd::Ones(6 * static_cast<Eigen::Index>(nodes.size() - 1));
-  row("solve with it", [&] { problem.solve(b); });
-  std::vector<Pose3> poses(chain.truth.size());
-  row("bend all inner poses", [&] {
-    runs.forget_bends();
-    runs.place(reduced, chain.odometry, poses);
-  });
-  row("move all inner poses rigidly", [&] { runs.place(reduced, chain.odometry, poses); });
+  row("solve with it", [&] { equations.solve(b); });
+  std::vector<Pose3> poses(chain.truth.size(), chain.truth.front());
+  row("bend all inner poses", [&] { place(runs, reduced, chain.odometry, poses); });
+  row("polish", [&] { (void)polish(nodes, chain.odometry, graph, equations, poses); });
 }
 
 void append_and_memory(int repetitions) {
@@ -292,8 +270,8 @@ int main(int argc, char** argv) {
       bench::kTunnelSteps);
   for (const auto* chain : {&few, &paper, &every_node}) update_from_scratch(*chain, repetitions);
   fmt::print(
-      "\n| constraints | batch | best ms | median ms | from scratch, best ms | ratio | poses bent | off from "
-      "scratch, mm |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+      "\n| constraints | batch | best ms | median ms | from scratch, best ms | ratio | off from "
+      "scratch, mm |\n| --- | --- | --- | --- | --- | --- | --- |\n");
   for (const auto* chain : {&few, &paper, &every_node}) batches(*chain, repetitions);
   fmt::print(
       "\n| constraints | arriving by | updates | all s | mean ms | worst ms | off from scratch, mm |\n| --- | --- | "

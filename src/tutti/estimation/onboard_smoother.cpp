@@ -3,16 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/estimation/between_factor.hpp"
-#include "tutti/estimation/internal/block_structure.hpp"
-#include "tutti/estimation/internal/full_step.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
-#include "tutti/estimation/internal/odometry_runs.hpp"
-#include "tutti/estimation/internal/reduced_problem.hpp"
+#include "tutti/estimation/internal/reduced_chain.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -22,9 +17,6 @@ constexpr double kStepTolerance = 1e-5;
 /// Of an edge's rotation: nearer than this to all measurements, the last poses lead to the minimum that raw odometry
 /// leads to.
 constexpr double kNearby_rad = 0.3;
-
-/// Chi-square by which rounding may seem to raise the cost of the full graph.
-constexpr double kCostTolerance = 1e-3;
 
 bool is_nearby(const PoseGraph& graph, const std::vector<Pose3>& poses) {
   const double least = std::cos(0.5 * kNearby_rad);
@@ -37,11 +29,7 @@ bool is_nearby(const PoseGraph& graph, const std::vector<Pose3>& poses) {
 }  // namespace
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, const Pose3& first)
-    : config_(config),
-      state_{.first = first},
-      poses_{first},
-      runs_(std::make_unique<internal::OdometryRuns>()),
-      problem_(std::make_unique<internal::ReducedProblem>()) {}
+    : config_(config), state_{.first = first}, poses_{first} {}
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state)
     : OnboardSmoother(config, state.first) {
@@ -50,12 +38,6 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
   for (const RelativePose& step : state.odometry) append(step);
   set_constraints(std::move(state.constraints));
 }
-
-OnboardSmoother::~OnboardSmoother() = default;
-OnboardSmoother::OnboardSmoother(OnboardSmoother&&) noexcept = default;
-OnboardSmoother& OnboardSmoother::operator=(OnboardSmoother&&) noexcept = default;
-
-std::size_t OnboardSmoother::stored_runs() const { return runs_->all().size(); }
 
 std::size_t OnboardSmoother::append(const RelativePose& odometry) {
   state_.odometry.push_back(odometry);
@@ -78,66 +60,45 @@ void OnboardSmoother::set_first_pose(const Pose3& T_map_first) {
 
 SmootherSummary OnboardSmoother::solve() {
   SmootherSummary summary;
-  auto nodes = internal::reduced_nodes(state_.constraints);
-  summary.compounded_steps = runs_->update(nodes, state_.odometry);
-  summary.analysed = problem_->update(std::move(nodes), runs_->all(), state_.constraints, state_.first);
-  summary.reduced_nodes = problem_->graph().poses.size();
-  summary.reduced_edges = problem_->graph().edges.size();
-  if (!internal::is_finite(problem_->graph())) {
+  const auto nodes = internal::reduced_nodes(state_.constraints);
+  summary.compounded_steps = internal::update_runs(nodes, state_.odometry, runs_);
+  PoseGraph graph = internal::reduced_graph(nodes, runs_, state_.constraints, state_.first);
+  summary.reduced_nodes = graph.poses.size();
+  summary.reduced_edges = graph.edges.size();
+  if (!internal::is_finite(graph)) {
     summary.termination = Termination::invalid_input;
     return summary;
   }
 
+  const auto structure = internal::analyse_blocks(graph);
+  internal::GraphEquations equations(graph, structure);
   std::vector<Pose3> reduced;
-  const auto result = minimise(reduced);
+  for (const std::size_t node : nodes) reduced.push_back(poses_[node]);
+  const auto minimise = [&] {
+    const SolverConfig solver{.max_iterations = config_.max_iterations,
+                              .relative_cost_tolerance = config_.relative_cost_tolerance};
+    return internal::minimise(equations, reduced, {}, solver, kStepTolerance);
+  };
+  // From the last poses, or, when these are far off or lead nowhere, from raw odometry.
+  SolveSummary result;
+  if (is_nearby(graph, reduced)) result = minimise();
+  if (result.termination != Termination::converged) {
+    reduced = graph.poses;
+    result = minimise();
+  }
   summary.termination = result.termination;
   summary.iterations = result.iterations;
   summary.initial_cost = result.initial_cost;
   summary.final_cost = result.final_cost;
-  if (is_usable(summary.termination)) place(reduced, summary);
+  if (!is_usable(summary.termination)) return summary;
+
+  internal::place(runs_, reduced, state_.odometry, poses_);
+  while (summary.polishing_steps < config_.polishing_steps &&
+         internal::polish(nodes, state_.odometry, graph, equations, poses_))
+    ++summary.polishing_steps;
+  for (std::size_t k = nodes.back(); k < state_.odometry.size(); ++k)
+    poses_[k + 1] = poses_[k] * state_.odometry[k].T_a_b;
   return summary;
-}
-
-/// From the last poses, or, when these are far off or lead nowhere, from raw odometry.
-SolveSummary OnboardSmoother::minimise(std::vector<Pose3>& reduced) {
-  const PoseGraph& graph = problem_->graph();
-  const auto minimise = [&] {
-    const SolverConfig solver{.max_iterations = config_.max_iterations,
-                              .relative_cost_tolerance = config_.relative_cost_tolerance};
-    return internal::minimise(*problem_, reduced, {}, solver, {.step_tolerance = kStepTolerance});
-  };
-  for (const std::size_t node : problem_->reduced().nodes) reduced.push_back(poses_[node]);
-  if (is_nearby(graph, reduced))
-    if (const auto result = minimise(); result.termination == Termination::converged) return result;
-  reduced = graph.poses;
-  return minimise();
-}
-
-/// A step on the full graph, unless it makes matters worse: where odometry knows little of some axes and much of
-/// others, Gauss-Newton can lead metres away from where it started.
-bool OnboardSmoother::polish() {
-  std::vector<Pose3> polished = poses_;
-  if (!internal::full_step(*problem_, state_.odometry, polished)) return false;
-  const double change = internal::full_cost_change(*problem_, state_.odometry, poses_, polished);
-  if (!(change < kCostTolerance)) return false;
-  poses_.swap(polished);
-  runs_->forget_bends();
-  return true;
-}
-
-/// Makes every pose of the chain follow the reduced nodes.
-void OnboardSmoother::place(const std::vector<Pose3>& reduced, SmootherSummary& summary) {
-  const std::size_t last = problem_->reduced().nodes.back();
-  const Pose3 last_before = poses_[last];
-  summary.bent_poses = runs_->place(reduced, state_.odometry, poses_);
-  for (int k = 0; k < config_.polishing_steps && polish(); ++k) ++summary.polishing_steps;
-  if (composed_from_ <= last) {
-    const Pose3 motion = poses_[last] * last_before.inverse();
-    for (std::size_t k = last + 1; k < poses_.size(); ++k) poses_[k] = motion * poses_[k];
-  } else {
-    for (std::size_t k = last; k < state_.odometry.size(); ++k) poses_[k + 1] = poses_[k] * state_.odometry[k].T_a_b;
-  }
-  composed_from_ = last;
 }
 
 }  // namespace tutti::estimation

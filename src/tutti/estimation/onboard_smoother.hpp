@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <vector>
 
 #include "tutti/base/config.hpp"
@@ -10,12 +9,6 @@
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti::estimation {
-
-namespace internal {
-class OdometryRuns;
-class ReducedProblem;
-struct ChainGraph;
-}  // namespace internal
 
 struct OnboardSmootherConfig {
   int max_iterations = 20;
@@ -48,11 +41,7 @@ struct SmootherSummary {
   int polishing_steps = 0;  ///< Taken: one that would raise the cost of the full graph is not.
   std::size_t reduced_nodes = 0;
   std::size_t reduced_edges = 0;
-  /// What had to be done again since the last solve: odometry steps compounded, inner poses bent (the others moved
-  /// rigidly), the sparsity analysed.
-  std::size_t compounded_steps = 0;
-  std::size_t bent_poses = 0;
-  bool analysed = false;
+  std::size_t compounded_steps = 0;  ///< Of odometry: those between nodes that the last solve did not have.
 };
 
 /// All that determines the estimate; enough to restore the smoother.
@@ -71,16 +60,12 @@ struct SmootherState {
 /// when the full graph's cost does not rise. docs/math.md derives it.
 ///
 /// Constraints hold, whatever their residual (docs/math.md says why). A solve starts from the last one's poses and
-/// keeps what did not change: compounds, sparsity, the shape of runs. The estimate is still a function of state(), to a
-/// tolerance: the same calls give the same bits; another history of calls, or a restored state, the same poses to 0.1
-/// mm (docs/math.md).
+/// keeps the compounds of runs that stayed. The estimate is still a function of state(), to a tolerance: the same calls
+/// give the same bits; another history of calls, or a restored state, the same poses to 0.1 mm (docs/math.md).
 class OnboardSmoother {
  public:
   explicit OnboardSmoother(const OnboardSmootherConfig& config = {}, const Pose3& first = {});
   OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state);
-  ~OnboardSmoother();
-  OnboardSmoother(OnboardSmoother&&) noexcept;
-  OnboardSmoother& operator=(OnboardSmoother&&) noexcept;
 
   /// Adds a node by odometry from the last one and returns its position; its pose is composed until solve().
   /// Its covariance must be positive definite.
@@ -97,20 +82,12 @@ class OnboardSmoother {
   [[nodiscard]] const Pose3& pose(std::size_t node) const { return poses_[node]; }
   [[nodiscard]] const std::vector<Pose3>& poses() const { return poses_; }  ///< T_map_body per node.
   [[nodiscard]] const SmootherState& state() const { return state_; }
-  /// Compounded runs kept, all there is besides a pose per node, state() and the reduced graph of the last solve.
-  [[nodiscard]] std::size_t stored_runs() const;
 
  private:
-  SolveSummary minimise(std::vector<Pose3>& reduced);
-  bool polish();
-  void place(const std::vector<Pose3>& reduced, SmootherSummary& summary);
-
   OnboardSmootherConfig config_;
   SmootherState state_;
   std::vector<Pose3> poses_;
-  std::unique_ptr<internal::OdometryRuns> runs_;
-  std::unique_ptr<internal::ReducedProblem> problem_;  ///< Of the last solve.
-  std::size_t composed_from_ = 0;                      ///< From here on, poses are raw odometry composed.
+  std::vector<PoseGraphEdge> runs_;  ///< Compounded odometry between the reduced nodes of the last solve.
 };
 
 }  // namespace tutti::estimation

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <algorithm>
+#include <utility>
 
 #include "tutti/estimation/testing/chain_mission.hpp"
 
@@ -76,7 +76,19 @@ TEST(OnboardSmootherUpdate, SameCallsSameBits) {
   EXPECT_EQ(live(Rng(3), m, {}, 10).poses(), live(Rng(3), m, {}, 10).poses());
 }
 
-TEST(OnboardSmootherUpdate, DoesAgainOnlyWhatChanged) {
+RC_GTEST_PROP(OnboardSmootherUpdate, TheOrderOfConstraintsDoesNotMatter, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  auto m = mission(rng, 300, 25);
+  const OnboardSmootherConfig config{.polishing_steps = rng.bernoulli(0.5) ? 1 : 0};
+  auto ordered = smoother_of(m, config);
+  for (std::size_t k = m.constraints.size(); k > 1; --k) std::swap(m.constraints[k - 1], m.constraints[rng.index(k)]);
+  auto shuffled = smoother_of(m, config);
+  RC_ASSERT(is_usable(ordered.solve().termination));
+  RC_ASSERT(is_usable(shuffled.solve().termination));
+  RC_ASSERT(largest_position_difference(ordered.poses(), shuffled.poses()) < 1e-6);
+}
+
+TEST(OnboardSmootherUpdate, CompoundsOnlyWhatChanged) {
   Rng rng(5);
   auto m = mission(rng, 4000, 0);
   const auto link = [&](std::size_t a, std::size_t b) {
@@ -85,36 +97,17 @@ TEST(OnboardSmootherUpdate, DoesAgainOnlyWhatChanged) {
   };
   for (std::size_t k = 0; k < 3600; k += 100) link(k, k + 100);
   auto smoother = smoother_of(m);
-  const auto first = smoother.solve();
-  EXPECT_TRUE(first.analysed);
-  EXPECT_EQ(first.compounded_steps, 3600U);
-  EXPECT_EQ(first.bent_poses, 3600U - 36U);
-
+  EXPECT_EQ(smoother.solve().compounded_steps, 3600U);
   const auto again = smoother.solve();
-  EXPECT_FALSE(again.analysed);
   EXPECT_EQ(again.compounded_steps, 0U);
-  EXPECT_EQ(again.bent_poses, 0U);
   EXPECT_EQ(again.iterations, 1);
-
-  // A measurement changes: a chain of links is bent there alone, all behind follows rigidly.
   auto& T = m.constraints[17].measurement.T_a_b;
   T = retract(T, random_tangent(rng, 2e-3, 1e-3));
   smoother.set_constraints(m.constraints);
-  const auto replaced = smoother.solve();
-  EXPECT_FALSE(replaced.analysed);
-  EXPECT_EQ(replaced.compounded_steps, 0U);
-  EXPECT_EQ(replaced.bent_poses, 99U);
-
+  EXPECT_EQ(smoother.solve().compounded_steps, 0U);
   link(1010, 1950);  // splits two runs
   smoother.set_constraints(m.constraints);
-  const auto added = smoother.solve();
-  EXPECT_TRUE(added.analysed);
-  EXPECT_EQ(added.compounded_steps, 200U);
-  EXPECT_LE(added.bent_poses, 1000U);
-
-  OnboardSmoother restored({}, smoother.state());
-  restored.solve();
-  EXPECT_LT(largest_position_difference(smoother.poses(), restored.poses()), 1e-4);
+  EXPECT_EQ(smoother.solve().compounded_steps, 200U);
 }
 
 /// A robot drives on for months: what is kept is bounded by the constraints that stand now.
@@ -129,14 +122,12 @@ TEST(OnboardSmootherUpdate, NothingGrowsWithTheNumberOfUpdates) {
     const auto summary = smoother.solve();
     ASSERT_TRUE(is_usable(summary.termination));
     EXPECT_LE(summary.reduced_nodes, 2 * constraints.size() + 1);
-    EXPECT_EQ(smoother.stored_runs(), summary.reduced_nodes - 1);
-    EXPECT_LE(summary.reduced_edges, smoother.stored_runs() + constraints.size());
+    EXPECT_LE(summary.reduced_edges, summary.reduced_nodes - 1 + constraints.size());
   }
   EXPECT_EQ(smoother.state().odometry.size(), 800U);
   EXPECT_EQ(smoother.poses().size(), 801U);
   smoother.set_constraints({});
-  smoother.solve();
-  EXPECT_EQ(smoother.stored_runs(), 0U);
+  EXPECT_EQ(smoother.solve().reduced_nodes, 1U);
 }
 
 /// From a map bent by nonsense, withdrawing it must lead back to where a fresh start leads.

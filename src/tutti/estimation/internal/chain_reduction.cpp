@@ -36,9 +36,9 @@ std::vector<Passage> passages(const PoseGraph& graph, std::span<const EdgeRole> 
   return nodes;
 }
 
-Matrix6d inverse(const Matrix6d& m) { return m.llt().solve(Matrix6d::Identity()); }
-
-RelativePose step_of(const PoseGraphEdge& edge) { return {edge.T_from_to, inverse(edge.information)}; }
+RelativePose step_of(const PoseGraphEdge& edge) {
+  return {edge.T_from_to, edge.information.llt().solve(Matrix6d::Identity())};
+}
 
 }  // namespace
 
@@ -72,11 +72,7 @@ ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> rol
       run.steps.push_back(nodes[end].out);
       steps.push_back(step_of(graph.edges[run.steps.back()]));
     }
-    const RunSum sum = sum_odometry(steps);
-    const Matrix6d to_end = adjoint(sum.T_a_b.inverse());
-    const Matrix6d information = inverse(to_end * sum.covariance * to_end.transpose());
-    out.graph.edges.push_back(
-        {position[edge.from], position[end], sum.T_a_b, 0.5 * (information + information.transpose())});
+    out.graph.edges.push_back(as_edge(sum_odometry(steps), position[edge.from], position[end]));
     out.roles.push_back(EdgeRole::trusted);
     out.runs.push_back(std::move(run));
   }
@@ -90,13 +86,11 @@ void expand_chains(const PoseGraph& graph, const ReducedGraph& reduced, std::spa
   std::vector<Pose3> run_poses;
   for (const auto& run : reduced.runs) {
     const PoseGraphEdge& compound = reduced.graph.edges[run.edge];
-    const Pose3& begin = reduced_poses[compound.from];
-    const Vector6d closing = local(begin * compound.T_from_to, reduced_poses[compound.to]);
-    const Vector6d lambda = adjoint(compound.T_from_to.inverse()).transpose() * (compound.information * closing);
     steps.clear();
     for (const std::size_t e : run.steps) steps.push_back(step_of(graph.edges[e]));
-    run_poses.assign(steps.size() + 1, begin);
-    distribute_odometry(steps, run_poses, lambda);
+    run_poses.assign(steps.size() + 1, reduced_poses[compound.from]);
+    run_poses.back() = reduced_poses[compound.to];
+    distribute_odometry(steps, compound, run_poses);
     for (std::size_t k = 1; k < steps.size(); ++k) poses[graph.edges[run.steps[k]].from] = run_poses[k];
   }
 }

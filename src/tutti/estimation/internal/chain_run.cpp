@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/internal/chain_run.hpp"
 
+#include <Eigen/Cholesky>
+
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::estimation::internal {
@@ -113,11 +115,24 @@ RunSum sum_about(std::span<const RelativePose> steps, std::span<const Pose3> pos
   return sum;
 }
 
-void distribute_about(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& zeta_a,
-                      const Vector6d& lambda) {
+PoseGraphEdge as_edge(const RunSum& run, std::size_t from, std::size_t to) {
+  // At b, the run says delta_b - Ad(T_a_b^-1) delta_a = at_b. Of an edge measured as below, the residual is J_b times
+  // -at_b and J_a = -J_b Ad(T_a_b^-1), with J_b = diag(Exp(-at_b), Jr^-1(-at_b)) of the rotation's part.
+  const Vector6d at_b = adjoint(run.T_a_b.inverse()) * run.offset;
+  Matrix6d J_b_inverse = Matrix6d::Zero();
+  J_b_inverse.topLeftCorner<3, 3>() = so3_exp(at_b.tail<3>()).toRotationMatrix();
+  J_b_inverse.bottomRightCorner<3, 3>() = so3_right_jacobian(-at_b.tail<3>());
+  Matrix6d whitened = adjoint(run.T_a_b) * J_b_inverse;
+  run.covariance.llt().matrixL().solveInPlace(whitened);
+  return {from, to, retract(run.T_a_b, at_b), whitened.transpose() * whitened};
+}
+
+void distribute_about(std::span<const RelativePose> steps, const RunSum& run, const Vector6d& delta_a,
+                      const Vector6d& delta_b, std::span<Pose3> poses) {
+  const Vector6d lambda = run.covariance.llt().solve(adjoint(run.T_a_b) * delta_b - delta_a - run.offset);
   const Pose3 T_w_a = poses.front();
   Pose3 previous = poses.front();
-  Vector6d zeta = zeta_a;
+  Vector6d zeta = delta_a;
   for (std::size_t k = 0; k + 1 < steps.size(); ++k) {
     Pose3& pose = poses[k + 1];
     const LinearStep step = linearise(steps[k], T_w_a, previous, pose);
@@ -127,8 +142,10 @@ void distribute_about(std::span<const RelativePose> steps, std::span<Pose3> pose
   }
 }
 
-void distribute_odometry(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& lambda) {
+void distribute_odometry(std::span<const RelativePose> steps, const PoseGraphEdge& run, std::span<Pose3> poses) {
   const Pose3 T_w_a = poses.front();
+  const Vector6d closing = local(T_w_a * run.T_from_to, poses.back());
+  const Vector6d lambda = adjoint(run.T_from_to.inverse()).transpose() * (run.information * closing);
   const Matrix3d R_w_a = T_w_a.rotation.toRotationMatrix();
   const Vector3d lambda_t = lambda.head<3>();
   const Vector3d lambda_r = lambda.tail<3>();

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <span>
 
+#include "tutti/model/pose_graph.hpp"
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti::estimation::internal {
@@ -24,13 +26,17 @@ RunSum sum_odometry(std::span<const RelativePose> steps);
 /// About given poses (one more than steps).
 RunSum sum_about(std::span<const RelativePose> steps, std::span<const Pose3> poses);
 
-/// The most likely inner perturbations given those of both ends, delta_a and delta_b (tangent of a, see above):
-/// zeta_k follows w_k = Q'_k Ad(C_k)^T lambda with lambda = covariance^-1 (zeta_b - zeta_a - offset). Applies them to
-/// poses 1..m-1 in place; the ends are left to the caller.
-/// `zeta_a`, `lambda` in the tangent of a.
-void distribute_about(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& zeta_a,
-                      const Vector6d& lambda);
-/// The same for raw odometry composed from the pose poses[0] on (zeta_a = 0); writes poses 1..m-1.
-void distribute_odometry(std::span<const RelativePose> steps, std::span<Pose3> poses, const Vector6d& lambda);
+/// The run as the edge of a pose graph: residual, gradient and Hessian of that edge, linearised at T_a_b, are the
+/// run's.
+PoseGraphEdge as_edge(const RunSum& run, std::size_t from, std::size_t to);
+
+/// The most likely inner perturbations given those of both ends, delta_a and delta_b, each in its own tangent: zeta_k
+/// follows w_k = Q'_k Ad(C_k)^T lambda with lambda = covariance^-1 (zeta_b - zeta_a - offset). Applies them to poses
+/// 1..m-1 in place; the ends are left to the caller.
+void distribute_about(std::span<const RelativePose> steps, const RunSum& run, const Vector6d& delta_a,
+                      const Vector6d& delta_b, std::span<Pose3> poses);
+/// The same for raw odometry, `run` being as_edge(sum_odometry(steps)): bent to meet the poses of both ends, the first
+/// and the last of `poses`; writes those between.
+void distribute_odometry(std::span<const RelativePose> steps, const PoseGraphEdge& run, std::span<Pose3> poses);
 
 }  // namespace tutti::estimation::internal

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/testing/random_graphs.hpp"
 
 namespace tutti::estimation::internal {
@@ -29,11 +30,6 @@ Run any_run(Rng& rng) {
   return run;
 }
 
-/// The multiplier that closes a gap of about this size in the tangent of the run's begin.
-Vector6d closing(Rng& rng, const RunSum& sum, double size) {
-  return sum.covariance.llt().solve(random_tangent(rng, size, size));
-}
-
 RC_GTEST_PROP(ChainRun, SumsAboutRawOdometryAgree, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   const Run run = any_run(rng);
@@ -48,29 +44,51 @@ RC_GTEST_PROP(ChainRun, SumsAboutRawOdometryAgree, ()) {
 RC_GTEST_PROP(ChainRun, BendingRawOdometryIsBendingAboutIt, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   const Run run = any_run(rng);
-  const Vector6d lambda = closing(rng, sum_odometry(run.steps), std::pow(10.0, rng.uniform(-6.0, 0.0)));
+  const double size = std::pow(10.0, rng.uniform(-6.0, 0.0));
+  const Vector6d gap = random_tangent(rng, size, size);
   std::vector<Pose3> raw = run.poses;
+  raw.back() = retract(raw.back(), gap);
   std::vector<Pose3> about = run.poses;
-  distribute_odometry(run.steps, raw, lambda);
-  distribute_about(run.steps, about, Vector6d::Zero(), lambda);
-  RC_ASSERT(largest_position_difference(raw, about) < 1e-9);
-  RC_ASSERT(largest_rotation_difference(raw, about) < 1e-9);
+  const RunSum sum = sum_odometry(run.steps);
+  distribute_odometry(run.steps, as_edge(sum, 0, 1), raw);
+  distribute_about(run.steps, sum, Vector6d::Zero(), gap, about);
+  about.back() = raw.back();  // left to the caller
+  RC_ASSERT(largest_position_difference(raw, about) < 1e-7 * (1.0 + size * run.poses.back().translation.norm()));
+  RC_ASSERT(largest_rotation_difference(raw, about) < 1e-7);
 }
 
 /// The steps share the gap: carried on to the last step, the bend arrives where the gap closes.
 RC_GTEST_PROP(ChainRun, TheBendClosesTheGap, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   Run run = any_run(rng);
-  const Vector6d gap = random_tangent(rng, 1e-3, 1e-3);
   run.steps.push_back({Pose3{}, Matrix6d::Zero()});  // a step without uncertainty: its begin moves as the end does
   run.poses.push_back(run.poses.back());
-  const Vector6d lambda = sum_odometry(run.steps).covariance.llt().solve(gap);
+  const Vector6d gap = random_tangent(rng, 1e-3, 1e-3);
   std::vector<Pose3> bent = run.poses;
-  distribute_odometry(run.steps, bent, lambda);
+  bent.back() = retract(bent.back(), gap);
+  distribute_odometry(run.steps, as_edge(sum_odometry(run.steps), 0, 1), bent);
   const std::size_t last = bent.size() - 2;
-  const Pose3 T_a_last = run.poses.front().inverse() * run.poses[last];
-  const Vector6d moved = adjoint(T_a_last) * local(run.poses[last], bent[last]);
-  RC_ASSERT((moved - gap).norm() < 1e-9);
+  RC_ASSERT((local(run.poses[last], bent[last]) - gap).norm() < 1e-8);
+}
+
+/// Linearised where the run is, the edge has its gradient and its Hessian.
+RC_GTEST_PROP(ChainRun, AsAnEdgeItIsTheSame, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  Run run = any_run(rng);
+  for (Pose3& pose : run.poses) pose = retract(pose, random_tangent(rng, 0.05, 0.05));
+  const RunSum sum = sum_about(run.steps, run.poses);
+  const PoseGraphEdge edge = as_edge(sum, 3, 7);
+  const auto linear = linearise_between(run.poses.front(), run.poses.back(), edge.T_from_to);
+  const Matrix6d W = sum.covariance.llt().solve(Matrix6d::Identity());
+  const Matrix6d A = adjoint(sum.T_a_b);  // the run's Jacobians are -1 and A, its residual -offset
+  const Vector6d force = edge.information * linear.residual;
+  const auto near = [](const auto& a, const auto& b) { return (a - b).norm() < 1e-8 * (1.0 + b.norm()); };
+  RC_ASSERT(edge.from == 3U && edge.to == 7U);
+  RC_ASSERT(near(Matrix6d(linear.J_i.transpose() * edge.information * linear.J_i), W));
+  RC_ASSERT(near(Matrix6d(linear.J_j.transpose() * edge.information * linear.J_j), Matrix6d(A.transpose() * W * A)));
+  RC_ASSERT(near(Matrix6d(linear.J_i.transpose() * edge.information * linear.J_j), Matrix6d(-W * A)));
+  RC_ASSERT(near(Vector6d(linear.J_i.transpose() * force), Vector6d(W * sum.offset)));
+  RC_ASSERT(near(Vector6d(linear.J_j.transpose() * force), Vector6d(-A.transpose() * W * sum.offset)));
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ struct Tried {
   double cost;
 };
 /// Halves the step until it costs at most `most`, or for the last time; `candidate`: the poses after it.
-Tried search_line(NormalEquations& equations, const std::vector<Pose3>& poses, const Eigen::VectorXd& step,
+Tried search_line(GraphEquations& equations, const std::vector<Pose3>& poses, const Eigen::VectorXd& step,
                   const EdgeCosts& costs, double most, int max_halvings, std::vector<Pose3>& candidate) {
   for (Tried tried{.scale = 1.0, .cost = 0.0};; tried.scale *= 0.5) {
     for (std::size_t i = 0; i < poses.size(); ++i)
@@ -53,8 +53,9 @@ Tried search_line(NormalEquations& equations, const std::vector<Pose3>& poses, c
 
 }  // namespace
 
-SolveSummary minimise(NormalEquations& equations, std::vector<Pose3>& poses, const EdgeCosts& costs,
-                      const SolverConfig& config, const Continuation& how) {
+SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, const EdgeCosts& costs,
+                      const SolverConfig& config, double step_tolerance) {
+  const bool limits_step = std::isfinite(step_tolerance);
   SolveSummary summary{.components = equations.components()};
   summary.initial_cost = summary.final_cost = equations.cost(poses, costs);
   summary.termination = Termination::max_iterations;
@@ -80,20 +81,20 @@ SolveSummary minimise(NormalEquations& equations, std::vector<Pose3>& poses, con
     const double relative = decrease / (summary.final_cost + kCostFloor);
     const double size = step.size() > 0 ? step.lpNorm<Eigen::Infinity>() : 0.0;
     if (reuse_factor && (decrease > kReuseContraction * previous_decrease ||
-                         (how.limits_step() && size > kReuseStepContraction * previous_size))) {
+                         (limits_step && size > kReuseStepContraction * previous_size))) {
       reuse_factor = false;
       continue;
     }
     ++summary.iterations;
     summary.gradient_norm = gradient.size() > 0 ? gradient.lpNorm<Eigen::Infinity>() : 0.0;
 
-    const double cost_to_go = how.limits_step() ? still_to_go(decrease, previous_decrease) : decrease;
+    const double cost_to_go = limits_step ? still_to_go(decrease, previous_decrease) : decrease;
     const bool converged = cost_to_go <= config.relative_cost_tolerance * (summary.final_cost + kCostFloor) &&
-                           still_to_go(size, previous_size) <= how.step_tolerance;
+                           still_to_go(size, previous_size) <= step_tolerance;
     previous_decrease = decrease;
     previous_size = size;
     // A step that is asked for by its size may promise less than the cost's rounding.
-    const double most = summary.final_cost * (relative <= kRounding && how.limits_step() ? 1.0 + kRounding : 1.0);
+    const double most = summary.final_cost * (relative <= kRounding && limits_step ? 1.0 + kRounding : 1.0);
     const auto [scale, new_cost] =
         search_line(equations, poses, step, costs, most, config.max_step_halvings, candidate);
     if (!(new_cost <= most)) {  // not by more than rounding, when converged
@@ -107,7 +108,7 @@ SolveSummary minimise(NormalEquations& equations, std::vector<Pose3>& poses, con
       summary.termination = Termination::converged;
       break;
     }
-    reuse_factor = scale == 1.0 && relative < kReuseBelow && !(how.limits_step() && size > kReuseStepBelow);
+    reuse_factor = scale == 1.0 && relative < kReuseBelow && !(limits_step && size > kReuseStepBelow);
   }
   return summary;
 }
