@@ -10,7 +10,6 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
-#include "tutti/model/imu_sample.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 
@@ -42,7 +41,6 @@ struct Recording {
   std::vector<Matrix6d> increment_covariance;  ///< Of odometry k -> k + 1; one fewer than odometry.
   Trajectory reference;                     ///< T_reference_body, one frame for all robots; empty when there is none.
   std::shared_ptr<const ScanSource> scans;  ///< Null when there is no range sensor.
-  std::vector<ImuSample> imu;               ///< Empty when there is no inertial sensor.
   std::vector<DriftOrigin> drift_origins;   ///< In time order; empty when unknown.
 };
 

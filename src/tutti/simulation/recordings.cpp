@@ -10,8 +10,6 @@
 namespace tutti::simulation {
 namespace {
 
-constexpr double kMostImuSamples = 5e7;
-
 std::string name_of(const SimulationConfig& config, std::size_t i) {
   constexpr std::array kNames = {"alpha", "bravo", "charlie", "delta", "echo", "foxtrot", "golf", "hotel"};
   if (!config.robots[i].name.empty()) return config.robots[i].name;
@@ -32,12 +30,6 @@ Status check_robots(const SimulationConfig& config, const CorridorWorld& network
       return fail(ErrorCode::configuration, "simulation.robots.{}: name '{}' is taken", i, name);
     if (auto ok = check_walk(network, config.robots[i].walk, given_start(config.robots[i])); !ok)
       return in_context("robot " + name, ok.error());
-    const ImuConfig& imu = config.robots[i].imu;
-    const double samples = imu.enabled ? config.robots[i].walk.duration_s * imu.rate_hz : 0.0;
-    if (samples > kMostImuSamples)
-      return fail(ErrorCode::configuration,
-                  "robot {}: walk.duration_s {} at imu.rate_hz {} makes {:.3g} samples, expected at most {:g}", name,
-                  config.robots[i].walk.duration_s, imu.rate_hz, samples, kMostImuSamples);
   }
   return {};
 }
@@ -51,7 +43,6 @@ Recording simulate_robot(const SimulatedRobotConfig& config, const CorridorWorld
   recording.odometry = std::move(simulated.odometry);
   recording.increment_covariance = std::move(simulated.increment_covariance);
   recording.drift_origins = std::move(simulated.drift_origins);
-  if (config.imu.enabled) recording.imu = simulate_imu(recording.reference, config.imu, rng.fork("imu"));
   return recording;
 }
 

@@ -12,7 +12,6 @@
 #include "tutti/model/recording.hpp"
 #include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/corridor_world.hpp"
-#include "tutti/simulation/imu.hpp"
 #include "tutti/simulation/lidar.hpp"
 #include "tutti/simulation/odometry.hpp"
 #include "tutti/simulation/surface.hpp"
@@ -27,7 +26,6 @@ struct SimulatedRobotConfig {
   std::optional<int> start_junction;
   WalkConfig walk;
   OdometryNoiseConfig odometry;
-  ImuConfig imu;
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name; empty: alpha, bravo, ... by place in the list.");
@@ -35,7 +33,6 @@ struct SimulatedRobotConfig {
     v.field("start_junction", start_junction, at_least(0.0), "Where it starts; none: far from the others.");
     v.field("walk", walk, any(), "How it walks.");
     v.field("odometry", odometry, any(), "Errors of its odometry.");
-    v.field("imu", imu, any(), "Its inertial sensor.");
   }
 };
 

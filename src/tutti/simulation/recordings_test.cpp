@@ -39,15 +39,11 @@ TEST(SimulateRecordings, StartsWhereAndWhenItIsTold) {
   SimulationConfig config = short_walks(2);
   config.robots[1].start_s = 12.5;
   config.robots[1].start_junction = 7;
-  config.robots[1].imu.enabled = true;
   const auto world = simulate_recordings(config, {1000}, 3);
   ASSERT_TRUE(world.has_value());
   const Recording& late = world->recordings[1];
   EXPECT_EQ(late.reference.front().stamp, Timestamp{1000} + 12.5);
   EXPECT_LT((late.reference.front().pose.translation - world->network.junctions[7]).norm(), 0.1);
-  EXPECT_EQ(late.imu.size(), 20U * 200U + 1U);
-  EXPECT_EQ(late.imu.front().stamp, late.reference.front().stamp);
-  EXPECT_TRUE(world->recordings[0].imu.empty());
 }
 
 TEST(SimulateRecordings, LidarSeesTheWallsOfOneSharedWorld) {
@@ -91,7 +87,7 @@ TEST(SimulateRecordings, WhatTheWorldHasNotIsAClearError) {
 TEST(SimulateRecordings, SettingsThatCannotBeComputedAreRefused) {
   for (const std::string setting :
        {"robots: [{walk: {duration_s: .inf}}]", "robots: [{walk: {rate_hz: 1e9}}]", "robots: [{start_s: .inf}]",
-        "robots: [{walk: {length_m: .inf}}]", "robots: [{walk: {lookahead_m: 0}}]", "robots: [{imu: {rate_hz: .inf}}]",
+        "robots: [{walk: {length_m: .inf}}]", "robots: [{walk: {lookahead_m: 0}}]",
         "robots: [{odometry: {slip_m: .inf}}]", "world: {network: {block_m: 0.001}}", "world: {roof_length_m: .inf}",
         "surface: {width_m: .inf}", "surface: {doors_per_100m: .inf}", "lidar: {max_range_m: .inf}"}) {
     const auto node = parse_yaml(setting, "simulation");
@@ -102,10 +98,6 @@ TEST(SimulateRecordings, SettingsThatCannotBeComputedAreRefused) {
     EXPECT_NE(ok.error().message.find("must be in"), std::string::npos) << ok.error().message;
   }
   SimulationConfig config = short_walks(1);
-  config.robots[0].imu = {.enabled = true, .rate_hz = 1e4};
-  config.robots[0].walk.duration_s = 86400.0;
-  EXPECT_NE(problem_with(config).find("8.64e+08 samples"), std::string::npos) << problem_with(config);
-  config = short_walks(1);
   config.sensors = "lidar";
   config.world.network.rows = config.world.network.columns = 20;
   config.surface.cell_m = 0.05;
