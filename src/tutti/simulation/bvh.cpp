@@ -13,9 +13,7 @@
 namespace tutti::simulation {
 namespace {
 
-constexpr int kBins = 16;
-constexpr int kMaxDepth = 48;  ///< Below, ranges are halved, so that a stack of kStack is enough.
-constexpr int kStack = 256;
+constexpr int kStack = 256;  ///< Ranges are halved, so that this is enough.
 constexpr float kFar = std::numeric_limits<float>::infinity();
 constexpr float kSlack = 1.000002F;  ///< A few ulp: rounding may shrink a flat box's slab to less than nothing.
 constexpr float kEdge = 1e-5F;       ///< Of a triangle's size.
@@ -40,51 +38,6 @@ struct Item {
   [[nodiscard]] Eigen::Array3f centre() const { return 0.5F * (box.low + box.high); }
 };
 
-struct Split {
-  int axis = -1;
-  int bin = 0;  ///< Items of bins up to this one go left.
-  float cost = kFar;
-};
-
-int bin_of(float centre, float low, float scale) {
-  return std::clamp(static_cast<int>((centre - low) * scale), 0, kBins - 1);
-}
-
-/// Triangles are tested four at a time: what they cost.
-float packets(std::uint32_t count) { return static_cast<float>((count + 3) / 4); }
-
-Split best_split(const Item* items, std::uint32_t count, const Box& centres, int axis) {
-  const float extent = centres.high[axis] - centres.low[axis];
-  if (!(extent > 0.0F)) return {};
-  const float scale = static_cast<float>(kBins) / extent;
-  std::array<Box, kBins> boxes;
-  std::array<std::uint32_t, kBins> counts{};
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto bin = static_cast<std::size_t>(bin_of(items[i].centre()[axis], centres.low[axis], scale));
-    boxes[bin].add(items[i].box);
-    ++counts[bin];
-  }
-  std::array<float, kBins> right_cost{};
-  Box right;
-  std::uint32_t right_count = 0;
-  for (std::size_t bin = kBins - 1; bin > 0; --bin) {
-    right.add(boxes[bin]);
-    right_count += counts[bin];
-    right_cost[bin] = right_count == 0 ? 0.0F : right.half_area() * packets(right_count);
-  }
-  Split best;
-  Box left;
-  std::uint32_t left_count = 0;
-  for (std::size_t bin = 0; bin + 1 < kBins; ++bin) {
-    left.add(boxes[bin]);
-    left_count += counts[bin];
-    if (left_count == 0 || left_count == count) continue;
-    const float cost = left.half_area() * packets(left_count) + right_cost[bin + 1];
-    if (cost < best.cost) best = {axis, static_cast<int>(bin), cost};
-  }
-  return best;
-}
-
 }  // namespace
 
 struct Bvh::Builder {
@@ -106,33 +59,28 @@ struct Bvh::Builder {
     return out;
   }
 
-  /// Reorders the items of a range and says where its second part begins.
-  std::uint32_t partition(const Range& range, int depth) {
+  /// Reorders the items of a range and says where its second half begins: half of the packets' triangles, by where
+  /// their centres lie along the axis on which these spread most.
+  std::uint32_t halve(const Range& range) {
     Box centres;
     for (std::uint32_t i = range.begin; i < range.end; ++i) centres.add({items[i].centre(), items[i].centre()});
-    Split best;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Split split = best_split(items.data() + range.begin, range.size(), centres, axis);
-      if (split.cost < best.cost) best = split;
-    }
-    if (best.axis < 0 || depth > kMaxDepth) return range.begin + range.size() / 2;
-    const float low = centres.low[best.axis];
-    const float scale = static_cast<float>(kBins) / (centres.high[best.axis] - low);
-    const auto middle = std::partition(items.begin() + range.begin, items.begin() + range.end, [&](const Item& item) {
-      return bin_of(item.centre()[best.axis], low, scale) <= best.bin;
-    });
-    return static_cast<std::uint32_t>(middle - items.begin());
+    int axis = 0;
+    (centres.high - centres.low).maxCoeff(&axis);
+    const std::uint32_t middle = range.begin + (range.size() / 2 + kWidth - 1) / kWidth * kWidth;
+    std::nth_element(items.begin() + range.begin, items.begin() + middle, items.begin() + range.end,
+                     [axis](const Item& a, const Item& b) { return a.centre()[axis] < b.centre()[axis]; });
+    return middle;
   }
 
   /// Index of the node of a range.
-  std::int32_t build(const Range& whole, int depth) {
+  std::int32_t build(const Range& whole) {
     std::array<Range, kWidth> parts{whole};
     std::size_t count = 1;
     while (count < kWidth) {
       const auto largest = std::max_element(parts.begin(), parts.begin() + count,
                                             [](const Range& a, const Range& b) { return a.weight() < b.weight(); });
       if (largest->size() <= kWidth) break;
-      const std::uint32_t middle = partition(*largest, depth);
+      const std::uint32_t middle = halve(*largest);
       parts[count++] = range(middle, largest->end);
       *largest = range(largest->begin, middle);
     }
@@ -140,7 +88,7 @@ struct Bvh::Builder {
     bvh.nodes_.emplace_back();
     for (std::size_t i = 0; i < kWidth; ++i) {
       const bool leaf = parts[i].size() <= kWidth;
-      const std::int32_t child = i >= count ? 0 : leaf ? pack(parts[i]) : build(parts[i], depth + 1);
+      const std::int32_t child = i >= count ? 0 : leaf ? pack(parts[i]) : build(parts[i]);
       Node& node = bvh.nodes_[static_cast<std::size_t>(at)];
       node.children[i] = child;
       for (int axis = 0; axis < 3; ++axis) {
@@ -186,7 +134,7 @@ Bvh::Bvh(const TriangleMesh& mesh) : place_(mesh.triangles.size()) {
   }
   nodes_.reserve(count / 4 + 1);
   packets_.reserve(count / 2 + 1);
-  builder.build(builder.range(0, count), 0);
+  builder.build(builder.range(0, count));
 }
 
 /// A ray and the nearest hit so far. Comparisons are written so that a NaN (0 * infinity, where a ray runs within the

@@ -16,9 +16,8 @@ struct RayHit {
   std::uint32_t triangle = 0;
 };
 
-/// Closest-hit ray casting: bounding volume hierarchy by the binned surface area heuristic (Wald, "On fast Construction
-/// of SAH-based Bounding Volume Hierarchies", 2007), triangles by Moeller and Trumbore (1997). Single precision,
-/// immutable, safe to use from several threads.
+/// Closest-hit ray casting: bounding volume hierarchy split at the median, triangles by Moeller and Trumbore (1997).
+/// Single precision, immutable, safe to use from several threads.
 class Bvh {
  public:
   explicit Bvh(const TriangleMesh& mesh);
