@@ -9,28 +9,10 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/pose_at.hpp"
 
 namespace tutti::simulation {
 namespace {
-
-/// Poses between the samples of a trajectory, asked for in any order but found fastest in increasing time.
-class PoseAt {
- public:
-  PoseAt(const Trajectory& trajectory, Timestamp from)
-      : trajectory_(trajectory),
-        next_(std::ranges::upper_bound(trajectory, from, {}, &StampedPose::stamp) - trajectory.begin()) {}
-
-  Pose3 operator()(Timestamp stamp) {
-    while (next_ + 1 < std::ssize(trajectory_) && trajectory_[next_].stamp < stamp) ++next_;
-    const StampedPose& a = trajectory_[next_ - 1];
-    const StampedPose& b = trajectory_[next_];
-    return interpolate(a.pose, b.pose, (stamp - a.stamp) / (b.stamp - a.stamp));
-  }
-
- private:
-  const Trajectory& trajectory_;
-  std::ptrdiff_t next_;
-};
 
 /// Unit directions of all beams at azimuth 0 (ahead), sensor frame.
 std::vector<Eigen::Vector3d> beam_directions(const LidarConfig& config) {
@@ -69,11 +51,10 @@ std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, 
   const Eigen::Vector3d mount(0.0, 0.0, config.mount_height_m);
   auto cloud = std::make_shared<PointCloud>();
   auto ages = std::make_shared<std::vector<float>>();
-  PoseAt pose_at(truth, begin);
   for (std::size_t i = 0; i < firings; ++i) {
     const double share = static_cast<double>(i + 1) / static_cast<double>(firings);  // The last one fires at `end`.
     const double age_s = (1.0 - share) * turn_s;
-    const Pose3 T_reference_body = pose_at(end - age_s);
+    const Pose3 T_reference_body = *pose_at(truth, end - age_s);
     const Eigen::Matrix3d R_reference_body = T_reference_body.rotation.toRotationMatrix();
     const Eigen::Vector3f origin = (T_reference_body * mount).cast<float>();
     const double azimuth = std::numbers::pi * (1.0 - 2.0 * share);

@@ -10,6 +10,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/pose_at.hpp"
 
 namespace tutti::simulation {
 namespace {
@@ -84,15 +85,7 @@ ReferenceClosures::ReferenceClosures(std::map<RobotId, Trajectory> reference, co
 std::optional<Pose3> ReferenceClosures::pose_at(RobotId robot, Timestamp stamp) const {
   const auto found = reference_.find(robot);
   if (found == reference_.end()) return std::nullopt;
-  const Trajectory& trajectory = found->second;
-  const auto after = std::ranges::lower_bound(trajectory, stamp, {}, &StampedPose::stamp);
-  if (after == trajectory.end()) return std::nullopt;
-  if (after->stamp == stamp) return after->pose;
-  if (after == trajectory.begin()) return std::nullopt;
-  const auto before = std::prev(after);
-  const double gap = after->stamp - before->stamp;
-  if (gap > config_.max_reference_gap_s) return std::nullopt;
-  return interpolate(before->pose, after->pose, (stamp - before->stamp) / gap);
+  return tutti::pose_at(found->second, stamp, config_.max_reference_gap_s);
 }
 
 std::optional<Pose3> ReferenceClosures::true_relative_pose(RobotId robot_a, Timestamp stamp_a, RobotId robot_b,

@@ -6,17 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/model/pose_at.hpp"
+
 namespace tutti::lidar {
 namespace {
-
-/// Pose at a time between the first and the last sample.
-Pose3 pose_at(std::span<const StampedPose> samples, Timestamp stamp) {
-  const auto after = std::lower_bound(samples.begin(), samples.end(), stamp,
-                                      [](const StampedPose& sample, Timestamp t) { return sample.stamp < t; });
-  if (after->stamp == stamp) return after->pose;
-  const auto before = after - 1;
-  return interpolate(before->pose, after->pose, (stamp - before->stamp) / (after->stamp - before->stamp));
-}
 
 Status check_sweep(const Scan& scan, std::span<const StampedPose> samples) {
   if (!scan.cloud) return fail(ErrorCode::invalid, "scan at {} ns has no cloud", scan.stamp.ns);
@@ -41,7 +34,7 @@ Status check_sweep(const Scan& scan, std::span<const StampedPose> samples) {
 Result<Scan> undistort(const Scan& scan, std::span<const StampedPose> T_odom_body) {
   if (auto ok = check_sweep(scan, T_odom_body); !ok) return tl::unexpected(ok.error());
   if (!scan.age_s || scan.age_s->empty()) return Scan{scan.stamp, scan.cloud, nullptr};
-  const Pose3 T_end_odom = pose_at(T_odom_body, scan.stamp).inverse();
+  const Pose3 T_end_odom = pose_at(T_odom_body, scan.stamp)->inverse();
   auto cloud = std::make_shared<PointCloud>();
   cloud->points.reserve(scan.cloud->points.size());
   // All beams fire together, so many points in a row share their age.
@@ -53,7 +46,7 @@ Result<Scan> undistort(const Scan& scan, std::span<const StampedPose> T_odom_bod
       age_s = (*scan.age_s)[i];
       const Timestamp then =
           std::clamp(scan.stamp - double{age_s}, T_odom_body.front().stamp, T_odom_body.back().stamp);
-      const Pose3 T_end_then = T_end_odom * pose_at(T_odom_body, then);
+      const Pose3 T_end_then = T_end_odom * *pose_at(T_odom_body, then);
       R_end_then = T_end_then.rotation.toRotationMatrix().cast<float>();
       t_end_then = T_end_then.translation.cast<float>();
     }
