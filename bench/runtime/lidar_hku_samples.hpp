@@ -71,7 +71,7 @@ inline Session load(const std::string& folder, const Pose3& T_odom1_odom) {
   for (auto& pose : session.reference) {
     pose.pose = T_odom1_odom * pose.pose;
     const auto file = fmt::format("{}/Scans/{:06d}.pcd", folder, session.clouds.size());
-    session.clouds.push_back(std::make_shared<PointCloud>(value_or_exit(formats::read_pcd(file))));
+    session.clouds.push_back(std::make_shared<PointCloud>(value_or_exit(formats::read_timed_pcd(file)).cloud));
   }
   return session;
 }

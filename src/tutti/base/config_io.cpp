@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <numeric>
 #include <set>
-#include <sstream>
+
+#include "tutti/base/file.hpp"
 
 namespace tutti {
 namespace {
@@ -198,11 +198,7 @@ Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name) 
 }
 
 Result<ConfigNode> load_yaml(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  if (file.is_open() && file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
-  if (!file.is_open() || file.bad() || text.fail()) return fail(ErrorCode::io, "{}: cannot be read", path);
-  return parse_yaml(text.str(), path);
+  return read_file(path).and_then([&](const std::string& text) { return parse_yaml(text, path); });
 }
 
 std::string to_yaml(const ConfigNode& node) {

@@ -31,7 +31,7 @@ Result<Trajectory> parse_euroc_csv(std::string_view text, const std::string& nam
 }
 
 Result<Trajectory> read_euroc_csv(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& text) { return parse_euroc_csv(text, path); });
+  return read_file(path).and_then([&](const std::string& text) { return parse_euroc_csv(text, path); });
 }
 
 }  // namespace tutti::formats

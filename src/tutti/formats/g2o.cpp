@@ -260,7 +260,7 @@ Result<G2oFile> parse_g2o(std::string_view text, const std::string& name) {
 }
 
 Result<G2oFile> read_g2o(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& text) { return parse_g2o(text, path); });
+  return read_file(path).and_then([&](const std::string& text) { return parse_g2o(text, path); });
 }
 
 std::string to_g2o(const G2oFile& file) {
@@ -283,7 +283,7 @@ std::string to_g2o(const G2oFile& file) {
   return out;
 }
 
-Status write_g2o(const std::string& path, const G2oFile& file) { return internal::write_file(path, to_g2o(file)); }
+Status write_g2o(const std::string& path, const G2oFile& file) { return write_file(path, to_g2o(file)); }
 
 Status write_g2o(const std::string& path, const PoseGraph& graph) {
   G2oFile file{.graph = graph, .vertex_ids = std::vector<std::int64_t>(graph.poses.size())};

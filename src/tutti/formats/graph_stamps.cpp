@@ -49,7 +49,7 @@ Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const
 }
 
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& text) { return parse_graph_stamps(text, path); });
+  return read_file(path).and_then([&](const std::string& text) { return parse_graph_stamps(text, path); });
 }
 
 }  // namespace tutti::formats

@@ -46,7 +46,7 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
 }
 
 Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz, Timestamp start) {
-  return internal::read_file(path).and_then(
+  return read_file(path).and_then(
       [&](const std::string& text) { return parse_kitti_poses(text, path, rate_hz, start); });
 }
 
@@ -69,7 +69,7 @@ Result<Pose3> parse_transform(std::string_view text, const std::string& name) {
 }
 
 Result<Pose3> read_transform(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& text) { return parse_transform(text, path); });
+  return read_file(path).and_then([&](const std::string& text) { return parse_transform(text, path); });
 }
 
 Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::string& name) {
@@ -88,7 +88,7 @@ Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::str
 }
 
 Result<std::vector<Timestamp>> read_times(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& text) { return parse_times(text, path); });
+  return read_file(path).and_then([&](const std::string& text) { return parse_times(text, path); });
 }
 
 Result<PointCloud> parse_kitti_scan(std::string_view bytes, const std::string& name) {
@@ -101,7 +101,7 @@ Result<PointCloud> parse_kitti_scan(std::string_view bytes, const std::string& n
 }
 
 Result<PointCloud> read_kitti_scan(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& bytes) { return parse_kitti_scan(bytes, path); });
+  return read_file(path).and_then([&](const std::string& bytes) { return parse_kitti_scan(bytes, path); });
 }
 
 Result<Trajectory> with_times(Trajectory poses, std::span<const Timestamp> times) {

@@ -191,29 +191,7 @@ Result<TimedCloud> parse_timed_pcd(std::string_view bytes, const std::string& na
 }
 
 Result<TimedCloud> read_timed_pcd(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& bytes) { return parse_timed_pcd(bytes, path); });
+  return read_file(path).and_then([&](const std::string& bytes) { return parse_timed_pcd(bytes, path); });
 }
-
-Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name) {
-  return parse_timed_pcd(bytes, name).map([](TimedCloud&& timed) { return std::move(timed.cloud); });
-}
-
-Result<PointCloud> read_pcd(const std::string& path) {
-  return read_timed_pcd(path).map([](TimedCloud&& timed) { return std::move(timed.cloud); });
-}
-
-std::string to_pcd(const PointCloud& cloud) {
-  const std::size_t n = cloud.points.size();
-  std::string out = fmt::format(
-      "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
-      "WIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA binary\n",
-      n, n);
-  out.reserve(out.size() + 12 * n);
-  for (const Eigen::Vector3f& p : cloud.points)
-    for (int axis = 0; axis < 3; ++axis) internal::put(out, p[axis]);
-  return out;
-}
-
-Status write_pcd(const std::string& path, const PointCloud& cloud) { return internal::write_file(path, to_pcd(cloud)); }
 
 }  // namespace tutti::formats

@@ -25,12 +25,5 @@ struct TimedCloud {
 
 Result<TimedCloud> parse_timed_pcd(std::string_view bytes, const std::string& name);
 Result<TimedCloud> read_timed_pcd(const std::string& path);
-/// The points alone.
-Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name);
-Result<PointCloud> read_pcd(const std::string& path);
-
-/// Binary, fields x y z, float.
-std::string to_pcd(const PointCloud& cloud);
-Status write_pcd(const std::string& path, const PointCloud& cloud);
 
 }  // namespace tutti::formats

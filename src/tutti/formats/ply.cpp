@@ -136,7 +136,7 @@ Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name) {
 }
 
 Result<PointCloud> read_ply(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& bytes) { return parse_ply(bytes, path); });
+  return read_file(path).and_then([&](const std::string& bytes) { return parse_ply(bytes, path); });
 }
 
 std::string to_ply_mesh(std::span<const Eigen::Vector3f> vertices,
@@ -160,7 +160,7 @@ std::string to_ply_mesh(std::span<const Eigen::Vector3f> vertices,
 
 Status write_ply_mesh(const std::string& path, std::span<const Eigen::Vector3f> vertices,
                       std::span<const std::array<std::uint32_t, 3>> triangles) {
-  return internal::write_file(path, to_ply_mesh(vertices, triangles));
+  return write_file(path, to_ply_mesh(vertices, triangles));
 }
 
 std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours) {
@@ -180,7 +180,7 @@ std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb>
 }
 
 Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours) {
-  return internal::write_file(path, to_ply(points, colours));
+  return write_file(path, to_ply(points, colours));
 }
 
 }  // namespace tutti::formats

@@ -19,7 +19,7 @@ TrajectoryFormat recognise(std::string_view text) {
 }  // namespace
 
 Result<Trajectory> read_trajectory(const std::string& path, TrajectoryFormat format, double kitti_rate_hz) {
-  return internal::read_file(path).and_then([&](const std::string& text) {
+  return read_file(path).and_then([&](const std::string& text) {
     switch (format == TrajectoryFormat::automatic ? recognise(text) : format) {
       case TrajectoryFormat::euroc:
         return parse_euroc_csv(text, path);

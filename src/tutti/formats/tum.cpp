@@ -24,7 +24,7 @@ Result<Trajectory> parse_tum(std::string_view text, const std::string& name) {
 }
 
 Result<Trajectory> read_tum(const std::string& path) {
-  return internal::read_file(path).and_then([&](const std::string& text) { return parse_tum(text, path); });
+  return read_file(path).and_then([&](const std::string& text) { return parse_tum(text, path); });
 }
 
 std::string to_tum(const Trajectory& trajectory) {
@@ -38,8 +38,6 @@ std::string to_tum(const Trajectory& trajectory) {
   return out;
 }
 
-Status write_tum(const std::string& path, const Trajectory& trajectory) {
-  return internal::write_file(path, to_tum(trajectory));
-}
+Status write_tum(const std::string& path, const Trajectory& trajectory) { return write_file(path, to_tum(trajectory)); }
 
 }  // namespace tutti::formats

@@ -8,14 +8,11 @@
 #include <string_view>
 #include <vector>
 
-#include "tutti/base/result.hpp"
+#include "tutti/base/file.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// What the readers share: whole files, numbers, and lines that know where they are.
+/// What the readers share: numbers, and lines that know where they are.
 namespace tutti::formats::internal {
-
-Result<std::string> read_file(const std::string& path);
-Status write_file(const std::string& path, std::string_view bytes);
 
 /// Stamps are kept within +-2^61 ns (years 1896 to 2043), so that the difference of any two fits an int64 twice.
 inline constexpr std::int64_t kMaxStampNs = std::int64_t{1} << 61;

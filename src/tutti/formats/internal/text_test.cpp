@@ -103,24 +103,6 @@ TEST(Shown, ShortAndPrintable) {
   EXPECT_EQ(shown(std::string(50, 'a')), "'" + std::string(40, 'a') + "...'");
 }
 
-TEST(Files, MissingAndFolderAreIoErrors) {
-  for (const std::string path : {"/does/not/exist", "."}) {
-    const auto bytes = read_file(path);
-    ASSERT_FALSE(bytes);
-    EXPECT_EQ(bytes.error().code, ErrorCode::io);
-    EXPECT_TRUE(bytes.error().message.starts_with(path));
-  }
-  EXPECT_FALSE(write_file("/does/not/exist", "x"));
-}
-
-TEST(Files, BytesSurviveDisk) {
-  std::string bytes(600'000, '\0');  // several chunks
-  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * 2654435761U >> 13U);
-  const std::string path = testing::TempDir() + "tutti_text_test.bin";
-  ASSERT_TRUE(write_file(path, bytes));
-  EXPECT_EQ(read_file(path).value(), bytes);
-}
-
 RC_GTEST_PROP(UnitQuaternion, UnitOnesAreLeftAlone, ()) {
   const Eigen::Quaterniond q = any_pose().rotation;
   RC_ASSERT(to_unit(LineReader("", "f"), q)->coeffs() == q.coeffs());
