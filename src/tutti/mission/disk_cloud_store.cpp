@@ -6,12 +6,11 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <system_error>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/file.hpp"
 
 namespace tutti::mission {
 namespace fs = std::filesystem;
@@ -30,13 +29,12 @@ Status sync_to_disk(const fs::path& path) {
 
 }  // namespace
 
-Result<std::shared_ptr<DiskCloudStore>> DiskCloudStore::open(const fs::path& folder, const wire::CloudCodec& codec,
-                                                             std::size_t kept_in_memory) {
+Result<std::shared_ptr<DiskCloudStore>> DiskCloudStore::open(const fs::path& folder, const wire::CloudCodec& codec) {
   std::error_code failure;
   fs::create_directories(folder, failure);
   if (failure)
     return fail(ErrorCode::io, "{}: cannot make the folder of clouds: {}", folder.string(), failure.message());
-  return std::shared_ptr<DiskCloudStore>(new DiskCloudStore(folder, codec, kept_in_memory));
+  return std::shared_ptr<DiskCloudStore>(new DiskCloudStore(folder, codec));
 }
 
 fs::path DiskCloudStore::file_of(SubmapId id) const {
@@ -52,41 +50,21 @@ Status DiskCloudStore::put(SubmapId id, const std::shared_ptr<const PointCloud>&
   const fs::path file = file_of(id);
   fs::path aside = file;
   aside += ".part";
-  std::ofstream out(aside, std::ios::binary | std::ios::trunc);
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) return fail(ErrorCode::io, "{}: cannot write {} bytes", aside.string(), bytes.size());
+  if (auto ok = write_file(aside.string(), bytes); !ok) return ok;
   if (auto ok = sync_to_disk(aside); !ok) return ok;
   std::error_code failure;
   fs::rename(aside, file, failure);
   if (failure) return fail(ErrorCode::io, "{}: cannot be renamed: {}", aside.string(), failure.message());
-  if (auto ok = sync_to_disk(folder_); !ok) return ok;
-  const auto rounded = wire::decode_cloud(bytes);  // what get() would read
-  TUTTI_CHECK(rounded.has_value(), "{}", rounded.error().message);
-  remember(id, *rounded);
-  return {};
+  return sync_to_disk(folder_);
 }
 
 Result<std::shared_ptr<const PointCloud>> DiskCloudStore::get(SubmapId id) const {
-  {
-    const std::lock_guard lock(mutex_);
-    if (auto found = recent_.find(id)) return found;
-  }
-  const fs::path file = file_of(id);
-  const std::string what = fmt::format("cloud of submap {}: {}", to_string(id), file.string());
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return fail(ErrorCode::io, "{}: cannot be opened", what);
-  std::ostringstream bytes;
-  bytes << in.rdbuf();
-  auto cloud = wire::decode_cloud(bytes.view());
-  if (!cloud) return in_context(what, cloud.error());
-  remember(id, *cloud);
+  const std::string file = file_of(id).string();
+  const auto bytes = read_file(file);
+  if (!bytes) return in_context("cloud of submap " + to_string(id), bytes.error());
+  auto cloud = wire::decode_cloud(*bytes);
+  if (!cloud) return in_context(fmt::format("cloud of submap {}: {}", to_string(id), file), cloud.error());
   return cloud;
-}
-
-void DiskCloudStore::remember(SubmapId id, std::shared_ptr<const PointCloud> cloud) const {
-  const std::lock_guard lock(mutex_);
-  recent_.keep(id, std::move(cloud));
 }
 
 }  // namespace tutti::mission
