@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "support/paths.hpp"
-#include "tutti/mission/report/json.hpp"
+#include "tutti/mission/report/report.hpp"
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {

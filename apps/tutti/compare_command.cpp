@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "compare_command.hpp"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "commands.hpp"
 #include "compare_input.hpp"
-#include "number_checks.hpp"
+#include "options.hpp"
+#include "tutti/base/file.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/report/compare.hpp"
 
@@ -63,15 +60,8 @@ Status write_files(const mission::CompareReport& report, const std::filesystem::
   std::error_code failure;
   std::filesystem::create_directories(folder, failure);
   if (failure) return fail(ErrorCode::io, "--out {}: cannot make the folder: {}", folder.string(), failure.message());
-  for (const auto& [name, text] : {std::pair<const char*, std::string>{"compare.html", mission::compare_html(report)},
-                                   {"compare.json", mission::compare_json(report)}}) {
-    const auto path = folder / name;
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
-    file << text;
-    file.flush();
-    if (!file) return fail(ErrorCode::io, "{}: cannot write: {}", path.string(), std::strerror(errno));
-  }
-  return {};
+  if (auto ok = write_file((folder / "compare.html").string(), mission::compare_html(report)); !ok) return ok;
+  return write_file((folder / "compare.json").string(), mission::compare_json(report));
 }
 
 int run(const Options& options) {
@@ -79,10 +69,7 @@ int run(const Options& options) {
   const Status written = !report               ? tl::unexpected(report.error())
                          : options.out.empty() ? Status()
                                                : write_files(*report, options.out);
-  if (!written) {
-    fmt::print(stderr, "tutti compare: {}\n", written.error().message);
-    return 1;
-  }
+  if (!written) return complain("compare", written.error().message);
   fmt::print("{}", options.json ? mission::compare_json(*report) : mission::compare_text(*report));
   if (!options.out.empty() && !options.json) fmt::print("\nPictures: {}\n", (options.out / "compare.html").string());
   return 0;
@@ -90,35 +77,19 @@ int run(const Options& options) {
 
 /// What is known of either side's errors.
 void add_noise_options(CLI::App& command, Options& options) {
-  command
-      .add_option("--tolerance", options.config.tolerance_m,
-                  "How sure A is of its positions, over stretches of any length: standard deviation")
-      ->check(finite(false))
-      ->capture_default_str()
-      ->type_name("METRES");
-  command
-      .add_option(
-          "--tolerance-deg", options.tolerance_deg,
-          fmt::format("The same of its rotations; default: what moves a point {:g} m away by --tolerance", kArm_m))
-      ->check(finite(false))
-      ->type_name("DEGREES");
-  command
-      .add_option("--odometry-sigma", options.config.odometry_m,
-                  "Standard deviation of B's motion over 1 m, growing with the square root of the way; says where\n"
-                  "B failed rather than drifted, and how constraints bend it. A .g2o file brings its own")
-      ->check(finite(false))
-      ->capture_default_str()
-      ->type_name("METRES");
-  command.add_option("--odometry-sigma-deg", options.config.odometry_deg, "The same of its rotation")
-      ->check(finite(false))
-      ->capture_default_str()
-      ->type_name("DEGREES");
-  command
-      .add_option("--false-alarms", options.config.false_alarm_rate,
-                  "Chance of calling it disagreement when B differs from A within the tolerance only")
-      ->check(within(1e-9, 0.5))
-      ->capture_default_str()
-      ->type_name("RATE");
+  add_number(command, "--tolerance", options.config.tolerance_m,
+             "How sure A is of its positions, over stretches of any length: standard deviation", "METRES");
+  add_number(command, "--tolerance-deg", options.tolerance_deg,
+             fmt::format("The same of its rotations; default: what moves a point {:g} m away by --tolerance", kArm_m),
+             "DEGREES");
+  add_number(command, "--odometry-sigma", options.config.odometry_m,
+             "Standard deviation of B's motion over 1 m, growing with the square root of the way; says where\n"
+             "B failed rather than drifted, and how constraints bend it. A .g2o file brings its own",
+             "METRES");
+  add_number(command, "--odometry-sigma-deg", options.config.odometry_deg, "The same of its rotation", "DEGREES");
+  add_number(command, "--false-alarms", options.config.false_alarm_rate,
+             "Chance of calling it disagreement when B differs from A within the tolerance only", "RATE",
+             within(1e-9, 0.5));
 }
 
 }  // namespace
@@ -147,22 +118,14 @@ void add_compare_command(CLI::App& app, int& exit_code) {
       ->type_name("FOLDER");
   command->add_flag("--json", options->json, "Print JSON instead of tables; with the whole disagreement map");
   add_noise_options(*command, *options);
-  command
-      ->add_option("--spacing", options->config.spacing_m,
-                   "Way between two nodes; default: a 500th of the way, at least 0.1 m")
-      ->check(finite(false))
-      ->type_name("METRES");
-  command
-      ->add_option("--max-gap", options->config.association.max_gap_s,
-                   "Interpolate A only between poses at most this far apart")
-      ->check(finite(true))
-      ->capture_default_str()
-      ->type_name("SECONDS");
-  command
-      ->add_option("--max-difference", options->max_difference_s,
-                   "Pair each pose of B with A's nearest in time, at most this far away, instead of interpolating")
-      ->check(finite(true))
-      ->type_name("SECONDS");
+  add_number(*command, "--spacing", options->config.spacing_m,
+             "Way between two nodes; default: a 500th of the way, at least 0.1 m", "METRES")
+      ->default_str("");
+  add_number(*command, "--max-gap", options->config.association.max_gap_s,
+             "Interpolate A only between poses at most this far apart", "SECONDS", finite(true));
+  add_number(*command, "--max-difference", options->max_difference_s,
+             "Pair each pose of B with A's nearest in time, at most this far away, instead of interpolating", "SECONDS",
+             finite(true));
   const auto estimates = CLI::IsMember({"onboard", "corrected", "server", "reference"});
   command->add_option("--a-estimate", options->a_estimate, "Which of a folder's estimates A is")
       ->check(estimates)

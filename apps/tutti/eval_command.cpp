@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "eval_command.hpp"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -11,8 +9,9 @@
 #include <optional>
 #include <string>
 
+#include "commands.hpp"
 #include "eval_map.hpp"
-#include "number_checks.hpp"
+#include "options.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/formats/trajectory_file.hpp"
@@ -150,10 +149,7 @@ int run(Options options) {
     return eval_map(options.map_options);
   }
   const auto report = evaluate(options);
-  if (!report) {
-    fmt::print(stderr, "tutti eval: {}\n", report.error().message);
-    return 1;
-  }
+  if (!report) return complain("eval", report.error().message);
   if (options.json)
     print_json(options, *report);
   else
@@ -184,12 +180,8 @@ void add_map_options(CLI::App& command, EvalMapOptions& options, CLI::Option* ma
                        "moved; needs\na start within about 1 m. Without it the error includes how the "
                        "map as a whole lies");
   CLI::Option* voxel =
-      command
-          .add_option("--voxel", options.voxel_m,
-                      "Thin the map to one point per such voxel, so that what was seen often counts once")
-          ->check(finite(false))
-          ->capture_default_str()
-          ->type_name("METRES");
+      add_number(command, "--voxel", options.voxel_m,
+                 "Thin the map to one point per such voxel, so that what was seen often counts once", "METRES");
   for (CLI::Option* option : {transform, report, refine, voxel}) option->needs(map)->group(group);
 }
 
@@ -220,33 +212,20 @@ void add_eval_command(CLI::App& app, int& exit_code) {
   command->add_option("REF", options->reference_path, "Ground truth, or the best there is; survey")
       ->required()
       ->type_name("FILE");
-  command
-      ->add_option("--max-difference", options->max_difference_s,
-                   "Pair each pose with the reference pose nearest in time, at most this far away, instead of\n"
-                   "interpolating the reference")
-      ->check(finite(true))
-      ->type_name("SECONDS");
-  command
-      ->add_option("--max-gap", options->max_gap_s, "Interpolate only between reference poses at most this far apart")
-      ->check(finite(true))
-      ->capture_default_str()
-      ->type_name("SECONDS");
-  command->add_option("--rpe-time", options->rpe_time_s, "Interval of the RPE over time")
-      ->check(finite(false))
-      ->capture_default_str()
-      ->type_name("SECONDS");
-  command->add_option("--rpe-distance", options->rpe_distance_m, "Interval of the RPE over distance")
-      ->check(finite(false))
-      ->capture_default_str()
-      ->type_name("METRES");
+  add_number(*command, "--max-difference", options->max_difference_s,
+             "Pair each pose with the reference pose nearest in time, at most this far away, instead of\n"
+             "interpolating the reference",
+             "SECONDS", finite(true));
+  add_number(*command, "--max-gap", options->max_gap_s,
+             "Interpolate only between reference poses at most this far apart", "SECONDS", finite(true));
+  add_number(*command, "--rpe-time", options->rpe_time_s, "Interval of the RPE over time", "SECONDS");
+  add_number(*command, "--rpe-distance", options->rpe_distance_m, "Interval of the RPE over distance", "METRES");
   command->add_option("--format", options->format, "Format of both files; auto looks at each file's first row")
       ->check(CLI::IsMember({"auto", "tum", "euroc", "kitti"}))
       ->capture_default_str()
       ->type_name("");
-  command->add_option("--kitti-rate", options->kitti_rate_hz, "Poses a second in KITTI files, which hold no stamps")
-      ->check(finite(false))
-      ->capture_default_str()
-      ->type_name("HZ");
+  add_number(*command, "--kitti-rate", options->kitti_rate_hz, "Poses a second in KITTI files, which hold no stamps",
+             "HZ");
   command->add_flag("--json", options->json, "Print JSON instead of the table");
   add_map_options(*command, options->map_options, map);
   command->callback([options, &exit_code] { exit_code = run(*options); });

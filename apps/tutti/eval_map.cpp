@@ -6,12 +6,12 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 
-#include "tutti/base/result.hpp"
+#include "options.hpp"
+#include "tutti/base/file.hpp"
 #include "tutti/evaluation/cloud_distance.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -62,11 +62,9 @@ std::optional<std::array<double, 7>> seven_numbers(const std::string& text) {
 }
 
 Result<Pose3> transform_of_report(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  if (file) text << file.rdbuf();
-  if (!file || !text) return fail(ErrorCode::io, "{}: cannot be read, expected the report.json of a mission", path);
-  const Json report = Json::parse(text.str(), nullptr, false);
+  const auto text = read_file(path);
+  if (!text) return tl::unexpected(text.error());
+  const Json report = Json::parse(*text, nullptr, false);
   const auto wanted = Json::json_pointer("/server/T_reference_world");
   if (report.is_discarded() || !report.is_object() || !report.contains(wanted))
     return fail(ErrorCode::invalid, "{}: no server.T_reference_world, expected the report.json of a mission", path);
@@ -220,10 +218,7 @@ std::string check_transform(const std::string& text) {
 
 int eval_map(const EvalMapOptions& options) {
   const auto report = evaluate(options);
-  if (!report) {
-    fmt::print(stderr, "tutti eval: {}\n", report.error().message);
-    return 1;
-  }
+  if (!report) return complain("eval", report.error().message);
   if (options.json)
     print_json(options, *report);
   else

@@ -4,13 +4,7 @@
 #include <exception>
 #include <iostream>
 
-#include "compare_command.hpp"
-#include "demo_command.hpp"
-#include "eval_command.hpp"
-#include "optimise_command.hpp"
-#include "run_command.hpp"
-#include "settings_command.hpp"
-#include "world_command.hpp"
+#include "commands.hpp"
 
 int main(int argc, char** argv) {
   CLI::App app{

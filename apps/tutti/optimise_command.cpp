@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "optimise_command.hpp"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "commands.hpp"
+#include "options.hpp"
 #include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
@@ -104,27 +104,19 @@ Status copy_stamps(const OptimiseOptions& options) {
 
 int run(const OptimiseOptions& options) {
   auto file = formats::read_g2o(options.input);
-  if (!file) {
-    fmt::print(stderr, "tutti optimise: {}\n", file.error().message);
-    return 1;
-  }
+  if (!file) return complain("optimise", file.error().message);
   const Outcome outcome = optimise(*file, options);
   print(*file, outcome, options);
   const auto termination = outcome.solution.summary.termination;
-  if (!is_usable(termination)) {
-    fmt::print(stderr, "tutti optimise: {}: {}; nothing written\n", options.input,
-               termination == Termination::singular ? "the edges do not determine every pose (singular)"
-                                                    : "a pose or an edge is not a number");
-    return 1;
-  }
+  if (!is_usable(termination))
+    return complain("optimise", fmt::format("{}: {}; nothing written", options.input,
+                                            termination == Termination::singular
+                                                ? "the edges do not determine every pose (singular)"
+                                                : "a pose or an edge is not a number"));
   file->graph.poses = outcome.solution.poses;
   auto written = formats::write_g2o(options.output, *file);
   if (written) written = copy_stamps(options);
-  if (!written) {
-    fmt::print(stderr, "tutti optimise: {}\n", written.error().message);
-    return 1;
-  }
-  return 0;
+  return written ? 0 : complain("optimise", written.error().message);
 }
 
 }  // namespace

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "settings_command.hpp"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "commands.hpp"
+#include "options.hpp"
 #include "tutti/base/config_io.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/operator_settings.hpp"
@@ -53,8 +53,8 @@ int run(const std::vector<std::string>& parts, bool all) {
     ++shown;
   }
   if (shown > 0) return 0;
-  fmt::print(stderr, "tutti settings: no key or meaning contains '{}'; --all lists all\n", fmt::join(parts, "' and '"));
-  return 1;
+  return complain("settings",
+                  fmt::format("no key or meaning contains '{}'; --all lists all", fmt::join(parts, "' and '")));
 }
 
 }  // namespace

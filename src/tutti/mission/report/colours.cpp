@@ -5,7 +5,7 @@
 
 namespace tutti::mission {
 
-// Hues that keep apart under the common colour deficiencies, and from the estimates' colours in html_style.cpp.
+// Hues that keep apart under the common colour deficiencies, and from the estimates' colours in report.css.
 formats::Rgb robot_rgb(std::size_t index) {
   static constexpr formats::Rgb kColours[kRobotColours] = {{15, 111, 181}, {194, 65, 12}, {11, 143, 106},
                                                            {139, 63, 168}, {166, 124, 0}, {27, 155, 184},

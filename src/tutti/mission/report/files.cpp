@@ -1,43 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/files.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
+#include "tutti/base/file.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/tum.hpp"
 #include "tutti/mission/report/colours.hpp"
 #include "tutti/mission/report/file_names.hpp"
-#include "tutti/mission/report/html.hpp"
-#include "tutti/mission/report/json.hpp"
 #include "tutti/mission/report/map_pictures.hpp"
+#include "tutti/mission/report/report.hpp"
 
 namespace tutti::mission {
 namespace {
 
 namespace fs = std::filesystem;
 
-Status write_text(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.flush();
-  if (!file) return fail(ErrorCode::io, "{}: cannot write: {}", path.string(), std::strerror(errno));
-  return {};
-}
-
 /// What an earlier mission wrote here, as its report.json says, is not to be taken for this one's.
 Status remove_former(const fs::path& out_dir) {
-  std::ifstream file(out_dir / "report.json", std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();  // of a folder, nothing
-  const auto former = nlohmann::json::parse(text.str(), nullptr, false);
+  const auto former = nlohmann::json::parse(read_file((out_dir / "report.json").string()).value_or(""), nullptr, false);
   if (!former.is_object() || !former.contains("files") || !former["files"].is_array()) return {};
   for (const auto& entry : former["files"]) {
     if (!entry.is_string() || !is_report_file_name(entry.get<std::string>())) continue;
@@ -75,7 +58,7 @@ Status write_graph(const ServerRecord& server, const fs::path& out_dir) {
   for (std::size_t i = 0; i < server.nodes.size(); ++i)
     csv += fmt::format("{},{},{},{}\n", i, server.nodes[i].id.chain.robot.value, server.nodes[i].id.index,
                        server.nodes[i].stamp.ns);
-  return write_text(out_dir / "graph_stamps.csv", csv);
+  return write_file((out_dir / "graph_stamps.csv").string(), csv);
 }
 
 Status write_map(const MissionRecord& record, const fs::path& out_dir) {
@@ -97,7 +80,8 @@ Status write_pictures(const MissionRecord& record, const fs::path& out_dir) {
        {std::tuple<const char*, MapPicture, std::size_t>{"map_top.png", map_from_above(record), 2},
         {"map_section.png", map_section(record), 1}})
     if (!picture.panels.empty())
-      if (auto status = write_text(out_dir / name, encode_png(compose(picture, columns))); !status) return status;
+      if (auto status = write_file((out_dir / name).string(), encode_png(compose(picture, columns))); !status)
+        return status;
   return {};
 }
 
@@ -117,7 +101,7 @@ Status write_report(const MissionRecord& record, const fs::path& out_dir) {
                                    {"timing.json", timing_json(record)},
                                    {"report.html", report_html(record)},
                                    {"config.yaml", config_text(record)}})
-    if (auto status = write_text(out_dir / name, text); !status) return status;
+    if (auto status = write_file((out_dir / name).string(), text); !status) return status;
   if (auto status = write_trajectories(record, out_dir); !status) return status;
   if (auto status = write_graph(record.server, out_dir); !status) return status;
   if (auto status = write_map(record, out_dir); !status) return status;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/files.hpp"
-
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -12,7 +10,7 @@
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/tum.hpp"
-#include "tutti/mission/report/json.hpp"
+#include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {

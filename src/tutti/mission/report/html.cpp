@@ -1,15 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/html.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "tutti/mission/report/colours.hpp"
 #include "tutti/mission/report/html_parts.hpp"
+#include "tutti/mission/report/report.hpp"
+#include "tutti/mission/report/style.hpp"
 
 namespace tutti::mission {
 namespace {
+
+/// Every robot's colour, light and dark, and what is drawn in it.
+std::string robot_colours() {
+  std::string light;
+  std::string dark;
+  std::string classes;
+  for (std::size_t r = 0; r < kRobotColours; ++r) {
+    light += fmt::format(" --r{}: {};", r, hex(robot_rgb(r)));
+    dark += fmt::format(" --r{}: {};", r, hex(robot_rgb_on_dark(r)));
+    classes += fmt::format(
+        ".r{0} {{ stroke: var(--r{0}); }} .end.r{0} {{ fill: var(--r{0}); }} .swatch.r{0} {{ background: var(--r{0}); "
+        "}}\n",
+        r);
+  }
+  return fmt::format("\n:root {{{} }}\n@media (prefers-color-scheme: dark) {{ :root {{{} }} }}\n{}", light, dark,
+                     classes);
+}
 
 std::string notes_html(const MissionRecord& record) {
   if (record.notes.empty()) return "";
@@ -53,7 +70,7 @@ std::string page(std::string_view title, const std::string& body) {
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
-      escape_xml(title), report_style(), body);
+      escape_xml(title), robot_colours() + std::string(kStyle), body);
 }
 
 std::string report_html(const MissionRecord& record) {

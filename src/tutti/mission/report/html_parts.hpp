@@ -12,9 +12,6 @@
 /// The page's sections, each a function of the record that gives HTML; empty when there is nothing to show.
 namespace tutti::mission {
 
-/// The style sheet: colours for light and dark, layout.
-std::string report_style();
-
 /// How much detail each robot's pictures may have: `total` shared among the robots, within [least, most].
 std::size_t detail_per_robot(const MissionRecord& record, std::size_t total, std::size_t least, std::size_t most);
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/html.hpp"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/testing/good_page.hpp"
 #include "tutti/mission/report/testing/report_example.hpp"
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/json.hpp"
-
 #include "tutti/mission/report/explanation.hpp"
 #include "tutti/mission/report/file_names.hpp"
 #include "tutti/mission/report/format.hpp"
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/json_parts.hpp"
+#include "tutti/mission/report/report.hpp"
 
 namespace tutti::mission {
 namespace {

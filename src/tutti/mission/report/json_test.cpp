@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/json.hpp"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {

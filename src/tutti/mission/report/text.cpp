@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/text.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include "tutti/mission/report/explanation.hpp"
 #include "tutti/mission/report/format.hpp"
 #include "tutti/mission/report/geometry.hpp"
+#include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/table.hpp"
 
 namespace tutti::mission {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/report/text.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <sstream>
 
 #include "tutti/mission/report/format.hpp"
+#include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {

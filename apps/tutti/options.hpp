@@ -7,7 +7,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <string>
+#include <type_traits>
 
 namespace tutti::app {
 
@@ -42,6 +44,21 @@ inline CLI::Validator whole_number() {
             return fmt::format("is '{}', expected a whole number from 0 to 2^64 - 1", input);
           },
           ""};
+}
+
+/// An option that takes a number; shows its default if it has one.
+template <class Number>
+CLI::Option* add_number(CLI::App& command, const std::string& name, Number& value, const std::string& help,
+                        const std::string& unit, const CLI::Validator& check = finite(false)) {
+  CLI::Option* option = command.add_option(name, value, help)->check(check)->type_name(unit);
+  if constexpr (std::is_arithmetic_v<Number>) option->capture_default_str();
+  return option;
+}
+
+/// Says on stderr why a command failed; returns the exit code.
+inline int complain(const char* command, const std::string& message, int exit_code = 1) {
+  fmt::print(stderr, "tutti {}: {}\n", command, message);
+  return exit_code;
 }
 
 }  // namespace tutti::app

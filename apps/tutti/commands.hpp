@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+/// The subcommands, each as its --help says. When one has run, `exit_code` is 0; 1 with a message on stderr when the
+/// run failed; 2 when usage or configuration is wrong. `app` and `exit_code` must outlive the parse.
+namespace tutti::app {
+
+void add_demo_command(CLI::App& app, int& exit_code);
+void add_run_command(CLI::App& app, int& exit_code);
+void add_eval_command(CLI::App& app, int& exit_code);
+void add_compare_command(CLI::App& app, int& exit_code);
+void add_optimise_command(CLI::App& app, int& exit_code);
+void add_settings_command(CLI::App& app, int& exit_code);
+void add_world_command(CLI::App& app, int& exit_code);
+
+}  // namespace tutti::app

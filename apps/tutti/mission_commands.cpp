@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What takes a mission: run, demo and world.
+#include <fmt/format.h>
+#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "tutti/base/config_io.hpp"
+#include "tutti/formats/ply.hpp"
+#include "tutti/mission/report/report.hpp"
+#include "tutti/mission/runner.hpp"
+#include "tutti/simulation/surface.hpp"
+
+namespace tutti::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder that nobody had before; it goes when this does, with all that is in it, and nothing else goes.
+class OwnFolder {
+ public:
+  /// "<parent>/.<name>-XXXXXX"; the parent must exist. Without a path when it could not be made: errno says why.
+  OwnFolder(const fs::path& parent, const std::string& name) : path_((parent / ("." + name + "-XXXXXX")).string()) {
+    if (mkdtemp(path_.data()) == nullptr) path_.clear();
+  }
+  OwnFolder(const OwnFolder&) = delete;
+  OwnFolder& operator=(const OwnFolder&) = delete;
+  ~OwnFolder() {
+    std::error_code nobody_is_left_to_tell;
+    if (!path_.empty()) fs::remove_all(path_, nobody_is_left_to_tell);
+  }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// One line on stderr that is rewritten on a terminal, and a line every ten per cent elsewhere.
+class ProgressLine {
+ public:
+  void operator()(const mission::Progress& progress) {
+    const double share = progress.duration_s > 0.0 ? std::min(1.0, progress.time_s / progress.duration_s) : 1.0;
+    const std::string maps = progress.components == 0   ? "no map yet"
+                             : progress.components == 1 ? "1 map"
+                                                        : fmt::format("{} maps (not joined yet)", progress.components);
+    const std::string line = fmt::format("{:4.0f} % of {:.0f} s   {} submaps, {} closures, {}", 100.0 * share,
+                                         progress.duration_s, progress.submaps, progress.closures, maps);
+    if (terminal_) {
+      std::cerr << "\r\033[K" << line << std::flush;
+      open_ = true;
+    } else if (share >= next_) {
+      std::cerr << line << '\n';
+      while (next_ <= share) next_ += 0.1;
+    }
+  }
+  void close() {
+    if (open_) std::cerr << '\n';
+    open_ = false;
+  }
+
+ private:
+  bool terminal_ = isatty(STDERR_FILENO) != 0;
+  bool open_ = false;
+  double next_ = 0.1;
+};
+
+/// What `run` and `demo` share.
+struct MissionArguments {
+  fs::path mission, out;
+  mission::RunOptions run{.version = TUTTI_VERSION};
+  std::vector<std::string> assignments;
+  bool print_config = false;
+};
+
+void add_mission_options(CLI::App& command, MissionArguments& arguments) {
+  command
+      .add_option("--out", arguments.out,
+                  "Folder for the report, made if missing; default: out/ and the mission's name")
+      ->type_name("DIR");
+  command.add_option("--seed", arguments.run.seed, "Everything random comes from this number; default: 1")
+      ->type_name("N")
+      ->check(whole_number());
+  add_number(command, "--rate", arguments.run.rate,
+             "Times real time, e.g. 1; shows each robot's and the server's CPU share and worst update\n"
+             "latency. Without it: as fast as possible",
+             "R", within(1e-3, 1e6));
+  command.add_option("--threads", arguments.run.threads, "Threads for verifying closures; 0 = all cores")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024));
+  command
+      .add_option("--set", arguments.assignments,
+                  "Change a setting, e.g. --set agent.policy.name=uniform or --set agent.submap.duration_s=5;\n"
+                  "may be given several times")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command.add_flag("--print-config", arguments.print_config, "Print every setting with its value, and stop");
+}
+
+/// Runs, writes the report, prints the table. Returns the exit code.
+int run_and_report(const Result<mission::MissionConfig>& config, MissionArguments& arguments) {
+  const auto failed = [](const std::string& message, int exit_code = 1) {
+    std::cerr << "tutti: " << message << '\n';
+    return exit_code;
+  };
+  if (!config) return failed(config.error().message, 2);
+  if (arguments.print_config) {
+    std::cout << to_yaml(dump_config(*config));
+    return 0;
+  }
+  const std::string out = arguments.out.string();
+  std::error_code failure;  // before the mission, not after it
+  fs::create_directories(out, failure);
+  if (failure) return failed(fmt::format("--out {}: cannot make the folder: {}", out, failure.message()));
+  const OwnFolder clouds(out, "clouds");
+  if (clouds.path().empty())
+    return failed(fmt::format("--out {}: cannot make a folder in it: {}", out, std::strerror(errno)));
+  ProgressLine progress;
+  arguments.run.clouds = clouds.path();
+  arguments.run.progress = std::ref(progress);
+  const auto record = mission::run_mission(*config, arguments.run);
+  progress.close();
+  if (!record) {
+    const bool wants_data = record.error().code == ErrorCode::io && arguments.run.data.empty();
+    return failed(record.error().message +
+                  (wants_data
+                       ? "\ntutti: the mission's files are looked for in this folder; --data FOLDER says where they are"
+                       : ""));
+  }
+  if (const auto ok = mission::write_report(*record, out); !ok) return failed(ok.error().message);
+  std::cout << mission::report_text(*record, (arguments.out / "report.html").string());
+  return 0;
+}
+
+struct WorldOptions {
+  std::string mission;
+  std::string output;
+  std::uint64_t seed = 1;
+  double points_m = 0.0;
+  std::vector<std::string> assignments;
+};
+
+int write_world(const WorldOptions& options) {
+  const auto config = mission::load_mission(options.mission, options.assignments);
+  if (!config) return complain("world", config.error().message, 2);
+  if (config->source != "simulation")
+    return complain("world", fmt::format("{}: source is '{}', expected 'simulation'", options.mission, config->source),
+                    2);
+  const auto mesh = simulation::world_mesh(config->simulation, options.seed);
+  const Status written =
+      options.points_m > 0.0
+          ? formats::write_ply(options.output,
+                               simulation::sample_surface(mesh, options.points_m, Rng(options.seed)).points)
+          : formats::write_ply_mesh(options.output, mesh.vertices, mesh.triangles);
+  if (!written) return complain("world", written.error().message);
+  fmt::print("{}: {} triangles, world of {} with seed {}\n", options.output, mesh.triangles.size(), config->mission,
+             options.seed);
+  return 0;
+}
+
+}  // namespace
+
+void add_demo_command(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<MissionArguments>();
+  arguments->out = fs::path("out") / "demo";
+  CLI::App* command = app.add_subcommand(
+      "demo",
+      "See it work without any data: two simulated legged robots with LiDAR map a piece of tunnel for six minutes, "
+      "with\n"
+      "drifting odometry; loop closures are found from their scans. Takes about a minute and ends with a table and a\n"
+      "report to look at.");
+  add_mission_options(*command, *arguments);
+  command->callback([arguments, &exit_code] {
+    exit_code = run_and_report(mission::demo_mission(arguments->assignments), *arguments);
+  });
+}
+
+void add_run_command(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<MissionArguments>();
+  CLI::App* command = app.add_subcommand(
+      "run",
+      "Run a mission: replay (or simulate) its robots, join their maps on the server, send proxy graphs back,\n"
+      "correct the robots, and write a report (report.html, report.json, trajectories, graph, map).\n"
+      "The same mission, data and seed give the same report.json.");
+  command->add_option("mission", arguments->mission, "Mission file")->type_name("MISSION.yaml")->required();
+  command->add_option("--data", arguments->run.data, "Folder that the mission's file names are relative to")
+      ->type_name("DIR");
+  add_mission_options(*command, *arguments);
+  command->callback([arguments, &exit_code] {
+    if (arguments->out.empty()) arguments->out = fs::path("out") / arguments->mission.stem();
+    exit_code = run_and_report(mission::load_mission(arguments->mission, arguments->assignments), *arguments);
+  });
+}
+
+void add_world_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<WorldOptions>();
+  auto* command =
+      app.add_subcommand("world", "Write the world of a simulated mission as a PLY file, to look at or to survey.");
+  command->footer(
+      "The very walls that the simulated LiDAR sees with the same seed, in the frame of the reference trajectories.\n"
+      "Example: tutti world missions/tunnel.yaml -o tunnel.ply\n");
+  command->add_option("mission", options->mission, "Mission file with source: simulation.")
+      ->required()
+      ->type_name("MISSION.yaml");
+  command->add_option("-o,--output", options->output, "Where to write it.")->required()->type_name("OUT.ply");
+  command->add_option("--seed", options->seed, "As for tutti run.")->check(whole_number())->capture_default_str();
+  command->add_option("--points", options->points_m, "Points about this far apart instead of a mesh, in metres.")
+      ->check(within(1e-3, 1e3));
+  command->add_option("--set", options->assignments, "Change a setting of the mission: key=value.")
+      ->type_name("KEY=VALUE");
+  command->callback([options, &exit_code] { exit_code = write_world(*options); });
+}
+
+}  // namespace tutti::app
