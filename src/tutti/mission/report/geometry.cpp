@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <unordered_map>
 
 #include "tutti/evaluation/association.hpp"
@@ -132,13 +133,26 @@ const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp sta
   return found == trajectory.end() || found->stamp != stamp ? nullptr : &found->pose.translation;
 }
 
-std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const MissionRecord& record) {
-  std::map<KeyframeId, Eigen::Vector3d> out;
+Pose3 display_from_world(const MissionRecord& record, std::uint32_t component) {
+  if (component != record.server.largest_component) return {};
+  return record.server.T_reference_world.value_or(Pose3{});
+}
+
+ClosureStrokes closure_strokes(const MissionRecord& record, std::uint32_t component, const MapView& map) {
+  std::map<KeyframeId, Eigen::Vector3d> positions;
   for (const RobotRecord& robot : record.robots)
     for (const NodeRecord& node : record.server.nodes)
-      if (node.id.chain.robot == robot.id)
+      if (robot.component == component && node.id.chain.robot == robot.id)
         if (const Eigen::Vector3d* position = find_position(robot.server_estimate, node.stamp))
-          out[node.id] = *position;
+          positions[node.id] = *position;
+  ClosureStrokes out;
+  for (const ClosureRecord& closure : record.server.closures) {
+    const auto from = positions.find(closure.from);
+    const auto to = positions.find(closure.to);
+    if (from == positions.end() || to == positions.end()) continue;
+    (closure.from.chain.robot == closure.to.chain.robot ? out.intra : out.inter)
+        .emplace_back(map(from->second), map(to->second));
+  }
   return out;
 }
 

@@ -2,12 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 #include <utility>
 #include <vector>
 
 #include "tutti/mission/record.hpp"
-#include "tutti/mission/report/svg.hpp"
+#include "tutti/mission/report/plot.hpp"
 
 /// Where everything is drawn: estimates live in unrelated frames, so for display each is moved by one rigid transform.
 namespace tutti::mission {
@@ -63,7 +62,22 @@ std::pair<std::size_t, std::size_t> stretch(const Trajectory& trajectory, Timest
 /// Position of a robot's estimate at a stamp of its keyframes.
 const Eigen::Vector3d* find_position(const Trajectory& trajectory, Timestamp stamp);
 
-/// The server's final estimate of every keyframe, in `world` of its robot's component; without those of another.
-std::map<KeyframeId, Eigen::Vector3d> keyframe_positions(const MissionRecord& record);
+/// One component of the joint map from above: from `world` to pixels.
+struct MapView {
+  Pose3 T_display_world;
+  GroundPlane ground;
+  PlanView view;
+  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector3d& p_world) const {
+    return view(ground(T_display_world * p_world));
+  }
+};
+/// Where a component is displayed: the largest one on the reference, where there is one.
+Pose3 display_from_world(const MissionRecord& record, std::uint32_t component);
+
+/// The loop closures of a component in pixels, by the server's final estimate: within a robot, and between robots.
+struct ClosureStrokes {
+  Strokes intra, inter;
+};
+ClosureStrokes closure_strokes(const MissionRecord& record, std::uint32_t component, const MapView& map);
 
 }  // namespace tutti::mission

@@ -60,14 +60,17 @@ TEST(RobotGeometry, NewDriftIsWhereTheOdometryWentWrong) {
   }
 }
 
-TEST(KeyframePositions, LeaveOutWhatLiesInAnotherComponent) {
+TEST(ClosureStrokes, LeaveOutWhatLiesInAnotherComponent) {
   MissionRecord record = test::example_record({.robots = 1, .keyframes = 30});
-  EXPECT_EQ(keyframe_positions(record).size(), 30U);
+  const auto node = [&](std::size_t i) { return record.server.nodes[i].id; };
+  record.server.closures = {{node(0), node(19)}, {node(0), node(20)}};
+  const auto drawn = [&](std::uint32_t component) {
+    return closure_strokes(record, component, {{}, {}, PlanView({}, 100.0, 100.0)}).intra.size();
+  };
+  EXPECT_EQ(drawn(record.robots[0].component), 2U);
+  EXPECT_EQ(drawn(record.robots[0].component + 1), 0U);
   record.robots[0].server_estimate.resize(20);  // the last ten are not joined to the first
-  const auto positions = keyframe_positions(record);
-  EXPECT_EQ(positions.size(), 20U);
-  EXPECT_TRUE(positions.contains(record.server.nodes[19].id));
-  EXPECT_FALSE(positions.contains(record.server.nodes[20].id));
+  EXPECT_EQ(drawn(record.robots[0].component), 1U);
 }
 
 TEST(Stretch, HasOnePoseMoreOnEitherSide) {

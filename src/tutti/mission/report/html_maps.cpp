@@ -19,12 +19,6 @@ namespace {
 constexpr double kWide_px = 1160.0;
 constexpr double kHalf_px = 560.0;
 
-Points3d transformed(const Pose3& T_a_b, const Trajectory& trajectory_b) {
-  Points3d out;
-  for (const auto& p : trajectory_b) out.push_back(T_a_b * p.pose.translation);
-  return out;
-}
-
 /// What the robots saw, as a picture under the routes.
 void draw_clouds(Svg& svg, const PlanView& view, const GroundPlane& ground, std::vector<CloudLayer> clouds) {
   constexpr formats::Rgb kInk{112, 122, 140};
@@ -51,34 +45,6 @@ void draw_drift(Svg& svg, const RobotRecord& robot, const Trajectory& route, con
   }
 }
 
-std::vector<std::size_t> members(const MissionRecord& record, std::uint32_t component) {
-  std::vector<std::size_t> out;
-  for (std::size_t r = 0; r < record.robots.size(); ++r)
-    if (record.robots[r].component == component) out.push_back(r);
-  return out;
-}
-
-bool is_member(const MissionRecord& record, const std::vector<std::size_t>& robots, RobotId id) {
-  return std::any_of(robots.begin(), robots.end(), [&](std::size_t r) { return record.robots[r].id == id; });
-}
-
-void draw_closures(Svg& svg, const MissionRecord& record, const Pose3& T_display_world, const GroundPlane& ground,
-                   const PlanView& view, const std::vector<std::size_t>& robots) {
-  const auto positions = keyframe_positions(record);
-  Strokes intra;
-  Strokes inter;
-  for (const auto& closure : record.server.closures) {
-    const auto from = positions.find(closure.from);
-    const auto to = positions.find(closure.to);
-    if (from == positions.end() || to == positions.end() || !is_member(record, robots, closure.from.chain.robot))
-      continue;
-    (closure.from.chain.robot == closure.to.chain.robot ? intra : inter)
-        .emplace_back(view(ground(T_display_world * from->second)), view(ground(T_display_world * to->second)));
-  }
-  svg.segments(thinned(intra), "intra", fmt::format("{} loop closures within one robot", intra.size()));
-  svg.segments(thinned(inter), "inter", fmt::format("{} loop closures between robots", inter.size()));
-}
-
 /// Invisible until pointed at.
 void draw_hover_points(Svg& svg, const Points2d& pixels, const std::vector<std::string>& titles, std::size_t count) {
   const std::size_t step = std::max<std::size_t>(1, pixels.size() / count);
@@ -95,13 +61,16 @@ std::vector<std::string> route_titles(const RobotRecord& robot) {
 }
 
 std::string component_figure(const MissionRecord& record, std::uint32_t component) {
-  const auto robots = members(record, component);
-  const bool laid_on = component == record.server.largest_component;
-  const Pose3 T_display_world = laid_on ? record.server.T_reference_world.value_or(Pose3{}) : Pose3{};
+  const Pose3 T_display_world = display_from_world(record, component);
+  std::vector<const RobotRecord*> robots;
   std::vector<Points3d> routes;
-  for (const std::size_t r : robots) routes.push_back(transformed(T_display_world, record.robots[r].server_estimate));
+  for (const RobotRecord& robot : record.robots) {
+    if (robot.component != component) continue;
+    robots.push_back(&robot);
+    Points3d& route = routes.emplace_back();
+    for (const StampedPose& p : robot.server_estimate) route.push_back(T_display_world * p.pose.translation);
+  }
   const GroundPlane ground = ground_plane(routes);
-
   std::vector<Points2d> layers;
   for (const auto& route : routes) layers.push_back(ground(route));
   std::vector<CloudLayer> clouds = server_layers(record, component);
@@ -110,9 +79,11 @@ std::string component_figure(const MissionRecord& record, std::uint32_t componen
   const PlanView view(box, kWide_px, 0.56 * kWide_px);
   Svg svg(view.width(), view.height(), "The joint map from above: every robot's way in the server's estimate");
   draw_clouds(svg, view, ground, std::move(clouds));
-  draw_closures(svg, record, T_display_world, ground, view, robots);
+  const auto [intra, inter] = closure_strokes(record, component, {T_display_world, ground, view});
+  svg.segments(thinned(intra), "intra", fmt::format("{} loop closures within one robot", intra.size()));
+  svg.segments(thinned(inter), "inter", fmt::format("{} loop closures between robots", inter.size()));
   for (std::size_t i = 0; i < robots.size(); ++i) {
-    const RobotRecord& robot = record.robots[robots[i]];
+    const RobotRecord& robot = *robots[i];
     const std::string colour = robot_class(record, robot.id);
     const Points2d pixels = view(layers[i]);
     draw_drift(svg, robot, robot.server_estimate, pixels);
@@ -121,7 +92,7 @@ std::string component_figure(const MissionRecord& record, std::uint32_t componen
   }
   for (std::size_t i = 0; i < robots.size(); ++i) {
     if (layers[i].empty()) continue;
-    const RobotRecord& robot = record.robots[robots[i]];
+    const RobotRecord& robot = *robots[i];
     const std::string colour = robot_class(record, robot.id);
     const double radius = 5.0 + 2.5 * static_cast<double>((robots.size() - 1 - i) % 4);  // rings around rings
     svg.circle(view(layers[i].front()), radius, "start " + colour, robot.name + " starts here");

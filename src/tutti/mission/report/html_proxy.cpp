@@ -54,46 +54,28 @@ std::uint32_t component_of(const ProxyGraph& graph, const ChainId& chain) {
   return 0;
 }
 
-/// The component with most proxy nodes: others live in unrelated frames and would be drawn over each other.
-std::uint32_t shown_component(const std::vector<std::uint32_t>& component) {
-  std::uint32_t best = 0;
-  std::ptrdiff_t most = 0;
-  for (const std::uint32_t candidate : component) {
-    const auto count = std::count(component.begin(), component.end(), candidate);
-    if (count > most || (count == most && candidate < best)) std::tie(best, most) = std::pair(candidate, count);
-    if (count * 2 > static_cast<std::ptrdiff_t>(component.size())) break;
-  }
-  return best;
-}
-
-/// One component of the graph from above, in the frame of the display.
+/// The largest component: others live in unrelated frames and would be drawn over it.
 struct Plan {
   std::vector<std::uint32_t> component;  ///< Per proxy node.
   std::uint32_t shown = 0;
-  Pose3 T_display_world;
-  GroundPlane ground;
-  PlanView view;
+  MapView map;
   Points2d pixels;  ///< Of the proxy nodes.
-
-  [[nodiscard]] Eigen::Vector2d operator()(const Eigen::Vector3d& p_world) const {
-    return view(ground(T_display_world * p_world));
-  }
 };
 
 Plan plan_of(const MissionRecord& record) {
   const ProxyGraph& graph = record.server.proxy;
+  const std::uint32_t shown = record.server.largest_component;
+  const Pose3 T_display_world = display_from_world(record, shown);
   std::vector<std::uint32_t> component;
-  for (const auto& node : graph.nodes) component.push_back(component_of(graph, node.chain));
-  const std::uint32_t shown = shown_component(component);
-  const Pose3 T_display_world = record.server.T_reference_world.value_or(Pose3{});
-  Points3d positions, box;
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-    positions.push_back(T_display_world * graph.nodes[i].T_world_body.translation);
-    if (component[i] == shown) box.push_back(positions.back());
+  Points3d box;
+  for (const ProxyNode& node : graph.nodes) {
+    component.push_back(component_of(graph, node.chain));
+    if (component.back() == shown) box.push_back(T_display_world * node.T_world_body.translation);
   }
   const GroundPlane ground = ground_plane({box});
-  const PlanView view({ground(box)}, kWide_px, 0.56 * kWide_px);
-  return {std::move(component), shown, T_display_world, ground, view, view(ground(positions))};
+  Plan plan{std::move(component), shown, {T_display_world, ground, {{ground(box)}, kWide_px, 0.56 * kWide_px}}, {}};
+  for (const ProxyNode& node : graph.nodes) plan.pixels.push_back(plan.map(node.T_world_body.translation));
+  return plan;
 }
 
 void draw_edges(Svg& svg, const Plan& plan, const Edges& edges) {
@@ -105,15 +87,8 @@ void draw_edges(Svg& svg, const Plan& plan, const Edges& edges) {
 
 /// How many there are.
 std::size_t draw_closures(Svg& svg, const Plan& plan, const MissionRecord& record) {
-  const auto keyframes = keyframe_positions(record);
-  Strokes strokes;
-  for (const auto& closure : record.server.closures) {
-    const auto from = keyframes.find(closure.from);
-    const auto to = keyframes.find(closure.to);
-    if (from != keyframes.end() && to != keyframes.end() &&
-        component_of(record.server.proxy, closure.from.chain) == plan.shown)
-      strokes.emplace_back(plan(from->second), plan(to->second));
-  }
+  auto [strokes, inter] = closure_strokes(record, plan.shown, plan.map);
+  strokes.insert(strokes.end(), inter.begin(), inter.end());
   svg.segments(thinned(strokes), "closure", fmt::format("{} loop closures", strokes.size()));
   return strokes.size();
 }
@@ -131,7 +106,7 @@ PerKind draw_constraints(Svg& svg, const Plan& plan, const MissionRecord& record
       const Eigen::Vector3d* from = find_position(robot.server_estimate, constraint.from);
       const Eigen::Vector3d* to = find_position(robot.server_estimate, constraint.to);
       if (from == nullptr || to == nullptr) continue;
-      arcs[static_cast<std::size_t>(constraint.kind)].emplace_back(plan(*from), plan(*to));
+      arcs[static_cast<std::size_t>(constraint.kind)].emplace_back(plan.map(*from), plan.map(*to));
     }
     for (std::size_t k = 0; k < arcs.size(); ++k) {
       kinds[k] += arcs[k].size();
@@ -159,12 +134,13 @@ std::string proxy_graph_html(const MissionRecord& record) {
   if (graph.nodes.empty()) return "";
   const Plan plan = plan_of(record);
   const Edges edges = proxy_edges(graph, plan.component);
-  Svg svg(plan.view.width(), plan.view.height(), "The proxy graph from above with loop closures and constraints");
+  Svg svg(plan.map.view.width(), plan.map.view.height(),
+          "The proxy graph from above with loop closures and constraints");
   draw_edges(svg, plan, edges);
   const std::size_t closures = draw_closures(svg, plan, record);
   const PerKind kinds = draw_constraints(svg, plan, record);
   draw_nodes(svg, plan, record);
-  plan.view.draw_scale_bar(svg);
+  plan.map.view.draw_scale_bar(svg);
 
   std::vector<LegendEntry> legend;
   for (const auto& robot : record.robots)

@@ -29,7 +29,6 @@ class Axis {
 
   [[nodiscard]] double operator()(double value) const;
   [[nodiscard]] const std::vector<double>& ticks() const { return ticks_; }
-  [[nodiscard]] bool is_logarithmic() const { return logarithmic_; }
 
  private:
   double low_ = 0.0;

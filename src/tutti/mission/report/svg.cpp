@@ -148,13 +148,6 @@ void Svg::arcs(std::span<const std::pair<Eigen::Vector2d, Eigen::Vector2d>> stro
   path(data, css_class, title);
 }
 
-void Svg::squares(std::span<const Eigen::Vector2d> corners, double side, std::string_view css_class) {
-  std::string data;
-  for (const auto& p : corners)
-    if (p.allFinite()) data += fmt::format("M{}h{}v{}h-{}z", xy(p), px(side), px(side), px(side));
-  path(data, css_class, {});
-}
-
 void Svg::dots(std::span<const Eigen::Vector2d> centers, std::string_view css_class) {
   std::string data;
   for (const auto& p : centers)

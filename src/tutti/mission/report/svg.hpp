@@ -37,8 +37,6 @@ class Svg {
   /// The same, each bent to one side, so that parallel strokes stay apart.
   void arcs(std::span<const std::pair<Eigen::Vector2d, Eigen::Vector2d>> strokes, std::string_view css_class,
             std::string_view title = {});
-  /// Many squares with the given lower-left corners (in pixels: smallest x and y) as one shape.
-  void squares(std::span<const Eigen::Vector2d> corners, double side, std::string_view css_class);
   /// Many dots as one shape; their size is the class's stroke width.
   void dots(std::span<const Eigen::Vector2d> centers, std::string_view css_class);
   void circle(const Eigen::Vector2d& center, double radius, std::string_view css_class, std::string_view title = {});
