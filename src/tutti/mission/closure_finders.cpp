@@ -2,6 +2,7 @@
 #include "tutti/mission/closure_finders.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -50,6 +51,47 @@ Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::feature
 
 namespace {
 
+/// The keyframe next to a moment within this robot's submap; neighbouring submaps share no moment.
+const Keyframe* keyframe_at(const Submap& submap, RobotId robot, Timestamp stamp) {
+  const auto& keyframes = submap.keyframes;
+  if (submap.id.chain.robot != robot || stamp < keyframes.front().stamp || keyframes.back().stamp <= stamp)
+    return nullptr;
+  return &*std::ranges::min_element(keyframes, {}, [&](const Keyframe& k) { return std::abs(k.stamp - stamp); });
+}
+
+}  // namespace
+
+ReferenceClosureFinder::ReferenceClosureFinder(std::map<RobotId, Trajectory> reference,
+                                               const simulation::ReferenceClosureConfig& config, std::uint64_t seed,
+                                               std::vector<PlantedClosure> planted)
+    : closures_(std::move(reference), config, seed), planted_(std::move(planted)) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(config.sigma_m), Eigen::Vector3d::Constant(config.sigma_deg * kRadPerDeg);
+  covariance_ = sigma.cwiseAbs2().asDiagonal();
+}
+
+std::optional<LoopClosure> ReferenceClosureFinder::planted_in(const Submap& first, const Submap& second) const {
+  const auto claim = [&](const PlantedClosure& planted, const Submap& from,
+                         const Submap& to) -> std::optional<LoopClosure> {
+    const Keyframe* a = keyframe_at(from, planted.other, planted.other_stamp);
+    const Keyframe* b = keyframe_at(to, planted.robot, planted.stamp);
+    if (a == nullptr || b == nullptr) return std::nullopt;
+    const auto T_a_b = closures_.true_relative_pose(planted.other, a->stamp, planted.robot, b->stamp);
+    if (!T_a_b) return std::nullopt;
+    return LoopClosure{
+        {from.id.chain, a->index}, {to.id.chain, b->index}, {planted.T_claimed_true * *T_a_b, covariance_}};
+  };
+  for (const PlantedClosure& planted : planted_) {
+    if (const auto found = claim(planted, first, second)) return found;
+    const auto backwards = claim(planted, second, first);
+    if (!backwards) continue;
+    return LoopClosure{backwards->to, backwards->from, {backwards->measurement.T_a_b.inverse(), covariance_}};
+  }
+  return std::nullopt;
+}
+
+namespace {
+
 std::vector<PlantedClosure> planted_closures(const std::vector<PlantedClosureConfig>& configs,
                                              const std::vector<MissionRecording>& recordings) {
   const auto moment = [&](const std::string& name, double time_s) {
@@ -73,15 +115,8 @@ std::shared_ptr<const server::ClosureFinder> make_reference_finder(const Closure
                                                                    std::uint64_t seed) {
   std::map<RobotId, Trajectory> reference;
   for (const MissionRecording& robot : recordings) reference[robot.recording.robot] = robot.recording.reference;
-  const auto truth =
-      std::make_shared<const simulation::ReferenceClosures>(std::move(reference), config.reference, seed);
-  auto finder = std::make_shared<ReferenceClosureFinder>(truth);
-  if (config.planted.empty()) return finder;
-  Vector6d sigma;
-  sigma << Eigen::Vector3d::Constant(config.reference.sigma_m),
-      Eigen::Vector3d::Constant(config.reference.sigma_deg * kRadPerDeg);
-  return std::make_shared<PlantedClosureFinder>(std::move(finder), truth, planted_closures(config.planted, recordings),
-                                                Matrix6d(sigma.cwiseAbs2().asDiagonal()));
+  return std::make_shared<ReferenceClosureFinder>(std::move(reference), config.reference, seed,
+                                                  planted_closures(config.planted, recordings));
 }
 
 }  // namespace

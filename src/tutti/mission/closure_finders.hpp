@@ -2,7 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "tutti/mission/feature_cache.hpp"
 #include "tutti/mission/mission_config.hpp"
@@ -33,23 +37,40 @@ class LidarClosureFinder final : public server::ClosureFinder {
   mutable FeatureCache cache_;
 };
 
-/// For recordings without sensor data: true relative poses plus noise and a share of wrong ones.
+/// A planted closure in terms of robots and stamps.
+struct PlantedClosure {
+  RobotId robot;
+  Timestamp stamp;
+  RobotId other;
+  Timestamp other_stamp;
+  Pose3 T_claimed_true;  ///< Error of where the robot is claimed to be, in the other's body frame.
+};
+
+/// For recordings without sensor data: true relative poses plus noise and a share of wrong ones. On the two submaps
+/// that contain the moments of a planted closure it says that one instead: between the keyframes next to them, the true
+/// relative pose but for the error, as confident as the others.
 class ReferenceClosureFinder final : public server::ClosureFinder {
  public:
-  explicit ReferenceClosureFinder(std::shared_ptr<const simulation::ReferenceClosures> closures)
-      : closures_(std::move(closures)) {}
+  ReferenceClosureFinder(std::map<RobotId, Trajectory> reference, const simulation::ReferenceClosureConfig& config,
+                         std::uint64_t seed, std::vector<PlantedClosure> planted = {});
   [[nodiscard]] std::uint32_t version() const override { return simulation::ReferenceClosures::kVersion; }
   [[nodiscard]] bool needs_clouds() const override { return false; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
-    return closures_->is_candidate(first, second);
+    return planted_in(first, second) || closures_.is_candidate(first, second);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::CloudStore&) const override {
-    return closures_->verify(first, second);
+    if (const auto planted = planted_in(first, second))
+      return ClosureVerdict{{first.id, second.id}, {*planted}, std::nullopt, version()};
+    return closures_.verify(first, second);
   }
 
  private:
-  std::shared_ptr<const simulation::ReferenceClosures> closures_;
+  [[nodiscard]] std::optional<LoopClosure> planted_in(const Submap& first, const Submap& second) const;
+
+  simulation::ReferenceClosures closures_;
+  std::vector<PlantedClosure> planted_;
+  Matrix6d covariance_;  // of those
 };
 
 /// What load_input() accepts is complete: planted closures name robots of the mission.

@@ -44,14 +44,6 @@ const Pose3& block_anchor(const Submap& submap) {
   return (even ? submap.keyframes.back() : submap.keyframes.front()).T_odom_body;
 }
 
-/// The keyframe next to a moment within this robot's submap; neighbouring submaps share no moment.
-const Keyframe* keyframe_at(const Submap& submap, RobotId robot, Timestamp stamp) {
-  const auto& keyframes = submap.keyframes;
-  if (submap.id.chain.robot != robot || stamp < keyframes.front().stamp || keyframes.back().stamp <= stamp)
-    return nullptr;
-  return &*std::ranges::min_element(keyframes, {}, [&](const Keyframe& k) { return std::abs(k.stamp - stamp); });
-}
-
 }  // namespace
 
 SpoiledClosureFinder::SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
@@ -76,42 +68,6 @@ Result<ClosureVerdict> SpoiledClosureFinder::verify(const Submap& first, const S
     closure.measurement.T_a_b = T_anchor_from.inverse() * *error * T_anchor_from * closure.measurement.T_a_b;
   }
   return verdict;
-}
-
-PlantedClosureFinder::PlantedClosureFinder(std::shared_ptr<const server::ClosureFinder> inner,
-                                           std::shared_ptr<const simulation::ReferenceClosures> truth,
-                                           std::vector<PlantedClosure> planted, const Matrix6d& covariance)
-    : inner_(std::move(inner)), truth_(std::move(truth)), planted_(std::move(planted)), covariance_(covariance) {}
-
-std::optional<LoopClosure> PlantedClosureFinder::planted_in(const Submap& first, const Submap& second) const {
-  const auto claim = [&](const PlantedClosure& planted, const Submap& from,
-                         const Submap& to) -> std::optional<LoopClosure> {
-    const Keyframe* a = keyframe_at(from, planted.other, planted.other_stamp);
-    const Keyframe* b = keyframe_at(to, planted.robot, planted.stamp);
-    if (a == nullptr || b == nullptr) return std::nullopt;
-    const auto T_a_b = truth_->true_relative_pose(planted.other, a->stamp, planted.robot, b->stamp);
-    if (!T_a_b) return std::nullopt;
-    return LoopClosure{
-        {from.id.chain, a->index}, {to.id.chain, b->index}, {planted.T_claimed_true * *T_a_b, covariance_}};
-  };
-  for (const PlantedClosure& planted : planted_) {
-    if (const auto found = claim(planted, first, second)) return found;
-    const auto backwards = claim(planted, second, first);
-    if (!backwards) continue;
-    return LoopClosure{backwards->to, backwards->from, {backwards->measurement.T_a_b.inverse(), covariance_}};
-  }
-  return std::nullopt;
-}
-
-bool PlantedClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  return planted_in(first, second) || inner_->is_candidate(first, second);
-}
-
-Result<ClosureVerdict> PlantedClosureFinder::verify(const Submap& first, const Submap& second,
-                                                    const server::CloudStore& clouds) const {
-  const auto planted = planted_in(first, second);
-  if (!planted) return inner_->verify(first, second, clouds);
-  return ClosureVerdict{{first.id, second.id}, {*planted}, std::nullopt, version()};
 }
 
 }  // namespace tutti::mission

@@ -10,7 +10,6 @@
 #include "tutti/base/config.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/simulation/bounds.hpp"
-#include "tutti/simulation/reference_closures.hpp"
 
 namespace tutti::mission {
 
@@ -69,37 +68,6 @@ struct PlantedClosureConfig {
     v.field("left_m", left_m, between(-simulation::kFarthest_m, simulation::kFarthest_m), "... to the left,");
     v.field("yaw_deg", yaw_deg, between(-180.0, 180.0), "... and turned about the other robot.");
   }
-};
-
-/// A planted closure in terms of robots and stamps.
-struct PlantedClosure {
-  RobotId robot;
-  Timestamp stamp;
-  RobotId other;
-  Timestamp other_stamp;
-  Pose3 T_claimed_true;  ///< Error of where the robot is claimed to be, in the other's body frame.
-};
-
-/// Puts one closure in place of the verdict of another finder on the two submaps that contain the given moments:
-/// between the keyframes next to them, the true relative pose but for the error, as confident as the covariance says.
-class PlantedClosureFinder final : public server::ClosureFinder {
- public:
-  PlantedClosureFinder(std::shared_ptr<const server::ClosureFinder> inner,
-                       std::shared_ptr<const simulation::ReferenceClosures> truth, std::vector<PlantedClosure> planted,
-                       const Matrix6d& covariance);
-  [[nodiscard]] std::uint32_t version() const override { return inner_->version(); }
-  [[nodiscard]] bool needs_clouds() const override { return inner_->needs_clouds(); }
-  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
-  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore& clouds) const override;
-
- private:
-  [[nodiscard]] std::optional<LoopClosure> planted_in(const Submap& first, const Submap& second) const;
-
-  std::shared_ptr<const server::ClosureFinder> inner_;
-  std::shared_ptr<const simulation::ReferenceClosures> truth_;
-  std::vector<PlantedClosure> planted_;
-  Matrix6d covariance_;
 };
 
 }  // namespace tutti::mission

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
+#include "tutti/mission/closure_finders.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -99,25 +100,13 @@ class Planted : public testing::Test {
         for (const Keyframe& keyframe : submap(robot, index).keyframes)
           if (reference[RobotId{robot}].empty() || reference[RobotId{robot}].back().stamp < keyframe.stamp)
             reference[RobotId{robot}].push_back({keyframe.stamp, keyframe.T_odom_body});
-    finder_ = std::make_shared<PlantedClosureFinder>(
-        std::make_shared<Nothing>(),
-        std::make_shared<const simulation::ReferenceClosures>(reference, simulation::ReferenceClosureConfig{}, 1),
-        std::vector<PlantedClosure>{{RobotId{1}, Timestamp{} + 21.2, RobotId{0}, Timestamp{} + 4.9, error_}},
-        Matrix6d::Identity());
+    finder_ = std::make_shared<ReferenceClosureFinder>(
+        reference, simulation::ReferenceClosureConfig{.radius_m = 1e-3, .wrong_share = 0.0}, 1,
+        std::vector<PlantedClosure>{{RobotId{1}, Timestamp{} + 21.2, RobotId{0}, Timestamp{} + 4.9, error_}});
   }
-  class Nothing final : public server::ClosureFinder {
-   public:
-    [[nodiscard]] std::uint32_t version() const override { return 7; }
-    [[nodiscard]] bool needs_clouds() const override { return false; }
-    [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return false; }
-    [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                                const server::CloudStore&) const override {
-      return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::distant}, version()};
-    }
-  };
   const Pose3 error_{so3_exp({0.0, 0.0, 0.1}), {1.5, -0.5, 0.0}};
   server::MemoryCloudStore clouds_;
-  std::shared_ptr<PlantedClosureFinder> finder_;
+  std::shared_ptr<ReferenceClosureFinder> finder_;
 };
 
 TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
@@ -127,7 +116,7 @@ TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
       const auto verdict = finder_->verify(submap(0, i), submap(1, j), clouds_);
       EXPECT_EQ(finder_->is_candidate(submap(0, i), submap(1, j)), !verdict->closures.empty());
       EXPECT_EQ(verdict->refusal.has_value(), verdict->closures.empty());
-      EXPECT_EQ(verdict->finder_version, 7U);
+      EXPECT_EQ(verdict->finder_version, simulation::ReferenceClosures::kVersion);
       if (verdict->closures.empty()) continue;
       ++found;
       const LoopClosure& closure = verdict->closures.front();
