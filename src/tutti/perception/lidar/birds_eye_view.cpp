@@ -44,7 +44,7 @@ std::array<double, kBins> facing(const BirdsEyeView& view) {
 ComplexImage draw(const BirdsEyeView& view, double yaw, double cell_m) {
   constexpr int kMask = kImageSize - 1;
   constexpr float kReach = 0.5F * kImageSize - 1.0F;
-  ComplexImage image;
+  ComplexImage image = ComplexImage::Zero(kImageSize, kImageSize);
   const Eigen::Matrix2f R = Eigen::Rotation2Df(static_cast<float>(yaw)).toRotationMatrix();
   for (const auto& wall : view.walls) {
     const Eigen::Vector2f p = R * wall.position / static_cast<float>(cell_m), n = R * wall.normal;
@@ -53,9 +53,8 @@ ComplexImage draw(const BirdsEyeView& view, double yaw, double cell_m) {
     for (int corner = 0; corner < 4; ++corner) {  // bilinear
       const int dx = corner & 1, dy = corner >> 1;
       const float w = (dx ? fx : 1.0F - fx) * (dy ? fy : 1.0F - fy);
-      const int k = ((static_cast<int>(y0) + dy) & kMask) * kImageSize + ((static_cast<int>(x0) + dx) & kMask);
-      image.re[k] += w * n.x();
-      image.im[k] += w * n.y();
+      image((static_cast<int>(y0) + dy) & kMask, (static_cast<int>(x0) + dx) & kMask) +=
+          std::complex<float>(w * n.x(), w * n.y());
     }
   }
   return image;
@@ -65,28 +64,16 @@ ComplexImage draw(const BirdsEyeView& view, double yaw, double cell_m) {
 /// when there is nothing to scale.
 bool whiten(ComplexImage& spectrum) {
   constexpr float kFade = 0.25F * kImageSize;
-  float strongest = 0.0F;
-  for (std::size_t k = 0; k < spectrum.re.size(); ++k)
-    strongest = std::max(strongest, std::hypot(spectrum.re[k], spectrum.im[k]));
+  const Eigen::ArrayXXf size = spectrum.abs();
+  const float strongest = size.maxCoeff();
   if (strongest == 0.0F) return false;
-  double sum = 0.0;
-  const auto each = [&](auto&& scale) {
-    for (int row = 0; row < kImageSize; ++row)
-      for (int column = 0; column < kImageSize; ++column) {
-        const int k = row * kImageSize + column;
-        const float factor = scale(std::min(row, kImageSize - row), std::min(column, kImageSize - column), k);
-        spectrum.re[k] *= factor;
-        spectrum.im[k] *= factor;
-        sum += double{spectrum.re[k]} * spectrum.re[k] + double{spectrum.im[k]} * spectrum.im[k];
-      }
-  };
-  each([&](int row, int column, int k) {
-    const float size = std::hypot(spectrum.re[k], spectrum.im[k]);
-    const auto squared = static_cast<float>(row * row + column * column);
-    return size > 1e-6F * strongest ? std::exp(-0.5F * squared / (kFade * kFade)) / size : 0.0F;
-  });
-  const auto unit = static_cast<float>(1.0 / std::sqrt(sum));
-  each([&](int, int, int) { return unit; });
+  for (int row = 0; row < kImageSize; ++row)
+    for (int column = 0; column < kImageSize; ++column) {
+      const int y = std::min(row, kImageSize - row), x = std::min(column, kImageSize - column);
+      const float fade = std::exp(-0.5F * static_cast<float>(y * y + x * x) / (kFade * kFade));
+      spectrum(row, column) *= size(row, column) > 1e-6F * strongest ? fade / size(row, column) : 0.0F;
+    }
+  spectrum /= static_cast<float>(std::sqrt(spectrum.abs2().cast<double>().sum()));
   return true;
 }
 
@@ -156,10 +143,9 @@ std::vector<double> wall_directions(const BirdsEyeView& view, int count) {
 }
 
 std::vector<TurnedView> turn_views(const BirdsEyeView& view, const CandidateConfig& config) {
-  const Fft fft;
   std::vector<TurnedView> out;
   for (const double direction : wall_directions(view, config.wall_directions)) {
-    TurnedView turned{direction, fft.forward(draw(view, -direction, config.cell_m))};
+    TurnedView turned{direction, forward_fft(draw(view, -direction, config.cell_m))};
     if (whiten(turned.spectrum)) out.push_back(std::move(turned));
   }
   return out;

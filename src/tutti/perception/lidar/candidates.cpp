@@ -25,62 +25,47 @@ struct Peak {
 
 /// f(-x) from f(x): of a spectrum as well as of an image.
 ComplexImage mirrored(const ComplexImage& f) {
-  ComplexImage out;
+  ComplexImage out(kN, kN);
   for (int row = 0; row < kN; ++row)
-    for (int column = 0; column < kN; ++column) {
-      const int from = ((kN - row) & kMask) * kN + ((kN - column) & kMask), to = row * kN + column;
-      out.re[to] = f.re[from];
-      out.im[to] = f.im[from];
-    }
+    for (int column = 0; column < kN; ++column) out(row, column) = f((kN - row) & kMask, (kN - column) & kMask);
   return out;
 }
 
 /// Correlations c(s) = sum_x Re(conj(f_b(x - s)) f_a(x)) of image a with image b (real part of the result) and with b
 /// turned by half (imaginary part). With A, B the spectra, C = A conj(B); the half turn gives C' = -A conj(B(-k)); the
 /// spectrum of Re c is H(k) = (C(k) + conj(C(-k))) / 2; one inverse transform of H + i H' yields both.
-ComplexImage correlate_both(const Fft& fft, const ComplexImage& A, const ComplexImage& A_mirrored,
-                            const ComplexImage& B) {
+ComplexImage correlate_both(const ComplexImage& A, const ComplexImage& A_mirrored, const ComplexImage& B) {
+  constexpr std::complex<float> i(0.0F, 1.0F);
   const ComplexImage B_mirrored = mirrored(B);
-  ComplexImage H;
-  const float *a_re = A.re.data(), *a_im = A.im.data(), *am_re = A_mirrored.re.data(), *am_im = A_mirrored.im.data();
-  const float *b_re = B.re.data(), *b_im = B.im.data(), *bm_re = B_mirrored.re.data(), *bm_im = B_mirrored.im.data();
-  float *h_re = H.re.data(), *h_im = H.im.data();
-  for (int k = 0; k < kN * kN; ++k) {
-    // H + i H' = A (conj(B) - i conj(B-)) + conj(A-) (B- - i B), but for a factor 1/2
-    const float u_re = b_re[k] - bm_im[k], u_im = -b_im[k] - bm_re[k];
-    const float v_re = bm_re[k] + b_im[k], v_im = bm_im[k] - b_re[k];
-    h_re[k] = a_re[k] * u_re - a_im[k] * u_im + am_re[k] * v_re + am_im[k] * v_im;
-    h_im[k] = a_re[k] * u_im + a_im[k] * u_re + am_re[k] * v_im - am_im[k] * v_re;
-  }
-  return fft.inverse(H);
+  // H + i H', but for a factor 1/2
+  return inverse_fft(A * (B.conjugate() - i * B_mirrored.conjugate()) + A_mirrored.conjugate() * (B_mirrored - i * B));
 }
 
 /// Adds the highest point of a correlation, and the highest one farther than `apart` cells (in either axis) from it.
-void add_peaks(std::vector<float>& correlation, double direction_a, double yaw, int apart, double cell_m,
+void add_peaks(Eigen::ArrayXXf correlation, double direction_a, double yaw, int apart, double cell_m,
                std::vector<Peak>& peaks) {
   const auto centred = [](int i) { return i < kN / 2 ? i : i - kN; };
   for (int n = 0; n < 2; ++n) {
-    const auto best = std::max_element(correlation.begin(), correlation.end());
-    const int k = static_cast<int>(best - correlation.begin());
-    const Eigen::Vector2d cells(centred(k & kMask), centred(k / kN));
-    peaks.push_back({yaw, Eigen::Rotation2Dd(direction_a) * (cell_m * cells), 0.5F * *best});
+    int y = 0, x = 0;
+    const float best = correlation.maxCoeff(&y, &x);
+    const Eigen::Vector2d cells(centred(x), centred(y));
+    peaks.push_back({yaw, Eigen::Rotation2Dd(direction_a) * (cell_m * cells), 0.5F * best});
     for (int dy = -apart; dy <= apart; ++dy)
-      for (int dx = -apart; dx <= apart; ++dx) correlation[((k / kN + dy) & kMask) * kN + ((k + dx) & kMask)] = 0.0F;
+      for (int dx = -apart; dx <= apart; ++dx) correlation((y + dy) & kMask, (x + dx) & kMask) = 0.0F;
   }
 }
 
 /// The best two shifts of every yaw that lays a wall direction of b on one of a.
 std::vector<Peak> correlate(const SubmapFeatures& a, const SubmapFeatures& b, const CandidateConfig& config) {
-  const Fft fft;
   const int apart = std::min(static_cast<int>(config.distinct_m / config.cell_m), kN / 2 - 1);
   std::vector<Peak> peaks;
   for (const TurnedView& view_a : *a.turned_views) {
     const ComplexImage mirrored_a = mirrored(view_a.spectrum);
     for (const TurnedView& view_b : *b.turned_views) {
-      ComplexImage both = correlate_both(fft, view_a.spectrum, mirrored_a, view_b.spectrum);
+      const ComplexImage both = correlate_both(view_a.spectrum, mirrored_a, view_b.spectrum);
       const double yaw = view_a.direction - view_b.direction;
-      add_peaks(both.re, view_a.direction, yaw, apart, config.cell_m, peaks);
-      add_peaks(both.im, view_a.direction, yaw + std::numbers::pi, apart, config.cell_m, peaks);
+      add_peaks(both.real(), view_a.direction, yaw, apart, config.cell_m, peaks);
+      add_peaks(both.imag(), view_a.direction, yaw + std::numbers::pi, apart, config.cell_m, peaks);
     }
   }
   return peaks;

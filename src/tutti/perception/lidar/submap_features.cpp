@@ -110,7 +110,7 @@ std::size_t bytes_of(const SubmapFeatures& features) {
   if (features.cloud.roughness) bytes += of_elements(*features.cloud.roughness);
   if (features.turned_views)
     for (const TurnedView& view : *features.turned_views)
-      bytes += sizeof view + of_elements(view.spectrum.re) + of_elements(view.spectrum.im);
+      bytes += sizeof view + static_cast<std::size_t>(view.spectrum.size()) * sizeof(view.spectrum(0));
   if (features.panoramas)
     for (const DepthPanorama& panorama : *features.panoramas) bytes += panorama.bytes();
   return bytes;
