@@ -65,8 +65,6 @@ void InProcessBus::set_link(RobotId robot, const LinkConfig& link) {
 
 void InProcessBus::subscribe(Endpoint endpoint, MessageKind kind) { subscriptions_.insert({kind, endpoint}); }
 
-void InProcessBus::unsubscribe(Endpoint endpoint, MessageKind kind) { subscriptions_.erase({kind, endpoint}); }
-
 InProcessBus::Direction& InProcessBus::direction(Endpoint from, Endpoint to) {
   const auto found = directions_.find({from, to});
   if (found != directions_.end()) return found->second;

@@ -109,7 +109,6 @@ class InProcessBus {
   void set_link(RobotId robot, const LinkConfig& link);
   /// Broadcasts of this kind reach this endpoint from now on.
   void subscribe(Endpoint endpoint, MessageKind kind);
-  void unsubscribe(Endpoint endpoint, MessageKind kind);
 
   /// `to`: one receiver, or nothing = every subscriber but the sender. `now` never goes back.
   void publish(Timestamp now, Endpoint from, std::optional<Endpoint> to, MessageKind kind, std::string bytes);
