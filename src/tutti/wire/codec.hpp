@@ -52,9 +52,6 @@ Result<ClosureVerdict> decode_verdict(std::string_view bytes);
 std::string encode(const PointCloud& cloud, const CloudCodec& codec = {});
 Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes);
 
-/// Kind of a frame with a supported version, judged by its first bytes only.
-Result<MessageKind> peek_kind(std::string_view bytes);
-
 /// What every message must fulfil, whoever made it: finite values, unit quaternions, consecutive indices, increasing
 /// stamps, symmetric positive semidefinite covariances, sorted nodes, edges of positive weight, indices in range,
 /// counts within limits, shapes of robots with nodes and of the size that those nodes give.

@@ -74,10 +74,6 @@ Result<Header> read_header(std::string_view bytes) {
 
 }  // namespace
 
-Result<MessageKind> peek_kind(std::string_view bytes) {
-  return read_header(bytes).map([](const Header& header) { return header.kind; });
-}
-
 std::string pack_frame(MessageKind kind, std::string_view payload) {
   TUTTI_CHECK(payload.size() <= kMaxMessageBytes, "message of {} bytes", payload.size());
   std::string frame(kMagic);
