@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -18,13 +17,6 @@
 
 namespace tutti::app {
 namespace {
-
-using formats::TrajectoryFormat;
-
-const std::map<std::string, TrajectoryFormat> kFormats = {{"auto", TrajectoryFormat::automatic},
-                                                          {"tum", TrajectoryFormat::tum},
-                                                          {"euroc", TrajectoryFormat::euroc},
-                                                          {"kitti", TrajectoryFormat::kitti}};
 
 struct Options {
   std::string estimate_path;
@@ -52,7 +44,7 @@ double duration_s(const Trajectory& trajectory) { return trajectory.back().stamp
 double seconds(Timestamp stamp) { return static_cast<double>(stamp.ns) * 1e-9; }
 
 Result<Trajectory> load(const std::string& path, const Options& options) {
-  auto trajectory = formats::read_trajectory(path, kFormats.at(options.format), options.kitti_rate_hz);
+  auto trajectory = formats::read_trajectory(path, options.format, options.kitti_rate_hz);
   if (trajectory && trajectory->empty())
     return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
   return trajectory;

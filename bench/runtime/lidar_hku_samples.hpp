@@ -19,6 +19,7 @@
 #include "tutti/base/random.hpp"
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/pcd.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
@@ -66,7 +67,7 @@ struct Session {
 inline Session load(const std::string& folder, const Pose3& T_odom1_odom) {
   Session session;
   session.reference =
-      value_or_exit(formats::with_times(value_or_exit(formats::read_kitti_poses(folder + "/odom_poses.txt")),
+      value_or_exit(formats::with_times(value_or_exit(formats::read_trajectory(folder + "/odom_poses.txt")),
                                         value_or_exit(formats::read_times(folder + "/times.txt"))));
   for (auto& pose : session.reference) {
     pose.pose = T_odom1_odom * pose.pose;

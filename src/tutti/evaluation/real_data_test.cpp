@@ -7,7 +7,7 @@
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/evaluation/rpe.hpp"
 #include "tutti/formats/kitti.hpp"
-#include "tutti/formats/tum.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 
 namespace tutti::evaluation {
 namespace {
@@ -24,8 +24,9 @@ class RealAte : public testing::TestWithParam<Figure> {};
 TEST_P(RealAte, IsThePrintedOne) {
   TUTTI_REQUIRE_SHARED("data/euroc");
   const Figure& figure = GetParam();
-  const auto estimate = formats::read_tum(test::shared_path("data/" + figure.folder + "/" + figure.file + ".tum"));
-  const auto reference = formats::read_tum(test::shared_path("data/" + figure.folder + "/groundtruth.tum"));
+  const auto estimate =
+      formats::read_trajectory(test::shared_path("data/" + figure.folder + "/" + figure.file + ".tum"));
+  const auto reference = formats::read_trajectory(test::shared_path("data/" + figure.folder + "/groundtruth.tum"));
   ASSERT_TRUE(estimate) << estimate.error().message;
   ASSERT_TRUE(reference) << reference.error().message;
   const auto result =
@@ -61,8 +62,8 @@ TEST(RealKitti, AteIsThePrintedOne) {
       {"00", "4.86 (10.2)"}, {"02", "5.24 (9.8)"}, {"05", "2.29 (6.5)"}, {"07", "0.78 (1.3)"}};
   for (const auto& [sequence, rmse_max] : figures) {
     const auto estimate =
-        formats::read_kitti_poses(test::shared_path("data/kitti/lidar_odometry_simple_online/" + sequence + ".txt"));
-    const auto reference = formats::read_kitti_poses(test::shared_path("data/kitti/gt_poses/" + sequence + ".txt"));
+        formats::read_trajectory(test::shared_path("data/kitti/lidar_odometry_simple_online/" + sequence + ".txt"));
+    const auto reference = formats::read_trajectory(test::shared_path("data/kitti/gt_poses/" + sequence + ".txt"));
     const auto pairs = associate(*estimate, *reference);
     const auto result = ate(pairs);
     EXPECT_EQ(pairs.size(), estimate->size());

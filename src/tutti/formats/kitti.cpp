@@ -1,55 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/kitti.hpp"
 
-#include <Eigen/LU>
-
 #include "tutti/formats/internal/points.hpp"
 #include "tutti/formats/internal/text.hpp"
-#include "tutti/geometry/so3.hpp"
 
 namespace tutti::formats {
-namespace {
-
-/// A rotation but for few digits, in the rows up to the current line.
-Status check_rotation(const internal::LineReader& line, const Eigen::Matrix3d& R) {
-  constexpr double kRotationTolerance = 1e-3;
-  const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (error <= kRotationTolerance && R.determinant() > 0.0) return {};
-  return line.fail(ErrorCode::invalid, "|R^T R - I| is {:.3g}, det R {:.3g}, expected a rotation within {}", error,
-                   R.determinant(), kRotationTolerance);
-}
-
-}  // namespace
-
-Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start) {
-  constexpr double kLowestRate = 1e-2;
-  constexpr double kHighestRate = 1e6;
-  if (!(rate_hz >= kLowestRate && rate_hz <= kHighestRate))
-    return fail(ErrorCode::configuration, "{}: rate of the poses is {} Hz, expected {} to {}", name, rate_hz,
-                kLowestRate, kHighestRate);
-  if (!internal::is_in_range(start))
-    return fail(ErrorCode::configuration, "{}: first stamp is {} ns, expected at most 2^61 either way", name, start.ns);
-
-  internal::LineReader line(text, name);
-  Trajectory trajectory;
-  while (line.next()) {
-    if (auto ok = line.expect_columns(12, "row-major 3x4 matrix [R t]"); !ok) return tl::unexpected(ok.error());
-    Eigen::Matrix<double, 3, 4, Eigen::RowMajor> m;
-    if (auto ok = line.numbers(0, {m.data(), 12}); !ok) return tl::unexpected(ok.error());
-    const Eigen::Matrix3d R = m.leftCols<3>();
-    if (auto ok = check_rotation(line, R); !ok) return tl::unexpected(ok.error());
-    const Timestamp stamp = start + static_cast<double>(trajectory.size()) / rate_hz;
-    const Eigen::Quaterniond q(project_to_so3(R));
-    if (auto ok = append(line, trajectory, {stamp, {q.normalized(), m.col(3)}}); !ok) return tl::unexpected(ok.error());
-  }
-  return trajectory;
-}
-
-Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz, Timestamp start) {
-  return read_file(path).and_then(
-      [&](const std::string& text) { return parse_kitti_poses(text, path, rate_hz, start); });
-}
-
 Result<Pose3> parse_transform(std::string_view text, const std::string& name) {
   internal::LineReader line(text, name);
   Eigen::Matrix<double, 4, 4, Eigen::RowMajor> m;

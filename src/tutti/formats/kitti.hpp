@@ -10,16 +10,10 @@
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// KITTI odometry files: a pose is 12 numbers a line, the row-major 3x4 matrix [R t] of T_world_body; there are no
-/// stamps in it. R is printed with few digits, so it must be a rotation within 1e-3 (each entry of R^T R, det > 0) and
-/// is then projected to SO(3).
+/// What lies beside KITTI's poses (trajectory_file.hpp).
 namespace tutti::formats {
 
-/// Pose k gets the stamp start + k / rate. 0.01 <= rate_hz <= 1e6.
-Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start);
-Result<Trajectory> read_kitti_poses(const std::string& path, double rate_hz = 10.0, Timestamp start = {});
-
-/// A rigid motion as a 4x4 matrix, four rows of four; R as in the poses, the last row 0 0 0 1, and nothing after it.
+/// A rigid motion as a 4x4 matrix, four rows of four; R as in poses, the last row 0 0 0 1, and nothing after it.
 Result<Pose3> parse_transform(std::string_view text, const std::string& name);
 Result<Pose3> read_transform(const std::string& path);
 

@@ -2,6 +2,8 @@
 #include "tutti/formats/kitti.hpp"
 
 #include <gtest/gtest.h>
+
+#include "tutti/formats/trajectory_file.hpp"
 // RapidCheck after gtest.
 #include <rapidcheck/gtest.h>
 
@@ -123,7 +125,7 @@ TEST(Kitti, RealFiles) {
       {"00", 4541}, {"02", 4661}, {"05", 2761}, {"07", 1101}};
   for (const auto& [sequence, count] : counts)
     for (const std::string folder : {"gt_poses", "lidar_odometry_simple_online"}) {
-      const auto poses = read_kitti_poses(test::shared_path("data/kitti/" + folder + "/" + sequence + ".txt"));
+      const auto poses = read_trajectory(test::shared_path("data/kitti/" + folder + "/" + sequence + ".txt"));
       ASSERT_TRUE(poses) << poses.error().message;
       EXPECT_EQ(poses->size(), count);
     }
@@ -134,7 +136,7 @@ TEST(Kitti, RealFastLio2Recordings) {
   const std::vector<std::pair<std::string, std::size_t>> counts = {{"hku_session1", 314}, {"hku_session2", 266}};
   for (const auto& [session, count] : counts) {
     const auto folder = test::shared_path("data/lidar/hku_two_sessions/" + session);
-    const auto poses = read_kitti_poses(folder / "odom_poses.txt");
+    const auto poses = read_trajectory(folder / "odom_poses.txt");
     const auto times = read_times(folder / "times.txt");
     ASSERT_TRUE(poses) << poses.error().message;
     ASSERT_TRUE(times) << times.error().message;

@@ -2,17 +2,34 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "tutti/base/result.hpp"
 #include "tutti/model/trajectory.hpp"
 
+/// Trajectories in any of our formats. '#' starts a comment. Errors name file and line: wrong column count, NaN or
+/// infinity, quaternion off unit norm by more than 1e-3, stamps that do not increase.
 namespace tutti::formats {
 
-enum class TrajectoryFormat { automatic, tum, euroc, kitti };
+/// TUM: one `stamp[s] x y z qx qy qz qw` a line (metres, Hamilton quaternion). Stamps go between decimal text and
+/// nanoseconds exactly, never through a double.
+Result<Trajectory> parse_tum(std::string_view text, const std::string& name);
+/// Nine decimals for stamps, shortest digits that read back the same for the rest: parse_tum(to_tum(t)) == t.
+std::string to_tum(const Trajectory& trajectory);
+Status write_tum(const std::string& path, const Trajectory& trajectory);
 
-/// Reads a trajectory in any of our formats. `automatic` looks at the first row that is not a comment: commas mean
-/// EuRoC csv, 12 columns KITTI, anything else TUM. KITTI poses get the stamps k / kitti_rate_hz.
-Result<Trajectory> read_trajectory(const std::string& path, TrajectoryFormat format = TrajectoryFormat::automatic,
+/// EuRoC MAV ground truth or state: `stamp[ns],px,py,pz,qw,qx,qy,qz` and any further columns (velocity, biases), which
+/// are counted but not read.
+Result<Trajectory> parse_euroc_csv(std::string_view text, const std::string& name);
+
+/// KITTI odometry: a pose is 12 numbers a line, the row-major 3x4 matrix [R t] of T_world_body; there are no stamps in
+/// it: pose k gets start + k / rate, 0.01 <= rate_hz <= 1e6. R is printed with few digits, so it must be a rotation
+/// within 1e-3 (each entry of R^T R, det > 0) and is then projected to SO(3).
+Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start);
+
+/// `format`: tum, euroc, kitti (stamps k / kitti_rate_hz), or auto, which looks at the first row that is not a comment:
+/// commas mean EuRoC csv, 12 columns KITTI, anything else TUM.
+Result<Trajectory> read_trajectory(const std::string& path, std::string_view format = "auto",
                                    double kitti_rate_hz = 10.0);
 
 }  // namespace tutti::formats

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/formats/tum.hpp"
-
 #include <gtest/gtest.h>
+
+#include "tutti/formats/trajectory_file.hpp"
 // RapidCheck after gtest.
 #include <rapidcheck/gtest.h>
 
@@ -58,13 +58,13 @@ TEST(Tum, SurvivesAnyBytes) {
       internal::is_sound_trajectory);
 }
 
-TEST(Tum, MissingFile) { EXPECT_EQ(read_tum("/no/such.tum").error().code, ErrorCode::io); }
+TEST(Tum, MissingFile) { EXPECT_EQ(read_trajectory("/no/such.tum").error().code, ErrorCode::io); }
 
 TEST(Tum, WritesFiles) {
   const Trajectory trajectory = {{{-1}, {}}, {{5}, {Eigen::Quaterniond(0.6, 0, 0.8, 0), {0.1, -0.2, 1e-12}}}};
   const std::string path = testing::TempDir() + "tutti_tum_test.tum";
   ASSERT_TRUE(write_tum(path, trajectory));
-  EXPECT_EQ(read_tum(path).value(), trajectory);
+  EXPECT_EQ(read_trajectory(path).value(), trajectory);
 }
 
 /// Pose counts of data/SOURCES-euroc-images-excavator.md.
@@ -79,11 +79,11 @@ TEST(Tum, RealFiles) {
       {"excavator_mm/MM_04/rovio.tum", 1490},         {"excavator_mm/MM_05/m545_state.tum", 4533},
       {"excavator_mm/MM_05/rovio_DIVERGED.tum", 1379}};
   for (const auto& [file, count] : counts) {
-    const auto trajectory = read_tum(test::shared_path("data/" + file));
+    const auto trajectory = read_trajectory(test::shared_path("data/" + file));
     ASSERT_TRUE(trajectory) << trajectory.error().message;
     EXPECT_EQ(trajectory->size(), count) << file;
   }
-  const auto first = read_tum(test::shared_path("data/euroc/MH_01/groundtruth.tum"));
+  const auto first = read_trajectory(test::shared_path("data/euroc/MH_01/groundtruth.tum"));
   EXPECT_EQ(first->front().stamp.ns, 1403636580838555648);  // as text; the nearest double is another number
 }
 

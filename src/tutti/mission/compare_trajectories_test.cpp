@@ -5,7 +5,7 @@
 
 #include "support/random_pose.hpp"
 #include "support/shared_data.hpp"
-#include "tutti/formats/tum.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::mission {
@@ -162,7 +162,7 @@ TEST(CompareTrajectories, RefusesWhatCannotBeCompared) {
 TEST(CompareTrajectories, RealOdometryAgainstGroundTruth) {
   TUTTI_REQUIRE_SHARED("data/euroc/MH_03/groundtruth.tum");
   const auto read = [](const char* name) {
-    return formats::read_tum(test::shared_path(std::string("data/euroc/MH_03/") + name)).value();
+    return formats::read_trajectory(test::shared_path(std::string("data/euroc/MH_03/") + name)).value();
   };
   const auto c = compare_trajectories({"", read("groundtruth.tum"), {}}, {"", read("rpg_vio_mono.tum"), {}},
                                       {.tolerance_m = 0.01, .tolerance_deg = 0.2});

@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "tutti/base/random.hpp"
-#include "tutti/formats/euroc_csv.hpp"
 #include "tutti/formats/kitti.hpp"
-#include "tutti/formats/tum.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/scan_folder.hpp"
 #include "tutti/simulation/surface.hpp"
 
@@ -23,11 +22,8 @@ namespace fs = std::filesystem;
 constexpr double kSurveySpacing_m = 0.1;
 
 Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data) {
-  const fs::path path = data / source.file;
-  if (source.format == "tum") return formats::read_tum(path.string());
-  if (source.format == "euroc") return formats::read_euroc_csv(path.string());
-  auto poses = formats::read_kitti_poses(path.string(), source.rate_hz, Timestamp{0});
-  if (!poses || source.times.empty()) return poses;
+  auto poses = formats::read_trajectory((data / source.file).string(), source.format, source.rate_hz);
+  if (!poses || source.format != "kitti" || source.times.empty()) return poses;
   const auto times = formats::read_times((data / source.times).string());
   if (!times) return tl::unexpected(times.error());
   return formats::with_times(*poses, *times);

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "tutti/formats/tum.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/internal/text.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -154,6 +155,14 @@ Status check_position(const LineReader& where, const Eigen::Vector3d& p) {
   if ((p.array().abs() <= kMaxCoordinate_m).all()) return {};
   return where.fail(ErrorCode::invalid, "position is ({:g}, {:g}, {:g}) m, expected at most {:g} m along each axis",
                     p.x(), p.y(), p.z(), kMaxCoordinate_m);
+}
+
+Status check_rotation(const LineReader& where, const Eigen::Matrix3d& R) {
+  constexpr double kRotationTolerance = 1e-3;
+  const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (error <= kRotationTolerance && R.determinant() > 0.0) return {};
+  return where.fail(ErrorCode::invalid, "|R^T R - I| is {:.3g}, det R {:.3g}, expected a rotation within {}", error,
+                    R.determinant(), kRotationTolerance);
 }
 
 Status append(const LineReader& where, Trajectory& trajectory, const StampedPose& pose) {

@@ -73,6 +73,8 @@ class LineReader {
 /// The unit quaternion that is meant, or what is wrong with it; left bit for bit when already unit to rounding.
 Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quaterniond& q);
 Status check_position(const LineReader& where, const Eigen::Vector3d& position_m);
+/// Is it a rotation but for few digits? In the rows up to the current line.
+Status check_rotation(const LineReader& where, const Eigen::Matrix3d& R);
 /// Appends if the position is within range and the stamp comes after the last one and is within range.
 Status append(const LineReader& where, Trajectory& trajectory, const StampedPose& pose);
 

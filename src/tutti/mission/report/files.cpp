@@ -7,7 +7,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
-#include "tutti/formats/tum.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/report/colours.hpp"
 #include "tutti/mission/report/file_names.hpp"
 #include "tutti/mission/report/map_pictures.hpp"

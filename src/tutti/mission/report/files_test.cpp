@@ -9,7 +9,7 @@
 #include "tutti/base/config_io.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
-#include "tutti/formats/tum.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/testing/report_example.hpp"
 
@@ -53,7 +53,7 @@ TEST_F(ReportFiles, WritesEverythingAndItReadsBack) {
   EXPECT_EQ(text("report.json"), report_json(record));
   EXPECT_NO_THROW(std::ignore = nlohmann::json::parse(text("timing.json")));
 
-  const auto corrected = formats::read_tum((dir_ / "bravo_corrected.tum").string());
+  const auto corrected = formats::read_trajectory((dir_ / "bravo_corrected.tum").string());
   ASSERT_TRUE(corrected) << corrected.error().message;
   ASSERT_EQ(corrected->size(), 40U);
   EXPECT_EQ(corrected->back().stamp, record.robots[1].policies[2].corrected.back().stamp);
