@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/evaluation/agreement.hpp"
 #include "tutti/mission/load_meter.hpp"
 
 namespace tutti::mission {
@@ -105,17 +104,13 @@ void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::o
     note(failed_updates_, fmt::format("the optimisation on board ended {}", to_string(summary.optimised)));
   else if (summary.taken_back)
     note(failed_updates_, "the chosen constraints led farther from the map than odometry is");
-  UpdateRecord record{.time_s = time_s,
+  updates_.push_back({.time_s = time_s,
                       .revision = summary.revision,
-                      .synchronised_nodes = summary.synchronised,
                       .constraints_total = summary.constraints,
                       .mean_disagreement_m = summary.mean_disagreement,
                       .max_disagreement_m = summary.max_disagreement,
-                      .origins = summary.explanation.origins};
+                      .origins = summary.explanation.origins});
   explanation_ = std::move(summary.explanation);
-  if (const auto agreement = evaluation::agreement(member.agent.corrected(), trajectory_of(message.graph, id())))
-    record.agreement_rmse_m = agreement->rmse_m;
-  updates_.push_back(std::move(record));
 }
 
 RobotOutcome RobotActor::outcome() const {

@@ -83,7 +83,6 @@ inline PointCloud example_walls(const Trajectory& way, Rng rng) {
 
 inline UpdateRecord example_update(double time_s, std::uint64_t revision, Rng rng) {
   UpdateRecord update{.time_s = time_s, .revision = revision};
-  update.synchronised_nodes = 10 * revision;
   update.constraints_total = 2 * revision;
   update.mean_disagreement_m.resize(7);
   for (Eigen::Index s = 0; s < 7; ++s)
