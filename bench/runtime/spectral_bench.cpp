@@ -44,12 +44,6 @@ void BM_graph(benchmark::State& state) {
   state.counters["neighbours"] = static_cast<double>(L.nonZeros() - L.rows()) / static_cast<double>(L.rows());
 }
 
-void BM_largest_eigenvalue(benchmark::State& state) {
-  const SparseMatrix L = graph_of(server_run(state));
-  for (auto _ : state) benchmark::DoNotOptimize(largest_eigenvalue(L));
-  state.counters["relative_error"] = 1.0 - largest_eigenvalue(L) / largest_eigenpair(L, 1e-13).value;
-}
-
 void BM_largest_eigenpair(benchmark::State& state) {
   const SparseMatrix L = graph_of(server_run(state));
   for (auto _ : state) benchmark::DoNotOptimize(largest_eigenpair(L));
@@ -134,7 +128,6 @@ void BM_kron_reduce(benchmark::State& state) {
 }
 
 BENCHMARK(BM_graph)->Arg(1600)->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_largest_eigenvalue)->Arg(1600)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_largest_eigenpair)->Arg(1600)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_exact_transform)->Arg(400)->Arg(1600)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_chebyshev_transform)

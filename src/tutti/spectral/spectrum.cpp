@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/single_thread.hpp"
-#include "tutti/spectral/internal/lanczos.hpp"
 #include "tutti/spectral/internal/row_blocks.hpp"
 
 namespace tutti::spectral {
@@ -41,6 +41,17 @@ class Operator {
   const internal::RowBlocks& matrix_;
   mutable Eigen::VectorXd in_, out_;
 };
+
+/// Fixed numbers in [-1, 1) without any pattern, so that no eigenvector is orthogonal to them; zero in the padding.
+Eigen::VectorXd start_vector(const internal::RowBlocks& matrix) {
+  Eigen::VectorXd out(matrix.nodes());
+  std::uint64_t state = 0x9e3779b97f4a7c15ULL;
+  for (double& x : out) {  // 64-bit linear congruential generator [Knuth, MMIX]; its upper bits
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    x = std::ldexp(static_cast<double>(state >> 11U), -52) - 1.0;
+  }
+  return matrix.to_blocks(out);
+}
 
 }  // namespace
 
@@ -78,7 +89,7 @@ ExtremalPair largest_eigenpair(const SparseMatrix& laplacian, double tolerance) 
   const internal::RowBlocks blocks(laplacian);
   Operator product(blocks);
   Spectra::SymEigsSolver<Operator> solver(product, 1, kKrylov);
-  solver.init(internal::start_vector(blocks).data());
+  solver.init(start_vector(blocks).data());
   solver.compute(Spectra::SortRule::LargestAlge, kMaxRestarts, tolerance);
   ExtremalPair out{.vector = Eigen::VectorXd::Zero(n), .iterations = static_cast<int>(solver.num_operations())};
   if (solver.info() == Spectra::CompInfo::Successful) {
@@ -93,7 +104,7 @@ ExtremalPair largest_eigenpair(const SparseMatrix& laplacian, double tolerance) 
 }
 
 double largest_eigenvalue(const SparseMatrix& laplacian, double tolerance) {
-  return internal::largest_eigenvalue(internal::RowBlocks(laplacian), largest_eigenvalue_bound(laplacian), tolerance);
+  return largest_eigenpair(laplacian, tolerance).value;
 }
 
 double largest_eigenvalue_bound(const SparseMatrix& laplacian) {

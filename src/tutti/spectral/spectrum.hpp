@@ -30,9 +30,8 @@ struct ExtremalPair {
 /// edges the value is 0 and the vector is the first unit vector.
 [[nodiscard]] ExtremalPair largest_eigenpair(const SparseMatrix& laplacian, double tolerance = 1e-10);
 
-/// The largest eigenvalue alone, several times cheaper than the pair: relative error about `tolerance` (never above the
-/// true value but for rounding), deterministic. This is the lambda_max that Meyer scales want: take the larger one of
-/// two graphs and build one filter bank for both.
+/// The largest eigenvalue alone: relative error at most `tolerance`, deterministic. This is the lambda_max that Meyer
+/// scales want: take the larger one of two graphs and build one filter bank for both.
 [[nodiscard]] double largest_eigenvalue(const SparseMatrix& laplacian, double tolerance = 1e-10);
 
 /// Guaranteed upper bound on the largest eigenvalue in one pass over the edges, at most twice too large:

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
-#include "tutti/spectral/internal/lanczos.hpp"
 #include "tutti/spectral/internal/row_blocks.hpp"
 
 namespace tutti::spectral {
@@ -223,7 +222,7 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
   constexpr double kMargin = 1.0 + 1e-8;
   const internal::RowBlocks blocks(laplacian);
   const double bound = largest_eigenvalue_bound(laplacian);
-  const double domain = std::min(bound, kMargin * internal::largest_eigenvalue(blocks, bound, kAccuracy));
+  const double domain = std::min(bound, kMargin * largest_eigenvalue(laplacian, kAccuracy));
   const Index max_degree = config.max_order - 1;  // one product made L f
   Index size = 2048;
   Expansion expansion = expand(bank, domain, size);
