@@ -65,9 +65,6 @@ struct PolicyRecord {
 struct UpdateRecord {
   double time_s = 0.0;  ///< Mission time.
   std::uint64_t revision = 0;
-  std::size_t constraints_total = 0;       ///< Held after this update.
-  Eigen::VectorXd mean_disagreement_m;     ///< Per scale (0 = largest), over the synchronised nodes; before correcting.
-  Eigen::VectorXd max_disagreement_m;      ///< Same shape. Both are empty where nothing looks at them.
   std::vector<consistency::SuspectedOrigin> origins;  ///< Where the raw odometry was then thought to part from the map.
 };
 

@@ -25,9 +25,7 @@ RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConf
   for (const std::string& policy : ordered) {
     robot::AgentConfig own = config;
     own.policy.name = policy;
-    const bool is_shown = policy == config.policy.name;  // shadows are not
-    own.explain = config.explain && is_shown;
-    own.always_compare = config.always_compare && is_shown;
+    own.explain = config.explain && policy == config.policy.name;  // shadows are not shown
     members_.push_back({policy,
                         robot::RobotAgent(recording.recording.robot, 0, own, rng.fork(policy)),
                         {.robot = recording.recording.name, .policy = policy}});
@@ -104,12 +102,7 @@ void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::o
     note(failed_updates_, fmt::format("the optimisation on board ended {}", to_string(summary.optimised)));
   else if (summary.taken_back)
     note(failed_updates_, "the chosen constraints led farther from the map than odometry is");
-  updates_.push_back({.time_s = time_s,
-                      .revision = summary.revision,
-                      .constraints_total = summary.constraints,
-                      .mean_disagreement_m = summary.mean_disagreement,
-                      .max_disagreement_m = summary.max_disagreement,
-                      .origins = summary.explanation.origins});
+  updates_.push_back({.time_s = time_s, .revision = summary.revision, .origins = summary.explanation.origins});
   explanation_ = std::move(summary.explanation);
 }
 

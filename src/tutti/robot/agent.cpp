@@ -110,7 +110,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   };
 
   const std::vector<consistency::RobotNode> own = nodes();
-  const auto comparison = config_.always_compare || policy_->needs_disagreement()
+  const auto comparison = policy_->needs_disagreement()
                               ? consistency::compare(message.graph, chain_, own, config_.compare)
                               : consistency::synchronised(message.graph, chain_, own);
   ended(UpdateStage::compare);
@@ -152,10 +152,6 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   summary.proposed = selection.constraints.size();
   summary.constraints = state_.ledger.size();
   summary.order = comparison.order;
-  if (comparison.disagreement.rows() > 0) {
-    summary.mean_disagreement = comparison.disagreement.colwise().mean().transpose();
-    summary.max_disagreement = comparison.disagreement.colwise().maxCoeff().transpose();
-  }
   return summary;
 }
 

@@ -29,7 +29,6 @@ struct AgentConfig {
   estimation::OnboardSmootherConfig smoother{.polishing_steps =
                                                  1};  ///< Few links, long runs: one step gives them back millimetres.
   bool explain = true;
-  bool always_compare = false;
   template <class V>
   void describe(V& v) {
     v.field("submap", submap);
@@ -38,9 +37,6 @@ struct AgentConfig {
     v.field("ledger", ledger);
     v.field("smoother", smoother);
     v.field("explain", explain, any(), "Say after every update where and when odometry and map part.");
-    v.field("always_compare", always_compare, any(),
-            "Compute the paper's disagreement of the graph signals at every update, even for a policy that does not "
-            "look at it: the page then shows it over time. It takes tens of milliseconds for 1000 nodes.");
   }
 };
 
@@ -54,12 +50,9 @@ struct Whereabouts {
 /// What one proxy graph changed.
 struct UpdateSummary {
   std::uint64_t revision = 0;
-  std::size_t synchronised = 0;  ///< Pairs of nodes compared.
-  std::size_t proposed = 0;      ///< Constraints the policy chose.
-  std::size_t constraints = 0;   ///< In the ledger afterwards.
-  /// Per scale, before the correction, in the signal's unit; empty unless the policy looks at it or `always_compare`.
-  Eigen::VectorXd mean_disagreement;
-  Eigen::VectorXd max_disagreement;
+  std::size_t synchronised = 0;      ///< Pairs of nodes compared.
+  std::size_t proposed = 0;          ///< Constraints the policy chose.
+  std::size_t constraints = 0;       ///< In the ledger afterwards.
   int order = 0;                     ///< Of the Chebyshev transform; 0 = exact or not computed.
   consistency::LedgerUpdate ledger;  ///< What became of the constraints.
   /// How the optimisation with them ended.

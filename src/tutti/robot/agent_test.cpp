@@ -251,25 +251,18 @@ TEST(Agent, SaysWhereTheRobotIsNow) {
 
 // The default policy looks at none of it, and it takes longer than all the rest of an update.
 TEST(Agent, ComparesGraphSignalsOnlyForWhoLooksAtThem) {
-  const auto update = [](const char* policy, bool always) {
-    AgentConfig config{.always_compare = always};
+  const auto order = [](const char* policy) {
+    AgentConfig config;
     config.policy.name = policy;
     RobotAgent agent(RobotId{1}, 1, config, Rng(1));
     feed(agent, drifting_odometry(240));
     const UpdateSummary summary = agent.receive(broadcast(agent, 1, kWorld));
     EXPECT_GT(summary.synchronised, 70U);
     EXPECT_GT(summary.constraints, 0U);
-    EXPECT_EQ(summary.mean_disagreement.size(), summary.max_disagreement.size());
-    return std::tuple(summary.mean_disagreement.size(), summary.order > 0, agent.corrected());
+    return summary.order;
   };
-  const auto [none, unfiltered, corrected] = update("adaptive", false);
-  EXPECT_EQ(none, 0);
-  EXPECT_FALSE(unfiltered);
-  const auto [asked, filtered, same] = update("adaptive", true);
-  EXPECT_EQ(asked, 7);
-  EXPECT_TRUE(filtered);
-  EXPECT_EQ(same, corrected);
-  EXPECT_EQ(std::get<0>(update("spectral", false)), 7);
+  EXPECT_EQ(order("adaptive"), 0);
+  EXPECT_GT(order("spectral"), 0);
 }
 
 TEST(Agent, MapsOnWithoutAServerAndUploadsOnlyRawOdometry) {

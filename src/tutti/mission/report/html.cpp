@@ -83,7 +83,6 @@ std::string report_html(const MissionRecord& record) {
   body += explanation_html(record);
   body += robot_maps_html(record, geometry);
   body += policies_html(record);
-  body += disagreement_html(record);
   body += proxy_graph_html(record);
   body += closures_html(record);
   body += transforms_html(record);

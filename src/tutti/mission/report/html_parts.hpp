@@ -43,7 +43,6 @@ std::string explanation_html(const MissionRecord& record);
 std::string joint_map_html(const MissionRecord& record);
 std::string robot_maps_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
 std::string proxy_graph_html(const MissionRecord& record);
-std::string disagreement_html(const MissionRecord& record);
 /// Map clouds beside the survey.
 std::string clouds_html(const MissionRecord& record);
 std::string errors_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);

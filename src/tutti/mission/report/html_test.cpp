@@ -79,7 +79,6 @@ TEST(ReportHtml, HasEverySectionInOrder) {
                                           "Where odometry and map part",
                                           "Each robot by itself",
                                           "Policies side by side",
-                                          "Where and when the maps disagree",
                                           "The proxy graph",
                                           "Loop closures",
                                           "How the robots&#39; frames lie",
@@ -129,17 +128,6 @@ TEST(ReportHtml, ShowsTheMapBesideTheSurvey) {
   std::size_t pictures = 0;  // one under the joint map; four from above and four sections; two disagreement maps
   for (std::size_t at = html.find("<image"); at != std::string::npos; at = html.find("<image", at + 1)) ++pictures;
   EXPECT_EQ(pictures, 11U);
-}
-
-TEST(ReportHtml, SaysWhereThePapersDisagreementWasNotAskedFor) {
-  MissionRecord record = test::example_record();
-  for (RobotRecord& robot : record.robots)
-    for (UpdateRecord& update : robot.updates) update.mean_disagreement_m = update.max_disagreement_m = {};
-  const std::string html = report_html(record);
-  expect_good_page(html);
-  EXPECT_EQ(html.find("Where and when the maps disagree"), std::string::npos);
-  EXPECT_NE(html.find("What the robots hold"), std::string::npos);
-  EXPECT_NE(html.find("agent.always_compare"), std::string::npos);
 }
 
 TEST(ReportHtml, MarksDriftAndNamesSuspectedFailures) {
@@ -271,8 +259,6 @@ TEST(ReportHtml, SurvivesNumbersThatAreNotFinite) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   record.robots[0].odometry[7].pose.translation.x() = kNaN;
   record.robots[0].policies[2].corrected[9].pose.translation.y() = std::numeric_limits<double>::infinity();
-  record.robots[0].updates[0].mean_disagreement_m[2] = kNaN;
-  record.robots[0].updates[0].max_disagreement_m.resize(3);
   record.robots[0].onboard.rmse_m = kNaN;
   record.robots[0].explanation->significance(4, 2) = kNaN;
   record.robots[0].explanation->significance(9, 1) = std::numeric_limits<double>::infinity();

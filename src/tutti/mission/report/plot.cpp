@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace tutti::mission {
@@ -142,18 +141,6 @@ void PlanView::draw_scale_bar(Svg& svg, std::string_view look) const {
   svg.polyline(Points2d{left + up, left, right, right + up}, fmt::format("scalebar {}", look));
   svg.text(0.5 * (left + right) + Eigen::Vector2d(0.0, -6.0), length_label(length_m), fmt::format("tick {}", look),
            "middle");
-}
-
-std::string heat_colour(double t) {
-  static constexpr std::array<std::array<double, 3>, 5> kStops{
-      {{18, 35, 84}, {48, 85, 130}, {88, 142, 148}, {160, 196, 120}, {253, 231, 76}}};
-  const double s = (t > 0.0 ? std::min(t, 1.0) : 0.0) * static_cast<double>(kStops.size() - 1);
-  const auto i = std::min(static_cast<std::size_t>(s), kStops.size() - 2);
-  std::array<int, 3> rgb{};
-  for (std::size_t c = 0; c < 3; ++c)
-    rgb[c] =
-        static_cast<int>(std::lround(kStops[i][c] + (s - static_cast<double>(i)) * (kStops[i + 1][c] - kStops[i][c])));
-  return fmt::format("#{:02x}{:02x}{:02x}", rgb[0], rgb[1], rgb[2]);
 }
 
 std::string legend_html(const std::vector<LegendEntry>& entries) {

@@ -7,7 +7,7 @@
 
 #include "tutti/mission/report/svg.hpp"
 
-/// Axes, views from above and colour scales on top of Svg.
+/// Axes and views from above on top of Svg.
 namespace tutti::mission {
 
 /// Smallest to largest value seen; ignores what is not finite.
@@ -68,9 +68,6 @@ class PlanView {
   double scale_ = 1.0;
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
 };
-
-/// Colour of t in [0, 1] from dark blue to yellow, lightness strictly increasing: reads without colour vision too.
-std::string heat_colour(double t);
 
 /// Squares of one line for a legend above or below a picture; HTML.
 struct LegendEntry {

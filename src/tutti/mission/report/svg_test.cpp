@@ -133,17 +133,6 @@ RC_GTEST_PROP(PlanView, KeepsShapesAndFitsThem, ()) {
   RC_ASSERT(view.height() <= 400.0 + 1e-9);
 }
 
-TEST(HeatColour, GetsLighterFromLowToHigh) {
-  const auto lightness = [](double t) {
-    const std::string c = heat_colour(t);
-    return 0.2126 * std::stoi(c.substr(1, 2), nullptr, 16) + 0.7152 * std::stoi(c.substr(3, 2), nullptr, 16) +
-           0.0722 * std::stoi(c.substr(5, 2), nullptr, 16);
-  };
-  for (int i = 1; i <= 40; ++i) EXPECT_GT(lightness(i / 40.0), lightness((i - 1) / 40.0)) << i;
-  EXPECT_EQ(heat_colour(-3.0), heat_colour(0.0));
-  EXPECT_EQ(heat_colour(7.0), heat_colour(1.0));
-}
-
 TEST(Labels, Lengths) {
   EXPECT_EQ(length_label(0.002), "2 mm");
   EXPECT_EQ(length_label(0.05), "5 cm");

@@ -81,17 +81,6 @@ inline PointCloud example_walls(const Trajectory& way, Rng rng) {
   return out;
 }
 
-inline UpdateRecord example_update(double time_s, std::uint64_t revision, Rng rng) {
-  UpdateRecord update{.time_s = time_s, .revision = revision};
-  update.constraints_total = 2 * revision;
-  update.mean_disagreement_m.resize(7);
-  for (Eigen::Index s = 0; s < 7; ++s)
-    update.mean_disagreement_m[s] =
-        0.3 * std::exp(-0.6 * static_cast<double>(s) - time_s / 120.0) * rng.uniform(0.3, 1.7);
-  update.max_disagreement_m = 4.0 * update.mean_disagreement_m;
-  return update;
-}
-
 inline RobotRecord example_robot(std::size_t index, const ExampleOptions& options, const Rng& rng) {
   static const char* const kNames[] = {"alpha", "bravo", "charlie", "delta"};
   RobotRecord robot{.id = {static_cast<std::uint32_t>(index)}};
@@ -159,7 +148,7 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
     robot.server = {0.0173, 0.05, 0.024, 0.13, 0.026, 0.14, 1.0};
   }
   for (std::uint64_t u = 1; 20.0 * static_cast<double>(u) <= robot.duration_s; ++u)
-    robot.updates.push_back(example_update(20.0 * static_cast<double>(u), u, rng.fork(100 + u)));
+    robot.updates.push_back({.time_s = 20.0 * static_cast<double>(u), .revision = u});
   return robot;
 }
 
