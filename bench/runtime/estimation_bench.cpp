@@ -13,7 +13,6 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/marginals.hpp"
-#include "tutti/estimation/odometry_trial.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/formats/g2o.hpp"
 
@@ -56,45 +55,6 @@ BENCHMARK_CAPTURE(public_set, torus3D, "torus3D.g2o", {})->Unit(benchmark::kMill
 BENCHMARK_CAPTURE(public_set, parking_garage, "parking-garage.g2o", {})->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(public_set, intel, "intel.g2o", {})->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(public_set, manhattan, "manhattan.g2o", {})->Unit(benchmark::kMillisecond);
-
-/// Two robots on circles of 8 m with drift; half of the closures wrong by metres.
-void odometry_trial(benchmark::State& state) {
-  constexpr std::size_t kSteps = 1000;
-  Rng rng(3);
-  std::vector<OdometryChain> chains(2);
-  std::vector<std::vector<Pose3>> truth(2);
-  for (std::uint32_t robot = 0; robot < 2; ++robot) {
-    chains[robot] = {.id = RobotId{robot}, .first_index = 0, .T_odom_body = {Pose3{}}, .step_covariance = {}};
-    for (std::size_t k = 0; k <= kSteps; ++k) {
-      const double angle = 4.0 * M_PI * static_cast<double>(k) / kSteps + robot;
-      truth[robot].push_back({Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
-                              {8.0 * std::cos(angle), 8.0 * std::sin(angle), 0.0}});
-    }
-    for (std::size_t k = 0; k < kSteps; ++k) {
-      const Pose3 step = retract(truth[robot][k].inverse() * truth[robot][k + 1], noise(rng, 0.01, 0.003));
-      chains[robot].T_odom_body.push_back(chains[robot].T_odom_body.back() * step);
-      chains[robot].step_covariance.push_back(covariance(0.01, 0.003));
-    }
-  }
-  std::vector<LoopClosure> closures;
-  for (std::int64_t k = 0; k < state.range(0); ++k) {
-    const auto i = static_cast<std::size_t>(rng.index(kSteps));
-    const auto j = static_cast<std::size_t>(rng.index(kSteps));
-    Pose3 T = retract(truth[0][i].inverse() * truth[1][j], noise(rng, 0.03, 0.01));
-    if (k % 2 == 1) T = retract(T, noise(rng, 3.0, 0.5));
-    closures.push_back({{RobotId{0}, static_cast<std::uint32_t>(i)},
-                        {RobotId{1}, static_cast<std::uint32_t>(j)},
-                        {T, covariance(0.03, 0.01)}});
-  }
-  OdometryVerdict result;
-  for (auto _ : state) result = try_odometry(chains, closures, {});
-  std::size_t right = 0;
-  std::size_t wrong = 0;
-  for (std::size_t k = 0; k < closures.size(); ++k) (k % 2 == 0 ? right : wrong) += result.accepted[k] ? 1 : 0;
-  state.counters["right_of_half"] = static_cast<double>(right);
-  state.counters["wrong"] = static_cast<double>(wrong);
-}
-BENCHMARK(odometry_trial)->ArgName("closures")->Arg(500)->Arg(1500)->Unit(benchmark::kMillisecond);
 
 /// 2,000 poses, 1,000 consecutive pairs, closures every few poses. `factor` is the time of the optimisation's setup and
 /// one Gauss-Newton step for comparison.

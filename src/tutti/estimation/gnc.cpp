@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -13,6 +14,7 @@
 #include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
+#include "tutti/estimation/internal/truncated_least_squares.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -37,36 +39,37 @@ double squared_error(const PoseGraphEdge& edge, const std::vector<Pose3>& poses)
 
 bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
 
-/// The re-weighting itself. Without anything to reject, the plain optimum.
-GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles,
-                   std::span<const std::size_t> fixed) {
+}  // namespace
+
+GncResult internal::truncated_least_squares(const PoseGraph& graph, const GncConfig& config,
+                                            std::span<const double> truncation, std::span<const std::size_t> fixed) {
   const std::size_t edges = graph.edges.size();
   GncResult out;
   out.inlier_weight.assign(edges, 1.0);
   SolverConfig inner = config.solver;
   inner.loss = "none";
-  out.solution = solve_pose_graph(graph, inner, roles, fixed);
+  out.solution = solve_pose_graph(graph, inner, {}, fixed);
   if (!is_usable(out.solution.summary.termination)) return out;
 
-  const auto is_robust = [&](std::size_t e) { return roles.empty() || roles[e] == EdgeRole::robust; };
-  const double c2 = chi_square_6_quantile(config.confidence);
+  // In units of the truncation, so that one mu serves edges with different ones.
+  const auto excess = [&](std::size_t e) { return squared_error(graph.edges[e], out.solution.poses) / truncation[e]; };
   double worst = 0.0;
   for (std::size_t e = 0; e < edges; ++e)
-    if (is_robust(e)) worst = std::max(worst, squared_error(graph.edges[e], out.solution.poses));
-  if (worst <= c2) return out;  // nothing to reject
+    if (std::isfinite(truncation[e])) worst = std::max(worst, excess(e));
+  if (worst <= 1.0) return out;  // nothing to reject
 
   const auto structure = internal::analyse_blocks(graph, {}, fixed);
   internal::GraphEquations equations(graph, structure);
   std::vector<double> scale(edges, 1.0);
-  const internal::EdgeCosts costs{.loss = {}, .roles = roles, .scale = scale};
+  const internal::EdgeCosts costs{.loss = {}, .roles = {}, .scale = scale};
   inner.relative_cost_tolerance = std::max(kInnerTolerance, config.solver.relative_cost_tolerance);
   inner.max_iterations = kInnerIterations;
-  double mu = c2 / (2.0 * worst - c2);  // remark 5
+  double mu = 1.0 / (2.0 * worst - 1.0);  // remark 5
   for (bool binary = false; !binary && out.outer_iterations < config.max_outer_iterations; ++out.outer_iterations) {
     binary = true;
     for (std::size_t e = 0; e < edges; ++e) {
-      if (!is_robust(e)) continue;
-      out.inlier_weight[e] = tls_weight(squared_error(graph.edges[e], out.solution.poses), c2, mu);
+      if (!std::isfinite(truncation[e])) continue;
+      out.inlier_weight[e] = tls_weight(excess(e), 1.0, mu);
       binary = binary && is_binary(out.inlier_weight[e]);
       scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
     }
@@ -77,6 +80,16 @@ GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<co
   }
   out.solution.weights = out.inlier_weight;
   return out;
+}
+
+namespace {
+
+GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles,
+                   std::span<const std::size_t> fixed) {
+  std::vector<double> truncation(graph.edges.size(), chi_square_6_quantile(config.confidence));
+  for (std::size_t e = 0; e < roles.size(); ++e)
+    if (roles[e] == EdgeRole::trusted) truncation[e] = std::numeric_limits<double>::infinity();
+  return internal::truncated_least_squares(graph, config, truncation, fixed);
 }
 
 }  // namespace

@@ -8,10 +8,6 @@
 namespace tutti::server {
 namespace {
 
-constexpr double kNear_s = 10.0;     // what a submap saw
-constexpr double kLongest_s = 30.0;  // as seen by three submaps in a row
-constexpr std::size_t kMost = 24;    // more cost more than they are worth
-
 /// When the ends of a closure were seen, the chain with the smaller id first; of one chain the earlier end.
 struct Ends {
   ChainId chains[2];
@@ -35,7 +31,7 @@ bool is_near(const Ends& a, const Ends& b, double most_s) {
 
 std::vector<std::vector<std::size_t>> closure_groups(const std::vector<MapNode>& nodes,
                                                      std::span<const PoseGraphEdge> edges,
-                                                     std::span<const std::size_t> closures) {
+                                                     std::span<const std::size_t> closures, const GroupLimits& limits) {
   std::vector<Ends> ends;
   for (const std::size_t e : closures) ends.push_back(ends_of(nodes, edges[e]));
   std::vector<bool> taken(closures.size(), false);
@@ -46,14 +42,14 @@ std::vector<std::vector<std::size_t>> closure_groups(const std::vector<MapNode>&
     taken[first] = true;
     for (std::size_t k = 0; k < group.size(); ++k)
       for (std::size_t other = first + 1; other < closures.size(); ++other)
-        if (!taken[other] && is_near(ends[group[k]], ends[other], kNear_s)) {
+        if (!taken[other] && is_near(ends[group[k]], ends[other], limits.near_s)) {
           taken[other] = true;
           group.push_back(other);
         }
     const auto is_long = [&](std::size_t a) {
-      return std::ranges::any_of(group, [&](std::size_t b) { return !is_near(ends[a], ends[b], kLongest_s); });
+      return std::ranges::any_of(group, [&](std::size_t b) { return !is_near(ends[a], ends[b], limits.longest_s); });
     };
-    if (group.size() > kMost || std::ranges::any_of(group, is_long)) continue;
+    if (group.size() > limits.most_closures || std::ranges::any_of(group, is_long)) continue;
     std::ranges::sort(group);
     for (std::size_t& k : group) k = closures[k];
     out.push_back(std::move(group));

@@ -15,7 +15,6 @@
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/server/map_components.hpp"
-#include "tutti/server/odometry_honesty.hpp"
 #include "tutti/server/shape_ties.hpp"
 #include "tutti/server/shape_uncertainty.hpp"
 
@@ -117,10 +116,11 @@ std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& g
 
 /// Per edge: odometry counts as much as its closures show that it is worth.
 std::vector<double> honest_weights(const MapEstimate& map) {
-  const std::map<ChainId, double> factors = odometry_variance_factors(map);
   std::vector<double> out(map.graph.edges.size(), 1.0);
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
-    out[e] = 1.0 / factors.at(map.nodes[map.graph.edges[e].from].id.chain);
+    if (const auto found = map.overstated.find(map.nodes[map.graph.edges[e].from].id.chain);
+        found != map.overstated.end())
+      out[e] = 1.0 / found->second;
   return out;
 }
 

@@ -5,17 +5,16 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
-#include <ranges>
 #include <set>
 #include <tuple>
 #include <unordered_map>
 
-#include "tutti/estimation/chi_square.hpp"
+#include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/influence.hpp"
+#include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/server/closure_groups.hpp"
-#include "tutti/server/relocate_failures.hpp"
-#include "tutti/server/rotation_honesty.hpp"
+#include "tutti/server/odometry_honesty.hpp"
 #include "tutti/server/spare_pairs.hpp"
 
 namespace tutti::server {
@@ -101,30 +100,27 @@ std::vector<LoopClosure> collect_closures(const VerdictSet& verdicts, const Subm
 }
 
 /// Odometry's rotations count as much as the closures show that they are worth.
-void see_through(MapEstimate& map, std::vector<estimation::OdometryChain>& chains) {
-  for (estimation::OdometryChain& chain : chains)
-    for (Matrix6d& covariance : chain.step_covariance)
-      covariance = scale_rotation(covariance, map.rotation_factors.at(chain.id));
+void see_through(MapEstimate& map) {
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     PoseGraphEdge& edge = map.graph.edges[e];
     edge.information = scale_rotation(edge.information, 1.0 / map.rotation_factors.at(map.nodes[edge.from].id.chain));
   }
 }
 
-/// What failed odometry is let go by over its whole stretch: enough for any jump, and the map stays in one piece.
-constexpr double kFreeTranslation = 100.0;
-constexpr double kFreeRotation = 3.0;
+/// Odometry whose loops are so many times their stated variance, at least, says much too little of its errors.
+constexpr double kUnderstated = 4.0;
 
-/// How often the convicted stretches are looked for again in the map they made.
-constexpr int kRelocations = 2;
-/// ... which must fit as many closures, or this share of them when what is convicted is half as long or less.
-constexpr double kAlmostAll = 0.95;
+/// What failed odometry missed is measured; that it was this much more is as likely as not.
+constexpr double kDoubt = 2.0;
+
+/// Closures of neighbouring submaps may be wrong all together.
+constexpr double kNeighbours_s = 15.0;
 
 /// How many groups of closures can be refused as lone witnesses against all the rest.
 constexpr int kRefusals = 5;
 
-/// Chi-square (6 dof, 0.999) below which the odometry of a stretch agrees with the map after all.
-constexpr double kRightAfterAll = 22.46;
+/// Probability with which the odometry of a stretch agrees with the map after all.
+constexpr double kRightAfterAll = 0.999;
 
 /// Adds a variance (m, rad) to failed odometry, in equal shares to the steps of the stretch.
 void weaken(PoseGraph& graph, const MapEstimate& map, std::size_t from, std::size_t to, double sigma_m,
@@ -140,39 +136,23 @@ void weaken(PoseGraph& graph, const MapEstimate& map, std::size_t from, std::siz
   }
 }
 
-/// As it was judged: a step that jumped by what it was instead, else with a variance.
-void doubt(PoseGraph& graph, const MapEstimate& map, const NodeIndex& index, const DoubtedStretch& doubted,
-           double sigma_m, double sigma_rad) {
-  const auto& [chain, from, to] = doubted.stretch;
-  const std::size_t a = index.at({chain, from}), b = index.at({chain, to});
-  if (!doubted.motion) return weaken(graph, map, a, b, sigma_m, sigma_rad);
-  for (std::size_t e = 0; e < map.odometry_edges; ++e)
-    if (graph.edges[e].from == a && graph.edges[e].to == b)
-      graph.edges[e] = {a, b, doubted.motion->T_a_b, information_of(doubted.motion->covariance)};
-}
-
 /// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A stretch that
 /// turns out to have been right, nearly or within its own doubt, is no failure.
-void record_failure(const DoubtedStretch& doubted, const NodeIndex& index, double min_jump_m, MapEstimate& map) {
-  const auto& [chain, from, to] = doubted.stretch;
-  const std::size_t a = index.at({chain, from}), b = index.at({chain, to});
-  const auto raw = [&](std::size_t i, std::size_t j) {
-    return map.nodes[i].T_odom_body.inverse() * map.nodes[j].T_odom_body;
-  };
+void record_failure(const estimation::FailedStretch& failed, double min_jump_m, MapEstimate& map) {
+  const MapNode &a = map.nodes[failed.from], &b = map.nodes[failed.to];
   Matrix6d covariance = Matrix6d::Zero();
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     const PoseGraphEdge& edge = map.graph.edges[e];
-    if (edge.from < a || edge.to > b) continue;
-    const Matrix6d to_end = adjoint(raw(b, edge.to));
+    if (edge.from < failed.from || edge.to > failed.to) continue;
+    const Matrix6d to_end = adjoint(b.T_odom_body.inverse() * map.nodes[edge.to].T_odom_body);
     covariance += to_end * edge.information.inverse() * to_end.transpose();
   }
-  const Vector6d jump = local(raw(a, b), map.nodes[a].T_world_body.inverse() * map.nodes[b].T_world_body);
-  const double jump_m = jump.head<3>().norm();
-  const double jump_rad = jump.tail<3>().norm();
+  const Vector6d jump = local(a.T_odom_body.inverse() * b.T_odom_body, a.T_world_body.inverse() * b.T_world_body);
+  const double jump_m = jump.head<3>().norm(), jump_rad = jump.tail<3>().norm();
   if (estimation::failure_size(jump_m, jump_rad) < 0.5 * min_jump_m) return;
-  if (jump.dot(covariance.llt().solve(jump)) < kRightAfterAll) return;
-  map.failed_odometry.push_back({chain, from, to, jump_m, jump_rad});
-  doubt(map.graph, map, index, doubted, jump_m, jump_rad);
+  if (jump.dot(covariance.llt().solve(jump)) < chi_square_quantile(kRightAfterAll, 6)) return;
+  map.failed_odometry.push_back({a.id.chain, a.id.index, b.id.index, jump_m, jump_rad});
+  weaken(map.graph, map, failed.from, failed.to, jump_m, jump_rad);
 }
 
 void label_components(MapEstimate& map) {
@@ -192,66 +172,68 @@ void label_components(MapEstimate& map) {
   map.components = static_cast<std::uint32_t>(label.size());
 }
 
-/// What a verdict on closures and odometry makes of the map.
+/// What an explanation of the closures makes of the map.
 struct Optimum {
-  std::vector<DoubtedStretch> failed;
+  std::vector<estimation::FailedStretch> failed;
   PoseGraph graph;                           ///< Odometry, let go where it failed, and the closures not rejected.
   std::vector<std::size_t> closure_of_edge;  ///< Of the edges beyond odometry.
   estimation::GncResult robust;
   std::vector<std::size_t> fitting;  ///< Edges of closures that fit the map.
-
-  [[nodiscard]] std::size_t convicted() const {  ///< Steps of odometry.
-    std::size_t steps = 0;
-    for (const auto& [chain, from, to] : failed | std::views::transform(&DoubtedStretch::stretch)) steps += to - from;
-    return steps;
-  }
-  [[nodiscard]] bool explains_better_than(const Optimum& other) const {
-    if (fitting.size() >= other.fitting.size()) return true;
-    return 2 * convicted() <= other.convicted() &&
-           static_cast<double>(fitting.size()) >= kAlmostAll * static_cast<double>(other.fitting.size());
-  }
 };
 
-class Judgement {
+class Optimiser {
  public:
   /// All must outlive this.
-  Judgement(const MapEstimate& map, const NodeIndex& index, const std::vector<LoopClosure>& closures,
-            const std::vector<estimation::OdometryChain>& chains, const MapConfig& config)
-      : map_(map),
-        index_(index),
-        closures_(closures),
-        chains_(chains),
-        config_(config),
-        trial_(chains, closures, config.trial) {}
+  Optimiser(const MapEstimate& map, const NodeIndex& index, const std::vector<LoopClosure>& closures,
+            const MapConfig& config)
+      : map_(map), closures_(closures), config_(config) {
+    for (const LoopClosure& closure : closures)
+      closure_edges_.push_back({.from = index.at(closure.from),
+                                .to = index.at(closure.to),
+                                .T_from_to = closure.measurement.T_a_b,
+                                .information = information_of(closure.measurement.covariance)});
+  }
 
-  /// The map with the failures where the trial puts them, then where the maps so made put them, as long as that
-  /// explains the closures better.
-  Optimum decide() {
-    const estimation::OdometryVerdict first = trial_.decide();
-    std::vector<DoubtedStretch> failed;
-    for (const auto& stretch : first.failed) failed.push_back({stretch, kFreeTranslation, kFreeRotation, std::nullopt});
-    Optimum best = optimise(first.accepted, std::move(failed));
-    for (int round = 0; round < kRelocations && !best.failed.empty(); ++round) {
-      Optimum next = relocated(best);
-      if (!next.explains_better_than(best)) break;
-      best = std::move(next);
-    }
+  [[nodiscard]] Optimum decide() const {
+    PoseGraph graph = map_.graph;
+    graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
+    const estimation::OdometryWays odometry(graph.poses.size(), map_.graph.edges);
+    std::vector<std::size_t> all(closures_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    const auto groups = closure_groups(map_.nodes, closure_edges_, all,
+                                       {kNeighbours_s, std::numeric_limits<double>::infinity(), closures_.size()});
+    auto found =
+        estimation::explain_closures(graph, odometry, map_.odometry_edges, groups, config_.who_is_wrong, config_.gnc);
+    leave_unjoined(odometry, found.accepted);
+    Optimum best = optimise(found.accepted, std::move(found.failed));
     for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
     return best;
   }
 
  private:
-  [[nodiscard]] Optimum optimise(const std::vector<bool>& accepted, std::vector<DoubtedStretch> failed) const {
+  /// Too few closures do not join two pieces of odometry.
+  void leave_unjoined(const estimation::OdometryWays& odometry, std::vector<bool>& accepted) const {
+    std::map<std::pair<std::size_t, std::size_t>, std::vector<std::size_t>> between;
+    for (std::size_t c = 0; c < closures_.size(); ++c)
+      if (accepted[c])
+        between[std::minmax({odometry.piece(closure_edges_[c].from), odometry.piece(closure_edges_[c].to)})].push_back(
+            c);
+    for (const auto& [pieces, joining] : between)
+      if (pieces.first != pieces.second &&
+          joining.size() < static_cast<std::size_t>(config_.who_is_wrong.min_joining_closures))
+        for (const std::size_t c : joining) accepted[c] = false;
+  }
+
+  [[nodiscard]] Optimum optimise(const std::vector<bool>& accepted,
+                                 std::vector<estimation::FailedStretch> failed) const {
     Optimum out{.failed = std::move(failed), .graph = map_.graph, .closure_of_edge = {}, .robust = {}, .fitting = {}};
-    for (const DoubtedStretch& doubted : out.failed)
-      doubt(out.graph, map_, index_, doubted, doubted.sigma_m, doubted.sigma_rad);
-    for (std::size_t i = 0; i < closures_.size(); ++i) {
-      if (!accepted[i]) continue;
-      out.graph.edges.push_back({.from = index_.at(closures_[i].from),
-                                 .to = index_.at(closures_[i].to),
-                                 .T_from_to = closures_[i].measurement.T_a_b,
-                                 .information = information_of(closures_[i].measurement.covariance)});
-      out.closure_of_edge.push_back(i);
+    for (const estimation::FailedStretch& stretch : out.failed)
+      weaken(out.graph, map_, stretch.from, stretch.to, kDoubt * stretch.missed.head<3>().norm(),
+             kDoubt * stretch.missed.tail<3>().norm());
+    for (std::size_t c = 0; c < closures_.size(); ++c) {
+      if (!accepted[c]) continue;
+      out.graph.edges.push_back(closure_edges_[c]);
+      out.closure_of_edge.push_back(c);
     }
     std::vector<estimation::EdgeRole> roles(out.graph.edges.size(), estimation::EdgeRole::robust);
     std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
@@ -262,7 +244,7 @@ class Judgement {
   }
 
   /// Takes back the group of closures at one pair of places that contradicts all the rest of the map most, if it does
-  /// beyond chance: as a lone closure against odometry, a lone group convicts itself. False if there is none.
+  /// beyond chance: as a lone closure against odometry, a lone group is wrong itself. False if there is none.
   [[nodiscard]] bool refuse_lone_witness(Optimum& best) const {
     if (!estimation::is_usable(best.robust.solution.summary.termination)) return false;
     PoseGraph fitted{.poses = {},
@@ -277,7 +259,7 @@ class Judgement {
     const auto groups = closure_groups(map_.nodes, fitted.edges, closures);
     const auto misfits = estimation::group_misfits(fitted, best.robust.solution.poses, roles, groups);
     const auto worst = std::ranges::max_element(misfits);
-    if (worst == misfits.end() || *worst <= estimation::chi_square_6_quantile(config_.trial.confidence)) return false;
+    if (worst == misfits.end() || *worst <= chi_square_quantile(config_.who_is_wrong.confidence, 6)) return false;
     std::vector<bool> accepted(closures_.size(), false);
     for (const std::size_t closure : best.closure_of_edge) accepted[closure] = true;
     for (const std::size_t e : groups[static_cast<std::size_t>(worst - misfits.begin())])
@@ -286,51 +268,66 @@ class Judgement {
     return true;
   }
 
-  /// The map with the failures of another one moved to where that says they are.
-  [[nodiscard]] Optimum relocated(const Optimum& other) {
-    const auto pose_of = [&](KeyframeId id) { return other.robust.solution.poses[index_.at(id)]; };
-    auto moved = relocate_failures(other.failed, chains_, closures_, pose_of);
-    std::vector<estimation::OdometryStretch> stretches;
-    for (const DoubtedStretch& doubted : moved) stretches.push_back(doubted.stretch);
-    const auto accepted = trial_.assume(stretches).accepted;
-    return optimise(accepted, std::move(moved));
-  }
-
   const MapEstimate& map_;
-  const NodeIndex& index_;
   const std::vector<LoopClosure>& closures_;
-  const std::vector<estimation::OdometryChain>& chains_;
   const MapConfig& config_;
-  estimation::OdometryTrial trial_;
+  std::vector<PoseGraphEdge> closure_edges_;
 };
 
-void adopt(const Optimum& optimum, const NodeIndex& index, double min_jump_m, MapEstimate& map) {
+void adopt(const Optimum& optimum, double min_jump_m, MapEstimate& map) {
   for (const std::size_t edge : optimum.fitting) {
     map.graph.edges.push_back(optimum.graph.edges[edge]);
     map.closures[optimum.closure_of_edge[edge - map.odometry_edges]].accepted = true;
   }
   map.graph.poses = optimum.robust.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
-  for (const DoubtedStretch& doubted : optimum.failed) record_failure(doubted, index, min_jump_m, map);
+  for (const estimation::FailedStretch& failed : optimum.failed) record_failure(failed, min_jump_m, map);
 }
 
 }  // namespace
 
-std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
-                                                       const std::vector<std::optional<Matrix6d>>& step_to) {
-  std::vector<estimation::OdometryChain> chains;
+std::vector<OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
+                                           const std::vector<std::optional<Matrix6d>>& step_to) {
+  std::vector<OdometryChain> chains;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (step_to[i])
       chains.back().step_covariance.push_back(*step_to[i]);
     else
       chains.push_back({.id = nodes[i].id.chain, .first_index = nodes[i].id.index});
     chains.back().T_odom_body.push_back(nodes[i].T_odom_body);
-    chains.back().stamps.push_back(nodes[i].stamp);
   }
   return chains;
 }
 
 namespace {
+
+/// What odometry is worth by the closures that fit. What failed is a gap: the map's word on it is not odometry's.
+std::map<ChainId, OdometryHonesty> honesty_after(const MapEstimate& map, const Optimum& optimum,
+                                                 const std::vector<LoopClosure>& closures) {
+  std::vector<std::optional<Matrix6d>> step_to(map.nodes.size());
+  for (std::size_t e = 0; e < map.odometry_edges; ++e) {
+    const PoseGraphEdge& edge = map.graph.edges[e];
+    const auto holds = [&](const estimation::FailedStretch& f) { return f.from < edge.to && edge.from < f.to; };
+    if (std::ranges::none_of(optimum.failed, holds))
+      step_to[edge.to] = edge.information.ldlt().solve(Matrix6d::Identity());
+  }
+  std::vector<LoopClosure> fitting;
+  for (const std::size_t e : optimum.fitting)
+    fitting.push_back(closures[optimum.closure_of_edge[e - map.odometry_edges]]);
+  return odometry_honesty(odometry_chains(map.nodes, step_to), fitting);
+}
+
+/// True if the odometry of any chain was far worse than it said; it now says so.
+bool raise_understated(const std::map<ChainId, OdometryHonesty>& honesty, MapEstimate& map) {
+  for (const auto& [chain, worth] : honesty)
+    if (worth.whole > kUnderstated) map.understated[chain] = worth.whole;
+  for (std::size_t e = 0; e < map.odometry_edges; ++e) {
+    PoseGraphEdge& edge = map.graph.edges[e];
+    if (const auto found = map.understated.find(map.nodes[edge.from].id.chain); found != map.understated.end())
+      edge.information /= found->second;
+  }
+  return !map.understated.empty();
+}
 
 /// Of submaps that do not contradict each other.
 MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config) {
@@ -339,15 +336,22 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   const auto spare = spare_pairs(verdicts, submaps, static_cast<std::size_t>(config.most_closed_pairs));
   map.spare_pairs = spare.size();
   const std::vector<LoopClosure> closures = collect_closures(verdicts, submaps, index, spare);
-  std::vector<estimation::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
-  if (config.judge_rotation) {
-    map.rotation_factors = rotation_variance_factors(chains, closures);
-    see_through(map, chains);
+  if (config.judge_odometry) {
+    for (const auto& [chain, worth] :
+         odometry_honesty(odometry_chains(map.nodes, stated_steps(submaps, index)), closures))
+      map.rotation_factors[chain] = worth.rotation;
+    see_through(map);
   }
-  const Optimum optimum = Judgement(map, index, closures, chains, config).decide();
+  Optimum optimum = Optimiser(map, index, closures, config).decide();
+  auto honesty = honesty_after(map, optimum, closures);
+  if (config.judge_odometry && raise_understated(honesty, map)) {
+    optimum = Optimiser(map, index, closures, config).decide();
+    honesty = honesty_after(map, optimum, closures);
+  }
+  for (const auto& [chain, worth] : honesty) map.overstated[chain] = std::min(1.0, worth.whole);
   for (const LoopClosure& closure : closures) map.closures.push_back({closure, false});
   map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
-  if (map.converged) adopt(optimum, index, config.trial.min_jump_m, map);
+  if (map.converged) adopt(optimum, config.who_is_wrong.min_jump_m, map);
   label_components(map);
   return map;
 }

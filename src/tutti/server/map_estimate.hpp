@@ -9,11 +9,12 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/gnc.hpp"
-#include "tutti/estimation/odometry_trial.hpp"
+#include "tutti/estimation/who_is_wrong/settings.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/submap.hpp"
+#include "tutti/server/odometry_loops.hpp"
 
 namespace tutti::server {
 
@@ -35,7 +36,7 @@ struct JudgedClosure {
   bool accepted = false;
 };
 
-/// Odometry that the closures convicted: between these two keyframes of one chain it is not believed.
+/// Odometry that the closures show to have failed: between these two keyframes of one chain it is not believed.
 struct FailedOdometry {
   ChainId chain;
   std::uint32_t from = 0;  ///< KeyframeId::index
@@ -52,8 +53,12 @@ struct MapEstimate {
   std::size_t odometry_edges = 0;               ///< graph.edges[0 .. odometry_edges) are odometry.
   std::vector<JudgedClosure> closures;          ///< Sorted by (from, to).
   std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (chain, from).
-  /// By which the variances of each chain's odometry count, in rotation (rotation_honesty.hpp); `graph` has them so.
+  /// By which the variances of each chain's odometry count, in rotation (odometry_honesty.hpp); `graph` has them so.
   std::map<ChainId, double> rotation_factors;
+  /// Of chains whose odometry is far worse than it says: by which all its variances count; `graph` has them so.
+  std::map<ChainId, double> understated;
+  /// By which the map shows the variances of each chain's odometry, as in `graph`, to be overstated still, in (0, 1].
+  std::map<ChainId, double> overstated;
   std::uint32_t components = 0;  ///< Connected components that contain a node.
   /// Submaps that contradict earlier ones of their chain: keyframes that are there already, at other moments or out of
   /// order. And all of a chain without which the map can be solved, and with which it cannot.
@@ -63,16 +68,16 @@ struct MapEstimate {
 };
 
 struct MapConfig {
-  estimation::OdometryTrialConfig trial;
+  estimation::WhoIsWrongConfig who_is_wrong;
   estimation::GncConfig gnc;
-  bool judge_rotation = true;
+  bool judge_odometry = true;
   int most_closed_pairs = 40;
   template <class V>
   void describe(V& v) {
-    v.field("trial", trial);
+    v.field("who_is_wrong", who_is_wrong);
     v.field("gnc", gnc);
-    v.field("judge_rotation", judge_rotation, any(),
-            "Odometry that turns better than it says counts as much as the closures show (off: as it says).");
+    v.field("judge_odometry", judge_odometry, any(),
+            "Odometry that turns better than it says, or is far worse, counts as the closures show (off: as it says).");
     v.field("most_closed_pairs", most_closed_pairs, at_least(1),
             "A submap that closures tie to more submaps of one robot than this does not have all judged "
             "(spare_pairs.hpp).");
@@ -81,8 +86,8 @@ struct MapConfig {
 
 /// Raw odometry of nodes sorted by id, one chain per piece without a gap. `step_to`: per node the covariance of the
 /// step that ends there, nothing where odometry begins.
-std::vector<estimation::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
-                                                       const std::vector<std::optional<Matrix6d>>& step_to);
+std::vector<OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
+                                           const std::vector<std::optional<Matrix6d>>& step_to);
 
 /// The map of a set of submaps and verdicts: attaches submaps by their shared keyframes, judges closures and odometry,
 /// optimises. Pure: the same sets give the same map, whatever the order they came in.

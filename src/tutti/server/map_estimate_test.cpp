@@ -101,7 +101,7 @@ TEST(MapEstimate, SeesThroughRotationsThatAreBetterThanStated) {
       submap = std::make_shared<const Submap>(std::move(overstated));
     }
     judged += rmse(estimate_map(in.submaps, in.verdicts, {}));
-    stated += rmse(estimate_map(in.submaps, in.verdicts, {.judge_rotation = false}));
+    stated += rmse(estimate_map(in.submaps, in.verdicts, {.judge_odometry = false}));
   }
   EXPECT_LT(judged, 0.9 * stated);
 }
@@ -114,7 +114,7 @@ TEST(MapEstimate, ALoneClosureDoesNotJoinTwoRobots) {
   ASSERT_NE(inter, in.verdicts.end());
   const VerdictSet one{*inter};
   EXPECT_EQ(estimate_map(in.submaps, one, {}).components, 2U);
-  EXPECT_EQ(estimate_map(in.submaps, one, {.trial = {.min_joining_closures = 1}}).components, 1U);
+  EXPECT_EQ(estimate_map(in.submaps, one, {.who_is_wrong = {.min_joining_closures = 1}}).components, 1U);
 }
 
 TEST(MapEstimate, AMissingSubmapLeavesAGapAndNothingElse) {

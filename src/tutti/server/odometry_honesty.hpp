@@ -2,19 +2,34 @@
 #pragma once
 
 #include <map>
+#include <span>
 
 #include "tutti/base/ids.hpp"
-#include "tutti/server/map_estimate.hpp"
+#include "tutti/model/loop_closure.hpp"
+#include "tutti/server/odometry_loops.hpp"
 
 namespace tutti::server {
 
-/// By how much each robot's odometry overstates its variances, as a factor on them in (0, 1]: the median over loops of
-/// z^2 over the median of chi-square (6 degrees of freedom), where z is how far odometry misses to close the loop, in
-/// all covariances on the way. Loops are the robot's accepted closures with itself, and pairs of closures with another
-/// robot together with both odometries between them; loops that odometry leaves surer than the closure say nothing.
-/// Front ends inflate their covariance to be on the safe side (and missions on recordings have to guess one); a map
-/// that believes them says it knows less than it does. Never above 1: odometry that misses its closures is the business
-/// of those who judge them (estimation/odometry_trial). Never below 1/25; 1 with fewer than 8 loops.
-std::map<ChainId, double> odometry_variance_factors(const MapEstimate& map);
+/// What a robot's odometry is worth, as factors on its variances: the least with which a share of its loops
+/// (odometry_loops.hpp), of those that tell of odometry more than of closures, miss by no more than chi-square allows
+/// that share. 1 with fewer than 8 such loops.
+struct OdometryHonesty {
+  /// On the variances of rotations, in [0.08, 1]: 70 % of the loops, and twice the least (loops share their odometry,
+  /// so a walk tells of it only so well). Closures need not be judged: fewer than 30 % wrong ones make it larger, on
+  /// the safe side; with more it is 1. Rotations only: by how far a loop misses in rotation is read off directly, and
+  /// errors of rotation add up like a random walk; how odometry errs in translation depends on the length of the way.
+  double rotation = 1.0;
+  /// On all variances, in [0.04, 400]: half of the loops. Of closures that have been judged; below 1 their own
+  /// covariance is scaled likewise, so that closures that overstate theirs do not make odometry too sure.
+  double whole = 1.0;
+};
+
+/// Of every robot of `chains`.
+std::map<ChainId, OdometryHonesty> odometry_honesty(std::span<const OdometryChain> chains,
+                                                    std::span<const LoopClosure> closures);
+
+/// S C S, S = diag(1, 1, 1, s, s, s), s = sqrt(factor): a covariance (right tangent) with the variances of its
+/// rotations times `factor`. To its inverse, information, 1 / factor does the same.
+Matrix6d scale_rotation(const Matrix6d& covariance, double factor);
 
 }  // namespace tutti::server

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tutti/base/random.hpp"
@@ -12,106 +13,105 @@
 namespace tutti::server {
 namespace {
 
-constexpr double kClosure_m = 0.02;
-constexpr double kClosure_rad = 0.004;
+constexpr RobotId kRobot{0};
+constexpr std::uint32_t kKeyframes = 400;
+constexpr double kStep_m = 0.03, kStep_rad = 0.004;  // what odometry is truly good for
+constexpr double kClosure_m = 0.05, kClosure_rad = 0.01;
 
-Vector6d noise(Rng& rng, double sigma_m, double sigma_rad) {
-  Vector6d out;
-  for (int i = 0; i < 6; ++i) out(i) = rng.normal(i < 3 ? sigma_m : sigma_rad);
-  return out;
-}
-
-struct Rounds {
-  std::uint32_t robots = 1;
-  double stated = 1.0;  ///< Standard deviations of odometry as stated, over the true ones.
-  std::size_t closures = 60;
-  bool between_robots = false;
+struct Case {
+  double stated = 1.0;  ///< Standard deviation of rotations as stated, over the true one.
+  std::size_t closures = 80;
+  double wrong_share = 0.0;
+  double scale = 1.0;     ///< Of odometry's translations.
+  double stated_m = 1.0;  ///< As `stated`, of translations.
 };
 
-/// Robots walking round a ring, odometry and closures with known noise.
-MapEstimate walked(const Rounds& rounds, std::uint64_t seed) {
+OdometryHonesty honesty(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
-  MapEstimate map;
-  constexpr std::uint32_t kNodes = 200;
-  std::vector<Pose3> truth;
-  for (std::uint32_t r = 0; r < rounds.robots; ++r) {
-    Pose3 T_odom_body;
-    Pose3 T_world_body;
-    for (std::uint32_t k = 0; k < kNodes; ++k) {
-      if (k > 0) {
-        const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 0.1)), Eigen::Vector3d(1, 0, 0)};
-        const Pose3 measured = retract(step, noise(rng, 0.02, 0.004));
-        T_world_body = T_world_body * step;
-        T_odom_body = T_odom_body * measured;
-        map.graph.edges.push_back(
-            {.from = map.nodes.size() - 1,
-             .to = map.nodes.size(),
-             .T_from_to = measured,
-             .information = test::diagonal_covariance(0.02 * rounds.stated, 0.004 * rounds.stated).inverse()});
-      }
-      map.nodes.push_back({.id = {RobotId{r}, k}, .T_odom_body = T_odom_body, .T_world_body = T_world_body});
-      truth.push_back(T_world_body);
-    }
+  OdometryChain chain{.id = kRobot};
+  std::vector<Pose3> truth(1);
+  chain.T_odom_body.resize(1);
+  for (std::uint32_t k = 1; k < kKeyframes; ++k) {
+    const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 0.1)), Eigen::Vector3d(1, 0, 0)};
+    Pose3 measured = retract(step, test::draw(rng, kStep_m, kStep_rad));
+    measured.translation *= c.scale;
+    truth.push_back(truth.back() * step);
+    chain.T_odom_body.push_back(chain.T_odom_body.back() * measured);
+    chain.step_covariance.push_back(test::diagonal_covariance(kStep_m * c.stated_m, kStep_rad * c.stated));
   }
-  map.odometry_edges = map.graph.edges.size();
-  for (std::size_t c = 0; c < rounds.closures; ++c) {
-    const auto a = static_cast<std::uint32_t>(rng.index(kNodes));
-    const auto b = static_cast<std::uint32_t>((a + 40 + rng.index(kNodes - 80)) % kNodes);
-    const std::uint32_t other = rounds.between_robots ? 1 : 0;
-    const Pose3 T_a_b = truth[a].inverse() * truth[other * kNodes + b];
-    LoopClosure closure;
-    closure.from = {RobotId{0}, a};
-    closure.to = {RobotId{other}, b};
-    closure.measurement = {retract(T_a_b, noise(rng, kClosure_m, kClosure_rad)),
-                           test::diagonal_covariance(kClosure_m, kClosure_rad)};
-    map.closures.push_back({closure, true});
+  std::vector<LoopClosure> closures;
+  while (closures.size() < c.closures) {
+    const auto a = static_cast<std::uint32_t>(rng.index(kKeyframes));
+    const auto b = static_cast<std::uint32_t>(rng.index(kKeyframes));
+    if (std::max(a, b) - std::min(a, b) < 40) continue;
+    Pose3 T_a_b = retract(truth[a].inverse() * truth[b], test::draw(rng, kClosure_m, kClosure_rad));
+    if (rng.bernoulli(c.wrong_share)) T_a_b = T_a_b * Pose3{so3_exp(Eigen::Vector3d(0, 0, 1.0)), {3, 2, 1}};
+    closures.push_back({{kRobot, a}, {kRobot, b}, {T_a_b, test::diagonal_covariance(kClosure_m, kClosure_rad)}});
   }
-  return map;
+  const std::vector<OdometryChain> chains{chain};
+  return odometry_honesty(chains, closures).at(kRobot);
 }
 
-TEST(OdometryHonesty, HonestOdometryIsTakenAtItsWord) {
-  for (const std::uint64_t seed : {1U, 2U, 3U})
-    EXPECT_GT(odometry_variance_factors(walked({}, seed)).at(RobotId{0}), 0.5) << "seed " << seed;
-}
+double factor(const Case& c, std::uint64_t seed) { return honesty(c, seed).rotation; }
 
-TEST(OdometryHonesty, OverstatedOdometryIsSeenThrough) {
-  for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const double factor = odometry_variance_factors(walked({.stated = 4.0}, seed)).at(RobotId{0});
-    EXPECT_GT(factor, 0.5 / 16.0) << "seed " << seed;
-    EXPECT_LT(factor, 2.0 / 16.0) << "seed " << seed;
+constexpr std::uint64_t kSeeds = 20;
+
+TEST(OdometryHonesty, SeesHowMuchIsOverstated) {
+  for (const double stated : {2.0, 3.0, 4.0}) {
+    std::vector<double> ratios;  // of the factor to the true one
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed)
+      ratios.push_back(factor({.stated = stated}, seed) * stated * stated);
+    std::ranges::sort(ratios);
+    EXPECT_NEAR(ratios[kSeeds / 2], 2.0, 0.7) << stated;  // twice as careful as it would have to be,
+    EXPECT_GT(ratios.front(), 0.7) << stated;             // which is what one walk may be wrong by
   }
 }
 
-TEST(OdometryHonesty, LoopsThroughAnotherRobotCountForBoth) {
-  const auto factors = odometry_variance_factors(walked({.robots = 2, .stated = 4.0, .between_robots = true}, 4));
-  for (const auto& [robot, factor] : factors) {
-    EXPECT_GT(factor, 0.4 / 16.0);
-    EXPECT_LT(factor, 2.5 / 16.0);
+TEST(OdometryHonesty, HonestAndUnderstatedRotationsStayAsTheyAre) {
+  std::size_t untouched = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    EXPECT_GT(factor({}, seed), 0.7) << seed;
+    untouched += factor({}, seed) == 1.0 ? 1 : 0;
+    EXPECT_EQ(factor({.stated = 0.3}, seed), 1.0) << seed;
   }
+  EXPECT_GE(untouched, kSeeds * 3 / 4);
+}
+
+TEST(OdometryHonesty, WrongClosuresMakeItCarefulOnly) {
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    EXPECT_GE(factor({.stated = 4.0, .wrong_share = 0.15}, seed), 0.7 / 16.0) << seed;
+    EXPECT_LT(factor({.stated = 4.0, .wrong_share = 0.15}, seed), 1.0) << seed;
+    EXPECT_EQ(factor({.stated = 4.0, .wrong_share = 0.5}, seed), 1.0) << seed;
+  }
+}
+
+TEST(OdometryHonesty, AScaleErrorIsNoneOfItsBusiness) {
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed)
+    EXPECT_NEAR(factor({.stated = 3.0, .scale = 1.05}, seed), factor({.stated = 3.0}, seed), 1e-9);
 }
 
 TEST(OdometryHonesty, StaysWithinItsBounds) {
-  EXPECT_EQ(odometry_variance_factors(walked({.stated = 4.0, .closures = 7}, 1)).at(RobotId{0}), 1.0);  // too few
-  EXPECT_EQ(odometry_variance_factors(walked({.stated = 0.2}, 1)).at(RobotId{0}), 1.0);  // understated: not ours
-  EXPECT_GE(odometry_variance_factors(walked({.stated = 100.0}, 1)).at(RobotId{0}), 0.04);
-  EXPECT_TRUE(odometry_variance_factors({}).empty());
+  EXPECT_EQ(factor({.stated = 4.0, .closures = 7}, 1), 1.0);  // too few to tell
+  EXPECT_EQ(factor({.stated = 100.0}, 1), 0.08);
+  EXPECT_TRUE(odometry_honesty({}, {}).empty());
 }
 
-/// The map puts another motion in the place of a step that jumped; raw odometry still has the jump.
-TEST(OdometryHonesty, LoopsOverFailedOdometryDoNotCount) {
-  auto map = walked({.stated = 4.0, .closures = 120}, 5);
-  const Pose3 jump{so3_exp(Eigen::Vector3d(0, 0, 0.3)), Eigen::Vector3d(3, -2, 0)};
-  const Pose3 before = map.nodes[99].T_odom_body;
-  for (std::size_t i = 100; i < map.nodes.size(); ++i)
-    map.nodes[i].T_odom_body = before * jump * before.inverse() * map.nodes[i].T_odom_body;
-  map.failed_odometry = {{RobotId{0}, 99, 100, jump.translation.norm(), 0.3}};
-  EXPECT_LT(odometry_variance_factors(map).at(RobotId{0}), 2.5 / 16.0);
+// Judged closures tell of the whole, either way.
+TEST(OdometryHonesty, SeesHowMuchTheWholeIsOverstatedOrUnderstated) {
+  for (const double stated : {0.15, 0.5, 1.0, 3.0}) {
+    std::vector<double> ratios;  // of the factor to the true one
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed)
+      ratios.push_back(honesty({.stated = stated, .stated_m = stated}, seed).whole * stated * stated);
+    std::ranges::sort(ratios);
+    EXPECT_NEAR(ratios[kSeeds / 2], 1.0, 0.5) << stated;
+    EXPECT_GT(ratios.front(), 0.3) << stated;
+    EXPECT_LT(ratios.back(), 3.0) << stated;
+  }
 }
 
-TEST(OdometryHonesty, RefusedClosuresDoNotCount) {
-  auto map = walked({.stated = 4.0}, 1);
-  for (JudgedClosure& judged : map.closures) judged.accepted = false;
-  EXPECT_EQ(odometry_variance_factors(map).at(RobotId{0}), 1.0);
+TEST(OdometryHonesty, ScalesOnlyRotations) {
+  EXPECT_LT((scale_rotation(test::diagonal_covariance(2.0, 2.0), 0.25) - test::diagonal_covariance(2.0, 1.0)).norm(),
+            1e-12);
 }
 
 }  // namespace

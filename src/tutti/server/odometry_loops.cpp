@@ -10,8 +10,6 @@
 namespace tutti::server {
 namespace {
 
-using estimation::OdometryChain;
-
 /// Odometry between any two keyframes of one chain.
 class Ways {
  public:

@@ -21,12 +21,12 @@ RelativePose measured(const Pose3& truth, double sigma_m, double sigma_rad, Rng&
 
 /// Two robots on one winding way, the second a metre beside the first.
 struct Walk {
-  std::vector<estimation::OdometryChain> chains;
+  std::vector<OdometryChain> chains;
   std::vector<Pose3> truth;  ///< T_world_body of both, one after the other.
 
   Walk(double sigma_m, double sigma_rad, Rng& rng) {
     for (const RobotId robot : {kOne, kTwo}) {
-      estimation::OdometryChain chain{.id = robot};
+      OdometryChain chain{.id = robot};
       Pose3 T_world_body{Eigen::Quaterniond::Identity(), {0, 1.0 * robot.value, 0}};
       for (std::uint32_t k = 0; k < kKeyframes; ++k) {
         if (k > 0) {
@@ -88,8 +88,8 @@ TEST(OdometryLoops, NotOverAGap) {
   Walk walk(0.01, 0.002, rng);
   const std::vector<LoopClosure> closures{walk.closure({kOne, 5}, {kOne, 45}, 0.02, 0.01, rng),
                                           walk.closure({kOne, 35}, {kOne, 50}, 0.02, 0.01, rng)};
-  estimation::OdometryChain& all = walk.chains.front();
-  estimation::OdometryChain late{.id = kOne, .first_index = 30};
+  OdometryChain& all = walk.chains.front();
+  OdometryChain late{.id = kOne, .first_index = 30};
   late.T_odom_body.assign(all.T_odom_body.begin() + 30, all.T_odom_body.end());
   late.step_covariance.assign(all.step_covariance.begin() + 30, all.step_covariance.end());
   all.T_odom_body.resize(20);

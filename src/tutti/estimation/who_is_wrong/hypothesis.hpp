@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "tutti/estimation/internal/chain_reduction.hpp"
+#include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
+
+namespace tutti::estimation {
+
+/// Neighbouring runs of odometry that may be let go, by number.
+struct Window {
+  std::size_t first = 0;
+  std::size_t last = 0;  ///< Inclusive.
+};
+
+struct Hypothesis {
+  std::vector<Window> windows;                  ///< In order; none overlap.
+  std::vector<std::vector<std::size_t>> wrong;  ///< Groups of closures.
+};
+
+/// What a hypothesis makes of the closures. Votes: closures that end at one place share one.
+struct Solution {
+  Hypothesis hypothesis;
+  bool solved = false;
+  std::vector<char> let_go;           ///< Per run.
+  std::vector<char> accepted;         ///< Per closure.
+  std::vector<FailedStretch> failed;  ///< Runs let go, neighbours together; nodes of the graph.
+  double misfit = 0.0;  ///< In votes, with what failed stretches and wrong groups pay; infinite when one is too small.
+  bool suspicious = false;   ///< More than wrong closures strewn about may be behind what is unexplained.
+  double unexplained = 0.0;  ///< Votes of refused closures, and what strains one window of odometry beyond chance.
+};
+
+/// Solves a pose graph under hypotheses, on the graph of the closures' ends.
+class HypothesisSolver {
+ public:
+  /// All must outlive this.
+  HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
+                   const WhoIsWrongConfig& config, const GncConfig& gnc);
+
+  [[nodiscard]] Solution solve(Hypothesis hypothesis) const;
+  [[nodiscard]] std::size_t runs() const { return runs_.size(); }
+  /// The runs around one, within the search distance on its piece.
+  [[nodiscard]] Window around(std::size_t run) const;
+  [[nodiscard]] double votes(std::size_t closure) const { return votes_[closure]; }
+
+ private:
+  [[nodiscard]] std::size_t begin_of(std::size_t run) const;
+  [[nodiscard]] std::size_t end_of(std::size_t run) const;
+  void count_votes();
+  void find_failed(const std::vector<Pose3>& poses, Solution& out) const;
+  /// How large a failure was, at the node of its stretch from which it looks least.
+  [[nodiscard]] double least_size(const FailedStretch& failed) const;
+
+  const OdometryWays& odometry_;
+  const WhoIsWrongConfig& config_;
+  const GncConfig& gnc_;
+  double limit_;
+  internal::ReducedGraph reduced_;
+  std::vector<std::size_t> runs_;      // edges of the reduced graph, by their begin
+  std::vector<std::size_t> closures_;  // edges of the reduced graph
+  std::vector<double> votes_;          // per closure
+};
+
+}  // namespace tutti::estimation

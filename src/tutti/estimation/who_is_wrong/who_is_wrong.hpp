@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "tutti/estimation/gnc.hpp"
+#include "tutti/estimation/who_is_wrong/odometry_ways.hpp"
+#include "tutti/estimation/who_is_wrong/settings.hpp"
+
+namespace tutti::estimation {
+
+/// Size of a failure in metres: 0.2 rad count as one.
+inline double failure_size(double translation_m, double rotation_rad) { return translation_m + 5.0 * rotation_rad; }
+
+/// Odometry between two nodes of one piece that is not to be believed.
+struct FailedStretch {
+  std::size_t from = 0;
+  std::size_t to = 0;
+  Vector6d missed = Vector6d::Zero();  ///< local(odometry, what the closures say), where the stretch was let go.
+};
+
+/// The size of a failure as seen from a node of its stretch: a wrong turn shifts more the farther away it was.
+double failure_size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node);
+
+struct Explanation {
+  std::vector<bool> accepted;         ///< Per closure.
+  std::vector<FailedStretch> failed;  ///< By `from`; none overlap.
+  bool solved = false;                ///< Otherwise nothing is accepted.
+};
+
+/// Decides between closures and odometry that contradict each other (docs/math.md, "Who is wrong?"). A hypothesis says
+/// which runs of odometry (between two ends of closures) may be let go and which closures are wrong for certain; its
+/// misfit is that of the pose graph solved under it by graduated non-convexity, every closure truncated and the
+/// closures at one place sharing one vote, plus what its failed stretches must pay (settings.hpp). The hypothesis with
+/// the least misfit counts. Tried are: nothing failed; what fails when all odometry may, less whatever does not pay for
+/// itself; and the largest `groups` of closures (positions in `closures`) as wrong all together.
+/// `graph`: odometry, then closures. Does not depend on the order of the closures, but for rounding.
+Explanation explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
+                             std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,
+                             const GncConfig& gnc);
+
+}  // namespace tutti::estimation

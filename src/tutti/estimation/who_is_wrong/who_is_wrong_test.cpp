@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "tutti/base/random.hpp"
+#include "tutti/estimation/who_is_wrong/closure_support.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::estimation {
+namespace {
+
+constexpr std::size_t kLap = 100, kNodes = 2 * kLap + 1;
+constexpr double kStep_m = 2.0;
+
+Matrix6d information(double sigma_m, double sigma_rad) {
+  Vector6d v;
+  v << Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m)), Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad));
+  return v.asDiagonal();
+}
+
+Vector6d noise(Rng& rng, double sigma_m, double sigma_rad) {
+  Vector6d out;
+  for (int i = 0; i < 6; ++i) out(i) = rng.normal(i < 3 ? sigma_m : sigma_rad);
+  return out;
+}
+
+/// Two laps round a circle of 200 m, with a closure at every `every`-th node of the second one.
+struct Laps {
+  Rng rng{7};
+  std::vector<Pose3> truth{Pose3{}};
+  PoseGraph graph{.poses = {Pose3{}}, .edges = {}};
+  std::size_t odometry_edges = kNodes - 1;
+
+  /// What odometry misses at the step from node `failed_at` (radians of yaw).
+  explicit Laps(std::size_t failed_at = 0, double missed_rad = 0.0) {
+    const Pose3 step{so3_exp({0.0, 0.0, 2.0 * M_PI / kLap}), {kStep_m, 0.0, 0.0}};
+    for (std::size_t k = 0; k + 1 < kNodes; ++k) {
+      truth.push_back(truth.back() * step);
+      Pose3 measured = retract(step, noise(rng, 0.01, 0.001));
+      if (k == failed_at) measured = measured * Pose3{so3_exp({0.0, 0.0, missed_rad}), {}};
+      graph.poses.push_back(graph.poses.back() * measured);
+      graph.edges.push_back({k, k + 1, measured, information(0.01, 0.001)});
+    }
+  }
+  void close(std::size_t from, std::size_t to, const Pose3& wrong_by = {}) {
+    const Pose3 T = retract(truth[from].inverse() * truth[to] * wrong_by, noise(rng, 0.03, 0.005));
+    graph.edges.push_back({from, to, T, information(0.03, 0.005)});
+  }
+  void close_laps(std::size_t every) {
+    for (std::size_t k = 1; k < kLap; k += every) close(k, k + kLap);
+  }
+  [[nodiscard]] OdometryWays ways() const { return {kNodes, std::span(graph.edges).first(odometry_edges)}; }
+  [[nodiscard]] Explanation explain(const std::vector<std::vector<std::size_t>>& groups = {},
+                                    const WhoIsWrongConfig& config = {}) const {
+    return explain_closures(graph, ways(), odometry_edges, groups, config, {});
+  }
+};
+
+Pose3 off(Rng& rng) { return retract(Pose3{}, noise(rng, 5.0, 0.5)); }
+
+TEST(OdometryWays, KnowsThePiecesAndWhatLiesBetween) {
+  Laps laps;
+  laps.graph.edges.erase(laps.graph.edges.begin() + 60);  // a gap after node 60
+  const OdometryWays ways(kNodes, laps.graph.edges);
+  EXPECT_EQ(ways.piece(60), 0U);
+  EXPECT_EQ(ways.piece(200), 61U);
+  EXPECT_NEAR(ways.way_m(30), 30 * kStep_m, 0.5);
+  RelativePose sum{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  for (std::size_t e = 10; e < 14; ++e)
+    sum = compound(sum, {laps.graph.edges[e].T_from_to, laps.graph.edges[e].information.inverse()});
+  const RelativePose forth = ways.between(10, 14), back = ways.between(14, 10);
+  EXPECT_LT(local(sum.T_a_b, forth.T_a_b).norm(), 1e-9);
+  EXPECT_LT((sum.covariance - forth.covariance).norm(), 1e-9);
+  EXPECT_LT((inverse(forth).covariance - back.covariance).norm(), 1e-9);
+  EXPECT_NEAR(ways.turn_variance(10, 14), 4 * 3 * 1e-6, 1e-9);
+}
+
+TEST(ClosureSupport, RightClosuresHaveItAndWrongOnesDoNot) {
+  Laps laps(40, 0.3);  // nor does odometry speak for the right ones
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 20; ++k) laps.close(k, k + 120, off(laps.rng));
+  const auto supported = supported_closures(laps.ways(), std::span(laps.graph.edges).subspan(laps.odometry_edges), {});
+  EXPECT_EQ(std::count(supported.begin(), supported.begin() + 20, true), 20);
+  EXPECT_LE(std::count(supported.begin() + 20, supported.end(), true), 1);
+}
+
+TEST(WhoIsWrong, WrongClosuresAreWrongAndHonestOdometryIsNot) {
+  Laps laps;
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 20; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Explanation found = laps.explain();
+  EXPECT_TRUE(found.solved);
+  EXPECT_EQ(std::count(found.accepted.begin(), found.accepted.begin() + 20, true), 20);
+  EXPECT_EQ(std::count(found.accepted.begin() + 20, found.accepted.end(), true), 0);
+  EXPECT_TRUE(found.failed.empty());
+}
+
+TEST(WhoIsWrong, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
+  Laps lone;
+  lone.close(20, 120, Pose3{so3_exp({0.0, 0.0, 0.3}), {}});
+  EXPECT_FALSE(lone.explain().accepted[0]);
+  EXPECT_TRUE(lone.explain().failed.empty());
+
+  Laps laps(130, 0.3);
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Explanation found = laps.explain();
+  ASSERT_EQ(found.failed.size(), 1U);
+  EXPECT_LE(found.failed[0].from, 130U);
+  EXPECT_GE(found.failed[0].to, 131U);
+  EXPECT_LE(found.failed[0].to - found.failed[0].from, 10U);
+  EXPECT_NEAR(found.failed[0].missed.tail<3>().norm(), 0.3, 0.02);
+  EXPECT_GE(std::count(found.accepted.begin(), found.accepted.begin() + 20, true), 19);
+  EXPECT_EQ(std::count(found.accepted.begin() + 20, found.accepted.end(), true), 0);
+  EXPECT_TRUE(laps.explain({}, {.let_odometry_fail = false}).failed.empty());
+}
+
+TEST(WhoIsWrong, PlacesThatLookAlikeBlameNothing) {
+  Laps laps;
+  laps.close_laps(10);
+  const std::size_t right = laps.graph.edges.size() - laps.odometry_edges;
+  const Pose3 alike{so3_exp({0.0, 0.0, 0.5}), {6.0, 4.0, 0.0}};
+  const Pose3 T_moved = laps.truth[30] * alike * laps.truth[150].inverse();
+  std::vector<std::size_t> group;
+  for (std::size_t i = 30; i < 38; i += 2)
+    for (std::size_t j = 150; j < 158; j += 2) {
+      group.push_back(laps.graph.edges.size() - laps.odometry_edges);
+      laps.graph.edges.push_back({i, j, laps.truth[i].inverse() * T_moved * laps.truth[j], information(0.03, 0.005)});
+    }
+  const Explanation found = laps.explain({group});
+  EXPECT_TRUE(found.failed.empty());
+  for (std::size_t c = 0; c < found.accepted.size(); ++c) EXPECT_EQ(found.accepted[c], c < right) << c;
+}
+
+TEST(WhoIsWrong, DoesNotDependOnTheOrderOfTheClosures) {
+  Laps laps(130, 0.3);
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Explanation forth = laps.explain();
+  std::reverse(laps.graph.edges.begin() + static_cast<std::ptrdiff_t>(laps.odometry_edges), laps.graph.edges.end());
+  Explanation back = laps.explain();
+  std::reverse(back.accepted.begin(), back.accepted.end());
+  EXPECT_EQ(forth.accepted, back.accepted);
+  ASSERT_EQ(forth.failed.size(), back.failed.size());
+  EXPECT_EQ(forth.failed[0].from, back.failed[0].from);
+  EXPECT_EQ(forth.failed[0].to, back.failed[0].to);
+}
+
+}  // namespace
+}  // namespace tutti::estimation
