@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
 
 #include "tutti/wire/codec.hpp"
 
@@ -22,6 +25,35 @@ std::string why_odometry_alone(const std::vector<RejectionRecord>& rejections) {
   const RejectionRecord& most = *std::ranges::max_element(rejections, {}, pairs);
   return fmt::format("all {} pairs of submaps that were compared were refused, {} because: {}", refused,
                      pairs(most) == refused ? "all" : std::to_string(pairs(most)), to_string(most.nearest));
+}
+
+/// Of closures between two robots, or of one with itself, this share and this many are more than wrong ones would be.
+constexpr double kManyInconsistent = 0.4;
+constexpr std::size_t kEnoughInconsistent = 8;
+
+void note_inconsistent_closures(const server::MapEstimate& map, MissionRecord& record) {
+  struct Count {
+    std::size_t refused = 0, all = 0;
+  };
+  std::map<std::pair<RobotId, RobotId>, Count> between;
+  for (const auto& [closure, accepted] : map.closures) {
+    Count& count = between[std::minmax({closure.from.chain.robot, closure.to.chain.robot})];
+    ++count.all;
+    if (!accepted) ++count.refused;
+  }
+  for (const auto& [robots, count] : between) {
+    if (count.refused < kEnoughInconsistent ||
+        static_cast<double>(count.refused) < kManyInconsistent * static_cast<double>(count.all))
+      continue;
+    const std::string& one = record.robots[robots.first.value].name;
+    record.notes.push_back(fmt::format(
+        "{}: {} of {} closures contradict the map and are not in it; so many are seldom all wrong: odometry may be "
+        "worse "
+        "than its covariance says, or have failed where nothing tells",
+        robots.first == robots.second ? one + " with itself"
+                                      : fmt::format("{} with {}", one, record.robots[robots.second.value].name),
+        count.refused, count.all));
+  }
 }
 
 }  // namespace
@@ -63,6 +95,12 @@ void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& reco
         "solved; the first is {} of {}",
         map.left_out.size(), first.index, record.robots[first.chain.robot.value].name));
   }
+  for (const auto& [chain, factor] : map.understated)
+    record.notes.push_back(
+        fmt::format("{}: its odometry errs {:.1f} times as much as its covariance says, by the loops it makes; the map "
+                    "counts it so",
+                    record.robots[chain.robot.value].name, std::sqrt(factor)));
+  note_inconsistent_closures(map, record);
   if (map.spare_pairs > 0)
     record.notes.push_back(
         fmt::format("{} pairs of submaps have closures that the map does not need and that were not judged "

@@ -62,5 +62,31 @@ TEST(Warnings, RobotsThatAreNotInTheMap) {
   EXPECT_EQ(warnings_of(record).at(0), "alpha: none of its submaps reached the server");
 }
 
+TEST(Notes, ManyClosuresThatContradictTheMap) {
+  const auto notes = [](std::size_t accepted, std::size_t refused) {
+    MissionRecord record = joined();
+    record.notes.clear();
+    server::MapEstimate map;
+    for (std::size_t k = 0; k < accepted + refused; ++k)
+      map.closures.push_back({{{RobotId{1}, 3}, {RobotId{0}, 7}, {}}, k < accepted});
+    note_what_the_map_lacks(map, record);
+    return record.notes;
+  };
+  EXPECT_TRUE(notes(70, 30).empty());  // as many as wrong ones may be
+  EXPECT_TRUE(notes(0, 5).empty());    // too few to tell
+  ASSERT_EQ(notes(10, 20).size(), 1U);
+  EXPECT_NE(notes(10, 20).at(0).find("alpha with bravo: 20 of 30 closures contradict the map"), std::string::npos);
+}
+
+TEST(Notes, OdometryThatSaysTooLittleOfItsErrors) {
+  MissionRecord record = joined();
+  record.notes.clear();
+  server::MapEstimate map;
+  map.understated[{RobotId{1}}] = 36.0;
+  note_what_the_map_lacks(map, record);
+  ASSERT_EQ(record.notes.size(), 1U);
+  EXPECT_NE(record.notes[0].find("bravo: its odometry errs 6.0 times"), std::string::npos) << record.notes[0];
+}
+
 }  // namespace
 }  // namespace tutti::mission
