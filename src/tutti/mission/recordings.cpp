@@ -99,9 +99,9 @@ Result<MissionInput> simulate(const MissionConfig& config, std::uint64_t seed) {
   auto world = simulation::simulate_recordings(config.simulation, Timestamp{0}, seed);
   if (!world) return tl::unexpected(world.error());
   MissionInput input;
+  const auto robots = simulation::single_robots(config.simulation.robots);
   for (std::size_t i = 0; i < world->recordings.size(); ++i)
-    input.robots.push_back(
-        {.recording = std::move(world->recordings[i]), .start_s = config.simulation.robots[i].start_s});
+    input.robots.push_back({.recording = std::move(world->recordings[i]), .start_s = robots[i].start_s});
   if (world->surface)
     input.survey = std::make_shared<const PointCloud>(
         simulation::sample_surface(*world->surface, kSurveySpacing_m, Rng(seed).fork("survey")));

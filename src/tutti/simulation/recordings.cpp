@@ -53,7 +53,20 @@ TriangleMesh world_mesh(const SimulationConfig& config, std::uint64_t seed) {
   return world_surface(make_world(config.world, rng.fork("world")), config.surface, rng.fork("surface"));
 }
 
-Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed) {
+std::vector<SimulatedRobotConfig> single_robots(const std::vector<SimulatedRobotConfig>& robots) {
+  std::vector<SimulatedRobotConfig> out;
+  for (const SimulatedRobotConfig& robot : robots)
+    for (int k = 1; k <= robot.copies; ++k) {
+      out.push_back(robot);
+      out.back().copies = 1;
+      if (robot.copies > 1 && !robot.name.empty()) out.back().name += std::to_string(k);
+    }
+  return out;
+}
+
+Result<SimulatedWorld> simulate_recordings(const SimulationConfig& fleet, Timestamp start, std::uint64_t seed) {
+  SimulationConfig config = fleet;
+  config.robots = single_robots(fleet.robots);
   const Rng rng(seed);
   SimulatedWorld world{.network = make_world(config.world, rng.fork("world")), .recordings = {}, .surface = {}};
   if (auto ok = check_world(world.network, config.world); !ok) return tl::unexpected(ok.error());

@@ -22,6 +22,7 @@ namespace tutti::simulation {
 
 struct SimulatedRobotConfig {
   std::string name;  ///< Empty: "alpha", "bravo", ... by place in the list.
+  int copies = 1;
   double start_s = 0.0;
   std::optional<int> start_junction;
   WalkConfig walk;
@@ -29,6 +30,8 @@ struct SimulatedRobotConfig {
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name; empty: alpha, bravo, ... by place in the list.");
+    v.field("copies", copies, between(1, 100),
+            "As many robots as this, alike but for what is drawn: start, walk, errors; of a name: it and a number.");
     v.field("start_s", start_s, between(0.0, kLongest_s), "Mission time at which it starts to walk.");
     v.field("start_junction", start_junction, at_least(0.0), "Where it starts; none: far from the others.");
     v.field("walk", walk, any(), "How it walks.");
@@ -52,10 +55,13 @@ struct SimulationConfig {
   }
 };
 
+/// Every robot by itself, copies one after the other.
+std::vector<SimulatedRobotConfig> single_robots(const std::vector<SimulatedRobotConfig>& robots);
+
 /// What a simulated mission replays, and the world it took place in.
 struct SimulatedWorld {
   CorridorWorld network;
-  std::vector<Recording> recordings;            ///< Robots 0, 1, ... in the order of the configuration.
+  std::vector<Recording> recordings;            ///< Robots 0, 1, ... in the order of single_robots().
   std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would find; null without sensors.
 };
 

@@ -35,6 +35,24 @@ TEST(SimulateRecordings, EveryRobotIsItsOwnAndDependsOnlyOnTheSeed) {
   }
 }
 
+TEST(SimulateRecordings, CopiesAreRobotsOfTheirOwn) {
+  SimulationConfig config = short_walks(1);
+  config.robots.front().copies = 3;
+  config.robots.push_back({.name = "dog", .copies = 2, .start_s = 5.0, .walk = {.duration_s = 20.0}});
+  const auto fleet = simulate_recordings(config, {1000}, 9);
+  ASSERT_TRUE(fleet.has_value());
+  std::vector<std::string> names;
+  for (const Recording& recording : fleet->recordings) names.push_back(recording.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"alpha", "bravo", "charlie", "dog1", "dog2"}));
+  const auto three = simulate_recordings(short_walks(3), {1000}, 9);  // the same as written out
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(fleet->recordings[i].odometry, three->recordings[i].odometry);
+  EXPECT_NE(fleet->recordings[3].reference, fleet->recordings[4].reference);
+  EXPECT_EQ(fleet->recordings[4].reference.front().stamp, Timestamp{1000} + 5.0);
+  config.robots.back().name = "alpha";
+  config.robots.back().copies = 1;
+  EXPECT_EQ(problem_with(config), "simulation.robots.3: name 'alpha' is taken");
+}
+
 TEST(SimulateRecordings, StartsWhereAndWhenItIsTold) {
   SimulationConfig config = short_walks(2);
   config.robots[1].start_s = 12.5;
