@@ -262,6 +262,38 @@ TEST_F(Revision, AWrongClosureStandsForMinutesAndIsGone) {
   EXPECT_LT(*after.robots[1].server.max_error_m, 0.3);
 }
 
+TEST_F(Revision, TheRecordFollowsClosuresAndErrorsOverTime) {
+  MissionConfig config = scenario("revision", {"server.update_period_s=60", "duration_s=900"});
+  config.compare_policies = {"none"};
+  const MissionRecord record = run(config);
+  for (const MapUpdateRecord& update : record.server.updates) {
+    if (update.closures == 0) continue;
+    const std::size_t wrong = update.time_s > 561.0 && update.time_s < 721.0 ? 1 : 0;  // the planted one, of 560 s
+    EXPECT_EQ(update.wrong, std::optional(wrong)) << update.time_s;
+  }
+  EXPECT_EQ(record.server.updates.back().wrong, std::optional<std::size_t>(0));
+  for (const RobotRecord& robot : record.robots) {
+    ASSERT_FALSE(robot.updates.empty());
+    for (const UpdateRecord& update : robot.updates) {
+      ASSERT_EQ(update.answers.size(), 2U);
+      for (const AnswerRecord& answer : update.answers) {
+        EXPECT_EQ(answer.constraints, answer.policy == "none" ? 0U : update.constraints_total);
+        if (answer.constraints == 0) {
+          EXPECT_NEAR(*answer.rmse_m, *update.onboard_rmse_m, 1e-6);
+        }
+      }
+    }
+    // The last one is of nearly the whole way, and the report's own figures are of all of it.
+    const UpdateRecord& last = robot.updates.back();
+    EXPECT_NEAR(*last.onboard_rmse_m, *robot.onboard.rmse_m, 0.15 * *robot.onboard.rmse_m) << robot.name;
+    EXPECT_NEAR(*last.server_rmse_m, *robot.server.rmse_m, 0.15 * *robot.server.rmse_m) << robot.name;
+    for (const AnswerRecord& answer : last.answers) {
+      const double rmse_m = *find_policy(robot, answer.policy)->accuracy.rmse_m;
+      EXPECT_NEAR(*answer.rmse_m, rmse_m, 0.15 * rmse_m) << robot.name << ' ' << answer.policy;
+    }
+  }
+}
+
 TEST(Scenarios, LateJoinsLoseContactAndReturn) {
   const MissionConfig config = scenario("late", {"server.update_period_s=30", "agent.submap.duration_s=20"});
   const MissionRecord record = run(config);

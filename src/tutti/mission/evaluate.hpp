@@ -35,6 +35,10 @@ struct RobotOutcome {
 /// Robots whose reference is not for scoring get no accuracy.
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
                      const evaluation::AssociationConfig& association, MissionRecord& record);
+/// Accepted closures against the reference poses of their ends; nothing where none can be checked.
+std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
+                                                 const std::vector<const MissionRecording*>& robots,
+                                                 const evaluation::AssociationConfig& association);
 /// Calls evaluate_map() at the end.
 void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
                      const evaluation::AssociationConfig& association, MissionRecord& record);

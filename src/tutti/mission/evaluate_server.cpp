@@ -64,35 +64,23 @@ void name_failures(const server::MapEstimate& map, ServerRecord& out) {
                                    .error_rad = failed.jump_rad});
 }
 
-/// How far accepted closures are from the reference, where there is one.
-void check_closures(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
-                    const evaluation::AssociationConfig& association, MissionRecord& record) {
-  std::map<KeyframeId, Pose3> truth;
-  for (const RobotOutcome& robot : robots) {
-    const RobotId id = robot.recording->recording.robot;
-    std::map<Timestamp, KeyframeId> by_stamp;
-    Trajectory estimate;
-    for (const server::MapNode& node : server.map().nodes)
-      if (node.id.chain.robot == id) {
-        by_stamp[node.stamp] = node.id;
-        estimate.push_back({node.stamp, node.T_world_body});
-      }
-    for (const auto& pair : evaluation::associate(estimate, robot.recording->recording.reference, association))
-      truth[by_stamp.at(pair.stamp)] = pair.reference;
+/// Reference poses of the keyframes at which accepted closures end.
+std::map<KeyframeId, Pose3> true_ends(const server::MapEstimate& map,
+                                      const std::vector<const MissionRecording*>& robots,
+                                      const evaluation::AssociationConfig& association) {
+  std::map<RobotId, std::map<Timestamp, KeyframeId>> ends;
+  for (const server::JudgedClosure& judged : map.closures)
+    if (judged.accepted)
+      for (const KeyframeId& id : {judged.closure.from, judged.closure.to})
+        ends[id.chain.robot][std::ranges::lower_bound(map.nodes, id, {}, &server::MapNode::id)->stamp] = id;
+  std::map<KeyframeId, Pose3> out;
+  for (const MissionRecording* robot : robots) {
+    Trajectory moments;
+    for (const auto& [stamp, id] : ends[robot->recording.robot]) moments.push_back({stamp, {}});
+    for (const auto& pair : evaluation::associate(moments, robot->recording.reference, association))
+      out[ends[robot->recording.robot].at(pair.stamp)] = pair.reference;
   }
-  for (const server::JudgedClosure& judged : server.map().closures) {
-    if (!judged.accepted) continue;
-    const auto from = truth.find(judged.closure.from);
-    const auto to = truth.find(judged.closure.to);
-    if (from == truth.end() || to == truth.end()) continue;
-    const Vector6d error = local(from->second.inverse() * to->second, judged.closure.measurement.T_a_b);
-    auto& check = record.server.closure_check;
-    if (!check) check.emplace();
-    ++check->checked;
-    if (error.head<3>().norm() > 0.5 || error.tail<3>().norm() > 2.0 * kRadPerDeg) ++check->wrong;
-    check->max_error_m = std::max(check->max_error_m, error.head<3>().norm());
-    check->max_error_deg = std::max(check->max_error_deg, error.tail<3>().norm() / kRadPerDeg);
-  }
+  return out;
 }
 
 /// T_odom-of-robot <- world, from the server's and the raw poses of the robot's keyframes: the rigid motion that fits
@@ -137,13 +125,35 @@ void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEst
 
 }  // namespace
 
+std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
+                                                 const std::vector<const MissionRecording*>& robots,
+                                                 const evaluation::AssociationConfig& association) {
+  const std::map<KeyframeId, Pose3> truth = true_ends(map, robots, association);
+  std::optional<ClosureCheckRecord> check;
+  for (const server::JudgedClosure& judged : map.closures) {
+    if (!judged.accepted) continue;
+    const auto from = truth.find(judged.closure.from);
+    const auto to = truth.find(judged.closure.to);
+    if (from == truth.end() || to == truth.end()) continue;
+    const Vector6d error = local(from->second.inverse() * to->second, judged.closure.measurement.T_a_b);
+    if (!check) check.emplace();
+    ++check->checked;
+    if (error.head<3>().norm() > 0.5 || error.tail<3>().norm() > 2.0 * kRadPerDeg) ++check->wrong;
+    check->max_error_m = std::max(check->max_error_m, error.head<3>().norm());
+    check->max_error_deg = std::max(check->max_error_deg, error.tail<3>().norm() / kRadPerDeg);
+  }
+  return check;
+}
+
 void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
                      const evaluation::AssociationConfig& association, MissionRecord& record) {
   const server::MapComponents components = server::choose_components(server.map());
   measure_joint_map(robots, server.map(), components, association, record);
   judge_closures(server, record);
   name_failures(server.map(), record.server);
-  check_closures(robots, server, association, record);
+  std::vector<const MissionRecording*> recordings;
+  for (const RobotOutcome& robot : robots) recordings.push_back(robot.recording);
+  record.server.closure_check = check_closures(server.map(), recordings, association);
   record.server.graph = server.map().graph;
   for (const server::MapNode& node : server.map().nodes) record.server.nodes.push_back({node.id, node.stamp});
   relate_robots(robots, server.map(), components.of_robot, record);

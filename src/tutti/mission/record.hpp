@@ -61,10 +61,21 @@ struct PolicyRecord {
   std::vector<ConstraintRecord> constraints;
 };
 
+/// What one policy made of one broadcast.
+struct AnswerRecord {
+  std::string policy;
+  std::size_t constraints = 0;   ///< Held after it.
+  std::optional<double> rmse_m;  ///< Of the corrected estimate, as UpdateRecord::onboard_rmse_m.
+};
+
 /// One answer of a robot to one broadcast (default policy).
 struct UpdateRecord {
   double time_s = 0.0;  ///< Mission time.
   std::uint64_t revision = 0;
+  /// ATE of raw odometry and of the broadcast at the robot's nodes in it, each after a rigid alignment of its own.
+  std::optional<double> onboard_rmse_m;
+  std::optional<double> server_rmse_m;
+  std::vector<AnswerRecord> answers;                  ///< Of every policy.
   std::vector<consistency::SuspectedOrigin> origins;  ///< Where the raw odometry was then thought to part from the map.
 };
 
@@ -182,7 +193,15 @@ struct FailedOdometryRecord {
   double error_rad = 0.0;
 };
 
+/// One update of the map.
+struct MapUpdateRecord {
+  double time_s = 0.0;               ///< Mission time.
+  std::size_t closures = 0;          ///< Accepted.
+  std::optional<std::size_t> wrong;  ///< Of these, as ClosureCheckRecord; nothing where none can be checked.
+};
+
 struct ServerRecord {
+  std::vector<MapUpdateRecord> updates;
   std::size_t components = 0;               ///< Groups of robots that share a frame.
   std::vector<ClosureRecord> closures;      ///< Accepted.
   std::vector<RejectionRecord> rejections;  ///< By reason.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/evaluation/agreement.hpp"
 #include "tutti/mission/load_meter.hpp"
 
 namespace tutti::mission {
@@ -18,8 +19,9 @@ constexpr const char* kBudgetPolicy = "spectral";
 }  // namespace
 
 RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-                       const std::vector<std::string>& policies, Rng rng)
-    : recording_(recording) {
+                       const std::vector<std::string>& policies, const evaluation::AssociationConfig& association,
+                       Rng rng)
+    : recording_(recording), association_(association) {
   std::vector<std::string> ordered = policies;
   std::stable_partition(ordered.begin(), ordered.end(), [](const std::string& p) { return p == kBudgetPolicy; });
   for (const std::string& policy : ordered) {
@@ -75,10 +77,30 @@ void RobotActor::feed_scan(std::size_t sample) {
 
 void RobotActor::receive(const ProxyGraphMessage& message, double time_s) {
   std::optional<std::size_t> budget;
+  const std::size_t updates = updates_.size();
   for (Member& member : members_) {
     update(member, message, member.agent.policy().needs_budget() ? budget : std::nullopt, time_s);
     if (member.policy == kBudgetPolicy) budget = member.agent.ledger().size();
   }
+  if (updates_.size() > updates) score(trajectory_of(message.graph, default_agent().chain()), updates_.back());
+}
+
+void RobotActor::score(const Trajectory& map, UpdateRecord& update) const {
+  Trajectory truth;
+  if (recording_.score_against_reference)
+    for (const auto& pair : evaluation::associate(map, recording_.recording.reference, association_))
+      truth.push_back({pair.stamp, pair.reference});
+  const auto rmse = [&](const Trajectory& estimate) -> std::optional<double> {
+    const auto error = evaluation::agreement(estimate, truth);
+    return error ? std::optional(error->rmse_m) : std::nullopt;
+  };
+  Trajectory odometry;
+  for (const Keyframe& keyframe : members_[default_].agent.keyframes())
+    odometry.push_back({keyframe.stamp, keyframe.T_odom_body});
+  update.onboard_rmse_m = rmse(odometry);
+  update.server_rmse_m = rmse(map);
+  for (const Member& member : members_)
+    update.answers.push_back({member.policy, member.agent.ledger().size(), rmse(member.agent.corrected())});
 }
 
 void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::optional<std::size_t> budget,

@@ -21,7 +21,7 @@ class RobotActor {
  public:
   /// `policies`: all that run, the default one (config.policy.name) among them.
   RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-             const std::vector<std::string>& policies, Rng rng);
+             const std::vector<std::string>& policies, const evaluation::AssociationConfig& association, Rng rng);
 
   /// Mission time of the next sample; infinity when there is none left.
   [[nodiscard]] double next_time() const;
@@ -62,10 +62,13 @@ class RobotActor {
 
   robot::RobotAgent& default_agent() { return members_[default_].agent; }
   void update(Member& member, const ProxyGraphMessage& message, std::optional<std::size_t> budget, double time_s);
+  /// How far every estimate is from the reference at the nodes of the broadcast.
+  void score(const Trajectory& map, UpdateRecord& update) const;
   void feed_scan(std::size_t sample);
   static void note(Trouble& trouble, const std::string& message);
 
   const MissionRecording& recording_;
+  const evaluation::AssociationConfig& association_;
   std::vector<Member> members_;  // `spectral` first, if it is there: it sets the budget
   std::size_t default_ = 0;
   std::size_t next_ = 0;

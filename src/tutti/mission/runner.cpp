@@ -75,7 +75,7 @@ class MissionRun {
         if (recording.recording.name == own.robot) bus_.set_link(recording.recording.robot, own.link);
     const Rng rng(options.seed);
     for (const MissionRecording& recording : recordings_) {
-      robots_.push_back(std::make_unique<RobotActor>(recording, config.agent, policies,
+      robots_.push_back(std::make_unique<RobotActor>(recording, config.agent, policies, config.association,
                                                      rng.fork("agent/" + recording.recording.name)));
       bus_.subscribe(bus::Endpoint::of(recording.recording.robot), wire::MessageKind::proxy_graph);
       const Trajectory& odometry = recording.recording.odometry;
@@ -221,11 +221,19 @@ class MissionRun {
       proxy_graph_ = message.graph;
       bus_.publish(kMissionStart + time_s_, bus::Endpoint::server(), std::nullopt, wire::MessageKind::proxy_graph,
                    wire::encode(message));
+      note_update();
       server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
     }
     if (options_.progress)
       options_.progress(
           {time_s_, duration_s_, server_.state().submaps.size(), accepted_closures(), server_.map().components});
+  }
+
+  void note_update() {
+    std::vector<const MissionRecording*> recordings;
+    for (const MissionRecording& recording : recordings_) recordings.push_back(&recording);
+    const auto check = check_closures(server_.map(), recordings, config_.association);
+    map_updates_.push_back({time_s_, accepted_closures(), check ? std::optional(check->wrong) : std::nullopt});
   }
 
   [[nodiscard]] std::size_t accepted_closures() const {
@@ -259,6 +267,7 @@ class MissionRun {
   double time_s_ = 0.0;
   double duration_s_ = 0.0;
   ProxyGraph proxy_graph_;  // the last broadcast
+  std::vector<MapUpdateRecord> map_updates_;
   std::vector<std::string> refusals_;
   std::set<SubmapPair> unreadable_;  // pairs that had an error instead of a verdict
   TimingRecord timing_;
@@ -338,6 +347,7 @@ MissionRecord MissionRun::record() const {
   note_what_the_map_lacks(server_.map(), record);
   evaluate_server(outcomes, server_, config_.association, record);
   record.server.proxy = proxy_graph_;
+  record.server.updates = map_updates_;
   for (RobotRecord& robot : record.robots) {
     record_traffic(robot);
     robot.updates = robots_[robot.id.value]->updates();

@@ -124,6 +124,22 @@ Json alerts_json(const RobotRecord& robot) {
   return out;
 }
 
+/// Broadcast by broadcast: every estimate's error so far.
+Json course_json(const RobotRecord& robot) {
+  Json out = Json::array();
+  for (const UpdateRecord& update : robot.updates) {
+    Json policies = Json::object();
+    for (const AnswerRecord& answer : update.answers)
+      policies[answer.policy] = {{"rmse_m", number(answer.rmse_m)}, {"constraints", answer.constraints}};
+    out.push_back({{"time_s", number(update.time_s)},
+                   {"broadcast", update.revision},
+                   {"onboard_rmse_m", number(update.onboard_rmse_m)},
+                   {"server_rmse_m", number(update.server_rmse_m)},
+                   {"policies", std::move(policies)}});
+  }
+  return out;
+}
+
 Json traffic_json(const std::vector<TrafficRecord>& traffic) {
   Json rows = Json::array();
   for (const auto& row : traffic)
@@ -167,7 +183,8 @@ Json robot_json(const RobotRecord& robot, bool tied) {
               {"messages_down", robot.messages_down},
               {"traffic", traffic_json(robot.traffic)},
               {"proxy_nodes", robot.proxy_nodes},
-              {"updates", robot.updates.size()}});
+              {"updates", robot.updates.size()},
+              {"course", course_json(robot)}});
   return out;
 }
 
@@ -197,6 +214,11 @@ Json server_json(const MissionRecord& record) {
         failed.push_back(stretch_json(
             robot, stretch,
             {{"robot", robot.name}, {"error_m", number(stretch.error_m)}, {"error_rad", number(stretch.error_rad)}}));
+  Json course = Json::array();
+  for (const MapUpdateRecord& update : server.updates)
+    course.push_back({{"time_s", number(update.time_s)},
+                      {"closures_accepted", update.closures},
+                      {"closures_wrong", update.wrong ? Json(*update.wrong) : Json(nullptr)}});
   Json out{{"components", server.components},
            {"closures_accepted", counts.accepted()},
            {"closures_accepted_intra", counts.accepted_intra},
@@ -210,7 +232,8 @@ Json server_json(const MissionRecord& record) {
            {"T_reference_world", server.T_reference_world ? pose_json(*server.T_reference_world) : Json(nullptr)},
            {"map_error", map_error_json(server.map_error)},
            {"survey_covered", number(server.survey_covered)},
-           {"failed_odometry", std::move(failed)}};
+           {"failed_odometry", std::move(failed)},
+           {"course", std::move(course)}};
   add_scored(out, "", server.joint.scored_share);
   return out;
 }

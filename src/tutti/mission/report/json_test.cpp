@@ -69,6 +69,31 @@ TEST(ReportJson, CarriesTheRecordsFigures) {
       report["server"]["closures_accepted"].get<int>());
 }
 
+TEST(ReportJson, FollowsErrorsFromBroadcastToBroadcast) {
+  MissionRecord record = test::example_record();
+  record.server.updates = {{.time_s = 20.0, .closures = 3, .wrong = 1}, {.time_s = 40.0, .closures = 4, .wrong = {}}};
+  record.robots[1].updates = {{.time_s = 21.0, .revision = 1},
+                              {.time_s = 41.0,
+                               .revision = 2,
+                               .onboard_rmse_m = 0.5,
+                               .server_rmse_m = 0.25,
+                               .answers = {{"spectral", 7, 0.375}, {"none", 0, {}}}}};
+  const json report = json::parse(report_json(record));
+  const json& course = report["robots"][1]["course"];
+  ASSERT_EQ(course.size(), 2U);
+  EXPECT_TRUE(course[0]["onboard_rmse_m"].is_null());
+  EXPECT_EQ(course[1], (json{{"time_s", 41.0},
+                             {"broadcast", 2},
+                             {"onboard_rmse_m", 0.5},
+                             {"server_rmse_m", 0.25},
+                             {"policies",
+                              {{"spectral", {{"rmse_m", 0.375}, {"constraints", 7}}},
+                               {"none", {{"rmse_m", nullptr}, {"constraints", 0}}}}}}));
+  EXPECT_EQ(report["server"]["course"],
+            (json{{{"time_s", 20.0}, {"closures_accepted", 3}, {"closures_wrong", 1}},
+                  {{"time_s", 40.0}, {"closures_accepted", 4}, {"closures_wrong", nullptr}}}));
+}
+
 TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
   MissionRecord record = test::example_record();
   record.robots[1].start_s = 300.0;
