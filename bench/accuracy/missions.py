@@ -10,7 +10,7 @@ import argparse
 
 from runs import SOURCE, compare, mission_file, report_of, row, write_results
 
-COMPETITORS = ["every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"]
+COMPETITORS = ["every_node", "every_node_2", "spectral", "uniform", "random", "skeleton"]
 
 
 def metres(value):
@@ -49,9 +49,8 @@ def main():
         f"Seed {arguments.seed}; written by `bench/accuracy/missions.py TUTTI --data FOLDER`. RMSE in metres after one",
         "rigid alignment (SE(3), no scale) at keyframes, in brackets the constraints held at the end; * is the policy the",
         "robot follows. Where there is no reference, the figure is the RMSE to the server; a dash stands where the reference",
-        "covers less than 95 % of the way. Which part of the input is real is said in each line. `uniform`, `random` and `euclidean` have the budget of `spectral`. `tunnel` and `terrace` are in",
+        "covers less than 95 % of the way. Which part of the input is real is said in each line. `uniform` and `random` have the budget of `spectral`. `tunnel` and `terrace` are in",
         f"`paper.md`. Every run: `--set {compare(*COMPETITORS)}`.", "",
-        "Terms are not equal yet: competitors' links are five times softer than the default's (`docs/limits.md`).", "",
     ]
     options = ["--seed", arguments.seed, "--set", compare(*COMPETITORS)]
     text += section(report_of(arguments.tutti, "demo", *options))
