@@ -240,9 +240,7 @@ def document(runs):
              f"`--set {UPDATE_PERIOD} --set {SEEDS_SETS[0]} --set {SEEDS_SETS[1]}",
              f"--set {SEEDS_SETS[2]}`: median (least - largest).", ""]
     text += seeds_table(runs, range(1, 6))
-    text += ["", "`selection.md` (closed loop) has the same figures for tunnel, but others for terrace: there",
-             "`closures.reference.radius_m` is left at 4 m and the period at 10 s. It is the radius that counts: with 4 m",
-             "more submaps are near each other, so there are more closures."]
+    text += ["", "`selection.md` has the same figures for tunnel; there the map of terrace is updated every 10 s."]
     return text
 
 

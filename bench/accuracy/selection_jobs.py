@@ -13,14 +13,13 @@ from runs import SOURCE, compare, mission_file, without_partial
 
 DEFAULT, TOP, OLD = "adaptive", "spectral, `top`", "old default"
 COMPARED = ["none", "every_node", "every_node_2", "spectral", "uniform", "random", "skeleton"]
-TRAJECTORIES = ["simulation.sensors=none", "closures.finder=reference"]
+TRAJECTORIES = ["simulation.sensors=none", "closures.finder=reference", "closures.reference.radius_m=1.5"]
 FLEETS = {f"fleet_{n}": ["fleet", f"simulation.robots.0.copies={n}"] for n in (4, 8, 16)}
-ROOM = ["tunnel", *TRAJECTORIES, "closures.reference.radius_m=1.5", "simulation.world.featureless_share=0",
+ROOM = ["tunnel", *TRAJECTORIES, "simulation.world.featureless_share=0",
         "simulation.world.network={rows: 2, columns: 2, block_m: 8, jitter_m: 1}",
         *(f"simulation.robots.{k}.walk={{duration_s: 900, lookahead_m: 1.2}}" for k in (0, 1))]
 # What is run under a name of its own: the mission file, and what is set.
-VARIANTS = {**FLEETS, "room": ROOM, "terrace": ["terrace", *TRAJECTORIES],
-            **{name: [name, *TRAJECTORIES, "closures.reference.radius_m=1.5"] for name in ("tunnel", "demo")}}
+VARIANTS = {**FLEETS, "room": ROOM, **{name: [name, *TRAJECTORIES] for name in ("tunnel", "terrace", "demo")}}
 NEEDS_SCANS = ("hku_degraded", "hku_two_sessions")
 SHORT_S = 120
 MANY = {"agree": 100, "spin": 100, "height": 100, "revision": 20}
