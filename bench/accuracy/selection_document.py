@@ -109,6 +109,10 @@ def policy_table(lines):
                         spread([l["harm_m"] for l in own]), rpe("rpe_m"), rpe("rpe_10m_m"),
                         f"{worse('rpe_m')}, {worse('rpe_10m_m')}", number(median(l["links"] for l in held), 0),
                         f"{number(median(l['median_ms'] for l in own), 1)}, {number(largest(l['max_ms'] for l in own), 0)}"))
+    if harmed := [l for l in lines if l["policy"] == DEFAULT and l["harm_m"] is not None]:
+        worst = max(harmed, key=lambda l: l["harm_m"])
+        text += ["", f"The default's largest harm: {worst['harm_m']:.2f} m, {where(worst)}; over 1.5 times in "
+                 f"{sum(l['harm'] > 1.5 for l in harmed)} of {len(harmed)} robots."]
     return text + [""]
 
 
