@@ -66,16 +66,42 @@ double proximity_weight(double distance_m, double sigma_m) {
   return std::exp(-distance_m / (2.0 * sigma_m * sigma_m));  // eq. (1)
 }
 
+/// Of edges whose weight is their length: those among the `most` shortest of either end.
+void keep_nearest(std::size_t nodes, std::size_t most, EdgeList& edges) {
+  struct Neighbour {
+    double distance_m;
+    int node;
+    std::size_t edge;
+  };
+  std::vector<std::vector<Neighbour>> neighbours(nodes);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    neighbours[static_cast<std::size_t>(edges[e].a)].push_back({edges[e].weight, edges[e].b, e});
+    neighbours[static_cast<std::size_t>(edges[e].b)].push_back({edges[e].weight, edges[e].a, e});
+  }
+  std::vector<bool> kept(edges.size(), false);
+  for (auto& list : neighbours) {
+    if (list.size() > most)
+      std::nth_element(list.begin(), list.begin() + static_cast<std::ptrdiff_t>(most), list.end(),
+                       [](const Neighbour& a, const Neighbour& b) {
+                         return std::tie(a.distance_m, a.node) < std::tie(b.distance_m, b.node);
+                       });
+    for (std::size_t k = 0; k < std::min(most, list.size()); ++k) kept[list[k].edge] = true;
+  }
+  std::size_t next = 0;
+  std::erase_if(edges, [&](const WeightedEdge&) { return !kept[next++]; });
+}
+
 }  // namespace
 
-SparseMatrix proximity_adjacency(std::span<const Eigen::Vector3d> positions, double radius_m, double sigma_m) {
+SparseMatrix proximity_adjacency(std::span<const Eigen::Vector3d> positions, double radius_m, double sigma_m,
+                                 int most_neighbours) {
   TUTTI_CHECK(radius_m > 0.0 && sigma_m > 0.0, "radius {} m, sigma {} m", radius_m, sigma_m);
-  EdgeList edges;
+  EdgeList edges;  // weights are distances at first
   edges.reserve(positions.size() * 16);
-  for_each_close_pair(positions, radius_m, [&](int n, int m, double distance) {
-    const double weight = proximity_weight(distance, sigma_m);
-    if (weight > 0.0) edges.push_back({n, m, weight});
-  });
+  for_each_close_pair(positions, radius_m, [&](int n, int m, double distance) { edges.push_back({n, m, distance}); });
+  if (most_neighbours > 0) keep_nearest(positions.size(), static_cast<std::size_t>(most_neighbours), edges);
+  for (WeightedEdge& edge : edges) edge.weight = proximity_weight(edge.weight, sigma_m);
+  std::erase_if(edges, [](const WeightedEdge& edge) { return !(edge.weight > 0.0); });
   return symmetric_from(static_cast<int>(positions.size()), edges);
 }
 

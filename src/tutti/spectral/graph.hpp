@@ -23,8 +23,10 @@ struct WeightedEdge {
 /// Adjacency of the proximity graph, eq. (1): w(n, m) = exp(-||v_n - v_m|| / (2 sigma^2)) (the norm is not squared)
 /// when the distance is at most `radius_m`, else no edge; zero diagonal. positions: one 3-vector per node, any frame,
 /// metres, finite; radius_m > 0, sigma_m > 0. A weight below the smallest positive double is no edge.
+/// `most_neighbours` > 0: two nodes are joined only if either is among the other's so many nearest (the smaller number
+/// of two as near), so that a thousand nodes in one room do not make a million edges.
 [[nodiscard]] SparseMatrix proximity_adjacency(std::span<const Eigen::Vector3d> positions, double radius_m,
-                                               double sigma_m);
+                                               double sigma_m, int most_neighbours = 0);
 
 /// Symmetric adjacency of `nodes` nodes. Weights are finite and positive, ends differ; several edges between the same
 /// two nodes add up.

@@ -58,6 +58,47 @@ TEST(ProximityAdjacency, RadiusBelongsToIt) {
   EXPECT_DOUBLE_EQ(adjacency.coeff(3, 1), std::exp(-3.5));
 }
 
+/// The nearest nodes of each, within the radius, nearer ones first, the smaller number of two as near.
+std::vector<std::vector<int>> nearest_nodes(const std::vector<Vector3d>& positions, double radius_m) {
+  std::vector<std::vector<int>> out(positions.size());
+  for (std::size_t n = 0; n < positions.size(); ++n) {
+    const auto distance = [&](int m) { return (positions[n] - positions[static_cast<std::size_t>(m)]).norm(); };
+    for (int m = 0; m < static_cast<int>(positions.size()); ++m)
+      if (m != static_cast<int>(n) && distance(m) <= radius_m) out[n].push_back(m);
+    std::ranges::stable_sort(out[n], {}, distance);
+  }
+  return out;
+}
+
+RC_GTEST_PROP(ProximityAdjacency, JoinsWhatIsAmongTheNearestOfEither, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const int nodes = *rc::gen::inRange(0, 60), most = *rc::gen::inRange(1, 12);
+  auto positions = random_positions(nodes, 6.0, rng);
+  if (*rc::gen::arbitrary<bool>())  // on a grid many are as near as each other, or at one place
+    for (Vector3d& position : positions) position = position.array().round();
+  const SparseMatrix full = proximity_adjacency(positions, 7.0, 1.0);
+  const SparseMatrix some = proximity_adjacency(positions, 7.0, 1.0, most);
+  const auto nearest = nearest_nodes(positions, 7.0);
+  const auto is_near = [&](int n, int m) {
+    const auto& list = nearest[static_cast<std::size_t>(n)];
+    return std::find(list.begin(), list.end(), m) - list.begin() < std::min<std::ptrdiff_t>(most, std::ssize(list));
+  };
+  for (int n = 0; n < nodes; ++n)
+    for (int m = 0; m < nodes; ++m)
+      RC_ASSERT(some.coeff(n, m) == (is_near(n, m) || is_near(m, n) ? full.coeff(n, m) : 0.0));
+  RC_ASSERT(MatrixXd(some) == MatrixXd(some).transpose());
+  RC_ASSERT(MatrixXd(proximity_adjacency(positions, 7.0, 1.0, nodes)) == MatrixXd(full));  // fewer than so many
+}
+
+TEST(ProximityAdjacency, ARoomFullOfNodesHasFewEdges) {
+  Rng rng(2);
+  const auto positions = random_positions(1000, 1.5, rng);
+  const SparseMatrix adjacency = proximity_adjacency(positions, 7.0, 1.0, 32);
+  EXPECT_EQ(connected_components(adjacency).count, 1);
+  EXPECT_GE(adjacency.nonZeros(), 32 * 1000);
+  EXPECT_LE(adjacency.nonZeros(), 2 * 32 * 1000);
+}
+
 TEST(ProximityAdjacency, DivergedAndCoincidentNodes) {
   const std::vector<Vector3d> positions{{0, 0, 0}, {1e300, 0, 0}, {0, 0, 0}, {1e17, 1e17, 0}, {1e17, 1e17, 0}};
   const SparseMatrix adjacency = proximity_adjacency(positions, 7.0, 1.0);

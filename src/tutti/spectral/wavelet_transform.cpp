@@ -247,4 +247,62 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
   return result;
 }
 
+struct WaveletFilter::Prepared {
+  SparseMatrix laplacian;
+  internal::RowBlocks blocks;
+  MeyerFilterBank bank;
+  double domain = 0.0;
+  Expansion expansion;
+  std::vector<Index> degrees;  ///< Of the polynomials of h_s, not growing with s.
+};
+
+WaveletFilter::WaveletFilter(const SparseMatrix& laplacian, int scales, double tolerance) {
+  TUTTI_CHECK(scales >= 2 && tolerance > 0.0, "{} scales, tolerance {}", scales, tolerance);
+  // T_k grows exponentially outside of the domain, which must hold the largest eigenvalue.
+  constexpr double kAccuracy = 1e-3;
+  constexpr double kMargin = 1.01;
+  constexpr Index kTerms = 2048;
+  internal::RowBlocks blocks(laplacian);
+  const double bound = largest_eigenvalue_bound(laplacian);
+  const double domain = std::min(bound, kMargin * largest_eigenvalue(laplacian, kAccuracy));
+  MeyerFilterBank bank(scales, domain);
+  auto made = std::make_unique<Prepared>(Prepared{laplacian, std::move(blocks), bank, domain, {}, {}});
+  if (domain > 0.0) {
+    made->expansion = expand(bank, domain, kTerms);
+    made->degrees = worst_case_degrees(made->expansion, domain, tolerance);
+    for (std::size_t s = made->degrees.size() - 1; s-- > 0;)
+      made->degrees[s] = std::max(made->degrees[s], made->degrees[s + 1]);
+  }
+  prepared_ = std::move(made);
+}
+
+WaveletFilter::~WaveletFilter() = default;
+WaveletFilter::WaveletFilter(WaveletFilter&&) noexcept = default;
+
+const MeyerFilterBank& WaveletFilter::bank() const { return prepared_->bank; }
+
+int WaveletFilter::degree() const {
+  return prepared_->degrees.empty() ? 0 : static_cast<int>(prepared_->degrees.front()) + 1;
+}
+
+Eigen::MatrixXd WaveletFilter::operator()(const Eigen::Ref<const Eigen::MatrixXd>& signals) const {
+  const auto& [laplacian, blocks, bank, domain, expansion, degrees] = *prepared_;
+  TUTTI_CHECK(signals.rows() == laplacian.rows(), "signals of {} nodes, graph of {}", signals.rows(), laplacian.rows());
+  const Index d = signals.cols();
+  Eigen::MatrixXd out(signals.rows(), bank.scales() * d);
+  for (int s = 0; s < bank.scales(); ++s) out.middleCols(s * d, d) = bank.kernel(s, 0.0) * signals;
+  if (degrees.empty()) return out;
+  const Eigen::MatrixXd smoothed = laplacian * signals;
+  Eigen::VectorXd column(signals.rows());
+  for (Index c = 0; c < d; ++c) {
+    Recurrence recurrence(blocks, domain, expansion, blocks.to_blocks(smoothed.col(c)));
+    recurrence.run(degrees, false);
+    for (int s = 0; s < bank.scales(); ++s) {
+      blocks.from_blocks(recurrence.sums().col(s), column);
+      out.col(s * d + c) += column;
+    }
+  }
+  return out;
+}
+
 }  // namespace tutti::spectral

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
 #include "tutti/base/config.hpp"
 #include "tutti/spectral/graph.hpp"
@@ -43,5 +44,25 @@ struct ChebyshevResult {
 /// bank.lambda_max() below the graph's largest eigenvalue is allowed (see MeyerFilterBank), only slower.
 [[nodiscard]] ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFilterBank& bank,
                                                   const Eigen::MatrixXd& signals, const ChebyshevConfig& config = {});
+
+/// The Meyer bank of one graph by polynomials whose degree depends on the bank alone, so that the transform is one
+/// linear map: what it does to samples of an error says what it does to the error. For many signals of one graph.
+class WaveletFilter {
+ public:
+  /// A Laplacian, scales >= 2. No kernel is off by more than `tolerance` anywhere, and in proportion to the frequency
+  /// less near zero; a constant per connected component passes exactly.
+  WaveletFilter(const SparseMatrix& laplacian, int scales, double tolerance = 0.05);
+  ~WaveletFilter();
+  WaveletFilter(WaveletFilter&&) noexcept;
+
+  [[nodiscard]] const MeyerFilterBank& bank() const;
+  [[nodiscard]] int degree() const;  ///< Products with the Laplacian per signal.
+  /// nodes x d -> nodes x (scales * d), ordered as above.
+  [[nodiscard]] Eigen::MatrixXd operator()(const Eigen::Ref<const Eigen::MatrixXd>& signals) const;
+
+ private:
+  struct Prepared;
+  std::unique_ptr<const Prepared> prepared_;
+};
 
 }  // namespace tutti::spectral

@@ -139,6 +139,78 @@ TEST(ChebyshevTransform, TunnelOfSeveralTolerances) {
   }
 }
 
+RC_GTEST_PROP(WaveletFilter, NoKernelIsOffByMoreThanTheTolerance, (std::uint64_t seed)) {
+  Rng rng(seed);
+  const int nodes = *rc::gen::inRange(2, 60);
+  const SparseMatrix L = random_graph(nodes, rng);
+  const Spectrum spectrum = dense_spectrum(L);
+  const double tolerance = *rc::gen::element(0.1, 0.01, 1e-3);
+  const WaveletFilter filter(L, *rc::gen::inRange(2, 8), tolerance);
+  const MeyerFilterBank& bank = filter.bank();
+  const double lambda_max = spectrum.eigenvalues[nodes - 1];
+  RC_ASSERT(bank.lambda_max() >= lambda_max * (1.0 - 1e-12));
+  RC_ASSERT(bank.lambda_max() <= 1.02 * lambda_max);
+  // Every wave of the graph by itself, so that the coefficient is the kernel, and less so near zero.
+  const MatrixXd off = filter(spectrum.eigenvectors) - exact_transform(spectrum, bank, spectrum.eigenvectors);
+  for (int s = 0; s < bank.scales(); ++s)
+    for (int k = 0; k < nodes; ++k) {
+      const double share = lambda_max > 0.0 ? std::max(0.0, spectrum.eigenvalues[k]) / lambda_max : 0.0;
+      RC_ASSERT(off.col(s * nodes + k).norm() <= tolerance * share * (1.0 + 1e-6) + 1e-10);
+    }
+}
+
+TEST(WaveletFilter, TunnelAtTheDefaultTolerance) {
+  const auto positions = testing::tunnel(400, 1.0, Rng(3));
+  const SparseMatrix L = laplacian(proximity_adjacency(positions, 7.0, 1.0));
+  const VectorXd signal = testing::distance_signal(positions);
+  const VectorXd deviation = signal.array() - signal.mean();
+  const Spectrum spectrum = dense_spectrum(L);
+  int degree = 0;
+  for (const double tolerance : {0.1, 0.01, 1e-3}) {
+    const WaveletFilter filter(L, 4, tolerance);
+    const MatrixXd off = filter(signal) - exact_transform(spectrum, filter.bank(), signal);
+    EXPECT_LE(off.colwise().norm().maxCoeff(), tolerance * deviation.norm());
+    EXPECT_GT(filter.degree(), degree);
+    degree = filter.degree();
+  }
+  EXPECT_LT(WaveletFilter(L, 4).degree(), 60);
+}
+
+TEST(WaveletFilter, ConstantsPerComponentPassExactly) {
+  const SparseMatrix L = testing::laplacian_of(6, {{0, 1, 1.0}, {1, 2, 2.0}, {3, 4, 0.5}});  // node 5 is isolated
+  const VectorXd signal = (VectorXd(6) << 7, 7, 7, -300, -300, 1e6).finished();
+  const MatrixXd coefficients = WaveletFilter(L, 4)(signal);
+  EXPECT_EQ(coefficients.col(0), signal);
+  EXPECT_EQ(coefficients.rightCols(3), MatrixXd::Zero(6, 3));
+}
+
+// What holds of samples of an error holds of the error only if the filter does not look at what it filters.
+TEST(WaveletFilter, IsOneLinearMapWhateverTheSignal) {
+  Rng rng(11);
+  const SparseMatrix L = laplacian(proximity_adjacency(testing::tunnel(150, 1.0, Rng(5)), 7.0, 1.0));
+  const WaveletFilter filter(L, 5);
+  const MatrixXd f = random_signals(150, 3, rng);
+  const MatrixXd W = filter(f);
+  ASSERT_EQ(W.cols(), 15);
+  for (int c = 0; c < 3; ++c) {
+    const MatrixXd alone = filter(f.col(c));
+    for (int s = 0; s < 5; ++s) EXPECT_EQ(alone.col(s), W.col(3 * s + c));
+  }
+  const MatrixXd mixed = filter(2.0 * f.col(0) - 1e-5 * f.col(1));
+  for (int s = 0; s < 5; ++s)
+    EXPECT_LT((mixed.col(s) - 2.0 * W.col(3 * s) + 1e-5 * W.col(3 * s + 1)).norm(), 1e-11 * f.norm());
+}
+
+TEST(WaveletFilter, SmallestGraphs) {
+  EXPECT_EQ(WaveletFilter(SparseMatrix(0, 0), 3)(MatrixXd(0, 2)).cols(), 6);
+  const WaveletFilter one(testing::laplacian_of(1, {}), 3);
+  EXPECT_EQ(one.degree(), 0);
+  EXPECT_EQ(one(MatrixXd::Constant(1, 1, 5.0)), (MatrixXd(1, 3) << 5, 0, 0).finished());
+  EXPECT_EQ(one(MatrixXd(1, 0)).cols(), 0);
+  EXPECT_THROW((void)one(MatrixXd(2, 1)), std::logic_error);
+  EXPECT_THROW(WaveletFilter(testing::path(3), 1), std::logic_error);
+}
+
 TEST(Transforms, SmallestGraphs) {
   const MeyerFilterBank bank(3, 0.0);
   const SparseMatrix none(0, 0);
