@@ -131,16 +131,28 @@ std::vector<Matrix6d> JointPosterior::relative_covariances() const {
   return out;
 }
 
-Eigen::MatrixXd JointPosterior::samples(std::span<const std::size_t> nodes, std::size_t count, Rng rng) const {
+std::vector<int> JointPosterior::variables_of(std::span<const std::size_t> nodes) const {
   const auto& structure = factorised_->structure;
-  std::vector<int> variables;
+  std::vector<int> out;
   for (const std::size_t node : nodes) {
     TUTTI_CHECK(node < structure.variable.size(), "node {} of {}", node, structure.variable.size());
-    variables.push_back(structure.variable[node]);
+    out.push_back(structure.variable[node]);
   }
-  Eigen::MatrixXd out = internal::posterior_samples(factorised_->factor, variables, count, rng);
+  return out;
+}
+
+Eigen::MatrixXd JointPosterior::samples(std::span<const std::size_t> nodes, std::size_t count, Rng rng) const {
+  Eigen::MatrixXd out = internal::posterior_samples(factorised_->factor, variables_of(nodes), count, rng);
   for (std::size_t k = 0; k < nodes.size(); ++k)
     if (!factorised_->determined[nodes[k]]) out.middleRows<6>(static_cast<Eigen::Index>(6 * k)).setConstant(kInfinity);
+  return out;
+}
+
+Eigen::MatrixXd JointPosterior::covariance(std::span<const std::size_t> nodes) const {
+  Eigen::MatrixXd out = internal::posterior_covariance(factorised_->factor, variables_of(nodes));
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    if (!factorised_->determined[nodes[k]])
+      out.diagonal().segment<6>(static_cast<Eigen::Index>(6 * k)).setConstant(kInfinity);
   return out;
 }
 

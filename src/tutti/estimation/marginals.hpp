@@ -34,13 +34,17 @@ class JointPosterior {
   [[nodiscard]] std::vector<Matrix6d> relative_covariances() const;
 
   /// `count` joint samples of the nodes' errors: (6 nodes) x count, rows [6 k, 6 k + 6) what node k of `nodes` is off
-  /// by. Zero mean and the covariance of the posterior; not normal: L^-T z with random signs z, because second moments
-  /// estimated with signs scatter less than with normal numbers (Hutchinson 1990). A node's sample does not depend on
-  /// which others are asked for. In a component that does not determine its poses: infinity.
+  /// by. Zero mean, the covariance of the posterior, nearly normal: L^-T z, z sums of 64 random signs. A node's sample
+  /// does not depend on which others are asked for. In a component that does not determine its poses: infinity.
   [[nodiscard]] Eigen::MatrixXd samples(std::span<const std::size_t> nodes, std::size_t count, Rng rng) const;
+
+  /// Joint covariance of the nodes' errors, (6 nodes) x (6 nodes), exact; infinity on the diagonal of those in a
+  /// component that does not determine its poses.
+  [[nodiscard]] Eigen::MatrixXd covariance(std::span<const std::size_t> nodes) const;
 
  private:
   struct Factorised;
+  [[nodiscard]] std::vector<int> variables_of(std::span<const std::size_t> nodes) const;
   std::unique_ptr<const Factorised> factorised_;
 };
 

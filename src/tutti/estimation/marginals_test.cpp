@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
@@ -52,6 +53,33 @@ TEST(Marginals, AreTheBlocksOfTheDenseInverse) {
       const Matrix6d expected = relative_covariance(graph, joint, pairs[k].first, pairs[k].second);
       EXPECT_LT((covariances[k] - expected).norm(), 1e-7 * expected.norm()) << seed << " " << k;
     }
+  }
+}
+
+TEST(Marginals, TheJointCovarianceIsTheDenseInverse) {
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    Rng rng(seed);
+    const PoseGraph graph = random_graph(rng, 30, 5 * seed, 1.0).graph;
+    std::vector<double> weights;
+    for (std::size_t e = 0; e < graph.edges.size(); ++e) weights.push_back(rng.uniform(0.5, 1.0));
+    const std::vector<std::size_t> nodes{17, 0, 29, 3, 4, 17};  // in any order, the anchored one, one twice
+    const Eigen::MatrixXd covariance = JointPosterior(graph, graph.poses, {}, weights).covariance(nodes);
+    const Eigen::MatrixXd dense = dense_covariance(graph, weights);
+    ASSERT_EQ(covariance.rows(), 36);
+    EXPECT_EQ(covariance, covariance.transpose().eval());
+    for (std::size_t a = 0; a < nodes.size(); ++a)
+      for (std::size_t b = 0; b < nodes.size(); ++b) {
+        const auto of = [](std::size_t node) { return static_cast<Eigen::Index>(6 * node); };
+        const Matrix6d found = covariance.block<6, 6>(of(a), of(b));
+        const Matrix6d expected = dense.block<6, 6>(of(nodes[a]), of(nodes[b]));
+        const double size = std::sqrt(dense.block<6, 6>(of(nodes[a]), of(nodes[a])).trace() *
+                                      dense.block<6, 6>(of(nodes[b]), of(nodes[b])).trace());
+        if (nodes[a] == 0 || nodes[b] == 0) {
+          EXPECT_TRUE(found.isZero(0.0));
+        } else {
+          EXPECT_LT((found - expected).norm(), 1e-7 * size) << seed << " " << a << " " << b;
+        }
+      }
   }
 }
 
@@ -148,6 +176,29 @@ TEST(Marginals, AnUndeterminedComponentLeavesTheOthers) {
   EXPECT_TRUE(samples.middleRows<6>(6).array().isInf().all());
   EXPECT_TRUE(samples.bottomRows<6>().allFinite());
   EXPECT_GT(samples.bottomRows<6>().norm(), 0.0);
+  const Eigen::MatrixXd covariance = after.covariance(nodes), whole = before.covariance(nodes);
+  for (const Eigen::Index k : {0, 12}) {
+    const Eigen::MatrixXd own = covariance.block<6, 6>(k, k);
+    EXPECT_LT((own - whole.block<6, 6>(k, k)).norm(), 1e-9 * own.norm());
+  }
+  EXPECT_TRUE(covariance.diagonal().segment<6>(6).array().isInf().all());
+}
+
+// What comes of few samples depends on how they are drawn: their fourth moments are those of normal numbers.
+TEST(Marginals, SamplesAreNearlyNormal) {
+  constexpr std::size_t kSamples = 4'000;
+  Rng rng(6);
+  const PoseGraph graph = random_graph(rng, 12, 5, 1.0).graph;
+  const JointPosterior posterior(graph, graph.poses);
+  const std::vector<std::size_t> nodes{11, 4};
+  const Eigen::MatrixXd samples = posterior.samples(nodes, kSamples, Rng(7));
+  const Eigen::MatrixXd covariance = posterior.covariance(nodes);
+  const Eigen::MatrixXd white = covariance.llt().matrixL().solve(samples);
+  const Eigen::ArrayXd distance = white.colwise().squaredNorm().transpose().array();
+  // Chi-square with 12 degrees of freedom: mean 12, variance 24; and a share of 1 % beyond its 99 % quantile.
+  EXPECT_NEAR(distance.mean(), 12.0, 4.0 * std::sqrt(24.0 / kSamples));
+  EXPECT_NEAR((distance - distance.mean()).square().mean(), 24.0, 4.0 * std::sqrt(24.0 * 24.0 * 3.0 / kSamples));
+  EXPECT_NEAR(static_cast<double>((distance > 26.217).count()) / kSamples, 0.01, 4.0 * std::sqrt(0.0099 / kSamples));
 }
 
 TEST(Marginals, SayWhatIsNotDetermined) {

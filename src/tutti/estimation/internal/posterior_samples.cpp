@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "tutti/geometry/pose3.hpp"
@@ -11,13 +13,19 @@
 namespace tutti::estimation::internal {
 namespace {
 
-/// So many samples at a time: a slab of them stays in registers, a batch of slabs takes one random number per row and
-/// bounds the memory.
+/// So many samples at a time: a slab of them stays in registers, a batch of slabs bounds the memory.
 constexpr int kSlab = 8;
 constexpr std::size_t kSlabs = 4;
 constexpr std::size_t kBatch = kSlabs * kSlab;
 using Slab = Eigen::Matrix<double, 6, kSlab, Eigen::RowMajor>;
 using Batch = std::array<Slab, kSlabs>;
+
+/// The block variable above this one in the elimination tree; none above the root.
+std::optional<std::size_t> parent_of(const BlockCholesky::Columns& factor, std::size_t j) {
+  const int below = factor.start[6 * j + 5] + 1;
+  if (below >= factor.start[6 * j + 6]) return std::nullopt;
+  return static_cast<std::size_t>(factor.row[below] / 6);
+}
 
 /// The block variables that the asked ones depend on: their ancestors in the elimination tree.
 std::vector<bool> with_ancestors(const BlockCholesky::Columns& factor, std::span<const int> variables) {
@@ -25,22 +33,18 @@ std::vector<bool> with_ancestors(const BlockCholesky::Columns& factor, std::span
   std::vector<bool> needed(n, false);
   for (const int variable : variables)
     if (variable >= 0) needed[static_cast<std::size_t>(variable)] = true;
-  for (std::size_t j = 0; j < n; ++j) {
-    const int last_column = factor.start[6 * j + 5];
-    if (needed[j] && last_column + 1 < factor.start[6 * j + 6])
-      needed[static_cast<std::size_t>(factor.row[last_column + 1] / 6)] = true;
-  }
+  for (std::size_t j = 0; j < n; ++j)
+    if (const auto parent = parent_of(factor, j); parent && needed[j]) needed[*parent] = true;
   return needed;
 }
 
-void fill_with_random_signs(std::vector<Batch>& Z, Rng& rng) {
-  static_assert(kBatch == 32);
-  for (Batch& batch : Z)
-    for (int row = 0; row < 6; ++row) {
-      std::uint64_t bits = rng.index(std::uint64_t{1} << 32U);
-      for (Slab& slab : batch)
-        for (int column = 0; column < kSlab; ++column, bits >>= 1U) slab(row, column) = (bits & 1U) != 0 ? 1.0 : -1.0;
-    }
+/// A sum of 64 random signs over its standard deviation: a normal number for all that is asked of samples, and cheap.
+double nearly_normal(std::uint64_t number) { return (std::popcount(mixed(number)) - 32) / 4.0; }
+
+void fill_at_random(std::uint64_t stream, std::size_t j, Batch& batch) {
+  std::uint64_t number = stream + j * std::uint64_t{6 * kBatch};
+  for (Slab& slab : batch)
+    for (double& value : slab.reshaped()) value = nearly_normal(++number);
 }
 
 /// Y_j <- L_jj^-T (Y_j - sum over the blocks i below of L_ij^T Y_i). The six columns of a block have the same rows.
@@ -73,15 +77,66 @@ Eigen::MatrixXd posterior_samples(const BlockCholesky::Columns& factor, std::spa
   Eigen::MatrixXd out =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(6 * variables.size()), static_cast<Eigen::Index>(count));
   for (std::size_t first = 0; first < count; first += kBatch) {
-    fill_with_random_signs(Y, rng);
-    for (std::size_t j = n; j-- > 0;)
-      if (needed[j]) solve_block(factor, j, Y);
+    const std::uint64_t stream = rng.index(~std::uint64_t{0});
+    for (std::size_t j = n; j-- > 0;) {
+      if (!needed[j]) continue;
+      fill_at_random(stream, j, Y[j]);
+      solve_block(factor, j, Y);
+    }
     for (std::size_t s = 0; s < std::min(kBatch, count - first); ++s)
       for (std::size_t v = 0; v < variables.size(); ++v)
         if (variables[v] >= 0)
           out.col(static_cast<Eigen::Index>(first + s)).segment<6>(static_cast<Eigen::Index>(6 * v)) =
               Y[static_cast<std::size_t>(variables[v])][s / kSlab].col(static_cast<int>(s % kSlab));
   }
+  return out;
+}
+
+Eigen::MatrixXd posterior_covariance(const BlockCholesky::Columns& factor, std::span<const int> variables) {
+  std::vector<Matrix6d> y(factor.start.size() / 6, Matrix6d::Zero());
+  struct Way {
+    std::vector<std::size_t> block;  // ascending
+    std::vector<Matrix6d> y;
+  };
+  std::vector<Way> ways(variables.size());
+  for (std::size_t v = 0; v < variables.size(); ++v) {
+    if (variables[v] < 0) continue;
+    Way& way = ways[v];
+    y[static_cast<std::size_t>(variables[v])].setIdentity();
+    for (std::optional<std::size_t> j = static_cast<std::size_t>(variables[v]); j; j = parent_of(factor, *j)) {
+      const int* start = factor.start.data() + 6 * *j;
+      Matrix6d& y_j = y[*j];
+      for (int c = 0; c < 6; ++c) {
+        const double* column = factor.value.data() + start[c];  // from the diagonal down
+        y_j.row(c) /= column[0];
+        for (int d = c + 1; d < 6; ++d) y_j.row(d) -= column[d - c] * y_j.row(c);
+      }
+      const int below = (start[6] - start[5] - 1) / 6;
+      for (int b = 0; b < below; ++b) {
+        Matrix6d& y_i = y[static_cast<std::size_t>(factor.row[start[5] + 1 + 6 * b] / 6)];
+        for (int c = 0; c < 6; ++c)
+          y_i.noalias() -= Eigen::Map<const Vector6d>(factor.value.data() + start[c] + (6 - c) + 6 * b) * y_j.row(c);
+      }
+      way.block.push_back(*j);
+      way.y.push_back(y_j);
+    }
+    for (const std::size_t j : way.block) y[j].setZero();
+  }
+  const auto size = static_cast<Eigen::Index>(6 * variables.size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(size, size);
+  for (std::size_t a = 0; a < ways.size(); ++a)
+    for (std::size_t b = a; b < ways.size(); ++b) {
+      Matrix6d sum = Matrix6d::Zero();
+      for (std::size_t i = 0, k = 0; i < ways[a].block.size() && k < ways[b].block.size();) {
+        if (ways[a].block[i] == ways[b].block[k])
+          sum.noalias() += ways[a].y[i++].transpose() * ways[b].y[k++];
+        else
+          ways[a].block[i] < ways[b].block[k] ? ++i : ++k;
+      }
+      const auto row = static_cast<Eigen::Index>(6 * a), column = static_cast<Eigen::Index>(6 * b);
+      out.block<6, 6>(row, column) = sum;
+      out.block<6, 6>(column, row) = sum.transpose();
+    }
   return out;
 }
 
