@@ -171,9 +171,9 @@ class CommandLine(unittest.TestCase):
         everything = tutti("settings", "--all")
         self.expect(everything, 0, "closures.finder = ", "simulation.robots[].start_s = 0")
         self.assertGreater(len(everything.stdout.splitlines()), 500)
-        one = tutti("settings", "agreement", "alarm")
-        self.expect(one, 0, "agent.policy.adaptive.agreement.false_alarm_rate = 0.01   (a number, ")
-        self.assertEqual(len(one.stdout.splitlines()), 4, one.stdout)  # and the one whose meaning names it
+        one = tutti("settings", "disagreement", "alarm")
+        self.expect(one, 0, "agent.disagreement.false_alarm_rate = 0.01   (a number, ")
+        self.assertEqual(len(one.stdout.splitlines()), 2, one.stdout)
         self.expect(tutti("settings", "transmissions", "lost"), 0, "link.loss = 0")  # words of its meaning
         self.expect(tutti("settings", "dance"), 1, "no key or meaning contains 'dance'")
 

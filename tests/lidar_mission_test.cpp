@@ -41,7 +41,6 @@ TEST(LidarMission, HalfOfTheDemoIsMappedFromItsScans) {
     EXPECT_LT(*corrected.rmse_m, 1.1 * *robot.server.rmse_m + 0.01) << robot.name;
     EXPECT_GT(*robot.onboard.rmse_m, 2.0 * *corrected.rmse_m) << robot.name;
     EXPECT_GE(robot.policies[0].constraints_added, 1U);
-    EXPECT_LE(robot.policies[0].constraints_added, 5U);  // 2 and 1
     EXPECT_LE(*corrected.rpe_m, 1.02 * *robot.onboard.rpe_m) << robot.name;
   }
 }

@@ -3,7 +3,6 @@
 // order of time, without a radio; at every tenth update of the map, draws of the map's own posterior, with other random
 // numbers than the server's, take the robot's place in its test. One JSON object per robot and update.
 #include <CLI/CLI.hpp>
-#include <Eigen/QR>
 #include <cstdio>
 #include <limits>
 #include <map>
@@ -13,56 +12,37 @@
 #include <string>
 #include <vector>
 
-#include "tutti/consistency/chain_agreement.hpp"
+#include "tutti/consistency/disagreement.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
-#include "tutti/server/odometry_honesty.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace {
 
 using namespace tutti;
 
-/// The test that a robot makes of a broadcast, as if it had `poses` at its nodes in it.
-class RobotsTest {
- public:
-  /// The first of a mission's looks has half of its false alarms: twice alpha gives this one all of alpha.
-  RobotsTest(const ProxyGraph& graph, const ChainId& chain, double alpha) {
-    for (const StampedPose& node : trajectory_of(graph, chain)) server_.push_back(node.pose);
-    const auto shape = std::ranges::find(graph.shapes, chain, &ShapeUncertainty::chain);
-    std::vector<std::size_t> ranks(server_.size());
-    for (std::size_t k = 0; k < ranks.size(); ++k) ranks[k] = k;
-    agreement_ =
-        std::make_unique<consistency::ChainAgreement>(ranks, shape == graph.shapes.end() ? nullptr : &*shape, 1,
-                                                      consistency::AgreementConfig{.false_alarm_rate = 2.0 * alpha});
-  }
-  [[nodiscard]] bool rejects(const std::vector<Pose3>& poses) const {
-    return agreement_->compare(server_, poses).disagrees();
-  }
+/// The test that a robot makes of a broadcast, all of whose nodes of this chain it has. The first of a mission's looks
+/// has half of its false alarms: twice alpha gives this one all of alpha.
+consistency::DisagreementTest robots_test(const ProxyGraph& graph, const ChainId& chain, double alpha) {
+  std::vector<consistency::NodePair> pairs;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i)
+    if (graph.nodes[i].chain == chain) pairs.push_back({.proxy = i, .robot = pairs.size()});
+  return {graph, chain, pairs, 1, {.false_alarm_rate = 2.0 * alpha}};
+}
 
- private:
-  std::vector<Pose3> server_;
-  std::unique_ptr<consistency::ChainAgreement> agreement_;
-};
-
-/// Of these nodes' errors (right tangents): (6 nodes) x count. JointPosterior::samples has random signs behind it;
-/// turned among each other by a random rotation they are all but normal, with the same covariance.
+/// Of these nodes' errors (right tangents): (6 nodes) x count, other draws than the server's own.
 Eigen::MatrixXd normal_draws(const server::MapEstimate& map, const std::vector<std::size_t>& nodes, std::size_t count,
                              Rng rng) {
-  const std::map<ChainId, double> factors = server::odometry_variance_factors(map);
   std::vector<double> weights(map.graph.edges.size(), 1.0);
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
-    weights[e] = 1.0 / factors.at(map.nodes[map.graph.edges[e].from].id.chain);
-  const estimation::JointPosterior posterior(map.graph, map.graph.poses, {}, weights);
-  const auto size = static_cast<Eigen::Index>(count);
-  Eigen::MatrixXd normal(size, size);
-  for (double& entry : normal.reshaped()) entry = rng.normal();
-  const Eigen::MatrixXd turn = Eigen::HouseholderQR<Eigen::MatrixXd>(normal).householderQ();
-  return posterior.samples(nodes, count, rng.fork("signs")) * turn;
+    if (const auto factor = map.overstated.find(map.nodes[map.graph.edges[e].from].id.chain);
+        factor != map.overstated.end())
+      weights[e] = 1.0 / factor->second;
+  return estimation::JointPosterior(map.graph, map.graph.poses, {}, weights).samples(nodes, count, rng.fork("draws"));
 }
 
 struct Options {
@@ -86,14 +66,14 @@ void judge(const Options& options, std::size_t update, const server::MapEstimate
     const Eigen::MatrixXd draws =
         normal_draws(map, nodes, options.draws, Rng(options.seed).fork("calibration").fork(update));
     if (!draws.allFinite()) continue;
-    const RobotsTest test(graph, chain, options.alpha);
+    const auto test = robots_test(graph, chain, options.alpha);
     std::size_t rejected = 0;
     for (Eigen::Index d = 0; d < draws.cols(); ++d) {
       std::vector<Pose3> robot;
       for (std::size_t k = 0; k < nodes.size(); ++k)
         robot.push_back(
             retract(map.nodes[nodes[k]].T_world_body, draws.col(d).segment<6>(static_cast<Eigen::Index>(6 * k))));
-      rejected += test.rejects(robot) ? 1U : 0U;
+      rejected += test(robot).disagrees() ? 1U : 0U;
     }
     const nlohmann::json line{{"robot", names.at(chain.robot)},
                               {"update", update},

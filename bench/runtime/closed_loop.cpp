@@ -79,7 +79,7 @@ void run(const ClosedLoopConfig& config, std::uint64_t seed) {
   const auto first = row();
   if (!config.competitors) return;
   loop.budgets = first.ledger_sizes;
-  for (const char* name : {"every_node", "every_node_2", "uniform", "random", "euclidean"}) {
+  for (const char* name : {"every_node", "every_node_2", "uniform", "random", "skeleton"}) {
     loop.policy.name = name;
     row();
   }

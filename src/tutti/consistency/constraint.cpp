@@ -2,73 +2,41 @@
 #include "tutti/consistency/constraint.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/covariance.hpp"
 
 namespace tutti::consistency {
-namespace {
-
-Matrix6d moved(const Pose3& T_a_b, const Matrix6d& covariance_b) {
-  const Matrix6d Ad = adjoint(T_a_b);
-  return Ad * covariance_b * Ad.transpose();
-}
-
-}  // namespace
-
-double distrust(std::uint32_t support, const ConstraintConfig& config) {
-  if (support == 0) return 1.0;
-  if (static_cast<int>(support) >= config.full_support) return config.trust;
-  const double earned = (support - 1.0) / (config.full_support - 1.0);
-  return std::pow(config.doubt, 1.0 - earned) * std::pow(config.trust, earned);
-}
 
 ConstraintMaker::ConstraintMaker(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
-                                 std::span<const NodePair> pairs, const ConstraintConfig& config)
-    : revision_(graph.revision), config_(config) {
-  std::vector<std::size_t> own;  // this chain's proxy nodes in time order
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i)
-    if (graph.nodes[i].chain == chain) own.push_back(i);
-  std::stable_sort(own.begin(), own.end(),
-                   [&](std::size_t a, std::size_t b) { return graph.nodes[a].stamp < graph.nodes[b].stamp; });
-  nodes_.reserve(pairs.size());
-  if (own.empty()) return;
-
-  // In the frame of the first proxy node the stretches' covariances simply add; make() moves the difference of two sums
-  // to the frame of the constraint. Equal to compounding from node to node, without the loop.
-  const Pose3 T_start_world = graph.nodes[own[0]].T_world_body.inverse();
-  Matrix6d sum = Matrix6d::Zero();
-  std::size_t pair = 0;
-  for (std::size_t rank = 0; rank < own.size(); ++rank) {
-    const ProxyNode& node = graph.nodes[own[rank]];
-    const Pose3 T_start_body = T_start_world * node.T_world_body;
-    const double factor = distrust(node.support, config);
-    if (rank > 0) sum += moved(T_start_body, factor * factor * node.covariance);
-    support_.push_back(node.support);
-    if (pair < pairs.size() && pairs[pair].proxy == own[rank]) {
-      nodes_.push_back({node.stamp, nodes[pairs[pair].robot].chain_index, T_start_body, sum, rank});
-      ++pair;
-    }
+                                 std::span<const NodePair> pairs)
+    : revision_(graph.revision) {
+  const std::span<const ProxyNode> own = nodes_of(graph, chain);
+  nodes_.assign(own.begin(), own.end());
+  for (const NodePair& pair : pairs) {
+    const auto node = static_cast<std::size_t>(&graph.nodes[pair.proxy] - own.data());
+    TUTTI_CHECK(node < own.size() && (ends_.empty() || ends_.back().node < node),
+                "the pairs are not nodes of robot {} in time order", to_string(chain));
+    ends_.push_back({own[node].stamp, nodes[pair.robot].chain_index, node});
   }
-  TUTTI_CHECK(pair == pairs.size(), "{} of {} pairs are nodes of robot {} in time order", pair, pairs.size(),
-              to_string(chain));
 }
 
 Constraint ConstraintMaker::make(std::size_t a, std::size_t b, ConstraintKind kind) const {
-  TUTTI_CHECK(a != b && a < nodes_.size() && b < nodes_.size(), "a = {}, b = {}, {} nodes", a, b, nodes_.size());
-  const Node& from = nodes_[std::min(a, b)];
-  const Node& to = nodes_[std::max(a, b)];
-  Constraint out{from.stamp, to.stamp, from.chain_index, to.chain_index, {}, kind, revision_};
-  out.support = *std::min_element(support_.begin() + static_cast<std::ptrdiff_t>(from.proxy) + 1,
-                                  support_.begin() + static_cast<std::ptrdiff_t>(to.proxy) + 1);
-  out.measurement.T_a_b = from.T_start_body.inverse() * to.T_start_body;
-  Matrix6d covariance = moved(to.T_start_body.inverse(), to.covariance_sum - from.covariance_sum);
-  covariance = 0.5 * (covariance + covariance.transpose()).eval();
-  const double factor = distrust(out.support, config_);
-  covariance.diagonal().head<3>().array() += std::pow(factor * config_.floor_translation_m, 2);
-  covariance.diagonal().tail<3>().array() += std::pow(factor * config_.floor_rotation_rad, 2);
-  out.measurement.covariance = covariance;
-  return out;
+  TUTTI_CHECK(a != b && a < ends_.size() && b < ends_.size(), "a = {}, b = {}, {} nodes", a, b, ends_.size());
+  const auto& [from, to] = std::minmax(ends_[a], ends_[b], [](const End& x, const End& y) { return x.node < y.node; });
+  Matrix6d covariance = Matrix6d::Zero();
+  for (std::size_t k = from.node + 1; k <= to.node; ++k)
+    covariance = compound_covariance(nodes_[k - 1].T_world_body.inverse() * nodes_[k].T_world_body, covariance,
+                                     nodes_[k].covariance);
+  return {.from_stamp = from.stamp,
+          .to_stamp = to.stamp,
+          .from = from.chain_index,
+          .to = to.chain_index,
+          .measurement = {nodes_[from.node].T_world_body.inverse() * nodes_[to.node].T_world_body,
+                          kOdometryInside * kOdometryInside *
+                              invertible_covariance(0.5 * (covariance + covariance.transpose()))},
+          .kind = kind,
+          .revision = revision_};
 }
 
 }  // namespace tutti::consistency

@@ -10,64 +10,48 @@
 namespace tutti::consistency {
 namespace {
 
-std::vector<Pose3> composed(const std::vector<RelativePose>& odometry) {
-  std::vector<Pose3> poses{Pose3{}};
-  for (std::size_t k = 1; k < odometry.size(); ++k) poses.push_back(poses.back() * odometry[k].T_a_b);
-  return poses;
-}
-
-/// The scale that speaks of this length, in nodes.
-int scale_of(const ChainAgreement& test, double nodes) {
-  int best = 0;
-  for (int s = 1; s < test.scales(); ++s)
-    if (std::abs(std::log(test.scale_length(s) / nodes)) < std::abs(std::log(test.scale_length(best) / nodes)))
-      best = s;
-  return best;
+/// The scale that speaks of this length.
+int scale_of(const std::vector<double>& scale_length_m, double length_m) {
+  const auto apart = [&](double scale_m) { return std::abs(std::log(scale_m / std::max(length_m, 1e-3))); };
+  const auto best = std::ranges::min_element(scale_length_m, {}, apart);
+  return static_cast<int>(best - scale_length_m.begin());
 }
 
 }  // namespace
 
 Explanation explain(const ProxyGraph& graph, const ChainId& id, std::span<const RobotNode> nodes,
-                    std::span<const NodePair> pairs, std::uint64_t update, const AgreementConfig& config) {
+                    std::span<const NodePair> pairs, const DisagreementTest& test, Disagreement found,
+                    double false_alarm_rate) {
   Explanation out;
-  if (pairs.size() < 2) return out;
-  const internal::TimeChain chain = internal::time_chain(graph, id, nodes, pairs);
-  const ShapeUncertainty* shape = internal::shape_of(graph, id);
-  const ChainAgreement test(chain.ranks, shape, update, config);
-  const std::vector<Pose3> odometry = composed(chain.odometry);
-  ChainDisagreement raw = test.compare(chain.server, odometry);
+  const internal::TimeChain chain = internal::time_chain(graph, nodes, pairs);
+  const ChainUncertainty* uncertainty = uncertainty_of(graph, id);
+  const std::vector<Pose3> odometry = odometry_at(nodes, pairs);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     out.stamps.push_back(nodes[pairs[k].robot].stamp);
     out.distance_m.push_back(
         k == 0 ? 0.0 : out.distance_m.back() + (chain.server[k].translation - chain.server[k - 1].translation).norm());
   }
-  const double spacing = out.distance_m.back() / static_cast<double>(pairs.size() - 1);
-  for (int s = 0; s < test.scales(); ++s) out.scale_length_m.push_back(test.scale_length(s) * spacing);
-  out.scale_significance.assign(raw.scale_significance.begin(), raw.scale_significance.end());
-  out.position_m = std::move(raw.position_m);
-  out.rotation_rad = std::move(raw.rotation_rad);
-  out.significance = std::move(raw.significance);
-  for (const MissedTie& tie : raw.missed_ties)
-    out.missed_ways.push_back({.from = out.stamps[tie.a],
-                               .until = out.stamps[tie.b],
-                               .length_m = out.distance_m[tie.b] - out.distance_m[tie.a],
-                               .translation_m = tie.position_m,
-                               .rotation_rad = tie.rotation_rad,
-                               .significance = tie.significance});
+  for (int s = 0; s < test.scales(); ++s) out.scale_length_m.push_back(test.scale_length_m(s));
+  out.scale_significance.assign(found.scale_significance.begin(), found.scale_significance.end());
+  out.direction_significance = found.direction_significance;
+  out.position_m = std::move(found.position_m);
+  out.rotation_rad = std::move(found.rotation_rad);
+  out.significance = std::move(found.significance);
   out.aligned_rmse_m = internal::aligned_rmse(chain.server, odometry);
-  if (shape != nullptr) out.expected_rmse_m = shape->whole.position_m;
+  if (uncertainty != nullptr) out.expected_rmse_m = uncertainty->whole.position_m;
   if (!out.disagrees()) return out;  // nothing was born anywhere
-  for (const internal::DriftStretch& stretch : internal::drift_stretches(chain, shape, config.false_alarm_rate)) {
+  for (const internal::DriftStretch& stretch : internal::drift_stretches(chain, test, uncertainty, false_alarm_rate)) {
     const auto relative = [&](const std::vector<Pose3>& poses) {
       return poses[stretch.first].inverse() * poses[stretch.last];
     };
     const Vector6d missed = local(relative(chain.server), relative(odometry));
+    const double length_m = out.distance_m[stretch.last] - out.distance_m[stretch.first];
     const NodePair& middle = pairs[(stretch.first + stretch.last) / 2];
     out.origins.push_back({.from = out.stamps[stretch.first],
                            .until = out.stamps[stretch.last],
                            .place_m = graph.nodes[middle.proxy].T_world_body.translation,
-                           .scale = scale_of(test, static_cast<double>(stretch.last - stretch.first)),
-                           .length_m = out.distance_m[stretch.last] - out.distance_m[stretch.first],
+                           .scale = scale_of(out.scale_length_m, length_m),
+                           .length_m = length_m,
                            .translation_m = missed.head<3>().norm(),
                            .rotation_rad = missed.tail<3>().norm(),
                            .significance = stretch.significance,

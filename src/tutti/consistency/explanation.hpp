@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tutti/base/timestamp.hpp"
-#include "tutti/consistency/chain_agreement.hpp"
+#include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/robot_node.hpp"
 #include "tutti/consistency/synchronise.hpp"
 #include "tutti/model/proxy_graph.hpp"
@@ -29,16 +29,6 @@ struct SuspectedOrigin {
   bool alert = false;
 };
 
-/// Two nodes that the map knows well relative to each other, and whose way odometry misses by more than that.
-struct MissedWay {
-  Timestamp from;
-  Timestamp until;
-  double length_m = 0.0;       ///< Along the server's estimate.
-  double translation_m = 0.0;  ///< Odometry against the map: relative pose from -> until.
-  double rotation_rad = 0.0;
-  double significance = 0.0;  ///< Over its threshold; > 1.
-};
-
 /// Where, at which scale and since when a robot's estimate and the server's map differ. Rows are the synchronised
 /// nodes in time order, columns the scales (0 = largest).
 struct Explanation {
@@ -49,22 +39,23 @@ struct Explanation {
   Eigen::MatrixXd position_m;  ///< Disagreement, nodes x scales.
   Eigen::MatrixXd rotation_rad;
   Eigen::MatrixXd significance;  ///< Disagreement over its threshold, the larger of position and rotation; 1 = at it.
-  std::vector<double> scale_significance;  ///< The same for all of a scale together (ChainDisagreement).
-  std::vector<MissedWay> missed_ways;      ///< Largest significance first.
+  std::vector<double> scale_significance;  ///< The same for all of a scale together (Disagreement).
+  double direction_significance = 0.0;     ///< The same for what closures know far better than odometry.
   double aligned_rmse_m = 0.0;             ///< Of the two estimates after one rigid alignment.
   double expected_rmse_m = 0.0;            ///< What the server says its own error is; 0 = it does not say.
   std::vector<SuspectedOrigin> origins;    ///< In time order, none overlapping.
   /// Something stands out of the server's uncertainty: the two do not agree.
   [[nodiscard]] bool disagrees() const {
     const auto above = [](double s) { return s > 1.0; };
-    return !missed_ways.empty() || std::ranges::any_of(scale_significance, above) ||
+    return above(direction_significance) || std::ranges::any_of(scale_significance, above) ||
            (significance.size() > 0 && significance.maxCoeff() > 1.0);
   }
 };
 
-/// Compares raw odometry with the server's map along the synchronised nodes `pairs` (ChainAgreement) and looks for
-/// where the difference was born. `update` counts from 1. Fewer than 2 pairs: empty.
+/// What `test` said of raw odometry (odometry_at()), `found`, put into words, and where the difference was born: looked
+/// for at that false-alarm rate. `pairs`: those of the test.
 Explanation explain(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
-                    std::span<const NodePair> pairs, std::uint64_t update, const AgreementConfig& config);
+                    std::span<const NodePair> pairs, const DisagreementTest& test, Disagreement found,
+                    double false_alarm_rate);
 
 }  // namespace tutti::consistency

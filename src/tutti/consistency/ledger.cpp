@@ -22,7 +22,6 @@ bool says_otherwise(const Constraint& held, const Constraint& fresh, const Ledge
 
 /// The server has become surer or less sure.
 bool counts_otherwise(const Constraint& held, const Constraint& fresh, const LedgerConfig& config) {
-  if (held.support != fresh.support) return true;
   const Eigen::Array<double, 6, 1> before = held.measurement.covariance.diagonal().array().sqrt();
   const Eigen::Array<double, 6, 1> now = fresh.measurement.covariance.diagonal().array().sqrt();
   return ((now - before).abs() > config.replace_sigma_share * before).any();
@@ -58,11 +57,6 @@ LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& 
         ++counts.removed;
       else
         next.push_back(std::move(held));
-      continue;
-    }
-    if (found->second.support == 0 && held.support > 0) {
-      ++counts.withdrawn;
-      fresh.erase(found);
       continue;
     }
     const bool replace = says_otherwise(held, found->second, config) || counts_otherwise(held, found->second, config);

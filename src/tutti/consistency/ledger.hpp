@@ -19,9 +19,8 @@ struct LedgerConfig {
     v.field("replace_translation_m", replace_translation_m, at_least(0.0),
             "A constraint is replaced when the new one differs by more than this, or by more than the rotation below.");
     v.field("replace_rotation_deg", replace_rotation_deg, at_least(0.0), "See replace_translation_m.");
-    v.field(
-        "replace_sigma_share", replace_sigma_share, at_least(0.0),
-        "... or when other closures support it than before, or a standard deviation changes by more than this share.");
+    v.field("replace_sigma_share", replace_sigma_share, at_least(0.0),
+            "... or when a standard deviation changes by more than this share.");
   }
 };
 
@@ -47,8 +46,6 @@ class Ledger {
   /// Takes `chosen` in. A constraint between the same two nodes, either way round, is replaced only when the new one
   /// differs beyond a threshold, in what it says or in how much that counts; otherwise it stays untouched. With
   /// `replaces_all`, constraints whose nodes are not in `chosen` go. The same pair twice in `chosen`: the last counts.
-  /// A held constraint that had support and is chosen again with 0 is withdrawn: the closures that it came from are
-  /// gone, and the server knows no better than odometry.
   LedgerUpdate update(std::vector<Constraint> chosen, const LedgerConfig& config, bool replaces_all);
 
   /// Withdraws every constraint with an end that this proxy graph does not know of (any more): neither among its nodes

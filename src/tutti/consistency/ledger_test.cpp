@@ -40,22 +40,18 @@ TEST(Ledger, KeepsAConstraintUntilItDiffersReasonably) {
   EXPECT_EQ(ledger.constraints()[0].revision, 4U);
 }
 
-/// What a constraint weighs follows the server: three closures behind it that become one, or the other way round.
+/// What a constraint weighs follows the server.
 TEST(Ledger, ReplacesAConstraintThatCountsOtherwise) {
-  const auto weighing = [](std::uint32_t support, double sigma, std::uint64_t revision) {
+  const auto weighing = [](double sigma, std::uint64_t revision) {
     Constraint out = link(0, 1, 1.0, 0.0, revision);
-    out.support = support;
     out.measurement.covariance = sigma * sigma * Matrix6d::Identity();
     return out;
   };
-  Ledger ledger({weighing(3, 0.01, 1)});
-  EXPECT_EQ(ledger.update({weighing(3, 0.0105, 2)}, kConfig, false).unchanged, 1U);
-  EXPECT_EQ(ledger.update({weighing(1, 0.01, 3)}, kConfig, false).replaced, 1U);
-  EXPECT_EQ(ledger.constraints()[0].support, 1U);
-  EXPECT_EQ(ledger.update({weighing(3, 0.01, 4)}, kConfig, false).replaced, 1U);
-  EXPECT_EQ(ledger.update({weighing(3, 0.012, 5)}, kConfig, false).replaced, 1U);
-  EXPECT_EQ(ledger.constraints()[0].revision, 5U);
-  EXPECT_EQ(ledger.update({weighing(3, 0.0105, 6)}, kConfig, false).replaced, 1U);
+  Ledger ledger({weighing(0.01, 1)});
+  EXPECT_EQ(ledger.update({weighing(0.0105, 2)}, kConfig, false).unchanged, 1U);
+  EXPECT_EQ(ledger.update({weighing(0.012, 3)}, kConfig, false).replaced, 1U);
+  EXPECT_EQ(ledger.constraints()[0].revision, 3U);
+  EXPECT_EQ(ledger.update({weighing(0.0105, 4)}, kConfig, false).replaced, 1U);
 }
 
 // Small steps each below the threshold must not add up unseen: the comparison is with what is held.
@@ -128,32 +124,6 @@ TEST(Withdraw, AnotherRobotsNodesDoNotCount) {
   EXPECT_EQ(ledger.size(), 0U);
 }
 
-Constraint supported(Constraint constraint, std::uint32_t support) {
-  constraint.support = support;
-  return constraint;
-}
-
-TEST(Withdraw, WhatIsChosenAgainWithoutSupport) {
-  for (const bool replaces_all : {false, true}) {
-    Ledger ledger({supported(link(0, 1), 3), supported(link(1, 2), 3)});
-    const auto update = ledger.update({supported(link(0, 1, 7.0), 0), supported(link(1, 2), 3)}, kConfig, replaces_all);
-    EXPECT_EQ(update.withdrawn, 1U);
-    EXPECT_EQ(update.unchanged, 1U);
-    EXPECT_EQ(update.removed + update.added + update.replaced, 0U);
-    ASSERT_EQ(ledger.size(), 1U);
-    EXPECT_EQ(ledger.constraints()[0].from, 1U);
-  }
-}
-
-// A link over odometry that nothing supports is taken as it comes (it says no more than odometry) and may be held on.
-TEST(Withdraw, NotWhatNeverHadSupport) {
-  Ledger ledger;
-  EXPECT_EQ(ledger.update({supported(link(0, 1), 0)}, kConfig, false).added, 1U);
-  const auto update = ledger.update({supported(link(0, 1), 0)}, kConfig, false);
-  EXPECT_EQ(update.withdrawn, 0U);
-  EXPECT_EQ(update.unchanged, 1U);
-}
-
 RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
   Ledger ledger;
   for (int round = 0; round < 4; ++round) {
@@ -162,7 +132,6 @@ RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
       const auto from = *rc::gen::inRange<std::size_t>(0, 6);
       const auto to = from + *rc::gen::inRange<std::size_t>(1, 4);
       chosen.push_back(link(from, to, *rc::gen::inRange(0, 5) * 0.04));
-      chosen.back().support = *rc::gen::inRange(0U, 3U);
       if (*rc::gen::arbitrary<bool>()) {
         std::swap(chosen.back().from, chosen.back().to);
         std::swap(chosen.back().from_stamp, chosen.back().to_stamp);

@@ -12,12 +12,11 @@ Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, c
   if (name == "spectral") return std::make_unique<internal::SpectralPolicy>(config);
   if (name == "uniform") return std::make_unique<internal::UniformPolicy>(config);
   if (name == "random") return std::make_unique<internal::RandomPolicy>(config);
-  if (name == "euclidean") return std::make_unique<internal::EuclideanPolicy>(config);
   if (name == "skeleton") return std::make_unique<internal::SkeletonPolicy>(config);
   if (name == "adaptive") return std::make_unique<internal::AdaptivePolicy>(config);
   return fail(ErrorCode::configuration,
               "policy '{}' is unknown, expected none, every_node, every_node_2, spectral, uniform, random, "
-              "euclidean, skeleton or adaptive",
+              "skeleton or adaptive",
               name);
 }
 

@@ -10,9 +10,10 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
-#include "tutti/consistency/chain_agreement.hpp"
+#include "tutti/base/result.hpp"
 #include "tutti/consistency/compare.hpp"
 #include "tutti/consistency/constraint.hpp"
+#include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/ledger.hpp"
 
 namespace tutti::consistency {
@@ -28,7 +29,9 @@ struct PolicyInput {
   std::optional<std::size_t> budget;
   Rng rng;
   const Ledger& ledger;
-  std::uint64_t update = 1;  ///< How many proxy graphs this robot has compared, this one included.
+  /// Of raw odometry against the server's map; null: fewer than two synchronised nodes, or nobody asked.
+  const DisagreementTest* test = nullptr;
+  const Disagreement* odometry_disagreement = nullptr;  ///< What it says.
 };
 
 struct Selection {
@@ -45,33 +48,9 @@ class ConstraintPolicy {
   [[nodiscard]] virtual bool needs_budget() const { return false; }
   /// Looks at PolicyInput::comparison.disagreement, which is costly: others go without.
   [[nodiscard]] virtual bool needs_disagreement() const { return false; }
+  /// Looks at PolicyInput::test.
+  [[nodiscard]] virtual bool needs_test() const { return false; }
   [[nodiscard]] virtual Selection choose(const PolicyInput& input) const = 0;
-};
-
-struct AdaptiveConfig {
-  AgreementConfig agreement;
-  double least_gain = 30.0;
-  double tolerance_m = 0.02;
-  double trust = 0.02;
-  std::string detection = "agreement";
-  std::string placement = "optimal";
-
-  template <class V>
-  void describe(V& v) {
-    v.field("agreement", agreement, any(), "When robot and server are said to disagree.");
-    v.field("least_gain", least_gain, greater_than(0.0),
-            "Once they do, every link has to lower the disagreement, squared and summed over the nodes, by this many "
-            "times the square of what the server says its own error is (RMSE).");
-    v.field("tolerance_m", tolerance_m, greater_than(0.0),
-            "Taken for the server's error with absolute thresholds, and when the server does not say.");
-    v.field("trust", trust, between(1e-3, 1.0),
-            "Instead of constraint.trust: a few links have to hold where many would help each other.");
-    v.field("detection", detection, one_of({"agreement", "rmse", "always"}),
-            "How disagreement is noticed; 'rmse' (aligned, above 3x what the server says) and 'always' are there to "
-            "compare with.");
-    v.field("placement", placement, one_of({"optimal", "uniform"}),
-            "Where links begin and end; 'uniform' is there to compare with.");
-  }
 };
 
 /// The thresholds of `spectral` were set once, on simulated corridor missions (bench/runtime/closed_loop.cpp, five
@@ -90,17 +69,14 @@ struct PolicyConfig {
   double top_threshold_m = 0.07;
   int mid_hops = 5;
   int nearest_submaps = 4;
-  double euclidean_threshold_m = 0.1;
   int default_budget = 25;
   double skeleton_tolerance_m = 0.01;
-  AdaptiveConfig adaptive;
-  ConstraintConfig constraint;
+  double adaptive_error_share = 0.25;
 
   template <class V>
   void describe(V& v) {
     v.field("name", name,
-            one_of({"none", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton",
-                    "adaptive"}),
+            one_of({"none", "every_node", "every_node_2", "spectral", "uniform", "random", "skeleton", "adaptive"}),
             "How a robot chooses constraints; 'spectral' is the paper's, 'adaptive' the product's default, "
             "'none' leaves it alone.");
     v.field("classifier", classifier, one_of({"thresholds", "top"}),
@@ -115,14 +91,13 @@ struct PolicyConfig {
     v.field("top_threshold_m", top_threshold_m, at_least(0.0), "spectral, classifier top: and only above this.");
     v.field("mid_hops", mid_hops, at_least(1.0), "Mid-scale links go this many nodes back and forth in time.");
     v.field("nearest_submaps", nearest_submaps, at_least(1.0), "Large-scale links go to this many submaps.");
-    v.field("euclidean_threshold_m", euclidean_threshold_m, at_least(0.0),
-            "euclidean without a budget: distance above which a node gets links.");
     v.field("default_budget", default_budget, at_least(1.0),
             "uniform and random: constraints held when no budget is given.");
     v.field("skeleton_tolerance_m", skeleton_tolerance_m, greater_than(0.0),
             "skeleton: links are split until every node is this close to the server's map.");
-    v.field("adaptive", adaptive, any(), "adaptive: when to add, and how much.");
-    v.field("constraint", constraint);
+    v.field("adaptive_error_share", adaptive_error_share, greater_than(0.0),
+            "adaptive: once robot and map disagree, links are split until every node is this close to the map, as a "
+            "share of what the map itself is unsure of there.");
   }
 };
 

@@ -47,14 +47,13 @@ TEST(Policy, UnknownNameIsAConfigurationError) {
 }
 
 TEST(Policy, NamesMatchTheFactory) {
-  for (const char* name :
-       {"none", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"})
+  for (const char* name : {"none", "every_node", "every_node_2", "spectral", "uniform", "random", "skeleton"})
     EXPECT_EQ((*make_policy(name, {}))->name(), name);
 }
 
 TEST(Policy, ZeroOrOneNodeGivesNothingAndTakesNothingAway) {
   for (const std::size_t length : {0U, 1U})
-    for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "skeleton"}) {
+    for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random", "skeleton"}) {
       Scene scene(length);
       scene.comparison.disagreement.setConstant(10.0);
       const auto selection = scene.choose(name, 5);
@@ -67,7 +66,7 @@ TEST(Policy, EveryLinkIsMeasuredOnTheServersMap) {
   Scene scene(60);
   scene.comparison.disagreement.setConstant(1.0);
   for (RobotNode& node : scene.nodes) node.T_map_body.translation *= 1.5;
-  for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean"}) {
+  for (const char* name : {"every_node", "every_node_2", "spectral", "uniform", "random"}) {
     const auto selection = scene.choose(name, 40);
     EXPECT_FALSE(selection.constraints.empty()) << name;
     for (const Constraint& c : selection.constraints) {
@@ -222,20 +221,6 @@ TEST(Random, ATinyGraphHasOnlySoManyLinks) {
   const auto selection = Scene(3).choose("random", 50);
   EXPECT_LE(selection.constraints.size(), 3U);
   EXPECT_GE(selection.constraints.size(), 2U);
-}
-
-TEST(Euclidean, TakesTheFarthestAfterAligningNodeZero) {
-  Scene scene(60);
-  Rng rng(5);
-  scene.nodes[20].T_map_body.translation.z() += 2.0;
-  scene.nodes[40].T_map_body.translation.z() += 1.0;
-  scene.nodes[50].T_map_body.translation.z() += 0.05;
-  const Pose3 T = test::random_pose(rng, 30.0);
-  for (RobotNode& node : scene.nodes) node.T_map_body = T * node.T_map_body;
-  EXPECT_EQ(linked(scene.choose("euclidean", 4)), (Pairs{{19, 20}, {20, 21}, {15, 20}, {20, 25}}));
-  EXPECT_EQ(linked(scene.choose("euclidean", 5)).size(), 5U);
-  EXPECT_EQ(linked(scene.choose("euclidean")),  // above 0.1 m
-            (Pairs{{19, 20}, {20, 21}, {15, 20}, {20, 25}, {39, 40}, {40, 41}, {35, 40}, {40, 45}}));
 }
 
 /// The robot's chain bends at one node, everything else agrees.

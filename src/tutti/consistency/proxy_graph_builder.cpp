@@ -66,7 +66,6 @@ void append_reduced(ProxyGraph& graph, const std::vector<ServerNode>& nodes, Rob
 
   const auto offset = static_cast<std::uint32_t>(graph.nodes.size());
   Matrix6d covariance = Matrix6d::Zero();
-  std::uint32_t support = ~0U;
   std::size_t next = 0;  // position in `kept`
   for (int i = 0; i < n; ++i) {
     const ServerNode& node = nodes[range.begin + static_cast<std::size_t>(i)];
@@ -74,13 +73,11 @@ void append_reduced(ProxyGraph& graph, const std::vector<ServerNode>& nodes, Rob
       const ServerNode& previous = nodes[range.begin + static_cast<std::size_t>(i) - 1];
       const Pose3 T_previous_body = previous.T_world_body.inverse() * node.T_world_body;
       covariance = compound_covariance(T_previous_body, covariance, node.covariance);
-      support = std::min(support, node.support);
     }
     if (next < kept.size() && kept[next] == i) {
       ++next;
-      graph.nodes.push_back({node.chain, node.stamp, node.T_world_body, covariance, i > 0 ? support : node.support});
+      graph.nodes.push_back({node.chain, node.stamp, node.T_world_body, covariance});
       covariance = Matrix6d::Zero();
-      support = ~0U;
     } else {
       graph.eliminated.push_back({node.chain, node.stamp});
     }
@@ -113,7 +110,7 @@ ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nod
   const auto budget = static_cast<std::size_t>(config.node_budget);
   if (budget == 0 || nodes.size() <= budget) {
     for (const ServerNode& node : nodes)
-      graph.nodes.push_back({node.chain, node.stamp, node.T_world_body, node.covariance, node.support});
+      graph.nodes.push_back({node.chain, node.stamp, node.T_world_body, node.covariance});
     return graph;
   }
   graph.reduced = true;

@@ -17,7 +17,6 @@ struct ServerNode {
   Pose3 T_world_body;
   /// Of this pose relative to the same chain's previous ServerNode (right tangent); ignored for the first.
   Matrix6d covariance = Matrix6d::Zero();
-  std::uint32_t support = 0;  ///< Independent closures that support the stretch from the previous node to this one.
 };
 
 struct ProxyGraphConfig {
@@ -26,9 +25,8 @@ struct ProxyGraphConfig {
   int node_budget = 0;
   std::string reducer = "budget";
   double sparsify_threshold = 1e-3;
-  int shape_samples = 32;
+  int shape_samples = 64;
   int shape_deletions = 32;
-  int shape_ties = 32;
 
   template <class V>
   void describe(V& v) {
@@ -49,9 +47,6 @@ struct ProxyGraphConfig {
     v.field("shape_deletions", shape_deletions, between(0.0, 10'000.0),
             "And that any one closure may be wrong: how many of those on which the map hinges, the most influential "
             "ones, are taken away one by one to see what would change; 0 = none.");
-    v.field("shape_ties", shape_ties, between(0.0, 1000.0),
-            "For how many pairs of a robot's nodes, far apart along its way, it says how well it knows one relative to "
-            "the other: those of which closures tell most.");
   }
 };
 
@@ -61,7 +56,7 @@ struct ProxyGraphConfig {
 /// Reduction (only above the budget) is done per chain on the subgraph induced by that chain's nodes, so that the robot
 /// can repeat it on its own estimate: Schur complement of the Laplacian (eq. 3), then sparsified. The budget is shared
 /// between the chains in proportion to their nodes, at least two each (one if the chain has one node). The covariance
-/// of a kept node is compounded over the removed nodes before it, its support the smallest of them.
+/// of a kept node is compounded over the removed nodes before it.
 ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
                              std::vector<ChainComponent> components, const ProxyGraphConfig& config);
 

@@ -29,10 +29,6 @@ class Signal {
   /// robot's poses are moved by one rigid transform. What is filtered when both live on one graph.
   [[nodiscard]] virtual Eigen::MatrixXd difference(std::span<const Pose3> server,
                                                    std::span<const Pose3> robot) const = 0;
-
-  /// How much of the variance of the nodes' errors, after one rigid alignment, shows up in difference() at a frequency
-  /// lambda of the time chain (unit weights): 1 for the errors themselves, lambda for their steps.
-  [[nodiscard]] virtual double gain(double lambda) const = 0;
 };
 
 /// The paper's: f(n) = ||x_n - x_0||_2, m. Blind to any turn about node 0, and nearly so to what lies across the line
@@ -43,7 +39,6 @@ class DistanceSignal final : public Signal {
   [[nodiscard]] Eigen::Index metres() const override { return 1; }
   [[nodiscard]] Eigen::MatrixXd evaluate(std::span<const Pose3> poses) const override;
   [[nodiscard]] Eigen::MatrixXd difference(std::span<const Pose3> server, std::span<const Pose3> robot) const override;
-  [[nodiscard]] double gain(double) const override { return 1.0; }
 };
 
 /// The pose itself, SE(3). f(n) = T_0^-1 T_n as [translation m; rotation matrix / sqrt(2), whose distance is
@@ -56,7 +51,6 @@ class PoseSignal final : public Signal {
   [[nodiscard]] Eigen::Index metres() const override { return 3; }
   [[nodiscard]] Eigen::MatrixXd evaluate(std::span<const Pose3> poses) const override;
   [[nodiscard]] Eigen::MatrixXd difference(std::span<const Pose3> server, std::span<const Pose3> robot) const override;
-  [[nodiscard]] double gain(double) const override { return 1.0; }
 };
 
 /// Motion since the previous node, T_{n-1}^-1 T_n in the same units, nothing at the first node. Needs no gauge at all;
@@ -67,7 +61,6 @@ class RelativeMotionSignal final : public Signal {
   [[nodiscard]] Eigen::Index metres() const override { return 3; }
   [[nodiscard]] Eigen::MatrixXd evaluate(std::span<const Pose3> poses) const override;
   [[nodiscard]] Eigen::MatrixXd difference(std::span<const Pose3> server, std::span<const Pose3> robot) const override;
-  [[nodiscard]] double gain(double lambda) const override { return lambda; }
 };
 
 /// "distance", "pose" or "relative_motion".

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/between_factor.hpp"
-#include "tutti/estimation/chi_square.hpp"
 #include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/estimation/internal/chain_reduction.hpp"
 #include "tutti/estimation/internal/chordal.hpp"
@@ -86,7 +86,7 @@ namespace {
 
 GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles,
                    std::span<const std::size_t> fixed) {
-  std::vector<double> truncation(graph.edges.size(), chi_square_6_quantile(config.confidence));
+  std::vector<double> truncation(graph.edges.size(), chi_square_quantile(config.confidence, 6.0));
   for (std::size_t e = 0; e < roles.size(); ++e)
     if (roles[e] == EdgeRole::trusted) truncation[e] = std::numeric_limits<double>::infinity();
   return internal::truncated_least_squares(graph, config, truncation, fixed);

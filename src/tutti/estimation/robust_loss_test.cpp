@@ -5,8 +5,6 @@
 
 #include <cmath>
 
-#include "tutti/estimation/chi_square.hpp"
-
 namespace tutti::estimation {
 namespace {
 
@@ -53,19 +51,6 @@ TEST(RobustLoss, LeavesInliersAloneAndGrowsSlower) {
 TEST(RobustLoss, KnowsItsNames) {
   EXPECT_EQ(loss_kind("geman_mcclure"), LossKind::geman_mcclure);
   EXPECT_THROW(loss_kind("tukey"), std::logic_error);
-}
-
-TEST(ChiSquare, AgreesWithTables) {
-  // Abramowitz & Stegun, table 26.8, 6 degrees of freedom.
-  EXPECT_NEAR(chi_square_6_quantile(0.5), 5.348, 5e-4);
-  EXPECT_NEAR(chi_square_6_quantile(0.95), 12.592, 5e-4);
-  EXPECT_NEAR(chi_square_6_quantile(0.99), 16.812, 5e-4);
-  EXPECT_NEAR(chi_square_6_quantile(0.999), 22.458, 5e-4);
-  EXPECT_NEAR(chi_square_6_quantile(0.0), 0.0, 1e-3);
-}
-
-TEST(ChiSquare, QuantileInvertsProbability) {
-  for (double p = 0.01; p < 1.0; p += 0.07) EXPECT_NEAR(chi_square_6_probability(chi_square_6_quantile(p)), p, 1e-12);
 }
 
 }  // namespace

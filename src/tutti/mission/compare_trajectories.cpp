@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tutti/base/check.hpp"
+#include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/consistency/explanation.hpp"
 #include "tutti/consistency/policy.hpp"
 #include "tutti/consistency/synchronise.hpp"
@@ -16,7 +17,6 @@ namespace tutti::mission {
 namespace {
 
 constexpr RobotId kRobot{};
-constexpr std::uint32_t kFullySupported = 1'000'000;  // A is what B is judged by: never doubted
 constexpr double kNodesPerWay = 500.0;
 constexpr std::size_t kMostNodes = 2000;  // where B parts from A all the time
 constexpr double kLeastSpacing_m = 0.1;
@@ -92,26 +92,22 @@ std::vector<consistency::RobotNode> robot_nodes(const NamedTrajectory& b, const 
   return out;
 }
 
-/// A as a server would send it: sure of its shape to the tolerance at every length.
-ProxyGraph proxy_graph(const std::vector<Node>& nodes, const CompareTrajectoriesConfig& config) {
-  const ShapeSigma sigma{config.tolerance_m, config.tolerance_deg * kRadPerDeg};
+/// A as a server would send it, a graph of neighbours at seven nodes' spacing.
+ProxyGraph proxy_graph(const std::vector<Node>& nodes, double spacing_m, const CompareTrajectoriesConfig& config) {
+  const PoseSigma sigma{config.tolerance_m, config.tolerance_deg * kRadPerDeg};
   // Over the whole run, the steps' covariances compound to the tolerance.
   const double share = 1.0 / static_cast<double>(nodes.size() - 1);
   Matrix6d covariance = Matrix6d::Zero();
   covariance.diagonal().head<3>().setConstant(share * sigma.position_m * sigma.position_m);
   covariance.diagonal().tail<3>().setConstant(share * sigma.rotation_rad * sigma.rotation_rad);
-  ProxyGraph graph{.revision = 1};
+  ProxyGraph graph{.revision = 1, .radius_m = 7.0 * spacing_m, .sigma_m = std::sqrt(spacing_m)};
   for (const Node& node : nodes)
     graph.nodes.push_back({.chain = kRobot,
                            .stamp = node.pair.stamp,
                            .T_world_body = node.pair.reference,
-                           .covariance = graph.nodes.empty() ? Matrix6d(Matrix6d::Zero()) : covariance,
-                           .support = kFullySupported});
+                           .covariance = graph.nodes.empty() ? Matrix6d(Matrix6d::Zero()) : covariance});
   graph.components = {{kRobot, 0}};
-  ShapeUncertainty shape{.chain = kRobot, .whole = sigma, .sag = {}};
-  while (const std::size_t count = ShapeUncertainty::stretches(nodes.size(), shape.sag.size()))
-    shape.sag.emplace_back(count, sigma);
-  graph.shapes = {shape};
+  graph.uncertainties = {consistency::even_uncertainty(kRobot, nodes.size(), sigma)};
   return graph;
 }
 
@@ -170,19 +166,20 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
     out.judge.push_back({node.pair.stamp, node.pair.reference});
     out.judged.push_back({node.pair.stamp, node.pair.estimate});
   }
-  const ProxyGraph graph = proxy_graph(nodes, config);
+  const ProxyGraph graph = proxy_graph(nodes, out.spacing_m, config);
   const auto robot = robot_nodes(b, nodes, config);
   consistency::Comparison comparison;
   comparison.pairs = consistency::synchronise(graph, kRobot, robot).pairs;
-
-  consistency::PolicyConfig policy;
-  policy.adaptive.agreement.false_alarm_rate = config.false_alarm_rate;
-  out.explanation = consistency::explain(graph, kRobot, robot, comparison.pairs, 1, policy.adaptive.agreement);
-  const auto chooser = consistency::make_policy("adaptive", policy);
+  const consistency::DisagreementTest test(graph, kRobot, comparison.pairs, 1,
+                                           {.false_alarm_rate = config.false_alarm_rate});
+  const consistency::Disagreement found = test(consistency::odometry_at(robot, comparison.pairs));
+  const auto chooser = consistency::make_policy("adaptive", {});
   TUTTI_CHECK(chooser.has_value());
   const consistency::Ledger nothing_held;
-  out.constraints =
-      (*chooser)->choose({graph, kRobot, robot, comparison, std::nullopt, Rng(0), nothing_held}).constraints;
+  out.constraints = (*chooser)
+                        ->choose({graph, kRobot, robot, comparison, std::nullopt, Rng(0), nothing_held, &test, &found})
+                        .constraints;
+  out.explanation = consistency::explain(graph, kRobot, robot, comparison.pairs, test, found, config.false_alarm_rate);
 
   out.corrected = out.judged;
   if (!out.constraints.empty()) correct(robot, out);

@@ -19,7 +19,7 @@ std::span<const OperatorSetting> operator_settings() {
       {"agent.submap.voxel_m", "Clouds of submaps are thinned to voxels of this edge; it decides the bytes uplink."},
       {"agent.submap.max_range_m", "LiDAR points farther away than this are dropped."},
       {"agent.policy.name", "The rule by which a robot chooses constraints from the server's proxy graph."},
-      {"agent.policy.adaptive.agreement.false_alarm_rate",
+      {"agent.disagreement.false_alarm_rate",
        "The chance, per robot and mission, to be told of a disagreement that is only the server's own uncertainty."},
       {"server.update_period_s", "The server optimises and broadcasts once in this time."},
       {"closures.finder", "Loop closures come from LiDAR scans, or from the reference where there are none."},

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -20,8 +22,6 @@ struct ProxyNode {
   Pose3 T_world_body;
   /// Covariance of this pose relative to the same chain's previous proxy node (right tangent); zero for the first.
   Matrix6d covariance = Matrix6d::Zero();
-  /// Independent closures that support the stretch from the previous proxy node to this one (docs/math.md).
-  std::uint32_t support = 0;
   friend bool operator==(const ProxyNode&, const ProxyNode&) = default;
 };
 
@@ -48,40 +48,60 @@ struct ChainComponent {
 };
 
 /// Standard deviations in the direction that is worst.
-struct ShapeSigma {
+struct PoseSigma {
   double position_m = 0.0;
   double rotation_rad = 0.0;
-  friend bool operator==(const ShapeSigma&, const ShapeSigma&) = default;
+  friend bool operator==(const PoseSigma&, const PoseSigma&) = default;
 };
 
-/// Two of a chain's proxy nodes, a before b, that the map knows relative to each other, T_a_b, much better than the way
-/// between them alone would allow: what it knows of the two from closures.
-struct ShapeTie {
-  std::uint32_t a = 0;
-  std::uint32_t b = 0;  ///< Counted along the chain's nodes in the graph; a < b.
-  ShapeSigma sigma;     ///< Of T_a_b.
-  friend bool operator==(const ShapeTie&, const ShapeTie&) = default;
+/// What a sum of squared errors is like: chi-square with `degrees` degrees of freedom, scaled to the mean.
+struct Energy {
+  double mean = 0.0;
+  double degrees = 1.0;
+  friend bool operator==(const Energy&, const Energy&) = default;
 };
 
-/// How sure the server is of the shape of one chain's trajectory: stretch by stretch, over all, and across the ties.
-/// Let x_k be what the estimate of the chain's k-th proxy node is off by: its position after one rigid alignment of all
-/// the chain's nodes, its rotation (rotation vector) less the mean over all of them; both in the axes of `world`. Any
-/// one closure may be wrong: what would change without the one that matters most counts as uncertainty too
-/// (docs/math.md).
-struct ShapeUncertainty {
-  static constexpr std::size_t kShortest = 4;  ///< Half the length, in nodes, of the shortest stretches.
-  /// How many stretches of scale j fit into a chain's nodes: sag[j].size(); 0 = sag ends before j.
-  static constexpr std::size_t stretches(std::size_t nodes, std::size_t j) {
-    return nodes == 0 || j >= 32 ? 0 : (nodes - 1) / (2 * kShortest << j);
+/// What the wavelet coefficients of a chain's errors are like at one scale.
+struct ScaleUncertainty {
+  /// Per block of ChainUncertainty::kBlock nodes the largest of its nodes; empty: too few waves to say anything.
+  std::vector<PoseSigma> sigma;
+  Energy position, rotation;  ///< Of the sum over all nodes of (coefficient / sigma)^2.
+  friend bool operator==(const ScaleUncertainty&, const ScaleUncertainty&) = default;
+};
+
+/// A combination of a chain's poses that closures know far better than odometry does:
+///   sum over the spread nodes k >= 1 of (position_k . dp_k / 127 + rotation_scale rotation_k . dr_k / 127),
+/// dp_k [m] and dr_k [rad] what node k is off by, seen from the chain's first node, in the axes of `world`.
+struct KnownDirection {
+  std::vector<std::int8_t> position, rotation;  ///< 3 per spread node but the first.
+  double rotation_scale = 1.0;
+  double sigma = 0.0;  ///< Standard deviation of the combination.
+  friend bool operator==(const KnownDirection&, const KnownDirection&) = default;
+};
+
+/// How sure the server is of the shape of one chain's trajectory, with the errors seen through the wavelets of the
+/// chain's own proximity graph and through the directions that closures know. Any one closure on which the map hinges
+/// may be wrong: what would change without it counts as uncertainty too (docs/math.md).
+struct ChainUncertainty {
+  static constexpr std::size_t kBlock = 10;   ///< Nodes that share a sigma.
+  static constexpr std::size_t kSpread = 24;  ///< Evenly spread nodes that directions speak of; fewer on short chains.
+  static constexpr std::size_t kMostScales = 16;
+  static constexpr std::size_t kMostDirections = 16;
+  static constexpr std::size_t blocks(std::size_t nodes) { return (nodes + kBlock - 1) / kBlock; }
+  /// Which of a chain's nodes directions speak of; none if it has fewer than two.
+  static std::vector<std::size_t> spread(std::size_t nodes) {
+    std::vector<std::size_t> out;
+    const std::size_t count = nodes < 2 ? 0 : std::min(nodes, kSpread);
+    for (std::size_t i = 0; i < count; ++i) out.push_back(i * (nodes - 1) / (count - 1));
+    return out;
   }
   ChainId chain;
-  ShapeSigma whole;  ///< Root mean square of |x_k| over all nodes: the RMSE of the ATE that the server expects.
-  /// sag[j][i]: of x_m - (x_a + x_b) / 2, what the middle of a stretch is off by when its ends are held, for the i-th
-  /// stretch of 2 L nodes, L = kShortest 2^j: a = 2 L i, m = a + L, b = a + 2 L, counted along the chain's nodes in the
-  /// graph. As many j as fit; sag[j].size() = (nodes - 1) / (2 L), see stretches().
-  std::vector<std::vector<ShapeSigma>> sag;
-  std::vector<ShapeTie> ties;  ///< Sorted by (a, b), none twice.
-  friend bool operator==(const ShapeUncertainty&, const ShapeUncertainty&) = default;
+  /// Root mean square over the nodes of what each is off by: in position after one rigid alignment (the RMSE of the ATE
+  /// that the server expects), in rotation less the mean.
+  PoseSigma whole;
+  std::vector<ScaleUncertainty> scales;  ///< Of the Meyer bank on the chain's graph; scale 0 = largest.
+  std::vector<KnownDirection> directions;
+  friend bool operator==(const ChainUncertainty&, const ChainUncertainty&) = default;
 };
 
 /// The server's map in kilobytes. Unreduced, edges follow from the positions by one rule (radius, sigma; eqs. 1, 2) and
@@ -96,13 +116,25 @@ struct ProxyGraph {
   std::vector<ChainComponent> components;
   bool reduced = false;
   std::vector<ProxyEdge> edges;
-  std::vector<EliminatedNode> eliminated;  ///< Sorted by (chain, stamp).
-  std::vector<ShapeUncertainty> shapes;    ///< Sorted by chain; a chain may be missing: nothing is known.
+  std::vector<EliminatedNode> eliminated;       ///< Sorted by (chain, stamp).
+  std::vector<ChainUncertainty> uncertainties;  ///< Sorted by chain; a chain may be missing: nothing is known.
   friend bool operator==(const ProxyGraph&, const ProxyGraph&) = default;
 
   /// The larger one is newer: a server that goes on from an older state than its robots have heard of is heard at once.
   [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> age() const { return {epoch, revision}; }
 };
+
+/// The nodes of one chain.
+inline std::span<const ProxyNode> nodes_of(const ProxyGraph& graph, const ChainId& chain) {
+  const auto [first, last] = std::ranges::equal_range(graph.nodes, chain, {}, &ProxyNode::chain);
+  return {first, last};
+}
+
+/// What the server says about this chain; null: nothing.
+inline const ChainUncertainty* uncertainty_of(const ProxyGraph& graph, const ChainId& chain) {
+  const auto found = std::ranges::find(graph.uncertainties, chain, &ChainUncertainty::chain);
+  return found == graph.uncertainties.end() ? nullptr : &*found;
+}
 
 /// T_world_body of one chain's nodes.
 inline Trajectory trajectory_of(const ProxyGraph& graph, const ChainId& chain) {

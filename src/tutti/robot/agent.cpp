@@ -2,11 +2,11 @@
 #include "tutti/robot/agent.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/evaluation/agreement.hpp"
 #include "tutti/geometry/covariance.hpp"
 
 namespace tutti::robot {
@@ -22,8 +22,6 @@ std::unique_ptr<consistency::ConstraintPolicy> known_policy(const consistency::P
 /// With 100 m and 3 rad that graph is often without a solution; a robot moves less from one sample to the next.
 constexpr double kUnknownStep_m = 10.0;
 constexpr double kUnknownStep_rad = 0.3;
-/// Nearer to the map than this nobody can say that odometry was better.
-constexpr double kAstray_m = 0.02;
 
 /// Quaternions printed with few digits are off by this much at most.
 constexpr double kRoundedQuaternion = 1e-3;
@@ -115,6 +113,13 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
                               : consistency::synchronised(message.graph, chain_, own);
   ended(UpdateStage::compare);
 
+  std::optional<consistency::DisagreementTest> test;
+  consistency::Disagreement odometry_disagreement;
+  ++state_.comparisons;
+  if (comparison.pairs.size() >= 2 && (config_.explain || policy_->needs_test())) {
+    test.emplace(message.graph, chain_, comparison.pairs, state_.comparisons, config_.disagreement);
+    odometry_disagreement = (*test)(consistency::odometry_at(own, comparison.pairs));
+  }
   const std::size_t withdrawn = state_.ledger.withdraw_unknown(message.graph, chain_);
   const consistency::Ledger held = state_.ledger;
   const auto selection = policy_->choose({.graph = message.graph,
@@ -124,18 +129,17 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
                                           .budget = budget,
                                           .rng = rng_.fork(state_.revision),
                                           .ledger = state_.ledger,
-                                          .update = ++state_.comparisons});
+                                          .test = test ? &*test : nullptr,
+                                          .odometry_disagreement = &odometry_disagreement});
   summary.ledger = state_.ledger.update(selection.constraints, config_.ledger, selection.replaces_all);
   summary.ledger.withdrawn += withdrawn;
   ended(UpdateStage::choose);
 
   summary.optimised = optimise();
-  const bool whole_plan = selection.replaces_all && !policy_->needs_budget();
-  const auto astray = [&] { return whole_plan && leads_astray(message.graph); };
-  if (!estimation::is_usable(summary.optimised) || astray()) {
+  if (!estimation::is_usable(summary.optimised)) {
     summary.taken_back = true;
     state_.ledger = held;
-    if (!estimation::is_usable(optimise()) || astray()) {
+    if (!estimation::is_usable(optimise())) {
       state_.ledger = {};
       optimise();
     }
@@ -145,9 +149,9 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   locate_others(message.graph, own, comparison.pairs);
   ended(UpdateStage::optimise);
 
-  if (config_.explain)
-    summary.explanation = consistency::explain(message.graph, chain_, own, comparison.pairs, state_.comparisons,
-                                               config_.policy.adaptive.agreement);
+  if (config_.explain && test)
+    summary.explanation = consistency::explain(message.graph, chain_, own, comparison.pairs, *test,
+                                               std::move(odometry_disagreement), config_.disagreement.false_alarm_rate);
   summary.synchronised = comparison.pairs.size();
   summary.proposed = selection.constraints.size();
   summary.constraints = state_.ledger.size();
@@ -161,16 +165,6 @@ estimation::Termination RobotAgent::optimise() {
     constraints.push_back({.from = c.from, .to = c.to, .measurement = c.measurement});
   smoother_.set_constraints(std::move(constraints));
   return smoother_.solve().termination;
-}
-
-/// Corrected, it is farther from the map than by odometry alone: the reduced problem promised what did not come true.
-bool RobotAgent::leads_astray(const ProxyGraph& graph) const {
-  Trajectory odometry;
-  for (const Keyframe& keyframe : state_.keyframes) odometry.push_back({keyframe.stamp, keyframe.T_odom_body});
-  const Trajectory map = trajectory_of(graph, chain_);
-  const auto by_odometry = evaluation::agreement(odometry, map);
-  const auto by_constraints = evaluation::agreement(corrected(), map);
-  return by_odometry && by_constraints && by_constraints->rmse_m > by_odometry->rmse_m + kAstray_m;
 }
 
 // Frames differ by an unknown transform; the newest common node ties them together where this robot is now.

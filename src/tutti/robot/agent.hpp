@@ -24,6 +24,7 @@ namespace tutti::robot {
 struct AgentConfig {
   SubmapConfig submap;
   consistency::CompareConfig compare;
+  consistency::DisagreementConfig disagreement;
   consistency::PolicyConfig policy;
   consistency::LedgerConfig ledger;
   estimation::OnboardSmootherConfig smoother{.polishing_steps =
@@ -33,6 +34,7 @@ struct AgentConfig {
   void describe(V& v) {
     v.field("submap", submap);
     v.field("compare", compare);
+    v.field("disagreement", disagreement);
     v.field("policy", policy);
     v.field("ledger", ledger);
     v.field("smoother", smoother);
@@ -57,8 +59,7 @@ struct UpdateSummary {
   consistency::LedgerUpdate ledger;  ///< What became of the constraints.
   /// How the optimisation with them ended.
   estimation::Termination optimised = estimation::Termination::not_run;
-  /// They could not be solved, or a whole plan of them led farther from the map than odometry is: the ledger holds what
-  /// it held before, or nothing.
+  /// They could not be solved: the ledger holds what it held before, or nothing.
   bool taken_back = false;
   consistency::Explanation explanation;  ///< Of raw odometry against the server's map.
 };
@@ -138,7 +139,6 @@ class RobotAgent {
   void add_keyframe(const KeyframeStep& step, std::uint32_t submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
   estimation::Termination optimise();
-  [[nodiscard]] bool leads_astray(const ProxyGraph& graph) const;
   void locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                      std::span<const consistency::NodePair> pairs);
 

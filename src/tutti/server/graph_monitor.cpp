@@ -9,14 +9,13 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/chi_square.hpp"
 #include "tutti/base/random.hpp"
-#include "tutti/estimation/chi_square.hpp"
+#include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/server/map_components.hpp"
-#include "tutti/server/shape_ties.hpp"
-#include "tutti/server/shape_uncertainty.hpp"
 
 namespace tutti::server {
 namespace {
@@ -72,7 +71,7 @@ Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const std::vect
   if (closures.empty()) return Eigen::MatrixXd(static_cast<Eigen::Index>(6 * nodes.size()), 0);
   const double probability = 1.0 - kFalseHinge / static_cast<double>(closures.size());
   const auto influences = estimation::largest_influences(map.graph, map.graph.poses, closures, count,
-                                                         std::sqrt(estimation::chi_square_6_quantile(probability)));
+                                                         std::sqrt(chi_square_quantile(probability, 6.0)));
   Eigen::MatrixXd out(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(influences.size()));
   for (Eigen::Index c = 0; c < out.cols(); ++c)
     for (std::size_t k = 0; k < nodes.size(); ++k)
@@ -81,11 +80,37 @@ Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const std::vect
   return out;
 }
 
-/// Of every chain's nodes in the graph. The random numbers are always the same: the result is a function of the map.
-std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& graph,
-                                     const std::map<ChainId, std::vector<std::size_t>>& chosen,
-                                     const estimation::JointPosterior& posterior,
-                                     const consistency::ProxyGraphConfig& config) {
+/// Covariances of neighbouring spread nodes by odometry alone, as honest as `weights` make it and let go where it
+/// failed.
+std::vector<Matrix6d> spread_odometry(const MapEstimate& map, std::span<const std::size_t> spread,
+                                      std::span<const double> weights) {
+  std::vector<Matrix6d> out(spread.size(), Matrix6d::Zero());
+  // Odometry's edges are in the order of their ends; between submaps that are missing there is none, and no end to it.
+  std::size_t e = 0;
+  for (std::size_t k = 1; k < spread.size(); ++k) {
+    std::size_t reached = spread[k - 1];
+    while (e < map.odometry_edges && map.graph.edges[e].from < reached) ++e;
+    for (; e < map.odometry_edges && map.graph.edges[e].to <= spread[k]; ++e) {
+      const PoseGraphEdge& edge = map.graph.edges[e];
+      if (edge.from != reached) break;
+      out[k] = compound_covariance(edge.T_from_to, out[k], edge.information.inverse() / weights[e]);
+      reached = edge.to;
+    }
+    if (reached == spread[k]) continue;
+    out[k].setZero();
+    out[k].diagonal().head<3>().setConstant(kUnknownTranslation_m * kUnknownTranslation_m);
+    out[k].diagonal().tail<3>().setConstant(kUnknownRotation_rad * kUnknownRotation_rad);
+  }
+  return out;
+}
+
+/// How sure the map is of every chain in the graph. The random numbers are always the same: the result is a function of
+/// the map.
+std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyGraph& graph,
+                                            const std::map<ChainId, std::vector<std::size_t>>& chosen,
+                                            const estimation::JointPosterior& posterior,
+                                            std::span<const double> weights,
+                                            const consistency::ProxyGraphConfig& config) {
   std::vector<std::size_t> kept;  // indices into map.nodes of graph.nodes
   for (const auto& [chain, nodes] : chosen)
     for (const std::size_t i : nodes)
@@ -94,22 +119,21 @@ std::vector<ShapeUncertainty> shapes(const MapEstimate& map, const ProxyGraph& g
         kept.push_back(i);
   TUTTI_CHECK(kept.size() == graph.nodes.size(), "{} of {} nodes found", kept.size(), graph.nodes.size());
   const Eigen::MatrixXd samples =
-      posterior.samples(kept, static_cast<std::size_t>(config.shape_samples), Rng(0).fork("shape"));
-  std::vector<ShapeUncertainty> out;
+      posterior.samples(kept, static_cast<std::size_t>(config.shape_samples), Rng(0).fork("uncertainty"));
+  std::vector<ChainUncertainty> out;
   if (!samples.allFinite()) return out;
   const Eigen::MatrixXd shifts = shifts_without_a_closure(map, kept, static_cast<std::size_t>(config.shape_deletions));
   for (std::size_t begin = 0, end = 0; begin < kept.size(); begin = end) {
     const ChainId chain = graph.nodes[begin].chain;
-    std::vector<Pose3> poses;
-    std::vector<Matrix6d> steps;
-    for (; end < kept.size() && graph.nodes[end].chain == chain; ++end) {
-      poses.push_back(graph.nodes[end].T_world_body);
-      steps.push_back(graph.nodes[end].covariance);
-    }
+    while (end < kept.size() && graph.nodes[end].chain == chain) ++end;
+    std::vector<std::size_t> spread;
+    for (const std::size_t node : ChainUncertainty::spread(end - begin)) spread.push_back(kept[begin + node]);
     const auto first = static_cast<Eigen::Index>(6 * begin), rows = static_cast<Eigen::Index>(6 * (end - begin));
-    const Eigen::MatrixXd own_samples = samples.middleRows(first, rows), own_shifts = shifts.middleRows(first, rows);
-    out.push_back(shape_uncertainty(chain, poses, own_samples, own_shifts));
-    out.back().ties = shape_ties(poses, steps, own_samples, own_shifts, static_cast<std::size_t>(config.shape_ties));
+    out.push_back(consistency::chain_uncertainty(graph, chain,
+                                                 {.samples = samples.middleRows(first, rows),
+                                                  .shifts = shifts.middleRows(first, rows),
+                                                  .spread_covariance = posterior.covariance(spread),
+                                                  .spread_odometry = spread_odometry(map, spread, weights)}));
   }
   return out;
 }
@@ -126,45 +150,6 @@ std::vector<double> honest_weights(const MapEstimate& map) {
 
 }  // namespace
 
-std::vector<std::uint32_t> closure_support(const MapEstimate& map, const std::vector<std::size_t>& chosen) {
-  const std::size_t n = chosen.size();
-  std::vector<std::uint32_t> support(n, 0);
-  if (n == 0) return support;
-  const ChainId chain = map.nodes[chosen.front()].id.chain;
-  // Stretch k runs from chosen[k - 1] to chosen[k]. A keyframe lies before the stretches above `after`, and after the
-  // stretches up to `before`.
-  struct Place {
-    std::size_t before = 0;  // how many chosen nodes, less one, are at or before it (0 when none)
-    std::size_t after = 0;   // the first chosen node at or after it (n when none)
-  };
-  const auto place = [&](const KeyframeId& id) {
-    const auto index_of = [&](std::size_t node) { return map.nodes[node].id.index; };
-    const auto at_or_after = std::ranges::lower_bound(chosen, id.index, {}, index_of);
-    const auto beyond = std::ranges::upper_bound(chosen, id.index, {}, index_of);
-    return Place{beyond == chosen.begin() ? 0 : static_cast<std::size_t>(beyond - chosen.begin()) - 1,
-                 static_cast<std::size_t>(at_or_after - chosen.begin())};
-  };
-  std::map<ChainId, std::vector<Place>> ends_with;  // per other chain: where its closures end on this one
-  for (const JudgedClosure& judged : map.closures) {
-    if (!judged.accepted) continue;
-    const auto& [from, to, measurement] = judged.closure;
-    if (from.chain == chain && to.chain == chain) {
-      const auto& [first, last] = std::minmax({from, to});
-      const std::size_t end = place(last).before;
-      for (std::size_t k = place(first).after + 1; k <= end; ++k) ++support[k];
-    } else if (from.chain == chain || to.chain == chain) {
-      ends_with[from.chain == chain ? to.chain : from.chain].push_back(place(from.chain == chain ? from : to));
-    }
-  }
-  for (const auto& [other, ends] : ends_with)
-    for (std::size_t k = 1; k < n; ++k) {
-      const auto before = std::ranges::count_if(ends, [k](const Place& end) { return end.after < k; });
-      const auto after = std::ranges::count_if(ends, [k](const Place& end) { return end.before >= k; });
-      support[k] += static_cast<std::uint32_t>(std::min(before, after));
-    }
-  return support;
-}
-
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config) {
   auto chosen = choose_nodes(map);
   std::vector<std::pair<std::size_t, std::size_t>> stretches;
@@ -172,7 +157,8 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
     for (const auto& [first, last] : repairs(map, chain, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
   }
-  const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches, honest_weights(map));
+  const std::vector<double> weights = honest_weights(map);
+  const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches, weights);
   const std::vector<Matrix6d> covariances = posterior.relative_covariances();
 
   std::vector<consistency::ServerNode> nodes;
@@ -189,15 +175,13 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     }
     if (indices.empty()) continue;
     components.push_back({chain, map.nodes[indices.front()].component});
-    const std::vector<std::uint32_t> support = closure_support(map, indices);
     const std::size_t first_node = nodes.size();
     for (std::size_t k = 0; k < indices.size(); ++k) {
       const MapNode& node = map.nodes[indices[k]];
       nodes.push_back({.chain = chain,
                        .stamp = node.stamp,
                        .T_world_body = node.T_world_body,
-                       .covariance = k == 0 ? Matrix6d::Zero() : covariances[stretch++],
-                       .support = support[k]});
+                       .covariance = k == 0 ? Matrix6d::Zero() : covariances[stretch++]});
     }
     // Where odometry failed, the steps' errors are large but must add up to what the closures say, so they undo each
     // other, which a covariance per step cannot express. Equal shares of the whole stretch's add up to the right sum.
@@ -212,7 +196,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     }
   }
   ProxyGraph graph = consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
-  if (config.shape_samples > 0) graph.shapes = shapes(map, graph, chosen, posterior, config);
+  if (config.shape_samples > 0) graph.uncertainties = uncertainties(map, graph, chosen, posterior, weights, config);
   return graph;
 }
 

@@ -141,7 +141,7 @@ void expect_unharmed(const Inputs& in, const std::string& what, double most_m = 
   const ProxyGraph graph = monitor_graph(map, 1, {});
   EXPECT_TRUE(std::ranges::all_of(graph.nodes, [](const ProxyNode& n) { return n.covariance.allFinite(); })) << what;
   EXPECT_EQ(std::ranges::count(graph.nodes, ChainId(RobotId{0}), &ProxyNode::chain), 46) << what;
-  EXPECT_EQ(std::ranges::count(graph.shapes, ChainId(RobotId{0}), &ShapeUncertainty::chain), 1) << what;
+  EXPECT_EQ(std::ranges::count(graph.uncertainties, ChainId(RobotId{0}), &ChainUncertainty::chain), 1) << what;
 }
 
 /// Changes what robot 2 sent.

@@ -35,8 +35,8 @@ const char* name(MessageKind kind) {
 
 // What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions. Verdict: the same up to 4,
 // which said why a pair was refused in words only, and not by which version of the finder; 6 has sessions. Proxy graph:
-// 1 had no range coder, 2 landed with two codings that cannot be told apart, 3 had no ties, 4 no epoch and no sessions.
-// Cloud: came with 2, the same since.
+// up to 5 it told what it is unsure of in other terms, which no robot compares any more; nobody keeps one. Cloud: came
+// with 2, the same since.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
@@ -44,7 +44,7 @@ Versions versions(MessageKind kind) {
     case MessageKind::verdict:
       return {.oldest = 1, .current = 6};
     case MessageKind::proxy_graph:
-      return {.oldest = 3, .current = 5};
+      return {.oldest = 6, .current = 6};
     case MessageKind::cloud:
       return {.oldest = 2, .current = 4};
   }

@@ -96,57 +96,60 @@ TEST(Golden, ProxyGraph) {
   graph.epoch = 1'700'000'000'000'000'000;
   graph.revision = 42;
   const ChainId seven{RobotId{7}, 1'700'000'123};
-  graph.nodes = {{RobotId{0}, {1'000'000'001}, {Eigen::Quaterniond::Identity(), {0, 0, 0}}, Matrix6d::Zero(), 0},
-                 {RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}, diagonal(1e-4, 1e-6), 5},
-                 {seven, {2'000'000'000}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1}};
+  graph.nodes = {{RobotId{0}, {1'000'000'001}, {Eigen::Quaterniond::Identity(), {0, 0, 0}}, Matrix6d::Zero()},
+                 {RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}, diagonal(1e-4, 1e-6)},
+                 {seven, {2'000'000'000}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero()}};
   for (std::int64_t k = 1; k < 9; ++k)
-    graph.nodes.push_back({seven, {2'000'000'000 + k}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero(), 1});
+    graph.nodes.push_back({seven, {2'000'000'000 + k}, {kQuarterTurn, {-9, 100, 2}}, Matrix6d::Zero()});
   graph.components = {{RobotId{0}, 0}, {seven, 1}};
   graph.reduced = true;
   graph.edges = {{0, 1, 0.625}};
   graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
-  graph.shapes = {{RobotId{0}, {0.25, 0.0}, {}, {}}, {seven, {0.5, 0.01}, {{{0.03, 0.002}}}, {{0, 8, {0.05, 0.004}}}}};
-  const auto check = [&](const ProxyGraphMessage& decoded, unsigned version) {
-    const auto chain_of = [&](const ChainId& chain) { return version < 5 ? ChainId(chain.robot) : chain; };
+  graph.uncertainties = {{RobotId{0}, {0.25, 0.0}, {}, {{{127, -5, 0}, {3, -127, 64}, 2.5, 0.02}}},
+                         {seven, {0.5, 0.01}, {{}, {{{0.03, 0.002}}, {120.0, 14.5}, {90.0, 8.25}}}, {}}};
+  const auto check = [&](const ProxyGraphMessage& decoded, unsigned) {
     EXPECT_EQ(decoded.header, message.header);
-    EXPECT_EQ(decoded.graph.epoch, version < 5 ? 0U : graph.epoch);
+    EXPECT_EQ(decoded.graph.epoch, graph.epoch);
     EXPECT_EQ(decoded.graph.revision, 42U);
     EXPECT_EQ(decoded.graph.radius_m, 7.0);
-    ASSERT_EQ(decoded.graph.components.size(), 2U);
-    EXPECT_EQ(decoded.graph.components[0], graph.components[0]);
-    EXPECT_EQ(decoded.graph.components[1], (ChainComponent{chain_of(seven), 1}));
+    EXPECT_EQ(decoded.graph.components, graph.components);
     ASSERT_EQ(decoded.graph.edges.size(), 1U);
     EXPECT_EQ(decoded.graph.edges[0].a, 0U);
     EXPECT_EQ(decoded.graph.edges[0].b, 1U);
     EXPECT_NEAR(decoded.graph.edges[0].weight, 0.625, 2e-4);
     EXPECT_EQ(decoded.graph.eliminated, graph.eliminated);
-    ASSERT_EQ(decoded.graph.shapes.size(), 2U);
-    EXPECT_EQ(decoded.graph.shapes[0].chain, ChainId(RobotId{0}));
-    EXPECT_NEAR(decoded.graph.shapes[0].whole.position_m, 0.25, 0.0125);
-    EXPECT_EQ(decoded.graph.shapes[0].whole.rotation_rad, 0.0);
-    EXPECT_TRUE(decoded.graph.shapes[0].sag.empty());
-    EXPECT_EQ(decoded.graph.shapes[1].chain, chain_of(seven));
-    ASSERT_EQ(decoded.graph.shapes[1].sag.size(), 1U);
-    ASSERT_EQ(decoded.graph.shapes[1].sag[0].size(), 1U);
-    EXPECT_NEAR(decoded.graph.shapes[1].sag[0][0].position_m, 0.03, 0.0015);
-    EXPECT_NEAR(decoded.graph.shapes[1].sag[0][0].rotation_rad, 0.002, 0.0001);
-    EXPECT_TRUE(decoded.graph.shapes[0].ties.empty());
-    ASSERT_EQ(decoded.graph.shapes[1].ties.size(), version < 4 ? 0U : 1U);
-    for (const ShapeTie& tie : decoded.graph.shapes[1].ties) {
-      EXPECT_EQ(tie.a, 0U);
-      EXPECT_EQ(tie.b, 8U);
-      EXPECT_NEAR(tie.sigma.position_m, 0.05, 0.0025);
-      EXPECT_NEAR(tie.sigma.rotation_rad, 0.004, 0.0002);
-    }
     ASSERT_EQ(decoded.graph.nodes.size(), graph.nodes.size());
     for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-      EXPECT_EQ(decoded.graph.nodes[i].chain, chain_of(graph.nodes[i].chain));
+      EXPECT_EQ(decoded.graph.nodes[i].chain, graph.nodes[i].chain);
       EXPECT_EQ(decoded.graph.nodes[i].stamp, graph.nodes[i].stamp);
-      EXPECT_EQ(decoded.graph.nodes[i].support, graph.nodes[i].support);
       EXPECT_LT(local(decoded.graph.nodes[i].T_world_body, graph.nodes[i].T_world_body).norm(), 5e-4);
     }
     EXPECT_EQ(decoded.graph.nodes[0].covariance, Matrix6d::Zero().eval());
     EXPECT_NEAR(decoded.graph.nodes[1].covariance(2, 2), 1e-4, 8e-6);
+
+    ASSERT_EQ(decoded.graph.uncertainties.size(), 2U);
+    const ChainUncertainty& first = decoded.graph.uncertainties[0];
+    const ChainUncertainty& second = decoded.graph.uncertainties[1];
+    EXPECT_EQ(first.chain, ChainId(RobotId{0}));
+    EXPECT_NEAR(first.whole.position_m, 0.25, 0.025);
+    EXPECT_EQ(first.whole.rotation_rad, 0.0);
+    EXPECT_TRUE(first.scales.empty());
+    ASSERT_EQ(first.directions.size(), 1U);
+    EXPECT_EQ(first.directions[0].position, graph.uncertainties[0].directions[0].position);
+    EXPECT_EQ(first.directions[0].rotation, graph.uncertainties[0].directions[0].rotation);
+    EXPECT_NEAR(first.directions[0].rotation_scale, 2.5, 0.0025);
+    EXPECT_NEAR(first.directions[0].sigma, 0.02, 2e-5);
+    EXPECT_EQ(second.chain, seven);
+    ASSERT_EQ(second.scales.size(), 2U);
+    EXPECT_TRUE(second.scales[0].sigma.empty());
+    ASSERT_EQ(second.scales[1].sigma.size(), 1U);
+    EXPECT_NEAR(second.scales[1].sigma[0].position_m, 0.03, 0.003);
+    EXPECT_NEAR(second.scales[1].sigma[0].rotation_rad, 0.002, 0.0002);
+    EXPECT_NEAR(second.scales[1].position.mean, 120.0, 0.12);
+    EXPECT_NEAR(second.scales[1].position.degrees, 14.5, 0.015);
+    EXPECT_NEAR(second.scales[1].rotation.mean, 90.0, 0.09);
+    EXPECT_NEAR(second.scales[1].rotation.degrees, 8.25, 0.009);
+    EXPECT_TRUE(second.directions.empty());
   };
   for_every_version(MessageKind::proxy_graph, encode(message), decode_proxy_graph, check);
 }

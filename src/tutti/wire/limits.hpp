@@ -11,7 +11,6 @@ inline constexpr std::size_t kMaxKeyframes = 10'000;         ///< Per submap.
 inline constexpr std::size_t kMaxCloudPoints = 1'000'000;
 inline constexpr std::size_t kMaxProxyNodes = 200'000;  ///< Also of eliminated ones.
 inline constexpr std::size_t kMaxProxyEdges = 1'000'000;
-inline constexpr std::size_t kMaxTies = 1'000;      ///< Per chain.
 inline constexpr std::size_t kMaxClosures = 1'000;  ///< Per verdict.
 
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.

@@ -13,9 +13,9 @@
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/columns.hpp"
 #include "tutti/wire/internal/integer_coder.hpp"
+#include "tutti/wire/internal/logarithm.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/quantise.hpp"
-#include "tutti/wire/internal/shape.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -35,8 +35,7 @@ struct Run {
   Clock clock;
   std::size_t nodes = 0;
   std::size_t eliminated = 0;
-  bool has_shape = false;
-  std::size_t ties = 0;
+  bool has_uncertainty = false;
 };
 
 // One routine serves both ways, so that they cannot differ: it hands each number to code(model, number), which writes
@@ -91,26 +90,21 @@ class NodeColumns {
       change = difference(covariance[i], previous_covariance_[i]);
     }
     previous_covariance_ = covariance;
-    const std::int64_t support = sum(previous_support_, coder.code(support_, node.support - previous_support_));
 
     const auto T_previous_body = dequantise(motion, kProxyPoseSteps);
     const auto matrix = dequantise(covariance, kProxyCovarianceSteps);
-    if (!T_previous_body || !matrix || support < 0 || support > std::numeric_limits<std::uint32_t>::max())
-      return std::nullopt;
-    previous_support_ = support;
+    if (!T_previous_body || !matrix) return std::nullopt;
     T_world_previous_ = T_world_previous_ * *T_previous_body;
     if (T_world_previous_.translation.cwiseAbs().maxCoeff() > kMaxCoordinate_m + 1.0) return std::nullopt;
-    return ProxyNode{run.chain, stamp, T_world_previous_, *matrix, static_cast<std::uint32_t>(support)};
+    return ProxyNode{run.chain, stamp, T_world_previous_, *matrix};
   }
 
  private:
   StampColumn stamps_;
   std::array<IntegerModel, 6> motion_;
   std::array<IntegerModel, 21> covariance_;
-  IntegerModel support_;
   Pose3 T_world_previous_;
   CovarianceCode previous_covariance_{};
-  std::int64_t previous_support_ = 0;
 };
 
 /// Edges, in few bits when sorted. The logarithm of the weight is rounded; 0 stays 0.
@@ -140,60 +134,80 @@ class EdgeColumns {
   IntegerModel a_, first_b_, next_b_, positive_, log_weight_;
 };
 
-/// Shapes: `whole`, then the sags of scale after scale, each by its difference to the one before it along the way; the
-/// first of a scale to the first of the scale before. Then the ties: the first node by its distance to that of the tie
-/// before, how far the second one is, and the sigmas, by their differences.
-class ShapeColumns {
+/// Uncertainties: `whole`, then scale after scale, the sigmas each by their difference to the block before, then the
+/// directions.
+class UncertaintyColumns {
  public:
   /// Nothing when a number is outside what encoding makes.
   template <class Coder>
-  std::optional<ShapeUncertainty> code(Coder& coder, const Run& run, const ShapeUncertainty& shape) {
-    ShapeUncertainty out{.chain = run.chain};
-    SigmaCode first{};
-    const auto whole = code(coder, whole_, shape.whole, first);
-    if (!whole) return std::nullopt;
-    out.whole = *whole;
-    for (std::size_t j = 0; const std::size_t count = ShapeUncertainty::stretches(run.nodes, j); ++j) {
-      SigmaCode previous = first;
-      auto& scale = out.sag.emplace_back();
-      for (std::size_t i = 0; i < count; ++i) {
-        const ShapeSigma& sag = shape.sag.empty() ? ShapeSigma{} : shape.sag[j][i];
-        const auto sigma = code(coder, i == 0 ? first_ : next_, sag, previous);
-        if (!sigma) return std::nullopt;
-        scale.push_back(*sigma);
-        if (i == 0) first = previous;
+  std::optional<ChainUncertainty> code(Coder& coder, const Run& run, const ChainUncertainty& in) {
+    ChainUncertainty out{.chain = run.chain};
+    SigmaCode previous{};
+    if (!code(coder, whole_, in.whole, previous, out.whole)) return std::nullopt;
+    const auto scales = coder.code(count_, static_cast<std::int64_t>(in.scales.size()));
+    if (scales < 0 || scales > static_cast<std::int64_t>(ChainUncertainty::kMostScales)) return std::nullopt;
+    for (std::size_t s = 0; s < static_cast<std::size_t>(scales); ++s) {
+      const ScaleUncertainty scale = s < in.scales.size() ? in.scales[s] : ScaleUncertainty{};
+      auto& made = out.scales.emplace_back();
+      if (coder.code(has_sigma_, scale.sigma.empty() ? 0 : 1) == 0) continue;
+      if (!code(coder, scale.position, made.position) || !code(coder, scale.rotation, made.rotation))
+        return std::nullopt;
+      for (std::size_t b = 0; b < ChainUncertainty::blocks(run.nodes); ++b) {
+        const PoseSigma sigma = scale.sigma.empty() ? PoseSigma{} : scale.sigma[b];
+        if (!code(coder, b == 0 ? first_ : next_, sigma, previous, made.sigma.emplace_back())) return std::nullopt;
       }
     }
-    SigmaCode previous{};
-    std::int64_t a = 0, length = 0;
-    for (std::size_t i = 0; i < run.ties; ++i) {
-      const ShapeTie tie = shape.ties.empty() ? ShapeTie{} : shape.ties[i];
-      a = sum(a, coder.code(tie_from_, difference(tie.a, a)));
-      length = sum(length, coder.code(tie_length_, difference(difference(tie.b, tie.a), length)));
-      const auto sigma = code(coder, tie_sigma_, tie.sigma, previous);
-      const auto nodes = static_cast<std::int64_t>(run.nodes);
-      if (!sigma || a < 0 || a >= nodes || length <= 0 || length >= nodes - a) return std::nullopt;
-      out.ties.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(a + length), *sigma});
-    }
+    const auto directions = coder.code(count_, static_cast<std::int64_t>(in.directions.size()));
+    if (directions < 0 || directions > static_cast<std::int64_t>(ChainUncertainty::kMostDirections))
+      return std::nullopt;
+    for (std::size_t d = 0; d < static_cast<std::size_t>(directions); ++d)
+      if (!code(coder, run, d < in.directions.size() ? in.directions[d] : KnownDirection{},
+                out.directions.emplace_back()))
+        return std::nullopt;
     return out;
   }
 
  private:
+  static constexpr int kSigmaSteps = 8;
+  static constexpr int kFineSteps = 1024;
   using SigmaCode = std::array<std::int64_t, 2>;
   using Models = std::array<IntegerModel, 2>;
   /// `previous` becomes this one's code.
   template <class Coder>
-  static std::optional<ShapeSigma> code(Coder& coder, Models& models, const ShapeSigma& sigma, SigmaCode& previous) {
-    const SigmaCode wanted{quantise_sigma(sigma.position_m), quantise_sigma(sigma.rotation_rad)};
+  static bool code(Coder& coder, Models& models, const PoseSigma& sigma, SigmaCode& previous, PoseSigma& out) {
+    const SigmaCode wanted{quantise_log(sigma.position_m, kSigmaSteps), quantise_log(sigma.rotation_rad, kSigmaSteps)};
     for (std::size_t k = 0; k < 2; ++k)
       previous[k] = sum(previous[k], coder.code(models[k], difference(wanted[k], previous[k])));
-    const auto position_m = dequantise_sigma(previous[0]);
-    const auto rotation_rad = dequantise_sigma(previous[1]);
-    if (!position_m || !rotation_rad) return std::nullopt;
-    return ShapeSigma{*position_m, *rotation_rad};
+    const auto position_m = dequantise_log(previous[0], kSigmaSteps);
+    const auto rotation_rad = dequantise_log(previous[1], kSigmaSteps);
+    if (position_m && rotation_rad) out = {*position_m, *rotation_rad};
+    return position_m && rotation_rad;
   }
-  Models whole_, first_, next_, tie_sigma_;
-  IntegerModel tie_from_, tie_length_;
+  template <class Coder>
+  bool code_fine(Coder& coder, double value, double& out) {
+    const auto made = dequantise_log(coder.code(fine_, quantise_log(value, kFineSteps)), kFineSteps);
+    if (made) out = *made;
+    return made.has_value();
+  }
+  template <class Coder>
+  bool code(Coder& coder, const Energy& energy, Energy& out) {
+    return code_fine(coder, energy.mean, out.mean) && code_fine(coder, energy.degrees, out.degrees);
+  }
+  template <class Coder>
+  bool code(Coder& coder, const Run& run, const KnownDirection& in, KnownDirection& out) {
+    if (!code_fine(coder, in.rotation_scale, out.rotation_scale) || !code_fine(coder, in.sigma, out.sigma))
+      return false;
+    const std::size_t spread = ChainUncertainty::spread(run.nodes).size();
+    for (std::size_t i = 0; i + 3 < 3 * spread; ++i)
+      for (const auto member : {&KnownDirection::position, &KnownDirection::rotation}) {
+        const auto number = coder.code(number_, i < (in.*member).size() ? (in.*member)[i] : 0);
+        if (number < -127 || number > 127) return false;
+        (out.*member).push_back(static_cast<std::int8_t>(number));
+      }
+    return true;
+  }
+  Models whole_, first_, next_;
+  IntegerModel count_, has_sigma_, fine_, number_;
 };
 
 std::vector<Run> runs_of(const ProxyGraph& graph) {
@@ -210,10 +224,7 @@ std::vector<Run> runs_of(const ProxyGraph& graph) {
   };
   add(graph.nodes, &Run::nodes);
   add(graph.eliminated, &Run::eliminated);
-  for (const ShapeUncertainty& shape : graph.shapes) {
-    runs[shape.chain].has_shape = true;
-    runs[shape.chain].ties = shape.ties.size();
-  }
+  for (const ChainUncertainty& uncertainty : graph.uncertainties) runs[uncertainty.chain].has_uncertainty = true;
   std::vector<Run> out;
   for (auto& [chain, run] : runs) {
     run.clock.step_ns = std::max<std::uint64_t>(run.clock.step_ns, 1);
@@ -234,14 +245,11 @@ Result<std::vector<Run>> read_runs(const v1::ProxyGraph& in) {
                   kMaxProxyNodes);
     if (run.stamp_step_ns() == 0)
       return fail(ErrorCode::invalid, "robot {}: a step of 0 ns between stamps", run.robot());
-    if (run.ties() > kMaxTies)
-      return fail(ErrorCode::invalid, "robot {}: {} ties, at most {} are accepted", run.robot(), run.ties(), kMaxTies);
     runs.push_back({{RobotId{run.robot()}, run.session()},
                     {static_cast<std::uint64_t>(run.stamp_offset_ns()), run.stamp_step_ns()},
                     run.nodes(),
                     run.eliminated(),
-                    run.shape(),
-                    run.ties()});
+                    run.uncertainty()});
   }
   return runs;
 }
@@ -250,17 +258,17 @@ void write_body(const ProxyGraph& graph, const std::vector<Run>& runs, v1::Proxy
   Writer writer;
   NodeColumns nodes;
   StampColumn eliminated;
-  ShapeColumns shapes;
+  UncertaintyColumns uncertainties;
   auto node = graph.nodes.begin();
   auto gone = graph.eliminated.begin();
-  auto shape = graph.shapes.begin();
+  auto uncertainty = graph.uncertainties.begin();
   for (const Run& run : runs) {
     nodes.start_run();
     eliminated.start_run();
     for (std::size_t i = 0; i < run.nodes; ++i)
       TUTTI_CHECK(nodes.code(writer, run, *node++).has_value(), "node {} of robot {}", i, to_string(run.chain));
     for (std::size_t i = 0; i < run.eliminated; ++i) eliminated.code(writer, run.clock, (gone++)->stamp);
-    if (run.has_shape) shapes.code(writer, run, *shape++);
+    if (run.has_uncertainty) uncertainties.code(writer, run, *uncertainty++);
   }
   EdgeColumns edges;
   const auto count = static_cast<std::int64_t>(graph.nodes.size());
@@ -276,7 +284,7 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
   Reader reader{RangeDecoder(in.body())};
   NodeColumns nodes;
   StampColumn eliminated;
-  ShapeColumns shapes;
+  UncertaintyColumns uncertainties;
   for (const Run& run : runs) {
     nodes.start_run();
     eliminated.start_run();
@@ -287,10 +295,11 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
     }
     for (std::size_t i = 0; i < run.eliminated && !reader.in.overrun(); ++i)
       graph.eliminated.push_back({run.chain, eliminated.code(reader, run.clock, {})});
-    if (!run.has_shape || reader.in.overrun()) continue;
-    auto shape = shapes.code(reader, run, {});
-    if (!shape) return fail(ErrorCode::invalid, "the shape of robot {} is out of range", to_string(run.chain));
-    graph.shapes.push_back(std::move(*shape));
+    if (!run.has_uncertainty || reader.in.overrun()) continue;
+    auto uncertainty = uncertainties.code(reader, run, {});
+    if (!uncertainty)
+      return fail(ErrorCode::invalid, "the uncertainty of robot {} is out of range", to_string(run.chain));
+    graph.uncertainties.push_back(std::move(*uncertainty));
   }
   EdgeColumns edges;
   for (std::size_t i = 0; i < in.edges() && !reader.in.overrun(); ++i) {
@@ -341,8 +350,7 @@ std::string encode(const ProxyGraphMessage& message) {
     entry.set_eliminated(static_cast<std::uint32_t>(run.eliminated));
     entry.set_stamp_offset_ns(static_cast<std::int64_t>(run.clock.offset_ns));
     entry.set_stamp_step_ns(run.clock.step_ns);
-    entry.set_shape(run.has_shape);
-    entry.set_ties(static_cast<std::uint32_t>(run.ties));
+    entry.set_uncertainty(run.has_uncertainty);
   }
   write_body(graph, runs, out);
   const bool sessions = std::ranges::any_of(graph.components, [](const auto& c) { return c.chain.session != 0; });

@@ -7,7 +7,6 @@
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/wire/codec.hpp"
-#include "tutti/wire/internal/shape.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -101,48 +100,64 @@ Status check_nodes(const ProxyGraph& graph) {
   return check_order(graph.nodes, "node");
 }
 
-Status check_shape(const ShapeUncertainty& shape, std::size_t nodes) {
-  if (nodes == 0) return fail(ErrorCode::invalid, "the robot has no nodes");
-  std::size_t scales = 0;
-  while (ShapeUncertainty::stretches(nodes, scales) > 0) ++scales;
-  if (shape.sag.size() != scales)
-    return fail(ErrorCode::invalid, "{} scales, expected {} of {} nodes", shape.sag.size(), scales, nodes);
+Status check_sigma(const PoseSigma& sigma) {
   const auto is_sigma = [](double value) { return std::isfinite(value) && value >= 0.0; };
-  const auto check = [&](const ShapeSigma& sigma) -> Status {
-    if (is_sigma(sigma.position_m) && is_sigma(sigma.rotation_rad)) return {};
-    return fail(ErrorCode::invalid, "a sigma of {} m, {} rad, expected finite ones >= 0", sigma.position_m,
-                sigma.rotation_rad);
-  };
-  if (auto ok = check(shape.whole); !ok) return ok;
-  for (std::size_t j = 0; j < scales; ++j) {
-    if (shape.sag[j].size() != ShapeUncertainty::stretches(nodes, j))
-      return fail(ErrorCode::invalid, "{} stretches of scale {}, expected {} of {} nodes", shape.sag[j].size(), j,
-                  ShapeUncertainty::stretches(nodes, j), nodes);
-    for (const ShapeSigma& sigma : shape.sag[j])
-      if (auto ok = check(sigma); !ok) return ok;
+  if (is_sigma(sigma.position_m) && is_sigma(sigma.rotation_rad)) return {};
+  return fail(ErrorCode::invalid, "a sigma of {} m, {} rad, expected finite ones >= 0", sigma.position_m,
+              sigma.rotation_rad);
+}
+
+Status check_scale(const ScaleUncertainty& scale, std::size_t nodes) {
+  if (scale.sigma.empty()) return {};
+  if (scale.sigma.size() != ChainUncertainty::blocks(nodes))
+    return fail(ErrorCode::invalid, "{} sigmas, expected {} of {} nodes", scale.sigma.size(),
+                ChainUncertainty::blocks(nodes), nodes);
+  for (const PoseSigma& sigma : scale.sigma) {
+    if (auto ok = check_sigma(sigma); !ok) return ok;
+    if (!(sigma.position_m > 0.0 && sigma.rotation_rad > 0.0))
+      return fail(ErrorCode::invalid, "a sigma of {} m, {} rad, expected > 0", sigma.position_m, sigma.rotation_rad);
   }
-  if (auto ok = at_most(shape.ties.size(), kMaxTies, "ties"); !ok) return ok;
-  for (std::size_t i = 0; i < shape.ties.size(); ++i) {
-    const auto& [a, b, sigma] = shape.ties[i];
-    if (a >= b || b >= nodes)
-      return fail(ErrorCode::invalid, "tie {} joins nodes {} and {} of {}, expected the earlier one first", i, a, b,
-                  nodes);
-    if (i > 0 && std::pair(shape.ties[i - 1].a, shape.ties[i - 1].b) >= std::pair(a, b))
-      return fail(ErrorCode::invalid, "tie {} ({}, {}) does not come after the one before it", i, a, b);
-    if (auto ok = check(sigma); !ok) return ok;
-  }
+  for (const Energy& energy : {scale.position, scale.rotation})
+    if (!(std::isfinite(energy.mean) && energy.mean > 0.0 && std::isfinite(energy.degrees) && energy.degrees > 0.0))
+      return fail(ErrorCode::invalid, "an energy of {} with {} degrees of freedom, expected finite ones > 0",
+                  energy.mean, energy.degrees);
   return {};
 }
 
-Status check_shapes(const ProxyGraph& graph) {
-  for (std::size_t i = 0; i < graph.shapes.size(); ++i) {
-    const ChainId& chain = graph.shapes[i].chain;
-    if (i > 0 && chain <= graph.shapes[i - 1].chain)
-      return fail(ErrorCode::invalid, "the shape of robot {} does not come after robot {}'s", to_string(chain),
-                  to_string(graph.shapes[i - 1].chain));
-    const auto nodes = std::ranges::equal_range(graph.nodes, chain, {}, &ProxyNode::chain);
-    if (auto ok = check_shape(graph.shapes[i], nodes.size()); !ok)
-      return in_context("shape of robot " + to_string(chain), ok.error());
+Status check_direction(const KnownDirection& direction, std::size_t nodes) {
+  const std::size_t spread = ChainUncertainty::spread(nodes).size();
+  const std::size_t expected = spread == 0 ? 0 : 3 * (spread - 1);
+  if (direction.position.size() != expected || direction.rotation.size() != expected)
+    return fail(ErrorCode::invalid, "a direction of {} and {} numbers, expected {} of {} nodes",
+                direction.position.size(), direction.rotation.size(), expected, nodes);
+  for (const double value : {direction.sigma, direction.rotation_scale})
+    if (!std::isfinite(value) || value <= 0.0)
+      return fail(ErrorCode::invalid, "a direction with sigma {} and ratio {}, expected finite ones > 0",
+                  direction.sigma, direction.rotation_scale);
+  return {};
+}
+
+Status check_uncertainty(const ChainUncertainty& uncertainty, std::size_t nodes) {
+  if (nodes == 0) return fail(ErrorCode::invalid, "the robot has no nodes");
+  for (const auto& ok :
+       {check_sigma(uncertainty.whole), at_most(uncertainty.scales.size(), ChainUncertainty::kMostScales, "scales"),
+        at_most(uncertainty.directions.size(), ChainUncertainty::kMostDirections, "directions")})
+    if (!ok) return ok;
+  for (const ScaleUncertainty& scale : uncertainty.scales)
+    if (auto ok = check_scale(scale, nodes); !ok) return ok;
+  for (const KnownDirection& direction : uncertainty.directions)
+    if (auto ok = check_direction(direction, nodes); !ok) return ok;
+  return {};
+}
+
+Status check_uncertainties(const ProxyGraph& graph) {
+  for (std::size_t i = 0; i < graph.uncertainties.size(); ++i) {
+    const ChainId& chain = graph.uncertainties[i].chain;
+    if (i > 0 && chain <= graph.uncertainties[i - 1].chain)
+      return fail(ErrorCode::invalid, "the uncertainty of robot {} does not come after robot {}'s", to_string(chain),
+                  to_string(graph.uncertainties[i - 1].chain));
+    if (auto ok = check_uncertainty(graph.uncertainties[i], nodes_of(graph, chain).size()); !ok)
+      return in_context("uncertainty of robot " + to_string(chain), ok.error());
   }
   return {};
 }
@@ -162,7 +177,7 @@ Status check_graph(const ProxyGraph& graph) {
       return fail(ErrorCode::invalid, "robot {} has two components", to_string(component.chain));
   if (auto ok = check_nodes(graph); !ok) return ok;
   if (auto ok = check_order(graph.eliminated, "eliminated node"); !ok) return ok;
-  if (auto ok = check_shapes(graph); !ok) return ok;
+  if (auto ok = check_uncertainties(graph); !ok) return ok;
   return check_edges(graph);
 }
 

@@ -5,8 +5,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "tutti/consistency/chain_agreement.hpp"
+#include "tutti/base/chi_square.hpp"
+#include "tutti/consistency/internal/odometry_drift.hpp"
+#include "tutti/geometry/stretch_covariance.hpp"
 
 namespace tutti::consistency::internal {
 namespace {
@@ -58,43 +61,66 @@ std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
   return out;
 }
 
-/// The server's variance of a relative pose over `length` nodes where it knows its map well (lower quartile): a
-/// relative position is two sags of half the length apart, or less. Not as it knows it there: where odometry failed the
-/// server is unsure of what lies inside the stretch, but not of how its ends lie to each other.
-ShapeSigma server_variance(const ShapeUncertainty* shape, std::size_t length) {
-  if (shape == nullptr || shape->sag.empty()) return {};
-  const double octave =
-      std::log2(std::max(1.0, static_cast<double>(length) / 2.0 / static_cast<double>(ShapeUncertainty::kShortest)));
-  const auto& stretches = shape->sag[std::min(shape->sag.size() - 1, static_cast<std::size_t>(std::lround(octave)))];
-  std::vector<double> metres, radians;
-  for (const ShapeSigma& sigma : stretches) {
-    metres.push_back(sigma.position_m);
-    radians.push_back(sigma.rotation_rad);
+/// The server's variance of a relative pose over so many nodes where it knows its map well (lower quartile over the
+/// blocks), by length: scales shorter than the stretch move both ends, of longer ones only the slope counts. Not as it
+/// knows it there: where odometry failed the server is unsure of what lies inside the stretch, but not of how its ends
+/// lie to each other.
+std::vector<PoseSigma> server_variances(const DisagreementTest& test, const ChainUncertainty* uncertainty,
+                                        std::size_t nodes) {
+  std::vector<PoseSigma> out(nodes);
+  if (uncertainty == nullptr) return out;
+  const double spacing_m = std::max(1e-3, test.scale_length_m(0) / static_cast<double>(nodes));
+  for (std::size_t s = 0; s < uncertainty->scales.size(); ++s) {
+    std::vector<double> metres, radians;
+    for (const PoseSigma& sigma : uncertainty->scales[s].sigma) {
+      metres.push_back(sigma.position_m);
+      radians.push_back(sigma.rotation_rad);
+    }
+    if (metres.empty()) continue;
+    const double usual_m = quantile(metres, 0.25), usual_rad = quantile(radians, 0.25);
+    const double scale_length = std::max(1.0, test.scale_length_m(static_cast<int>(s)) / spacing_m);
+    for (std::size_t length = 0; length < nodes; ++length) {
+      const double share = 2.0 * std::pow(std::min(1.0, static_cast<double>(length) / scale_length), 2);
+      out[length].position_m += share * usual_m * usual_m;
+      out[length].rotation_rad += share * usual_rad * usual_rad;
+    }
   }
-  return {2.0 * std::pow(quantile(metres, 0.25), 2), 2.0 * std::pow(quantile(radians, 0.25), 2)};
+  return out;
+}
+
+/// By covariance of the steps.
+StretchCovariance stretches(std::span<const Pose3> poses, std::span<const RelativePose> steps) {
+  std::vector<Matrix6d> covariances;
+  for (const RelativePose& step : steps) covariances.push_back(step.covariance);
+  return {poses, covariances};
 }
 
 class Scan {
  public:
-  Scan(const TimeChain& chain, const ShapeUncertainty* shape)
-      : usual_(chain.server, usual_odometry(chain), 1.0), stated_(chain.server, chain.odometry, 1.0) {
-    for (std::size_t length = 0; length < chain.server.size(); ++length)
-      server_.push_back(server_variance(shape, length));
-  }
+  Scan(const TimeChain& chain, std::vector<PoseSigma> server)
+      : poses_(chain.server),
+        drift_(chain.server, chain.odometry),
+        usual_(stretches(chain.server, usual_odometry(chain))),
+        stated_(stretches(chain.server, chain.odometry)),
+        server_(std::move(server)) {}
 
   [[nodiscard]] double statistic(std::size_t a, std::size_t b) const { return statistic(usual_, a, b); }
   [[nodiscard]] double stated_statistic(std::size_t a, std::size_t b) const { return statistic(stated_, a, b); }
 
  private:
-  [[nodiscard]] double statistic(const OdometryError& error, std::size_t a, std::size_t b) const {
-    const Vector6d missed = error.missed(a, b);
-    Matrix6d C = error.missed_covariance(a, b);
+  [[nodiscard]] double statistic(const StretchCovariance& odometry, std::size_t a, std::size_t b) const {
+    Vector6d missed = drift_.missed(a, b);  // turned into the axes of pose b, as the covariance
+    const Eigen::Quaterniond to_b = poses_[b].rotation.conjugate();
+    missed << to_b * missed.head<3>(), to_b * missed.tail<3>();
+    Matrix6d C = odometry(a, b);
     C.diagonal().head<3>().array() += server_[b - a].position_m + 1e-6;
     C.diagonal().tail<3>().array() += server_[b - a].rotation_rad + 1e-7;
     return missed.dot(C.llt().solve(missed));
   }
-  OdometryError usual_, stated_;
-  std::vector<ShapeSigma> server_;  // variances by length
+  std::span<const Pose3> poses_;
+  OdometryDrift drift_;
+  StretchCovariance usual_, stated_;
+  std::vector<PoseSigma> server_;  // variances by length
 };
 
 struct Stretch {
@@ -142,11 +168,12 @@ void settle(const Scan& scan, Stretch& s, std::size_t low, std::size_t high) {
 
 }  // namespace
 
-std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const ShapeUncertainty* shape, double probability) {
+std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const DisagreementTest& test,
+                                          const ChainUncertainty* uncertainty, double probability) {
   const std::size_t nodes = chain.server.size();
   std::vector<DriftStretch> out;
   if (nodes < 4) return out;
-  const Scan scan(chain, shape);
+  const Scan scan(chain, server_variances(test, uncertainty, nodes));
   // Stretches that overlap tell much the same: about as many independent ones as nodes.
   const double threshold = chi_square_exceeded_with(probability / static_cast<double>(nodes), kDegrees);
   std::vector<Stretch> found = candidates(scan, nodes, threshold);

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "tutti/consistency/internal/odometry_error.hpp"
+#include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/internal/time_chain.hpp"
 
 namespace tutti::consistency::internal {
@@ -22,6 +22,7 @@ struct DriftStretch {
 /// degrees of freedom beyond `probability` shared by all stretches. Of stretches that stand out nearly alike the
 /// shortest is meant. Odometry's covariance is taken as it usually is (per metre, median over the run: a covariance
 /// that odometry itself has inflated does not hide anything), plus the server's own uncertainty over the stretch.
-std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const ShapeUncertainty* shape, double probability);
+std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const DisagreementTest& test,
+                                          const ChainUncertainty* uncertainty, double probability);
 
 }  // namespace tutti::consistency::internal

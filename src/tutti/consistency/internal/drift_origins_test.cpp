@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <numeric>
+#include <algorithm>
 
 #include "tutti/consistency/testing/uncertainty.hpp"
 
@@ -23,7 +23,7 @@ struct Failure {
 
 struct Scene {
   TimeChain chain;
-  ShapeUncertainty shape;
+  ProxyGraph graph;
 };
 
 Scene scene(std::uint64_t seed, const std::vector<Failure>& failures) {
@@ -45,13 +45,17 @@ Scene scene(std::uint64_t seed, const std::vector<Failure>& failures) {
     out.chain.odometry.push_back(step);
   }
   out.chain.robot = out.chain.server;
-  out.chain.ranks.resize(kNodes);
-  std::iota(out.chain.ranks.begin(), out.chain.ranks.end(), 0U);
-  out.shape = test::shape_of(test::kAlpha, map, kNodes);
+  out.graph = build_proxy_graph(1, test::server_nodes(test::kAlpha, out.chain.server), {}, {});
+  out.graph.uncertainties = {test::uncertainty_by(map, out.graph, test::kAlpha)};
   return out;
 }
 
-std::vector<DriftStretch> stretches(const Scene& s) { return drift_stretches(s.chain, &s.shape, kRate); }
+std::vector<DriftStretch> stretches(const Scene& s) {
+  std::vector<NodePair> pairs;
+  for (std::size_t n = 0; n < kNodes; ++n) pairs.push_back({n, n});
+  return drift_stretches(s.chain, DisagreementTest(s.graph, test::kAlpha, pairs, 1, {}), &s.graph.uncertainties[0],
+                         kRate);
+}
 
 /// Sorted, apart from each other (they may touch), within the run, above their threshold.
 void expect_in_order(const std::vector<DriftStretch>& found) {
@@ -120,12 +124,14 @@ TEST(DriftStretches, FindsAFlaggedSlideAndRaisesNone) {
 
 TEST(DriftStretches, FindsASingleJumpToTheNode) {
   const Failure jump{.first = 89, .last = 90, .slide = {so3_exp(Eigen::Vector3d(0, 0, 0.1)), {0.5, 0.3, 0}}};
+  std::size_t others = 0;
   for (const auto& found : runs_with({jump})) {
-    ASSERT_EQ(found.size(), 1U);
-    EXPECT_EQ(found[0].first, 89U);
-    EXPECT_EQ(found[0].last, 90U);
-    EXPECT_TRUE(found[0].alert);
+    EXPECT_TRUE(std::ranges::any_of(found, [](const DriftStretch& s) {
+      return s.first == 89 && s.last == 90 && s.alert && s.significance > 10.0;
+    }));
+    others += found.empty() ? 0 : found.size() - 1;
   }
+  EXPECT_LE(others, 2U);  // 0.4 asked for
 }
 
 TEST(DriftStretches, FindsTwoFailuresApart) {

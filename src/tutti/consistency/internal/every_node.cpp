@@ -7,7 +7,7 @@ namespace tutti::consistency::internal {
 Selection EveryNodePolicy::choose(const PolicyInput& input) const {
   PolicyInput unlimited = input;
   unlimited.budget.reset();
-  LinkCollector collector(unlimited, config_.constraint, true);
+  LinkCollector collector(unlimited, true);
   const std::size_t nodes = input.comparison.pairs.size();
   for (std::size_t i = 0; i < nodes; ++i)
     for (std::size_t hop = 1; hop <= static_cast<std::size_t>(reach_) && i + hop < nodes; ++hop)

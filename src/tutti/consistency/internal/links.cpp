@@ -68,9 +68,9 @@ std::vector<Link> Neighbourhood::submap_links(std::size_t node) const {
   return out;
 }
 
-LinkCollector::LinkCollector(const PolicyInput& input, const ConstraintConfig& config, bool from_scratch)
+LinkCollector::LinkCollector(const PolicyInput& input, bool from_scratch)
     : input_(input),
-      maker_(input.graph, input.chain, input.nodes, input.comparison.pairs, config),
+      maker_(input.graph, input.chain, input.nodes, input.comparison.pairs),
       from_scratch_(from_scratch) {
   selection_.replaces_all = from_scratch && maker_.size() >= 2;
   if (from_scratch) return;
@@ -88,12 +88,6 @@ void LinkCollector::add(Link link, ConstraintKind kind) {
   if (!linked_.emplace(std::min(link.a, link.b), std::max(link.a, link.b)).second) return;
   selection_.constraints.push_back(maker_.make(link.a, link.b, kind));
   ++added_;
-}
-
-void LinkCollector::add(Link link, ConstraintKind kind, const Pose3& T_a_b) {
-  const std::size_t before = added_;
-  add(link, kind);
-  if (added_ > before) selection_.constraints.back().measurement.T_a_b = T_a_b;
 }
 
 void LinkCollector::add(const std::vector<Link>& links, ConstraintKind kind) {

@@ -50,13 +50,11 @@ class Neighbourhood {
 class LinkCollector {
  public:
   /// `from_scratch`: the ledger's constraints do not count (the selection will replace them all).
-  LinkCollector(const PolicyInput& input, const ConstraintConfig& config, bool from_scratch);
+  LinkCollector(const PolicyInput& input, bool from_scratch);
 
   [[nodiscard]] bool full() const { return input_.budget && held_ + added_ >= *input_.budget; }
   /// Ignored when full, or when the two nodes are linked already (here, or in the ledger unless from scratch).
   void add(Link link, ConstraintKind kind);
-  /// The same with a relative pose T_a_b of the caller's, a before b.
-  void add(Link link, ConstraintKind kind, const Pose3& T_a_b);
   void add(const std::vector<Link>& links, ConstraintKind kind);
   /// The new constraints; unless from scratch, before them every held constraint whose nodes are synchronised, measured
   /// again in the newest map: the ledger then decides whether it differs enough.

@@ -67,19 +67,6 @@ class RandomPolicy final : public ConstraintPolicy {
   PolicyConfig config_;
 };
 
-/// Ranks nodes by ||x_server - x_robot|| after laying node 0 of one on node 0 of the other; small- and mid-kind links
-/// to the largest first. Adds to what is there, up to the budget; without one, to every node above the threshold.
-class EuclideanPolicy final : public ConstraintPolicy {
- public:
-  explicit EuclideanPolicy(const PolicyConfig& config) : config_(config) {}
-  [[nodiscard]] std::string name() const override { return "euclidean"; }
-  [[nodiscard]] bool needs_budget() const override { return true; }
-  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
-
- private:
-  PolicyConfig config_;
-};
-
 /// Links that span runs of nodes, as long as the disagreement allows: one link over the whole run first; where the
 /// robot's raw chain, spread between the links' ends, is farthest from the server's map, a link is split in two; worst
 /// run first, until every node is within `skeleton_tolerance_m` (or the budget is used up). Chosen anew from raw
@@ -94,32 +81,22 @@ class SkeletonPolicy final : public ConstraintPolicy {
   PolicyConfig config_;
 };
 
-struct TimeChain;
-struct JointPlan;
-class OdometryError;
-
-/// Nothing while the robot's estimate differs from the server's only within the server's uncertainty (ChainAgreement).
-/// Once it has been told otherwise: the links that pay, bending raw odometry to the server's map (place_joints: each
-/// lowers the summed squared disagreement by `least_gain` nodes' worth of the server's own variance), so that their
-/// lengths follow the scale of the disagreement and their ends lie where drift was born; and more where what is left
-/// stands out at any scale. Planned afresh at every update; held links stay, measured anew in the newest map, unless
-/// the new plan is better by a link's worth, or does without any, as after a wrong closure is gone and the map has come
-/// back to raw odometry.
+/// Nothing while raw odometry differs from the server's map only within the server's uncertainty (DisagreementTest).
+/// Once it has been told otherwise: a chain of links over the whole run, held where the server has its ends; a run is
+/// split where odometry bent to the links is predicted to be farther from the map than `adaptive_error_share` of what
+/// the map itself is unsure of there, and where the same test still sees a difference. So the lengths of links follow
+/// the scale of the disagreement. Planned afresh at every update; no links again once odometry agrees well within the
+/// threshold, as after a wrong closure is gone.
 class AdaptivePolicy final : public ConstraintPolicy {
  public:
   explicit AdaptivePolicy(const PolicyConfig& config) : config_(config) {}
   [[nodiscard]] std::string name() const override { return "adaptive"; }
+  [[nodiscard]] bool needs_test() const override { return true; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
  private:
-  static constexpr double kLeastRmse_m = 2e-3;  ///< Poses on the wire are rounded to a quarter of it.
-  static constexpr double kRmseFactor = 3.0;
-  // What a radian counts: where links go, positions decide; how joints are turned, what that does to 10 m around them.
-  static constexpr double kPlacingLever_m = 0.3;
-  static constexpr double kFittingLever_m = 2.0;
-  [[nodiscard]] bool disagree(const ChainAgreement& test, const TimeChain& chain, double expected_rmse_m) const;
-  [[nodiscard]] JointPlan plan(const TimeChain& chain, const OdometryError& fitting, const ChainAgreement& test,
-                               std::size_t most, double least_gain) const;
+  static constexpr double kLeastError_m = 1e-3;  ///< Poses on the wire are rounded to half of it.
+  static constexpr double kLetGo = 0.5;          ///< Share of the threshold below which links held are given up.
   PolicyConfig config_;
 };
 

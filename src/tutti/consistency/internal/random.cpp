@@ -13,7 +13,7 @@ constexpr std::size_t kDrawsPerLink = 50;
 Selection RandomPolicy::choose(const PolicyInput& input) const {
   PolicyInput limited = input;
   if (!limited.budget) limited.budget = static_cast<std::size_t>(config_.default_budget);
-  LinkCollector collector(limited, config_.constraint, true);
+  LinkCollector collector(limited, true);
   const std::size_t nodes = input.comparison.pairs.size();
   if (nodes < 2) return std::move(collector).take();
   const Neighbourhood neighbourhood(input, config_);

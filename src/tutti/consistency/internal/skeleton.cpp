@@ -13,7 +13,7 @@ namespace {
 
 /// The robot's raw chain as a smoother; each run of odometry is compounded once, however often the joints change.
 estimation::OnboardSmoother make_smoother(const TimeChain& chain) {
-  estimation::OnboardSmoother smoother;
+  estimation::OnboardSmoother smoother({}, chain.server.front());
   for (std::size_t k = 1; k < chain.odometry.size(); ++k) smoother.append(chain.odometry[k]);
   return smoother;
 }
@@ -66,10 +66,10 @@ std::vector<std::size_t> worst_nodes(const std::vector<double>& disagreement, co
 }  // namespace
 
 Selection SkeletonPolicy::choose(const PolicyInput& input) const {
-  LinkCollector collector(input, config_.constraint, true);
+  LinkCollector collector(input, true);
   const std::size_t nodes = input.comparison.pairs.size();
   if (nodes < 2) return std::move(collector).take();
-  const TimeChain chain = time_chain(input.graph, input.chain, input.nodes, input.comparison.pairs);
+  const TimeChain chain = time_chain(input.graph, input.nodes, input.comparison.pairs);
   estimation::OnboardSmoother smoother = make_smoother(chain);
   std::vector<std::size_t> joints{0};
   const std::vector<double> raw = disagreements(chain, spread(smoother, chain, joints), false);

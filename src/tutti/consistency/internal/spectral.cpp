@@ -76,7 +76,7 @@ Selection SpectralPolicy::choose(const PolicyInput& input) const {
   const auto rows = static_cast<std::size_t>(input.comparison.disagreement.rows());
   TUTTI_CHECK(rows == input.comparison.pairs.size(), "disagreement of {} of {} pairs", rows,
               input.comparison.pairs.size());
-  LinkCollector collector(input, config_.constraint, false);
+  LinkCollector collector(input, false);
   const Eigen::MatrixX3d sums = group_sums(input.comparison.disagreement);
   const Labels labels = config_.classifier == "top" ? label_top(sums, config_) : label_by_thresholds(sums, config_);
 

@@ -7,7 +7,7 @@
 namespace tutti::consistency::internal {
 
 Selection UniformPolicy::choose(const PolicyInput& input) const {
-  LinkCollector collector(input, config_.constraint, true);
+  LinkCollector collector(input, true);
   const std::size_t nodes = input.comparison.pairs.size();
   if (nodes < 2) return std::move(collector).take();
   const std::size_t links =

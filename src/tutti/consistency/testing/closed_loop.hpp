@@ -22,7 +22,7 @@ struct Mission {
   OdometryNoise noise;
   ServerNoise server_noise;
   /// False: the server knows its final map from the start. True: what lies after the latest revisit is odometry to the
-  /// server, too, with support 0.
+  /// server, too.
   bool late_closures = false;
   /// True: the server starts from odometry and comes to its final map bit by bit, by 4/5 of the mission.
   bool settling = false;
@@ -48,7 +48,7 @@ inline std::vector<ServerNode> server_after(const Mission& mission, std::size_t 
       const Pose3 final_step = mission.server[n - 1].inverse() * mission.server[n];
       poses.push_back(poses.back() * interpolate(mission.increments[n - 1], final_step, std::min(done, 1.0)));
     }
-    return server_nodes(kAlpha, poses, 10, covariance_of(mission.noise));
+    return server_nodes(kAlpha, poses, covariance_of(mission.noise));
   }
   constexpr double kClosure_m = 5.0;
   constexpr std::size_t kRevisit = 60;
@@ -61,9 +61,7 @@ inline std::vector<ServerNode> server_after(const Mission& mission, std::size_t 
       }
   std::vector<Pose3> poses(mission.server.begin(), mission.server.begin() + static_cast<std::ptrdiff_t>(closed) + 1);
   while (poses.size() < count) poses.push_back(poses.back() * mission.increments[poses.size() - 1]);
-  auto nodes = server_nodes(kAlpha, poses, 10, covariance_of(mission.noise));
-  for (std::size_t n = closed + 1; n < count; ++n) nodes[n].support = 0;
-  return nodes;
+  return server_nodes(kAlpha, poses, covariance_of(mission.noise));
 }
 
 /// RMSE of the positions after the best rigid alignment, m.
@@ -121,13 +119,19 @@ inline LoopResult run_closed_loop(const Mission& mission, const LoopConfig& conf
     if (count % config.nodes_per_update != 0 && count != length) continue;
     auto graph = build_proxy_graph(++out.updates, server_after(mission, count), {{kAlpha, 0}}, config.proxy_graph);
     if (!mission.settling && !mission.late_closures && !graph.reduced)
-      graph.shapes = {shape_of(kAlpha, mission.server_noise, count)};
+      graph.uncertainties = {uncertainty_by(mission.server_noise, graph, kAlpha)};
     const auto nodes = robot_nodes(estimate(count), mission.increments);
     const auto comparison = compare(graph, kAlpha, nodes, config.compare);
     std::optional<std::size_t> budget;
     if (!config.budgets.empty()) budget = config.budgets[out.updates - 1];
-    const auto selection =
-        (*policy)->choose({graph, kAlpha, nodes, comparison, budget, Rng(out.updates), ledger, out.updates});
+    std::optional<DisagreementTest> test;
+    Disagreement found;
+    if (comparison.pairs.size() >= 2) {
+      test.emplace(graph, kAlpha, comparison.pairs, out.updates, DisagreementConfig{});
+      found = (*test)(odometry_at(nodes, comparison.pairs));
+    }
+    const auto selection = (*policy)->choose(
+        {graph, kAlpha, nodes, comparison, budget, Rng(out.updates), ledger, test ? &*test : nullptr, &found});
     out.replaced += ledger.update(selection.constraints, config.ledger, selection.replaces_all).replaced;
     std::vector<estimation::ChainConstraint> constraints;
     for (const Constraint& c : ledger.constraints()) constraints.push_back({c.from, c.to, c.measurement});

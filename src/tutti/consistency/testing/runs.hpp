@@ -139,10 +139,10 @@ inline Matrix6d covariance_of(const OdometryNoise& noise) {
   return sigma.array().square().matrix().asDiagonal();
 }
 
-inline std::vector<ServerNode> server_nodes(RobotId robot, const std::vector<Pose3>& poses, std::uint32_t support = 10,
+inline std::vector<ServerNode> server_nodes(RobotId robot, const std::vector<Pose3>& poses,
                                             const Matrix6d& covariance = covariance_of({})) {
   std::vector<ServerNode> out;
-  for (std::size_t n = 0; n < poses.size(); ++n) out.push_back({robot, stamp_of(n), poses[n], covariance, support});
+  for (std::size_t n = 0; n < poses.size(); ++n) out.push_back({robot, stamp_of(n), poses[n], covariance});
   return out;
 }
 

@@ -3,81 +3,85 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/consistency/testing/runs.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::consistency::test {
 
-/// Standard deviations of every stretch from those by rank and half-length: sag(rank of the middle, L) -> ShapeSigma.
-template <class Sag>
-ShapeUncertainty stretch_by_stretch(RobotId robot, std::size_t nodes, ShapeSigma whole, Sag sag) {
-  ShapeUncertainty out{.chain = robot, .whole = whole};
-  for (std::size_t L = ShapeUncertainty::kShortest; 2 * L < nodes; L *= 2) {
-    out.sag.emplace_back();
-    for (std::size_t i = 0; i < (nodes - 1) / (2 * L); ++i) out.sag.back().push_back(sag(2 * L * i + L, L));
+inline constexpr std::size_t kSamples = 64;
+
+/// From draws of what the nodes of this chain of the graph may be: draw(poses, rng) -> poses.
+template <class Draw>
+ChainKnowledge knowledge(const ProxyGraph& graph, const ChainId& chain, Draw draw, std::size_t samples = kSamples) {
+  const auto nodes = nodes_of(graph, chain);
+  std::vector<Pose3> poses;
+  for (const ProxyNode& node : nodes) poses.push_back(node.T_world_body);
+  ChainKnowledge out;
+  out.samples.resize(static_cast<Eigen::Index>(6 * poses.size()), static_cast<Eigen::Index>(samples));
+  for (std::size_t s = 0; s < samples; ++s) {
+    const std::vector<Pose3> drawn = draw(poses, Rng(77).fork(s));
+    for (std::size_t k = 0; k < poses.size(); ++k)
+      out.samples.col(static_cast<Eigen::Index>(s)).segment<6>(static_cast<Eigen::Index>(6 * k)) =
+          local(poses[k], drawn[k]);
   }
   return out;
 }
 
 /// What server_estimate() is off by: three waves of random phase and white noise, the same along the whole run.
-inline ShapeUncertainty shape_of(RobotId robot, const ServerNoise& noise, std::size_t nodes) {
-  const double A = noise.smooth_m;
-  const ShapeSigma whole{std::sqrt(0.5 * A * A * 2.25 + 3.0 * std::pow(noise.local_m, 2)),
-                         std::sqrt(3.0) * noise.local_rad};
-  return stretch_by_stretch(robot, nodes, whole, [&](std::size_t, std::size_t half) {
-    const auto L = static_cast<double>(half);
-    double worst = 0.0;
-    for (const auto& [amplitude, length] : {std::pair{A, 40.0}, {A, 55.0}, {0.5 * A, 70.0}})
-      worst = std::max(worst, 0.5 * std::pow(amplitude * (1.0 - std::cos(L / length)), 2));
-    return ShapeSigma{std::sqrt(worst + 1.5 * std::pow(noise.local_m, 2)), std::sqrt(1.5) * noise.local_rad};
-  });
+inline ChainUncertainty uncertainty_by(const ServerNoise& noise, const ProxyGraph& graph, const ChainId& chain) {
+  return chain_uncertainty(graph, chain, knowledge(graph, chain, [&](const std::vector<Pose3>& poses, Rng rng) {
+                             return server_estimate(poses, noise, rng);
+                           }));
 }
 
 /// Errors of a map made of a random walk and of closures to known places: position and rotation, every axis on its own,
 /// with the covariance (A^T A)^-1 of such a walk held at every `closure_every`-th node.
 class WalkWithClosures {
  public:
-  WalkWithClosures(std::size_t nodes, std::size_t closure_every, ShapeSigma step, ShapeSigma closure)
-      : position_(covariance(nodes, closure_every, step.position_m, closure.position_m)),
+  WalkWithClosures(std::size_t nodes, std::size_t closure_every, PoseSigma step, PoseSigma closure)
+      : step_(step),
+        position_(covariance(nodes, closure_every, step.position_m, closure.position_m)),
         rotation_(covariance(nodes, closure_every, step.rotation_rad, closure.rotation_rad)),
         root_position_(position_.llt().matrixL()),
         root_rotation_(rotation_.llt().matrixL()) {}
 
   [[nodiscard]] std::size_t nodes() const { return static_cast<std::size_t>(position_.rows()); }
-  [[nodiscard]] ShapeUncertainty shape(RobotId robot) const { return shape(robot, nodes()); }
-  /// Of the run's first nodes only.
-  [[nodiscard]] ShapeUncertainty shape(RobotId robot, std::size_t count) const {
-    const auto n = static_cast<Eigen::Index>(count);
-    const auto sag = [](const Eigen::MatrixXd& C, std::size_t middle, std::size_t half) {
-      const auto m = static_cast<Eigen::Index>(middle), L = static_cast<Eigen::Index>(half);
-      const Eigen::Vector3d v(-0.5, 1.0, -0.5);
-      Eigen::Matrix3d ends;
-      for (Eigen::Index i = 0; i < 3; ++i)
-        for (Eigen::Index j = 0; j < 3; ++j) ends(i, j) = C(m + (i - 1) * L, m + (j - 1) * L);
-      return std::sqrt(v.dot(ends * v));
-    };
-    return stretch_by_stretch(robot, count,
-                              {whole(position_.topLeftCorner(n, n)), whole(rotation_.topLeftCorner(n, n))},
-                              [&](std::size_t m, std::size_t L) {
-                                return ShapeSigma{sag(position_, m, L), sag(rotation_, m, L)};
-                              });
-  }
-  /// Of some pairs of the poses, T_a_b in the worst direction: across the arm where the turn at a matters.
-  [[nodiscard]] std::vector<ShapeTie> ties(std::span<const Pose3> poses,
-                                           const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) const {
-    std::vector<ShapeTie> out;
-    for (const auto& [a, b] : pairs) {
-      const auto difference = [a, b](const Eigen::MatrixXd& C) { return C(a, a) + C(b, b) - 2.0 * C(a, b); };
-      const double arm = (poses[b].translation - poses[a].translation).squaredNorm();
-      out.push_back(
-          {a, b, {std::sqrt(difference(position_) + arm * rotation_(a, a)), std::sqrt(difference(rotation_))}});
+  /// Of every axis.
+  [[nodiscard]] const Eigen::MatrixXd& position_covariance() const { return position_; }
+  [[nodiscard]] const Eigen::MatrixXd& rotation_covariance() const { return rotation_; }
+  /// Of the whole run, which is this chain of the graph.
+  [[nodiscard]] ChainKnowledge knowledge(const ProxyGraph& graph, const ChainId& chain) const {
+    ChainKnowledge out = test::knowledge(
+        graph, chain, [this](std::vector<Pose3> poses, Rng rng) { return displace(std::move(poses), rng); });
+    const auto nodes = nodes_of(graph, chain);
+    const auto spread = ChainUncertainty::spread(nodes.size());
+    const auto m = static_cast<Eigen::Index>(spread.size());
+    out.spread_covariance.setZero(6 * m, 6 * m);
+    for (Eigen::Index a = 0; a < m; ++a)
+      for (Eigen::Index b = 0; b < m; ++b) {
+        const std::size_t i = spread[static_cast<std::size_t>(a)], k = spread[static_cast<std::size_t>(b)];
+        const Eigen::Matrix3d R =
+            (nodes[i].T_world_body.rotation.conjugate() * nodes[k].T_world_body.rotation).matrix();
+        const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(k);
+        out.spread_covariance.block<3, 3>(6 * a, 6 * b) = position_(row, column) * R;
+        out.spread_covariance.block<3, 3>(6 * a + 3, 6 * b + 3) = rotation_(row, column) * R;
+      }
+    for (std::size_t k = 0; k < spread.size(); ++k) {
+      const double steps = k == 0 ? 1.0 : static_cast<double>(spread[k] - spread[k - 1]);
+      Matrix6d covariance = Matrix6d::Zero();
+      covariance.diagonal().head<3>().setConstant(steps * step_.position_m * step_.position_m);
+      covariance.diagonal().tail<3>().setConstant(steps * step_.rotation_rad * step_.rotation_rad);
+      out.spread_odometry.push_back(covariance);
     }
     return out;
+  }
+  [[nodiscard]] ChainUncertainty uncertainty(const ProxyGraph& graph, const ChainId& chain) const {
+    return chain_uncertainty(graph, chain, knowledge(graph, chain));
   }
   /// The poses, each off by a draw.
   [[nodiscard]] std::vector<Pose3> displace(std::vector<Pose3> poses, Rng rng) const {
@@ -104,15 +108,12 @@ class WalkWithClosures {
     }
     return information.llt().solve(Eigen::MatrixXd::Identity(n, n));
   }
-  /// Three axes, less their mean over the run.
-  static double whole(const Eigen::MatrixXd& C) {
-    return std::sqrt(3.0 * (C.trace() / static_cast<double>(C.rows()) - C.mean()));
-  }
   [[nodiscard]] Eigen::MatrixXd white(Rng& rng) const {
     Eigen::MatrixXd z(position_.rows(), 3);
     for (double& v : z.reshaped()) v = rng.normal();
     return z;
   }
+  PoseSigma step_;
   Eigen::MatrixXd position_, rotation_, root_position_, root_rotation_;
 };
 

@@ -16,7 +16,6 @@ namespace tutti::mission {
 namespace {
 
 using consistency::Explanation;
-using consistency::MissedWay;
 using consistency::SuspectedOrigin;
 
 constexpr double kLeastShown = 0.1;  // of the threshold: below, all look the same
@@ -82,21 +81,6 @@ std::string words(const DriftOrigin& origin) {
 std::pair<double, double> extent(const Axis& x, double from_s, double until_s) {
   const double width = std::max(kThinnest_px, x(until_s) - x(from_s));
   return {0.5 * (x(from_s) + x(until_s) - width), width};
-}
-
-/// The way that odometry misses most, as a bracket between the two places that closures tie together.
-void draw_missed_way(Svg& svg, const ExplanationPicture& picture, const Axis& x, double top) {
-  const MissedWay& way = picture.explanation->missed_ways.front();
-  const auto [left, width] = extent(x, picture.clock(way.from), picture.clock(way.until));
-  const std::string colour = hex(significance_colour(way.significance));
-  const std::string said = fmt::format(
-      "{} to {}: closures tie the two places together; odometry misses that by {} m, {} deg over {} m, {} the "
-      "threshold",
-      format_moment(picture.clock(way.from)), format_moment(picture.clock(way.until)), significant(way.translation_m),
-      significant(way.rotation_rad / kRadPerDeg), significant(way.length_m), format_significance(way.significance));
-  svg.text({kLeft_px - 8.0, top + kBar_px - 2.0}, "missed", "tick", "end");
-  svg.rect({left, top + 0.5 * kBar_px - 1.5}, {width, 3.0}, "cell", said, colour);
-  for (const double end : {left, left + width - 3.0}) svg.rect({end, top}, {3.0, kBar_px}, "cell", said, colour);
 }
 
 void draw_hover_cells(Svg& svg, const ExplanationPicture& picture, const Axis& x) {
@@ -178,8 +162,7 @@ std::string explanation_svg(const ExplanationPicture& picture, double width_px) 
   const auto scales = e.significance.cols();
   const double right = width_px - kRight_px;
   const double map_bottom = kTop_px + row * static_cast<double>(scales);
-  const double missed_top = map_bottom + 8.0;
-  const double suspected_top = missed_top + (e.missed_ways.empty() ? 0.0 : kBar_px + 6.0);
+  const double suspected_top = map_bottom + 8.0;
   const double truth_top = suspected_top + kBar_px + 6.0;
   const double bottom = picture.truth.empty() ? suspected_top + kBar_px + 5.0 : truth_top + kBar_px + 5.0;
   const Axis x = Axis::linear(picture.time_s, kLeft_px, right, 14, false);
@@ -212,7 +195,6 @@ std::string explanation_svg(const ExplanationPicture& picture, double width_px) 
     svg.text({x(tick), bottom + 16.0}, tick_label(tick), "tick", "middle");
   }
   svg.segments(grid, "gridline");
-  if (!e.missed_ways.empty()) draw_missed_way(svg, picture, x, missed_top);
   svg.text({kLeft_px - 8.0, suspected_top + kBar_px - 2.0}, "suspected", "tick", "end");
   for (const SuspectedOrigin& origin : e.origins) {
     const auto [left, width] = extent(x, picture.clock(origin.from), picture.clock(origin.until));
@@ -281,8 +263,7 @@ void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Traj
 double largest_significance(const Explanation& e) {
   double largest = e.significance.size() > 0 ? e.significance.maxCoeff() : 0.0;
   for (const double whole : e.scale_significance) largest = std::max(largest, whole);
-  for (const MissedWay& way : e.missed_ways) largest = std::max(largest, way.significance);
-  return largest;
+  return std::max(largest, e.direction_significance);
 }
 
 std::string format_moment(double value_s) { return std::isfinite(value_s) ? fmt::format("{:.1f} s", value_s) : "-"; }
@@ -313,21 +294,17 @@ std::string format_motion_error(double translation_m, double rotation_rad) {
   return fmt::format("{}, {:.1f} deg", format_metres(translation_m), rotation_rad / kRadPerDeg);
 }
 
-std::string format_disagreement(const Explanation& e, const PictureClock& clock) {
+std::string format_disagreement(const Explanation& e) {
   if (!e.disagrees()) return "odometry and map agree within what the server is sure of";
-  std::string text =
-      fmt::format("odometry and map part by up to {} the threshold", format_significance(largest_significance(e)));
-  if (e.missed_ways.empty()) return text;
-  const MissedWay& way = e.missed_ways.front();
-  return text + fmt::format(": closures tie {} to {}, and odometry misses that by {} m, {} deg",
-                            format_moment(clock(way.until)), format_moment(clock(way.from)),
-                            significant(way.translation_m), significant(way.rotation_rad / kRadPerDeg));
+  const double largest = largest_significance(e);
+  return fmt::format("odometry and map part by up to {} the threshold{}", format_significance(largest),
+                     e.direction_significance == largest ? ", in what closures know best" : "");
 }
 
 std::string format_comparison(const MissionRecord& record, const RobotRecord& robot) {
   if (!robot.explanation->disagrees() && !is_tied(record, robot.id))
     return "there was nothing to compare odometry with: no loop closure ties its map";
-  return format_disagreement(*robot.explanation, mission_clock(robot));
+  return format_disagreement(*robot.explanation);
 }
 
 std::string format_scale(const Explanation& explanation, int scale) {

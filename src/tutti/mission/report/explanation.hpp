@@ -66,7 +66,7 @@ std::string format_place(const Eigen::Vector3d& place_m);
 std::string format_motion_error(double translation_m, double rotation_rad);
 /// "odometry and map part by up to 12 x the threshold", and the way that odometry misses by most, if any; or that they
 /// agree.
-std::string format_disagreement(const consistency::Explanation& explanation, const PictureClock& clock);
+std::string format_disagreement(const consistency::Explanation& explanation);
 /// The same of a robot's last update, whose explanation is there; or that there was nothing to compare with, where the
 /// map of it is its own odometry.
 std::string format_comparison(const MissionRecord& record, const RobotRecord& robot);

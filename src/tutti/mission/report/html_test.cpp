@@ -96,7 +96,7 @@ TEST(ReportHtml, PoliciesSideBySideAreThoseOfTheRecord) {
   MissionRecord record = test::example_record();
   const std::string several = section_of(report_html(record), "Policies side by side");
   const std::vector<std::string> of_a_robot{
-      "onboard (raw odometry)", "every_node", "every_node_2", "spectral", "uniform", "random", "euclidean", "server"};
+      "onboard (raw odometry)", "every_node", "every_node_2", "spectral", "uniform", "random", "skeleton", "server"};
   std::vector<std::string> expected;
   for (const char* robot : {"alpha", "bravo"}) {
     expected.emplace_back(robot);
@@ -164,17 +164,6 @@ TEST(ReportHtml, ExplainsWhereOdometryAndMapPart) {
     EXPECT_NE(html.find(shape), std::string::npos) << shape;
   record.robots[0].alerts[0].withdrawn_s = 770.0;
   EXPECT_NE(report_html(record).find("Localisation failure no longer suspected:</b> alpha"), std::string::npos);
-}
-
-TEST(ReportHtml, DrawsTheWayThatOdometryMisses) {
-  MissionRecord record = test::example_record({.robots = 1});
-  EXPECT_EQ(report_html(record).find(">missed</text>"), std::string::npos);
-  test::miss_a_way(*record.robots[0].explanation);
-  const std::string html = report_html(record);
-  expect_good_page(html);
-  EXPECT_NE(html.find(">missed</text>"), std::string::npos);
-  EXPECT_NE(html.find("odometry misses that by 4.80 m, 1.15 deg over 80.0 m, 44 x the threshold"), std::string::npos);
-  EXPECT_NE(html.find("part by up to 44 x the threshold: closures tie"), std::string::npos);
 }
 
 TEST(ReportHtml, NamesOdometryThatIsBetterThanStated) {

@@ -94,13 +94,6 @@ Json explanation_json(const RobotRecord& robot) {
   for (const double significance : e.scale_significance) whole.push_back(number(significance));
   Json origins = Json::array();
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
-  Json ways = Json::array();
-  for (const auto& way : e.missed_ways)
-    ways.push_back(stretch_json(robot, way,
-                                {{"length_m", number(way.length_m)},
-                                 {"translation_m", number(way.translation_m)},
-                                 {"rotation_rad", number(way.rotation_rad)},
-                                 {"significance", number(way.significance)}}));
   return {{"disagrees", e.disagrees()},
           {"nodes", e.stamps.size()},
           {"aligned_rmse_m", number(e.aligned_rmse_m)},
@@ -108,7 +101,7 @@ Json explanation_json(const RobotRecord& robot) {
           {"scale_length_m", std::move(lengths)},
           {"largest_significance", std::move(largest)},
           {"scale_significance", std::move(whole)},
-          {"missed_ways", std::move(ways)},
+          {"direction_significance", number(e.direction_significance)},
           {"suspected_origins", std::move(origins)}};
 }
 

@@ -98,13 +98,7 @@ TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
   MissionRecord record = test::example_record();
   record.robots[1].start_s = 300.0;
   record.robots[0].explanation.reset();
-  const auto& stamps = record.robots[1].explanation->stamps;
-  record.robots[1].explanation->missed_ways = {{.from = stamps[3],
-                                                .until = stamps[90],
-                                                .length_m = 80.0,
-                                                .translation_m = 4.8,
-                                                .rotation_rad = 0.02,
-                                                .significance = 14.0}};
+  record.robots[1].explanation->direction_significance = 14.0;
   record.robots[0].alerts.clear();
   const json report = json::parse(report_json(record));
   EXPECT_TRUE(report["robots"][0]["explanation"].is_null());
@@ -114,12 +108,7 @@ TEST(ReportJson, ExplainsTheLastUpdateInMissionTime) {
   EXPECT_EQ(explanation["nodes"], record.robots[1].explanation->stamps.size());
   ASSERT_EQ(explanation["largest_significance"].size(), explanation["scale_length_m"].size());
   EXPECT_NEAR(explanation["largest_significance"][4], 8.7, 1.0);
-  ASSERT_EQ(explanation["missed_ways"].size(), 1U);
-  const json& way = explanation["missed_ways"][0];
-  EXPECT_DOUBLE_EQ(way["from_s"], 300.0 + (stamps[3] - record.robots[1].odometry.front().stamp));
-  EXPECT_DOUBLE_EQ(way["until_s"], 300.0 + (stamps[90] - record.robots[1].odometry.front().stamp));
-  EXPECT_DOUBLE_EQ(way["translation_m"], 4.8);
-  EXPECT_DOUBLE_EQ(way["significance"], 14.0);
+  EXPECT_DOUBLE_EQ(explanation["direction_significance"], 14.0);
   ASSERT_EQ(explanation["suspected_origins"].size(), 2U);
   const json& failure = explanation["suspected_origins"][1];
   EXPECT_DOUBLE_EQ(failure["from_s"], 362.0);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/robot/agent.hpp"
 
 /// A robot whose odometry turns too much on a large circle, and a server that knows better.
@@ -48,9 +49,10 @@ inline ProxyGraphMessage broadcast(const RobotAgent& agent, std::uint64_t revisi
     message.graph.nodes.push_back({.chain = agent.chain(),
                                    .stamp = k.stamp,
                                    .T_world_body = T_world_true * true_pose(sample),
-                                   .covariance = message.graph.nodes.empty() ? Matrix6d::Zero() : covariance,
-                                   .support = 5});
+                                   .covariance = message.graph.nodes.empty() ? Matrix6d::Zero() : covariance});
   }
+  message.graph.uncertainties = {
+      consistency::even_uncertainty(agent.chain(), message.graph.nodes.size(), {0.002, 0.001})};
   message.graph.nodes.push_back({.chain = RobotId{9}, .stamp = at(3), .T_world_body = T_world_true * true_pose(7)});
   message.graph.components = {{agent.chain(), 0}, {RobotId{9}, 0}};
   return message;

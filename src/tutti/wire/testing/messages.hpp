@@ -73,29 +73,35 @@ inline SubmapMessage any_submap(Rng& rng, std::size_t keyframes, std::size_t poi
   return message;
 }
 
-/// As estimated from 32 samples of a drifting trajectory with as many nodes, 32 of which are tied to others if there
-/// are as many.
-inline ShapeUncertainty any_shape(Rng& rng, const ChainId& chain, std::size_t nodes) {
+/// As of a drifting trajectory with so many nodes.
+inline ChainUncertainty any_uncertainty(Rng& rng, const ChainId& chain, std::size_t nodes) {
   const auto sigma = [&](double length) {
-    return ShapeSigma{0.002 * std::pow(length, 1.3) * std::exp(rng.normal(0.12)),
-                      0.001 * std::sqrt(length) * std::exp(rng.normal(0.12))};
+    return PoseSigma{0.002 * std::pow(length, 1.3) * std::exp(rng.normal(0.12)),
+                     0.001 * std::sqrt(length) * std::exp(rng.normal(0.12))};
   };
-  ShapeUncertainty shape{.chain = chain, .whole = sigma(static_cast<double>(nodes))};
-  for (std::size_t L = ShapeUncertainty::kShortest; 2 * L < nodes; L *= 2) {
-    auto& stretches = shape.sag.emplace_back();
-    for (std::size_t i = 0; i < (nodes - 1) / (2 * L); ++i) stretches.push_back(sigma(static_cast<double>(L)));
+  ChainUncertainty out{.chain = chain, .whole = sigma(static_cast<double>(nodes))};
+  for (int s = 0; s < 4; ++s) {
+    ScaleUncertainty& scale = out.scales.emplace_back();
+    if (s == 1) continue;
+    for (std::size_t b = 0; b < ChainUncertainty::blocks(nodes); ++b) scale.sigma.push_back(sigma(8.0 / (1 + s)));
+    scale.position = {rng.uniform(10.0, 1000.0), rng.uniform(1.0, 100.0)};
+    scale.rotation = {rng.uniform(10.0, 1000.0), rng.uniform(1.0, 100.0)};
   }
-  for (std::size_t i = 0, a = 0; i < 32; ++i) {
-    a += 1 + rng.index(nodes / 32 + 1);
-    if (a + 8 >= nodes) break;
-    const std::size_t b = a + 8 + rng.index(nodes - a - 8);
-    shape.ties.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), sigma(10.0)});
+  const std::size_t spread = ChainUncertainty::spread(nodes).size();
+  for (std::size_t d = spread == 0 ? 0 : rng.index(5); d-- > 0;) {
+    KnownDirection& direction = out.directions.emplace_back();
+    direction.rotation_scale = rng.uniform(0.1, 10.0);
+    direction.sigma = rng.uniform(0.01, 1.0);
+    for (std::size_t i = 3; i < 3 * spread; ++i) {
+      direction.position.push_back(static_cast<std::int8_t>(static_cast<int>(rng.index(255)) - 127));
+      direction.rotation.push_back(static_cast<std::int8_t>(static_cast<int>(rng.index(255)) - 127));
+    }
   }
-  return shape;
+  return out;
 }
 
 /// Nodes about every metre along each chain's way, two chains a robot; of every other chain, beginning with the first,
-/// the shape is known.
+/// it is known how sure the server is.
 inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t chains, std::size_t nodes_each, bool reduced) {
   ProxyGraphMessage message;
   message.header.session = rng.index(1'000'000'000'000);
@@ -119,9 +125,9 @@ inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t chains, std::size
         continue;
       }
       const Matrix6d covariance = k == 0 ? Matrix6d::Zero() : odometry_covariance(rng.uniform(0.9, 1.2), turn);
-      graph.nodes.push_back({chain, stamp, T, covariance, static_cast<std::uint32_t>(rng.index(20))});
+      graph.nodes.push_back({chain, stamp, T, covariance});
     }
-    if (r % 2 == 0) graph.shapes.push_back(any_shape(rng, chain, graph.nodes.size() - first));
+    if (r % 2 == 0) graph.uncertainties.push_back(any_uncertainty(rng, chain, graph.nodes.size() - first));
     if (!reduced) continue;
     for (std::size_t a = first; a < graph.nodes.size(); ++a)
       for (std::size_t b = a + 1; b < std::min(a + 5, graph.nodes.size()); ++b)

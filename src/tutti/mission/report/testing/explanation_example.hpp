@@ -54,14 +54,4 @@ inline consistency::Explanation example_explanation(const Trajectory& way,
   return e;
 }
 
-/// Odometry misses a way by 4.8 m and 0.02 rad, 44 times its threshold.
-inline void miss_a_way(consistency::Explanation& e) {
-  e.missed_ways = {{.from = e.stamps[5],
-                    .until = e.stamps[50],
-                    .length_m = 80.0,
-                    .translation_m = 4.8,
-                    .rotation_rad = 0.02,
-                    .significance = 44.0}};
-}
-
 }  // namespace tutti::mission::test

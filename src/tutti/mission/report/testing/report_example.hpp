@@ -121,7 +121,7 @@ inline RobotRecord example_robot(std::size_t index, const ExampleOptions& option
   robot.messages_up = robot.submaps;
   robot.messages_down = 24;
   const double quality[] = {0.055, 0.03, 0.02, 0.018, 0.04, 0.09};
-  const char* const names[] = {"every_node", "every_node_2", "spectral", "uniform", "random", "euclidean"};
+  const char* const names[] = {"every_node", "every_node_2", "spectral", "uniform", "random", "skeleton"};
   for (std::size_t p = 0; p < 6; ++p) {
     PolicyRecord policy{.name = names[p]};
     const Pose3 T_map_truth = robot.odometry.front().pose * truth.front().pose.inverse();

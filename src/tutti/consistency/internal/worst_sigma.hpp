@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-namespace tutti::server {
+namespace tutti::consistency::internal {
 
 /// Standard deviation in the worst direction, from the sum of x x^T over so many samples of zero mean. The largest
 /// eigenvalue of few samples' covariance S is too large when the true ones are alike, so S is first drawn towards
@@ -11,4 +11,4 @@ namespace tutti::server {
 /// algorithms for MMSE covariance estimation", 2010, eq. 23).
 double worst_sigma(const Eigen::Matrix3d& scatter, double samples);
 
-}  // namespace tutti::server
+}  // namespace tutti::consistency::internal

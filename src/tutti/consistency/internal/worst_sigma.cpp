@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/server/worst_sigma.hpp"
+#include "tutti/consistency/internal/worst_sigma.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-namespace tutti::server {
+namespace tutti::consistency::internal {
 
 double worst_sigma(const Eigen::Matrix3d& scatter, double samples) {
   const Eigen::Matrix3d S = scatter / samples;
@@ -18,4 +18,4 @@ double worst_sigma(const Eigen::Matrix3d& scatter, double samples) {
   return std::sqrt((1.0 - share) * largest + share * trace / 3.0);
 }
 
-}  // namespace tutti::server
+}  // namespace tutti::consistency::internal

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/consistency/chain_uncertainty.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "tutti/base/check.hpp"
+#include "tutti/base/chi_square.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/consistency/internal/chain_filter.hpp"
+#include "tutti/consistency/internal/worst_sigma.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/spectral/wavelet_transform.hpp"
+
+namespace tutti::consistency {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// A scale with fewer waves than these is left out: the rigid motion has taken most of it away.
+constexpr double kLeastWaves = 2.0;
+constexpr Index kProbes = 32;
+/// Every sample is left out of the sigmas of its own group, one of so many.
+constexpr Index kGroups = 8;
+/// Quantile of what so few samples say about the spread of an energy: its degrees of freedom are rather too few.
+constexpr double kCautious = 0.16;
+/// Closures know a direction far better than odometry does below this ratio of variances.
+constexpr double kKnownFarBetter = 0.25;
+constexpr Index kMostDirections = 4;
+constexpr double kFinest = 127.0;
+
+/// Errors of one kind in the axes of `world`: n x (3 columns).
+struct Errors {
+  MatrixXd position_m, rotation_rad;
+};
+
+/// Right tangents, (6 n) x columns.
+Errors in_world(std::span<const ProxyNode> nodes, const MatrixXd& tangents) {
+  const auto n = static_cast<Index>(nodes.size());
+  Errors out{MatrixXd(n, 3 * tangents.cols()), MatrixXd(n, 3 * tangents.cols())};
+  for (Index k = 0; k < n && tangents.cols() > 0; ++k) {
+    const Eigen::Matrix3d R = nodes[static_cast<std::size_t>(k)].T_world_body.rotation.toRotationMatrix();
+    out.position_m.row(k) = (R * tangents.middleRows<3>(6 * k)).reshaped().transpose();
+    out.rotation_rad.row(k) = (R * tangents.middleRows<3>(6 * k + 3)).reshaped().transpose();
+  }
+  return out;
+}
+
+/// As the robot sees them: without what the gauge can take away.
+void free_of_gauge(const internal::RigidMotion& rigid, Errors& errors) {
+  for (Index c = 0; c < errors.position_m.cols(); c += 3) {
+    rigid.remove(errors.position_m.middleCols<3>(c));
+    internal::remove_mean(errors.rotation_rad.middleCols<3>(c));
+  }
+}
+
+double largest_square(const MatrixXd& errors) {
+  double out = 0.0;
+  for (Index c = 0; c < errors.cols(); c += 3) out = std::max(out, errors.middleCols<3>(c).squaredNorm());
+  return out;
+}
+
+/// Root mean square over the nodes.
+double whole(const MatrixXd& samples, const MatrixXd& shifts) {
+  const double squares = 3.0 * samples.squaredNorm() / static_cast<double>(samples.cols());
+  return std::sqrt((squares + largest_square(shifts)) / static_cast<double>(samples.rows()));
+}
+
+/// The wavelet coefficients of the errors of one kind at one scale.
+class Coefficients {
+ public:
+  /// n x (3 samples) and n x (3 shifts).
+  Coefficients(const Eigen::Ref<const MatrixXd>& samples, const Eigen::Ref<const MatrixXd>& shifts, double rounding)
+      : samples_(samples), shifts_(shifts), extra_(Eigen::VectorXd::Constant(samples.rows(), rounding * rounding)) {
+    Eigen::VectorXd largest = Eigen::VectorXd::Zero(samples.rows());
+    for (Index c = 0; c < shifts.cols(); c += 3)
+      largest = largest.cwiseMax(shifts.middleCols<3>(c).rowwise().squaredNorm());
+    extra_ += largest;
+    const Index group = (count() + kGroups - 1) / kGroups;
+    for (Index first = 0; first < count(); first += group)
+      groups_.push_back({first, std::min(group, count() - first), scatter(first, std::min(group, count() - first))});
+  }
+
+  /// Per block, from all samples.
+  [[nodiscard]] std::vector<double> sigma() const { return sigma_without(nullptr); }
+
+  [[nodiscard]] Energy energy() const {
+    std::vector<double> energies;
+    for (const Group& group : groups_) {
+      const std::vector<double> sigma = sigma_without(&group);
+      for (Index k = group.first; k < group.first + group.count; ++k)
+        energies.push_back(energy_of(samples_.middleCols<3>(3 * k), sigma));
+    }
+    const auto values = Eigen::VectorXd::Map(energies.data(), static_cast<Index>(energies.size()));
+    const double mean = values.mean();
+    const double spare = static_cast<double>(values.size() - 1);
+    const double variance = (values.array() - mean).square().sum() / spare;
+    const double largest_variance = variance * spare / chi_square_quantile(kCautious, spare);
+    Energy out{mean, std::max(1.0, 2.0 * mean * mean / std::max(largest_variance, 1e-12 * mean * mean))};
+    double shifted = 0.0;
+    for (Index c = 0; c < shifts_.cols(); c += 3)
+      shifted = std::max(shifted, energy_of(shifts_.middleCols<3>(c), sigma()));
+    out.mean += shifted;
+    return out;
+  }
+
+ private:
+  struct Group {
+    Index first, count;
+    MatrixXd scatter;  ///< n x 6, sums of products of coordinates.
+  };
+  [[nodiscard]] Index count() const { return samples_.cols() / 3; }
+  [[nodiscard]] MatrixXd scatter(Index first, Index count) const {
+    MatrixXd out = MatrixXd::Zero(samples_.rows(), 6);
+    for (Index k = 3 * first; k < 3 * (first + count); k += 3)
+      for (Index i = 0, c = 0; i < 3; ++i)
+        for (Index j = 0; j <= i; ++j, ++c) out.col(c) += samples_.col(k + i).cwiseProduct(samples_.col(k + j));
+    return out;
+  }
+  [[nodiscard]] std::vector<double> sigma_without(const Group* left_out) const {
+    MatrixXd sum = MatrixXd::Zero(samples_.rows(), 6);
+    for (const Group& group : groups_)
+      if (&group != left_out) sum += group.scatter;
+    const auto used = static_cast<double>(count() - (left_out == nullptr ? 0 : left_out->count));
+    std::vector<double> out(ChainUncertainty::blocks(static_cast<std::size_t>(sum.rows())), 0.0);
+    for (Index n = 0; n < sum.rows(); ++n) {
+      Eigen::Matrix3d S;
+      S << sum(n, 0), sum(n, 1), sum(n, 3), sum(n, 1), sum(n, 2), sum(n, 4), sum(n, 3), sum(n, 4), sum(n, 5);
+      const double sigma = std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + extra_(n));
+      double& block = out[static_cast<std::size_t>(n) / ChainUncertainty::kBlock];
+      block = std::max(block, sigma);
+    }
+    return out;
+  }
+  [[nodiscard]] static double energy_of(const Eigen::Ref<const MatrixXd>& W, const std::vector<double>& sigma) {
+    double out = 0.0;
+    for (Index n = 0; n < W.rows(); ++n)
+      out += W.row(n).squaredNorm() / std::pow(sigma[static_cast<std::size_t>(n) / ChainUncertainty::kBlock], 2);
+    return out;
+  }
+
+  MatrixXd samples_, shifts_;
+  Eigen::VectorXd extra_;  ///< Variance besides the samples', per node.
+  std::vector<Group> groups_;
+};
+
+/// Per scale, how many waves it holds, the constant not counted: the trace of g_s(L)^2, by random signs (Hutchinson
+/// 1990).
+std::vector<double> waves(const spectral::WaveletFilter& filter, Index nodes) {
+  Rng rng(0);
+  MatrixXd z(nodes, kProbes);
+  for (double& value : z.reshaped()) value = rng.bernoulli(0.5) ? 1.0 : -1.0;
+  z.rowwise() -= Eigen::RowVectorXd(z.colwise().mean());
+  const MatrixXd W = filter(z);
+  std::vector<double> out;
+  for (int s = 0; s < filter.bank().scales(); ++s)
+    out.push_back(W.middleCols(s * kProbes, kProbes).squaredNorm() / static_cast<double>(kProbes));
+  return out;
+}
+
+std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, const Errors& samples,
+                                     const Errors& shifts) {
+  const spectral::WaveletFilter filter(laplacian, internal::kScales);
+  const std::vector<double> held = waves(filter, laplacian.rows());
+  const Errors W{filter(samples.position_m), filter(samples.rotation_rad)};
+  const Errors H{filter(shifts.position_m), filter(shifts.rotation_rad)};
+  const Index columns = samples.position_m.cols(), shift_columns = shifts.position_m.cols();
+  std::vector<ScaleUncertainty> out(internal::kScales);
+  for (Index s = 0; s < internal::kScales; ++s) {
+    ScaleUncertainty& scale = out[static_cast<std::size_t>(s)];
+    if (held[static_cast<std::size_t>(s)] < kLeastWaves) continue;
+    const double share = std::sqrt(held[static_cast<std::size_t>(s)] / static_cast<double>(laplacian.rows()));
+    const auto of = [&](const MatrixXd Errors::*kind, double rounding) {
+      return Coefficients((W.*kind).middleCols(s * columns, columns),
+                          (H.*kind).middleCols(s * shift_columns, shift_columns), share * rounding);
+    };
+    const Coefficients position = of(&Errors::position_m, internal::kRounding.position_m);
+    const Coefficients rotation = of(&Errors::rotation_rad, internal::kRounding.rotation_rad);
+    const std::vector<double> metres = position.sigma(), radians = rotation.sigma();
+    for (std::size_t b = 0; b < metres.size(); ++b) scale.sigma.push_back({metres[b], radians[b]});
+    scale.position = position.energy();
+    scale.rotation = rotation.energy();
+  }
+  return out;
+}
+
+/// Of the spread nodes but the first, [position; rotation] in the axes of `world`, seen from the first: the map from
+/// the right tangents of all spread nodes.
+MatrixXd seen_from_first(std::span<const Pose3> poses) {
+  const auto m = static_cast<Index>(poses.size());
+  MatrixXd out = MatrixXd::Zero(6 * (m - 1), 6 * m);
+  const Eigen::Matrix3d R_first = poses[0].rotation.toRotationMatrix();
+  for (Index k = 1; k < m; ++k) {
+    const Pose3& T = poses[static_cast<std::size_t>(k)];
+    const Index row = 6 * (k - 1);
+    out.block<3, 3>(row, 0) = -R_first;
+    out.block<3, 3>(row, 3) = skew(T.translation - poses[0].translation) * R_first;
+    out.block<3, 3>(row + 3, 3) = -R_first;
+    out.block<3, 3>(row, 6 * k) = out.block<3, 3>(row + 3, 6 * k + 3) = T.rotation.toRotationMatrix();
+  }
+  return out;
+}
+
+/// Covariance of the same by odometry alone: every step moves all nodes after it.
+MatrixXd by_odometry(std::span<const Pose3> poses, std::span<const Matrix6d> steps) {
+  const auto m = static_cast<Index>(poses.size());
+  MatrixXd moves = MatrixXd::Zero(6 * (m - 1), 6 * (m - 1)), scaled = moves;
+  for (Index step = 1; step < m; ++step) {
+    const Pose3& T = poses[static_cast<std::size_t>(step)];
+    const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
+    const Index column = 6 * (step - 1);
+    for (Index k = step; k < m; ++k) {
+      const Index row = 6 * (k - 1);
+      moves.block<3, 3>(row, column) = moves.block<3, 3>(row + 3, column + 3) = R;
+      moves.block<3, 3>(row, column + 3) = -skew(poses[static_cast<std::size_t>(k)].translation - T.translation) * R;
+    }
+    scaled.middleCols<6>(column) = moves.middleCols<6>(column) * steps[static_cast<std::size_t>(step)];
+  }
+  return scaled * moves.transpose();
+}
+
+std::vector<KnownDirection> directions(std::span<const Pose3> poses, const MatrixXd& covariance,
+                                       std::span<const Matrix6d> steps, const MatrixXd& shifts) {
+  const MatrixXd seen = seen_from_first(poses);
+  const MatrixXd P = seen * covariance * seen.transpose();
+  const MatrixXd moved = seen * shifts;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (P + P.transpose()), by_odometry(poses, steps));
+  std::vector<KnownDirection> out;
+  if (eigen.info() != Eigen::Success) return out;
+  for (Index i = 0; i < std::min(kMostDirections, P.rows()) && eigen.eigenvalues()(i) < kKnownFarBetter; ++i) {
+    Eigen::VectorXd v = eigen.eigenvectors().col(i);
+    std::array<double, 2> largest{};
+    for (Index k = 0; k < v.size(); ++k) largest[k % 6 / 3] = std::max(largest[k % 6 / 3], std::abs(v(k)));
+    if (!(largest[0] > 0.0 && largest[1] > 0.0)) continue;
+    KnownDirection direction{.position = {}, .rotation = {}, .rotation_scale = largest[1] / largest[0]};
+    for (Index k = 0; k < v.size(); ++k) {
+      const double code = std::round(kFinest * v(k) / largest[k % 6 / 3]);
+      (k % 6 < 3 ? direction.position : direction.rotation).push_back(static_cast<std::int8_t>(code));
+      v(k) = code / kFinest * (k % 6 < 3 ? 1.0 : direction.rotation_scale);
+    }
+    double variance = std::max(0.0, v.dot(P * v));
+    if (moved.cols() > 0) variance += (v.transpose() * moved).array().square().maxCoeff();
+    for (Index k = 0; k < v.size(); ++k)
+      variance += std::pow(v(k) * (k % 6 < 3 ? internal::kRounding.position_m : internal::kRounding.rotation_rad), 2);
+    direction.sigma = std::sqrt(variance);
+    out.push_back(std::move(direction));
+  }
+  return out;
+}
+
+}  // namespace
+
+ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known) {
+  const std::span<const ProxyNode> nodes = nodes_of(graph, chain);
+  const auto n = static_cast<Index>(nodes.size());
+  TUTTI_CHECK(n > 0 && known.samples.rows() == 6 * n && known.samples.cols() > 0, "{} x {} samples of {} nodes",
+              known.samples.rows(), known.samples.cols(), n);
+  TUTTI_CHECK(known.shifts.cols() == 0 || known.shifts.rows() == 6 * n, "{} x {} shifts of {} nodes",
+              known.shifts.rows(), known.shifts.cols(), n);
+  const internal::RigidMotion rigid(nodes);
+  Errors samples = in_world(nodes, known.samples), shifts = in_world(nodes, known.shifts);
+  free_of_gauge(rigid, samples);
+  free_of_gauge(rigid, shifts);
+  ChainUncertainty out{
+      .chain = chain,
+      .whole = {whole(samples.position_m, shifts.position_m), whole(samples.rotation_rad, shifts.rotation_rad)}};
+  if (n >= 2 && known.samples.cols() >= kLeastSamples)
+    out.scales = scales(internal::chain_laplacian(graph, chain), samples, shifts);
+
+  const std::vector<std::size_t> spread = ChainUncertainty::spread(nodes.size());
+  const auto m = static_cast<Index>(spread.size());
+  if (m < 2 || known.spread_covariance.size() == 0) return out;
+  TUTTI_CHECK(known.spread_covariance.rows() == 6 * m && known.spread_odometry.size() == spread.size(),
+              "{} rows and {} steps of {} spread nodes", known.spread_covariance.rows(), known.spread_odometry.size(),
+              m);
+  std::vector<Pose3> poses;
+  MatrixXd spread_shifts(6 * m, known.shifts.cols());
+  for (Index k = 0; k < m; ++k) {
+    const std::size_t node = spread[static_cast<std::size_t>(k)];
+    poses.push_back(nodes[node].T_world_body);
+    if (known.shifts.cols() > 0)
+      spread_shifts.middleRows<6>(6 * k) = known.shifts.middleRows<6>(6 * static_cast<Index>(node));
+  }
+  out.directions = directions(poses, known.spread_covariance, known.spread_odometry, spread_shifts);
+  return out;
+}
+
+ChainUncertainty even_uncertainty(const ChainId& chain, std::size_t nodes, const PoseSigma& sigma) {
+  ChainUncertainty out{.chain = chain, .whole = sigma};
+  const double share = 1.0 / std::sqrt(static_cast<double>(internal::kScales));
+  const PoseSigma at_each{share * sigma.position_m, share * sigma.rotation_rad};
+  for (int s = 0; s < internal::kScales; ++s) {
+    const double waves = std::ldexp(static_cast<double>(nodes), s - internal::kScales);
+    ScaleUncertainty& scale = out.scales.emplace_back();
+    if (waves < kLeastWaves) continue;
+    scale.sigma.assign(ChainUncertainty::blocks(nodes), at_each);
+    scale.position = scale.rotation = {.mean = 3.0 * static_cast<double>(nodes), .degrees = 3.0 * waves};
+  }
+  return out;
+}
+
+}  // namespace tutti::consistency

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "tutti/model/proxy_graph.hpp"
+
+namespace tutti::consistency {
+
+/// What the map knows of the n nodes of one chain in a proxy graph, to first order. All rows are right tangents, six
+/// for each node.
+struct ChainKnowledge {
+  /// (6 n) x samples: joint draws of what the nodes are off by, zero mean.
+  Eigen::MatrixXd samples;
+  /// (6 n) x closures: how the nodes would move without each closure on which the map hinges; may have no columns.
+  Eigen::MatrixXd shifts;
+  /// (6 m) x (6 m): joint covariance of the m = ChainUncertainty::spread(n).size() spread nodes. Empty: no directions.
+  Eigen::MatrixXd spread_covariance;
+  /// Of spread node k relative to k - 1 by odometry alone; the first is not used. Positive definite.
+  std::vector<Matrix6d> spread_odometry;
+};
+
+/// Fewer samples than these say nothing of scales.
+inline constexpr Eigen::Index kLeastSamples = 16;
+
+/// Passes the samples through the same alignment and filters as the robot passes what it differs by. The sigma of a
+/// coefficient is that of the worst direction, from the samples' covariance shrunk towards its mean (OAS), plus the
+/// largest shift, as if the two were independent. The energies of a scale are those of samples left out of the sigmas
+/// that they are divided by. Directions: v with the smallest v^T P v / v^T O v below a quarter, at most four, P the
+/// map's covariance of the spread nodes seen from the first, O odometry's (docs/math.md).
+ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known);
+
+/// Of a judge who is as sure as this of every node, evenly at all scales that so many nodes are enough for.
+ChainUncertainty even_uncertainty(const ChainId& chain, std::size_t nodes, const PoseSigma& sigma);
+
+}  // namespace tutti::consistency
