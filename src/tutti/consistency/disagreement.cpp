@@ -92,19 +92,14 @@ Disagreement DisagreementTest::operator()(std::span<const Pose3> robot) const {
   if (filter_ != nullptr) {
     std::vector<Pose3> server;
     for (const std::size_t rank : ranks_) server.push_back(server_[rank]);
-    const MatrixXd off = filled(PoseSignal().difference(server, robot), ranks_, server_.size());
-    measure_scales(off.leftCols<3>(), off.rightCols<3>(), out);
+    measure_scales((*filter_)(filled(PoseSignal().difference(server, robot), ranks_, server_.size())), out);
   }
   if (uncertainty_ != nullptr && config_.without != "directions")
     out.direction_significance = measure_directions(robot);
   return out;
 }
 
-void DisagreementTest::measure_scales(const MatrixXd& position_m, const MatrixXd& rotation_rad,
-                                      Disagreement& out) const {
-  MatrixXd both(position_m.rows(), 6);
-  both << position_m, rotation_rad;
-  const MatrixXd W = (*filter_)(both);
+void DisagreementTest::measure_scales(const MatrixXd& W, Disagreement& out) const {
   const auto tested = static_cast<double>(
       std::ranges::count_if(uncertainty_->scales, [](const ScaleUncertainty& scale) { return !scale.sigma.empty(); }));
   const auto n = static_cast<Index>(server_.size());

@@ -72,7 +72,8 @@ class DisagreementTest {
   [[nodiscard]] double scale_length_m(int scale) const;
 
  private:
-  void measure_scales(const Eigen::MatrixXd& position_m, const Eigen::MatrixXd& rotation_rad, Disagreement& out) const;
+  /// From the coefficients of all nodes, n x (scales * 6).
+  void measure_scales(const Eigen::MatrixXd& W, Disagreement& out) const;
   [[nodiscard]] double measure_directions(std::span<const Pose3> robot) const;
 
   std::vector<Pose3> server_;       ///< Of all nodes of the chain.

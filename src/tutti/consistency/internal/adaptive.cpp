@@ -60,8 +60,7 @@ Eigen::VectorXd blame(const Disagreement& rest) {
 }  // namespace
 
 Selection AdaptivePolicy::choose(const PolicyInput& input) const {
-  PolicyInput unlimited = input;
-  LinkCollector collector(unlimited, true);
+  LinkCollector collector(input, true);
   const std::size_t nodes = input.comparison.pairs.size();
   if (nodes < 2 || input.test == nullptr || !input.test->is_informed()) return std::move(collector).take();
   TUTTI_CHECK(input.odometry_disagreement != nullptr, "a test without what it says");
