@@ -124,6 +124,7 @@ function(tutti_add_bench name source)
   cmake_parse_arguments(ARG "" "" "LIBS" ${ARGN})
   add_executable(bench_${name} ${source})
   target_link_libraries(bench_${name} PRIVATE ${ARG_LIBS} benchmark::benchmark)
+  target_include_directories(bench_${name} PRIVATE "${PROJECT_SOURCE_DIR}/tests") # the rooms and runs of the tests
   target_compile_definitions(bench_${name} PRIVATE TUTTI_SHARED_DIR="${TUTTI_SHARED_DIR}")
   tutti_target_options(bench_${name})
 endfunction()

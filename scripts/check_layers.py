@@ -17,11 +17,13 @@ CONFINED = [
     (r"nanoflann", r"(perception|spectral|consistency|evaluation)/.*\.cpp$", "perception/, spectral/, consistency/, evaluation/ *.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),
+    (r"support/", r"(.*_test\.cpp|tests/.*)$", "tests"),
 ]
 # A library returns what it has to say, never ends the program, and knows nothing but its arguments.
 FORBIDDEN = re.compile(
     r"\bstd::(cout|cerr|clog)\b|\bfmt::print\b|\b(system_clock|random_device)\b|(?<![\w.>])(std::|::)?"
     r"(f?printf|puts|abort|exit|_Exit|quick_exit|terminate|s?rand|getenv)\s*\(")
+SUPPORT = "tests/support/"  # what tests share: a folder a module, held to its layer
 INCLUDE = re.compile(r'\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 
@@ -37,9 +39,11 @@ def layer_of(order, path):
 
 
 def include_breach(order, relative, include):
-    layer = layer_of(order, relative)
-    if include.startswith("tutti/") and not include.endswith(".pb.h"):  # those are generated from proto/
-        other = layer_of(order, include.removeprefix("tutti/"))
+    layer = layer_of(order, relative.removeprefix(SUPPORT))
+    if include.startswith(("tutti/", "support/")) and not include.endswith(".pb.h"):  # those are generated from proto/
+        other = layer_of(order, include.split("/", 1)[1])
+        if other is None and include.startswith("support/"):
+            other = order[0]  # what every test may use
         if other is None:
             return f"'{include.split('/')[1]}' is no layer"
         if order.index(other) > order.index(layer):
@@ -54,10 +58,10 @@ def include_breach(order, relative, include):
 
 def breaches(root):
     order = layer_order(root)
-    source = root / "src/tutti"
-    for path in sorted(p for p in source.rglob("*") if p.suffix in (".hpp", ".cpp")):
-        relative = path.relative_to(source).as_posix()
-        if layer_of(order, relative) is None:
+    files = [*(root / "src/tutti").rglob("*"), *(root / SUPPORT).glob("*/**/*")]
+    for path in sorted(p for p in files if p.suffix in (".hpp", ".cpp")):
+        relative = path.relative_to(root).as_posix().removeprefix("src/tutti/")
+        if layer_of(order, relative.removeprefix(SUPPORT)) is None:
             yield f"{path}:1: '{relative.split('/')[0]}' is missing in src/tutti/CMakeLists.txt"
             continue
         text = re.sub(r"/\*.*?\*/", lambda m: "\n" * m.group().count("\n"), path.read_text(), flags=re.S)

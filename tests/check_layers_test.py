@@ -29,6 +29,8 @@ class CheckLayers(unittest.TestCase):
             "base/a_test.cpp": "#include <ceres/ceres.h>\nstd::cout << 1;\n",
             "perception/lidar/a.cpp": '#include "tutti/geometry/a.hpp"\n#include <nanoflann.hpp>\n',
             "wire/replay/internal/a.hpp": '#include "tutti/wire/a.hpp"\n#include "tutti/wire/replay/a.hpp"\n',
+            "../../tests/support/robot/a.hpp": '#include "tutti/robot/a.hpp"\n#include "support/geometry/a.hpp"\n',
+            "robot/a_test.cpp": '#include "support/robot/a.hpp"\n#include "support/paths.hpp"\n',
             "wire/a.cpp": '#include "tutti/v1/a.pb.h"\n#include <google/protobuf/message.h>\n',
         })
         self.assertEqual(code, 0, out)
@@ -43,6 +45,9 @@ class CheckLayers(unittest.TestCase):
             ("wire/a.hpp", '#include "tutti/wire/replay/a.hpp"'),
             ("base/a.hpp", '#include "tutti/nowhere/a.hpp"'),
             ("attic/a.hpp", "int x;"),
+            ("robot/a.cpp", '#include "support/robot/a.hpp"'),
+            ("geometry/a_test.cpp", '#include "support/robot/a.hpp"'),
+            ("../../tests/support/geometry/a.hpp", '#include "tutti/robot/a.hpp"'),
             ("base/other.cpp", "#include <yaml-cpp/yaml.h>"),
             ("robot/a.cpp", '#include "tutti/v1/a.pb.h"'),
             ("robot/a.cpp", "#include <google/protobuf/message.h>"),
@@ -61,7 +66,7 @@ class CheckLayers(unittest.TestCase):
             number = 1 if name.startswith("attic") else 3
             code, out = check({name: f"//\n\n{line}\n"})
             self.assertEqual(code, 1, (name, line))
-            self.assertIn(f"{name}:{number}: ", out)
+            self.assertIn(f"{name.removeprefix('../../')}:{number}: ", out)
             self.assertEqual(len(out.splitlines()), 1, out)
 
 

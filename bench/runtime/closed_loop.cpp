@@ -3,7 +3,7 @@
 // policy. This is how the default thresholds of `spectral` were found (docs/math.md). Usage, every setting of
 // ClosedLoopConfig by name:
 //   bench_closed_loop length=1295 policy.threshold_small_m=0.02 competitors=true
-#include "tutti/consistency/testing/closed_loop.hpp"
+#include "support/consistency/closed_loop.hpp"
 
 #include <fmt/format.h>
 

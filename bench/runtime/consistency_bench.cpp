@@ -3,8 +3,8 @@
 // either side). Beside the time: the largest error against the exact transform, and the polynomial order.
 #include <benchmark/benchmark.h>
 
+#include "support/consistency/runs.hpp"
 #include "tutti/consistency/compare.hpp"
-#include "tutti/consistency/testing/runs.hpp"
 
 namespace {
 

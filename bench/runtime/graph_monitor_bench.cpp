@@ -8,9 +8,9 @@
 #include <cmath>
 #include <vector>
 
+#include "support/server/corridor_run.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/server/graph_monitor.hpp"
-#include "tutti/server/testing/corridor_run.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace {

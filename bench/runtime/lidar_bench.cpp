@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "support/perception/lidar/rooms.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/fft.hpp"
 #include "tutti/perception/lidar/registration.hpp"
-#include "tutti/perception/lidar/testing/rooms.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 
 namespace {

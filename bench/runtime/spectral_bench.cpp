@@ -7,8 +7,8 @@
 #include <cmath>
 #include <string>
 
+#include "support/spectral/graphs.hpp"
 #include "tutti/spectral/kron.hpp"
-#include "tutti/spectral/testing/graphs.hpp"
 #include "tutti/spectral/wavelet_transform.hpp"
 
 extern "C" {  // of the library that is really loaded

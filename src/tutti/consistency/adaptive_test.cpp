@@ -4,8 +4,8 @@
 
 #include <cstdio>
 
+#include "support/consistency/closed_loop.hpp"
 #include "support/sanitized.hpp"
-#include "tutti/consistency/testing/closed_loop.hpp"
 
 namespace tutti::consistency {
 namespace {

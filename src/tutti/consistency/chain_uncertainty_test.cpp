@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "support/consistency/uncertainty.hpp"
 #include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/internal/chain_filter.hpp"
-#include "tutti/consistency/testing/uncertainty.hpp"
 #include "tutti/spectral/spectrum.hpp"
 #include "tutti/spectral/wavelet_transform.hpp"
 

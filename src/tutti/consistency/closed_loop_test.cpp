@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The whole chain over a mission: proxy graph, comparison, policy, ledger, onboard optimisation.
-#include "tutti/consistency/testing/closed_loop.hpp"
+#include "support/consistency/closed_loop.hpp"
 
 #include <gtest/gtest.h>
 

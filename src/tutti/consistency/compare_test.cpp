@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "support/consistency/runs.hpp"
 #include "support/shared_data.hpp"
-#include "tutti/consistency/testing/runs.hpp"
 #include "tutti/spectral/graph.hpp"
 #include "tutti/spectral/spectrum.hpp"
 

@@ -7,7 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "tutti/consistency/testing/runs.hpp"
+#include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

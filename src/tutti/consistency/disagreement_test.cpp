@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "support/consistency/uncertainty.hpp"
 #include "support/sanitized.hpp"
-#include "tutti/consistency/testing/uncertainty.hpp"
 
 namespace tutti::consistency {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 
-#include "tutti/consistency/testing/uncertainty.hpp"
+#include "support/consistency/uncertainty.hpp"
 
 namespace tutti::consistency {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "tutti/consistency/testing/runs.hpp"
+#include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <set>
 
-#include "tutti/consistency/testing/runs.hpp"
+#include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

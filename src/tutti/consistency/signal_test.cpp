@@ -7,7 +7,7 @@
 
 #include <numbers>
 
-#include "tutti/consistency/testing/runs.hpp"
+#include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "tutti/consistency/testing/runs.hpp"
+#include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
 namespace {

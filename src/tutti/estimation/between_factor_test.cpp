@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tutti/estimation/testing/random_graphs.hpp"
+#include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation {
 namespace {

@@ -8,10 +8,10 @@
 
 #include <array>
 
+#include "support/estimation/random_graphs.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/estimation/chordal.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
-#include "tutti/estimation/testing/random_graphs.hpp"
 #include "tutti/formats/g2o.hpp"
 
 namespace tutti::estimation {

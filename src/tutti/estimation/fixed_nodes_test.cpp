@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "tutti/estimation/testing/random_graphs.hpp"
+#include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation {
 namespace {

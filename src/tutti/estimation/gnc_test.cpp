@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tutti/estimation/testing/random_graphs.hpp"
+#include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation {
 namespace {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "support/estimation/random_graphs.hpp"
 #include "tutti/estimation/between_factor.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
-#include "tutti/estimation/testing/random_graphs.hpp"
 
 namespace tutti::estimation {
 namespace {

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "support/estimation/random_graphs.hpp"
 #include "tutti/estimation/between_factor.hpp"
-#include "tutti/estimation/testing/random_graphs.hpp"
 
 namespace tutti::estimation {
 namespace {

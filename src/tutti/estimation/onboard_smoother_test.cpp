@@ -7,7 +7,7 @@
 #include <Eigen/Cholesky>
 #include <limits>
 
-#include "tutti/estimation/testing/chain_mission.hpp"
+#include "support/estimation/chain_mission.hpp"
 
 namespace tutti::estimation {
 namespace {

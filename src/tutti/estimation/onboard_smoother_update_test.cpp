@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "tutti/estimation/testing/chain_mission.hpp"
+#include "support/estimation/chain_mission.hpp"
 
 namespace tutti::estimation {
 namespace {

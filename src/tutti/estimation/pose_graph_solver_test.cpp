@@ -7,8 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "support/estimation/random_graphs.hpp"
 #include "tutti/estimation/chordal.hpp"
-#include "tutti/estimation/testing/random_graphs.hpp"
 
 extern "C" void openblas_set_num_threads(int threads);
 

@@ -7,8 +7,8 @@
 
 #include <fstream>
 
+#include "support/formats/mutations.hpp"
 #include "support/shared_data.hpp"
-#include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "support/formats/mutations.hpp"
 #include "support/shared_data.hpp"
-#include "tutti/formats/testing/mutations.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::formats {

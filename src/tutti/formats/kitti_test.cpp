@@ -10,9 +10,9 @@
 #include <algorithm>
 #include <limits>
 
+#include "support/formats/mutations.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/formats/internal/points.hpp"
-#include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
 namespace {

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <limits>
 
+#include "support/formats/mutations.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/formats/internal/points.hpp"
-#include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
 namespace {

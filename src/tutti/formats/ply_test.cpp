@@ -5,8 +5,8 @@
 // RapidCheck after gtest.
 #include <rapidcheck/gtest.h>
 
+#include "support/formats/mutations.hpp"
 #include "tutti/formats/internal/points.hpp"
-#include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
 namespace {

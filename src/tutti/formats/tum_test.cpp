@@ -5,8 +5,8 @@
 // RapidCheck after gtest.
 #include <rapidcheck/gtest.h>
 
+#include "support/formats/mutations.hpp"
 #include "support/shared_data.hpp"
-#include "tutti/formats/testing/mutations.hpp"
 
 namespace tutti::formats {
 namespace {

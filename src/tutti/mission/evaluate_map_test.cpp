@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include "support/server/world.hpp"
 #include "tutti/mission/evaluate.hpp"
-#include "tutti/server/testing/world.hpp"
 
 namespace tutti::mission {
 namespace {

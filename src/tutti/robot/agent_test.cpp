@@ -5,10 +5,10 @@
 
 #include <limits>
 
+#include "support/robot/drifting_robot.hpp"
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/robot/testing/drifting_robot.hpp"
 
 namespace tutti::robot {
 namespace {

@@ -8,11 +8,11 @@
 #include <cmath>
 #include <cstdio>
 
+#include "support/server/world.hpp"
 #include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/signal.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/server/map_components.hpp"
-#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

@@ -7,9 +7,9 @@
 #include <limits>
 #include <optional>
 
+#include "support/server/world.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/server/graph_monitor.hpp"
-#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

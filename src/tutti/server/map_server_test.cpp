@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "tutti/server/testing/world.hpp"
+#include "support/server/world.hpp"
 
 namespace tutti::server {
 namespace {

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "support/server/world.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

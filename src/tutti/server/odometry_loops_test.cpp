@@ -5,9 +5,9 @@
 
 #include <Eigen/Cholesky>
 
+#include "support/server/world.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <map>
 
-#include "tutti/server/testing/world.hpp"
+#include "support/server/world.hpp"
 
 namespace tutti::server {
 namespace {

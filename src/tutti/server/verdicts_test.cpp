@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "support/server/world.hpp"
 #include "tutti/server/map_server.hpp"
-#include "tutti/server/testing/world.hpp"
 
 namespace tutti::server {
 namespace {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "support/sanitized.hpp"
+#include "support/server/corridor_run.hpp"
 #include "tutti/server/graph_monitor.hpp"
 #include "tutti/server/map_estimate.hpp"
-#include "tutti/server/testing/corridor_run.hpp"
 
 namespace tutti::server {
 namespace {

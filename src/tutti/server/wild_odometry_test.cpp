@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "support/sanitized.hpp"
+#include "support/server/world.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/server/graph_monitor.hpp"
-#include "tutti/server/testing/world.hpp"
 
 /// One robot's odometry and covariances are anything that a message may carry; the others must not feel it.
 namespace tutti::server {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tutti/spectral/testing/graphs.hpp"
+#include "support/spectral/graphs.hpp"
 
 namespace tutti::spectral {
 namespace {

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <set>
 
+#include "support/spectral/graphs.hpp"
 #include "tutti/spectral/spectrum.hpp"
-#include "tutti/spectral/testing/graphs.hpp"
 
 namespace tutti::spectral {
 namespace {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tutti/spectral/testing/graphs.hpp"
+#include "support/spectral/graphs.hpp"
 
 extern "C" void openblas_set_num_threads(int threads);
 

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "tutti/spectral/testing/graphs.hpp"
+#include "support/spectral/graphs.hpp"
 
 namespace tutti::spectral {
 namespace {

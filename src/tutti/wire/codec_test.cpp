@@ -9,9 +9,9 @@
 #include <cstdio>
 #include <limits>
 
+#include "support/wire/messages.hpp"
 #include "tutti/wire/internal/logarithm.hpp"
 #include "tutti/wire/limits.hpp"
-#include "tutti/wire/testing/messages.hpp"
 
 namespace tutti::wire {
 namespace {

@@ -7,10 +7,10 @@
 #include <array>
 #include <string>
 
+#include "support/wire/messages.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/limits.hpp"
-#include "tutti/wire/testing/messages.hpp"
 
 namespace tutti::wire {
 namespace {

@@ -9,11 +9,11 @@
 #include <new>
 #include <string>
 
+#include "support/wire/messages.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/limits.hpp"
-#include "tutti/wire/testing/messages.hpp"
 
 namespace {
 

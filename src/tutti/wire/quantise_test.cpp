@@ -9,9 +9,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "support/wire/messages.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/wire/internal/columns.hpp"
-#include "tutti/wire/testing/messages.hpp"
 
 namespace tutti::wire {
 namespace {

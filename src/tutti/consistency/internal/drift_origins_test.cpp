@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "tutti/consistency/testing/uncertainty.hpp"
+#include "support/consistency/uncertainty.hpp"
 
 namespace tutti::consistency::internal {
 namespace {

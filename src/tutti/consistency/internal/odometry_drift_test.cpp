@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "tutti/consistency/testing/runs.hpp"
+#include "support/consistency/runs.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 
 namespace tutti::consistency::internal {

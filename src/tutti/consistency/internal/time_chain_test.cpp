@@ -5,8 +5,8 @@
 
 #include <cmath>
 
+#include "support/consistency/runs.hpp"
 #include "tutti/consistency/internal/links.hpp"
-#include "tutti/consistency/testing/runs.hpp"
 
 namespace tutti::consistency::internal {
 namespace {

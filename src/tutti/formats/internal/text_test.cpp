@@ -5,7 +5,7 @@
 // RapidCheck after gtest.
 #include <rapidcheck/gtest.h>
 
-#include "tutti/formats/testing/mutations.hpp"
+#include "support/formats/mutations.hpp"
 
 namespace tutti::formats::internal {
 namespace {

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "tutti/mission/report/testing/explanation_example.hpp"
-#include "tutti/mission/report/testing/good_page.hpp"
+#include "support/mission/report/explanation_example.hpp"
+#include "support/mission/report/good_page.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "tutti/mission/report/testing/explanation_example.hpp"
+#include "support/mission/report/explanation_example.hpp"
 
 namespace tutti::mission {
 namespace {

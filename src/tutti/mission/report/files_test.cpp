@@ -6,12 +6,12 @@
 #include <set>
 #include <sstream>
 
+#include "support/mission/report/report_example.hpp"
 #include "tutti/base/config_io.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

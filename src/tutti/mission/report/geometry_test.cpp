@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tutti/mission/report/testing/report_example.hpp"
+#include "support/mission/report/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "support/mission/report/good_page.hpp"
+#include "support/mission/report/report_example.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/mission/report/testing/good_page.hpp"
-#include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "support/mission/report/report_example.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "support/mission/report/report_example.hpp"
 #include "tutti/mission/report/label.hpp"
-#include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <sstream>
 
+#include "support/mission/report/report_example.hpp"
 #include "tutti/mission/report/format.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/mission/report/testing/report_example.hpp"
 
 namespace tutti::mission {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "support/perception/lidar/rooms.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
-#include "tutti/perception/lidar/testing/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "tutti/perception/lidar/testing/rooms.hpp"
+#include "support/perception/lidar/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {

@@ -6,8 +6,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "support/perception/lidar/rooms.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
-#include "tutti/perception/lidar/testing/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "support/perception/lidar/rooms.hpp"
 #include "tutti/model/way.hpp"
 #include "tutti/perception/lidar/levelling.hpp"
-#include "tutti/perception/lidar/testing/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "tutti/perception/lidar/testing/rooms.hpp"
+#include "support/perception/lidar/rooms.hpp"
 
 namespace tutti::lidar {
 namespace {

@@ -6,9 +6,9 @@
 #include <chrono>
 #include <vector>
 
+#include "support/consistency/uncertainty.hpp"
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/policy.hpp"
-#include "tutti/consistency/testing/uncertainty.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/geometry/alignment.hpp"
 

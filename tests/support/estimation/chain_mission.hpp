@@ -6,9 +6,9 @@
 #include <Eigen/LU>
 #include <vector>
 
+#include "support/estimation/random_graphs.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/estimation/pose_graph_solver.hpp"
-#include "tutti/estimation/testing/random_graphs.hpp"
 
 /// Odometry chains with constraints and known truth for the tests of the onboard smoother.
 namespace tutti::estimation::testing {

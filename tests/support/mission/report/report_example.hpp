@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "support/mission/report/explanation_example.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/follow_alerts.hpp"
 #include "tutti/mission/record.hpp"
-#include "tutti/mission/report/testing/explanation_example.hpp"
 
 /// For tests of the report only: a made-up mission record with plausible shapes. Its figures mean nothing.
 namespace tutti::mission::test {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
+#include "support/consistency/runs.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/consistency/chain_uncertainty.hpp"
-#include "tutti/consistency/testing/runs.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::consistency::test {
