@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "tutti/base/check.hpp"
 #include "tutti/consistency/signal.hpp"
 #include "tutti/spectral/graph.hpp"
 #include "tutti/spectral/kron.hpp"
@@ -79,32 +78,11 @@ Eigen::MatrixXd disagreement(const SparseMatrix& L_server, const Eigen::MatrixXd
   return d;
 }
 
-namespace {
-
-Comparison synchronised(const Synchronisation& sync) {
-  return {.pairs = sync.pairs,
-          .disagreement = {},
-          .rotation_disagreement = {},
-          .unmatched_proxy = sync.unmatched_proxy,
-          .unmatched_robot = sync.unmatched_robot,
-          .missing_eliminated = sync.missing_eliminated};
-}
-
-}  // namespace
-
-Comparison synchronised(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes) {
-  return synchronised(synchronise(graph, chain, nodes));
-}
-
 Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                    const CompareConfig& config) {
-  const auto signal = make_signal(config.signal);
-  TUTTI_CHECK(signal.has_value(), "signal '{}' is unknown", config.signal);
-
   const Synchronisation sync = synchronise(graph, chain, nodes);
-  Comparison out = synchronised(sync);
+  Comparison out{.pairs = sync.pairs, .disagreement = {}};
   out.disagreement = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(sync.pairs.size()), config.scales);
-  out.rotation_disagreement = out.disagreement;
   if (sync.pairs.size() < 2) return out;
 
   std::vector<Pose3> poses_server, poses_robot;
@@ -127,17 +105,8 @@ Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<cons
   }
   out.lambda_max = std::max(spectral::largest_eigenvalue(L_server, kLambdaTolerance),
                             spectral::largest_eigenvalue(L_robot, kLambdaTolerance));
-  const Eigen::MatrixXd f_server = (*signal)->evaluate(poses_server);
-  const Eigen::MatrixXd f_robot = (*signal)->evaluate(poses_robot);
-  const Eigen::Index metres = (*signal)->metres();
-  const Eigen::Index radians = f_server.cols() - metres;
-  out.disagreement = disagreement(L_server, f_server.leftCols(metres), L_robot, f_robot.leftCols(metres),
-                                  out.lambda_max, config, out.order);
-  if (radians == 0) return out;
-  int order = 0;
-  out.rotation_disagreement = disagreement(L_server, f_server.rightCols(radians), L_robot, f_robot.rightCols(radians),
-                                           out.lambda_max, config, order);
-  out.order = std::max(out.order, order);
+  out.disagreement = disagreement(L_server, evaluate_signal(config.signal, poses_server), L_robot,
+                                  evaluate_signal(config.signal, poses_robot), out.lambda_max, config, out.order);
   return out;
 }
 

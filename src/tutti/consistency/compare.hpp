@@ -37,16 +37,11 @@ struct CompareConfig {
 /// Where, and at which scale, the robot's estimate disagrees with the server's.
 struct Comparison {
   std::vector<NodePair> pairs;   ///< The synchronised nodes in time order: row r of `disagreement` is pairs[r].
-  Eigen::MatrixXd disagreement;  ///< pairs x scales, d^s of eq. (8) over the columns in metres; scale 0 = largest.
-                                 ///< Empty when only synchronised.
-  Eigen::MatrixXd rotation_disagreement;  ///< The same over the columns in radians; zero if the signal has none.
-  double lambda_max = 0.0;                ///< Common to both filter banks: the larger of the two graphs'. 0 = no edges.
-  int order = 0;                          ///< Of the Chebyshev polynomials (the larger of the two); 0 = exact.
-  std::size_t unmatched_proxy = 0, unmatched_robot = 0, missing_eliminated = 0;  ///< See Synchronisation.
+  Eigen::MatrixXd disagreement;  ///< pairs x scales, d^s of eq. (8), metres; scale 0 = largest. Empty when only
+                                 ///< synchronised.
+  double lambda_max = 0.0;       ///< Common to both filter banks: the larger of the two graphs'. 0 = no edges.
+  int order = 0;                 ///< Of the Chebyshev polynomials (the larger of the two); 0 = exact.
 };
-
-/// Step 4 of the paper's section III alone: what most policies need, and a hundredth of the work.
-Comparison synchronised(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes);
 
 /// Section III of the paper, steps 4 and 5: synchronise, build the robot's own graph by the server's rule, filter both
 /// signals, d^s.
@@ -55,9 +50,8 @@ Comparison synchronised(const ProxyGraph& graph, const ChainId& chain, std::span
 /// the carried weights, and the robot reduces its own graph over kept + eliminated nodes to the kept ones and keeps the
 /// edges the server kept: equal poses then give d^s = 0 in both cases. If the robot lacks some of the nodes of a
 /// reduced graph, it reduces what it has; the two graphs then differ and d^s does not vanish even for equal poses: near
-/// the gap in every scale, all along in the large ones. `missing_eliminated` and `unmatched_proxy` say so. Fewer than
-/// two pairs: disagreement is 0 for the pairs there are. Nodes without edges keep their whole signal in scale 0.
-/// `config.signal` must be known (checked).
+/// the gap in every scale, all along in the large ones. Fewer than two pairs: disagreement is 0 for the pairs there
+/// are. Nodes without edges keep their whole signal in scale 0. `config.signal` must be known (checked).
 Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                    const CompareConfig& config);
 

@@ -92,7 +92,7 @@ Disagreement DisagreementTest::operator()(std::span<const Pose3> robot) const {
   if (filter_ != nullptr) {
     std::vector<Pose3> server;
     for (const std::size_t rank : ranks_) server.push_back(server_[rank]);
-    measure_scales((*filter_)(filled(PoseSignal().difference(server, robot), ranks_, server_.size())), out);
+    measure_scales((*filter_)(filled(pose_difference(server, robot), ranks_, server_.size())), out);
   }
   if (uncertainty_ != nullptr && config_.without != "directions")
     out.direction_significance = measure_directions(robot);

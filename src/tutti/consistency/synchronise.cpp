@@ -50,11 +50,7 @@ Synchronisation synchronise(const ProxyGraph& graph, const ChainId& chain, std::
   const auto rest = merge(proxy, ours, [&](const Stamped& theirs, const Stamped& own) {
     out.pairs.push_back({theirs.position, own.position});
   });
-  const auto unknown =
-      merge(removed, rest, [&](const Stamped&, const Stamped& own) { out.eliminated.push_back(own.position); });
-  out.unmatched_proxy = proxy.size() - out.pairs.size();
-  out.missing_eliminated = removed.size() - out.eliminated.size();
-  out.unmatched_robot = unknown.size();
+  merge(removed, rest, [&](const Stamped&, const Stamped& own) { out.eliminated.push_back(own.position); });
   return out;
 }
 

@@ -20,9 +20,6 @@ struct NodePair {
 struct Synchronisation {
   std::vector<NodePair> pairs;          ///< One-to-one, in time order.
   std::vector<std::size_t> eliminated;  ///< Our nodes that the server's reduction removed; in time order.
-  std::size_t unmatched_proxy = 0;      ///< Proxy nodes of this robot that it does not have (any more).
-  std::size_t unmatched_robot = 0;      ///< Our nodes that the server does not have (yet).
-  std::size_t missing_eliminated = 0;   ///< Nodes the server's reduction removed that we do not have.
 };
 
 /// Chronological matching by (robot, stamp), stamps exactly equal: the robot makes the stamps and they travel

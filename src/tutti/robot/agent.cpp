@@ -110,7 +110,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   const std::vector<consistency::RobotNode> own = nodes();
   const auto comparison = policy_->needs_disagreement()
                               ? consistency::compare(message.graph, chain_, own, config_.compare)
-                              : consistency::synchronised(message.graph, chain_, own);
+                              : consistency::Comparison{consistency::synchronise(message.graph, chain_, own).pairs};
   ended(UpdateStage::compare);
 
   std::optional<consistency::DisagreementTest> test;

@@ -21,7 +21,7 @@ TimeChain time_chain(const ProxyGraph& graph, std::span<const RobotNode> nodes, 
 }
 
 double aligned_rmse(std::span<const Pose3> server, std::span<const Pose3> robot) {
-  const Eigen::MatrixXd off = PoseSignal().difference(server, robot);
+  const Eigen::MatrixXd off = pose_difference(server, robot);
   return std::sqrt(off.leftCols<3>().squaredNorm() / static_cast<double>(server.size()));
 }
 
