@@ -76,117 +76,57 @@ Expansion expand(const MeyerFilterBank& bank, double domain, Index n) {
   return out;
 }
 
-/// Smallest degree of each scale's polynomial whose worst case meets the tolerance.
-std::vector<Index> worst_case_degrees(const Expansion& expansion, double norm, double tolerance) {
-  std::vector<Index> degrees;
-  for (Index s = 0; s < expansion.tail.cols(); ++s) {
-    Index degree = 0;
-    while (degree + 1 < expansion.tail.rows() && expansion.tail(degree, s) * norm > tolerance) ++degree;
-    degrees.push_back(degree);
-  }
+/// Smallest degree of each scale's polynomial, at most `max_degree`, whose worst case meets the tolerance for a signal
+/// of this norm; larger scales never get less than smaller ones.
+std::vector<Index> degrees_for(const Expansion& expansion, double norm, double tolerance, Index max_degree) {
+  std::vector<Index> degrees(static_cast<std::size_t>(expansion.tail.cols()));
+  Index degree = 0;
+  for (std::size_t s = degrees.size(); s-- > 0; degrees[s] = degree)
+    while (degree < max_degree && degree + 1 < expansion.tail.rows() &&
+           expansion.tail(degree, static_cast<Index>(s)) * norm > tolerance)
+      ++degree;
   return degrees;
 }
 
-/// T_k(X) y for k = 0, 1, ..., with X = (2 / domain) L - I, its sums over k for every scale, and the moments
-/// mu_m = y^T T_m(X) y, two for every product [T_j T_k = (T_{j+k} + T_|j-k|) / 2].
-class Recurrence {
- public:
-  Recurrence(const internal::RowBlocks& laplacian, double domain, const Expansion& expansion, const Eigen::VectorXd& y)
-      : laplacian_(laplacian),
-        domain_(domain),
-        expansion_(expansion),
-        current_(y),
-        previous_(Eigen::VectorXd::Zero(y.size())),
-        sums_(y * expansion.coefficient.row(0)),
-        moments_{y.squaredNorm()} {}
-
-  /// Goes on to the highest of the degrees; scale s gets no term above degrees[s]. Degrees must not grow with s.
-  void run(std::span<const Index> degrees, bool with_moments) {
-    for (auto active = degrees.size(); degree_ < degrees.front();) {
-      ++degree_;
-      while (degrees[active - 1] < degree_) --active;
-      const double half = degree_ == 1 ? 0.5 : 1.0;  // T_1 = X T_0, then T_{k+1} = 2 X T_k - T_{k-1}
-      const std::span weights(&expansion_.coefficient(degree_, 0), active);
-      laplacian_.step(half * 4.0 / domain_, half * -2.0, current_, previous_, weights, sums_);
-      std::swap(current_, previous_);
-      if (!with_moments) continue;
-      const double odd = current_.dot(previous_);
-      moments_.push_back(degree_ == 1 ? odd : 2.0 * odd - moments_[1]);
-      moments_.push_back(2.0 * current_.squaredNorm() - moments_[0]);
-    }
-  }
-  [[nodiscard]] const Eigen::MatrixXd& sums() const { return sums_; }
-  [[nodiscard]] std::span<const double> moments() const { return moments_; }
-
- private:
-  const internal::RowBlocks& laplacian_;
-  double domain_;
-  const Expansion& expansion_;
-  Index degree_ = 0;
-  Eigen::VectorXd current_, previous_;
-  Eigen::MatrixXd sums_;
-  std::vector<double> moments_;
+/// A graph laid out for many products, and the polynomials' domain. T_k grows exponentially outside of that, so it
+/// holds the largest eigenvalue, found to `accuracy`, with ten times that to spare.
+struct Layout {
+  internal::RowBlocks blocks;
+  double domain;
+  Layout(const SparseMatrix& laplacian, double accuracy)
+      : blocks(laplacian),
+        domain(std::min(largest_eigenvalue_bound(laplacian),
+                        (1.0 + 10.0 * accuracy) * largest_eigenvalue(laplacian, accuracy))) {}
 };
 
-/// Entry K - from bounds || sum_{K < j <= to} c_j T_j(X) y ||_2 for K = from .. to, `to - from` <= number of moments:
-/// with x = cos(theta) and mu the signal's spectral measure, the square is
-///   int (sum c_j cos(j theta))^2 dmu <= int |sum c_j e^{i j theta}|^2 dmu = sum_{j, k} c_j c_k mu_|j-k|.
-/// Unlike sum |c_j| ||y|| it knows that the signal has little energy where the polynomial is still wrong.
-std::vector<double> measured_bounds(const Eigen::Ref<const Eigen::VectorXd>& c, std::span<const double> moments,
-                                    Index from, Index to) {
-  constexpr double kRounding = 1e-14;
-  std::vector<double> out(static_cast<std::size_t>(to - from) + 1, 0.0);
-  const auto mu = Eigen::VectorXd::Map(moments.data(), static_cast<Index>(moments.size()));
-  double square = 0.0;
-  double sum = 0.0;
-  for (Index j = to; j > from; --j) {
-    square += c[j] * (c[j] * mu[0] + 2.0 * c.segment(j + 1, to - j).dot(mu.segment(1, to - j)));
-    sum += std::abs(c[j]);
-    out[static_cast<std::size_t>(j - 1 - from)] = std::sqrt(std::max(square, 0.0) + kRounding * sum * sum * mu[0]);
-  }
+/// g_s(0) f of all signals.
+Eigen::MatrixXd unfiltered(const MeyerFilterBank& bank, const Eigen::Ref<const Eigen::MatrixXd>& signals) {
+  Eigen::MatrixXd out(signals.rows(), bank.scales() * signals.cols());
+  for (int s = 0; s < bank.scales(); ++s)
+    out.middleCols(s * signals.cols(), signals.cols()) = bank.kernel(s, 0.0) * signals;
   return out;
 }
 
-struct Filtered {
-  Eigen::MatrixXd sums;  ///< Column s = h_s(L) y.
-  Index degree = 0;
-  double error_bound = 0.0;
-};
-
-/// First a third of the degree that the worst case asks for. The moments found on the way then tell how far to go,
-/// usually less than half of it.
-Filtered filter(const internal::RowBlocks& laplacian, double domain, const Expansion& expansion,
-                const Eigen::VectorXd& y, double tolerance, Index max_degree) {
-  const double norm = y.norm();
-  const std::vector<Index> worst_case = worst_case_degrees(expansion, norm, 0.5 * tolerance);
-  const Index probe = std::min(max_degree, (*std::max_element(worst_case.begin(), worst_case.end()) + 2) / 3);
-  Recurrence recurrence(laplacian, domain, expansion, y);
-  recurrence.run(std::vector<Index>(worst_case.size(), probe), true);
-
-  Filtered out;
-  std::vector<Index> degrees(worst_case.size(), probe);
-  for (std::size_t s = worst_case.size(); s-- > 0;) {
-    const Index scale = static_cast<Index>(s);
-    const auto left_out = [&](Index degree) { return expansion.tail(degree, scale) * norm; };
-    if (s + 1 < degrees.size()) degrees[s] = degrees[s + 1];  // larger scales never get less than smaller ones
-    double error = left_out(degrees[s]);
-    const Index known = probe + static_cast<Index>(recurrence.moments().size()) - 1;
-    if (error > tolerance && worst_case[s] <= known) {
-      const Eigen::VectorXd c = expansion.coefficient.col(scale).head(worst_case[s] + 1);
-      const auto bounds = measured_bounds(c, recurrence.moments(), probe, worst_case[s]);
-      const auto bound_at = [&](Index degree) {
-        return left_out(std::max(degree, worst_case[s])) +
-               (degree < worst_case[s] ? bounds[static_cast<std::size_t>(degree - probe)] : 0.0);
-      };
-      while (bound_at(degrees[s]) > tolerance && degrees[s] < max_degree) ++degrees[s];
-      error = std::min(bound_at(degrees[s]), left_out(degrees[s]));
-    }
-    out.error_bound = std::max(out.error_bound, error);
+/// Adds h_s(L) y of one signal to the coefficients, y = L f = column `c` of `smoothed`, by the recurrence of T_k(X) y,
+/// X = (2 / domain) L - I; scale s gets no term above degrees[s].
+void add_filtered(const Layout& layout, const Expansion& expansion, std::span<const Index> degrees,
+                  const Eigen::MatrixXd& smoothed, Index c, Eigen::MatrixXd& coefficients) {
+  Eigen::VectorXd current = layout.blocks.to_blocks(smoothed.col(c));
+  Eigen::VectorXd previous = Eigen::VectorXd::Zero(current.size());
+  Eigen::MatrixXd sums = current * expansion.coefficient.row(0);
+  auto active = degrees.size();
+  for (Index k = 1; k <= degrees.front(); ++k) {
+    while (degrees[active - 1] < k) --active;
+    const double half = k == 1 ? 0.5 : 1.0;  // T_1 = X T_0, then T_{k+1} = 2 X T_k - T_{k-1}
+    const std::span weights(&expansion.coefficient(k, 0), active);
+    layout.blocks.step(half * 4.0 / layout.domain, half * -2.0, current, previous, weights, sums);
+    std::swap(current, previous);
   }
-  recurrence.run(degrees, false);
-  out.sums = recurrence.sums();
-  out.degree = degrees.front();
-  return out;
+  Eigen::VectorXd column(smoothed.rows());
+  for (Index s = 0; s < sums.cols(); ++s) {
+    layout.blocks.from_blocks(sums.col(s), column);
+    coefficients.col(s * smoothed.cols() + c) += column;
+  }
 }
 
 }  // namespace
@@ -208,40 +148,25 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
   TUTTI_CHECK(signals.rows() == laplacian.rows(), "signals of {} nodes, graph of {}", signals.rows(), laplacian.rows());
   TUTTI_CHECK(config.tolerance > 0.0 && config.max_order >= 1, "tolerance {}, max_order {}", config.tolerance,
               config.max_order);
-  ChebyshevResult result;
-  result.coefficients.setZero(signals.rows(), bank.scales() * signals.cols());
-  for (int s = 0; s < bank.scales(); ++s)
-    result.coefficients.middleCols(s * signals.cols(), signals.cols()) = bank.kernel(s, 0.0) * signals;
-
+  ChebyshevResult result{.coefficients = unfiltered(bank, signals)};
   const Eigen::MatrixXd smoothed = laplacian * signals;
   const double norm = smoothed.size() == 0 ? 0.0 : smoothed.colwise().norm().maxCoeff();
   if (norm == 0.0) return result;  // constant on every component
 
-  // A hair more than the largest eigenvalue, because T_k grows exponentially outside of the domain.
-  constexpr double kAccuracy = 1e-9;
-  constexpr double kMargin = 1.0 + 1e-8;
-  const internal::RowBlocks blocks(laplacian);
-  const double bound = largest_eigenvalue_bound(laplacian);
-  const double domain = std::min(bound, kMargin * largest_eigenvalue(laplacian, kAccuracy));
+  const Layout layout(laplacian, 1e-9);
   const Index max_degree = config.max_order - 1;  // one product made L f
   Index size = 2048;
-  Expansion expansion = expand(bank, domain, size);
-  const auto resolved = [&] {
-    const auto degrees = worst_case_degrees(expansion, norm, 0.5 * config.tolerance);
-    return *std::max_element(degrees.begin(), degrees.end()) + 1 < size;
-  };
-  while (!resolved() && size <= 2 * max_degree) expansion = expand(bank, domain, size *= 2);
+  Expansion expansion = expand(bank, layout.domain, size);
+  const auto resolved = [&] { return degrees_for(expansion, norm, 0.5 * config.tolerance, size).front() + 1 < size; };
+  while (!resolved() && size <= 2 * max_degree) expansion = expand(bank, layout.domain, size *= 2);
 
   for (Index c = 0; c < signals.cols(); ++c) {
-    const auto [sums, degree, error_bound] =
-        filter(blocks, domain, expansion, blocks.to_blocks(smoothed.col(c)), config.tolerance, max_degree);
-    Eigen::VectorXd column(signals.rows());
-    for (int s = 0; s < bank.scales(); ++s) {
-      blocks.from_blocks(sums.col(s), column);
-      result.coefficients.col(s * signals.cols() + c) += column;
-    }
-    result.order = std::max(result.order, static_cast<int>(degree) + 1);
-    result.error_bound = std::max(result.error_bound, error_bound);
+    const double own_norm = smoothed.col(c).norm();
+    const auto degrees = degrees_for(expansion, own_norm, config.tolerance, max_degree);
+    add_filtered(layout, expansion, degrees, smoothed, c, result.coefficients);
+    result.order = std::max(result.order, static_cast<int>(degrees.front()) + 1);
+    for (std::size_t s = 0; s < degrees.size(); ++s)
+      result.error_bound = std::max(result.error_bound, expansion.tail(degrees[s], static_cast<Index>(s)) * own_norm);
   }
   result.converged = result.error_bound <= config.tolerance;
   return result;
@@ -249,29 +174,22 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
 
 struct WaveletFilter::Prepared {
   SparseMatrix laplacian;
-  internal::RowBlocks blocks;
+  Layout layout;
   MeyerFilterBank bank;
-  double domain = 0.0;
   Expansion expansion;
-  std::vector<Index> degrees;  ///< Of the polynomials of h_s, not growing with s.
+  std::vector<Index> degrees;  ///< Of the polynomials of h_s.
 };
 
 WaveletFilter::WaveletFilter(const SparseMatrix& laplacian, int scales, double tolerance) {
   TUTTI_CHECK(scales >= 2 && tolerance > 0.0, "{} scales, tolerance {}", scales, tolerance);
-  // T_k grows exponentially outside of the domain, which must hold the largest eigenvalue.
-  constexpr double kAccuracy = 1e-3;
-  constexpr double kMargin = 1.01;
   constexpr Index kTerms = 2048;
-  internal::RowBlocks blocks(laplacian);
-  const double bound = largest_eigenvalue_bound(laplacian);
-  const double domain = std::min(bound, kMargin * largest_eigenvalue(laplacian, kAccuracy));
-  MeyerFilterBank bank(scales, domain);
-  auto made = std::make_unique<Prepared>(Prepared{laplacian, std::move(blocks), bank, domain, {}, {}});
+  Layout layout(laplacian, 1e-3);
+  const double domain = layout.domain;
+  const MeyerFilterBank bank(scales, domain);
+  auto made = std::make_unique<Prepared>(Prepared{laplacian, std::move(layout), bank, {}, {}});
   if (domain > 0.0) {
     made->expansion = expand(bank, domain, kTerms);
-    made->degrees = worst_case_degrees(made->expansion, domain, tolerance);
-    for (std::size_t s = made->degrees.size() - 1; s-- > 0;)
-      made->degrees[s] = std::max(made->degrees[s], made->degrees[s + 1]);
+    made->degrees = degrees_for(made->expansion, domain, tolerance, kTerms);
   }
   prepared_ = std::move(made);
 }
@@ -286,22 +204,12 @@ int WaveletFilter::degree() const {
 }
 
 Eigen::MatrixXd WaveletFilter::operator()(const Eigen::Ref<const Eigen::MatrixXd>& signals) const {
-  const auto& [laplacian, blocks, bank, domain, expansion, degrees] = *prepared_;
+  const auto& [laplacian, layout, bank, expansion, degrees] = *prepared_;
   TUTTI_CHECK(signals.rows() == laplacian.rows(), "signals of {} nodes, graph of {}", signals.rows(), laplacian.rows());
-  const Index d = signals.cols();
-  Eigen::MatrixXd out(signals.rows(), bank.scales() * d);
-  for (int s = 0; s < bank.scales(); ++s) out.middleCols(s * d, d) = bank.kernel(s, 0.0) * signals;
+  Eigen::MatrixXd out = unfiltered(bank, signals);
   if (degrees.empty()) return out;
   const Eigen::MatrixXd smoothed = laplacian * signals;
-  Eigen::VectorXd column(signals.rows());
-  for (Index c = 0; c < d; ++c) {
-    Recurrence recurrence(blocks, domain, expansion, blocks.to_blocks(smoothed.col(c)));
-    recurrence.run(degrees, false);
-    for (int s = 0; s < bank.scales(); ++s) {
-      blocks.from_blocks(recurrence.sums().col(s), column);
-      out.col(s * d + c) += column;
-    }
-  }
+  for (Index c = 0; c < signals.cols(); ++c) add_filtered(layout, expansion, degrees, smoothed, c, out);
   return out;
 }
 

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "tutti/base/config.hpp"
 #include "tutti/spectral/graph.hpp"
 #include "tutti/spectral/meyer.hpp"
 #include "tutti/spectral/spectrum.hpp"
@@ -21,15 +20,8 @@ namespace tutti::spectral {
                                               const Eigen::MatrixXd& signals);
 
 struct ChebyshevConfig {
-  double tolerance = 1e-3;  ///< In the signal's unit.
-  int max_order = 4000;
-
-  template <class V>
-  void describe(V& v) {
-    v.field("tolerance", tolerance, greater_than(0.0),
-            "Largest error allowed in any wavelet coefficient, in the signal's unit (metres for a distance).");
-    v.field("max_order", max_order, at_least(1), "Most products with the Laplacian to spend on one signal.");
-  }
+  double tolerance = 1e-3;  ///< Largest error allowed in any coefficient, in the signal's unit.
+  int max_order = 4000;     ///< Most products with the Laplacian to spend on one signal.
 };
 
 struct ChebyshevResult {
