@@ -34,7 +34,7 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
     return ClosureVerdict{{first.id, second.id}, {}, refusal, version()};
   };
   if (!a->usable || !b->usable) return refuse(a->usable ? b->refusal : a->refusal);
-  if (!lidar::plausible_pair(*a, *b, config_)) return refuse(Refusal{RefusalReason::unlike_from_above});
+  if (!lidar::plausible_pair(*a, *b)) return refuse(Refusal{RefusalReason::unlike_from_above});
   return lidar::to_verdict(first, second, lidar::verify_pair(*a, *b, config_));
 }
 

@@ -14,6 +14,8 @@ namespace {
 
 constexpr int kN = kImageSize;
 constexpr int kMask = kN - 1;
+constexpr double kMinScore = 0.1;          // correlation below which a guess is not worth a registration
+constexpr std::size_t kMinWallCells = 30;  // a view from above with fewer (half cells) says nothing
 static_assert((kN & kMask) == 0);
 
 /// A pose of b's view on a's, in the level frames, about the centres of the views.
@@ -57,7 +59,7 @@ void add_peaks(Eigen::ArrayXXf correlation, double direction_a, double yaw, int 
 
 /// The best two shifts of every yaw that lays a wall direction of b on one of a.
 std::vector<Peak> correlate(const SubmapFeatures& a, const SubmapFeatures& b, const CandidateConfig& config) {
-  const int apart = std::min(static_cast<int>(config.distinct_m / config.cell_m), kN / 2 - 1);
+  const int apart = std::min(static_cast<int>(kDistinct_m / config.cell_m), kN / 2 - 1);
   std::vector<Peak> peaks;
   for (const TurnedView& view_a : *a.turned_views) {
     const ComplexImage mirrored_a = mirrored(view_a.spectrum);
@@ -76,12 +78,11 @@ std::vector<Peak> select_distinct(std::vector<Peak> peaks, const CandidateConfig
   std::stable_sort(peaks.begin(), peaks.end(), [](const Peak& p, const Peak& q) { return p.value > q.value; });
   std::vector<Peak> chosen;
   for (const Peak& peak : peaks) {
-    if (peak.value < static_cast<float>(config.min_score)) break;
+    if (peak.value < static_cast<float>(kMinScore)) break;
     if (chosen.size() >= static_cast<std::size_t>(config.max_guesses)) break;
     const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Peak& other) {
       const double turn = std::remainder(other.yaw - peak.yaw, 2.0 * std::numbers::pi);
-      return std::abs(turn) < config.distinct_deg * kRadPerDeg &&
-             (other.shift - peak.shift).norm() <= config.distinct_m;
+      return std::abs(turn) < kDistinct_deg * kRadPerDeg && (other.shift - peak.shift).norm() <= kDistinct_m;
     });
     if (!known) chosen.push_back(peak);
   }
@@ -134,10 +135,8 @@ std::vector<AlignmentGuess> propose_alignments(const SubmapFeatures& a, const Su
   return guesses;
 }
 
-bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
-  const auto enough = [&](const SubmapFeatures& f) {
-    return f.usable && f.view.walls.size() >= static_cast<std::size_t>(config.candidates.min_wall_cells);
-  };
+bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b) {
+  const auto enough = [&](const SubmapFeatures& f) { return f.usable && f.view.walls.size() >= kMinWallCells; };
   return enough(a) && enough(b);
 }
 

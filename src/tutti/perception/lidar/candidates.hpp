@@ -23,6 +23,6 @@ std::vector<AlignmentGuess> propose_alignments(const SubmapFeatures& a, const Su
 
 /// Cheap test, invariant to the pose of either: false only when the two can never be accepted, because one is unusable
 /// or shows hardly any walls. (Two submaps of one size cannot be told apart more cheaply than by propose_alignments.)
-bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config);
+bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b);
 
 }  // namespace tutti::lidar

@@ -37,8 +37,8 @@ TEST(ProposeAlignments, proposeNothingForUnusableSubmaps) {
   const auto good = extract_features(make_submap({RobotId{0}, 0}, furnished_room(), {}, Rng(1)), config);
   EXPECT_TRUE(propose_alignments(good, SubmapFeatures{}, config).empty());
   EXPECT_TRUE(propose_alignments(SubmapFeatures{}, good, config).empty());
-  EXPECT_FALSE(plausible_pair(good, SubmapFeatures{}, config));
-  EXPECT_TRUE(plausible_pair(good, good, config));
+  EXPECT_FALSE(plausible_pair(good, SubmapFeatures{}));
+  EXPECT_TRUE(plausible_pair(good, good));
 }
 
 }  // namespace

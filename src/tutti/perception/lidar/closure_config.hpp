@@ -35,19 +35,15 @@ struct RegistrationLevel {
 
 struct RegistrationConfig {
   std::vector<RegistrationLevel> levels{{1.5, 500, 8}, {0.6, 1000, 8}, {0.3, 4000, 12}};  ///< Coarse to fine.
-  double max_normal_angle_deg = 45.0;  ///< Between the normals of two corresponding points.
-  double overlap_distance_m = 0.3;     ///< A point overlaps when a target point with a like normal is this close.
-  double residual_scale_m = 0.1;       ///< Of the robust loss at the finest level; grows with the level's distance.
-  double covariance_scale = 30.0;      ///< Neighbouring residuals are not independent: divides the information.
+  double overlap_distance_m = 0.3;  ///< A point overlaps when a target point with a like normal is this close.
+  double covariance_scale = 30.0;   ///< Neighbouring residuals are not independent: divides the information.
   double min_translation_sigma_m = 0.004;
   double min_rotation_sigma_rad = 0.001;
   template <class V>
   void describe(V& v) {
     v.field("levels", levels, any(), "Stages of the registration, coarse to fine.");
-    v.field("max_normal_angle_deg", max_normal_angle_deg, between(1.0, 180.0), "Between corresponding normals.");
     v.field("overlap_distance_m", overlap_distance_m, greater_than(0.0),
             "A point overlaps when a target point with a like normal is this close.");
-    v.field("residual_scale_m", residual_scale_m, greater_than(0.0), "Scale of the robust loss at the finest level.");
     v.field("covariance_scale", covariance_scale, at_least(1.0),
             "How many neighbouring residuals count as one independent one.");
     v.field("min_translation_sigma_m", min_translation_sigma_m, greater_than(0.0), "Floor of the standard deviation.");
@@ -55,25 +51,20 @@ struct RegistrationConfig {
   }
 };
 
+inline constexpr double kDistinct_deg = 12.0;  ///< Two alignments differ by this yaw,
+inline constexpr double kDistinct_m = 2.0;     ///< or this far: beyond what the registration would bridge.
+
 /// Search for the rough relative pose by correlating views from above.
 struct CandidateConfig {
-  double cell_m = 0.8;         ///< Cell of the 64 x 64 view from above.
-  int wall_directions = 2;     ///< Of each submap; any of one is laid on any of the other, either way round.
-  int max_guesses = 3;         ///< Best alignments handed to the registration.
-  int min_wall_cells = 30;     ///< A view from above with fewer (half cells) says nothing.
-  double distinct_deg = 12.0;  ///< Two alignments differ by this yaw,
-  double distinct_m = 2.0;     ///< or this far: beyond what the registration would bridge.
-  double min_score = 0.1;      ///< Correlation (0..1) below which a guess is not worth a registration.
+  double cell_m = 0.8;      ///< Cell of the 64 x 64 view from above.
+  int wall_directions = 2;  ///< Of each submap; any of one is laid on any of the other, either way round.
+  int max_guesses = 3;      ///< Best alignments handed to the registration.
   template <class V>
   void describe(V& v) {
     v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 64 x 64 view from above.");
     v.field("wall_directions", wall_directions, between(1, 4),
             "Main directions of each submap's walls; any of one is laid on any of the other, either way round.");
     v.field("max_guesses", max_guesses, between(1, 16), "Best alignments handed to the registration.");
-    v.field("min_wall_cells", min_wall_cells, at_least(1), "A view from above with fewer wall cells is not compared.");
-    v.field("distinct_deg", distinct_deg, between(0.0, 180.0), "Two alignments are different from this yaw on.");
-    v.field("distinct_m", distinct_m, greater_than(0.0), "Two alignments are different from this shift on.");
-    v.field("min_score", min_score, between(0.0, 1.0), "Correlation below which a guess is dropped.");
   }
 };
 
@@ -89,24 +80,12 @@ struct LidarClosureConfig {
   RegistrationConfig registration;
   double min_overlap = 0.3;                ///< Mean of both directions.
   double max_viewpoint_distance_m = 25.0;  ///< Between the middles of the two ways; farther apart says little.
-  /// First look at every rough alignment, with few points.
-  RegistrationLevel screening{1.0, 200, 8};
-  double early_overlap =
-      0.6;  ///< Of min_overlap: with less after a look or the coarse levels, an alignment is given up.
-  double screening_misfit = 2.0;    ///< Of max_misfit: with more after the first look, an alignment is given up.
-  double coarse_misfit = 1.5;       ///< Of max_misfit: with more after the coarse levels, an alignment is given up.
-  double max_misfit = 1.4;          ///< Residuals over what noise, roughness and odometry explain.
-  double max_plane_rmse_m = 0.085;  ///< Point to plane, over the overlap.
-  double min_eigenvalue = 0.03;     ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
+  double max_misfit = 1.4;                 ///< Residuals over what noise, roughness and odometry explain.
+  double max_plane_rmse_m = 0.085;         ///< Point to plane, over the overlap.
+  double min_eigenvalue = 0.03;            ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
   double sure_eigenvalue = 0.1;  ///< With less, max_misfit shrinks towards 1: little evidence must fit all the better.
-  double max_contradiction = 0.15;       ///< Share of the points in view that stand where the other looked through.
-  double visibility_margin_m = 0.5;      ///< A point this much nearer than the surface seen behind it contradicts.
-  int visibility_views = 5;              ///< Viewpoints of each submap, evenly spread along its way.
-  int visibility_points = 2000;          ///< Of each submap, evenly spread.
-  double max_rival_ratio = 0.75;         ///< A second, different alignment nearly as good: the place is ambiguous.
-  double max_slid_ratio = 0.65;          ///< The same for one a few metres along the direction constrained least.
-  double max_forward_backward_m = 0.05;  ///< Between a-to-b and b-to-a, at the centre of the overlap.
-  double max_forward_backward_deg = 0.5;
+  double max_contradiction = 0.15;  ///< Share of the points in view that stand where the other looked through.
+  double max_rival_ratio = 0.75;    ///< A second, different alignment nearly as good: the place is ambiguous.
   template <class V>
   void describe(V& v) {
     v.field("min_duration_s", min_duration_s, at_least(0.0),
@@ -122,13 +101,6 @@ struct LidarClosureConfig {
     v.field("max_viewpoint_distance_m", max_viewpoint_distance_m, greater_than(0.0),
             "Between the middles of the two ways; closures from farther apart are not looked for. In a network that is "
             "walked for an hour a few metres leave more than enough closures.");
-    v.field("screening", screening, any(), "First look at every rough alignment, with few points.");
-    v.field("early_overlap", early_overlap, between(0.0, 1.0),
-            "Share of min_overlap below which an alignment is given up after the first look or the coarse levels.");
-    v.field("screening_misfit", screening_misfit, at_least(1.0),
-            "Times max_misfit: an alignment with more is given up after the first look.");
-    v.field("coarse_misfit", coarse_misfit, at_least(1.0),
-            "Times max_misfit: an alignment with more is given up after the coarse levels.");
     v.field("max_misfit", max_misfit, greater_than(0.0),
             "Residuals over what noise, roughness and bent odometry explain, in the worst direction.");
     v.field("max_plane_rmse_m", max_plane_rmse_m, greater_than(0.0), "Point-to-plane residual over the overlap.");
@@ -139,18 +111,8 @@ struct LidarClosureConfig {
         "Below this eigenvalue max_misfit shrinks in proportion towards 1: little evidence must fit all the better.");
     v.field("max_contradiction", max_contradiction, between(0.0, 1.0),
             "Share of the points in view that stand where the other submap looked through.");
-    v.field("visibility_margin_m", visibility_margin_m, greater_than(0.0),
-            "A point this much nearer than the surface seen behind it contradicts.");
-    v.field("visibility_views", visibility_views, at_least(1), "Viewpoints of each submap tested for visibility.");
-    v.field("visibility_points", visibility_points, at_least(10), "Points of each submap tested for visibility.");
     v.field("max_rival_ratio", max_rival_ratio, between(0.0, 1.0),
             "Quality of the second best alignment over the best above which the place is ambiguous.");
-    v.field("max_slid_ratio", max_slid_ratio, between(0.0, 1.0),
-            "The same for an alignment slid along the direction that is constrained least.");
-    v.field("max_forward_backward_m", max_forward_backward_m, greater_than(0.0),
-            "Between the registrations of a to b and b to a.");
-    v.field("max_forward_backward_deg", max_forward_backward_deg, greater_than(0.0),
-            "Between the registrations of a to b and b to a.");
   }
 };
 

@@ -17,7 +17,9 @@ namespace tutti::lidar {
 namespace {
 
 constexpr std::size_t kMinCorrespondences = 20;
-constexpr double kStepTolerance = 1e-3;  // of the level's distance
+constexpr double kStepTolerance = 1e-3;       // of the level's distance
+constexpr double kMaxNormalAngle_deg = 45.0;  // between the normals of two corresponding points
+constexpr double kResidualScale_m = 0.1;      // of the robust loss at the finest level; grows with the level's distance
 
 /// At most `count` indices of points with a normal, evenly spread in storage (= Morton) order, hence in space.
 std::vector<std::size_t> sample_surface(const OrientedCloud& cloud, std::size_t count) {
@@ -97,7 +99,7 @@ NormalEquations linearise(const OrientedCloud& target, const OrientedCloud& sour
 bool run_level(const OrientedCloud& target, const OrientedCloud& source, const RegistrationLevel& level,
                const RegistrationConfig& config, double min_cosine, RegistrationResult& result) {
   const auto sample = sample_surface(source, static_cast<std::size_t>(level.max_points));
-  const double scale = config.residual_scale_m * std::max(1.0, level.max_distance_m / config.overlap_distance_m);
+  const double scale = kResidualScale_m * std::max(1.0, level.max_distance_m / config.overlap_distance_m);
   for (int k = 0; k < level.max_iterations; ++k) {
     const auto sums =
         linearise(target, source, sample, result.T_target_source, level.max_distance_m, scale, min_cosine);
@@ -127,7 +129,7 @@ void assess(const OrientedCloud& target, const OrientedCloud& source, const Regi
             double min_cosine, RegistrationResult& result) {
   const auto sample = sample_surface(source, static_cast<std::size_t>(config.levels.back().max_points));
   const auto sums = linearise(target, source, sample, result.T_target_source, config.overlap_distance_m,
-                              config.residual_scale_m, min_cosine);
+                              kResidualScale_m, min_cosine);
   if (sums.count < kMinCorrespondences) {
     result.converged = false;
     return;
@@ -161,7 +163,7 @@ RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCl
   TUTTI_CHECK(!config.levels.empty(), "a registration needs at least one level");
   RegistrationResult result{.T_target_source = T_init};
   if (target.size() == 0 || source.size() == 0) return result;
-  const double min_cosine = std::cos(config.max_normal_angle_deg * kRadPerDeg);
+  const double min_cosine = std::cos(kMaxNormalAngle_deg * kRadPerDeg);
   for (const auto& level : config.levels)
     result.converged = run_level(target, source, level, config, min_cosine, result);
   assess(target, source, config, min_cosine, result);
@@ -170,7 +172,7 @@ RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCl
 
 std::vector<float> self_residuals(const OrientedCloud& cloud, const RegistrationConfig& config) {
   constexpr std::size_t kTried = 6;  // neighbours, the point itself included
-  const auto min_cosine = static_cast<float>(std::cos(config.max_normal_angle_deg * kRadPerDeg));
+  const auto min_cosine = static_cast<float>(std::cos(kMaxNormalAngle_deg * kRadPerDeg));
   std::vector<float> out(cloud.size(), std::numeric_limits<float>::quiet_NaN());
   std::array<std::int32_t, kTried> neighbours{};
   for (std::size_t i = 0; i < cloud.size(); ++i) {

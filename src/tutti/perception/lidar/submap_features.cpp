@@ -70,9 +70,9 @@ std::shared_ptr<const std::vector<DepthPanorama>> look_around(const OrientedClou
                                                               std::span<const Eigen::Vector3f> viewpoints,
                                                               const LidarClosureConfig& config) {
   auto panoramas = std::make_shared<std::vector<DepthPanorama>>();
-  const auto count = static_cast<std::size_t>(config.visibility_views);
-  for (std::size_t k = 0; k < count; ++k)
-    panoramas->emplace_back(cloud, viewpoints[(2 * k + 1) * viewpoints.size() / (2 * count)],
+  constexpr std::size_t kViews = 5;
+  for (std::size_t k = 0; k < kViews; ++k)
+    panoramas->emplace_back(cloud, viewpoints[(2 * k + 1) * viewpoints.size() / (2 * kViews)],
                             static_cast<float>(config.voxel_m));
   return panoramas;
 }

@@ -15,13 +15,21 @@ namespace tutti::lidar {
 namespace {
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+const RegistrationLevel kScreening{1.0, 200, 8};  // first look at every rough alignment, with few points
+constexpr double kEarlyOverlap = 0.6;           // of min_overlap: with less after a look or the coarse levels, given up
+constexpr double kScreeningMisfit = 2.0;        // of max_misfit: with more after the first look, given up
+constexpr double kCoarseMisfit = 1.5;           // of max_misfit: with more after the coarse levels, given up
+constexpr double kVisibilityMargin_m = 0.5;     // a point this much nearer than the surface seen behind it contradicts
+constexpr int kVisibilityPoints = 2000;         // of each submap, evenly spread
+constexpr double kMaxSlidRatio = 0.65;          // of an alignment slid along the direction constrained least
+constexpr double kMaxForwardBackward_m = 0.05;  // between a-to-b and b-to-a, at the centre of the overlap
+constexpr double kMaxForwardBackward_deg = 0.5;
 
 /// Share of the points in view, both ways, that stand in space the other submap looked through.
-double contradiction(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
-                     const LidarClosureConfig& config) {
-  const auto margin = static_cast<float>(config.visibility_margin_m);
-  const VisibilityCount ab = count_visible(*a.panoramas, b.cloud, T_a_b, config.visibility_points, margin);
-  const VisibilityCount ba = count_visible(*b.panoramas, a.cloud, T_a_b.inverse(), config.visibility_points, margin);
+double contradiction(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b) {
+  const auto margin = static_cast<float>(kVisibilityMargin_m);
+  const VisibilityCount ab = count_visible(*a.panoramas, b.cloud, T_a_b, kVisibilityPoints, margin);
+  const VisibilityCount ba = count_visible(*b.panoramas, a.cloud, T_a_b.inverse(), kVisibilityPoints, margin);
   const int against = ab.contradicting + ba.contradicting, in_view = against + ab.seen + ba.seen;
   return in_view > 0 ? static_cast<double>(against) / in_view : 1.0;
 }
@@ -44,15 +52,14 @@ double viewpoint_distance(const SubmapFeatures& a, const SubmapFeatures& b, cons
 
 /// Before the finest level, when not even the refinement can help.
 bool is_hopeless(const RegistrationResult& result, double misfit_factor, const LidarClosureConfig& config) {
-  return result.overlap < config.early_overlap * config.min_overlap ||
-         result.misfit > misfit_factor * config.max_misfit;
+  return result.overlap < kEarlyOverlap * config.min_overlap || result.misfit > misfit_factor * config.max_misfit;
 }
 
 /// A rough alignment that a first look finds worth a registration, improved by it.
 std::optional<Pose3> screen(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
                             const LidarClosureConfig& config) {
-  const auto result = register_clouds(a.cloud, b.cloud, T_a_b, with_levels(config.registration, {config.screening}));
-  if (is_hopeless(result, config.screening_misfit, config)) return std::nullopt;
+  const auto result = register_clouds(a.cloud, b.cloud, T_a_b, with_levels(config.registration, {kScreening}));
+  if (is_hopeless(result, kScreeningMisfit, config)) return std::nullopt;
   return result.T_target_source;
 }
 
@@ -62,15 +69,14 @@ std::optional<Contender> contend(const SubmapFeatures& a, const SubmapFeatures& 
   RegistrationConfig coarse = config.registration;
   if (coarse.levels.size() > 1) coarse.levels.pop_back();
   const auto result = register_clouds(a.cloud, b.cloud, T_init, coarse);
-  if (is_hopeless(result, config.coarse_misfit, config)) return std::nullopt;
-  const double clear = 1.0 - contradiction(a, b, result.T_target_source, config);
+  if (is_hopeless(result, kCoarseMisfit, config)) return std::nullopt;
+  const double clear = 1.0 - contradiction(a, b, result.T_target_source);
   return Contender{result.T_target_source, result.overlap * clear / std::max(1.0, result.misfit), score};
 }
 
-bool is_same(const Pose3& T, const Pose3& other, const SubmapFeatures& b, double distance_m,
-             const LidarClosureConfig& config) {
+bool is_same(const Pose3& T, const Pose3& other, const SubmapFeatures& b, double distance_m) {
   const Pose3 difference = other.inverse() * T;
-  return rotation_angle(difference) * kDegPerRad < config.candidates.distinct_deg &&
+  return rotation_angle(difference) * kDegPerRad < kDistinct_deg &&
          (difference * b.middle - b.middle).norm() < distance_m;
 }
 
@@ -78,7 +84,7 @@ bool is_same(const Pose3& T, const Pose3& other, const SubmapFeatures& b, double
 std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config) {
   // One within reach is worth nothing without knowing what the others are worth; without one neither are they.
   const auto guesses = propose_alignments(a, b, config);
-  const double reach = config.max_viewpoint_distance_m + config.candidates.distinct_m;
+  const double reach = config.max_viewpoint_distance_m + kDistinct_m;
   std::vector<Contender> all;
   for (const bool near : {true, false}) {
     for (const auto& guess : guesses)
@@ -90,9 +96,8 @@ std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures&
   std::stable_sort(all.begin(), all.end(), [](const auto& p, const auto& q) { return p.quality > q.quality; });
   std::vector<Contender> distinct;
   for (const auto& one : all)
-    if (std::none_of(distinct.begin(), distinct.end(), [&](const Contender& other) {
-          return is_same(one.T_a_b, other.T_a_b, b, config.candidates.distinct_m, config);
-        }))
+    if (std::none_of(distinct.begin(), distinct.end(),
+                     [&](const Contender& other) { return is_same(one.T_a_b, other.T_a_b, b, kDistinct_m); }))
       distinct.push_back(one);
   return distinct;
 }
@@ -103,10 +108,9 @@ double best_slid_quality(const SubmapFeatures& a, const SubmapFeatures& b, const
                          const Eigen::Vector3d& weakest_b, const LidarClosureConfig& config) {
   double best = 0.0;
   for (const double steps : {-2.0, -1.0, 1.0, 2.0}) {
-    const Pose3 slid{Eigen::Quaterniond::Identity(), steps * config.candidates.distinct_m * weakest_b};
+    const Pose3 slid{Eigen::Quaterniond::Identity(), steps * kDistinct_m * weakest_b};
     const auto rival = contend(a, b, T_a_b * slid, 0.0, config);
-    if (rival && !is_same(rival->T_a_b, T_a_b, b, 0.5 * config.candidates.distinct_m, config))
-      best = std::max(best, rival->quality);
+    if (rival && !is_same(rival->T_a_b, T_a_b, b, 0.5 * kDistinct_m)) best = std::max(best, rival->quality);
   }
   return best;
 }
@@ -151,10 +155,10 @@ std::optional<Refusal> why_refused(const PairVerification& v, const LidarClosure
         above(misfit, v.misfit, allowed_misfit(v.min_eigenvalue, c)),
         below(free_to_slide, v.min_eigenvalue, c.min_eigenvalue),
         above(viewpoints, v.viewpoint_distance_m, c.max_viewpoint_distance_m),
-        above(both_ways_distance, v.forward_backward_m, c.max_forward_backward_m),
-        above(both_ways_angle, v.forward_backward_deg, c.max_forward_backward_deg),
+        above(both_ways_distance, v.forward_backward_m, kMaxForwardBackward_m),
+        above(both_ways_angle, v.forward_backward_deg, kMaxForwardBackward_deg),
         above(contradicted, v.contradiction, c.max_contradiction), above(ambiguous, v.rival_ratio, c.max_rival_ratio),
-        above(ambiguous_along, v.slid_ratio, c.max_slid_ratio)})
+        above(ambiguous_along, v.slid_ratio, kMaxSlidRatio)})
     if (refusal) return refusal;
   return std::nullopt;
 }
@@ -188,7 +192,7 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
   Eigen::Vector3d weakest_b;
   refine(a, b, ranked.front().T_a_b, config, out, weakest_b);
   out.viewpoint_distance_m = viewpoint_distance(a, b, out.T_a_b);
-  out.contradiction = contradiction(a, b, out.T_a_b, config);
+  out.contradiction = contradiction(a, b, out.T_a_b);
   out.refusal = why_refused(out, config);
   if (!out.refusal) {  // worth another look
     const double slid = best_slid_quality(a, b, out.T_a_b, weakest_b, config);
