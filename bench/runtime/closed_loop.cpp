@@ -32,7 +32,6 @@ struct ClosedLoopConfig {
   double server_local_rad = test::ServerNoise{}.local_rad;
   CompareConfig compare;
   PolicyConfig policy{.name = "spectral"};
-  LedgerConfig ledger;
   ProxyGraphConfig proxy_graph;
   template <class V>
   void describe(V& v) {
@@ -51,7 +50,6 @@ struct ClosedLoopConfig {
     v.field("server_local_rad", server_local_rad, at_least(0), "Same, rotation.");
     v.field("compare", compare);
     v.field("policy", policy);
-    v.field("ledger", ledger);
     v.field("proxy_graph", proxy_graph);
   }
 };
@@ -63,12 +61,8 @@ void run(const ClosedLoopConfig& config, std::uint64_t seed) {
   auto mission = test::corridor_mission(static_cast<std::size_t>(config.length), noise, seed, server);
   mission.late_closures = config.late_closures;
   mission.settling = config.settling;
-  test::LoopConfig loop{config.compare,
-                        config.policy,
-                        config.ledger,
-                        config.proxy_graph,
-                        static_cast<std::size_t>(config.nodes_per_update),
-                        {}};
+  test::LoopConfig loop{
+      config.compare, config.policy, config.proxy_graph, static_cast<std::size_t>(config.nodes_per_update), {}};
   const auto row = [&] {
     const auto r = test::run_closed_loop(mission, loop);
     fmt::print("{:5} {:14} {:8.3f} {:9.3f} {:9.3f} {:9.3f} {:7} {:8}\n", seed, loop.policy.name, r.onboard_m,

@@ -11,20 +11,24 @@
 namespace tutti::consistency {
 namespace {
 
+// A constraint is replaced when the new one differs by more than either of these,
+constexpr double kReplaceTranslation_m = 0.0005;
+constexpr double kReplaceRotation_rad = 0.005 * kRadPerDeg;
+constexpr double kReplaceSigmaShare = 0.1;  // or when a standard deviation changes by more than this share.
+
 using Key = std::pair<Timestamp, Timestamp>;
 Key key(const Constraint& constraint) { return {constraint.from_stamp, constraint.to_stamp}; }
 
-bool says_otherwise(const Constraint& held, const Constraint& fresh, const LedgerConfig& config) {
+bool says_otherwise(const Constraint& held, const Constraint& fresh) {
   const Pose3 difference = held.measurement.T_a_b.inverse() * fresh.measurement.T_a_b;
-  return difference.translation.norm() > config.replace_translation_m ||
-         rotation_angle(difference) > config.replace_rotation_deg * kRadPerDeg;
+  return difference.translation.norm() > kReplaceTranslation_m || rotation_angle(difference) > kReplaceRotation_rad;
 }
 
 /// The server has become surer or less sure.
-bool counts_otherwise(const Constraint& held, const Constraint& fresh, const LedgerConfig& config) {
+bool counts_otherwise(const Constraint& held, const Constraint& fresh) {
   const Eigen::Array<double, 6, 1> before = held.measurement.covariance.diagonal().array().sqrt();
   const Eigen::Array<double, 6, 1> now = fresh.measurement.covariance.diagonal().array().sqrt();
-  return ((now - before).abs() > config.replace_sigma_share * before).any();
+  return ((now - before).abs() > kReplaceSigmaShare * before).any();
 }
 
 }  // namespace
@@ -37,9 +41,9 @@ Constraint in_time_order(Constraint constraint) {
   return constraint;
 }
 
-Ledger::Ledger(std::vector<Constraint> constraints) { update(std::move(constraints), {}, true); }
+Ledger::Ledger(std::vector<Constraint> constraints) { update(std::move(constraints), true); }
 
-LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& config, bool replaces_all) {
+LedgerUpdate Ledger::update(std::vector<Constraint> chosen, bool replaces_all) {
   std::map<Key, Constraint> fresh;
   for (Constraint& constraint : chosen) {
     Constraint ordered = in_time_order(std::move(constraint));
@@ -59,7 +63,7 @@ LedgerUpdate Ledger::update(std::vector<Constraint> chosen, const LedgerConfig& 
         next.push_back(std::move(held));
       continue;
     }
-    const bool replace = says_otherwise(held, found->second, config) || counts_otherwise(held, found->second, config);
+    const bool replace = says_otherwise(held, found->second) || counts_otherwise(held, found->second);
     ++(replace ? counts.replaced : counts.unchanged);
     next.push_back(std::move(replace ? found->second : held));
     fresh.erase(found);

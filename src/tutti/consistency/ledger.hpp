@@ -4,25 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/consistency/constraint.hpp"
 
 namespace tutti::consistency {
-
-struct LedgerConfig {
-  double replace_translation_m = 0.0005;
-  double replace_rotation_deg = 0.005;
-  double replace_sigma_share = 0.1;
-
-  template <class V>
-  void describe(V& v) {
-    v.field("replace_translation_m", replace_translation_m, at_least(0.0),
-            "A constraint is replaced when the new one differs by more than this, or by more than the rotation below.");
-    v.field("replace_rotation_deg", replace_rotation_deg, at_least(0.0), "See replace_translation_m.");
-    v.field("replace_sigma_share", replace_sigma_share, at_least(0.0),
-            "... or when a standard deviation changes by more than this share.");
-  }
-};
 
 struct LedgerUpdate {
   std::size_t added = 0;
@@ -44,9 +28,10 @@ class Ledger {
   [[nodiscard]] std::size_t size() const { return constraints_.size(); }
 
   /// Takes `chosen` in. A constraint between the same two nodes, either way round, is replaced only when the new one
-  /// differs beyond a threshold, in what it says or in how much that counts; otherwise it stays untouched. With
-  /// `replaces_all`, constraints whose nodes are not in `chosen` go. The same pair twice in `chosen`: the last counts.
-  LedgerUpdate update(std::vector<Constraint> chosen, const LedgerConfig& config, bool replaces_all);
+  /// differs beyond a threshold (0.5 mm, 0.005 degrees, a tenth of a standard deviation); otherwise it stays untouched.
+  /// With `replaces_all`, constraints whose nodes are not in `chosen` go. The same pair twice in `chosen`: the last
+  /// counts.
+  LedgerUpdate update(std::vector<Constraint> chosen, bool replaces_all);
 
   /// Withdraws every constraint with an end that this proxy graph does not know of (any more): neither among its nodes
   /// nor among those that its reduction removed. Returns how many.

@@ -20,6 +20,8 @@ namespace tutti::estimation {
 namespace {
 
 /// A rejected edge keeps this weight inside the solver, so that what it alone connected stays determined.
+constexpr double kControlStep = 1.4;  // factor of mu between outer iterations
+constexpr int kMaxOuterIterations = 100;
 constexpr double kWeightFloor = 1e-8;
 /// Inner solves only follow the changing weights; the last one uses the caller's tolerance.
 constexpr double kInnerTolerance = 1e-3;
@@ -65,7 +67,7 @@ GncResult internal::truncated_least_squares(const PoseGraph& graph, const GncCon
   inner.relative_cost_tolerance = std::max(kInnerTolerance, config.solver.relative_cost_tolerance);
   inner.max_iterations = kInnerIterations;
   double mu = 1.0 / (2.0 * worst - 1.0);  // remark 5
-  for (bool binary = false; !binary && out.outer_iterations < config.max_outer_iterations; ++out.outer_iterations) {
+  for (bool binary = false; !binary && out.outer_iterations < kMaxOuterIterations; ++out.outer_iterations) {
     binary = true;
     for (std::size_t e = 0; e < edges; ++e) {
       if (!std::isfinite(truncation[e])) continue;
@@ -76,7 +78,7 @@ GncResult internal::truncated_least_squares(const PoseGraph& graph, const GncCon
     if (binary) inner = config.solver;
     out.solution.summary = internal::minimise(equations, out.solution.poses, costs, inner);
     if (!is_usable(out.solution.summary.termination)) return out;
-    mu *= config.control_step;
+    mu *= kControlStep;
   }
   out.solution.weights = out.inlier_weight;
   return out;

@@ -9,19 +9,14 @@
 namespace tutti::estimation {
 
 struct GncConfig {
-  SolverConfig solver;        ///< Its loss is not used.
-  double confidence = 0.99;   ///< An inlier's r^T Omega r lies below the chi-square quantile (6 dof) with this chance.
-  double control_step = 1.4;  ///< Factor of mu between outer iterations.
-  int max_outer_iterations = 100;
+  SolverConfig solver;       ///< Its loss is not used.
+  double confidence = 0.99;  ///< An inlier's r^T Omega r lies below the chi-square quantile (6 dof) with this chance.
 
   template <class V>
   void describe(V& v) {
     v.field("solver", solver, {}, "The weighted least-squares solver inside; its loss is not used.");
     v.field("confidence", confidence, between(0.5, 0.999999999),
             "Share of true closures whose error is expected to pass.");
-    v.field("control_step", control_step, greater_than(1.0),
-            "Factor by which the surrogate cost sharpens per iteration.");
-    v.field("max_outer_iterations", max_outer_iterations, at_least(1), "Re-weightings at most.");
   }
 };
 
@@ -32,7 +27,7 @@ struct GncResult {
 };
 
 /// Truncated least squares by graduated non-convexity: Yang, Antonante, Tzoumas, Carlone, "Graduated Non-Convexity for
-/// Robust Spatial Perception", RA-L 2020: initial mu (remark 5), weights eq. (14), mu <- control_step mu.
+/// Robust Spatial Perception", RA-L 2020: initial mu (remark 5), weights eq. (14), mu <- 1.4 mu.
 /// Trusted edges must connect what they should: a component held together by robust edges alone may lose them all, and
 /// the solver then keeps the parts where they are. `roles` empty: all robust.
 GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, std::span<const EdgeRole> roles = {});

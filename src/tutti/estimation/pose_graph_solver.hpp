@@ -17,7 +17,6 @@ struct SolverConfig {
   std::string initialisation = "chordal";
   std::string loss = "none";
   double loss_scale = 1.0;
-  int max_step_halvings = 8;
 
   template <class V>
   void describe(V& v) {
@@ -28,7 +27,6 @@ struct SolverConfig {
             "Where to start: from the measurements alone, or from the given poses.");
     v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the robust edges.");
     v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
-    v.field("max_step_halvings", max_step_halvings, at_least(0), "How often a step that raises the cost is halved.");
   }
 };
 

@@ -76,13 +76,6 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
   if (config.closures.finder != "reference" && !config.closures.planted.empty())
     problem(fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'",
                         config.closures.finder));
-  const simulation::ReferenceClosureConfig& reference = config.closures.reference;
-  if (reference.wrong_max_m < reference.wrong_min_m)
-    problem(fmt::format("closures.reference.wrong_max_m: is {}, expected at least wrong_min_m = {}",
-                        reference.wrong_max_m, reference.wrong_min_m));
-  if (config.closures.wrong.max_m < config.closures.wrong.min_m)
-    problem(fmt::format("closures.wrong.max_m: is {}, expected at least min_m = {}", config.closures.wrong.max_m,
-                        config.closures.wrong.min_m));
   check_links(config, problem);
   if (config.server.update_period_s < kShortestUpdate_s)  // every one is a step of the mission
     problem(fmt::format("server.update_period_s: is {}, expected at least {}", config.server.update_period_s,

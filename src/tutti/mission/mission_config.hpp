@@ -146,9 +146,7 @@ struct MissionConfig {
   std::vector<std::string> notes;             ///< Shown in the report.
   double duration_s = 0.0;                    ///< 0 = until the last sample.
   evaluation::AssociationConfig association;  ///< Of estimates with the reference.
-  double max_tilt_deg = 3.0;                  ///< Of a random frame.
-  double max_shift_m = 50.0;
-  std::string source = "recordings";  ///< recordings (`robots`) | simulation
+  std::string source = "recordings";          ///< recordings (`robots`) | simulation
   std::vector<RobotConfig> robots;
   simulation::SimulationConfig simulation;
   robot::AgentConfig agent;
@@ -165,8 +163,6 @@ struct MissionConfig {
     v.field("notes", notes, any(), "Sentences shown in the report.");
     v.field("duration_s", duration_s, at_least(0.0), "Mission time; 0 = until the last sample.");
     v.field("association", association);
-    v.field("max_tilt_deg", max_tilt_deg, between(0.0, 180.0), "Largest tilt of a random frame.");
-    v.field("max_shift_m", max_shift_m, between(0.0, simulation::kFarthest_m), "Largest shift of a random frame.");
     v.field("source", source, one_of({"recordings", "simulation"}), "Replay `robots`, or simulate.");
     v.field("robots", robots, any(), "The robots whose recordings are replayed.");
     v.field("simulation", simulation);

@@ -66,7 +66,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
   if (is_degraded(robot.degrade)) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
   raw = simulation::degrade_odometry(raw, robot.degrade);
   if (robot.random_frame) {
-    out.T_odom_recorded = simulation::random_frame(rng, config.max_tilt_deg, config.max_shift_m);
+    out.T_odom_recorded = simulation::random_frame(rng);
     raw = simulation::move_frame(raw, out.T_odom_recorded);
   }
   if (out.T_common_odom) out.T_common_odom = *out.T_common_odom * out.T_odom_recorded.inverse();

@@ -10,6 +10,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/simulation/reference_closures.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -31,9 +32,9 @@ std::optional<Pose3> draw_error(const SubmapPair& pair, double wrong_share, cons
     rng = pair_rng(seed, "spoiled", pair.first, pair.second);
     if (!rng.bernoulli(alone)) return std::nullopt;
   }
-  const double offset = rng.uniform(config.min_m, config.max_m);
+  const double offset = rng.uniform(simulation::kWrongLeast_m, simulation::kWrongMost_m);
   const double direction = rng.uniform(-std::numbers::pi, std::numbers::pi);
-  const double turn = rng.uniform(-config.max_deg, config.max_deg) * kRadPerDeg;
+  const double turn = rng.uniform(-simulation::kWrongTurn_deg, simulation::kWrongTurn_deg) * kRadPerDeg;
   return Pose3{so3_exp(turn * Eigen::Vector3d::UnitZ()),
                {offset * std::cos(direction), offset * std::sin(direction), 0.0}};
 }
@@ -48,9 +49,7 @@ const Pose3& block_anchor(const Submap& submap) {
 
 SpoiledClosureFinder::SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                                            const SpoiledClosureConfig& config, std::uint64_t seed)
-    : inner_(std::move(inner)), wrong_share_(wrong_share), config_(config), seed_(seed) {
-  TUTTI_CHECK(config_.max_m >= config_.min_m, "wrong offsets {} .. {} m", config_.min_m, config_.max_m);
-}
+    : inner_(std::move(inner)), wrong_share_(wrong_share), config_(config), seed_(seed) {}
 
 bool SpoiledClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
   return inner_->is_candidate(first, second);

@@ -16,16 +16,10 @@ namespace tutti::mission {
 /// Wrong closures forced into a mission, to see what the server makes of them.
 struct SpoiledClosureConfig {
   double agreeing_share = 0.3;
-  double min_m = 2.0;
-  double max_m = 8.0;
-  double max_deg = 60.0;
   template <class V>
   void describe(V& v) {
     v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
             "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
-    v.field("min_m", min_m, above_zero_to(simulation::kFarthest_m), "Least offset of a wrong closure.");
-    v.field("max_m", max_m, above_zero_to(simulation::kFarthest_m), "Largest offset; not below min_m.");
-    v.field("max_deg", max_deg, between(0.0, 180.0), "Largest turn.");
   }
 };
 

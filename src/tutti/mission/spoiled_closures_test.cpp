@@ -65,8 +65,8 @@ TEST_F(Spoiled, TheShareIsWrongByWhatWasAskedFor) {
       const double offset = error(i, j).translation.norm();
       if (offset < 1e-9) continue;
       ++wrong;
-      EXPECT_GE(offset, config_.min_m - 1e-9);
-      EXPECT_LE(offset, config_.max_m + 1e-9);
+      EXPECT_GE(offset, simulation::kWrongLeast_m - 1e-9);
+      EXPECT_LE(offset, simulation::kWrongMost_m + 1e-9);
     }
   EXPECT_NEAR(wrong / 1600.0, 0.3, 0.06);
 }

@@ -131,7 +131,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
                                           .ledger = state_.ledger,
                                           .test = test ? &*test : nullptr,
                                           .odometry_disagreement = &odometry_disagreement});
-  summary.ledger = state_.ledger.update(selection.constraints, config_.ledger, selection.replaces_all);
+  summary.ledger = state_.ledger.update(selection.constraints, selection.replaces_all);
   summary.ledger.withdrawn += withdrawn;
   ended(UpdateStage::choose);
 

@@ -26,7 +26,6 @@ struct AgentConfig {
   consistency::CompareConfig compare;
   consistency::DisagreementConfig disagreement;
   consistency::PolicyConfig policy;
-  consistency::LedgerConfig ledger;
   estimation::OnboardSmootherConfig smoother{.polishing_steps =
                                                  1};  ///< Few links, long runs: one step gives them back millimetres.
   bool explain = true;
@@ -36,7 +35,6 @@ struct AgentConfig {
     v.field("compare", compare);
     v.field("disagreement", disagreement);
     v.field("policy", policy);
-    v.field("ledger", ledger);
     v.field("smoother", smoother);
     v.field("explain", explain, any(), "Say after every update where and when odometry and map part.");
   }

@@ -26,7 +26,7 @@ struct DegradeConfig {
 Trajectory degrade_odometry(const Trajectory& odometry, const DegradeConfig& config);
 
 /// Any yaw, a tilt of up to `max_tilt_deg` about a horizontal axis, a shift of up to `max_shift_m` along each axis.
-Pose3 random_frame(Rng& rng, double max_tilt_deg, double max_shift_m);
+Pose3 random_frame(Rng& rng, double max_tilt_deg = 3.0, double max_shift_m = 50.0);
 
 /// T_new_body from T_odom_body. Increments, and so their covariances, stay what they are.
 Trajectory move_frame(const Trajectory& trajectory, const Pose3& T_new_odom);

@@ -10,6 +10,8 @@ namespace {
 constexpr double kSolid = 1.0;  ///< Value in rock far from everything.
 constexpr double kReach = 0.8;  ///< Parts matter this far outside of themselves.
 constexpr int kCellsPerBlock = 8;
+constexpr double kRoughnessLength_m = 1.0;   ///< Between bumps of rough walls.
+constexpr double kVariationLength_m = 12.0;  ///< How far apart wide places are.
 
 double gradient_dot(std::uint32_t hash, double x, double y, double z) {
   // The twelve directions to the middles of a cube's edges, four of them twice (Perlin, "Improving Noise", 2002).
@@ -70,14 +72,12 @@ FreeSpace::FreeSpace(const CorridorWorld& world, const SurfaceConfig& config, Rn
     : parts_(furnish(world, config, rng.fork("furnish"))),
       block_m_(kCellsPerBlock * config.cell_m),
       cell_m_(config.cell_m),
-      roughness_length_m_(config.roughness_length_m),
-      variation_length_m_(config.width_variation_length_m),
       seed_(static_cast<std::uint32_t>(rng.fork("noise").index(1ULL << 32U))) {
   index_parts();
 }
 
 double FreeSpace::bumps(const Eigen::Vector3d& p) const {
-  const double coarse = 1.0 / roughness_length_m_, fine = 2.7 * coarse;
+  const double coarse = 1.0 / kRoughnessLength_m, fine = 2.7 * coarse;
   return noise(p.x() * coarse, p.y() * coarse, p.z() * coarse, seed_) +
          0.4 * noise(p.x() * fine, p.y() * fine, p.z() * fine, seed_ + 1U);
 }
@@ -93,7 +93,7 @@ double FreeSpace::hall(const Hall& hall, const Eigen::Vector3d& p) const {
   if (hall.variation > 0.0) {
     // Both walls and the roof on their own; the two walls meet where the sign of `side` changes, inside the corridor.
     const bool left = along.x() * from_a.y() - along.y() * from_a.x() > 0.0;
-    const Eigen::Vector2d at = (hall.a.head<2>() + share * along) / variation_length_m_;
+    const Eigen::Vector2d at = (hall.a.head<2>() + share * along) / kVariationLength_m;
     half_width *= 1.0 + 1.3 * hall.variation * noise(at.x(), at.y(), left ? 0.3 : 7.3, seed_ + 2U);
     height *= 1.0 + 0.8 * hall.variation * noise(at.x(), at.y(), 13.3, seed_ + 2U);
   }

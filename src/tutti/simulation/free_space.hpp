@@ -21,8 +21,8 @@ struct Hall {
   double height = 0.0;
   double top_radius = 0.0;  ///< Of the cross-section's corners.
   double bottom_radius = 0.0;
-  double roughness = 0.0;  ///< As SurfaceConfig::roughness_m.
-  double variation = 0.0;  ///< As SurfaceConfig::width_variation.
+  double roughness = 0.0;  ///< How far walls stray from smooth.
+  double variation = 0.0;  ///< Share by which it widens and narrows.
 };
 
 /// Upright, turned about z.
@@ -86,8 +86,6 @@ class FreeSpace {
   SpaceParts parts_;
   double block_m_;
   double cell_m_;
-  double roughness_length_m_;
-  double variation_length_m_;
   std::uint32_t seed_;
   std::map<BlockIndex, Nearby> blocks_;
 };

@@ -12,11 +12,16 @@
 namespace tutti::simulation {
 namespace {
 
-constexpr double kAtJunction = 3.0;     ///< Nothing stands this near to a junction, where robots cut corners.
-constexpr double kClearance = 1.0;      ///< Around the lines that robots walk along (offices: 0.75).
-constexpr double kIntoWall = 0.6;       ///< How far things reach into the wall they stand at.
-constexpr double kStairhouseIn = 2.0;   ///< The door's house, inside the roof's edge.
-constexpr double kStairhouseOut = 1.5;  ///< And beyond it, so that sky and rock never meet.
+constexpr double kRoughness_m = 0.15;       ///< Rough walls stray from smooth by about this at most,
+constexpr double kWidthVariation = 0.2;     ///< and their corridors widen and narrow by up to this share.
+constexpr double kAlcovesPer100m = 8.0;     ///< Dug into the walls of rough corridors,
+constexpr double kObstaclesPer100m = 8.0;   ///< and standing at them.
+constexpr double kFurniturePer100m = 10.0;  ///< Office: cupboards and pillars at the walls.
+constexpr double kAtJunction = 3.0;         ///< Nothing stands this near to a junction, where robots cut corners.
+constexpr double kClearance = 1.0;          ///< Around the lines that robots walk along (offices: 0.75).
+constexpr double kIntoWall = 0.6;           ///< How far things reach into the wall they stand at.
+constexpr double kStairhouseIn = 2.0;       ///< The door's house, inside the roof's edge.
+constexpr double kStairhouseOut = 1.5;      ///< And beyond it, so that sky and rock never meet.
 
 /// A corridor as furniture sees it.
 struct Aisle {
@@ -50,17 +55,17 @@ std::vector<double> places(const Aisle& aisle, double per_100m, Rng& rng) {
 
 double either_side(Rng& rng) { return rng.bernoulli(0.5) ? 1.0 : -1.0; }
 
-void furnish_tunnel(const Aisle& aisle, const SurfaceConfig& config, SpaceParts& parts, Rng rng) {
-  for (const double s : places(aisle, config.alcoves_per_100m, rng)) {
+void furnish_tunnel(const Aisle& aisle, SpaceParts& parts, Rng rng) {
+  for (const double s : places(aisle, kAlcovesPer100m, rng)) {
     const double depth = rng.uniform(0.6, 1.6);
     parts.openings.push_back(box_at(aisle, s, rng.uniform(0.5, 1.5), either_side(rng), aisle.half_width - 0.6,
-                                    aisle.half_width + depth, rng.uniform(1.4, 2.3), config.roughness_m));
+                                    aisle.half_width + depth, rng.uniform(1.4, 2.3), kRoughness_m));
   }
-  for (const double s : places(aisle, config.obstacles_per_100m, rng)) {
-    const double front = std::max(kClearance, aisle.half_width - rng.uniform(0.2, 0.5)) + config.roughness_m;
-    const double height = rng.bernoulli(0.3) ? config.height_m + 1.0 : rng.uniform(0.4, 1.8);
+  for (const double s : places(aisle, kObstaclesPer100m, rng)) {
+    const double front = std::max(kClearance, aisle.half_width - rng.uniform(0.2, 0.5)) + kRoughness_m;
+    const double height = rng.bernoulli(0.3) ? kHeight_m + 1.0 : rng.uniform(0.4, 1.8);
     parts.solids.push_back(box_at(aisle, s, rng.uniform(0.2, 0.7), either_side(rng), front,
-                                  aisle.half_width + kIntoWall, height, config.roughness_m));
+                                  aisle.half_width + kIntoWall, height, kRoughness_m));
   }
 }
 
@@ -85,7 +90,7 @@ void furnish_office(const CorridorWorld& world, std::size_t corridor, const Aisl
     const bool open = rng.bernoulli(1.0 / 3.0);
     const double depth = rng.uniform(0.12, 0.3);
     const Box room = box_at(aisle, s + rng.uniform(-0.8, 0.8), rng.uniform(1.4, 2.2), side, wall + 0.35,
-                            wall + rng.uniform(2.8, 4.5), config.office_height_m - 0.1, 0.0);
+                            wall + rng.uniform(2.8, 4.5), kOfficeHeight_m - 0.1, 0.0);
     const Box table = box_at(aisle, s + rng.uniform(-0.8, 0.8), 0.6, side, wall + 1.8, wall + 2.5, 0.75, 0.0);
     const bool has_room = open && has_space(room, world, corridor, wall);
     parts.openings.push_back(box_at(aisle, s, 0.5, side, wall - 0.5, wall + (has_room ? 0.6 : depth), 2.1, 0.0));
@@ -93,23 +98,22 @@ void furnish_office(const CorridorWorld& world, std::size_t corridor, const Aisl
     parts.openings.push_back(room);
     parts.solids.push_back(table);
   }
-  for (const double s : places(aisle, config.furniture_per_100m, rng)) {
+  for (const double s : places(aisle, kFurniturePer100m, rng)) {
     const double front = aisle.half_width - rng.uniform(0.25, 0.45);
     const bool pillar = rng.bernoulli(0.3);
     parts.solids.push_back(box_at(aisle, s, pillar ? 0.2 : rng.uniform(0.4, 0.8), either_side(rng), front,
-                                  aisle.half_width + kIntoWall,
-                                  pillar ? config.office_height_m + 1.0 : rng.uniform(0.8, 2.0), 0.0));
+                                  aisle.half_width + kIntoWall, pillar ? kOfficeHeight_m + 1.0 : rng.uniform(0.8, 2.0),
+                                  0.0));
   }
 }
 
 Hall hall_of(CorridorKind kind, const SurfaceConfig& config, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  if (kind == CorridorKind::office)
-    return {a, b, 0.5 * config.office_width_m, config.office_height_m, 0.0, 0.0, 0.0, 0.0};
-  Hall hall{a, b, 0.5 * config.width_m, config.height_m, 1.2, 0.8, 0.0, 0.0};
+  if (kind == CorridorKind::office) return {a, b, 0.5 * config.office_width_m, kOfficeHeight_m, 0.0, 0.0, 0.0, 0.0};
+  Hall hall{a, b, 0.5 * config.width_m, kHeight_m, 1.2, 0.8, 0.0, 0.0};
   if (kind == CorridorKind::rough) {
     hall.bottom_radius = 0.4;
-    hall.roughness = config.roughness_m;
-    hall.variation = config.width_variation;
+    hall.roughness = kRoughness_m;
+    hall.variation = kWidthVariation;
   }
   return hall;
 }
@@ -168,7 +172,7 @@ std::optional<Roof> roof_of(const CorridorWorld& world, const SurfaceConfig& con
     bounds.extend(world.junctions[corridor.b]);
   }
   if (bounds.isEmpty()) return std::nullopt;
-  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(config.roof_margin_m);
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(kRoofMargin_m);
   Roof roof{
       bounds.min().head<2>() - margin, bounds.max().head<2>() + margin, bounds.min().z() - config.body_height_m, {}};
   add_parapet(config, roof);
@@ -194,7 +198,7 @@ SpaceParts furnish(const CorridorWorld& world, const SurfaceConfig& config, Rng 
     const Eigen::Vector3d ab = hall.b - hall.a;
     const double length = ab.head<2>().norm();
     const Aisle aisle{hall.a, ab.head<2>() / length, length, ab.z() / length, hall.half_width};
-    if (corridor.kind == CorridorKind::rough) furnish_tunnel(aisle, config, parts, rng.fork(i));
+    if (corridor.kind == CorridorKind::rough) furnish_tunnel(aisle, parts, rng.fork(i));
     if (corridor.kind == CorridorKind::office) furnish_office(world, i, aisle, config, parts, rng.fork(i));
     for (const std::size_t end : {corridor.a, corridor.b}) {
       const Eigen::Vector3d at = world.junctions[end] + down;

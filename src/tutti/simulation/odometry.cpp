@@ -15,6 +15,8 @@
 namespace tutti::simulation {
 namespace {
 
+constexpr double kBiasLength_m = 100.0;  // way over which the slowly varying yaw drift forgets itself
+
 double square(double x) { return x * x; }
 
 /// Errors that stay the same, or nearly so, from one increment to the next.
@@ -32,7 +34,7 @@ class SlowErrors {
     Vector6d error = Vector6d::Zero();
     error.head<3>() = scale_ * translation;
     error(5) = (yaw_drift_ + yaw_bias_) * distance;
-    const double keep = std::exp(-distance / config_.bias_length_m);  // exact Gauss-Markov transition
+    const double keep = std::exp(-distance / kBiasLength_m);  // exact Gauss-Markov transition
     yaw_bias_ = keep * yaw_bias_ + rng.normal(config_.yaw_bias_deg_per_m * kRadPerDeg * std::sqrt(1.0 - square(keep)));
     return error;
   }
@@ -62,7 +64,7 @@ Matrix6d honest_covariance(const OdometryNoiseConfig& config, const Eigen::Vecto
     const double scale_per_m = square(0.01 * config.scale_percent) * config.consistent_length_m;
     covariance.topLeftCorner<3, 3>() += scale_per_m / distance * translation * translation.transpose();
   }
-  const double bias_per_m = 2.0 * square(config.yaw_bias_deg_per_m) * config.bias_length_m +
+  const double bias_per_m = 2.0 * square(config.yaw_bias_deg_per_m) * kBiasLength_m +
                             square(config.yaw_drift_deg_per_m) * config.consistent_length_m;
   covariance(5, 5) += square(kRadPerDeg) * bias_per_m * distance;
   return covariance;
@@ -309,8 +311,7 @@ OdometrySimulation simulate_odometry(const Trajectory& truth, std::span<const Su
   Rng frame_rng = rng.fork("frame");
   result.odometry.reserve(truth.size());
   result.increment_covariance.reserve(truth.size() - 1);
-  result.odometry.push_back(
-      {truth.front().stamp, random_frame(frame_rng, config.start_tilt_deg, config.start_shift_m)});
+  result.odometry.push_back({truth.front().stamp, random_frame(frame_rng)});
   for (std::size_t k = 0; k + 1 < truth.size(); ++k) {
     const Pose3 increment = truth[k].pose.inverse() * truth[k + 1].pose;
     auto [error, covariance] = errors.next(k, increment.translation);

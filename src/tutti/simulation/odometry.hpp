@@ -80,7 +80,6 @@ struct OdometryNoiseConfig {
   double floor_m = 1e-4;
   double floor_deg = 1e-3;
   double yaw_bias_deg_per_m = 0.003;
-  double bias_length_m = 100.0;
   double yaw_drift_deg_per_m = 0.0;
   double scale_percent = 0.2;
   double consistent_length_m = 50.0;
@@ -91,8 +90,6 @@ struct OdometryNoiseConfig {
   FailureConfig failure;
   std::vector<ScriptedErrorConfig> scripted;
   double stated_sigma_factor = 1.0;
-  double start_tilt_deg = 3.0;
-  double start_shift_m = 50.0;
   template <class V>
   void describe(V& v) {
     v.field("translation_m_per_sqrt_m", translation_m_per_sqrt_m, between(0.0, kFarthest_m),
@@ -103,8 +100,6 @@ struct OdometryNoiseConfig {
             "Position noise of an increment even when standing still, per axis.");
     v.field("floor_deg", floor_deg, above_zero_to(180.0), "Rotation noise of an increment even when standing still.");
     v.field("yaw_bias_deg_per_m", yaw_bias_deg_per_m, between(0.0, 180.0), "Slowly varying yaw drift (Gauss-Markov).");
-    v.field("bias_length_m", bias_length_m, above_zero_to(kFarthest_m),
-            "Distance over which that bias forgets itself.");
     v.field("yaw_drift_deg_per_m", yaw_drift_deg_per_m, between(0.0, 180.0), "Constant yaw drift of the run.");
     v.field("scale_percent", scale_percent, between(0.0, 50.0), "Constant scale error of the run.");
     v.field("consistent_length_m", consistent_length_m, above_zero_to(kFarthest_m),
@@ -117,9 +112,6 @@ struct OdometryNoiseConfig {
     v.field("scripted", scripted, any(), "Errors of given size at given places.");
     v.field("stated_sigma_factor", stated_sigma_factor, above_zero_to(1e6),
             "Stated standard deviations over the honest ones: above 1 the odometry is better than it says.");
-    v.field("start_tilt_deg", start_tilt_deg, between(0.0, 30.0), "Largest tilt of the odom frame.");
-    v.field("start_shift_m", start_shift_m, between(0.0, kFarthest_m),
-            "Largest distance of the odom origin, per axis.");
   }
 };
 

@@ -77,15 +77,14 @@ struct ReferenceClosures::Assessment {
 ReferenceClosures::ReferenceClosures(std::map<RobotId, Trajectory> reference, const ReferenceClosureConfig& config,
                                      std::uint64_t seed)
     : reference_(std::move(reference)), config_(config), seed_(seed) {
-  TUTTI_CHECK(config_.wrong_max_m >= config_.wrong_min_m, "wrong offsets {} .. {} m", config_.wrong_min_m,
-              config_.wrong_max_m);
   set_wrong_probabilities();
 }
 
 std::optional<Pose3> ReferenceClosures::pose_at(RobotId robot, Timestamp stamp) const {
   const auto found = reference_.find(robot);
   if (found == reference_.end()) return std::nullopt;
-  return tutti::pose_at(found->second, stamp, config_.max_reference_gap_s);
+  constexpr double kMaxGap_s = 1.0;  // between the reference poses before and after
+  return tutti::pose_at(found->second, stamp, kMaxGap_s);
 }
 
 std::optional<Pose3> ReferenceClosures::true_relative_pose(RobotId robot_a, Timestamp stamp_a, RobotId robot_b,
@@ -122,7 +121,7 @@ ReferenceClosures::Assessment ReferenceClosures::assess(const PlacedSubmap& firs
 
   Assessment result;
   const double between = (first.centre - second.centre).norm();
-  if (between - first.radius_m - second.radius_m > config_.radius_m + 2.0 * config_.wrong_max_m) {
+  if (between - first.radius_m - second.radius_m > config_.radius_m + 2.0 * kWrongMost_m) {
     result.distant = true;
     return result;
   }
@@ -188,9 +187,9 @@ std::optional<Pose3> ReferenceClosures::draw_error(const SubmapPair& pair, bool 
     rng = pair_rng(seed_, "wrong", pair.first, pair.second);
     if (!rng.bernoulli(alone)) return std::nullopt;
   }
-  const double offset = rng.uniform(config_.wrong_min_m, config_.wrong_max_m);
+  const double offset = rng.uniform(kWrongLeast_m, kWrongMost_m);
   const double direction = rng.uniform(-std::numbers::pi, std::numbers::pi);
-  const double max_turn = config_.wrong_max_deg * kRadPerDeg;
+  const double max_turn = kWrongTurn_deg * kRadPerDeg;
   const double tilt = kWrongTilt_deg * kRadPerDeg;
   Pose3 error;
   error.translation = {offset * std::cos(direction), offset * std::sin(direction),

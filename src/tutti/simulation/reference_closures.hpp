@@ -15,6 +15,9 @@
 
 namespace tutti::simulation {
 
+/// How far off closures are that are made wrong.
+inline constexpr double kWrongLeast_m = 2.0, kWrongMost_m = 8.0, kWrongTurn_deg = 60.0;
+
 struct ReferenceClosureConfig {
   double radius_m = 4.0;
   double max_heading_deg = 180.0;
@@ -26,10 +29,6 @@ struct ReferenceClosureConfig {
   double wrong_share = 0.1;
   double distant_share = 0.5;
   double agreeing_share = 0.3;
-  double wrong_min_m = 2.0;
-  double wrong_max_m = 8.0;
-  double wrong_max_deg = 60.0;
-  double max_reference_gap_s = 1.0;
   template <class V>
   void describe(V& v) {
     v.field("radius_m", radius_m, greater_than(0.0), "Two submaps overlap when two keyframes are this close.");
@@ -45,12 +44,6 @@ struct ReferenceClosureConfig {
     v.field("distant_share", distant_share, between(0.0, 1.0), "Share of the wrong ones that join distant places.");
     v.field("agreeing_share", agreeing_share, between(0.0, 1.0),
             "Share of the wrong ones that agree with their neighbours, as places that look alike cause.");
-    v.field("wrong_min_m", wrong_min_m, above_zero_to(kFarthest_m), "Least offset of a wrong closure.");
-    v.field("wrong_max_m", wrong_max_m, above_zero_to(kFarthest_m),
-            "Largest offset of a wrong closure; not below wrong_min_m.");
-    v.field("wrong_max_deg", wrong_max_deg, between(0.0, 180.0), "Largest turn of a wrong closure.");
-    v.field("max_reference_gap_s", max_reference_gap_s, greater_than(0.0),
-            "A keyframe needs reference poses before and after it, at most this far apart.");
   }
 };
 

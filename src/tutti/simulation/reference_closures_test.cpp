@@ -92,7 +92,7 @@ TEST(ReferenceClosures, TheAskedShareIsWrongAndTheRestIsAsGoodAsItsCovariance) {
       reports += 1.0;
       if (is_wrong(error)) {
         wrong += 1.0;
-        if (error.translation.norm() > config.radius_m + config.wrong_max_m) wrong_distant += 1.0;
+        if (error.translation.norm() > config.radius_m + kWrongMost_m) wrong_distant += 1.0;
         continue;
       }
       const Vector6d e = local(Pose3{}, error);

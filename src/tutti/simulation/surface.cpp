@@ -140,7 +140,7 @@ Status check_surface(const CorridorWorld& world, const SurfaceConfig& config) {
   constexpr double kMostCells = 1e9;
   constexpr double kAround_m = 2.0;  // alcoves, and the blocks that the walls lie in
   const double width = std::max(config.width_m, config.office_width_m) + 2.0 * kAround_m;
-  const double height = std::max(config.height_m, config.office_height_m) + 2.0 * kAround_m;
+  const double height = std::max(kHeight_m, kOfficeHeight_m) + 2.0 * kAround_m;
   double volume = 0.0;
   Eigen::AlignedBox2d roof;
   for (const Corridor& corridor : world.corridors) {
@@ -150,7 +150,7 @@ Status check_surface(const CorridorWorld& world, const SurfaceConfig& config) {
     roof.extend(world.junctions[corridor.b].head<2>());
   }
   if (!roof.isEmpty())
-    volume += (roof.sizes().array() + 2.0 * config.roof_margin_m).prod() * (config.parapet_height_m + 2.0 * kAround_m);
+    volume += (roof.sizes().array() + 2.0 * kRoofMargin_m).prod() * (config.parapet_height_m + 2.0 * kAround_m);
   const double cells = volume / std::pow(config.cell_m, 3);
   if (cells <= kMostCells) return {};
   return fail(ErrorCode::configuration,

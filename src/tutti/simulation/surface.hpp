@@ -13,23 +13,17 @@ namespace tutti::simulation {
 
 class FreeSpace;
 
+inline constexpr double kHeight_m = 2.8;  ///< Of rough and featureless corridors,
+inline constexpr double kOfficeHeight_m = 2.6;
+inline constexpr double kRoofMargin_m = 4.0;  ///< From the outermost open corridors to the roof's edge.
+
 /// What the walls of a world look like. Lengths across a corridor are those of its smooth shape.
 struct SurfaceConfig {
   double cell_m = 0.25;
   double body_height_m = 0.55;
   double width_m = 3.2;
-  double height_m = 2.8;
-  double roughness_m = 0.15;
-  double roughness_length_m = 1.0;
-  double width_variation = 0.2;
-  double width_variation_length_m = 12.0;
-  double alcoves_per_100m = 8.0;
-  double obstacles_per_100m = 8.0;
   double office_width_m = 2.4;
-  double office_height_m = 2.6;
   double doors_per_100m = 20.0;
-  double furniture_per_100m = 10.0;
-  double roof_margin_m = 4.0;
   double parapet_height_m = 0.35;
   int chimneys = 2;
   template <class V>
@@ -38,26 +32,9 @@ struct SurfaceConfig {
     v.field("body_height_m", body_height_m, above_zero_to(kLargestRoom_m),
             "Height of the network's lines above the floor.");
     v.field("width_m", width_m, above_zero_to(kLargestRoom_m), "Of rough and featureless corridors.");
-    v.field("height_m", height_m, above_zero_to(kLargestRoom_m), "Of rough and featureless corridors.");
-    v.field("roughness_m", roughness_m, between(0.0, kLargestRoom_m),
-            "Rough walls stray from smooth by about this at most.");
-    v.field("roughness_length_m", roughness_length_m, above_zero_to(kLargestRoom_m),
-            "Distance between bumps of rough walls.");
-    v.field("width_variation", width_variation, between(0.0, 0.3),
-            "Rough corridors widen and narrow by up to this share.");
-    v.field("width_variation_length_m", width_variation_length_m, above_zero_to(kLargestRoom_m),
-            "How far apart wide places are.");
-    v.field("alcoves_per_100m", alcoves_per_100m, between(0.0, kMostPer100m), "Dug into the walls of rough corridors.");
-    v.field("obstacles_per_100m", obstacles_per_100m, between(0.0, kMostPer100m),
-            "Standing at the walls of rough corridors.");
     v.field("office_width_m", office_width_m, above_zero_to(kLargestRoom_m), "Of office corridors.");
-    v.field("office_height_m", office_height_m, above_zero_to(kLargestRoom_m), "Of office corridors.");
     v.field("doors_per_100m", doors_per_100m, between(0.0, kMostPer100m),
             "Office: door niches; every third stands open to a room.");
-    v.field("furniture_per_100m", furniture_per_100m, between(0.0, kMostPer100m),
-            "Office: cupboards and pillars at the walls.");
-    v.field("roof_margin_m", roof_margin_m, Bound{.low = 1.0, .high = kLargestRoom_m, .low_open = true},
-            "Roof: from the outermost open corridors to its edge.");
     v.field("parapet_height_m", parapet_height_m, between(0.0, kLargestRoom_m), "Roof: wall around its edge.");
     v.field("chimneys", chimneys, between(0, 20),
             "Roof: the only things that stand on it, beside the house of the door.");

@@ -78,7 +78,6 @@ inline double rmse(const std::vector<Pose3>& a, const std::vector<Pose3>& b) {
 struct LoopConfig {
   CompareConfig compare;
   PolicyConfig policy{.name = "spectral"};
-  LedgerConfig ledger;
   ProxyGraphConfig proxy_graph;
   std::size_t nodes_per_update = 7;  ///< 20 s at 0.33 m/s.
   /// Per update; empty: none.
@@ -132,7 +131,7 @@ inline LoopResult run_closed_loop(const Mission& mission, const LoopConfig& conf
     }
     const auto selection = (*policy)->choose(
         {graph, kAlpha, nodes, comparison, budget, Rng(out.updates), ledger, test ? &*test : nullptr, &found});
-    out.replaced += ledger.update(selection.constraints, config.ledger, selection.replaces_all).replaced;
+    out.replaced += ledger.update(selection.constraints, selection.replaces_all).replaced;
     std::vector<estimation::ChainConstraint> constraints;
     for (const Constraint& c : ledger.constraints()) constraints.push_back({c.from, c.to, c.measurement});
     smoother.set_constraints(std::move(constraints));

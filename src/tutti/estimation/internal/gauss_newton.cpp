@@ -10,6 +10,7 @@ namespace {
 
 /// A cost below this (chi2 has no unit) is zero: tolerances relative to it would ask for more digits than there are.
 constexpr double kCostFloor = 1e-6;
+constexpr int kMaxStepHalvings = 8;
 /// Once a step promises less than this share of the cost, the Hessian hardly changes and its factor is used again...
 constexpr double kReuseBelow = 1e-2;
 /// ...as long as every such step still shrinks the promised decrease by this factor.
@@ -95,8 +96,7 @@ SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, cons
     previous_size = size;
     // A step that is asked for by its size may promise less than the cost's rounding.
     const double most = summary.final_cost * (relative <= kRounding && limits_step ? 1.0 + kRounding : 1.0);
-    const auto [scale, new_cost] =
-        search_line(equations, poses, step, costs, most, config.max_step_halvings, candidate);
+    const auto [scale, new_cost] = search_line(equations, poses, step, costs, most, kMaxStepHalvings, candidate);
     if (!(new_cost <= most)) {  // not by more than rounding, when converged
       summary.termination = converged ? Termination::converged : Termination::stalled;
       break;
