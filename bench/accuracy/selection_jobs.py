@@ -29,8 +29,8 @@ ABLATIONS = {  # a mechanism switched off: what it takes
     "directions": ["agent.disagreement.without=directions"],
     "hinges": ["server.proxy_graph.shape_deletions=0"],
     "a quarter of sigma": ["agent.policy.adaptive_error_share=1000"],
-    "trial of odometry": ["server.map.trial.max_failures_per_chain=0"],
-    "honesty of rotations": ["server.map.judge_rotation=false"],
+    "failed odometry": ["server.map.who_is_wrong.let_odometry_fail=false"],
+    "honesty of odometry": ["server.map.judge_odometry=false"],
 }
 
 
