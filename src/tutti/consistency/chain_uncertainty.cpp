@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/consistency/chain_uncertainty.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "tutti/base/check.hpp"
@@ -32,6 +34,8 @@ constexpr double kCautious = 0.16;
 constexpr double kKnownFarBetter = 0.25;
 constexpr Index kMostDirections = 4;
 constexpr double kFinest = 127.0;
+/// A closure on which the map hinges is doubted by half when odometry finds it as unlikely as this of a right one.
+constexpr double kStillRight = 0.9;
 
 /// Errors of one kind in the axes of `world`: n x (3 columns).
 struct Errors {
@@ -223,33 +227,52 @@ MatrixXd by_odometry(std::span<const Pose3> poses, std::span<const Matrix6d> ste
   return scaled * moves.transpose();
 }
 
-std::vector<KnownDirection> directions(std::span<const Pose3> poses, const MatrixXd& covariance,
-                                       std::span<const Matrix6d> steps, const MatrixXd& shifts) {
-  const MatrixXd seen = seen_from_first(poses);
-  const MatrixXd P = seen * covariance * seen.transpose();
-  const MatrixXd moved = seen * shifts;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (P + P.transpose()), by_odometry(poses, steps));
+/// In one byte a number; `v` becomes what they say. None: a kind is all zero.
+std::optional<KnownDirection> coded(Eigen::VectorXd& v) {
+  std::array<double, 2> largest{};
+  for (Index k = 0; k < v.size(); ++k) largest[k % 6 / 3] = std::max(largest[k % 6 / 3], std::abs(v(k)));
+  if (!(largest[0] > 0.0 && largest[1] > 0.0)) return std::nullopt;
+  KnownDirection out{.position = {}, .rotation = {}, .rotation_scale = largest[1] / largest[0], .sigma = largest[0]};
+  for (Index k = 0; k < v.size(); ++k) {
+    const double code = std::round(kFinest * v(k) / largest[k % 6 / 3]);
+    (k % 6 < 3 ? out.position : out.rotation).push_back(static_cast<std::int8_t>(code));
+    v(k) = code / kFinest * (k % 6 < 3 ? 1.0 : out.rotation_scale);
+  }
+  return out;
+}
+
+/// `P`: the map's covariance of the spread nodes seen from the first; `O`: odometry's; `shifts`: of the same.
+std::vector<KnownDirection> directions(const MatrixXd& P, const MatrixXd& O, const MatrixXd& shifts) {
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (P + P.transpose()), O);
   std::vector<KnownDirection> out;
   if (eigen.info() != Eigen::Success) return out;
   for (Index i = 0; i < std::min(kMostDirections, P.rows()) && eigen.eigenvalues()(i) < kKnownFarBetter; ++i) {
     Eigen::VectorXd v = eigen.eigenvectors().col(i);
-    std::array<double, 2> largest{};
-    for (Index k = 0; k < v.size(); ++k) largest[k % 6 / 3] = std::max(largest[k % 6 / 3], std::abs(v(k)));
-    if (!(largest[0] > 0.0 && largest[1] > 0.0)) continue;
-    KnownDirection direction{.position = {}, .rotation = {}, .rotation_scale = largest[1] / largest[0]};
-    for (Index k = 0; k < v.size(); ++k) {
-      const double code = std::round(kFinest * v(k) / largest[k % 6 / 3]);
-      (k % 6 < 3 ? direction.position : direction.rotation).push_back(static_cast<std::int8_t>(code));
-      v(k) = code / kFinest * (k % 6 < 3 ? 1.0 : direction.rotation_scale);
-    }
+    auto direction = coded(v);
+    if (!direction) continue;
     double variance = std::max(0.0, v.dot(P * v));
-    if (moved.cols() > 0) variance += (v.transpose() * moved).array().square().maxCoeff();
+    if (shifts.cols() > 0) variance += (v.transpose() * shifts).array().square().maxCoeff();
     for (Index k = 0; k < v.size(); ++k)
       variance += std::pow(v(k) * (k % 6 < 3 ? internal::kRounding.position_m : internal::kRounding.rotation_rad), 2);
-    direction.sigma = std::sqrt(variance);
-    out.push_back(std::move(direction));
+    direction->sigma = std::sqrt(variance);
+    out.push_back(std::move(*direction));
   }
   return out;
+}
+
+/// With the closure right, the squared length of its shift in odometry's covariance is about chi-square with 6 degrees
+/// of freedom; D^2 beyond its quantile speaks for a wrong one with odds exp((D^2 - quantile) / 2). That share of the
+/// shift is doubted, of the closure of which it is largest.
+std::optional<KnownDirection> doubted(const MatrixXd& O, const MatrixXd& shifts) {
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(O.rows());
+  const Eigen::LDLT<MatrixXd> odometry(O);
+  for (const auto& shift : shifts.colwise()) {
+    const double beyond = shift.dot(odometry.solve(shift)) - chi_square_quantile(kStillRight, 6.0);
+    const Eigen::VectorXd share = shift / (1.0 + std::exp(-0.5 * beyond));
+    if (share.squaredNorm() > largest.squaredNorm()) largest = share;
+  }
+  if (largest.norm() < internal::kRounding.position_m) return std::nullopt;
+  return coded(largest);
 }
 
 }  // namespace
@@ -285,7 +308,10 @@ ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain
     if (known.shifts.cols() > 0)
       spread_shifts.middleRows<6>(6 * k) = known.shifts.middleRows<6>(6 * static_cast<Index>(node));
   }
-  out.directions = directions(poses, known.spread_covariance, known.spread_odometry, spread_shifts);
+  const MatrixXd seen = seen_from_first(poses), odometry = by_odometry(poses, known.spread_odometry);
+  spread_shifts = seen * spread_shifts;
+  out.directions = directions(seen * known.spread_covariance * seen.transpose(), odometry, spread_shifts);
+  out.doubted = doubted(odometry, spread_shifts);
   return out;
 }
 
@@ -299,6 +325,37 @@ ChainUncertainty even_uncertainty(const ChainId& chain, std::size_t nodes, const
     if (waves < kLeastWaves) continue;
     scale.sigma.assign(ChainUncertainty::blocks(nodes), at_each);
     scale.position = scale.rotation = {.mean = 3.0 * static_cast<double>(nodes), .degrees = 3.0 * waves};
+  }
+  return out;
+}
+
+ProxyGraph without_doubted(const ProxyGraph& graph, const ChainId& chain) {
+  ProxyGraph out = graph;
+  const ChainUncertainty* uncertainty = uncertainty_of(graph, chain);
+  if (uncertainty == nullptr || !uncertainty->doubted) return out;
+  const KnownDirection& doubted = *uncertainty->doubted;
+  const std::span<const ProxyNode> nodes = nodes_of(graph, chain);
+  const auto first = static_cast<std::size_t>(nodes.data() - graph.nodes.data());
+  const std::vector<std::size_t> spread = ChainUncertainty::spread(nodes.size());
+  // Motions of space about the first node, [translation; rotation], so that a turn carries what lies between.
+  const auto from_first = [&](std::size_t node) -> Eigen::Vector3d {
+    return nodes[node].T_world_body.translation - nodes[0].T_world_body.translation;
+  };
+  Vector6d before = Vector6d::Zero(), after;
+  for (std::size_t k = 1; k < spread.size(); ++k, before = after) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto row = static_cast<Index>(axis);
+      after(row) = doubted.sigma / kFinest * doubted.position[3 * (k - 1) + axis];
+      after(row + 3) = doubted.sigma * doubted.rotation_scale / kFinest * doubted.rotation[3 * (k - 1) + axis];
+    }
+    after.head<3>() -= after.tail<3>().cross(from_first(spread[k]));
+    for (std::size_t n = spread[k - 1] + 1; n <= spread[k]; ++n) {
+      const double alpha = static_cast<double>(n - spread[k - 1]) / static_cast<double>(spread[k] - spread[k - 1]);
+      const Vector6d motion = (1.0 - alpha) * before + alpha * after;
+      Pose3& T = out.nodes[first + n].T_world_body;
+      T.translation += motion.head<3>() + motion.tail<3>().cross(from_first(n));
+      T.rotation = so3_exp(motion.tail<3>()) * T.rotation;
+    }
   }
   return out;
 }

@@ -277,6 +277,50 @@ TEST(ChainUncertainty, DirectionsAreWhatClosuresKnowFarBetterThanOdometry) {
   }
 }
 
+// One closure turned a third of the way by 0.1 rad, 200 times what odometry may turn a step, or by 0.003 rad, which it
+// may well have missed; the robot is to follow the map without the former, every node of it.
+TEST(ChainUncertainty, WhatOneClosureSaysAgainstOdometryIsDoubted) {
+  const Scene scene(test::corridor(kNodes));
+  ChainKnowledge known = usual_map().knowledge(scene.graph, kBravo);
+  const auto turned_by = [&](double angle_rad) {  // evenly, from node 40 to 80
+    known.shifts = MatrixXd::Zero(6 * kNodes, 2);
+    std::vector<Eigen::Vector3d> moved;
+    for (std::size_t n = 0; n < kNodes; ++n) {
+      Vector6d shift = Vector6d::Zero();
+      for (std::size_t i = 40; i < std::min<std::size_t>(n, 80); ++i) {
+        const Eigen::Vector3d turn(0.0, 0.0, angle_rad / 40.0);
+        shift.head<3>() += turn.cross(scene.server[n].translation - scene.server[i].translation);
+        shift.tail<3>() += turn;
+      }
+      moved.emplace_back(shift.head<3>());
+      const Eigen::Matrix3d to_body = scene.server[n].rotation.conjugate().toRotationMatrix();
+      known.shifts.col(1).segment<6>(6 * static_cast<Index>(n)) << to_body * shift.head<3>(), to_body * shift.tail<3>();
+    }
+    return moved;
+  };
+  const auto moved = turned_by(0.1);
+  ProxyGraph graph = scene.graph;
+  graph.uncertainties = {chain_uncertainty(graph, kBravo, known)};
+  ASSERT_TRUE(graph.uncertainties[0].doubted.has_value());
+  const ProxyGraph followed = without_doubted(graph, kBravo);
+  double largest_m = 0.0;
+  for (const auto& by : moved) largest_m = std::max(largest_m, by.norm());
+  ASSERT_GT(largest_m, 1.0);
+  for (std::size_t n = 0; n < kNodes; ++n)
+    EXPECT_LT((nodes_of(followed, kBravo)[n].T_world_body.translation - scene.server[n].translation - moved[n]).norm(),
+              0.02 * largest_m)
+        << n;
+  EXPECT_EQ(followed.nodes[0], graph.nodes[0]);  // another robot's
+  (void)turned_by(0.003);
+  const auto little = chain_uncertainty(graph, kBravo, known).doubted;
+  EXPECT_LT(little ? little->sigma : 0.0, 0.03 * 0.03 * largest_m);
+  // Odometry that says nothing speaks against no closure.
+  (void)turned_by(0.1);
+  for (Matrix6d& step : known.spread_odometry) step *= 1e6;
+  const auto open = chain_uncertainty(graph, kBravo, known).doubted;
+  EXPECT_LT(open ? open->sigma : 0.0, 0.03 * largest_m);
+}
+
 // A map that is odometry and nothing else: nothing is known better.
 TEST(ChainUncertainty, WithoutClosuresThereAreNoDirections) {
   const Scene scene(test::corridor(kNodes));

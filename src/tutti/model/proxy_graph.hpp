@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -81,7 +82,8 @@ struct KnownDirection {
 
 /// How sure the server is of the shape of one chain's trajectory, with the errors seen through the wavelets of the
 /// chain's own proximity graph and through the directions that closures know. Any one closure on which the map hinges
-/// may be wrong: what would change without it counts as uncertainty too (docs/math.md).
+/// may be wrong: what would change without it counts as uncertainty too, and is doubted where odometry speaks against
+/// it (docs/math.md).
 struct ChainUncertainty {
   static constexpr std::size_t kBlock = 10;   ///< Nodes that share a sigma.
   static constexpr std::size_t kSpread = 24;  ///< Evenly spread nodes that directions speak of; fewer on short chains.
@@ -101,6 +103,9 @@ struct ChainUncertainty {
   PoseSigma whole;
   std::vector<ScaleUncertainty> scales;  ///< Of the Meyer bank on the chain's graph; scale 0 = largest.
   std::vector<KnownDirection> directions;
+  /// What rests on a single closure that odometry contradicts, as a shift: spread node k >= 1 as seen from the first
+  /// moves by sigma (position_k / 127, rotation_scale rotation_k / 127), m and rad, when robots are not to follow it.
+  std::optional<KnownDirection> doubted;
   friend bool operator==(const ChainUncertainty&, const ChainUncertainty&) = default;
 };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/geometry/covariance.hpp"
 
 namespace tutti::robot {
@@ -107,22 +108,23 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
     if (stage_ended) stage_ended(stage);
   };
 
+  const ProxyGraph graph = consistency::without_doubted(message.graph, chain_);
   const std::vector<consistency::RobotNode> own = nodes();
   const auto comparison = policy_->needs_disagreement()
-                              ? consistency::compare(message.graph, chain_, own, config_.compare)
-                              : consistency::Comparison{consistency::synchronise(message.graph, chain_, own).pairs};
+                              ? consistency::compare(graph, chain_, own, config_.compare)
+                              : consistency::Comparison{consistency::synchronise(graph, chain_, own).pairs};
   ended(UpdateStage::compare);
 
   std::optional<consistency::DisagreementTest> test;
   consistency::Disagreement odometry_disagreement;
   ++state_.comparisons;
   if (comparison.pairs.size() >= 2 && (config_.explain || policy_->needs_test())) {
-    test.emplace(message.graph, chain_, comparison.pairs, state_.comparisons, config_.disagreement);
+    test.emplace(graph, chain_, comparison.pairs, state_.comparisons, config_.disagreement);
     odometry_disagreement = (*test)(consistency::odometry_at(own, comparison.pairs));
   }
-  const std::size_t withdrawn = state_.ledger.withdraw_unknown(message.graph, chain_);
+  const std::size_t withdrawn = state_.ledger.withdraw_unknown(graph, chain_);
   const consistency::Ledger held = state_.ledger;
-  const auto selection = policy_->choose({.graph = message.graph,
+  const auto selection = policy_->choose({.graph = graph,
                                           .chain = chain_,
                                           .nodes = own,
                                           .comparison = comparison,
@@ -150,7 +152,7 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   ended(UpdateStage::optimise);
 
   if (config_.explain && test)
-    summary.explanation = consistency::explain(message.graph, chain_, own, comparison.pairs, *test,
+    summary.explanation = consistency::explain(graph, chain_, own, comparison.pairs, *test,
                                                std::move(odometry_disagreement), config_.disagreement.false_alarm_rate);
   summary.synchronised = comparison.pairs.size();
   summary.proposed = selection.constraints.size();

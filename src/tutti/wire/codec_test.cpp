@@ -134,7 +134,8 @@ bool close(const KnownDirection& in, const KnownDirection& out) {
 bool close(const ChainUncertainty& in, const ChainUncertainty& out) {
   const auto each = [](const auto& x, const auto& y) { return close(x, y); };
   return in.chain == out.chain && rounded_up(in.whole, out.whole) && std::ranges::equal(in.scales, out.scales, each) &&
-         std::ranges::equal(in.directions, out.directions, each);
+         std::ranges::equal(in.directions, out.directions, each) && in.doubted.has_value() == out.doubted.has_value() &&
+         (!in.doubted || close(*in.doubted, *out.doubted));
 }
 
 RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
@@ -354,7 +355,8 @@ TEST(Validate, Uncertainties) {
              {"68 and 69 numbers, expected 69 of 40 nodes", [](M& m) { of(m).directions[1].position.pop_back(); }},
              {"69 and 70 numbers, expected 69 of 40 nodes", [](M& m) { of(m).directions[0].rotation.push_back(1); }},
              {"sigma 0 and ratio 1", [](M& m) { of(m).directions[1].sigma = 0.0; }},
-             {"sigma 0.1 and ratio -1", [](M& m) { of(m).directions[1].rotation_scale = -1.0; }}});
+             {"sigma 0.1 and ratio -1", [](M& m) { of(m).directions[1].rotation_scale = -1.0; }},
+             {"0 and 0 numbers, expected 69 of 40 nodes", [](M& m) { of(m).doubted = KnownDirection{.sigma = 1.0}; }}});
 }
 
 TEST(Validate, DirectionsOfShortChains) {

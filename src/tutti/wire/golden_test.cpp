@@ -105,8 +105,12 @@ TEST(Golden, ProxyGraph) {
   graph.reduced = true;
   graph.edges = {{0, 1, 0.625}};
   graph.eliminated = {{RobotId{0}, {2'000'000'003}}};
-  graph.uncertainties = {{RobotId{0}, {0.25, 0.0}, {}, {{{127, -5, 0}, {3, -127, 64}, 2.5, 0.02}}},
-                         {seven, {0.5, 0.01}, {{}, {{{0.03, 0.002}}, {120.0, 14.5}, {90.0, 8.25}}}, {}}};
+  graph.uncertainties = {{RobotId{0},
+                          {0.25, 0.0},
+                          {},
+                          {{{127, -5, 0}, {3, -127, 64}, 2.5, 0.02}},
+                          KnownDirection{{1, 127, 0}, {127, 2, -3}, 0.5, 1.5}},
+                         {seven, {0.5, 0.01}, {{}, {{{0.03, 0.002}}, {120.0, 14.5}, {90.0, 8.25}}}, {}, {}}};
   const auto check = [&](const ProxyGraphMessage& decoded, unsigned) {
     EXPECT_EQ(decoded.header, message.header);
     EXPECT_EQ(decoded.graph.epoch, graph.epoch);
@@ -139,6 +143,11 @@ TEST(Golden, ProxyGraph) {
     EXPECT_EQ(first.directions[0].rotation, graph.uncertainties[0].directions[0].rotation);
     EXPECT_NEAR(first.directions[0].rotation_scale, 2.5, 0.0025);
     EXPECT_NEAR(first.directions[0].sigma, 0.02, 2e-5);
+    ASSERT_TRUE(first.doubted.has_value());
+    EXPECT_EQ(first.doubted->position, graph.uncertainties[0].doubted->position);
+    EXPECT_EQ(first.doubted->rotation, graph.uncertainties[0].doubted->rotation);
+    EXPECT_NEAR(first.doubted->sigma, 1.5, 0.0015);
+    EXPECT_FALSE(second.doubted.has_value());
     EXPECT_EQ(second.chain, seven);
     ASSERT_EQ(second.scales.size(), 2U);
     EXPECT_TRUE(second.scales[0].sigma.empty());

@@ -150,8 +150,8 @@ TEST(Hostile, ClaimedCountsAreBoundedBeforeMemoryIsTaken) {
 }
 
 TEST(Hostile, AnUncertaintyNeedsNodes) {
-  // radius 1 m, sigma 1 m, a run { robot: 0, stamp_step_ns: 1, uncertainty: true }, the two zeros of `whole`, no scales
-  // and no directions.
+  // radius 1 m, sigma 1 m, a run { robot: 0, stamp_step_ns: 1, uncertainty: true }, the two zeros of `whole`, no
+  // scales, no directions and no doubt.
   const std::string one("\x00\x00\x00\x00\x00\x00\xf0\x3f", 8);
   const std::string payload = "\x19" + one + "\x21" + one + std::string("\x2a\x06\x08\x00\x28\x01\x30\x01", 8) +
                               std::string("\x92\x01\x04\x00\x00\x00\x00", 7);

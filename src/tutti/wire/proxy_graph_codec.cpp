@@ -135,7 +135,7 @@ class EdgeColumns {
 };
 
 /// Uncertainties: `whole`, then scale after scale, the sigmas each by their difference to the block before, then the
-/// directions.
+/// directions, then what is doubted.
 class UncertaintyColumns {
  public:
   /// Nothing when a number is outside what encoding makes.
@@ -164,6 +164,8 @@ class UncertaintyColumns {
       if (!code(coder, run, d < in.directions.size() ? in.directions[d] : KnownDirection{},
                 out.directions.emplace_back()))
         return std::nullopt;
+    if (coder.code(doubted_, in.doubted ? 1 : 0) == 0) return out;
+    if (!code(coder, run, in.doubted ? *in.doubted : KnownDirection{}, out.doubted.emplace())) return std::nullopt;
     return out;
   }
 
@@ -207,7 +209,7 @@ class UncertaintyColumns {
     return true;
   }
   Models whole_, first_, next_;
-  IntegerModel count_, has_sigma_, fine_, number_;
+  IntegerModel count_, has_sigma_, doubted_, fine_, number_;
 };
 
 std::vector<Run> runs_of(const ProxyGraph& graph) {

@@ -147,7 +147,7 @@ Status check_uncertainty(const ChainUncertainty& uncertainty, std::size_t nodes)
     if (auto ok = check_scale(scale, nodes); !ok) return ok;
   for (const KnownDirection& direction : uncertainty.directions)
     if (auto ok = check_direction(direction, nodes); !ok) return ok;
-  return {};
+  return uncertainty.doubted ? check_direction(*uncertainty.doubted, nodes) : Status{};
 }
 
 Status check_uncertainties(const ProxyGraph& graph) {

@@ -97,6 +97,7 @@ inline ChainUncertainty any_uncertainty(Rng& rng, const ChainId& chain, std::siz
       direction.rotation.push_back(static_cast<std::int8_t>(static_cast<int>(rng.index(255)) - 127));
     }
   }
+  if (out.directions.size() > 1) out.doubted = out.directions.front();
   return out;
 }
 
