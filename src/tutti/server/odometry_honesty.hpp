@@ -12,12 +12,13 @@ namespace tutti::server {
 
 /// What a robot's odometry is worth, as factors on its variances: the least with which a share of its loops
 /// (odometry_loops.hpp), of those that tell of odometry more than of closures, miss by no more than chi-square allows
-/// that share. 1 with fewer than 8 such loops.
+/// that share. 1 with fewer than 8 such loops. Loops that go over the same odometry say the same, so a factor below 1
+/// is the largest with which so small misses still have a chance of 10 %, of as many loops as share no odometry.
 struct OdometryHonesty {
-  /// On the variances of rotations, in [0.08, 1]: 70 % of the loops, and twice the least (loops share their odometry,
-  /// so a walk tells of it only so well). Closures need not be judged: fewer than 30 % wrong ones make it larger, on
-  /// the safe side; with more it is 1. Rotations only: by how far a loop misses in rotation is read off directly, and
-  /// errors of rotation add up like a random walk; how odometry errs in translation depends on the length of the way.
+  /// On the variances of rotations, in [0.04, 1]: 70 % of the loops. Closures need not be judged: fewer than 30 % wrong
+  /// ones make it larger, on the safe side; with more it is 1. Rotations only: by how far a loop misses in rotation is
+  /// read off directly, and errors of rotation add up like a random walk; how odometry errs in translation depends on
+  /// the length of the way.
   double rotation = 1.0;
   /// On all variances, in [0.04, 400]: half of the loops. Of closures that have been judged; below 1 their own
   /// covariance is scaled likewise, so that closures that overstate theirs do not make odometry too sure.

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <iterator>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 namespace tutti::server {
@@ -77,6 +78,12 @@ OdometryLoop loop_of(const LoopClosure& first, const RelativePose& of_two, const
           .closures = over_two * first.measurement.covariance * over_two.transpose() + second.measurement.covariance};
 }
 
+/// As a loop of the robot whose odometry between these keyframes it goes over.
+OdometryLoop over(OdometryLoop loop, const KeyframeId& a, const KeyframeId& b) {
+  std::tie(loop.first, loop.last) = std::minmax(a.index, b.index);
+  return loop;
+}
+
 }  // namespace
 
 std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
@@ -87,7 +94,8 @@ std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const Odom
   for (const auto& [from, to, measurement] : closures)
     if (const auto odometry = ways.between(from, to))
       loops.at(from.chain)
-          .push_back({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance});
+          .push_back(over({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance},
+                          from, to));
   for (auto one = loops.begin(); one != loops.end(); ++one)
     for (auto two = std::next(one); two != loops.end(); ++two) {
       const std::vector<LoopClosure> between = closures_with(closures, one->first, two->first);
@@ -97,8 +105,9 @@ std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const Odom
         const auto of_one = ways.between(first.from, second.from);
         const auto of_two = ways.between(first.to, second.to);
         if (!of_one || !of_two) continue;
-        one->second.push_back(loop_of(first, *of_two, *of_one, second));
-        two->second.push_back(one->second.back());
+        const OdometryLoop loop = loop_of(first, *of_two, *of_one, second);
+        one->second.push_back(over(loop, first.from, second.from));
+        two->second.push_back(over(loop, first.to, second.to));
       }
     }
   return loops;

@@ -22,9 +22,11 @@ struct OdometryChain {
 
 /// A way over odometry and closures back to where it began.
 struct OdometryLoop {
-  Vector6d missed;    ///< By how far it fails to close (right tangent at its end: m, rad).
-  Matrix6d odometry;  ///< Covariance of `missed` that is odometry's, as stated,
-  Matrix6d closures;  ///< ... and what is the closures'.
+  Vector6d missed;          ///< By how far it fails to close (right tangent at its end: m, rad).
+  Matrix6d odometry;        ///< Covariance of `missed` that is odometry's, as stated,
+  Matrix6d closures;        ///< ... and what is the closures'.
+  std::uint32_t first = 0;  ///< KeyframeId::index: of the robot's own odometry it goes over these keyframes,
+  std::uint32_t last = 0;   ///< ... inclusive.
 };
 
 /// The loops that tell of each robot's odometry, every robot of `chains` among them: its closures with itself; and with
