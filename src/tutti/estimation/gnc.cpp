@@ -43,14 +43,18 @@ bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
 
 }  // namespace
 
+PoseGraphSolution internal::least_squares(const PoseGraph& graph, const GncConfig& config,
+                                          std::span<const std::size_t> fixed) {
+  SolverConfig plain = config.solver;
+  plain.loss = "none";
+  return solve_pose_graph(graph, plain, {}, fixed);
+}
+
 GncResult internal::truncated_least_squares(const PoseGraph& graph, const GncConfig& config,
-                                            std::span<const double> truncation, std::span<const std::size_t> fixed) {
+                                            std::span<const double> truncation, const PoseGraphSolution& start,
+                                            std::span<const std::size_t> fixed) {
   const std::size_t edges = graph.edges.size();
-  GncResult out;
-  out.inlier_weight.assign(edges, 1.0);
-  SolverConfig inner = config.solver;
-  inner.loss = "none";
-  out.solution = solve_pose_graph(graph, inner, {}, fixed);
+  GncResult out{.solution = start, .inlier_weight = std::vector<double>(edges, 1.0)};
   if (!is_usable(out.solution.summary.termination)) return out;
 
   // In units of the truncation, so that one mu serves edges with different ones.
@@ -64,6 +68,7 @@ GncResult internal::truncated_least_squares(const PoseGraph& graph, const GncCon
   internal::GraphEquations equations(graph, structure);
   std::vector<double> scale(edges, 1.0);
   const internal::EdgeCosts costs{.loss = {}, .roles = {}, .scale = scale};
+  SolverConfig inner = config.solver;
   inner.relative_cost_tolerance = std::max(kInnerTolerance, config.solver.relative_cost_tolerance);
   inner.max_iterations = kInnerIterations;
   double mu = 1.0 / (2.0 * worst - 1.0);  // remark 5
@@ -91,7 +96,8 @@ GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<co
   std::vector<double> truncation(graph.edges.size(), chi_square_quantile(config.confidence, 6.0));
   for (std::size_t e = 0; e < roles.size(); ++e)
     if (roles[e] == EdgeRole::trusted) truncation[e] = std::numeric_limits<double>::infinity();
-  return internal::truncated_least_squares(graph, config, truncation, fixed);
+  return internal::truncated_least_squares(graph, config, truncation, internal::least_squares(graph, config, fixed),
+                                           fixed);
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryWays& o
     if (reduced_.roles[e] == EdgeRole::trusted) runs_.push_back(e);
   std::ranges::sort(runs_, {}, [&](std::size_t e) { return reduced_.graph.edges[e].from; });
   count_votes();
+  all_held_ = internal::least_squares(reduced_.graph, gnc_);
 }
 
 std::size_t HypothesisSolver::begin_of(std::size_t run) const {
@@ -83,15 +84,23 @@ Window HypothesisSolver::around(std::size_t run) const {
 }
 
 Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
-  Solution out{.hypothesis = std::move(hypothesis), .let_go = {}, .accepted = {}, .failed = {}};
-  PoseGraph graph = reduced_.graph;
-  for (const auto& group : out.hypothesis.wrong)
-    for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
-  std::vector<double> truncation(graph.edges.size(), limit_);
+  std::vector<double> truncation(reduced_.graph.edges.size(), limit_);
   for (const std::size_t run : runs_) truncation[run] = kInfinite;
-  for (const Window& window : out.hypothesis.windows)
+  for (const Window& window : hypothesis.windows)
     for (std::size_t run = window.first; run <= window.last; ++run) truncation[runs_[run]] = limit_;
-  const GncResult robust = internal::truncated_least_squares(graph, gnc_, truncation);
+  if (hypothesis.wrong.empty())
+    return judge(std::move(hypothesis), internal::truncated_least_squares(reduced_.graph, gnc_, truncation, all_held_));
+  PoseGraph graph = reduced_.graph;
+  for (const auto& group : hypothesis.wrong)
+    for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
+  return judge(std::move(hypothesis),
+               internal::truncated_least_squares(graph, gnc_, truncation, internal::least_squares(graph, gnc_)));
+}
+
+Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const {
+  Solution out{
+      .hypothesis = std::move(hypothesis), .let_go = {}, .accepted = {}, .failed = {}, .optimum = std::move(optimum)};
+  const GncResult& robust = out.optimum;
   const std::vector<Pose3>& poses = robust.solution.poses;
   out.solved = is_usable(robust.solution.summary.termination);
   if (!out.solved) return out;
@@ -145,8 +154,9 @@ void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& ou
     if (out.failed.size() == known) continue;
     double size = 0.0;
     for (std::size_t f = known; f < out.failed.size(); ++f) size += least_size(out.failed[f]);
-    out.misfit += size < config_.min_jump_m ? kInfinite : config_.least_places + size / config_.jump_per_place_m;
+    out.price += size < config_.min_jump_m ? kInfinite : config_.least_places + size / config_.jump_per_place_m;
   }
+  out.misfit += out.price;
 }
 
 double HypothesisSolver::least_size(const FailedStretch& failed) const {

@@ -28,7 +28,9 @@ struct Solution {
   std::vector<char> let_go;           ///< Per run.
   std::vector<char> accepted;         ///< Per closure.
   std::vector<FailedStretch> failed;  ///< Runs let go, neighbours together; nodes of the graph.
+  GncResult optimum;                  ///< On the graph of the closures' ends.
   double misfit = 0.0;  ///< In votes, with what failed stretches and wrong groups pay; infinite when one is too small.
+  double price = 0.0;   ///< What of it failed stretches pay.
   bool suspicious = false;   ///< More than wrong closures strewn about may be behind what is unexplained.
   double unexplained = 0.0;  ///< Votes of refused closures, and what strains one window of odometry beyond chance.
 };
@@ -41,6 +43,9 @@ class HypothesisSolver {
                    const WhoIsWrongConfig& config, const GncConfig& gnc);
 
   [[nodiscard]] Solution solve(Hypothesis hypothesis) const;
+  /// What the optimum of another hypothesis with the same wrong groups is worth under this one, if that lets nothing go
+  /// outside this one's windows: then it is this one's, too, as it may let go no more.
+  [[nodiscard]] Solution judge(Hypothesis hypothesis, GncResult optimum) const;
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
   /// The runs around one, within the search distance on its piece.
   [[nodiscard]] Window around(std::size_t run) const;
@@ -59,6 +64,7 @@ class HypothesisSolver {
   const GncConfig& gnc_;
   double limit_;
   internal::ReducedGraph reduced_;
+  PoseGraphSolution all_held_;         // with nothing let go or refused, where every solution begins
   std::vector<std::size_t> runs_;      // edges of the reduced graph, by their begin
   std::vector<std::size_t> closures_;  // edges of the reduced graph
   std::vector<double> votes_;          // per closure

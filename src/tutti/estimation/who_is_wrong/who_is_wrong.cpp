@@ -46,10 +46,9 @@ class Search {
     // Whatever failed pays for its places and at least one run.
     if (!best.solved || !config_.let_odometry_fail || !best.suspicious || best.unexplained < config_.least_places + 1.0)
       return best;
-    if (auto windows = proposed(); !windows.empty())
-      keep_better(best, without_idle(solver_.solve({std::move(windows), {}})));
-    refuse_groups(std::move(groups), best);
-    return without_idle(std::move(best));
+    if (Solution proposal = proposed(); proposal.solved && !proposal.failed.empty())
+      keep_better(best, without_idle(std::move(proposal)));
+    return refuse_groups(std::move(groups), best) ? without_idle(std::move(best)) : best;
   }
 
  private:
@@ -59,41 +58,48 @@ class Search {
     return true;
   }
 
-  /// Around what is let go when all odometry may be.
-  [[nodiscard]] std::vector<Window> proposed() const {
+  /// What is let go when all odometry may be, in windows around it.
+  [[nodiscard]] Solution proposed() const {
     if (solver_.runs() == 0) return {};
-    const Solution all = solver_.solve({{{0, solver_.runs() - 1}}, {}});
-    std::vector<Window> out;
+    Solution all = solver_.solve({{{0, solver_.runs() - 1}}, {}});
+    std::vector<Window> windows;
     for (std::size_t run = 0; all.solved && run < solver_.runs(); ++run) {
       if (!all.let_go[run]) continue;
       const Window window = solver_.around(run);
-      if (!out.empty() && window.first <= out.back().last)
-        out.back().last = std::max(out.back().last, window.last);
+      if (!windows.empty() && window.first <= windows.back().last)
+        windows.back().last = std::max(windows.back().last, window.last);
       else
-        out.push_back(window);
+        windows.push_back(window);
     }
-    return out;
+    return solver_.judge({std::move(windows), {}}, std::move(all.optimum));
   }
 
   /// Takes back the windows that do not pay for themselves, the one that costs most first.
   [[nodiscard]] Solution without_idle(Solution best) const {
-    for (bool changed = true; std::exchange(changed, false) && best.solved;) {
+    std::vector<char> needed(best.hypothesis.windows.size(), 0);
+    while (best.solved) {
       std::optional<Solution> better;
+      std::size_t idle = 0;
       for (std::size_t k = 0; k < best.hypothesis.windows.size(); ++k) {
+        if (needed[k]) continue;
         Hypothesis less = best.hypothesis;
         less.windows.erase(less.windows.begin() + static_cast<std::ptrdiff_t>(k));
         Solution other = solver_.solve(std::move(less));
-        if (other.solved && other.misfit <= (better ? better->misfit : best.misfit)) better = std::move(other);
+        // Fewer windows fit no better, and save at most what they pay.
+        needed[k] = other.solved && other.misfit - other.price > best.misfit ? 1 : 0;
+        if (!other.solved || other.misfit > (better ? better->misfit : best.misfit)) continue;
+        better = std::move(other);
+        idle = k;
       }
       if (!better) break;
       best = std::move(*better);
-      changed = true;
+      needed.erase(needed.begin() + static_cast<std::ptrdiff_t>(idle));
     }
     return best;
   }
 
-  /// As long as the misfit falls enough when all closures of a group are wrong.
-  void refuse_groups(std::vector<std::vector<std::size_t>> groups, Solution& best) const {
+  /// As long as the misfit falls enough when all closures of a group are wrong. True if any are refused.
+  bool refuse_groups(std::vector<std::vector<std::size_t>> groups, Solution& best) const {
     std::erase_if(groups, [](const auto& group) { return group.size() < kLeastGroup; });
     std::ranges::stable_sort(groups, std::greater(), [](const auto& group) { return group.size(); });
     for (int refused = 0; refused < config_.most_refused_groups; ++refused) {
@@ -108,8 +114,9 @@ class Search {
         more.wrong.push_back(group);
         changed = keep_better(best, solver_.solve(std::move(more)));
       }
-      if (!changed) return;
+      if (!changed) return refused > 0;
     }
+    return config_.most_refused_groups > 0;
   }
 
   const HypothesisSolver& solver_;

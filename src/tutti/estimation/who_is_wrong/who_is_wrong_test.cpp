@@ -9,6 +9,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/estimation/who_is_wrong/closure_support.hpp"
+#include "tutti/estimation/who_is_wrong/hypothesis.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::estimation {
@@ -149,6 +150,28 @@ TEST(WhoIsWrong, DoesNotDependOnTheOrderOfTheClosures) {
   ASSERT_EQ(forth.failed.size(), back.failed.size());
   EXPECT_EQ(forth.failed[0].from, back.failed[0].from);
   EXPECT_EQ(forth.failed[0].to, back.failed[0].to);
+}
+
+// What is let go when all odometry may be is, around it, worth as much as what is found when only that may be.
+TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
+  for (const double missed_rad : {0.1, 0.4}) {
+    Laps laps(50, missed_rad);
+    laps.close_laps(5);
+    const OdometryWays ways = laps.ways();
+    const WhoIsWrongConfig config;
+    const GncConfig gnc;
+    const HypothesisSolver solver(laps.graph, ways, laps.odometry_edges, config, gnc);
+    const Solution all = solver.solve({{{0, solver.runs() - 1}}, {}});
+    const auto run = static_cast<std::size_t>(std::ranges::find(all.let_go, 1) - all.let_go.begin());
+    ASSERT_LT(run, solver.runs());
+    const Solution judged = solver.judge({{solver.around(run)}, {}}, all.optimum);
+    const Solution solved = solver.solve({{solver.around(run)}, {}});
+    EXPECT_NEAR(judged.misfit, solved.misfit, 0.01);
+    EXPECT_EQ(judged.let_go, solved.let_go);
+    EXPECT_EQ(judged.accepted, solved.accepted);
+    EXPECT_GT(judged.price, config.least_places);
+    EXPECT_LT(judged.misfit, solver.solve({}).misfit);
+  }
 }
 
 }  // namespace
