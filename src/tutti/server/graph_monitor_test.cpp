@@ -277,7 +277,7 @@ struct Calibration {
 /// Sees the map's errors as a robot sees them that knows the truth.
 void add_errors(const ProxyGraph& graph, const ChainUncertainty& u, Calibration& out) {
   const TrueRobot robot = true_robot(graph, u.chain);
-  const Eigen::MatrixXd off = consistency::PoseSignal().difference(robot.server, robot.truth);
+  const Eigen::MatrixXd off = consistency::pose_difference(robot.server, robot.truth);
   const auto nodes = static_cast<double>(off.rows());
   out.whole_m.add(off.leftCols<3>().squaredNorm() / nodes / std::pow(u.whole.position_m, 2));
   out.whole_rad.add(off.rightCols<3>().squaredNorm() / nodes / std::pow(u.whole.rotation_rad, 2));
