@@ -40,7 +40,7 @@ bool is_degraded(const simulation::DegradeConfig& degrade) {
   return degrade.yaw_deg_per_m != 0.0 || degrade.scale_percent != 0.0;
 }
 
-Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& config, const fs::path& data, Rng rng) {
+Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, Rng rng) {
   auto odometry = read_trajectory(robot.odometry, data);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
@@ -84,7 +84,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const MissionConfig& c
 Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, const fs::path& data, const Rng& rng) {
   std::vector<MissionRecording> out;
   for (const RobotConfig& robot : config.robots) {
-    auto loaded = replay(robot, config, data, rng.fork("robot/" + robot.name));
+    auto loaded = replay(robot, data, rng.fork("robot/" + robot.name));
     if (!loaded) return in_context("robot " + robot.name, loaded.error());
     loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
     loaded->recording.name = robot.name;
