@@ -5,8 +5,10 @@
 #include <cmath>
 #include <nanoflann.hpp>
 #include <tuple>
+#include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/disjoint_sets.hpp"
 
 namespace tutti::spectral {
 namespace {
@@ -137,26 +139,12 @@ SparseMatrix laplacian(const SparseMatrix& adjacency) {
 }
 
 Components connected_components(const SparseMatrix& graph) {
-  constexpr int kUnseen = -1;
-  Components out{.label = std::vector<int>(static_cast<std::size_t>(graph.cols()), kUnseen)};
-  std::vector<int> pending;
-  for (int seed = 0; seed < static_cast<int>(graph.cols()); ++seed) {
-    if (out.label[static_cast<std::size_t>(seed)] != kUnseen) continue;
-    out.label[static_cast<std::size_t>(seed)] = out.count;
-    pending.push_back(seed);
-    while (!pending.empty()) {
-      const int node = pending.back();
-      pending.pop_back();
-      for (SparseMatrix::InnerIterator it(graph, node); it; ++it) {
-        auto& label = out.label[static_cast<std::size_t>(it.row())];
-        if (it.value() == 0.0 || label != kUnseen) continue;
-        label = out.count;
-        pending.push_back(static_cast<int>(it.row()));
-      }
-    }
-    ++out.count;
-  }
-  return out;
+  DisjointSets sets(static_cast<std::size_t>(graph.cols()));
+  for (Eigen::Index node = 0; node < graph.cols(); ++node)
+    for (SparseMatrix::InnerIterator it(graph, node); it; ++it)
+      if (it.value() != 0.0) sets.join(static_cast<std::size_t>(it.row()), static_cast<std::size_t>(node));
+  auto [label, count] = sets.labels();
+  return {std::move(label), count};
 }
 
 }  // namespace tutti::spectral

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/disjoint_sets.hpp"
 #include "tutti/spectral/spectrum.hpp"
 
 namespace tutti::spectral {
@@ -99,25 +99,6 @@ void eliminate(int node, const Eigen::VectorXd& degree, std::vector<Links>& grap
   }
 }
 
-/// Union-find with path halving.
-class Forest {
- public:
-  explicit Forest(int nodes) : parent_(at(nodes)) { std::iota(parent_.begin(), parent_.end(), 0); }
-  bool join(int a, int b) {
-    const int root_a = root(a);
-    const int root_b = root(b);
-    parent_[at(root_a)] = root_b;
-    return root_a != root_b;
-  }
-
- private:
-  int root(int n) {
-    while (parent_[at(n)] != n) n = parent_[at(n)] = parent_[at(parent_[at(n)])];
-    return n;
-  }
-  std::vector<int> parent_;
-};
-
 }  // namespace
 
 /// Node by node, fewest neighbours first. Against a sparse Cholesky factor of L_bb: only sums of positive numbers, so
@@ -162,10 +143,10 @@ SparseMatrix sparsify(const SparseMatrix& laplacian, double relative_threshold) 
   std::sort(edges.begin(), edges.end(), [](const WeightedEdge& p, const WeightedEdge& q) {
     return std::tuple(-p.weight, p.a, p.b) < std::tuple(-q.weight, q.a, q.b);
   });
-  Forest forest(nodes);
+  DisjointSets forest(at(nodes));
   std::vector<WeightedEdge> kept;
   for (const auto& edge : edges) {
-    const bool joins = forest.join(edge.a, edge.b);
+    const bool joins = forest.join(at(edge.a), at(edge.b));
     if (joins || edge.weight >= relative_threshold * std::min(degree[edge.a], degree[edge.b])) kept.push_back(edge);
   }
   return spectral::laplacian(adjacency_from_edges(nodes, kept));

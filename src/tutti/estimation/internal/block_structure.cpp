@@ -8,35 +8,15 @@
 #include <limits>
 #include <mutex>
 #include <numeric>
+#include <tuple>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/disjoint_sets.hpp"
 
 namespace tutti::estimation::internal {
 namespace {
 
 using Pair = std::pair<int, int>;  // column < row
-
-/// Component of every node, numbered by first node.
-int find_components(const PoseGraph& graph, std::vector<int>& component) {
-  std::vector<std::size_t> parent(graph.poses.size());
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
-  const auto root = [&](std::size_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  for (const auto& edge : graph.edges) {
-    const std::size_t a = root(edge.from);
-    const std::size_t b = root(edge.to);
-    parent[std::max(a, b)] = std::min(a, b);  // the root stays the first node
-  }
-  int count = 0;
-  component.resize(parent.size());
-  for (std::size_t i = 0; i < parent.size(); ++i) {
-    const std::size_t r = root(i);
-    component[i] = r == i ? count++ : component[r];
-  }
-  return count;
-}
 
 /// Per node: fixed, or the first of a component without a fixed one.
 std::vector<bool> anchors(const BlockStructure& s, std::span<const std::size_t> fixed) {
@@ -121,7 +101,9 @@ BlockStructure analyse_blocks(const PoseGraph& graph, std::span<const std::pair<
   for (const auto& edge : graph.edges)
     TUTTI_CHECK(edge.from < nodes && edge.to < nodes, "edge {} -> {} of {} nodes", edge.from, edge.to, nodes);
   BlockStructure s;
-  s.components = find_components(graph, s.component);
+  DisjointSets sets(graph.poses.size());
+  for (const auto& edge : graph.edges) sets.join(edge.from, edge.to);
+  std::tie(s.component, s.components) = sets.labels();
   const std::vector<bool> anchored = anchors(s, fixed);
   s.variable.assign(nodes, -1);
   for (std::size_t i = 0; i < nodes; ++i)
