@@ -159,7 +159,7 @@ int write_world(const WorldOptions& options) {
       options.points_m > 0.0
           ? formats::write_ply(options.output,
                                simulation::sample_surface(mesh, options.points_m, Rng(options.seed)).points)
-          : formats::write_ply_mesh(options.output, mesh.vertices, mesh.triangles);
+          : formats::write_ply(options.output, mesh.vertices, {}, mesh.triangles);
   if (!written) return complain("world", written.error().message);
   fmt::print("{}: {} triangles, world of {} with seed {}\n", options.output, mesh.triangles.size(), config->mission,
              options.seed);

@@ -139,48 +139,36 @@ Result<PointCloud> read_ply(const std::string& path) {
   return read_file(path).and_then([&](const std::string& bytes) { return parse_ply(bytes, path); });
 }
 
-std::string to_ply_mesh(std::span<const Eigen::Vector3f> vertices,
-                        std::span<const std::array<std::uint32_t, 3>> triangles) {
+std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours,
+                   std::span<const Triangle> triangles) {
+  TUTTI_CHECK(colours.empty() || colours.size() == points.size(), "{} colours for {} points", colours.size(),
+              points.size());
   std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-      "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-      vertices.size(), triangles.size());
-  out.reserve(out.size() + vertices.size() * 12 + triangles.size() * 13);
-  for (const Eigen::Vector3f& vertex : vertices)
-    for (int axis = 0; axis < 3; ++axis) internal::put(out, vertex[axis]);
-  for (const auto& corners : triangles) {
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
+      points.size());
+  if (!colours.empty()) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (!triangles.empty())
+    out += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", triangles.size());
+  out += "end_header\n";
+  out.reserve(out.size() + points.size() * (colours.empty() ? 12 : 15) + triangles.size() * 13);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) internal::put(out, points[i][axis]);
+    if (colours.empty()) continue;
+    for (const std::uint8_t channel : {colours[i].red, colours[i].green, colours[i].blue}) internal::put(out, channel);
+  }
+  for (const Triangle& corners : triangles) {
     internal::put(out, std::uint8_t{3});
     for (const std::uint32_t corner : corners) {
-      TUTTI_CHECK(corner < vertices.size(), "corner {} of {} vertices", corner, vertices.size());
+      TUTTI_CHECK(corner < points.size(), "corner {} of {} vertices", corner, points.size());
       internal::put(out, corner);
     }
   }
   return out;
 }
 
-Status write_ply_mesh(const std::string& path, std::span<const Eigen::Vector3f> vertices,
-                      std::span<const std::array<std::uint32_t, 3>> triangles) {
-  return write_file(path, to_ply_mesh(vertices, triangles));
-}
-
-std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours) {
-  TUTTI_CHECK(colours.empty() || colours.size() == points.size(), "{} colours for {} points", colours.size(),
-              points.size());
-  std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-      "{}end_header\n",
-      points.size(), colours.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n");
-  out.reserve(out.size() + points.size() * (colours.empty() ? 12 : 15));
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) internal::put(out, points[i][axis]);
-    if (colours.empty()) continue;
-    for (const std::uint8_t channel : {colours[i].red, colours[i].green, colours[i].blue}) internal::put(out, channel);
-  }
-  return out;
-}
-
-Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours) {
-  return write_file(path, to_ply(points, colours));
+Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours,
+                 std::span<const Triangle> triangles) {
+  return write_file(path, to_ply(points, colours, triangles));
 }
 
 }  // namespace tutti::formats

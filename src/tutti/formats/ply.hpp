@@ -19,16 +19,14 @@ struct Rgb {
   std::uint8_t blue = 0;
 };
 
-/// PLY 1.0, binary little endian, vertices x y z (float) and, with colours, red green blue (uchar). `colours` is empty
-/// or has one entry per point.
-std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {});
-Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {});
+using Triangle = std::array<std::uint32_t, 3>;  ///< Positions of its corners among the points.
 
-/// The same with faces: element `face` with one list of uchar and int, vertex_indices.
-std::string to_ply_mesh(std::span<const Eigen::Vector3f> vertices,
-                        std::span<const std::array<std::uint32_t, 3>> triangles);
-Status write_ply_mesh(const std::string& path, std::span<const Eigen::Vector3f> vertices,
-                      std::span<const std::array<std::uint32_t, 3>> triangles);
+/// PLY 1.0, binary little endian, vertices x y z (float) and, with colours, red green blue (uchar). `colours` is empty
+/// or has one entry per point. With triangles: element `face` with one list of uchar and int, vertex_indices.
+std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {},
+                   std::span<const Triangle> triangles = {});
+Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {},
+                 std::span<const Triangle> triangles = {});
 
 /// The vertices of an ascii or binary little-endian PLY file: x, y, z float or double at any position, other scalar
 /// properties skipped, elements after `vertex` (faces) ignored, points with a non-finite coordinate dropped. List

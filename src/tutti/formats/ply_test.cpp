@@ -39,11 +39,11 @@ TEST(Ply, ColoursFollowTheirPoint) {
 TEST(Ply, FacesFollowTheVertices) {
   const std::vector<Eigen::Vector3f> vertices = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {1, 0, 1}};
   const std::vector<std::array<std::uint32_t, 3>> triangles = {{0, 1, 2}, {3, 2, 1}};
-  const std::string bytes = to_ply_mesh(vertices, triangles);
+  const std::string bytes = to_ply(vertices, {}, triangles);
   EXPECT_NE(bytes.find("element face 2\nproperty list uchar int vertex_indices\nend_header\n"), std::string::npos);
   EXPECT_EQ(bytes.substr(bytes.size() - 13), std::string("\3\3\0\0\0\2\0\0\0\1\0\0\0", 13));
   EXPECT_EQ(parse_ply(bytes, "p")->points, vertices);
-  EXPECT_THROW((void)to_ply_mesh(std::span(vertices).first(3), triangles), std::logic_error);
+  EXPECT_THROW((void)to_ply(std::span(vertices).first(3), {}, triangles), std::logic_error);
 }
 
 TEST(Ply, AsciiWithFacesBehind) {
