@@ -80,7 +80,7 @@ void marginals(benchmark::State& state) {
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   for (std::size_t k = 0; k < 1000; ++k) pairs.emplace_back(2 * k, 2 * k + 1);
   std::vector<Matrix6d> covariances;
-  for (auto _ : state) covariances = relative_covariances(graph, graph.poses, pairs);
+  for (auto _ : state) covariances = JointPosterior(graph, graph.poses, pairs).relative_covariances();
   state.counters["sigma_mm"] = 1e3 * std::sqrt(covariances[500](0, 0));
 }
 BENCHMARK(marginals)->Unit(benchmark::kMillisecond);

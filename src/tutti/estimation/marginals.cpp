@@ -156,10 +156,4 @@ Eigen::MatrixXd JointPosterior::covariance(std::span<const std::size_t> nodes) c
   return out;
 }
 
-std::vector<Matrix6d> relative_covariances(const PoseGraph& graph, std::span<const Pose3> poses,
-                                           std::span<const std::pair<std::size_t, std::size_t>> pairs,
-                                           std::span<const double> weights) {
-  return JointPosterior(graph, poses, pairs, weights).relative_covariances();
-}
-
 }  // namespace tutti::estimation

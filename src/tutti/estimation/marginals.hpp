@@ -48,9 +48,4 @@ class JointPosterior {
   std::unique_ptr<const Factorised> factorised_;
 };
 
-/// JointPosterior(graph, poses, pairs, weights).relative_covariances()
-std::vector<Matrix6d> relative_covariances(const PoseGraph& graph, std::span<const Pose3> poses,
-                                           std::span<const std::pair<std::size_t, std::size_t>> pairs,
-                                           std::span<const double> weights = {});
-
 }  // namespace tutti::estimation

@@ -3,10 +3,12 @@
 
 #include <Eigen/Cholesky>
 #include <cstddef>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/estimation/marginals.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/pose_graph.hpp"
 
@@ -80,6 +82,12 @@ inline double largest_rotation_difference(const std::vector<Pose3>& a, const std
   double largest = 0.0;
   for (std::size_t k = 0; k < a.size(); ++k) largest = std::max(largest, rotation_angle(a[k].inverse() * b[k]));
   return largest;
+}
+
+inline std::vector<Matrix6d> relative_covariances(const PoseGraph& graph, std::span<const Pose3> poses,
+                                                  std::span<const std::pair<std::size_t, std::size_t>> pairs,
+                                                  std::span<const double> weights = {}) {
+  return JointPosterior(graph, poses, pairs, weights).relative_covariances();
 }
 
 }  // namespace tutti::estimation::testing

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/estimation/chordal.hpp"
+#include "tutti/estimation/internal/chordal.hpp"
 
 #include <Eigen/LU>
 #include <cmath>
 
 #include "tutti/estimation/internal/block_cholesky.hpp"
-#include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/geometry/so3.hpp"
 
-namespace tutti::estimation {
-namespace internal {
+namespace tutti::estimation::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -107,21 +105,4 @@ bool chordal(const PoseGraph& graph, const BlockStructure& structure, std::vecto
   return solve_rotations(graph, structure, cholesky, R) && solve_translations(graph, structure, cholesky, R, poses);
 }
 
-}  // namespace internal
-
-Initialisation initialise_chordal(const PoseGraph& graph) {
-  Initialisation out{.poses = graph.poses};
-  if (!internal::is_finite(graph)) {
-    out.summary.termination = Termination::invalid_input;
-    return out;
-  }
-  const auto structure = internal::analyse_blocks(graph);
-  out.summary.components = structure.components;
-  out.summary.termination =
-      internal::chordal(graph, structure, out.poses) ? Termination::converged : Termination::singular;
-  return out;
-}
-
-std::vector<Pose3> chordal_initialisation(const PoseGraph& graph) { return initialise_chordal(graph).poses; }
-
-}  // namespace tutti::estimation
+}  // namespace tutti::estimation::internal
