@@ -33,7 +33,7 @@ struct Scene {
     const Disagreement found = test(odometry_at(nodes, comparison.pairs));
     const auto selection =
         policy->choose({graph, kAlpha, nodes, comparison, budget, Rng(update), ledger, &test, &found});
-    return ledger.update(selection.constraints, {}, selection.replaces_all);
+    return ledger.update(selection.constraints, selection.replaces_all);
   }
 };
 

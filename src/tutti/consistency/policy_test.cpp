@@ -164,7 +164,7 @@ TEST(Spectral, TopTakesTheLargestOverAllGroups) {
 TEST(Spectral, MeasuresHeldConstraintsAgainAndCountsThemInTheBudget) {
   Scene scene(60);
   scene.comparison.disagreement(10, 5) = 1.0;
-  scene.ledger.update(scene.choose("spectral", {}, kConfig).constraints, {}, false);
+  scene.ledger.update(scene.choose("spectral", {}, kConfig).constraints, false);
   ASSERT_EQ(scene.ledger.size(), 2U);
   scene.comparison.disagreement.setZero();
   scene.comparison.disagreement(30, 5) = 1.0;
@@ -172,7 +172,7 @@ TEST(Spectral, MeasuresHeldConstraintsAgainAndCountsThemInTheBudget) {
   scene.graph.nodes[11].T_world_body.translation.z() += 0.5;
   const auto selection = scene.choose("spectral", 3, kConfig);
   EXPECT_EQ(linked(selection), (Pairs{{9, 10}, {10, 11}, {29, 30}}));
-  const auto update = scene.ledger.update(selection.constraints, {}, selection.replaces_all);
+  const auto update = scene.ledger.update(selection.constraints, selection.replaces_all);
   EXPECT_EQ(update.added, 1U);
   EXPECT_EQ(update.replaced, 1U);
   EXPECT_EQ(update.unchanged, 1U);
