@@ -10,8 +10,6 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kWide_px = 1160.0;
-
 Points3d positions(const Trajectory& trajectory) {
   Points3d out;
   for (const StampedPose& p : trajectory) out.push_back(p.pose.translation);

@@ -72,11 +72,6 @@ std::string words(const Explanation& e, const SuspectedOrigin& origin, const Pic
                      format_significance(origin.significance), format_scale(e, origin.scale));
 }
 
-std::string words(const DriftOrigin& origin) {
-  return fmt::format("{} for {:.1f} s: {}, {:.2f} deg", drift_name(origin.kind), origin.until - origin.from,
-                     format_metres(origin.translation_m), origin.rotation_rad / kRadPerDeg);
-}
-
 /// Left edge and width of a stretch of time in pixels; never too thin to see.
 std::pair<double, double> extent(const Axis& x, double from_s, double until_s) {
   const double width = std::max(kThinnest_px, x(until_s) - x(from_s));
@@ -206,7 +201,8 @@ std::string explanation_svg(const ExplanationPicture& picture, double width_px) 
   if (!picture.truth.empty()) svg.text({kLeft_px - 8.0, truth_top + kBar_px - 2.0}, "true", "tick", "end");
   for (const DriftOrigin& origin : picture.truth) {
     const auto [left, width] = extent(x, picture.clock(origin.from), picture.clock(origin.until));
-    svg.rect({left, truth_top}, {width, kBar_px}, fmt::format("truth {}", drift_name(origin.kind)), words(origin));
+    svg.rect({left, truth_top}, {width, kBar_px}, fmt::format("truth {}", drift_name(origin.kind)),
+             format_drift(origin));
   }
   svg.polyline(Points2d{{kLeft_px, bottom}, {right, bottom}}, "baseline");
   svg.text({0.5 * (kLeft_px + right), bottom + 33.0}, picture.time_axis, "axis", "middle");
@@ -214,21 +210,13 @@ std::string explanation_svg(const ExplanationPicture& picture, double width_px) 
 }
 
 std::string significance_scale_html() {
-  constexpr double kWidth_px = 620.0;
-  constexpr double kBarLeft_px = 24.0;
-  constexpr double kBarWidth_px = 300.0;
-  constexpr int kSteps = 120;
-  const double low = std::log10(kLeastShown);
-  const double high = std::log10(kMostShown);
-  Svg svg(kWidth_px, 38.0, "Colour scale of the disagreement in units of its threshold");
-  for (int i = 0; i < kSteps; ++i)
-    svg.rect({kBarLeft_px + kBarWidth_px * i / kSteps, 6.0}, {kBarWidth_px / kSteps + 0.6, 12.0}, "cell", {},
-             hex(significance_colour(std::pow(10.0, low + (high - low) * (i + 0.5) / kSteps))));
+  const double low = std::log10(kLeastShown), range = std::log10(kMostShown) - low;
+  std::vector<std::pair<double, std::string>> ticks;
   for (const double tick : {0.1, 0.3, 1.0, 3.0, 10.0})
-    svg.text({kBarLeft_px + kBarWidth_px * (std::log10(tick) - low) / (high - low), 32.0},
-             tick == 1.0 ? std::string("1 = threshold") : tick_label(tick), "tick", "middle");
-  svg.text({kBarLeft_px + kBarWidth_px + 22.0, 16.0}, "disagreement over its threshold", "tick");
-  return "<div class=\"colourbar\">" + svg.str() + "</div>\n";
+    ticks.emplace_back((std::log10(tick) - low) / range, tick == 1.0 ? "1 = threshold" : tick_label(tick));
+  return colour_bar_html("Colour scale of the disagreement in units of its threshold",
+                         "disagreement over its threshold", ticks,
+                         [&](double share) { return hex(significance_colour(std::pow(10.0, low + range * share))); });
 }
 
 std::vector<LegendEntry> origin_legend(std::span<const SuspectedOrigin> origins) {
@@ -292,6 +280,11 @@ std::string format_origin(const SuspectedOrigin& origin, const PictureClock& clo
 
 std::string format_motion_error(double translation_m, double rotation_rad) {
   return fmt::format("{}, {:.1f} deg", format_metres(translation_m), rotation_rad / kRadPerDeg);
+}
+
+std::string format_drift(const DriftOrigin& origin) {
+  return fmt::format("{} for {:.1f} s: {}", drift_name(origin.kind), origin.until - origin.from,
+                     format_motion_error(origin.translation_m, origin.rotation_rad));
 }
 
 std::string format_disagreement(const Explanation& e) {

@@ -64,6 +64,8 @@ std::string format_origin(const consistency::SuspectedOrigin& origin, const Pict
 std::string format_place(const Eigen::Vector3d& place_m);
 /// "0.10 m, 20.3 deg"
 std::string format_motion_error(double translation_m, double rotation_rad);
+/// "slip for 2.0 s: 0.10 m, 20.3 deg"
+std::string format_drift(const DriftOrigin& origin);
 /// "odometry and map part by up to 12 x the threshold", and the way that odometry misses by most, if any; or that they
 /// agree.
 std::string format_disagreement(const consistency::Explanation& explanation);

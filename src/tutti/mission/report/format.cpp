@@ -84,6 +84,10 @@ std::string format_bytes(double bytes) {
   return three_digits(bytes) + " " + kUnits[unit];
 }
 
+std::string format_rate(std::uint64_t bytes, double seconds) {
+  return seconds > 0.0 ? format_bytes(static_cast<double>(bytes) / seconds) + "/s" : "-";
+}
+
 std::string format_share(std::size_t part, std::size_t whole) {
   return whole == 0 ? "-" : fmt::format("{:.1f} %", 100.0 * static_cast<double>(part) / static_cast<double>(whole));
 }

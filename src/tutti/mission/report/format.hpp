@@ -34,6 +34,8 @@ std::string format_duration_ms(double value_ms);
 std::string format_mission_time(double value_s);
 /// Powers of 1000: "812 B", "3.42 kB", "1.20 MB".
 std::string format_bytes(double bytes);
+/// "3.42 kB/s"
+std::string format_rate(std::uint64_t bytes, double seconds);
 /// "2.6 %"; "-" when the whole is 0.
 std::string format_share(std::size_t part, std::size_t whole);
 

@@ -138,6 +138,17 @@ Pose3 display_from_world(const MissionRecord& record, std::uint32_t component) {
   return record.server.T_reference_world.value_or(Pose3{});
 }
 
+std::vector<Points3d> displayed_routes(const MissionRecord& record, std::uint32_t component) {
+  const Pose3 T_display_world = display_from_world(record, component);
+  std::vector<Points3d> out;
+  for (const RobotRecord& robot : record.robots) {
+    if (robot.component != component) continue;
+    Points3d& route = out.emplace_back();
+    for (const StampedPose& p : robot.server_estimate) route.push_back(T_display_world * p.pose.translation);
+  }
+  return out;
+}
+
 ClosureStrokes closure_strokes(const MissionRecord& record, std::uint32_t component, const MapView& map) {
   std::map<KeyframeId, Eigen::Vector3d> positions;
   for (const RobotRecord& robot : record.robots)

@@ -73,6 +73,8 @@ struct MapView {
 };
 /// Where a component is displayed: the largest one on the reference, where there is one.
 Pose3 display_from_world(const MissionRecord& record, std::uint32_t component);
+/// The server's estimate of every robot of a component, displayed.
+std::vector<Points3d> displayed_routes(const MissionRecord& record, std::uint32_t component);
 
 /// The loop closures of a component in pixels, by the server's final estimate: within a robot, and between robots.
 struct ClosureStrokes {

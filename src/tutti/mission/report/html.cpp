@@ -53,6 +53,10 @@ std::string robot_name(const MissionRecord& record, RobotId robot) {
   return fmt::format("robot {}", robot.value);
 }
 
+std::string robot_cell(const MissionRecord& record, const RobotRecord& robot) {
+  return fmt::format("<span class=\"swatch {}\"></span>{}", robot_class(record, robot.id), escape_xml(robot.name));
+}
+
 std::string section(std::string_view title, std::string_view lead, const std::string& body) {
   return fmt::format("<section>\n<h2>{}</h2>\n<p class=\"lead\">{}</p>\n{}</section>\n", escape_xml(title),
                      escape_xml(lead), body);

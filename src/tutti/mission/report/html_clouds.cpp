@@ -2,6 +2,7 @@
 // What the robots saw beside what is there: onboard, server, survey; as pictures and figures.
 #include <fmt/format.h>
 
+#include "tutti/mission/report/colours.hpp"
 #include "tutti/mission/report/format.hpp"
 #include "tutti/mission/report/html_parts.hpp"
 #include "tutti/mission/report/map_pictures.hpp"
@@ -22,20 +23,11 @@ std::string panels_html(const MapPicture& picture, bool wide) {
 }
 
 std::string distance_scale() {
-  constexpr double kWidth_px = 560.0;
-  constexpr double kBar_px = 240.0;
-  constexpr int kSteps = 60;
-  Svg svg(kWidth_px, 38.0, "Colour scale of the distance to the survey");
-  for (int i = 0; i < kSteps; ++i) {
-    const auto c = distance_colour(kWorstShown_m * (i + 0.5) / kSteps);
-    svg.rect({24.0 + kBar_px * i / kSteps, 6.0}, {kBar_px / kSteps + 0.6, 12.0}, "cell", {},
-             fmt::format("#{:02x}{:02x}{:02x}", c.red, c.green, c.blue));
-  }
-  for (const double tick : {0.0, 0.5 * kWorstShown_m, kWorstShown_m})
-    svg.text({24.0 + kBar_px * tick / kWorstShown_m, 32.0},
-             tick < kWorstShown_m ? length_label(tick) : length_label(tick) + " or more", "tick", "middle");
-  svg.text({24.0 + kBar_px + 28.0, 16.0}, "distance to the survey", "tick");
-  return "<div class=\"colourbar\">" + svg.str() + "</div>\n";
+  std::vector<std::pair<double, std::string>> ticks;
+  for (const double share : {0.0, 0.5, 1.0})
+    ticks.emplace_back(share, length_label(share * kWorstShown_m) + (share < 1.0 ? "" : " or more"));
+  return colour_bar_html("Colour scale of the distance to the survey", "distance to the survey", ticks,
+                         [](double share) { return hex(distance_colour(share * kWorstShown_m)); });
 }
 
 std::string error_table(const MissionRecord& record) {

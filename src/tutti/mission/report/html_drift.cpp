@@ -13,7 +13,6 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kWidth_px = 1160.0;
 constexpr double kLeft_px = 78.0;
 constexpr double kRight_px = 14.0;
 constexpr std::string_view kTimeAxis = "mission time [s]";
@@ -40,11 +39,6 @@ struct Common {
   std::size_t hover_points = 0;
 };
 
-std::string words(const DriftOrigin& origin) {
-  return fmt::format("{} for {:.1f} s: {}", drift_name(origin.kind), origin.until - origin.from,
-                     format_motion_error(origin.translation_m, origin.rotation_rad));
-}
-
 /// Bands from the top to the bottom of the plot.
 void draw_bands(Svg& svg, const MissionRecord& record, const RobotRecord& robot, const Axis& x, double top,
                 double bottom) {
@@ -55,7 +49,7 @@ void draw_bands(Svg& svg, const MissionRecord& record, const RobotRecord& robot,
              title);
   };
   for (const DriftOrigin& origin : robot.drift_origins)
-    band(origin.from, origin.until, fmt::format("drift {}", drift_name(origin.kind)), words(origin));
+    band(origin.from, origin.until, fmt::format("drift {}", drift_name(origin.kind)), format_drift(origin));
   for (const FailedOdometryRecord& failed : record.server.failed_odometry)
     if (failed.robot == robot.id)
       band(failed.from, failed.until, "suspect",
@@ -116,13 +110,13 @@ std::string timeline(const MissionRecord& record, const RobotRecord& robot, cons
   constexpr double kErrorsBottom_px = 230.0;
   constexpr double kBornTop_px = 246.0;
   constexpr double kBornBottom_px = 306.0;
-  const double right = kWidth_px - kRight_px;
+  const double right = kWide_px - kRight_px;
   const bool born = !common.born_m.empty;
   const double bottom = born ? kBornBottom_px : kErrorsBottom_px;
   const Axis x = Axis::linear(common.time_s, kLeft_px, right, 14, false);
   const Axis y = common.logarithmic ? Axis::logarithmic(common.error_m, kErrorsBottom_px, kErrorsTop_px)
                                     : Axis::linear(common.error_m, kErrorsBottom_px, kErrorsTop_px, 5, true);
-  Svg svg(kWidth_px, bottom + 40.0, fmt::format("Error of {} over mission time", robot.name));
+  Svg svg(kWide_px, bottom + 40.0, fmt::format("Error of {} over mission time", robot.name));
   draw_bands(svg, record, robot, x, kMarksTop_px, bottom);
   svg.text({kLeft_px - 8.0, kMarksBottom_px - 3.0}, "constraints", "tick", "end");
   draw_constraints(svg, record, robot, x, kMarksTop_px, kMarksBottom_px);

@@ -12,8 +12,6 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kWide_px = 1160.0;
-
 std::string truth_cell(const consistency::SuspectedOrigin& origin, const RobotRecord& robot) {
   const auto truth = overlapping(origin, robot.drift_origins);
   if (!truth) return robot.drift_origins.empty() ? "" : "none";

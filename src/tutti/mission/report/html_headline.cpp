@@ -24,10 +24,6 @@ std::string cards_html(const std::vector<Card>& cards, std::string_view css_clas
   return out + "</div>\n";
 }
 
-std::string rate(std::uint64_t bytes, double seconds) {
-  return seconds > 0.0 ? format_bytes(static_cast<double>(bytes) / seconds) + "/s" : "-";
-}
-
 std::string from_to(std::optional<double> onboard_m, std::optional<double> corrected_m) {
   return fmt::format("<span class=\"up\">{}</span> → <span class=\"down\">{}</span>", format_metres(onboard_m),
                      format_metres(corrected_m));
@@ -57,9 +53,8 @@ Card robot_card(const MissionRecord& record, const RobotRecord& robot) {
   const PolicyRecord* policy = find_policy(robot, record.default_policy);
   const std::size_t constraints = policy != nullptr ? policy->constraints_added : 0;
   Card card;
-  card.what =
-      fmt::format("<span class=\"swatch {}\"></span>{} <small>{} in {}</small>", robot_class(record, robot.id),
-                  escape_xml(robot.name), format_distance(robot.distance_m), format_mission_time(robot.duration_s));
+  card.what = robot_cell(record, robot) + fmt::format(" <small>{} in {}</small>", format_distance(robot.distance_m),
+                                                      format_mission_time(robot.duration_s));
   if (robot.onboard.rmse_m && policy != nullptr)
     card.value = from_to(headline_rmse(robot.onboard), headline_rmse(policy->accuracy)) +
                  fmt::format(" <small>server {}</small>", format_metres(headline_rmse(robot.server)));
@@ -70,8 +65,8 @@ Card robot_card(const MissionRecord& record, const RobotRecord& robot) {
   card.detail =
       fmt::format("<b>{}</b> constraints beside {} odometry factors ({}); <b>{}</b> received ({}), {} sent ({})",
                   constraints, robot.odometry_factors, format_share(constraints, robot.odometry_factors),
-                  format_bytes(static_cast<double>(robot.bytes_down)), rate(robot.bytes_down, robot.duration_s),
-                  format_bytes(static_cast<double>(robot.bytes_up)), rate(robot.bytes_up, robot.duration_s));
+                  format_bytes(static_cast<double>(robot.bytes_down)), format_rate(robot.bytes_down, robot.duration_s),
+                  format_bytes(static_cast<double>(robot.bytes_up)), format_rate(robot.bytes_up, robot.duration_s));
   card.detail += partial_figures(robot, policy);
   if (const auto& [onboard, corrected] = robot.map_error; onboard && corrected)
     card.detail += fmt::format("<br>its map, mean distance to the survey: <b>{} → {}</b>",

@@ -16,7 +16,6 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kWide_px = 1160.0;
 constexpr double kHalf_px = 560.0;
 
 /// What the robots saw, as a picture under the routes.
@@ -63,13 +62,9 @@ std::vector<std::string> route_titles(const RobotRecord& robot) {
 std::string component_figure(const MissionRecord& record, std::uint32_t component) {
   const Pose3 T_display_world = display_from_world(record, component);
   std::vector<const RobotRecord*> robots;
-  std::vector<Points3d> routes;
-  for (const RobotRecord& robot : record.robots) {
-    if (robot.component != component) continue;
-    robots.push_back(&robot);
-    Points3d& route = routes.emplace_back();
-    for (const StampedPose& p : robot.server_estimate) route.push_back(T_display_world * p.pose.translation);
-  }
+  for (const RobotRecord& robot : record.robots)
+    if (robot.component == component) robots.push_back(&robot);
+  const std::vector<Points3d> routes = displayed_routes(record, component);
   const GroundPlane ground = ground_plane(routes);
   std::vector<Points2d> layers;
   for (const auto& route : routes) layers.push_back(ground(route));

@@ -18,6 +18,8 @@ std::size_t detail_per_robot(const MissionRecord& record, std::size_t total, std
 /// Colour class of a robot's strokes: "r0", "r1", ... in the order of the record, repeating after 8.
 std::string robot_class(const MissionRecord& record, RobotId robot);
 std::string robot_name(const MissionRecord& record, RobotId robot);
+/// Its name beside a square of its colour; HTML.
+std::string robot_cell(const MissionRecord& record, const RobotRecord& robot);
 
 /// The whole page around `body` (HTML); `title` is text.
 std::string page(std::string_view title, const std::string& body);

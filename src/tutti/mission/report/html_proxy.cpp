@@ -13,7 +13,6 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kWide_px = 1160.0;
 constexpr std::size_t kMaxEdges = 6000;
 constexpr std::array<const char*, 4> kKindClass{"small", "mid", "large", "other"};
 constexpr std::array<const char*, 4> kKindName{"small scale", "mid scale", "large scale", "chosen without scales"};

@@ -20,14 +20,6 @@ std::string with_bar(std::optional<double> value, double largest, std::string_vi
                      100.0 * std::min(1.0, *value / largest), metres(value));
 }
 
-std::string rate(std::uint64_t bytes, double seconds) {
-  return seconds > 0.0 ? format_bytes(static_cast<double>(bytes) / seconds) + "/s" : "-";
-}
-
-std::string robot_cell(const MissionRecord& record, const RobotRecord& robot) {
-  return fmt::format("<span class=\"swatch {}\"></span>{}", robot_class(record, robot.id), escape_xml(robot.name));
-}
-
 /// With a bar as long as its share of `largest`, unless the error is partial.
 std::string error_cell(std::optional<double> error_m, std::optional<double> scored_share, double largest,
                        std::string_view css_class) {
@@ -159,8 +151,8 @@ std::string radio_html(const MissionRecord& record) {
   HtmlTable kinds{{"from", "to", "kind", "messages", "largest", "handed over", "on the air", "mean rate"}, {}, 3};
   const auto bytes = [](std::uint64_t count) { return format_bytes(static_cast<double>(count)); };
   for (const auto& robot : record.robots) {
-    robots.rows.push_back({robot_cell(record, robot), rate(robot.bytes_up, robot.duration_s),
-                           rate(robot.bytes_down, robot.duration_s), std::to_string(robot.keyframes),
+    robots.rows.push_back({robot_cell(record, robot), format_rate(robot.bytes_up, robot.duration_s),
+                           format_rate(robot.bytes_down, robot.duration_s), std::to_string(robot.keyframes),
                            std::to_string(robot.submaps), std::to_string(robot.proxy_nodes)});
     for (const TrafficRecord& row : robot.traffic)
       kinds.rows.push_back({escape_xml(row.from), escape_xml(row.to), escape_xml(row.kind),

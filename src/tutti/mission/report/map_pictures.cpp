@@ -13,7 +13,6 @@ namespace tutti::mission {
 namespace {
 
 constexpr double kHalf_px = 562.0;
-constexpr double kWide_px = 1160.0;
 constexpr formats::Rgb kSurveyColour{168, 178, 194};
 
 template <class F>
@@ -38,23 +37,21 @@ std::vector<CloudLayer> onboard_layers(const MissionRecord& record, std::uint32_
 /// The panels' clouds; the survey's only where the map can be laid on it.
 struct Shown {
   std::vector<CloudLayer> onboard, server, survey, distance;
-  std::vector<Points3d> routes;  ///< Server, display frame.
+  GroundPlane ground;
+  std::vector<Points2d> routes;  ///< Server, display frame, on the ground.
 };
 
 Shown shown(const MissionRecord& record) {
   const std::uint32_t component = record.server.largest_component;
   Shown out{.onboard = onboard_layers(record, component), .server = server_layers(record, component)};
-  const Pose3 T_display_world = record.server.T_reference_world.value_or(Pose3{});
-  for (const RobotRecord& robot : record.robots) {
-    if (robot.component != component) continue;
-    Points3d& route = out.routes.emplace_back();
-    for (const StampedPose& p : robot.server_estimate) route.push_back(T_display_world * p.pose.translation);
-  }
+  const std::vector<Points3d> routes = displayed_routes(record, component);
+  out.ground = ground_plane(routes);
+  for (const Points3d& route : routes) out.routes.push_back(out.ground(route));
   if (!record.survey || !record.server.T_reference_world) return out;
   out.survey.push_back({record.survey.get(), {}, kSurveyColour});
   for (const CloudRecord& seen : record.server.clouds)
     if (seen.distance_m.size() == seen.cloud.points.size() && !seen.distance_m.empty())
-      out.distance.push_back({&seen.cloud, T_display_world, {}, &seen.distance_m});
+      out.distance.push_back({&seen.cloud, *record.server.T_reference_world, {}, &seen.distance_m});
   return out;
 }
 
@@ -127,8 +124,7 @@ Range heights(const std::vector<CloudLayer>& layers,
 }  // namespace
 
 std::vector<CloudLayer> server_layers(const MissionRecord& record, std::uint32_t component) {
-  const bool laid_on = component == record.server.largest_component;
-  const Pose3 T_display_world = laid_on ? record.server.T_reference_world.value_or(Pose3{}) : Pose3{};
+  const Pose3 T_display_world = display_from_world(record, component);
   std::vector<CloudLayer> out;
   for (const CloudRecord& seen : record.server.clouds)
     for (std::size_t r = 0; r < record.robots.size(); ++r)
@@ -195,23 +191,20 @@ Slice busiest_slice(const std::vector<Points2d>& routes, double length_m) {
 MapPicture map_from_above(const MissionRecord& record) {
   const Shown clouds = shown(record);
   if (clouds.server.empty()) return {};
-  const GroundPlane ground = ground_plane(clouds.routes);
-  std::vector<Points2d> routes;
-  for (const Points3d& route : clouds.routes) routes.push_back(ground(route));
-  const PlanView view({cloud_corners(clouds.server, ground, routes), cloud_corners(clouds.onboard, ground, routes)},
-                      kHalf_px, 0.9 * kHalf_px);
+  const GroundPlane& ground = clouds.ground;
+  const PlanView view(
+      {cloud_corners(clouds.server, ground, clouds.routes), cloud_corners(clouds.onboard, ground, clouds.routes)},
+      kHalf_px, 0.9 * kHalf_px);
   return picture(clouds, view, [&](const Eigen::Vector3d& p) { return std::optional(ground(p)); });
 }
 
 MapPicture map_section(const MissionRecord& record) {
   const Shown clouds = shown(record);
   if (clouds.server.empty()) return {};
-  const GroundPlane ground = ground_plane(clouds.routes);
-  std::vector<Points2d> routes;
-  for (const Points3d& route : clouds.routes) routes.push_back(ground(route));
-  const Points2d corners = cloud_corners(clouds.server, ground, routes);
+  const GroundPlane& ground = clouds.ground;
+  const Points2d corners = cloud_corners(clouds.server, ground, clouds.routes);
   if (corners.empty()) return {};
-  const Slice slice = busiest_slice(routes, std::clamp(0.4 * (corners[1] - corners[0]).maxCoeff(), 10.0, 40.0));
+  const Slice slice = busiest_slice(clouds.routes, std::clamp(0.4 * (corners[1] - corners[0]).maxCoeff(), 10.0, 40.0));
   const Eigen::Vector2d across(-slice.along.y(), slice.along.x());
   const Eigen::Index height = 3 - ground.right - ground.up;
   const auto to_plane = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector2d> {

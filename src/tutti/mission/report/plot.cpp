@@ -152,4 +152,18 @@ std::string legend_html(const std::vector<LegendEntry>& entries) {
   return out + "</p>\n";
 }
 
+std::string colour_bar_html(std::string_view label, std::string_view words,
+                            const std::vector<std::pair<double, std::string>>& ticks,
+                            const std::function<std::string(double)>& colour) {
+  constexpr double kLeft_px = 24.0, kBar_px = 300.0;
+  constexpr int kSteps = 120;
+  Svg svg(620.0, 38.0, label);
+  for (int i = 0; i < kSteps; ++i)
+    svg.rect({kLeft_px + kBar_px * i / kSteps, 6.0}, {kBar_px / kSteps + 0.6, 12.0}, "cell", {},
+             colour((i + 0.5) / kSteps));
+  for (const auto& [share, text] : ticks) svg.text({kLeft_px + kBar_px * share, 32.0}, text, "tick", "middle");
+  svg.text({kLeft_px + kBar_px + 28.0, 16.0}, words, "tick");
+  return "<div class=\"colourbar\">" + svg.str() + "</div>\n";
+}
+
 }  // namespace tutti::mission

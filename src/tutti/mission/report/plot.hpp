@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +10,8 @@
 
 /// Axes and views from above on top of Svg.
 namespace tutti::mission {
+
+inline constexpr double kWide_px = 1160.0;  ///< Of pictures that take the whole row.
 
 /// Smallest to largest value seen; ignores what is not finite.
 struct Range {
@@ -75,5 +78,10 @@ struct LegendEntry {
   std::string label;
 };
 std::string legend_html(const std::vector<LegendEntry>& entries);
+
+/// A bar of all colours, `colour` of 0 to 1, over its ticks (where, and what they say); HTML. `label` as of Svg.
+std::string colour_bar_html(std::string_view label, std::string_view words,
+                            const std::vector<std::pair<double, std::string>>& ticks,
+                            const std::function<std::string(double)>& colour);
 
 }  // namespace tutti::mission
