@@ -76,25 +76,28 @@ class Jobs:
                     if mission in self.missions:
                         self.run("many", mission, seed)
 
-        policies(self.missions, self.seeds[:1])
+        light = [m for m in self.missions if m not in NEEDS_SCANS]
+        policies(light, self.seeds[:1])
         many(1, 3 if quick else 20)
-        for mission in self.missions + self.fleets[:1]:
+        for mission in light + self.fleets[:1]:
             self.calibration(mission, 1)
         for seed in self.seeds:
-            for mission in self.missions:
+            for mission in light:
                 self.run("short", mission, seed, [f"duration_s={SHORT_S}", compare("every_node", "skeleton")])
         if self.fleets:
             self.run("room", "room", 1, [compare("every_node", "skeleton")])
-        policies(self.missions, self.seeds[1:])
-        policies(self.fleets[:2], self.seeds[:1])
+        policies(light, self.seeds[1:])
+        policies(self.fleets[:1], self.seeds[:1])
         if not quick:
             for seed in self.seeds[:3]:
                 for title, sets in ABLATIONS.items():
-                    for mission in self.missions:
+                    for mission in light:
                         self.run(f"without {title}", mission, seed, sets)
+            policies([m for m in self.missions if m in NEEDS_SCANS], self.seeds[:1])
             many(21, 100)
-        policies(self.fleets[:2], self.seeds[1:])
-        policies(self.fleets[2:], self.seeds)
+        policies(self.fleets[:1], self.seeds[1:])
+        policies(self.fleets[1:2], self.seeds[:3])
+        policies(self.fleets[2:], self.seeds[:1])
 
     def command(self, mission, seed, sets):
         name, *own = VARIANTS.get(mission, [mission])
