@@ -181,7 +181,7 @@ def ablation_table(results):
     for title in [None, *ABLATIONS]:
         kind = "policies" if title is None else f"without {title}"
         lines = [l for l in results.default(kind) if l["mission"] not in FLEETS and
-                 (title is None or l["seed"] in results.jobs.seeds[:3])]
+                 (title is None or l["seed"] in results.jobs.seeds[:2])]
         if not lines:
             continue
         changes = {} if title is None else moved(results, title)
