@@ -84,8 +84,6 @@ class Jobs:
         for seed in self.seeds:
             for mission in light:
                 self.run("short", mission, seed, [f"duration_s={SHORT_S}", compare("every_node", "skeleton")])
-        if self.fleets:
-            self.run("room", "room", 1, [compare("every_node", "skeleton")])
         policies(light, self.seeds[1:2])
         if not quick:
             for seed in self.seeds[:2]:
@@ -97,6 +95,8 @@ class Jobs:
             policies(light, self.seeds[2:])
             many(21, 100)
             policies([m for m in self.missions if m in NEEDS_SCANS], self.seeds[:1])
+        if self.fleets:
+            self.run("room", "room", 1, [compare("every_node", "skeleton")])
         policies(self.fleets[:1], self.seeds[2:])
         policies(self.fleets[1:2], self.seeds[:3])
         policies(self.fleets[2:], self.seeds[:1])
