@@ -16,6 +16,7 @@ namespace {
 constexpr std::string_view kMagic = "TU";
 constexpr std::size_t kHeaderBytes = 5;
 constexpr int kCompressionLevel = 9;
+constexpr auto kLastKind = static_cast<unsigned>(MessageKind::agent_state);
 
 }  // namespace
 
@@ -29,6 +30,16 @@ const char* name(MessageKind kind) {
       return "verdict";
     case MessageKind::cloud:
       return "cloud";
+    case MessageKind::receipt:
+      return "receipt";
+    case MessageKind::job:
+      return "job";
+    case MessageKind::verdicts:
+      return "verdicts";
+    case MessageKind::status:
+      return "status";
+    case MessageKind::agent_state:
+      return "agent state";
   }
   return "unknown";
 }
@@ -47,6 +58,12 @@ Versions versions(MessageKind kind) {
       return {.oldest = 6, .current = 6};
     case MessageKind::cloud:
       return {.oldest = 2, .current = 4};
+    case MessageKind::receipt:
+    case MessageKind::job:
+    case MessageKind::verdicts:
+    case MessageKind::status:
+    case MessageKind::agent_state:
+      return {.oldest = 1, .current = 1};
   }
   return {};
 }
@@ -63,7 +80,8 @@ Result<Header> read_header(std::string_view bytes) {
     return fail(ErrorCode::parse, "frame: {} bytes, a header alone has {}", bytes.size(), kHeaderBytes);
   if (!bytes.starts_with(kMagic)) return fail(ErrorCode::parse, "frame: does not begin with \"{}\"", kMagic);
   const auto byte = [&](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(bytes[i])); };
-  if (byte(4) < 1 || byte(4) > 4) return fail(ErrorCode::unsupported, "frame: unknown message kind {}", byte(4));
+  if (byte(4) < 1 || byte(4) > kLastKind)
+    return fail(ErrorCode::unsupported, "frame: unknown message kind {}", byte(4));
   const Header header{static_cast<MessageKind>(byte(4)), static_cast<std::uint16_t>(byte(2) | (byte(3) << 8U))};
   const auto [oldest, current] = versions(header.kind);
   if (header.version < oldest || header.version > current)

@@ -5,10 +5,21 @@
 
 namespace tutti::wire {
 
-/// What a frame carries. The numbers are on the wire: never reuse one. A cloud alone is not sent, but kept in files.
-enum class MessageKind : std::uint8_t { submap = 1, proxy_graph = 2, verdict = 3, cloud = 4 };
+/// What a frame carries. The numbers are on the wire: never reuse one. Single verdicts, clouds alone and the states of
+/// agents are not sent, but kept.
+enum class MessageKind : std::uint8_t {
+  submap = 1,
+  proxy_graph = 2,
+  verdict = 3,
+  cloud = 4,
+  receipt = 5,   ///< Which submaps of a robot the server has stored.
+  job = 6,       ///< Pairs of submaps to be verified.
+  verdicts = 7,  ///< The answer to a job.
+  status = 8,
+  agent_state = 9,
+};
 
-/// In words: "submap", "proxy graph", "verdict", "cloud".
+/// In words: "submap", "proxy graph", ...
 const char* name(MessageKind kind);
 
 /// Each kind has a version of its own, which is raised when its coding changes: a change of one makes nothing of

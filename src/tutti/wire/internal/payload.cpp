@@ -54,6 +54,8 @@ std::span<const Field> fields_of(MessageKind kind) {
       return kVerdict;
     case MessageKind::cloud:
       return kCloud;
+    default:
+      return {};
   }
   return {};
 }

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "tutti/wire/message_kind.hpp"
+
+namespace tutti::bus {
+
+/// What a port owes to a message, by its kind.
+enum class Delivery {
+  durable,   ///< Comes until it is acknowledged, also to a receiver that has started again. In any order, maybe twice.
+  retained,  ///< Only the newest value counts, and whoever comes later gets that at once. Needs no acknowledgement.
+  work_queue,  ///< As durable, to any one of the workers at a time.
+  best_effort  ///< Once at most, to who is there.
+};
+
+constexpr Delivery delivery_of(wire::MessageKind kind) {
+  switch (kind) {
+    case wire::MessageKind::proxy_graph:  // server -> one robot
+    case wire::MessageKind::receipt:      // server -> one robot
+      return Delivery::retained;
+    case wire::MessageKind::job:  // server -> any worker
+      return Delivery::work_queue;
+    case wire::MessageKind::status:  // robot, worker -> server
+      return Delivery::best_effort;
+    case wire::MessageKind::submap:    // robot -> server
+    case wire::MessageKind::verdicts:  // worker -> server
+    case wire::MessageKind::verdict:   // these three are stored, not sent
+    case wire::MessageKind::cloud:
+    case wire::MessageKind::agent_state:
+      return Delivery::durable;
+  }
+  return Delivery::durable;
+}
+
+}  // namespace tutti::bus

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/wire/message_kind.hpp"
+
+namespace tutti::bus {
+
+using wire::MessageKind;
+
+/// Who sends and receives: the server, a robot, or a worker, which verifies loop closures for the server.
+struct Endpoint {
+  enum class Role : std::uint8_t { server, robot, worker };
+  Role role = Role::server;
+  std::uint32_t number = 0;  ///< Of the robot or the worker.
+
+  static Endpoint server() { return {}; }
+  static Endpoint of(RobotId id) { return {Role::robot, id.value}; }
+  static Endpoint worker(std::uint32_t number) { return {Role::worker, number}; }
+  /// Whoever of the workers is free: only as a receiver.
+  static Endpoint any_worker() { return worker(std::numeric_limits<std::uint32_t>::max()); }
+
+  [[nodiscard]] std::optional<RobotId> robot() const {
+    return role == Role::robot ? std::optional(RobotId{number}) : std::nullopt;
+  }
+  friend auto operator<=>(const Endpoint&, const Endpoint&) = default;
+};
+
+/// A message on its way. Robots never write to robots.
+struct Envelope {
+  Endpoint from;
+  Endpoint to;
+  MessageKind kind = MessageKind::submap;
+  /// Of the content, the same whenever it is sent again: a port may store one message of a kind and id only. At most
+  /// 200 letters, digits and any of "./:-_". Empty where only the newest value counts.
+  std::string id;
+  std::shared_ptr<const std::string> bytes;  ///< Never null. Shared by all receivers of a broadcast.
+};
+
+}  // namespace tutti::bus
