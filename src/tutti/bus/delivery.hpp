@@ -8,7 +8,7 @@ namespace tutti::bus {
 /// What a port owes to a message, by its kind.
 enum class Delivery {
   durable,   ///< Comes until it is acknowledged, also to a receiver that has started again. In any order, maybe twice.
-  retained,  ///< Only the newest value counts, and whoever comes later gets that at once. Needs no acknowledgement.
+  retained,  ///< Only the newest value counts: it comes last, and at once to whoever comes later. Never acknowledged.
   work_queue,  ///< As durable, to any one of the workers at a time.
   best_effort  ///< Once at most, to who is there.
 };

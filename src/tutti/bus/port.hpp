@@ -16,7 +16,7 @@ struct Received {
 };
 
 /// One endpoint's way to the others: its only one, from when it starts until it ends. bus/delivery.hpp says what is
-/// owed to which kind of message. To be used by one thread. tests/support/bus/port_conformance.hpp holds every
+/// owed to which kind of message. To be used by one thread. port_conformance_test.cpp holds every
 /// implementation to this contract.
 class Port {
  public:

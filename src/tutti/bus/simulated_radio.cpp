@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/bus/in_process_bus.hpp"
+#include "tutti/bus/simulated_radio.hpp"
 
 #include <algorithm>
 #include <limits>
 
 #include "tutti/base/check.hpp"
+#include "tutti/bus/delivery.hpp"
 
 namespace tutti::bus {
 namespace {
 
-/// A proxy graph is worth sending only until there is a newer one.
-bool only_latest_counts(MessageKind kind) { return kind == MessageKind::proxy_graph; }
+/// Worth sending only until there is a newer one.
+bool only_latest_counts(MessageKind kind) { return delivery_of(kind) == Delivery::retained; }
 
 /// First time not before `t` with contact; the last timestamp: never.
 Timestamp in_contact(const LinkConfig& link, Timestamp start, Timestamp t) {
@@ -54,89 +55,68 @@ double wait_of_repetitions(const LinkConfig& link, Timestamp start, Timestamp t,
 
 }  // namespace
 
-InProcessBus::InProcessBus(Timestamp start, const LinkConfig& link, std::uint64_t seed)
+SimulatedRadio::SimulatedRadio(Timestamp start, const LinkConfig& link, std::uint64_t seed)
     : start_(start), now_(start), link_(link), rng_(seed) {}
 
-void InProcessBus::set_link(RobotId robot, const LinkConfig& link) {
+void SimulatedRadio::set_link(RobotId robot, const LinkConfig& link) {
   for (const auto& [ends, direction] : directions_)
-    TUTTI_CHECK(ends.first.robot != robot && ends.second.robot != robot, "robot {} has sent already", robot.value);
+    TUTTI_CHECK(ends.first.robot() != robot && ends.second.robot() != robot, "robot {} has sent already", robot.value);
   links_[robot] = link;
 }
 
-void InProcessBus::subscribe(Endpoint endpoint, MessageKind kind) { subscriptions_.insert({kind, endpoint}); }
-
-InProcessBus::Direction& InProcessBus::direction(Endpoint from, Endpoint to) {
+SimulatedRadio::Direction& SimulatedRadio::direction(Endpoint from, Endpoint to) {
   const auto found = directions_.find({from, to});
   if (found != directions_.end()) return found->second;
   Direction created{.free_at = start_, .last_arrival = start_};
-  const std::optional<RobotId> robot = from.robot ? from.robot : to.robot;
-  if (!robot) {
-    created.link.latency_s = 0.0;
-  } else {
-    const auto own = links_.find(*robot);
-    created.link = own == links_.end() ? link_ : own->second;
-  }
+  const auto own = links_.find(from.robot() ? *from.robot() : *to.robot());
+  created.link = own == links_.end() ? link_ : own->second;
   return directions_.emplace(std::pair{from, to}, std::move(created)).first->second;
 }
 
-TopicStatistics& InProcessBus::statistics_of(const Delivery& message) {
+TopicStatistics& SimulatedRadio::statistics_of(const Envelope& message) {
   return statistics_[{message.from, message.to, message.kind}];
 }
 
-void InProcessBus::publish(Timestamp now, Endpoint from, std::optional<Endpoint> to, MessageKind kind,
-                           std::string bytes) {
+void SimulatedRadio::send(Timestamp now, Envelope sent) {
   TUTTI_CHECK(now >= now_, "time goes back from {} to {} ns", now_.ns, now.ns);
-  TUTTI_CHECK(!from.robot || !to || !to->robot, "robot {} writes to robot {}", from.robot->value, to->robot->value);
+  const Endpoint server = Endpoint::server();
+  TUTTI_CHECK((sent.from == server && sent.to.robot()) || (sent.from.robot() && sent.to == server),
+              "the radio joins robots to the server");
+  TUTTI_CHECK(sent.bytes != nullptr, "a message without bytes");
   now_ = now;
   advance(now);
-  Delivery message{.sent = now, .from = from, .kind = kind};
-  message.bytes = std::make_shared<const std::string>(std::move(bytes));
-  if (to) {
-    message.to = *to;
-    enqueue(now, message);
-    return;
-  }
-  for (auto at = subscriptions_.lower_bound({kind, Endpoint{}}); at != subscriptions_.end() && at->first == kind;
-       ++at) {
-    if (at->second == from || (from.robot && at->second.robot)) continue;
-    message.to = at->second;
-    enqueue(now, message);
-  }
-}
-
-void InProcessBus::enqueue(Timestamp now, Delivery message) {
+  const Arrival message{std::move(sent), now, {}, next_number_++};
   TopicStatistics& statistics = statistics_of(message);
   ++statistics.published;
   statistics.published_bytes += message.bytes->size();
   statistics.largest_message = std::max<std::uint64_t>(statistics.largest_message, message.bytes->size());
   Direction& way = direction(message.from, message.to);
-  const MessageKind kind = message.kind;
-  if (only_latest_counts(kind))
-    statistics.superseded += std::erase_if(way.queue, [&](const Waiting& w) { return w.message.kind == kind; });
+  if (only_latest_counts(message.kind))
+    statistics.superseded += std::erase_if(way.queue, [&](const Waiting& w) { return w.message.kind == message.kind; });
   if (way.queue.size() >= static_cast<std::size_t>(way.link.queue_messages)) {
     ++statistics_of(way.queue.front().message).dropped;
     way.queue.pop_front();
   }
-  way.queue.push_back({next_number_++, std::move(message)});
+  way.queue.push_back({sent_[message.kind]++, message});
   advance(now);
 }
 
-Timestamp InProcessBus::transmission_start(const Direction& way) const {
+Timestamp SimulatedRadio::transmission_start(const Direction& way) const {
   return in_contact(way.link, start_, std::max(way.free_at, way.queue.front().message.sent));
 }
 
 /// Sends the front of the queue.
-void InProcessBus::transmit(Direction& way, Timestamp start) {
+void SimulatedRadio::transmit(Direction& way, Timestamp start) {
   const LinkConfig& link = way.link;
   const Waiting front = std::move(way.queue.front());
   way.queue.pop_front();
-  Delivery message = front.message;
+  Arrival message = front.message;
   TopicStatistics& statistics = statistics_of(message);
 
-  Rng rng = rng_.fork(front.number);
+  Rng rng = rng_.fork(static_cast<std::uint64_t>(message.kind)).fork(front.of_kind);
   int attempts = 1;
   bool arrives = !rng.bernoulli(link.loss);
-  while (!arrives && !only_latest_counts(message.kind)) {
+  while (!arrives && message.kind != MessageKind::proxy_graph) {
     ++attempts;
     arrives = !rng.bernoulli(link.loss);
   }
@@ -155,11 +135,11 @@ void InProcessBus::transmit(Direction& way, Timestamp start) {
     message.arrived = way.free_at + (retransmissions_s + link.latency_s + rng.uniform(0.0, 1.0) * link.jitter_s);
     if (link.in_order) message.arrived = std::max(message.arrived, way.last_arrival);
     way.last_arrival = std::max(way.last_arrival, message.arrived);
-    in_flight_.emplace(std::pair{message.arrived, front.number}, message);
+    in_flight_.emplace(std::pair{message.arrived, message.number}, message);
   }
 }
 
-void InProcessBus::advance(Timestamp now) {
+void SimulatedRadio::advance(Timestamp now) {
   for (auto& [ends, way] : directions_)
     while (!way.queue.empty()) {
       const Timestamp start = transmission_start(way);
@@ -168,11 +148,11 @@ void InProcessBus::advance(Timestamp now) {
     }
 }
 
-std::vector<Delivery> InProcessBus::deliver_until(Timestamp now) {
+std::vector<Arrival> SimulatedRadio::deliver_until(Timestamp now) {
   TUTTI_CHECK(now >= now_, "time goes back from {} to {} ns", now_.ns, now.ns);
   now_ = now;
   advance(now);
-  std::vector<Delivery> arrived;
+  std::vector<Arrival> arrived;
   const auto end = in_flight_.upper_bound({now, std::numeric_limits<std::uint64_t>::max()});
   for (auto at = in_flight_.begin(); at != end; ++at) {
     ++statistics_of(at->second).delivered;
@@ -182,7 +162,7 @@ std::vector<Delivery> InProcessBus::deliver_until(Timestamp now) {
   return arrived;
 }
 
-std::optional<Timestamp> InProcessBus::next_delivery() const {
+std::optional<Timestamp> SimulatedRadio::next_delivery() const {
   std::optional<Timestamp> next;
   const auto consider = [&](Timestamp t) {
     if (t < kLastTimestamp) next = next ? std::min(*next, t) : t;
@@ -193,9 +173,14 @@ std::optional<Timestamp> InProcessBus::next_delivery() const {
   return next;
 }
 
-std::map<InProcessBus::Topic, std::size_t> InProcessBus::undelivered() const {
+void SimulatedRadio::forget_waiting(Endpoint from) {
+  for (auto& [ends, way] : directions_)
+    if (ends.first == from) way.queue.clear();
+}
+
+std::map<SimulatedRadio::Topic, std::size_t> SimulatedRadio::undelivered() const {
   std::map<Topic, std::size_t> count;
-  const auto add = [&](const Delivery& message) { ++count[{message.from, message.to, message.kind}]; };
+  const auto add = [&](const Envelope& message) { ++count[{message.from, message.to, message.kind}]; };
   for (const auto& [arrival, message] : in_flight_) add(message);
   for (const auto& [ends, way] : directions_)
     for (const Waiting& waiting : way.queue) add(waiting.message);

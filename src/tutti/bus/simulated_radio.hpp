@@ -5,36 +5,23 @@
 #include <cstdint>
 #include <deque>
 #include <map>
-#include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "tutti/base/config.hpp"
-#include "tutti/base/ids.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/base/timestamp.hpp"
-#include "tutti/wire/message_kind.hpp"
+#include "tutti/bus/envelope.hpp"
 
 namespace tutti::bus {
-
-using wire::MessageKind;
-
-/// The server, or one robot.
-struct Endpoint {
-  std::optional<RobotId> robot;  ///< Nothing = the server.
-  static Endpoint server() { return {}; }
-  static Endpoint of(RobotId id) { return {id}; }
-  friend auto operator<=>(const Endpoint&, const Endpoint&) = default;
-};
 
 /// Longer than any radio takes; a robot that is away for longer has an outage.
 inline constexpr double kLongestLinkTime_s = 3600.0;
 
-/// Time without contact: [from_s, until_s) in seconds after the bus's start; infinity: for ever.
+/// Time without contact: [from_s, until_s) in seconds after the radio's start; infinity: for ever.
 struct Outage {
   double from_s = 0.0;
   double until_s = 0.0;
@@ -73,13 +60,11 @@ struct LinkConfig {
   }
 };
 
-struct Delivery {
+/// A message that has come.
+struct Arrival : Envelope {
   Timestamp sent;
   Timestamp arrived;
-  Endpoint from;
-  Endpoint to;
-  MessageKind kind = MessageKind::submap;
-  std::shared_ptr<const std::string> bytes;  ///< Shared by all receivers of a broadcast.
+  std::uint64_t number = 0;  ///< Of all messages, in the order of sending.
 };
 
 /// Of one (from, to, kind).
@@ -89,31 +74,28 @@ struct TopicStatistics {
   std::uint64_t lost = 0;               ///< Messages lost for good by the link.
   std::uint64_t superseded = 0;         ///< Waiting proxy graphs replaced by a newer one.
   std::uint64_t dropped = 0;            ///< Messages dropped because the queue was full.
-  std::uint64_t published_bytes = 0;    ///< Payload handed to the bus.
+  std::uint64_t published_bytes = 0;    ///< Payload handed to the radio.
   std::uint64_t transmitted_bytes = 0;  ///< Payload on the radio, repetitions counted.
-  std::uint64_t largest_message = 0;    ///< Bytes, of those handed to the bus.
+  std::uint64_t largest_message = 0;    ///< Bytes, of those handed to the radio.
   friend bool operator==(const TopicStatistics&, const TopicStatistics&) = default;
 };
 
-/// All messages of a mission in one process, in virtual time, without threads. Each robot has one link to the server;
-/// one end of every message is the server (server to server needs no link). What happens to a message is drawn from
-/// (seed, its number), so the same calls give the same deliveries. A message waits in the bounded queue of its
-/// direction until there is contact and bandwidth; its airtime passes with contact only, its latency always. Of the
-/// waiting proxy graphs only the newest is kept. A lost proxy graph is lost (a newer one follows); everything else is
-/// sent again, with contact, until it arrives.
-class InProcessBus {
+/// The radio between robots and server in virtual time, without threads. Each robot has one link to the server; one
+/// end of every message is the server. What happens to a message is drawn from (seed, its kind, its number), so the
+/// same calls give the same arrivals, whatever other kinds are sent beside it. A message waits in the bounded queue of
+/// its direction until there is contact and bandwidth; its airtime passes with contact only, its latency always. Of
+/// waiting messages that are retained (delivery.hpp) only the newest of a kind is kept. A lost proxy graph is lost (a
+/// newer one follows); everything else is sent again, with contact, until it arrives.
+class SimulatedRadio {
  public:
-  InProcessBus(Timestamp start, const LinkConfig& link, std::uint64_t seed);
+  SimulatedRadio(Timestamp start, const LinkConfig& link, std::uint64_t seed);
 
   /// For one robot instead of the common link; before its first message.
   void set_link(RobotId robot, const LinkConfig& link);
-  /// Broadcasts of this kind reach this endpoint from now on.
-  void subscribe(Endpoint endpoint, MessageKind kind);
-
-  /// `to`: one receiver, or nothing = every subscriber but the sender. `now` never goes back.
-  void publish(Timestamp now, Endpoint from, std::optional<Endpoint> to, MessageKind kind, std::string bytes);
+  /// `now` never goes back.
+  void send(Timestamp now, Envelope message);
   /// All messages that have arrived by `now`, in the order of arrival, each once (duplicates of the link: twice).
-  std::vector<Delivery> deliver_until(Timestamp now);
+  std::vector<Arrival> deliver_until(Timestamp now);
   /// Nothing arrives before this time, and nothing ever arrives when there is none. deliver_until() at this time may
   /// still return nothing: a message that only now leaves its queue arrives later.
   [[nodiscard]] std::optional<Timestamp> next_delivery() const;
@@ -121,12 +103,14 @@ class InProcessBus {
   using Topic = std::tuple<Endpoint, Endpoint, MessageKind>;  ///< (from, to, kind)
   /// How many messages wait or are under way.
   [[nodiscard]] std::map<Topic, std::size_t> undelivered() const;
+  /// What has not left this end yet is gone, as when its program ends.
+  void forget_waiting(Endpoint from);
   [[nodiscard]] const std::map<Topic, TopicStatistics>& statistics() const { return statistics_; }
 
  private:
   struct Waiting {
-    std::uint64_t number = 0;
-    Delivery message;
+    std::uint64_t of_kind = 0;  ///< Number among those of its kind.
+    Arrival message;
   };
   struct Direction {
     LinkConfig link;
@@ -135,22 +119,21 @@ class InProcessBus {
     Timestamp last_arrival;
   };
   Direction& direction(Endpoint from, Endpoint to);
-  void enqueue(Timestamp now, Delivery message);
   void transmit(Direction& direction, Timestamp start);
   void advance(Timestamp now);
   [[nodiscard]] Timestamp transmission_start(const Direction& direction) const;
-  TopicStatistics& statistics_of(const Delivery& message);
+  TopicStatistics& statistics_of(const Envelope& message);
 
   Timestamp start_;
   Timestamp now_;
   LinkConfig link_;
   Rng rng_;
   std::uint64_t next_number_ = 0;
+  std::map<MessageKind, std::uint64_t> sent_;  ///< How many.
   std::map<RobotId, LinkConfig> links_;
-  std::set<std::pair<MessageKind, Endpoint>> subscriptions_;
   std::map<std::pair<Endpoint, Endpoint>, Direction> directions_;
-  /// By arrival and number: of equal arrivals, what was published first.
-  std::multimap<std::pair<Timestamp, std::uint64_t>, Delivery> in_flight_;
+  /// By arrival and number: of equal arrivals, what was sent first.
+  std::multimap<std::pair<Timestamp, std::uint64_t>, Arrival> in_flight_;
   std::map<Topic, TopicStatistics> statistics_;
 };
 

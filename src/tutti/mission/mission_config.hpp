@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tutti/base/config.hpp"
-#include "tutti/bus/in_process_bus.hpp"
+#include "tutti/bus/simulated_radio.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/mission/spoiled_closures.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"

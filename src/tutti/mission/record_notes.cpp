@@ -76,10 +76,8 @@ std::vector<std::string> warnings_of(const MissionRecord& record) {
   return out;
 }
 
-void note_undelivered(const std::map<bus::InProcessBus::Topic, std::size_t>& undelivered, MissionRecord& record) {
-  const auto name = [&](const bus::Endpoint& end) {
-    return end.robot ? record.robots[end.robot->value].name : "server";
-  };
+void note_undelivered(const std::map<bus::SimulatedRadio::Topic, std::size_t>& undelivered, MissionRecord& record) {
+  const auto name = [&](const bus::Endpoint& end) { return end.robot() ? record.robots[end.number].name : "server"; };
   for (const auto& [topic, messages] : undelivered) {
     const auto& [from, to, kind] = topic;
     record.notes.push_back(fmt::format("{} to {}: {} x {} never delivered; the link would have taken more than a day",

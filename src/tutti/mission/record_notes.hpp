@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tutti/bus/in_process_bus.hpp"
+#include "tutti/bus/simulated_radio.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/server/map_estimate.hpp"
 
@@ -15,7 +15,7 @@
 namespace tutti::mission {
 
 /// Messages that the links still hold.
-void note_undelivered(const std::map<bus::InProcessBus::Topic, std::size_t>& undelivered, MissionRecord& record);
+void note_undelivered(const std::map<bus::SimulatedRadio::Topic, std::size_t>& undelivered, MissionRecord& record);
 /// Submaps that are not in the map, and closures that were not judged.
 void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record);
 

@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "tutti/base/config_io.hpp"
-#include "tutti/bus/in_process_bus.hpp"
+#include "tutti/bus/simulated_radio.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/disk_cloud_store.hpp"
 #include "tutti/mission/evaluate.hpp"
@@ -63,7 +63,7 @@ class MissionRun {
         finder_(make_closure_finder(config.closures, recordings_, options.seed)),
         clouds_(std::move(clouds)),
         server_(robot_ids(recordings_), finder_, clouds_, config.server, kEpoch),
-        bus_(kMissionStart, config.link, options.seed),
+        radio_(kMissionStart, config.link, options.seed),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                      : std::max(1U, std::thread::hardware_concurrency())),
         pace_(options.rate) {
@@ -72,12 +72,11 @@ class MissionRun {
       policies.insert(policies.begin(), config.agent.policy.name);
     for (const RobotLinkConfig& own : config.robot_links)
       for (const MissionRecording& recording : recordings_)
-        if (recording.recording.name == own.robot) bus_.set_link(recording.recording.robot, own.link);
+        if (recording.recording.name == own.robot) radio_.set_link(recording.recording.robot, own.link);
     const Rng rng(options.seed);
     for (const MissionRecording& recording : recordings_) {
       robots_.push_back(std::make_unique<RobotActor>(recording, config.agent, policies, config.association,
                                                      rng.fork("agent/" + recording.recording.name)));
-      bus_.subscribe(bus::Endpoint::of(recording.recording.robot), wire::MessageKind::proxy_graph);
       const Trajectory& odometry = recording.recording.odometry;
       duration_s_ = std::max(duration_s_, recording.start_s + (odometry.back().stamp - odometry.front().stamp));
     }
@@ -125,7 +124,7 @@ class MissionRun {
     return next > duration_s_ ? kNever : next;
   }
   [[nodiscard]] double next_delivery() const {
-    const auto next = bus_.next_delivery();
+    const auto next = radio_.next_delivery();
     return next ? *next - kMissionStart : kNever;
   }
 
@@ -153,17 +152,21 @@ class MissionRun {
         refusals_.push_back(ok.error().message);
         continue;
       }
-      bus_.publish(kMissionStart + time_s_, bus::Endpoint::of(robot.id()), bus::Endpoint::server(),
-                   wire::MessageKind::submap, wire::encode(message, {.voxel_m = config_.agent.submap.voxel_m}));
+      send(bus::Endpoint::of(robot.id()), bus::Endpoint::server(), wire::MessageKind::submap,
+           std::make_shared<const std::string>(wire::encode(message, {.voxel_m = config_.agent.submap.voxel_m})));
     }
   }
 
+  void send(bus::Endpoint from, bus::Endpoint to, wire::MessageKind kind, std::shared_ptr<const std::string> bytes) {
+    radio_.send(kMissionStart + time_s_, {from, to, kind, {}, std::move(bytes)});
+  }
+
   void deliver() {
-    for (const bus::Delivery& delivery : bus_.deliver_until(kMissionStart + time_s_)) {
-      if (delivery.kind == wire::MessageKind::submap)
-        receive_submap(*delivery.bytes);
-      else if (delivery.kind == wire::MessageKind::proxy_graph && delivery.to.robot)
-        receive_proxy_graph(*delivery.to.robot, *delivery.bytes);
+    for (const bus::Arrival& arrival : radio_.deliver_until(kMissionStart + time_s_)) {
+      if (arrival.kind == wire::MessageKind::submap)
+        receive_submap(*arrival.bytes);
+      else if (arrival.kind == wire::MessageKind::proxy_graph && arrival.to.robot())
+        receive_proxy_graph(*arrival.to.robot(), *arrival.bytes);
     }
   }
 
@@ -219,8 +222,9 @@ class MissionRun {
       timing_.server_optimisation_ms.push_back(watch.lap_ms());
       note_latencies(timing_.server_optimisation_ms.back());
       proxy_graph_ = message.graph;
-      bus_.publish(kMissionStart + time_s_, bus::Endpoint::server(), std::nullopt, wire::MessageKind::proxy_graph,
-                   wire::encode(message));
+      const auto bytes = std::make_shared<const std::string>(wire::encode(message));
+      for (const auto& robot : robots_)
+        send(bus::Endpoint::server(), bus::Endpoint::of(robot->id()), wire::MessageKind::proxy_graph, bytes);
       note_update();
       server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
     }
@@ -260,7 +264,7 @@ class MissionRun {
   std::shared_ptr<const server::ClosureFinder> finder_;
   std::shared_ptr<server::CloudStore> clouds_;
   server::MapServer server_;
-  bus::InProcessBus bus_;
+  bus::SimulatedRadio radio_;
   std::size_t threads_;
   Pace pace_;
   std::vector<std::unique_ptr<RobotActor>> robots_;  // by RobotId
@@ -282,10 +286,10 @@ class MissionRun {
 };
 
 void MissionRun::record_traffic(RobotRecord& robot) const {
-  for (const auto& [topic, statistics] : bus_.statistics()) {
+  for (const auto& [topic, statistics] : radio_.statistics()) {
     const auto& [from, to, kind] = topic;
-    const bool up = from.robot == robot.id;
-    if (!up && to.robot != robot.id) continue;
+    const bool up = from.robot() == robot.id;
+    if (!up && to.robot() != robot.id) continue;
     (up ? robot.bytes_up : robot.bytes_down) += statistics.published_bytes;
     (up ? robot.messages_up : robot.messages_down) += statistics.published;
     robot.traffic.push_back({.from = up ? robot.name : "server",
@@ -343,7 +347,7 @@ MissionRecord MissionRun::record() const {
         fmt::format("{} messages were refused, the first because: {}", refusals_.size(), refusals_.front()));
   record.robots.resize(robots_.size());
   evaluate_robots(outcomes, server_.map(), config_.association, record);
-  note_undelivered(bus_.undelivered(), record);
+  note_undelivered(radio_.undelivered(), record);
   note_what_the_map_lacks(server_.map(), record);
   evaluate_server(outcomes, server_, config_.association, record);
   record.server.proxy = proxy_graph_;

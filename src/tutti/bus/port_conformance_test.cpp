@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What every implementation of Port owes (port.hpp, delivery.hpp), for each of them.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/bus/port.hpp"
+#include "tutti/bus/simulated_network.hpp"
+
+namespace tutti::bus {
+namespace {
+
+/// A network of its own for one test.
+class PortNetwork {
+ public:
+  virtual ~PortNetwork() = default;
+  /// Destroying the port is what the end of a program is, killed or not.
+  virtual std::unique_ptr<Port> connect(Endpoint endpoint) = 0;
+  /// Long enough that whatever is to come has come.
+  virtual void settle() = 0;
+  /// Nothing gets from robots to the server or back until it is mended.
+  virtual void cut() = 0;
+  virtual void mend() = 0;
+};
+
+constexpr double kCutFrom_s = 1000.0, kCutUntil_s = 2000.0;
+
+class Simulated final : public PortNetwork {
+ public:
+  std::unique_ptr<Port> connect(Endpoint endpoint) override { return network_.connect(endpoint); }
+  void settle() override { advance(now_s_ + 10.0); }
+  void cut() override { advance(kCutFrom_s); }
+  void mend() override { advance(kCutUntil_s); }
+
+ private:
+  void advance(double now_s) {
+    now_s_ = now_s;
+    network_.advance(Timestamp{} + now_s_);
+  }
+  SimulatedNetwork network_{SimulatedRadio(Timestamp{}, {.jitter_s = 0.5, .outages = {{kCutFrom_s, kCutUntil_s}}}, 1),
+                            Timestamp{}};
+  double now_s_ = 0.0;
+};
+
+class PortConformance : public ::testing::TestWithParam<std::function<std::unique_ptr<PortNetwork>()>> {
+ protected:
+  using Messages = std::multiset<std::string>;
+
+  void send(Port& port, Endpoint from, Endpoint to, MessageKind kind, const std::string& id, const std::string& bytes) {
+    const Status sent = port.send({from, to, kind, id, std::make_shared<const std::string>(bytes)});
+    ASSERT_TRUE(sent.has_value()) << sent.error().message;
+  }
+  void send_submap(Port& robot, const std::string& id) {
+    send(robot, alpha, server, MessageKind::submap, id, "submap " + id);
+  }
+  void send_job(Port& port, const std::string& id) {
+    send(port, server, Endpoint::any_worker(), MessageKind::job, id, "job " + id);
+  }
+  std::vector<Received> receive(Port& port) {
+    network->settle();
+    return port.receive();
+  }
+  /// What has come by now, acknowledged if its id is not in `keep_back`.
+  Messages take(Port& port, const std::set<std::string>& keep_back = {}) {
+    Messages ids;
+    for (const Received& received : receive(port)) {
+      ids.insert(received.envelope.id);
+      if (!keep_back.contains(received.envelope.id)) port.acknowledge(received.ticket);
+    }
+    return ids;
+  }
+  /// The bytes of the newest message of this kind; empty if there is none.
+  std::string newest(Port& port, MessageKind kind) {
+    std::string bytes;
+    for (const Received& received : receive(port))
+      if (received.envelope.kind == kind) bytes = *received.envelope.bytes;
+    return bytes;
+  }
+
+  std::unique_ptr<PortNetwork> network = GetParam()();
+  Endpoint server = Endpoint::server(), alpha = Endpoint::of(RobotId{0}), bravo = Endpoint::of(RobotId{1});
+  Endpoint first = Endpoint::worker(0), second = Endpoint::worker(1);
+};
+
+TEST_P(PortConformance, AMessageArrivesAsItWasSent) {
+  const auto robot = network->connect(alpha), other = network->connect(bravo), hub = network->connect(server);
+  std::string bytes(1U << 20U, '\0');
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * 7);
+  send(*robot, alpha, server, MessageKind::submap, "0/1700000000/0", bytes);
+  send(*other, bravo, server, MessageKind::submap, "1/1700000000/0", "");
+  const auto received = receive(*hub);
+  ASSERT_EQ(received.size(), 2U);
+  const bool in_order = received[0].envelope.from == alpha;
+  const Envelope& large = received[in_order ? 0 : 1].envelope;
+  const Envelope& empty = received[in_order ? 1 : 0].envelope;
+  EXPECT_EQ(large.to, server);
+  EXPECT_EQ(large.kind, MessageKind::submap);
+  EXPECT_EQ(large.id, "0/1700000000/0");
+  EXPECT_TRUE(*large.bytes == bytes);
+  EXPECT_EQ(empty.from, bravo);
+  EXPECT_EQ(empty.id, "1/1700000000/0");
+  EXPECT_EQ(*empty.bytes, "");
+  EXPECT_NE(received[0].ticket, received[1].ticket);
+  EXPECT_TRUE(receive(*robot).empty());
+}
+
+TEST_P(PortConformance, DurableMessagesComeUntilTheyAreAcknowledged) {
+  const auto robot = network->connect(alpha), worker = network->connect(first);
+  auto hub = network->connect(server);
+  for (const char* id : {"a", "b"}) send_submap(*robot, id);
+  send(*worker, first, server, MessageKind::verdicts, "c", "verdicts");
+  EXPECT_EQ(take(*hub, {"b", "c"}), (Messages{"a", "b", "c"}));
+  hub.reset();
+  send_submap(*robot, "d");
+  network->settle();
+  hub = network->connect(server);
+  EXPECT_EQ(take(*hub, {"c"}), (Messages{"b", "c", "d"}));
+  hub.reset();
+  hub = network->connect(server);
+  EXPECT_EQ(take(*hub), (Messages{"c"}));
+  hub.reset();
+  hub = network->connect(server);
+  EXPECT_EQ(take(*hub), Messages{});
+}
+
+TEST_P(PortConformance, DurableMessagesWaitForAReceiverThatHasYetToStart) {
+  auto robot = network->connect(alpha);
+  send_submap(*robot, "a");
+  network->settle();
+  robot.reset();  // it has left: whoever sent it may go
+  const auto hub = network->connect(server);
+  EXPECT_EQ(take(*hub), (Messages{"a"}));
+}
+
+TEST_P(PortConformance, SentAgainItComesAtLeastOnceAndEndsWithItsAcknowledgements) {
+  auto robot = network->connect(alpha);
+  auto hub = network->connect(server);
+  for (int i = 0; i < 3; ++i) send_submap(*robot, "a");
+  const Messages heard = take(*hub);
+  EXPECT_GE(heard.size(), 1U);
+  EXPECT_EQ(heard.count("a"), heard.size());
+  hub.reset();
+  hub = network->connect(server);
+  EXPECT_EQ(take(*hub), Messages{});
+}
+
+TEST_P(PortConformance, OfRetainedMessagesTheNewestCountsAndALateReceiverGetsIt) {
+  const auto hub = network->connect(server);
+  auto robot = network->connect(alpha);
+  for (const char* graph : {"1", "2", "3"}) send(*hub, server, alpha, MessageKind::proxy_graph, "", graph);
+  send(*hub, server, alpha, MessageKind::receipt, "", "receipt");
+  EXPECT_EQ(newest(*robot, MessageKind::proxy_graph), "3");
+  EXPECT_TRUE(receive(*robot).empty());
+  robot.reset();
+  robot = network->connect(alpha);
+  std::map<MessageKind, std::string> values;
+  for (const Received& received : receive(*robot)) {
+    values[received.envelope.kind] = *received.envelope.bytes;
+    robot->acknowledge(received.ticket);
+  }
+  EXPECT_EQ(values,
+            (std::map<MessageKind, std::string>{{MessageKind::proxy_graph, "3"}, {MessageKind::receipt, "receipt"}}));
+  send(*hub, server, alpha, MessageKind::proxy_graph, "", "4");
+  EXPECT_EQ(newest(*robot, MessageKind::proxy_graph), "4");
+  robot.reset();
+  send(*hub, server, alpha, MessageKind::proxy_graph, "", "5");
+  network->settle();
+  robot = network->connect(alpha);
+  EXPECT_EQ(newest(*robot, MessageKind::proxy_graph), "5");
+}
+
+TEST_P(PortConformance, ARetainedMessageIsItsReceiversOwn) {
+  const auto hub = network->connect(server);
+  send(*hub, server, alpha, MessageKind::proxy_graph, "", "for alpha");
+  send(*hub, server, bravo, MessageKind::proxy_graph, "", "for bravo");
+  const auto a = network->connect(alpha), b = network->connect(bravo), c = network->connect(Endpoint::of(RobotId{2}));
+  EXPECT_EQ(newest(*a, MessageKind::proxy_graph), "for alpha");
+  EXPECT_EQ(newest(*b, MessageKind::proxy_graph), "for bravo");
+  EXPECT_TRUE(receive(*c).empty());
+}
+
+TEST_P(PortConformance, EveryJobIsDoneByOneOfTheWorkers) {
+  const auto hub = network->connect(server);
+  const auto one = network->connect(first), two = network->connect(second);
+  for (const char* id : {"a", "b", "c", "d", "e"}) send_job(*hub, id);
+  Messages done;
+  for (int round = 0; round < 5; ++round)
+    for (Port* worker : {one.get(), two.get()}) {
+      const Messages taken = take(*worker);
+      EXPECT_LE(taken.size(), 1U);
+      done.insert(taken.begin(), taken.end());
+    }
+  EXPECT_EQ(done, (Messages{"a", "b", "c", "d", "e"}));
+}
+
+TEST_P(PortConformance, AWorkerHasOneJobAtATimeAndLeavesItToOthersWhenItEnds) {
+  const auto hub = network->connect(server);
+  auto one = network->connect(first);
+  for (const char* id : {"a", "b"}) send_job(*hub, id);
+  const auto held = receive(*one);
+  ASSERT_EQ(held.size(), 1U);
+  EXPECT_EQ(held[0].envelope.kind, MessageKind::job);
+  one->still_busy(held[0].ticket);
+  EXPECT_TRUE(receive(*one).empty());
+  const auto two = network->connect(second);
+  Messages done = take(*two);
+  EXPECT_EQ(done.size(), 1U);
+  EXPECT_TRUE(receive(*two).empty());
+  one.reset();
+  done.merge(take(*two));
+  EXPECT_EQ(done, (Messages{"a", "b"}));
+}
+
+TEST_P(PortConformance, BestEffortIsHeardOnceByWhoIsThere) {
+  const auto robot = network->connect(alpha);
+  auto hub = network->connect(server);
+  network->settle();
+  send(*robot, alpha, server, MessageKind::status, "", "here");
+  EXPECT_EQ(newest(*hub, MessageKind::status), "here");
+  hub.reset();
+  send(*robot, alpha, server, MessageKind::status, "", "nobody listens");
+  network->settle();
+  hub = network->connect(server);
+  EXPECT_TRUE(receive(*hub).empty());
+}
+
+TEST_P(PortConformance, WithoutContactNothingWaitsAndNothingIsLost) {
+  const auto robot = network->connect(alpha), hub = network->connect(server);
+  network->settle();
+  network->cut();
+  const auto begin = std::chrono::steady_clock::now();
+  Messages sent;
+  for (int i = 0; i < 200; ++i) {
+    const std::string id = std::to_string(i);
+    if (robot->send({alpha, server, MessageKind::submap, id, std::make_shared<const std::string>(20'000, 'x')}))
+      sent.insert(id);
+    EXPECT_TRUE(robot->receive().empty());
+  }
+  send(*hub, server, alpha, MessageKind::proxy_graph, "", "graph");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+  EXPECT_FALSE(sent.empty());
+  network->mend();
+  Messages heard;
+  for (int round = 0; round < 50 && heard.size() < sent.size(); ++round) heard.merge(take(*hub));
+  EXPECT_EQ(std::set<std::string>(heard.begin(), heard.end()), std::set<std::string>(sent.begin(), sent.end()));
+  EXPECT_EQ(newest(*robot, MessageKind::proxy_graph), "graph");
+}
+
+INSTANTIATE_TEST_SUITE_P(Simulated, PortConformance, ::testing::Values([] { return std::make_unique<Simulated>(); }));
+
+}  // namespace
+}  // namespace tutti::bus
