@@ -20,43 +20,24 @@ AnsweredPairs::Place AnsweredPairs::place_of(const SubmapPair& pair) const {
 
 void AnsweredPairs::insert(const SubmapPair& pair) {
   const auto [later, earlier] = place_of(pair);
-  auto& stretches = answered_[later];
-  // The first that ends at this number or after it.
-  auto next = std::ranges::lower_bound(stretches, earlier, {}, &Stretch::end);
-  if (next == stretches.end() || earlier + 1 < next->begin) {
-    stretches.insert(next, {earlier, earlier + 1});
-    return;
-  }
-  next->begin = std::min(next->begin, earlier);
-  if (earlier < next->end) return;
-  ++next->end;
-  const auto after = std::next(next);
-  if (after == stretches.end() || next->end < after->begin) return;
-  next->end = after->end;
-  stretches.erase(after);
+  answered_[later].insert(earlier);
 }
 
 bool AnsweredPairs::contains(const SubmapPair& pair) const {
   if (!number_.contains(pair.first) || !number_.contains(pair.second)) return false;
   const auto [later, earlier] = place_of(pair);
-  const auto& stretches = answered_[later];
-  const auto next = std::ranges::upper_bound(stretches, earlier, {}, &Stretch::end);
-  return next != stretches.end() && next->begin <= earlier;
+  return answered_[later].contains(earlier);
 }
 
 void AnsweredPairs::forget_answers() {
-  for (auto& stretches : answered_) stretches.clear();
+  for (NumberSet& answered : answered_) answered.clear();
 }
 
-std::size_t AnsweredPairs::watermark(SubmapId id) const {
-  const auto& stretches = answered_[number_.at(id)];
-  return stretches.empty() || stretches.front().begin > 0 ? 0 : stretches.front().end;
-}
+std::size_t AnsweredPairs::watermark(SubmapId id) const { return answered_[number_.at(id)].watermark(); }
 
 std::size_t AnsweredPairs::stretches_beyond() const {
   std::size_t count = 0;
-  for (const auto& stretches : answered_)
-    count += stretches.size() - (!stretches.empty() && stretches.front().begin == 0 ? 1 : 0);
+  for (const NumberSet& answered : answered_) count += answered.stretches().size() - (answered.watermark() > 0 ? 1 : 0);
   return count;
 }
 

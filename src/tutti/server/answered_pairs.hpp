@@ -6,6 +6,7 @@
 #include <map>
 #include <vector>
 
+#include "tutti/base/number_set.hpp"
 #include "tutti/model/loop_closure.hpp"
 
 namespace tutti::server {
@@ -31,11 +32,6 @@ class AnsweredPairs {
   friend bool operator==(const AnsweredPairs&, const AnsweredPairs&) = default;
 
  private:
-  struct Stretch {  ///< Numbers begin ... end - 1.
-    std::uint32_t begin = 0;
-    std::uint32_t end = 0;
-    friend bool operator==(const Stretch&, const Stretch&) = default;
-  };
   struct Place {
     std::uint32_t later = 0;
     std::uint32_t earlier = 0;
@@ -43,8 +39,7 @@ class AnsweredPairs {
   [[nodiscard]] Place place_of(const SubmapPair& pair) const;
 
   std::map<SubmapId, std::uint32_t> number_;
-  /// By number: ascending, neither overlapping nor touching. One that begins at 0 ends at the watermark.
-  std::vector<std::vector<Stretch>> answered_;
+  std::vector<NumberSet> answered_;  ///< By number.
 };
 
 }  // namespace tutti::server
