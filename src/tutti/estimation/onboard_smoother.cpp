@@ -29,20 +29,23 @@ bool is_nearby(const PoseGraph& graph, const std::vector<Pose3>& poses) {
 }  // namespace
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, const Pose3& first)
-    : config_(config), state_{.first = first}, poses_{first} {}
+    : config_(config), state_{.first = first, .odometry = {}, .constraints = {}, .poses = {first}} {}
 
 OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherState state)
     : OnboardSmoother(config, state.first) {
   state_.odometry.reserve(state.odometry.size());
-  poses_.reserve(state.odometry.size() + 1);
+  state_.poses.reserve(state.odometry.size() + 1);
   for (const RelativePose& step : state.odometry) append(step);
   set_constraints(std::move(state.constraints));
+  if (state.poses.empty()) return;
+  TUTTI_CHECK(state.poses.size() == size(), "{} poses of {} nodes", state.poses.size(), size());
+  state_.poses = std::move(state.poses);
 }
 
 std::size_t OnboardSmoother::append(const RelativePose& odometry) {
   state_.odometry.push_back(odometry);
-  poses_.push_back(poses_.back() * odometry.T_a_b);
-  return poses_.size() - 1;
+  state_.poses.push_back(state_.poses.back() * odometry.T_a_b);
+  return state_.poses.size() - 1;
 }
 
 void OnboardSmoother::set_constraints(std::vector<ChainConstraint> constraints) {
@@ -54,8 +57,8 @@ void OnboardSmoother::set_constraints(std::vector<ChainConstraint> constraints) 
 
 void OnboardSmoother::set_first_pose(const Pose3& T_map_first) {
   const Pose3 motion = T_map_first * state_.first.inverse();
-  for (Pose3& pose : poses_) pose = motion * pose;
-  poses_.front() = state_.first = T_map_first;
+  for (Pose3& pose : state_.poses) pose = motion * pose;
+  state_.poses.front() = state_.first = T_map_first;
 }
 
 SmootherSummary OnboardSmoother::solve() {
@@ -73,7 +76,7 @@ SmootherSummary OnboardSmoother::solve() {
   const auto structure = internal::analyse_blocks(graph);
   internal::GraphEquations equations(graph, structure);
   std::vector<Pose3> reduced;
-  for (const std::size_t node : nodes) reduced.push_back(poses_[node]);
+  for (const std::size_t node : nodes) reduced.push_back(state_.poses[node]);
   const auto minimise = [&] {
     const SolverConfig solver{.max_iterations = config_.max_iterations,
                               .relative_cost_tolerance = config_.relative_cost_tolerance};
@@ -92,12 +95,12 @@ SmootherSummary OnboardSmoother::solve() {
   summary.final_cost = result.final_cost;
   if (!is_usable(summary.termination)) return summary;
 
-  internal::place(runs_, reduced, state_.odometry, poses_);
+  internal::place(runs_, reduced, state_.odometry, state_.poses);
   while (summary.polishing_steps < config_.polishing_steps &&
-         internal::polish(nodes, state_.odometry, graph, equations, poses_))
+         internal::polish(nodes, state_.odometry, graph, equations, state_.poses))
     ++summary.polishing_steps;
   for (std::size_t k = nodes.back(); k < state_.odometry.size(); ++k)
-    poses_[k + 1] = poses_[k] * state_.odometry[k].T_a_b;
+    state_.poses[k + 1] = state_.poses[k] * state_.odometry[k].T_a_b;
   return summary;
 }
 

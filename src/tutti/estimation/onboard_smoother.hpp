@@ -44,11 +44,14 @@ struct SmootherSummary {
   std::size_t compounded_steps = 0;  ///< Of odometry: those between nodes that the last solve did not have.
 };
 
-/// All that determines the estimate; enough to restore the smoother.
+/// All that a smoother knows but what it can compound again.
 struct SmootherState {
   Pose3 first;
   std::vector<RelativePose> odometry;
   std::vector<ChainConstraint> constraints;
+  /// T_map_body per node, one more than odometry steps, as the last solve left them: the next one starts there. Empty,
+  /// to restore a smoother from the rest: composed from odometry until solve().
+  std::vector<Pose3> poses;
   friend bool operator==(const SmootherState&, const SmootherState&) = default;
 };
 
@@ -60,8 +63,9 @@ struct SmootherState {
 /// when the full graph's cost does not rise. docs/math.md derives it.
 ///
 /// Constraints hold, whatever their residual (docs/math.md says why). A solve starts from the last one's poses and
-/// keeps the compounds of runs that stayed. The estimate is still a function of state(), to a tolerance: the same calls
-/// give the same bits; another history of calls, or a restored state, the same poses to 0.1 mm (docs/math.md).
+/// keeps the compounds of runs that stayed. The estimate is still a function of odometry and constraints, to a
+/// tolerance: the same calls give the same bits, also from a restored state; another history of calls, or a state
+/// without its poses, the same poses to 0.1 mm (docs/math.md).
 class OnboardSmoother {
  public:
   explicit OnboardSmoother(const OnboardSmootherConfig& config = {}, const Pose3& first = {});
@@ -71,7 +75,7 @@ class OnboardSmoother {
   /// Its covariance must be positive definite.
   std::size_t append(const RelativePose& odometry);
   /// Nodes: one more than odometry steps.
-  [[nodiscard]] std::size_t size() const { return poses_.size(); }
+  [[nodiscard]] std::size_t size() const { return state_.poses.size(); }
   /// The full current set, replacing the previous one; nodes must exist. from == to is ignored.
   void set_constraints(std::vector<ChainConstraint> constraints);
   /// Moves the fixed first pose; every pose follows rigidly.
@@ -79,14 +83,13 @@ class OnboardSmoother {
   /// On failure (singular, invalid_input) the poses stay as they were.
   SmootherSummary solve();
 
-  [[nodiscard]] const Pose3& pose(std::size_t node) const { return poses_[node]; }
-  [[nodiscard]] const std::vector<Pose3>& poses() const { return poses_; }  ///< T_map_body per node.
+  [[nodiscard]] const Pose3& pose(std::size_t node) const { return state_.poses[node]; }
+  [[nodiscard]] const std::vector<Pose3>& poses() const { return state_.poses; }  ///< T_map_body per node.
   [[nodiscard]] const SmootherState& state() const { return state_; }
 
  private:
   OnboardSmootherConfig config_;
   SmootherState state_;
-  std::vector<Pose3> poses_;
   std::vector<PoseGraphEdge> runs_;  ///< Compounded odometry between the reduced nodes of the last solve.
 };
 

@@ -38,9 +38,7 @@ RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentS
       policy_(known_policy(config.policy)),
       submaps_(chain_, config.submap, std::move(state.submaps)),
       smoother_(config.smoother, std::move(state.smoother)),
-      state_(std::move(state)) {
-  if (!smoother_.state().constraints.empty()) smoother_.solve();
-}
+      state_(std::move(state)) {}
 RobotAgent::~RobotAgent() = default;
 RobotAgent::RobotAgent(RobotAgent&&) noexcept = default;
 RobotAgent& RobotAgent::operator=(RobotAgent&&) noexcept = default;
