@@ -2,8 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "tutti/base/ids.hpp"
+#include "tutti/base/number_set.hpp"
+#include "tutti/model/loop_closure.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/submap.hpp"
 
@@ -26,6 +31,34 @@ struct SubmapMessage {  ///< robot -> server
 struct ProxyGraphMessage {  ///< server -> every robot
   MessageHeader header;
   ProxyGraph graph;
+};
+
+/// server -> one robot: which of its submaps are stored and need not be sent again.
+struct Receipt {
+  RobotId robot;
+  std::map<std::uint64_t, NumberSet> stored;  ///< Numbers of submaps, by session.
+
+  [[nodiscard]] bool contains(SubmapId id) const {
+    const auto session = stored.find(id.chain.session);
+    return id.chain.robot == robot && session != stored.end() && session->second.contains(id.index);
+  }
+  friend bool operator==(const Receipt&, const Receipt&) = default;
+};
+
+/// server -> one of the workers: pairs of submaps to be verified.
+struct Job {
+  std::string id;
+  std::vector<SubmapPair> pairs;
+  friend bool operator==(const Job&, const Job&) = default;
+};
+
+/// worker -> server: what became of a job's pairs.
+struct Verdicts {
+  std::string job;
+  std::vector<ClosureVerdict> verdicts;
+  std::vector<SubmapPair> failed;  ///< Without a verdict, as when a cloud could not be read.
+  std::string why;                 ///< The first of them failed.
+  friend bool operator==(const Verdicts&, const Verdicts&) = default;
 };
 
 }  // namespace tutti

@@ -48,6 +48,14 @@ Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
 std::string encode(const ClosureVerdict& verdict);
 Result<ClosureVerdict> decode_verdict(std::string_view bytes);
 
+/// Exact, with names of jobs of 1 to kMaxIdBytes plain letters.
+std::string encode(const Receipt& receipt);
+Result<Receipt> decode_receipt(std::string_view bytes);
+std::string encode(const Job& job);
+Result<Job> decode_job(std::string_view bytes);
+std::string encode(const Verdicts& verdicts);
+Result<Verdicts> decode_verdicts(std::string_view bytes);
+
 /// A cloud alone, with points within kMaxCloudRange_m; an empty one stays empty.
 std::string encode(const PointCloud& cloud, const CloudCodec& codec = {});
 Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes);
@@ -59,5 +67,8 @@ Status validate(const SubmapMessage& message);
 Status validate(const ProxyGraphMessage& message);
 Status validate(const ClosureVerdict& verdict);
 Status validate(const PointCloud& cloud);
+Status validate(const Receipt& receipt);
+Status validate(const Job& job);
+Status validate(const Verdicts& verdicts);
 
 }  // namespace tutti::wire

@@ -215,6 +215,32 @@ TEST(Logarithm, AtItsLimits) {
   }
 }
 
+RC_GTEST_PROP(JobCodec, ReceiptsJobsAndVerdictsComeBackExactly, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  const Receipt receipt = test::any_receipt(rng);
+  RC_ASSERT(decode_receipt(encode(receipt)).value() == receipt);
+  const Job job{"1/0/7", test::any_pairs(rng, rng.index(20))};
+  RC_ASSERT(decode_job(encode(job)).value() == job);
+  const Verdicts verdicts = test::any_verdicts(rng);
+  RC_ASSERT(decode_verdicts(encode(verdicts)).value() == verdicts);
+}
+
+TEST(JobCodec, WhatIsOutOfRangeIsRefused) {
+  Rng rng(1);
+  const auto pairs = test::any_pairs(rng, 1);
+  const std::vector<SubmapPair> turned = {{pairs[0].second, pairs[0].first}};
+  for (const Job& job : {Job{"", pairs}, Job{"a b", pairs}, Job{std::string(201, 'a'), pairs}, Job{"a", turned}})
+    EXPECT_FALSE(validate(job).has_value());
+  EXPECT_TRUE(validate(Job{std::string(200, 'a'), pairs}).has_value());
+  EXPECT_FALSE(validate(Verdicts{.job = "a", .verdicts = {}, .failed = turned, .why = {}}).has_value());
+  EXPECT_FALSE(validate(Verdicts{.job = "a", .verdicts = {}, .failed = {}, .why = std::string(1001, 'a')}).has_value());
+  Receipt receipt;
+  receipt.stored[0].insert(0xffffffffU);
+  EXPECT_TRUE(validate(receipt).has_value());
+  receipt.stored[0].insert(0x100000000U);
+  EXPECT_FALSE(validate(receipt).has_value());
+}
+
 RC_GTEST_PROP(VerdictCodec, IsExact, ()) {
   Rng rng = any_rng();
   const ClosureVerdict verdict = test::any_verdict(rng, *rc::gen::inRange<std::size_t>(0, 4));

@@ -15,7 +15,11 @@ namespace {
 
 constexpr std::string_view kMagic = "TU";
 constexpr std::size_t kHeaderBytes = 5;
-constexpr int kCompressionLevel = 9;
+/// A state is large and written often.
+constexpr int level_of(MessageKind kind) { return kind == MessageKind::agent_state ? 1 : 9; }
+constexpr std::size_t most_bytes(MessageKind kind) {
+  return kind == MessageKind::agent_state ? kMaxStateBytes : kMaxMessageBytes;
+}
 constexpr auto kLastKind = static_cast<unsigned>(MessageKind::agent_state);
 
 }  // namespace
@@ -93,7 +97,7 @@ Result<Header> read_header(std::string_view bytes) {
 }  // namespace
 
 std::string pack_frame(MessageKind kind, std::string_view payload) {
-  TUTTI_CHECK(payload.size() <= kMaxMessageBytes, "message of {} bytes", payload.size());
+  TUTTI_CHECK(payload.size() <= most_bytes(kind), "message of {} bytes", payload.size());
   std::string frame(kMagic);
   const unsigned version = versions(kind).current;
   frame.push_back(static_cast<char>(version & 0xffU));
@@ -102,7 +106,7 @@ std::string pack_frame(MessageKind kind, std::string_view payload) {
   frame.resize(kHeaderBytes + ZSTD_compressBound(payload.size()));
 
   const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kCompressionLevel);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level_of(kind));
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
   const std::size_t size = ZSTD_compress2(context.get(), frame.data() + kHeaderBytes, frame.size() - kHeaderBytes,
                                           payload.data(), payload.size());
@@ -121,8 +125,8 @@ Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame) {
   const unsigned long long size = ZSTD_getFrameContentSize(body.data(), body.size());
   if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN)
     return fail(ErrorCode::parse, "frame: not a zstd frame with a content size");
-  if (size > kMaxMessageBytes)
-    return fail(ErrorCode::invalid, "frame: claims {} bytes, at most {} are accepted", size, kMaxMessageBytes);
+  if (size > most_bytes(kind))
+    return fail(ErrorCode::invalid, "frame: claims {} bytes, at most {} are accepted", size, most_bytes(kind));
   const std::size_t compressed = ZSTD_findFrameCompressedSize(body.data(), body.size());
   if (ZSTD_isError(compressed) != 0U || compressed != body.size())
     return fail(ErrorCode::parse, "frame: truncated, or {} bytes are not one zstd frame", body.size());

@@ -12,7 +12,7 @@
 /// checksum, nothing after it.
 namespace tutti::wire {
 
-/// Of the kind's current version. `payload` is at most kMaxMessageBytes.
+/// Of the kind's current version. `payload` is at most kMaxMessageBytes, an agent's state kMaxStateBytes.
 std::string pack_frame(MessageKind kind, std::string_view payload);
 
 struct Unpacked {

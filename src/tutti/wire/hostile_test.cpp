@@ -15,12 +15,16 @@
 namespace tutti::wire {
 namespace {
 
-constexpr std::array kKinds = {MessageKind::submap, MessageKind::proxy_graph, MessageKind::verdict, MessageKind::cloud};
+constexpr std::array kKinds = {MessageKind::submap,  MessageKind::proxy_graph, MessageKind::verdict, MessageKind::cloud,
+                               MessageKind::receipt, MessageKind::job,         MessageKind::verdicts};
 
 std::string sample(MessageKind kind, Rng rng) {
   if (kind == MessageKind::submap) return encode(test::any_submap(rng, 6, 30));
   if (kind == MessageKind::proxy_graph) return encode(test::any_proxy_graph(rng, 2, 30, true));
   if (kind == MessageKind::cloud) return encode(*test::any_submap(rng, 1, 30).submap.cloud);
+  if (kind == MessageKind::receipt) return encode(test::any_receipt(rng));
+  if (kind == MessageKind::job) return encode(Job{"1/7", test::any_pairs(rng, 5)});
+  if (kind == MessageKind::verdicts) return encode(test::any_verdicts(rng));
   return encode(test::any_verdict(rng, 2));
 }
 
@@ -40,6 +44,9 @@ std::optional<Error> decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::submap) return outcome(decode_submap(bytes));
   if (kind == MessageKind::proxy_graph) return outcome(decode_proxy_graph(bytes));
   if (kind == MessageKind::verdict) return outcome(decode_verdict(bytes));
+  if (kind == MessageKind::receipt) return outcome(decode_receipt(bytes));
+  if (kind == MessageKind::job) return outcome(decode_job(bytes));
+  if (kind == MessageKind::verdicts) return outcome(decode_verdicts(bytes));
   const auto cloud = decode_cloud(bytes);
   return outcome(cloud ? Result<PointCloud>(**cloud) : tl::unexpected(cloud.error()));
 }

@@ -7,11 +7,16 @@
 namespace tutti::wire {
 
 inline constexpr std::size_t kMaxMessageBytes = 16U << 20U;  ///< Of the protobuf message, before compression.
+inline constexpr std::size_t kMaxStateBytes = 256U << 20U;   ///< Of an agent's state, which only its robot reads.
 inline constexpr std::size_t kMaxKeyframes = 10'000;         ///< Per submap.
 inline constexpr std::size_t kMaxCloudPoints = 1'000'000;
 inline constexpr std::size_t kMaxProxyNodes = 200'000;  ///< Also of eliminated ones.
 inline constexpr std::size_t kMaxProxyEdges = 1'000'000;
 inline constexpr std::size_t kMaxClosures = 1'000;  ///< Per verdict.
+inline constexpr std::size_t kMaxPairs = 10'000;    ///< Of submaps, per job.
+inline constexpr std::size_t kMaxIdBytes = 200;
+inline constexpr std::size_t kMaxReasonBytes = 1'000;
+inline constexpr std::size_t kMaxStretches = 100'000;  ///< Per receipt.
 
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.
 inline constexpr double kMaxVariance = 1e20;

@@ -8,6 +8,7 @@
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/payload.hpp"
+#include "tutti/wire/internal/verdict_message.hpp"
 
 namespace tutti::wire {
 namespace {
@@ -76,10 +77,7 @@ Result<std::optional<Refusal>> read_refusal(const v1::Verdict& in, unsigned vers
 
 }  // namespace
 
-std::string encode(const ClosureVerdict& verdict) {
-  const Status valid = validate(verdict);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
-  v1::Verdict out;
+void write(const ClosureVerdict& verdict, v1::Verdict& out) {
   out.set_first_robot(verdict.pair.first.chain.robot.value);
   out.set_first_index(verdict.pair.first.index);
   out.set_second_robot(verdict.pair.second.chain.robot.value);
@@ -94,13 +92,9 @@ std::string encode(const ClosureVerdict& verdict) {
     out.set_limit(verdict.refusal->limit);
   }
   out.set_finder_version(verdict.finder_version);
-  return pack_frame(MessageKind::verdict, out.SerializeAsString());
 }
 
-Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
-  const auto parsed = parse_frame<v1::Verdict>(MessageKind::verdict, bytes);
-  if (!parsed) return tl::unexpected(parsed.error());
-  const v1::Verdict& in = parsed->message;
+Result<ClosureVerdict> read_verdict(const v1::Verdict& in, std::uint16_t version) {
   ClosureVerdict verdict{.pair = {{{RobotId{in.first_robot()}, in.first_session()}, in.first_index()},
                                   {{RobotId{in.second_robot()}, in.second_session()}, in.second_index()}}};
   for (const v1::LoopClosure& closure : in.closure()) {
@@ -109,10 +103,26 @@ Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
     verdict.closures.push_back(*read_closure);
   }
   verdict.finder_version = in.finder_version();
-  const auto refusal = read_refusal(in, parsed->version);
+  const auto refusal = read_refusal(in, version);
   if (!refusal) return in_context("verdict", refusal.error());
   verdict.refusal = *refusal;
-  if (auto ok = validate(verdict); !ok) return tl::unexpected(ok.error());
+  return verdict;
+}
+
+std::string encode(const ClosureVerdict& verdict) {
+  const Status valid = validate(verdict);
+  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  v1::Verdict out;
+  write(verdict, out);
+  return pack_frame(MessageKind::verdict, out.SerializeAsString());
+}
+
+Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
+  const auto parsed = parse_frame<v1::Verdict>(MessageKind::verdict, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  auto verdict = read_verdict(parsed->message, parsed->version);
+  if (!verdict) return verdict;
+  if (auto ok = validate(*verdict); !ok) return tl::unexpected(ok.error());
   return verdict;
 }
 

@@ -150,4 +150,29 @@ inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
   return verdict;
 }
 
+inline std::vector<SubmapPair> any_pairs(Rng& rng, std::size_t count) {
+  std::vector<SubmapPair> pairs;
+  for (std::size_t i = 0; i < count; ++i) {
+    SubmapPair pair = any_verdict(rng, 1).pair;
+    pair.second.index = static_cast<std::uint32_t>(rng.index(1000));
+    pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+inline Receipt any_receipt(Rng& rng) {
+  Receipt receipt{.robot = RobotId{static_cast<std::uint32_t>(rng.index(5))}, .stored = {}};
+  for (std::uint64_t sessions = rng.index(4); sessions > 0; --sessions) {
+    NumberSet& numbers = receipt.stored[any_session(rng)];
+    for (int i = 0; i < 20; ++i) numbers.insert(rng.index(40));
+  }
+  return receipt;
+}
+
+inline Verdicts any_verdicts(Rng& rng) {
+  Verdicts out{.job = "12/0.3:4-5_6", .verdicts = {}, .failed = any_pairs(rng, rng.index(3)), .why = "\xff no cloud"};
+  for (std::size_t i = rng.index(5); i > 0; --i) out.verdicts.push_back(any_verdict(rng, rng.index(3)));
+  return out;
+}
+
 }  // namespace tutti::wire::test

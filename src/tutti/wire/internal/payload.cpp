@@ -26,7 +26,8 @@ struct Field {
   std::span<const Field> inside = {};  ///< Of a message.
 };
 
-using v1::Cloud, v1::ProxyGraph, v1::Submap, v1::Verdict;
+using v1::AgentState, v1::Cloud, v1::Job, v1::NumbersOfSession, v1::ProxyGraph, v1::Receipt, v1::SubmapPairs,
+    v1::Verdicts, v1::Submap, v1::Verdict;
 constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;
 
 constexpr std::array kCloud = {Field{Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
@@ -44,6 +45,19 @@ constexpr std::array kProxyGraph = {
     Field{ProxyGraph::kComponentFieldNumber, kMostChains, "components"}};
 constexpr std::array kVerdict = {Field{Verdict::kClosureFieldNumber, kMaxClosures, "closures", true}};
 
+constexpr std::array kNumbers = {Field{NumbersOfSession::kBoundFieldNumber, 2 * kMaxStretches, "bounds"}};
+constexpr std::array kReceipt = {Field{Receipt::kStoredFieldNumber, kMostChains, "sessions", true, kNumbers}};
+constexpr std::array kPairs = {Field{SubmapPairs::kFirstRobotFieldNumber, kMaxPairs, "pairs"},
+                               Field{SubmapPairs::kFirstSessionFieldNumber, kMaxPairs, "pairs"},
+                               Field{SubmapPairs::kFirstIndexFieldNumber, kMaxPairs, "pairs"},
+                               Field{SubmapPairs::kSecondRobotFieldNumber, kMaxPairs, "pairs"},
+                               Field{SubmapPairs::kSecondSessionFieldNumber, kMaxPairs, "pairs"},
+                               Field{SubmapPairs::kSecondIndexFieldNumber, kMaxPairs, "pairs"}};
+constexpr std::array kJob = {Field{Job::kPairsFieldNumber, 1, "lists of pairs", true, kPairs}};
+constexpr std::array kVerdicts = {Field{Verdicts::kVerdictFieldNumber, kMaxPairs, "verdicts", true, kVerdict},
+                                  Field{Verdicts::kFailedFieldNumber, 1, "lists of pairs", true, kPairs}};
+constexpr std::array kAgentState = {Field{AgentState::kIntegerFieldNumber, kMaxStateBytes / 32, "integers"}};
+
 std::span<const Field> fields_of(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
@@ -54,7 +68,15 @@ std::span<const Field> fields_of(MessageKind kind) {
       return kVerdict;
     case MessageKind::cloud:
       return kCloud;
-    default:
+    case MessageKind::agent_state:
+      return kAgentState;
+    case MessageKind::receipt:
+      return kReceipt;
+    case MessageKind::job:
+      return kJob;
+    case MessageKind::verdicts:
+      return kVerdicts;
+    case MessageKind::status:  // of no use yet
       return {};
   }
   return {};

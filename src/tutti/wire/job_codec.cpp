@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/base/check.hpp"
+#include "tutti/v1/messages.pb.h"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/payload.hpp"
+#include "tutti/wire/internal/verdict_message.hpp"
+#include "tutti/wire/limits.hpp"
+
+namespace tutti::wire {
+namespace {
+
+void write(const std::vector<SubmapPair>& pairs, v1::SubmapPairs& out) {
+  for (const auto& [first, second] : pairs) {
+    out.add_first_robot(first.chain.robot.value);
+    out.add_first_session(first.chain.session);
+    out.add_first_index(first.index);
+    out.add_second_robot(second.chain.robot.value);
+    out.add_second_session(second.chain.session);
+    out.add_second_index(second.index);
+  }
+}
+
+Result<std::vector<SubmapPair>> read(const v1::SubmapPairs& in) {
+  const int count = in.first_robot_size();
+  for (const int size : {in.first_session_size(), in.first_index_size(), in.second_robot_size(),
+                         in.second_session_size(), in.second_index_size()})
+    if (size != count) return fail(ErrorCode::parse, "pairs of submaps in columns of {} and {}", count, size);
+  std::vector<SubmapPair> pairs;
+  for (int i = 0; i < count; ++i)
+    pairs.push_back({{{RobotId{in.first_robot(i)}, in.first_session(i)}, in.first_index(i)},
+                     {{RobotId{in.second_robot(i)}, in.second_session(i)}, in.second_index(i)}});
+  return pairs;
+}
+
+Status check_pairs(const std::vector<SubmapPair>& pairs) {
+  if (pairs.size() > kMaxPairs)
+    return fail(ErrorCode::invalid, "{} pairs of submaps, at most {} are accepted", pairs.size(), kMaxPairs);
+  for (const auto& [first, second] : pairs)
+    if (!(first < second))
+      return fail(ErrorCode::invalid, "pair of submaps {} and {}, expected the first to be the smaller",
+                  to_string(first), to_string(second));
+  return {};
+}
+
+Status check_job_id(const std::string& id) {
+  const bool plain = std::ranges::all_of(id, [](unsigned char c) { return c > ' ' && c < 0x7f; });
+  if (!id.empty() && id.size() <= kMaxIdBytes && plain) return {};
+  return fail(ErrorCode::invalid, "the name of a job has {} letters, expected 1 to {} plain ones", id.size(),
+              kMaxIdBytes);
+}
+
+void expect_valid(const Status& valid) { TUTTI_CHECK(valid.has_value(), "{}", valid.error().message); }
+
+}  // namespace
+
+Status validate(const Receipt& receipt) {
+  std::size_t stretches = 0;
+  for (const auto& [session, numbers] : receipt.stored) {
+    stretches += numbers.stretches().size();
+    if (!numbers.stretches().empty() && numbers.stretches().back().end > std::uint64_t{1} << 32U)
+      return fail(ErrorCode::invalid, "receipt: a submap with a number of more than 32 bits");
+  }
+  if (receipt.stored.size() <= ProxyGraph::kMostChains && stretches <= kMaxStretches) return {};
+  return fail(ErrorCode::invalid, "receipt: {} sessions and {} stretches, at most {} and {} are accepted",
+              receipt.stored.size(), stretches, ProxyGraph::kMostChains, kMaxStretches);
+}
+
+Status validate(const Job& job) {
+  if (auto ok = check_job_id(job.id); !ok) return in_context("job", ok.error());
+  if (auto ok = check_pairs(job.pairs); !ok) return in_context("job", ok.error());
+  return {};
+}
+
+Status validate(const Verdicts& verdicts) {
+  if (auto ok = check_job_id(verdicts.job); !ok) return in_context("verdicts", ok.error());
+  if (auto ok = check_pairs(verdicts.failed); !ok) return in_context("verdicts", ok.error());
+  if (verdicts.verdicts.size() > kMaxPairs || verdicts.why.size() > kMaxReasonBytes)
+    return fail(ErrorCode::invalid, "verdicts: {} on pairs, with a reason of {} bytes, at most {} and {} are accepted",
+                verdicts.verdicts.size(), verdicts.why.size(), kMaxPairs, kMaxReasonBytes);
+  for (const ClosureVerdict& verdict : verdicts.verdicts)
+    if (auto ok = validate(verdict); !ok) return ok;
+  return {};
+}
+
+std::string encode(const Receipt& receipt) {
+  expect_valid(validate(receipt));
+  v1::Receipt out;
+  out.set_robot(receipt.robot.value);
+  for (const auto& [session, numbers] : receipt.stored) {
+    v1::NumbersOfSession& stored = *out.add_stored();
+    stored.set_session(session);
+    std::uint64_t last = 0;
+    for (const auto& [begin, end] : numbers.stretches()) {
+      stored.add_bound(begin - last);
+      stored.add_bound(end - begin);
+      last = end;
+    }
+  }
+  return pack_frame(MessageKind::receipt, out.SerializeAsString());
+}
+
+Result<Receipt> decode_receipt(std::string_view bytes) {
+  const auto parsed = parse_frame<v1::Receipt>(MessageKind::receipt, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  Receipt receipt{.robot = RobotId{parsed->message.robot()}, .stored = {}};
+  for (const v1::NumbersOfSession& stored : parsed->message.stored()) {
+    const auto [numbers, is_new] = receipt.stored.try_emplace(stored.session());
+    if (!is_new) return fail(ErrorCode::invalid, "receipt: session {} twice", stored.session());
+    std::uint64_t last = 0;
+    for (int i = 0; i + 1 < stored.bound_size(); i += 2) {
+      const std::uint64_t begin = last + stored.bound(i);
+      last = begin + stored.bound(i + 1);
+      if (!numbers->second.append({begin, last})) return fail(ErrorCode::invalid, "receipt: stretches that touch");
+    }
+  }
+  if (auto ok = validate(receipt); !ok) return tl::unexpected(ok.error());
+  return receipt;
+}
+
+std::string encode(const Job& job) {
+  expect_valid(validate(job));
+  v1::Job out;
+  out.set_id(job.id);
+  write(job.pairs, *out.mutable_pairs());
+  return pack_frame(MessageKind::job, out.SerializeAsString());
+}
+
+Result<Job> decode_job(std::string_view bytes) {
+  const auto parsed = parse_frame<v1::Job>(MessageKind::job, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  auto pairs = read(parsed->message.pairs());
+  if (!pairs) return in_context("job", pairs.error());
+  Job job{.id = parsed->message.id(), .pairs = std::move(*pairs)};
+  if (auto ok = validate(job); !ok) return tl::unexpected(ok.error());
+  return job;
+}
+
+std::string encode(const Verdicts& verdicts) {
+  expect_valid(validate(verdicts));
+  v1::Verdicts out;
+  out.set_job(verdicts.job);
+  for (const ClosureVerdict& verdict : verdicts.verdicts) write(verdict, *out.add_verdict());
+  write(verdicts.failed, *out.mutable_failed());
+  out.set_why(verdicts.why);
+  return pack_frame(MessageKind::verdicts, out.SerializeAsString());
+}
+
+Result<Verdicts> decode_verdicts(std::string_view bytes) {
+  const auto parsed = parse_frame<v1::Verdicts>(MessageKind::verdicts, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  auto failed = read(parsed->message.failed());
+  if (!failed) return in_context("verdicts", failed.error());
+  Verdicts verdicts{
+      .job = parsed->message.job(), .verdicts = {}, .failed = std::move(*failed), .why = parsed->message.why()};
+  for (const v1::Verdict& in : parsed->message.verdict()) {
+    auto verdict = read_verdict(in, versions(MessageKind::verdict).current);
+    if (!verdict) return tl::unexpected(verdict.error());
+    verdicts.verdicts.push_back(std::move(*verdict));
+  }
+  if (auto ok = validate(verdicts); !ok) return tl::unexpected(ok.error());
+  return verdicts;
+}
+
+}  // namespace tutti::wire
