@@ -100,7 +100,7 @@ std::vector<consistency::RobotNode> RobotAgent::nodes() const {
 UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget,
                                   const StageObserver& stage_ended) {
   UpdateSummary summary{.revision = message.graph.revision, .constraints = state_.ledger.size()};
-  if (message.graph.age() <= std::pair(state_.epoch, state_.revision)) return summary;  // late or repeated
+  if (!is_news(message.graph)) return summary;  // late or repeated
   std::tie(state_.epoch, state_.revision) = message.graph.age();
   const auto ended = [&](UpdateStage stage) {
     if (stage_ended) stage_ended(stage);

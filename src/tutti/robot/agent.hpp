@@ -117,6 +117,11 @@ class RobotAgent {
   UpdateSummary receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget = std::nullopt,
                         const StageObserver& stage_ended = {});
 
+  /// Newer than any that was received; another one changes nothing.
+  [[nodiscard]] bool is_news(const ProxyGraph& graph) const {
+    return graph.age() > std::pair(state_.epoch, state_.revision);
+  }
+
   [[nodiscard]] AgentState state() const;
   [[nodiscard]] RobotId robot() const { return chain_.robot; }
   [[nodiscard]] const ChainId& chain() const { return chain_; }

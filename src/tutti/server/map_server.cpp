@@ -285,9 +285,13 @@ RefusalCounts MapServer::refusals() const {
 }
 
 ProxyGraphMessage MapServer::optimise() {
+  ++state_.revision;
+  return rebuild();
+}
+
+ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
   map_ = estimate_map(state_.submaps, state_.verdicts, config_.map);
-  ++state_.revision;
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
                             .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};
   message.graph.epoch = state_.epoch;

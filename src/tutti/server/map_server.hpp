@@ -93,6 +93,8 @@ class MapServer {
   [[nodiscard]] bool has_news() const { return news_; }
   /// Optimises the joint map and returns the proxy graph to broadcast.
   ProxyGraphMessage optimise();
+  /// The last revision's again: for a server that goes on from a state in which nothing has come since.
+  ProxyGraphMessage rebuild();
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
   [[nodiscard]] const MapServerState& state() const { return state_; }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <variant>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/base/timestamp.hpp"
+#include "tutti/bus/envelope.hpp"
+#include "tutti/model/loop_closure.hpp"
+#include "tutti/robot/agent.hpp"
+
+/// What has happened at a node, for whoever keeps a record. How long it took is not in it: that is the host's to
+/// measure, and the same inputs give the same events.
+namespace tutti::node {
+
+struct SubmapStored {  ///< By the server, for the first time.
+  SubmapId id;
+};
+struct VerdictsTaken {  ///< By the server; of those refused there are MessageRefused beside.
+  std::string job;
+  std::size_t pairs = 0;
+};
+struct VerificationFailed {  ///< The pair is asked again, with the next submap.
+  SubmapPair pair;
+  std::string why;
+};
+struct MapUpdated {
+  std::uint64_t revision = 0;
+  std::size_t submaps = 0;
+  std::size_t accepted = 0;  ///< Closures.
+};
+struct RobotUpdated {
+  RobotId robot;
+  robot::UpdateSummary summary;
+};
+struct MessageRefused {  ///< It was no good, or what was to be sent was not.
+  bus::Endpoint from;
+  bus::MessageKind kind = bus::MessageKind::submap;
+  std::string why;
+};
+struct SampleRefused {
+  RobotId robot;
+  std::string why;
+};
+struct ScanRefused {
+  RobotId robot;
+  std::string why;
+};
+
+struct Event {
+  Timestamp time;
+  std::variant<SubmapStored, VerdictsTaken, VerificationFailed, MapUpdated, RobotUpdated, MessageRefused, SampleRefused,
+               ScanRefused>
+      what;
+};
+
+}  // namespace tutti::node

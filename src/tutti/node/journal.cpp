@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/journal.hpp"
+
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace tutti::node {
+namespace {
+
+constexpr std::uint64_t kNoBudget = std::numeric_limits<std::uint64_t>::max();
+
+template <class T>
+void put(std::string& out, const T& value) {
+  static_assert(std::is_arithmetic_v<T>);
+  out.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+template <class T>
+void put_all(std::string& out, const T* values, std::size_t count) {
+  out.append(reinterpret_cast<const char*>(values), count * sizeof(T));
+}
+
+/// Takes values from the front; after the end of the bytes, zeros.
+class Bytes {
+ public:
+  explicit Bytes(std::string_view left) : left_(left) {}
+  template <class T>
+  void take_all(T* values, std::size_t count) {
+    static_assert(std::is_arithmetic_v<T>);
+    if (count > left_.size() / sizeof(T)) {
+      short_ = true;
+      return;
+    }
+    std::memcpy(values, left_.data(), count * sizeof(T));
+    left_.remove_prefix(count * sizeof(T));
+  }
+  template <class T>
+  T take() {
+    T value{};
+    take_all(&value, 1);
+    return value;
+  }
+  /// As many as there can be, if `count` are announced.
+  template <class T>
+  std::vector<T> take_list(std::uint64_t count) {
+    std::vector<T> list(count > left_.size() / sizeof(T) ? 0 : static_cast<std::size_t>(count));
+    short_ = short_ || list.size() != count;
+    take_all(list.data(), list.size());
+    return list;
+  }
+  std::string take_rest() { return std::string(std::exchange(left_, {})); }
+  [[nodiscard]] bool is_done() const { return !short_ && left_.empty(); }
+
+ private:
+  std::string_view left_;
+  bool short_ = false;
+};
+
+void write(const OdometrySample& sample, std::string& out) {
+  put(out, sample.stamp.ns);
+  put_all(out, sample.T_odom_body.rotation.coeffs().data(), 4);
+  put_all(out, sample.T_odom_body.translation.data(), 3);
+  put_all(out, sample.increment_covariance.data(), 36);
+}
+void read(Bytes& in, OdometrySample& sample) {
+  sample.stamp.ns = in.take<std::int64_t>();
+  in.take_all(sample.T_odom_body.rotation.coeffs().data(), 4);
+  in.take_all(sample.T_odom_body.translation.data(), 3);
+  in.take_all(sample.increment_covariance.data(), 36);
+}
+
+void write(const Scan& scan, std::string& out) {
+  put(out, scan.stamp.ns);
+  put(out, std::uint64_t{scan.cloud->points.size()});
+  for (const Eigen::Vector3f& point : scan.cloud->points) put_all(out, point.data(), 3);
+  put(out, scan.age_s ? scan.age_s->size() : kNoBudget);
+  if (scan.age_s) put_all(out, scan.age_s->data(), scan.age_s->size());
+}
+void read(Bytes& in, Scan& scan) {
+  scan.stamp.ns = in.take<std::int64_t>();
+  const auto points = in.take<std::uint64_t>();
+  const auto numbers = in.take_list<float>(points > kNoBudget / 3 ? kNoBudget : 3 * points);
+  PointCloud cloud;
+  for (std::size_t i = 0; i + 2 < numbers.size(); i += 3)
+    cloud.points.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+  scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+  if (const auto ages = in.take<std::uint64_t>(); ages != kNoBudget)
+    scan.age_s = std::make_shared<const std::vector<float>>(in.take_list<float>(ages));
+}
+
+void write(const HeardGraph& graph, std::string& out) {
+  put(out, graph.budget ? std::uint64_t{*graph.budget} : kNoBudget);
+  out += graph.frame;
+}
+void read(Bytes& in, HeardGraph& graph) {
+  if (const auto budget = in.take<std::uint64_t>(); budget != kNoBudget) graph.budget = budget;
+  graph.frame = in.take_rest();
+}
+
+template <class Entry>
+Result<JournalEntry> read_entry(Bytes in) {
+  Entry entry;
+  read(in, entry);
+  if (!in.is_done()) return fail(ErrorCode::parse, "journal: an entry is not as long as it says");
+  return JournalEntry(std::move(entry));
+}
+
+}  // namespace
+
+std::string encode(const JournalEntry& entry) {
+  std::string out(1, static_cast<char>(entry.index()));
+  std::visit([&](const auto& what) { write(what, out); }, entry);
+  return out;
+}
+
+Result<JournalEntry> decode_entry(std::string_view bytes) {
+  if (bytes.empty()) return fail(ErrorCode::parse, "journal: an entry without bytes");
+  const Bytes rest(bytes.substr(1));
+  switch (bytes.front()) {
+    case 0:
+      return read_entry<OdometrySample>(rest);
+    case 1:
+      return read_entry<Scan>(rest);
+    case 2:
+      return read_entry<HeardGraph>(rest);
+    default:
+      return fail(ErrorCode::parse, "journal: an entry of unknown kind {}", static_cast<int>(bytes.front()));
+  }
+}
+
+}  // namespace tutti::node

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/journal.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+
+namespace tutti::node {
+namespace {
+
+JournalEntry any_entry(Rng& rng) {
+  if (rng.bernoulli(0.3))
+    return HeardGraph{"a frame\0of bytes", rng.bernoulli(0.5) ? std::optional(7UL) : std::nullopt};
+  if (rng.bernoulli(0.5)) {
+    OdometrySample sample{.stamp = {static_cast<std::int64_t>(rng.index(1'000'000))}};
+    for (double& x : sample.T_odom_body.rotation.coeffs()) x = rng.normal();
+    for (double& x : sample.T_odom_body.translation) x = rng.normal();
+    for (double& x : sample.increment_covariance.reshaped()) x = rng.normal();
+    return sample;
+  }
+  PointCloud cloud;
+  for (std::size_t i = rng.index(20); i > 0; --i) cloud.points.emplace_back(rng.normal(), rng.normal(), rng.normal());
+  Scan scan{{-5}, std::make_shared<const PointCloud>(cloud), {}};
+  if (rng.bernoulli(0.5)) scan.age_s = std::make_shared<const std::vector<float>>(cloud.points.size(), 0.1F);
+  return scan;
+}
+
+RC_GTEST_PROP(Journal, EntriesComeBackToTheBitAndPartsOfThemDoNot, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  const JournalEntry entry = any_entry(rng);
+  const std::string bytes = encode(entry);
+  const auto back = decode_entry(bytes);
+  RC_ASSERT(back.has_value());
+  RC_ASSERT(encode(*back) == bytes);
+  RC_ASSERT(back->index() == entry.index());
+  const bool has_any_end = std::holds_alternative<HeardGraph>(entry);
+  for (std::size_t size = 0; size < (has_any_end ? 9 : bytes.size()); ++size)
+    RC_ASSERT(!decode_entry(bytes.substr(0, size)).has_value());
+  std::string bad = bytes;
+  for (int edits = 0; edits < 3; ++edits) bad[rng.index(bad.size())] = static_cast<char>(rng.index(256));
+  if (const auto other = decode_entry(bad)) RC_ASSERT(encode(*other) == bad);
+}
+
+}  // namespace
+}  // namespace tutti::node

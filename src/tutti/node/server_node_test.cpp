@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/server_node.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "support/node/submaps.hpp"
+#include "tutti/node/worker_node.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::node {
+namespace {
+
+using bus::Endpoint, bus::MessageKind;
+const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
+
+/// A server on a store, whose steps are committed, and a worker beside it.
+class ServerNodeTest : public testing::Test {
+ protected:
+  ServerNodeTest() { restart(); }
+  /// From the bytes of its store.
+  void restart() {
+    store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
+                                                    store_ ? store_->tables() : storage::MemoryStore::Tables{});
+    node_ =
+        ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {.pairs_per_job = 2}, 1000 + ++starts_, *store_).value();
+    resumed_ = done(node_->resume(now_));
+  }
+  Step done(Step step) {
+    EXPECT_TRUE(store_->commit(step.writes).has_value());
+    return step;
+  }
+  Step receive(const bus::Envelope& envelope) { return done(node_->receive(envelope, now_)); }
+  Step receive(const SubmapMessage& message) { return receive(test::envelope(message)); }
+  static std::vector<bus::Envelope> of_kind(const Step& step, MessageKind kind) {
+    std::vector<bus::Envelope> out;
+    std::ranges::copy_if(step.messages, std::back_inserter(out), [&](const auto& m) { return m.kind == kind; });
+    return out;
+  }
+  static std::set<SubmapPair> pairs_of(const Step& step) {
+    std::set<SubmapPair> pairs;
+    for (const auto& job : of_kind(step, MessageKind::job)) {
+      const Job decoded = wire::decode_job(*job.bytes).value();
+      EXPECT_LE(decoded.pairs.size(), 2U);
+      EXPECT_EQ(decoded.id, job.id);
+      pairs.insert(decoded.pairs.begin(), decoded.pairs.end());
+    }
+    return pairs;
+  }
+  template <class What>
+  static std::size_t told(const Step& step) {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(step.events, [](const Event& e) { return std::holds_alternative<What>(e.what); }));
+  }
+  /// Everything that a step asks workers for is answered.
+  void answer(const Step& step) {
+    WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+    for (const auto& job : of_kind(step, MessageKind::job))
+      for (const auto& verdicts : worker.receive(job, now_).messages)
+        EXPECT_EQ(told<VerdictsTaken>(receive(verdicts)), 1U);
+  }
+  void fill() {
+    for (std::uint32_t i = 0; i < 4; ++i)
+      for (const ChainId& chain : {kAlpha, kBravo}) answer(receive(test::submap(chain, i)));
+  }
+
+  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
+  std::unique_ptr<storage::MemoryStore> store_;
+  std::unique_ptr<ServerNode> node_;
+  Step resumed_;
+  std::uint64_t starts_ = 0;
+  Timestamp now_ = Timestamp{} + 3.0;
+};
+
+TEST_F(ServerNodeTest, SaysWhatItHasStoredAndAsksForTheNewPairs) {
+  EXPECT_TRUE(resumed_.messages.empty());
+  receive(test::submap(kAlpha, 0));
+  receive(test::submap(kBravo, 0));
+  const Step step = receive(test::submap(kAlpha, 2));
+  EXPECT_EQ(told<SubmapStored>(step), 1U);
+  EXPECT_EQ(store_->tables().at("submaps").size(), 3U);
+  const auto receipts = of_kind(step, MessageKind::receipt);
+  ASSERT_EQ(receipts.size(), 1U);
+  EXPECT_EQ(receipts[0].to, Endpoint::of(RobotId{0}));
+  const Receipt receipt = wire::decode_receipt(*receipts[0].bytes).value();
+  for (std::uint32_t i = 0; i < 4; ++i) EXPECT_EQ(receipt.contains({kAlpha, i}), i % 2 == 0);
+  EXPECT_FALSE(receipt.contains({kBravo, 0}));
+  EXPECT_EQ(pairs_of(step), (std::set<SubmapPair>{{{kAlpha, 0}, {kAlpha, 2}}, {{kAlpha, 2}, {kBravo, 0}}}));
+  EXPECT_EQ(of_kind(step, MessageKind::job).size(), 1U);  // the new submap against both
+  EXPECT_EQ(*store_->read("submaps", key_of(SubmapId{kAlpha, 2})).value(), wire::encode(test::submap(kAlpha, 2)));
+}
+
+TEST_F(ServerNodeTest, ASubmapThatComesAgainIsOnlyConfirmed) {
+  receive(test::submap(kAlpha, 0));
+  const auto before = store_->tables();
+  const Step step = receive(test::submap(kAlpha, 0));
+  EXPECT_EQ(store_->tables(), before);
+  EXPECT_EQ(of_kind(step, MessageKind::receipt).size(), 1U);
+  EXPECT_EQ(step.messages.size(), 1U);
+  EXPECT_TRUE(step.events.empty());
+}
+
+TEST_F(ServerNodeTest, RefusesWhatIsNoGoodAndStoresNothingOfIt) {
+  const auto before = store_->tables();
+  bus::Envelope forged = test::envelope(test::submap(kAlpha, 0));
+  forged.from = Endpoint::of(RobotId{1});
+  bus::Envelope stranger = test::envelope(test::submap({RobotId{9}, 7}, 0));
+  bus::Envelope garbage = test::envelope(test::submap(kAlpha, 0));
+  garbage.bytes = std::make_shared<const std::string>("TU garbage");
+  bus::Envelope other = garbage;
+  other.kind = MessageKind::verdicts;
+  bus::Envelope misplaced = forged;
+  misplaced.kind = MessageKind::proxy_graph;
+  for (const bus::Envelope& bad : {forged, stranger, garbage, other, misplaced}) {
+    const Step step = receive(bad);
+    EXPECT_EQ(told<MessageRefused>(step), 1U);
+    EXPECT_TRUE(step.messages.empty());
+  }
+  EXPECT_EQ(store_->tables(), before);
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+}
+
+TEST_F(ServerNodeTest, UpdatesTheMapOnTimeAndOnlyWithNews) {
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+  now_ = Timestamp{} + 13.0;
+  receive(test::submap(kAlpha, 0));
+  ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);  // multiples of the period
+  EXPECT_TRUE(done(node_->on_timer(now_)).messages.empty());
+  now_ = Timestamp{} + 20.0;
+  const Step step = done(node_->on_timer(now_));
+  const auto graphs = of_kind(step, MessageKind::proxy_graph);
+  ASSERT_EQ(graphs.size(), 2U);
+  EXPECT_EQ(wire::decode_proxy_graph(*graphs[0].bytes)->graph.age(),
+            (std::pair<std::uint64_t, std::uint64_t>(1001, 1)));
+  EXPECT_EQ(told<MapUpdated>(step), 1U);
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+  EXPECT_TRUE(done(node_->on_timer(now_)).messages.empty());
+  receive(test::submap(kAlpha, 0));  // no news
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+}
+
+TEST_F(ServerNodeTest, GoesOnFromItsStoreAsIfNothingHadHappened) {
+  fill();
+  now_ = Timestamp{} + 20.0;
+  const Step updated = done(node_->on_timer(now_));
+  const auto nodes = node_->map_server().map().nodes;
+  const auto verdicts = node_->map_server().state().verdicts;
+  const auto refusals = node_->map_server().refusals();
+  ASSERT_GT(verdicts.size(), 3U);
+  ASSERT_EQ(refusals.size(), 1U);
+  restart();
+  EXPECT_TRUE(of_kind(resumed_, MessageKind::job).empty());
+  EXPECT_EQ(of_kind(resumed_, MessageKind::receipt).size(), 2U);
+  const auto sent = of_kind(updated, MessageKind::proxy_graph), again = of_kind(resumed_, MessageKind::proxy_graph);
+  ASSERT_EQ(again.size(), 2U);
+  EXPECT_EQ(*again[0].bytes, *sent[0].bytes);  // the same revision of the same epoch
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+  ASSERT_EQ(node_->map_server().map().nodes.size(), nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    EXPECT_EQ(node_->map_server().map().nodes[i].T_world_body, nodes[i].T_world_body);
+  EXPECT_EQ(node_->map_server().state().verdicts, verdicts);
+  EXPECT_EQ(node_->map_server().refusals(), refusals);
+
+  receive(test::submap(kAlpha, 9));
+  restart();
+  EXPECT_TRUE(of_kind(resumed_, MessageKind::proxy_graph).empty());  // there is news: the next revision comes first
+  EXPECT_EQ(node_->next_timer(), Timestamp{} + 20.0);
+  EXPECT_EQ(pairs_of(resumed_).size(), 8U);
+  done(node_->on_timer(now_));
+  EXPECT_EQ(node_->broadcast().age(), (std::pair<std::uint64_t, std::uint64_t>(1001, 2)));
+}
+
+TEST_F(ServerNodeTest, AsksAgainUntilItIsAnswered) {
+  receive(test::submap(kAlpha, 0));
+  receive(test::submap(kAlpha, 1));
+  const Step asked = receive(test::submap(kAlpha, 2));
+  EXPECT_EQ(pairs_of(asked).size(), 2U);
+  restart();
+  EXPECT_EQ(pairs_of(resumed_).size(), 3U);
+  for (const auto& job : of_kind(resumed_, MessageKind::job))
+    for (const auto& old : of_kind(asked, MessageKind::job)) EXPECT_NE(job.id, old.id);  // or a broker would drop it
+  answer(asked);                                                                         // late, from before
+  restart();
+  EXPECT_EQ(pairs_of(resumed_), (std::set<SubmapPair>{{{kAlpha, 0}, {kAlpha, 1}}}));
+  answer(resumed_);
+  answer(resumed_);  // twice
+  const server::RefusalCounts counts = node_->map_server().refusals();
+  restart();
+  EXPECT_TRUE(of_kind(resumed_, MessageKind::job).empty());
+  EXPECT_EQ(node_->map_server().refusals(), counts);
+  EXPECT_EQ(counts.at(RefusalReason::overlap).intra, 2U);
+}
+
+TEST_F(ServerNodeTest, APairThatCouldNotBeVerifiedComesAgainWithTheNextSubmap) {
+  receive(test::submap(kAlpha, 0));
+  const SubmapPair pair{{kAlpha, 0}, {kBravo, 0}};
+  const Step asked = receive(test::submap(kBravo, 0));
+  ASSERT_EQ(pairs_of(asked), std::set<SubmapPair>{pair});
+  const Verdicts failed{.job = "1/0", .verdicts = {}, .failed = {pair}, .why = "no cloud"};
+  const Step step = receive({Endpoint::worker(0), Endpoint::server(), MessageKind::verdicts, "1/0",
+                             std::make_shared<const std::string>(wire::encode(failed))});
+  EXPECT_EQ(told<VerificationFailed>(step), 1U);
+  EXPECT_TRUE(pairs_of(receive(test::submap(kAlpha, 1))).contains(pair));
+}
+
+TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
+  fill();
+  for (const auto& [table, rows] : store_->tables()) {
+    if (rows.empty()) continue;
+    auto tables = store_->tables();
+    tables.at(table).begin()->second.pop_back();
+    const storage::MemoryStore damaged(storage::map_schema(), tables);
+    const auto opened = ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {}, 1, damaged);
+    ASSERT_FALSE(opened.has_value()) << table;
+    EXPECT_NE(opened.error().message.find("map"), std::string::npos) << opened.error().message;
+  }
+}
+
+}  // namespace
+}  // namespace tutti::node

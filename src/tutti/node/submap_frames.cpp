@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/submap_frames.hpp"
+
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::node {
+
+std::string key_of(SubmapId id) { return storage::key_of({id.chain.robot.value, id.chain.session, id.index}); }
+
+std::shared_ptr<SubmapFrames> SubmapFrames::of(const storage::TableStore& map) {
+  return std::make_shared<SubmapFrames>([&map](SubmapId id) -> Result<std::string> {
+    auto row = map.read("submaps", key_of(id));
+    if (!row) return tl::unexpected(row.error());
+    if (!*row) return fail(ErrorCode::io, "submap {} is not in the map", to_string(id));
+    return std::move(**row);
+  });
+}
+
+Result<Submap> SubmapFrames::decode(SubmapId id) const {
+  const auto frame = fetch_(id);
+  if (!frame) return tl::unexpected(frame.error());
+  auto message = wire::decode_submap(*frame);
+  if (!message) return in_context("submap " + to_string(id), message.error());
+  if (message->submap.id != id)
+    return fail(ErrorCode::invalid, "submap {} in the place of {}", to_string(message->submap.id), to_string(id));
+  return std::move(message->submap);
+}
+
+Result<std::shared_ptr<const Submap>> SubmapFrames::submap(SubmapId id) const {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (const auto kept = kept_.find(id); kept != kept_.end()) return kept->second;
+  }
+  auto decoded = decode(id);
+  if (!decoded) return tl::unexpected(decoded.error());
+  decoded->cloud.reset();
+  const auto submap = std::make_shared<const Submap>(std::move(*decoded));
+  const std::scoped_lock lock(mutex_);
+  if (kept_.size() >= kMostKept) kept_.clear();
+  kept_.insert_or_assign(id, submap);
+  return submap;
+}
+
+Result<std::shared_ptr<const PointCloud>> SubmapFrames::get(SubmapId id) const {
+  auto decoded = decode(id);
+  if (!decoded) return tl::unexpected(decoded.error());
+  if (decoded->cloud == nullptr) return fail(ErrorCode::invalid, "submap {} has no cloud", to_string(id));
+  return std::move(decoded->cloud);
+}
+
+}  // namespace tutti::node

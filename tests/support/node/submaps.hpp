@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "tutti/bus/envelope.hpp"
+#include "tutti/server/closure_finder.hpp"
+#include "tutti/wire/codec.hpp"
+
+/// Submaps of robots that walk along straight lines, and who finds closures between them.
+namespace tutti::node::test {
+
+inline SubmapMessage submap(ChainId chain, std::uint32_t index) {
+  constexpr std::uint32_t kKeyframes = 4;
+  SubmapMessage message{.header = {chain.robot, chain.session, index}, .submap = {.id = {chain, index}}};
+  Pose3 step;
+  step.translation.x() = 1.0;
+  for (std::uint32_t k = index * (kKeyframes - 1); k < index * (kKeyframes - 1) + kKeyframes; ++k) {
+    Pose3 pose;
+    pose.translation.x() = k;
+    message.submap.keyframes.push_back({k, Timestamp{} + 1.0 * k, pose, true});
+    if (message.submap.keyframes.size() > 1) message.submap.odometry.push_back({step, 1e-4 * Matrix6d::Identity()});
+  }
+  PointCloud cloud;
+  cloud.points.emplace_back(1.0F * static_cast<float>(index), 2.0F, 3.0F);
+  message.submap.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+  return message;
+}
+
+inline bus::Envelope envelope(const SubmapMessage& message) {
+  return {bus::Endpoint::of(message.header.robot), bus::Endpoint::server(), bus::MessageKind::submap,
+          to_string(message.submap.id), std::make_shared<const std::string>(wire::encode(message))};
+}
+
+/// Asks for every pair; those of even numbers are in one place, the others refused. Needs both clouds.
+class EvenFinder final : public server::ClosureFinder {
+ public:
+  [[nodiscard]] std::uint32_t version() const override { return 3; }
+  [[nodiscard]] bool needs_clouds() const override { return true; }
+  [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const override {
+    for (const Submap* submap : {&first, &second})
+      if (const auto cloud = clouds.get(submap->id); !cloud) return tl::unexpected(cloud.error());
+    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder_version = version()};
+    if (first.id.index % 2 == 0 && second.id.index % 2 == 0)
+      verdict.closures.push_back({{first.id.chain, first.keyframes.front().index},
+                                  {second.id.chain, second.keyframes.front().index},
+                                  {first.keyframes.front().T_odom_body.inverse() * second.keyframes.front().T_odom_body,
+                                   1e-4 * Matrix6d::Identity()}});
+    else
+      verdict.refusal = Refusal{RefusalReason::overlap, 0.1, 0.3};
+    return verdict;
+  }
+};
+
+}  // namespace tutti::node::test
