@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Kill -9 in process: server, robots and workers of a small mission are dropped at random moments, also between the
+// parts of a step (commit, send, tell, acknowledge), and made again from the bytes of their stores; what was not
+// acknowledged comes again. The map is the undisturbed one, bit for bit, and so are the robots' corrected trajectories.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "support/sanitized.hpp"
+#include "tutti/bus/simulated_network.hpp"
+#include "tutti/mission/closure_finders.hpp"
+#include "tutti/node/robot_node.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/worker_node.hpp"
+#include "tutti/simulation/recordings.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti {
+namespace {
+
+using bus::Endpoint;
+using Role = Endpoint::Role;
+
+constexpr std::uint64_t kEpoch = 1'700'000'000, kSession = 1'700'000'100;
+constexpr double kUpdatePeriod_s = 20.0;
+
+struct World {
+  std::vector<mission::MissionRecording> recordings;
+  std::set<RobotId> robots;
+  std::shared_ptr<const server::ClosureFinder> finder;
+};
+
+World make_world() {
+  World out;
+  simulation::SimulationConfig config;
+  config.world.network = {.rows = 2, .columns = 3, .block_m = 15.0, .jitter_m = 2.0, .missing_share = 0.0};
+  for (simulation::SimulatedRobotConfig& robot : config.robots) {
+    robot.walk.duration_s = 150.0;
+    robot.odometry.yaw_deg_per_sqrt_m = 1.0;
+  }
+  auto world = simulation::simulate_recordings(config, Timestamp{0}, 11);
+  EXPECT_TRUE(world.has_value());
+  for (Recording& recording : world->recordings) {
+    out.robots.insert(recording.robot);
+    out.recordings.push_back({.recording = std::move(recording)});
+  }
+  mission::ClosureConfig closures{.finder = "reference"};
+  closures.reference.wrong_share = 0.2;
+  closures.reference.min_time_gap_s = 20.0;
+  out.finder = mission::make_closure_finder(closures, out.recordings, 5);
+  return out;
+}
+
+/// Before which part of a step a node is dropped, or after all.
+enum class Part { commit, send, half_sent, tell, acknowledge, end };
+constexpr std::size_t kParts = 6;
+/// Of which node, at which input.
+using Moment = std::tuple<Role, std::string, Part>;
+
+/// Which of the moments of each kind end a node.
+struct Killer {
+  std::map<Moment, std::set<std::size_t>> plan;
+  std::map<Moment, std::size_t> seen;
+  std::map<Moment, std::size_t> killed;
+  bool strikes(Moment moment) {
+    const bool now = plan[moment].contains(seen[moment]++);
+    if (now) ++killed[moment];
+    return now;
+  }
+};
+
+/// What a program of its own would be: a node, its port, and its store, which outlives both.
+template <class Node>
+struct Program {
+  Endpoint self;
+  storage::MemoryStore::Tables saved;  ///< What lies on its disk while nobody runs.
+  std::unique_ptr<storage::MemoryStore> store;
+  std::unique_ptr<bus::Port> port;
+  std::unique_ptr<Node> node;
+};
+
+class Mission {
+ public:
+  Mission(const World& world, const bus::LinkConfig& link, Killer& killer)
+      : world_(world), network_(bus::SimulatedRadio(Timestamp{}, link, 1), Timestamp{}), killer_(killer) {
+    server_.self = Endpoint::server();
+    start(server_);
+    for (const auto& recording : world.recordings) {
+      robots_.push_back({});
+      robots_.back().self = Endpoint::of(recording.recording.robot);
+    }
+    next_.resize(robots_.size(), 0);
+    for (auto& robot : robots_) start(robot);
+    for (std::size_t i = 0; i < workers_.size(); ++i) {
+      workers_[i].self = Endpoint::worker(static_cast<std::uint32_t>(i));
+      start(workers_[i]);
+    }
+  }
+
+  void run() {
+    while (true) {
+      std::optional<Timestamp> next = network_.next_delivery();
+      const auto consider = [&](std::optional<Timestamp> t) {
+        if (t && (!next || *t < *next)) next = t;
+      };
+      bool ended = true;
+      for (std::size_t r = 0; r < robots_.size(); ++r) {
+        const Trajectory& odometry = world_.recordings[r].recording.odometry;
+        if (next_[r] < odometry.size()) consider(odometry[next_[r]].stamp);
+        ended = ended && next_[r] >= odometry.size();
+      }
+      consider(server_.node->next_timer());
+      if (!next) break;
+      now_ = std::max(now_, *next);
+      pump();
+      for (std::size_t r = 0; r < robots_.size(); ++r) feed(r);
+      pump();
+      if (server_.node->next_timer() && *server_.node->next_timer() <= now_) {
+        static_cast<void>(carry_out(server_, "timer", server_.node->on_timer(now_)));
+        pump();
+      }
+    }
+  }
+
+  [[nodiscard]] const server::MapServer& server() const { return server_.node->map_server(); }
+  [[nodiscard]] const robot::RobotAgent& agent(std::size_t r) const { return robots_[r].node->agent(); }
+  [[nodiscard]] std::size_t robots() const { return robots_.size(); }
+  [[nodiscard]] const std::vector<std::string>& refusals() const { return refusals_; }
+  /// Nothing is kept back anywhere.
+  void expect_settled() const {
+    for (const auto& robot : robots_) EXPECT_TRUE(robot.node->backlog().empty());
+    for (const auto& robot : robots_) EXPECT_TRUE(robot.port->receive().empty());
+    EXPECT_TRUE(server_.port->receive().empty());
+  }
+
+ private:
+  std::unique_ptr<node::ServerNode> open(Program<node::ServerNode>& program) {
+    program.store = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(program.saved));
+    node::ServerNodeConfig config{.pairs_per_job = 3};
+    config.server.update_period_s = kUpdatePeriod_s;
+    return std::move(node::ServerNode::open(world_.robots, world_.finder, config, kEpoch, *program.store).value());
+  }
+  std::unique_ptr<node::RobotNode> open(Program<node::RobotNode>& program) {
+    program.store = std::make_unique<storage::MemoryStore>(storage::robot_schema(), std::move(program.saved));
+    auto node = node::RobotNode::open(*program.self.robot(), kSession, {}, Rng(1), *program.store);
+    EXPECT_TRUE(node.has_value()) << node.error().message;
+    return std::move(*node);
+  }
+  std::unique_ptr<node::WorkerNode> open(Program<node::WorkerNode>& program) {
+    const auto submaps = std::make_shared<node::SubmapFrames>(
+        [this](SubmapId id) { return Result<std::string>(**server_.store->read("submaps", node::key_of(id))); });
+    return std::make_unique<node::WorkerNode>(program.self, world_.finder, submaps);
+  }
+
+  /// From the bytes of its store; also when it is dropped in its very first step.
+  template <class Node>
+  void start(Program<Node>& program) {
+    program.port = network_.connect(program.self);
+    program.node = open(program);
+    if constexpr (!std::is_same_v<Node, node::WorkerNode>)
+      static_cast<void>(carry_out(program, "start", program.node->resume(now_)));
+  }
+
+  /// False when the node was dropped meanwhile; it runs again then.
+  template <class Node>
+  bool carry_out(Program<Node>& program, const std::string& input, const node::Step& step,
+                 std::optional<std::uint64_t> ticket = {}) {
+    const auto dies = [&](Part part) { return killer_.strikes({program.self.role, input, part}); };
+    const auto dropped = [&] {
+      program.node.reset();
+      program.port.reset();
+      if (program.store) program.saved = program.store->tables();
+      program.store.reset();
+      start(program);
+      return false;
+    };
+    if (dies(Part::commit)) return dropped();
+    if (program.store) {
+      EXPECT_TRUE(program.store->commit(step.writes).has_value());
+    }
+    if (dies(Part::send)) return dropped();
+    for (std::size_t i = 0; i < step.messages.size(); ++i) {
+      if (i == 1 && dies(Part::half_sent)) return dropped();
+      EXPECT_TRUE(program.port->send(step.messages[i]).has_value());
+    }
+    if (dies(Part::tell)) return dropped();
+    for (const node::Event& event : step.events)
+      if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) refusals_.push_back(refused->why);
+    if (dies(Part::acknowledge)) return dropped();
+    if (ticket) program.port->acknowledge(*ticket);
+    if (dies(Part::end)) return dropped();
+    return true;
+  }
+
+  /// Everything that is there to be received at this moment, and what that makes others send.
+  void pump() {
+    for (bool moved = true; moved;) {
+      network_.advance(now_);
+      moved = hear(server_);
+      for (auto& worker : workers_) moved = hear(worker) || moved;
+      for (auto& robot : robots_) moved = hear(robot) || moved;
+    }
+  }
+  template <class Node>
+  bool hear(Program<Node>& program) {
+    const auto received = program.port->receive();
+    for (const bus::Received& message : received)
+      if (!carry_out(program, wire::name(message.envelope.kind), program.node->receive(message.envelope, now_),
+                     message.ticket))
+        break;  // the rest comes again
+    return !received.empty();
+  }
+
+  /// The sensors say everything again that the robot has not acknowledged.
+  void feed(std::size_t r) {
+    Program<node::RobotNode>& robot = robots_[r];
+    const Recording& recording = world_.recordings[r].recording;
+    while (next_[r] < recording.odometry.size() && recording.odometry[next_[r]].stamp <= now_) {
+      const std::size_t i = next_[r];
+      const StampedPose& at = recording.odometry[i];
+      const Matrix6d covariance = i == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[i - 1];
+      const auto until_acknowledged = [&](const char* input, const auto& make) {
+        for (bool acknowledged = false; !acknowledged;) {
+          const node::Step step = make();
+          acknowledged = carry_out(robot, step.messages.empty() ? input : "end of a submap", step);
+        }
+      };
+      until_acknowledged("sample", [&] { return robot.node->add_odometry({at.stamp, at.pose, covariance}, now_); });
+      if (robot.node->agent().wants_scan())
+        until_acknowledged("scan", [&] { return robot.node->add_scan(scan(r, at.stamp), now_); });
+      if (++next_[r] == recording.odometry.size())
+        until_acknowledged("sample", [&] { return robot.node->finish(now_); });
+    }
+  }
+
+  static Scan scan(std::size_t r, Timestamp stamp) {
+    Rng rng = Rng(r).fork(static_cast<std::uint64_t>(stamp.ns));
+    PointCloud cloud;
+    for (int i = 0; i < 30; ++i) cloud.points.emplace_back(rng.normal(10.0), rng.normal(10.0), rng.normal(2.0));
+    return {stamp, std::make_shared<const PointCloud>(std::move(cloud)), {}};
+  }
+
+  const World& world_;
+  bus::SimulatedNetwork network_;
+  Killer& killer_;
+  Timestamp now_;
+  Program<node::ServerNode> server_;
+  std::vector<Program<node::RobotNode>> robots_;
+  std::array<Program<node::WorkerNode>, 2> workers_;
+  std::vector<std::size_t> next_;  // of each robot: sample to be fed
+  std::vector<std::string> refusals_;
+};
+
+void expect_same_map(const server::MapServer& a, const server::MapServer& b) {
+  ASSERT_EQ(a.map().nodes.size(), b.map().nodes.size());
+  for (std::size_t i = 0; i < a.map().nodes.size(); ++i) {
+    ASSERT_EQ(a.map().nodes[i].id, b.map().nodes[i].id);
+    ASSERT_EQ(a.map().nodes[i].T_world_body, b.map().nodes[i].T_world_body) << "node " << i;
+  }
+  ASSERT_EQ(a.map().closures.size(), b.map().closures.size());
+  for (std::size_t i = 0; i < a.map().closures.size(); ++i) {
+    ASSERT_EQ(a.map().closures[i].closure, b.map().closures[i].closure);
+    ASSERT_EQ(a.map().closures[i].accepted, b.map().closures[i].accepted);
+  }
+  EXPECT_EQ(a.state().verdicts, b.state().verdicts);
+  EXPECT_EQ(a.state().cloud_sizes, b.state().cloud_sizes);
+  ASSERT_EQ(a.refusals().size(), b.refusals().size());
+  for (const auto& [reason, count] : a.refusals()) {
+    EXPECT_EQ(b.refusals().at(reason).intra, count.intra);
+    EXPECT_EQ(b.refusals().at(reason).inter, count.inter);
+  }
+  for (const auto& [id, size] : a.state().cloud_sizes)
+    ASSERT_EQ((*a.clouds().get(id))->points, (*b.clouds().get(id))->points);
+}
+
+class Kill : public testing::Test {
+ protected:
+  /// Some moments of every kind, among as many as an undisturbed mission has.
+  static Killer planned(const Killer& undisturbed, Rng rng, std::size_t of_each) {
+    Killer killer;
+    for (const auto& [moment, count] : undisturbed.seen)
+      for (std::size_t i = 0; i < of_each; ++i) killer.plan[moment].insert(rng.index(count));
+    return killer;
+  }
+  static std::size_t count(const Killer& killer) {
+    std::size_t all = 0;
+    for (const auto& [moment, kills] : killer.killed) all += kills;
+    return all;
+  }
+
+  const World world_ = make_world();
+};
+
+TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
+  const bus::LinkConfig at_once{.latency_s = 0.0};
+  Killer nobody;
+  Mission undisturbed(world_, at_once, nobody);
+  undisturbed.run();
+  undisturbed.expect_settled();
+  ASSERT_GT(undisturbed.server().state().revision, 5U);
+  ASSERT_GT(undisturbed.agent(0).ledger().size() + undisturbed.agent(1).ledger().size(), 0U);
+  ASSERT_GT(undisturbed.server().state().verdicts.size(), 5U);
+  ASSERT_GE(nobody.seen.size(), 11 * (kParts - 1));  // kinds of inputs, of all nodes
+
+  std::map<Moment, std::size_t> killed;
+  std::size_t kills = 0;
+  for (std::uint64_t seed = 0; seed < tutti::seeds(4U); ++seed) {
+    Killer killer = planned(nobody, Rng(seed), 1);
+    Mission mission(world_, at_once, killer);
+    mission.run();
+    mission.expect_settled();
+    EXPECT_TRUE(mission.refusals().empty()) << mission.refusals().front();
+    expect_same_map(undisturbed.server(), mission.server());
+    EXPECT_EQ(mission.server().state().revision, undisturbed.server().state().revision);
+    for (std::size_t r = 0; r < mission.robots(); ++r) {
+      EXPECT_EQ(mission.agent(r).corrected(), undisturbed.agent(r).corrected()) << "robot " << r << ", seed " << seed;
+      EXPECT_EQ(mission.agent(r).ledger(), undisturbed.agent(r).ledger());
+      EXPECT_EQ(mission.agent(r).T_map_body(), undisturbed.agent(r).T_map_body());
+    }
+    for (const auto& [moment, n] : killer.killed) killed[moment] += n;
+    kills += count(killer);
+  }
+  RecordProperty("kills", static_cast<int>(kills));
+  EXPECT_GE(kills, tutti::seeds(4U) * 50);
+  EXPECT_EQ(killed.size(), nobody.seen.size());  // every node, at every input, before every part of a step
+}
+
+TEST_F(Kill, OnABadRadioTooTheMapIsTheSame) {
+  const bus::LinkConfig bad{
+      .latency_s = 0.3, .jitter_s = 8.0, .loss = 0.2, .duplicate = 0.2, .outages = {{40.0, 70.0}, {100.0, 110.0}}};
+  Killer nobody;
+  Mission undisturbed(world_, bus::LinkConfig{.latency_s = 0.0}, nobody);
+  undisturbed.run();
+  for (std::uint64_t seed = 100; seed < 100 + tutti::seeds(3U); ++seed) {
+    Killer killer = planned(nobody, Rng(seed), 1);
+    Mission mission(world_, bad, killer);
+    mission.run();
+    mission.expect_settled();
+    EXPECT_GT(count(killer), 20U);
+    EXPECT_TRUE(mission.refusals().empty()) << mission.refusals().front();
+    expect_same_map(undisturbed.server(), mission.server());
+  }
+}
+
+}  // namespace
+}  // namespace tutti
