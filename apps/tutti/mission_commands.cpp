@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What takes a mission: run, demo and world.
 #include <fmt/format.h>
-#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -23,25 +20,6 @@ namespace tutti::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder that nobody had before; it goes when this does, with all that is in it, and nothing else goes.
-class OwnFolder {
- public:
-  /// "<parent>/.<name>-XXXXXX"; the parent must exist. Without a path when it could not be made: errno says why.
-  OwnFolder(const fs::path& parent, const std::string& name) : path_((parent / ("." + name + "-XXXXXX")).string()) {
-    if (mkdtemp(path_.data()) == nullptr) path_.clear();
-  }
-  OwnFolder(const OwnFolder&) = delete;
-  OwnFolder& operator=(const OwnFolder&) = delete;
-  ~OwnFolder() {
-    std::error_code nobody_is_left_to_tell;
-    if (!path_.empty()) fs::remove_all(path_, nobody_is_left_to_tell);
-  }
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 /// One line on stderr that is rewritten on a terminal, and a line every ten per cent elsewhere.
 class ProgressLine {
@@ -120,11 +98,7 @@ int run_and_report(const Result<mission::MissionConfig>& config, MissionArgument
   std::error_code failure;  // before the mission, not after it
   fs::create_directories(out, failure);
   if (failure) return failed(fmt::format("--out {}: cannot make the folder: {}", out, failure.message()));
-  const OwnFolder clouds(out, "clouds");
-  if (clouds.path().empty())
-    return failed(fmt::format("--out {}: cannot make a folder in it: {}", out, std::strerror(errno)));
   ProgressLine progress;
-  arguments.run.clouds = clouds.path();
   arguments.run.progress = std::ref(progress);
   const auto record = mission::run_mission(*config, arguments.run);
   progress.close();

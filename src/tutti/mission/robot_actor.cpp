@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/mission/load_meter.hpp"
+#include "tutti/wire/codec.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -21,20 +23,23 @@ constexpr const char* kBudgetPolicy = "spectral";
 RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
                        const std::vector<std::string>& policies, const evaluation::AssociationConfig& association,
                        Rng rng)
-    : recording_(recording), association_(association) {
+    : recording_(recording), association_(association), store_(storage::robot_schema()) {
   std::vector<std::string> ordered = policies;
   std::stable_partition(ordered.begin(), ordered.end(), [](const std::string& p) { return p == kBudgetPolicy; });
   for (const std::string& policy : ordered) {
     robot::AgentConfig own = config;
     own.policy.name = policy;
-    own.explain = config.explain && policy == config.policy.name;  // shadows are not shown
-    members_.push_back({policy,
-                        robot::RobotAgent(recording.recording.robot, 0, own, rng.fork(policy)),
-                        {.robot = recording.recording.name, .policy = policy}});
-    if (policy == config.policy.name) default_ = members_.size() - 1;
+    const bool is_shadow = policy != config.policy.name;
+    if (is_shadow) own.explain = false;  // shadows are not shown
+    members_.push_back({policy, nullptr, {.robot = recording.recording.name, .policy = policy}});
+    if (is_shadow)
+      members_.back().shadow = std::make_unique<robot::RobotAgent>(recording.recording.robot, 0, own, rng.fork(policy));
+    else
+      node_ = node::RobotNode::open(recording.recording.robot, 0, {.agent = own, .keeps_state = false},
+                                    rng.fork(policy), store_)
+                  .value();
   }
-  TUTTI_CHECK(!members_.empty() && members_[default_].policy == config.policy.name, "default policy {} does not run",
-              config.policy.name);
+  TUTTI_CHECK(node_ != nullptr, "default policy {} does not run", config.policy.name);
 }
 
 double RobotActor::next_time() const {
@@ -43,46 +48,57 @@ double RobotActor::next_time() const {
   return recording_.start_s + (odometry[next_].stamp - odometry.front().stamp);
 }
 
-void RobotActor::replay_next() {
+void RobotActor::replay_next(Timestamp now) {
   const Recording& recording = recording_.recording;
   const StampedPose& sample = recording.odometry[next_];
   const Matrix6d covariance = next_ == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[next_ - 1];
-  for (std::size_t m = 0; m < members_.size(); ++m) {
-    double unused_s = 0.0;
-    const CpuScope cpu(m == default_ ? cpu_s_ : unused_s);
-    const auto ok = members_[m].agent.add_odometry(sample.stamp, sample.pose, covariance);
-    if (!ok && m == default_) note(refused_odometry_, ok.error().message);
-    if (m != default_) members_[m].agent.take_outgoing();  // shadows are never heard
+  for (const Member& member : members_) {
+    if (!member.shadow) {
+      const CpuScope cpu(cpu_s_);
+      take(node_->add_odometry({sample.stamp, sample.pose, covariance}, now));
+    } else if (member.shadow->add_odometry(sample.stamp, sample.pose, covariance)) {
+      member.shadow->take_outgoing();  // shadows are never heard
+    }
   }
-  feed_scan(next_);
-  if (++next_ == recording.odometry.size()) default_agent().finish();
+  feed_scan(next_, now);
+  if (++next_ == recording.odometry.size()) take(node_->finish(now));
 }
 
-std::vector<SubmapMessage> RobotActor::take_outgoing() {
-  const CpuScope cpu(cpu_s_);
-  return default_agent().take_outgoing();
+void RobotActor::take(node::Step step) {
+  for (const node::Event& event : step.events) note_event(event);
+  std::ranges::move(step.messages, std::back_inserter(step_.messages));
+  std::ranges::move(step.events, std::back_inserter(step_.events));
 }
 
-void RobotActor::feed_scan(std::size_t sample) {
+void RobotActor::note_event(const node::Event& event) {
+  if (const auto* sample = std::get_if<node::SampleRefused>(&event.what)) note(refused_odometry_, sample->why);
+  if (const auto* scan = std::get_if<node::ScanRefused>(&event.what)) note(refused_scans_, scan->why);
+  if (const auto* update = std::get_if<node::RobotUpdated>(&event.what)) note_update(*update, event.time);
+}
+
+void RobotActor::feed_scan(std::size_t sample, Timestamp now) {
   const Recording& recording = recording_.recording;
-  if (!recording.scans || !default_agent().wants_scan()) return;  // only keyframes need one
+  if (!recording.scans || !node_->agent().wants_scan()) return;  // only keyframes need one
   const auto scan = recording.scans->scan(sample);
   if (!scan) return note(refused_scans_, scan.error().message);
   if (!*scan) return;
   const CpuScope cpu(cpu_s_);
-  const auto ok = default_agent().add_scan(**scan);
-  if (!ok) return note(refused_scans_, ok.error().message);
-  ++taken_scans_;
+  const std::size_t refused = refused_scans_.count;
+  take(node_->add_scan(**scan, now));
+  if (refused == refused_scans_.count) ++taken_scans_;
 }
 
-void RobotActor::receive(const ProxyGraphMessage& message, double time_s) {
+void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
+  if (envelope.kind != bus::MessageKind::proxy_graph) return take(node_->receive(envelope, now));
+  const auto message = wire::decode_proxy_graph(*envelope.bytes);
+  if (!message) return take(node_->receive(envelope, now));  // which refuses it
   std::optional<std::size_t> budget;
   const std::size_t updates = updates_.size();
   for (Member& member : members_) {
-    update(member, message, member.agent.policy().needs_budget() ? budget : std::nullopt, time_s);
-    if (member.policy == kBudgetPolicy) budget = member.agent.ledger().size();
+    update(member, envelope, *message, agent_of(member).policy().needs_budget() ? budget : std::nullopt, now);
+    if (member.policy == kBudgetPolicy) budget = agent_of(member).ledger().size();
   }
-  if (updates_.size() > updates) score(trajectory_of(message.graph, default_agent().chain()), updates_.back());
+  if (updates_.size() > updates) score(trajectory_of(message->graph, node_->agent().chain()), updates_.back());
 }
 
 void RobotActor::score(const Trajectory& map, UpdateRecord& update) const {
@@ -95,43 +111,55 @@ void RobotActor::score(const Trajectory& map, UpdateRecord& update) const {
     return error ? std::optional(error->rmse_m) : std::nullopt;
   };
   Trajectory odometry;
-  for (const Keyframe& keyframe : members_[default_].agent.keyframes())
+  for (const Keyframe& keyframe : node_->agent().keyframes())
     odometry.push_back({keyframe.stamp, keyframe.T_odom_body});
   update.onboard_rmse_m = rmse(odometry);
   update.server_rmse_m = rmse(map);
   for (const Member& member : members_)
-    update.answers.push_back({member.policy, member.agent.ledger().size(), rmse(member.agent.corrected())});
+    update.answers.push_back({member.policy, agent_of(member).ledger().size(), rmse(agent_of(member).corrected())});
 }
 
-void RobotActor::update(Member& member, const ProxyGraphMessage& message, std::optional<std::size_t> budget,
-                        double time_s) {
-  const bool is_default = &member.agent == &default_agent();
+void RobotActor::update(Member& member, const bus::Envelope& envelope, const ProxyGraphMessage& message,
+                        std::optional<std::size_t> budget, Timestamp now) {
   double unused_s = 0.0;
-  robot::UpdateSummary summary;
-  {
-    const CpuScope cpu(is_default ? cpu_s_ : unused_s);
-    Stopwatch whole;
-    Stopwatch stage;
-    summary = member.agent.receive(message, budget, [&](robot::UpdateStage ended) {
-      const double ms = stage.lap_ms();
-      if (ended == robot::UpdateStage::compare) member.timing.comparison_ms.push_back(ms);
-      if (ended == robot::UpdateStage::optimise) member.timing.optimisation_ms.push_back(ms);
-    });
-    if (summary.synchronised > 0) member.timing.update_ms.push_back(whole.lap_ms());
+  const CpuScope cpu(member.shadow ? unused_s : cpu_s_);
+  Stopwatch whole;
+  Stopwatch stage;
+  const auto stage_ended = [&](robot::UpdateStage ended) {
+    const double ms = stage.lap_ms();
+    if (ended == robot::UpdateStage::compare) member.timing.comparison_ms.push_back(ms);
+    if (ended == robot::UpdateStage::optimise) member.timing.optimisation_ms.push_back(ms);
+  };
+  bool has_compared = false;
+  if (member.shadow) {
+    has_compared = member.shadow->receive(message, budget, stage_ended).synchronised > 0;
+  } else {
+    const std::size_t before = updates_.size();
+    node_->observe(stage_ended);
+    take(node_->receive(envelope, now, budget));
+    has_compared = updates_.size() > before;
   }
-  if (!is_default || summary.synchronised == 0) return;
+  if (has_compared) member.timing.update_ms.push_back(whole.lap_ms());
+}
+
+void RobotActor::note_update(const node::RobotUpdated& update, Timestamp time) {
+  const robot::UpdateSummary& summary = update.summary;
+  if (summary.synchronised == 0) return;
   if (!estimation::is_usable(summary.optimised))
     note(failed_updates_, fmt::format("the optimisation on board ended {}", to_string(summary.optimised)));
   else if (summary.taken_back)
     note(failed_updates_, "the chosen constraints led farther from the map than odometry is");
-  updates_.push_back({.time_s = time_s, .revision = summary.revision, .origins = summary.explanation.origins});
-  explanation_ = std::move(summary.explanation);
+  updates_.push_back(
+      {.time_s = time - kMissionStart, .revision = summary.revision, .origins = summary.explanation.origins});
+  explanation_ = summary.explanation;
 }
 
 RobotOutcome RobotActor::outcome() const {
-  RobotOutcome out{
-      .recording = &recording_, .default_policy = members_[default_].policy, .agents = {}, .replayed = next_};
-  for (const Member& member : members_) out.agents.emplace_back(member.policy, &member.agent);
+  RobotOutcome out{.recording = &recording_, .default_policy = {}, .agents = {}, .replayed = next_};
+  for (const Member& member : members_) {
+    out.agents.emplace_back(member.policy, &agent_of(member));
+    if (!member.shadow) out.default_policy = member.policy;
+  }
   return out;
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/random.hpp"
@@ -11,12 +13,17 @@
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/recordings.hpp"
-#include "tutti/robot/agent.hpp"
+#include "tutti/node/robot_node.hpp"
+#include "tutti/storage/memory_store.hpp"
 
 namespace tutti::mission {
 
-/// One robot of a mission: replays its recording into an agent with the default policy, which talks to the server, and
+/// Virtual time; robots' own stamps are never compared with it.
+inline constexpr Timestamp kMissionStart{0};
+
+/// One robot of a mission: replays its recording into a node with the default policy, which talks to the server, and
 /// into shadow agents with the policies that the mission compares, which hear the same broadcasts but are never heard.
+/// What becomes of the robot is folded from its node's events.
 class RobotActor {
  public:
   /// `policies`: all that run, the default one (config.policy.name) among them.
@@ -26,23 +33,23 @@ class RobotActor {
   /// Mission time of the next sample; infinity when there is none left.
   [[nodiscard]] double next_time() const;
   [[nodiscard]] bool has_scans() const { return recording_.recording.scans != nullptr; }
-  /// Replays one odometry sample and its scan; after the last one the default agent closes its last submap.
-  void replay_next();
+  /// Replays one odometry sample and its scan; after the last one the node closes its last submap.
+  void replay_next(Timestamp now);
   /// Closes the last submap before the recording ends.
-  void finish() { default_agent().finish(); }
-  /// Submaps of the default agent that are ready to be sent.
-  std::vector<SubmapMessage> take_outgoing();
+  void finish(Timestamp now) { take(node_->finish(now)); }
   /// The budget of policies that need one is what the policy `spectral` holds after the same broadcast.
-  void receive(const ProxyGraphMessage& message, double time_s);
+  void receive(const bus::Envelope& envelope, Timestamp now);
+  /// What the node has to send, and what others are to be told, since the last call.
+  node::Step take_step() { return std::exchange(step_, {}); }
 
   [[nodiscard]] const MissionRecording& recording() const { return recording_; }
   [[nodiscard]] RobotId id() const { return recording_.recording.robot; }
   [[nodiscard]] RobotOutcome outcome() const;
   [[nodiscard]] const std::vector<UpdateRecord>& updates() const { return updates_; }
-  /// Of the default agent's last update: its raw odometry against the map.
+  /// Of the node's last update: its raw odometry against the map.
   [[nodiscard]] const std::optional<consistency::Explanation>& explanation() const { return explanation_; }
   [[nodiscard]] std::vector<PolicyTiming> timing() const;
-  [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< Of the default agent.
+  [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< Of the node.
   /// What went wrong (bad samples or scans refused, updates without a correction): one line per kind with a count and
   /// the first case.
   [[nodiscard]] std::vector<std::string> troubles() const;
@@ -52,7 +59,7 @@ class RobotActor {
  private:
   struct Member {
     std::string policy;
-    robot::RobotAgent agent;
+    std::unique_ptr<robot::RobotAgent> shadow;  ///< Null: the node's own policy.
     PolicyTiming timing;
   };
   struct Trouble {
@@ -60,17 +67,26 @@ class RobotActor {
     std::string first;
   };
 
-  robot::RobotAgent& default_agent() { return members_[default_].agent; }
-  void update(Member& member, const ProxyGraphMessage& message, std::optional<std::size_t> budget, double time_s);
+  [[nodiscard]] const robot::RobotAgent& agent_of(const Member& member) const {
+    return member.shadow ? *member.shadow : node_->agent();
+  }
+  void take(node::Step step);
+  void note_event(const node::Event& event);
+  void note_update(const node::RobotUpdated& update, Timestamp time);
+  /// Times the stages of an update, and the whole if there is anything to compare.
+  void update(Member& member, const bus::Envelope& envelope, const ProxyGraphMessage& message,
+              std::optional<std::size_t> budget, Timestamp now);
   /// How far every estimate is from the reference at the nodes of the broadcast.
   void score(const Trajectory& map, UpdateRecord& update) const;
-  void feed_scan(std::size_t sample);
+  void feed_scan(std::size_t sample, Timestamp now);
   static void note(Trouble& trouble, const std::string& message);
 
   const MissionRecording& recording_;
   const evaluation::AssociationConfig& association_;
+  storage::MemoryStore store_;  // empty: nobody kills the node
+  std::unique_ptr<node::RobotNode> node_;
+  node::Step step_;
   std::vector<Member> members_;  // `spectral` first, if it is there: it sets the budget
-  std::size_t default_ = 0;
   std::size_t next_ = 0;
   std::vector<UpdateRecord> updates_;
   std::optional<consistency::Explanation> explanation_;

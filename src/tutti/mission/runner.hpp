@@ -22,8 +22,7 @@ struct Progress {
 };
 
 struct RunOptions {
-  std::filesystem::path data;    ///< Folder the mission's files lie in.
-  std::filesystem::path clouds;  ///< Folder for the clouds of submaps, made if missing; empty = all stay in memory.
+  std::filesystem::path data;  ///< Folder the mission's files lie in.
   std::uint64_t seed = 1;
   std::optional<double> rate;  ///< Times real time; none = as fast as possible.
   int threads = 0;             ///< For verifications; 0 = all cores. Does not change the result.
@@ -32,6 +31,7 @@ struct RunOptions {
 };
 
 /// Runs a whole mission in virtual time: robots, links, server and feedback, every message through its real encoding.
+/// The very nodes that programs are made of, a simulated radio between them, and nobody who kills any.
 /// The same configuration, data and seed give the same record (except its timing), whatever the threads or the rate.
 Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options);
 

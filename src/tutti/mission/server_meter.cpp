@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/server_meter.hpp"
+
+#include <algorithm>
+#include <variant>
+
+namespace tutti::mission {
+
+Result<ClosureVerdict> MeasuredFinder::verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const {
+  double cpu_s = 0.0;
+  Stopwatch watch;
+  auto verdict = [&] {
+    const CpuScope cpu(cpu_s);
+    return finder_->verify(first, second, clouds);
+  }();
+  const double took_ms = watch.lap_ms();
+  const std::scoped_lock lock(mutex_);
+  took_ms_.push_back(took_ms);
+  cpu_s_ += cpu_s;
+  return verdict;
+}
+
+void ServerMeter::note_submap(double time_s, const node::Step& step) {
+  if (std::ranges::none_of(
+          step.events, [](const node::Event& event) { return std::holds_alternative<node::SubmapStored>(event.what); }))
+    return;
+  for (const bus::Envelope& message : step.messages)
+    if (message.kind == bus::MessageKind::job) of_job_[message.id] = unanswered_.size();
+  unanswered_.push_back({time_s, 0.0});
+}
+
+void ServerMeter::note_job(const std::string& job, double cpu_s) {
+  if (const auto of = of_job_.find(job); of != of_job_.end()) unanswered_[of->second].verification_cpu_s += cpu_s;
+}
+
+/// The submaps are those that the update now ready is the first to contain. A lone core verifies a submap's pairs while
+/// it waits for the next update.
+void ServerMeter::note_update(double time_s, double took_ms) {
+  optimisation_ms_.push_back(took_ms);
+  for (const Unanswered& submap : unanswered_)
+    update_latency_ms_.push_back(1e3 * std::max(time_s - submap.arrived_s, submap.verification_cpu_s) + took_ms);
+  unanswered_.clear();
+  of_job_.clear();
+}
+
+void ServerMeter::record(double mission_s, TimingRecord& timing) const {
+  timing.server_verification_ms = finder_->took_ms();
+  timing.server_optimisation_ms = optimisation_ms_;
+  timing.server_load = {.mission_s = mission_s,
+                        .map_cpu_s = map_cpu_s_,
+                        .verification_cpu_s = finder_->cpu_s(),
+                        .update_latency_ms = update_latency_ms_,
+                        .peak_memory_mb = peak_memory_mb()};
+}
+
+}  // namespace tutti::mission

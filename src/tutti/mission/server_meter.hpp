@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/mission/load_meter.hpp"
+#include "tutti/mission/record.hpp"
+#include "tutti/node/step.hpp"
+#include "tutti/server/closure_finder.hpp"
+
+namespace tutti::mission {
+
+/// Another finder, and how long it takes for each pair.
+class MeasuredFinder final : public server::ClosureFinder {
+ public:
+  explicit MeasuredFinder(std::shared_ptr<const server::ClosureFinder> finder) : finder_(std::move(finder)) {}
+  [[nodiscard]] std::uint32_t version() const override { return finder_->version(); }
+  [[nodiscard]] bool needs_clouds() const override { return finder_->needs_clouds(); }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return finder_->is_candidate(first, second);
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const override;
+
+  [[nodiscard]] const std::vector<double>& took_ms() const { return took_ms_; }  ///< Not while it verifies.
+  [[nodiscard]] double cpu_s() const { return cpu_s_; }
+
+ private:
+  std::shared_ptr<const server::ClosureFinder> finder_;
+  mutable std::mutex mutex_;  // guards what follows
+  mutable std::vector<double> took_ms_;
+  mutable double cpu_s_ = 0.0;
+};
+
+/// What server and workers take of the machine they run on: beside the nodes, which know no clock.
+class ServerMeter {
+ public:
+  explicit ServerMeter(std::shared_ptr<const server::ClosureFinder> finder)
+      : finder_(std::make_shared<MeasuredFinder>(std::move(finder))) {}
+  /// To be used by server and workers.
+  [[nodiscard]] std::shared_ptr<const server::ClosureFinder> finder() const { return finder_; }
+
+  /// Calls `step` of the server, which may store a submap, and returns what it makes.
+  template <class F>
+  node::Step serve(double time_s, F&& step) {
+    const CpuScope cpu(map_cpu_s_);
+    node::Step made = step();
+    note_submap(time_s, made);
+    return made;
+  }
+  /// Calls `step` of the server, which updates the map.
+  template <class F>
+  node::Step update(double time_s, F&& step) {
+    const CpuScope cpu(map_cpu_s_);
+    Stopwatch watch;
+    node::Step made = step();
+    note_update(time_s, watch.lap_ms());
+    return made;
+  }
+  /// Calls `step` of a worker, whose input is this job.
+  template <class F>
+  node::Step verify(const std::string& job, F&& step) {
+    const double before_s = finder_->cpu_s();
+    node::Step made = step();
+    note_job(job, finder_->cpu_s() - before_s);
+    return made;
+  }
+
+  [[nodiscard]] double cpu_s() const { return map_cpu_s_ + finder_->cpu_s(); }
+  void record(double mission_s, TimingRecord& timing) const;
+
+ private:
+  struct Unanswered {
+    double arrived_s = 0.0;
+    double verification_cpu_s = 0.0;
+  };
+  void note_submap(double time_s, const node::Step& step);
+  void note_job(const std::string& job, double cpu_s);
+  void note_update(double time_s, double took_ms);
+
+  std::shared_ptr<MeasuredFinder> finder_;
+  double map_cpu_s_ = 0.0;
+  std::vector<Unanswered> unanswered_;         // submaps that no broadcast contains yet
+  std::map<std::string, std::size_t> of_job_;  // which of them it verifies
+  std::vector<double> optimisation_ms_;
+  std::vector<double> update_latency_ms_;
+};
+
+}  // namespace tutti::mission
