@@ -2,7 +2,9 @@
 // What every TableStore must do, for each implementation.
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include "tutti/storage/memory_store.hpp"
+#include "tutti/storage/sqlite_store.hpp"
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::storage {
@@ -40,6 +43,30 @@ class InMemory final : public Place {
  private:
   std::unique_ptr<MemoryStore> store_;
 };
+
+class InSqliteFile final : public Place {
+ public:
+  InSqliteFile() {
+    folder_ = std::filesystem::path(::testing::TempDir()) / ("tutti_conformance_" + std::to_string(getpid()));
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  ~InSqliteFile() override { std::filesystem::remove_all(folder_); }
+  TableStore& reopened() override {
+    store_.reset();
+    store_ = std::move(open_sqlite_store(folder_ / "store", kSchema, {.min_free_bytes = 0}).value());
+    return *store_;
+  }
+
+ private:
+  std::filesystem::path folder_;
+  std::unique_ptr<TableStore> store_;
+};
+
+template <class T>
+std::unique_ptr<Place> make() {
+  return std::make_unique<T>();
+}
 
 struct Implementation {
   const char* name;
@@ -156,6 +183,7 @@ TEST_P(Conformance, AVisitorThatCallsTheStoreIsABugAndThatThrowsEndsTheScan) {
 /// Any history of commits and restarts leaves what a map of maps holds.
 TEST_P(Conformance, BehavesAsAMapOfMaps) {
   const auto property = [&] {
+    place_.reset();
     place_ = GetParam().make();
     reopen();
     std::map<std::string, std::map<std::string, std::string>> model;
@@ -204,8 +232,8 @@ TEST_P(Conformance, SeveralThreadsSeeCommitsWhole) {
 }
 
 INSTANTIATE_TEST_SUITE_P(TableStore, Conformance,
-                         ::testing::Values(Implementation{
-                             "memory", []() -> std::unique_ptr<Place> { return std::make_unique<InMemory>(); }}),
+                         ::testing::Values(Implementation{"memory", &make<InMemory>},
+                                           Implementation{"sqlite", &make<InSqliteFile>}),
                          [](const auto& of) { return std::string(of.param.name); });
 
 }  // namespace

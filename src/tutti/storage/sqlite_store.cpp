@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/storage/sqlite_store.hpp"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+#include <sys/statvfs.h>
+
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/storage/internal/scanning.hpp"
+
+namespace tutti::storage {
+namespace {
+
+constexpr std::int64_t kApplicationId = 0x54757474;           // "Tutt", at byte 68 of the file
+constexpr std::size_t kLongestRow = std::size_t{256} << 20U;  // key and bytes; SQLite's own limit is 1e9
+
+struct Close {
+  void operator()(sqlite3* database) const { sqlite3_close(database); }
+  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+};
+using Database = std::unique_ptr<sqlite3, Close>;
+using Statement = std::unique_ptr<sqlite3_stmt, Close>;
+
+/// One use of a prepared statement: lets go of what is bound and locked when it ends.
+class Use {
+ public:
+  explicit Use(const Statement& statement) : statement_(statement.get()) {}
+  ~Use() {
+    sqlite3_reset(statement_);
+    sqlite3_clear_bindings(statement_);
+  }
+  Use(const Use&) = delete;
+  Use& operator=(const Use&) = delete;
+
+  /// `bytes` outlives this.
+  void bind(int index, std::string_view bytes) {
+    const char* data = bytes.empty() ? "" : bytes.data();  // null would be bound as NULL
+    sqlite3_bind_blob64(statement_, index, data, bytes.size(), SQLITE_STATIC);
+  }
+  void bind(int index, std::int64_t number) { sqlite3_bind_int64(statement_, index, number); }
+  int step() { return sqlite3_step(statement_); }
+  [[nodiscard]] std::string_view bytes(int column) const {
+    const auto* data = static_cast<const char*>(sqlite3_column_blob(statement_, column));
+    return {data == nullptr ? "" : data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
+  }
+  [[nodiscard]] std::int64_t number(int column) const { return sqlite3_column_int64(statement_, column); }
+
+ private:
+  sqlite3_stmt* statement_;
+};
+
+struct TableStatements {
+  Statement put;
+  Statement remove;
+  Statement read;
+  Statement scan;
+};
+
+/// FNV-1a over the key, then over the bytes. Any change within eight neighbouring bits changes it.
+std::int64_t hash_of(std::string_view key, std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const std::string_view part : {key, bytes})
+    for (const char c : part) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  return static_cast<std::int64_t>(hash);
+}
+
+/// For messages: hexadecimal, as SQLite's x'..' wants it.
+std::string hex(std::string_view key) {
+  std::string text;
+  for (const char c : key) text += fmt::format("{:02x}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+  return text;
+}
+
+std::string sql_of_table(const std::string& table) {
+  return "CREATE TABLE " + table + " (key BLOB PRIMARY KEY NOT NULL, hash INTEGER NOT NULL, bytes BLOB NOT NULL)";
+}
+
+std::string sql_of_kind() { return "CREATE TABLE store (kind TEXT NOT NULL)"; }
+
+class SqliteStore final : public TableStore {
+ public:
+  SqliteStore(std::filesystem::path file, const SqliteOptions& options)
+      : file_(std::filesystem::absolute(file)), options_(options) {}
+  Status open(const Schema& schema);
+
+  Status commit(std::span<const Write> writes) override;
+  [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override;
+  [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override;
+
+ private:
+  [[nodiscard]] tl::unexpected<Error> failure(int code, std::string_view doing) const;
+  [[nodiscard]] Status run(const std::string& sql) const;
+  [[nodiscard]] Result<Statement> prepare(const std::string& sql) const;
+  [[nodiscard]] Result<std::string> value_of(const std::string& sql) const;
+  [[nodiscard]] Result<std::int64_t> number_of(const std::string& sql) const;
+  Status configure();
+  Status create(const Schema& schema);
+  Status check(const Schema& schema) const;
+  [[nodiscard]] Status room_for(std::span<const Write> writes) const;
+  [[nodiscard]] Status write_all(std::span<const Write> writes) const;
+  [[nodiscard]] Status check_row(std::string_view table, std::string_view key, std::int64_t hash,
+                                 std::string_view bytes) const;
+  [[nodiscard]] const TableStatements& statements(std::string_view table) const;
+
+  std::filesystem::path file_;
+  SqliteOptions options_;
+  mutable std::recursive_mutex mutex_;  ///< Recursive, so that a visitor that calls the store is told.
+  mutable bool scanning_ = false;
+  Database database_;
+  std::map<std::string, TableStatements, std::less<>> tables_;
+};
+
+tl::unexpected<Error> SqliteStore::failure(int code, std::string_view doing) const {
+  const std::string file = file_.string();
+  switch (code & 0xff) {  // the rest says more of the same
+    case SQLITE_BUSY:
+      return fail(ErrorCode::io, "{}: is open in another program", file);
+    case SQLITE_NOTADB:
+      return fail(ErrorCode::parse, "{}: not an SQLite file", file);
+    case SQLITE_FULL:
+      return fail(ErrorCode::io, "{}: {}: the disk, or the size that the file may have, is full", file, doing);
+    case SQLITE_CORRUPT:
+      return fail(ErrorCode::parse, "{}: {}: the file is damaged: {}", file, doing, sqlite3_errmsg(database_.get()));
+    default:
+      return fail(ErrorCode::io, "{}: {}: {}", file, doing, sqlite3_errmsg(database_.get()));
+  }
+}
+
+Status SqliteStore::run(const std::string& sql) const {
+  const int code = sqlite3_exec(database_.get(), sql.c_str(), nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) return failure(code, sql);
+  return {};
+}
+
+Result<Statement> SqliteStore::prepare(const std::string& sql) const {
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v3(database_.get(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (code != SQLITE_OK) return failure(code, sql);
+  return Statement(statement);
+}
+
+/// The first column of all rows, a line each.
+Result<std::string> SqliteStore::value_of(const std::string& sql) const {
+  const Result<Statement> statement = prepare(sql);
+  if (!statement) return tl::unexpected(statement.error());
+  Use use(*statement);
+  std::string value;
+  int code = use.step();
+  for (; code == SQLITE_ROW; code = use.step()) {
+    if (!value.empty()) value += '\n';
+    value += use.bytes(0);
+  }
+  if (code != SQLITE_DONE) return failure(code, sql);
+  return value;
+}
+
+Result<std::int64_t> SqliteStore::number_of(const std::string& sql) const {
+  const Result<Statement> statement = prepare(sql);
+  if (!statement) return tl::unexpected(statement.error());
+  Use use(*statement);
+  if (const int code = use.step(); code != SQLITE_ROW) return failure(code, sql);
+  return use.number(0);
+}
+
+/// Alone with the file from here on: in exclusive mode what is locked once is kept.
+Status SqliteStore::configure() {
+  sqlite3* database = nullptr;
+  const int code = sqlite3_open_v2(file_.c_str(), &database,
+                                   SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
+  database_.reset(database);
+  if (code != SQLITE_OK) return failure(code, "opening it");
+  if (sqlite3_db_readonly(database, "main") != 0) return fail(ErrorCode::io, "{}: cannot be written", file_.string());
+  // A map comes from anywhere: nothing in it is run.
+  for (const char* sql : {"PRAGMA locking_mode = EXCLUSIVE", "PRAGMA trusted_schema = OFF",
+                          "PRAGMA secure_delete = OFF", "PRAGMA synchronous = FULL", "BEGIN EXCLUSIVE", "COMMIT"})
+    if (const Status done = run(sql); !done) return done;
+  return {};
+}
+
+Status SqliteStore::create(const Schema& schema) {
+  std::string sql = "BEGIN;" + sql_of_kind() + ";INSERT INTO store VALUES('" + schema.kind + "');";
+  for (const std::string& table : schema.tables) sql += sql_of_table(table) + ";";
+  sql += fmt::format("PRAGMA application_id={};PRAGMA user_version={};COMMIT", kApplicationId, schema.version);
+  return run(sql);
+}
+
+Status SqliteStore::check(const Schema& schema) const {
+  const std::string file = file_.string();
+  const Result<std::int64_t> application = number_of("PRAGMA application_id");
+  if (!application) return tl::unexpected(application.error());
+  if (*application != kApplicationId)
+    return fail(ErrorCode::parse, "{}: an SQLite file of another program (application {:#x}, Tutti's is {:#x})", file,
+                *application, kApplicationId);
+  const Result<std::string> kind = value_of("SELECT kind FROM store");
+  if (!kind) return tl::unexpected(kind.error());
+  if (*kind != schema.kind) return fail(ErrorCode::invalid, "{}: holds a {}, expected a {}", file, *kind, schema.kind);
+  const Result<std::int64_t> version = number_of("PRAGMA user_version");
+  if (!version) return tl::unexpected(version.error());
+  if (*version != schema.version)
+    return fail(ErrorCode::unsupported, "{}: a {} of version {}, this program reads version {}{}", file, schema.kind,
+                *version, schema.version, *version > schema.version ? "; it was written by a newer one" : "");
+  std::vector<std::string> expected{sql_of_kind()};
+  for (const std::string& table : schema.tables) expected.push_back(sql_of_table(table));
+  std::ranges::sort(expected);
+  const Result<std::string> found = value_of("SELECT sql FROM sqlite_schema WHERE sql IS NOT NULL ORDER BY sql");
+  if (!found) return tl::unexpected(found.error());
+  if (*found != fmt::format("{}", fmt::join(expected, "\n")))
+    return fail(ErrorCode::parse, "{}: has other tables than a {} of version {}:\n{}", file, schema.kind,
+                schema.version, *found);
+  const Result<std::string> damage = value_of("PRAGMA integrity_check(1)");
+  if (!damage) return tl::unexpected(damage.error());
+  if (*damage != "ok") return fail(ErrorCode::parse, "{}: the file is damaged: {}", file, *damage);
+  return {};
+}
+
+Status SqliteStore::open(const Schema& schema) {
+  if (const Status done = configure(); !done) return done;
+  const Result<std::int64_t> tables = number_of("SELECT count(*) FROM sqlite_schema");
+  if (!tables) return tl::unexpected(tables.error());
+  if (*tables == 0)
+    if (const Status done = create(schema); !done) return done;
+  if (const Status done = check(schema); !done) return done;
+  if (const Result<std::string> mode = value_of("PRAGMA journal_mode = WAL"); !mode)
+    return tl::unexpected(mode.error());
+  else if (*mode != "wal")
+    return fail(ErrorCode::io, "{}: no write-ahead log on this file system, only '{}'", file_.string(), *mode);
+  if (options_.max_bytes > 0) {
+    const Result<std::int64_t> page = number_of("PRAGMA page_size");
+    if (!page) return tl::unexpected(page.error());
+    const std::uint64_t pages = std::max<std::uint64_t>(1, options_.max_bytes / static_cast<std::uint64_t>(*page));
+    if (const Status done = run(fmt::format("PRAGMA max_page_count = {}", pages)); !done) return done;
+  }
+  for (const std::string& table : schema.tables) {
+    auto put = prepare("INSERT INTO " + table + " (key, hash, bytes) VALUES (?1, ?2, ?3) " +
+                       "ON CONFLICT (key) DO UPDATE SET hash = excluded.hash, bytes = excluded.bytes");
+    auto remove = prepare("DELETE FROM " + table + " WHERE key = ?1");
+    auto read = prepare("SELECT hash, bytes FROM " + table + " WHERE key = ?1");
+    auto scan = prepare("SELECT key, hash, bytes FROM " + table + " WHERE key >= ?1 ORDER BY key");
+    for (const auto* made : {&put, &remove, &read, &scan})
+      if (!*made) return tl::unexpected(made->error());
+    tables_[table] = {std::move(*put), std::move(*remove), std::move(*read), std::move(*scan)};
+  }
+  return {};
+}
+
+const TableStatements& SqliteStore::statements(std::string_view table) const {
+  TUTTI_CHECK(!scanning_, "a visitor calls the store that it visits");
+  const auto found = tables_.find(table);
+  TUTTI_CHECK(found != tables_.end(), "no table '{}'", table);
+  return found->second;
+}
+
+/// Below the limit rows may be deleted, and added in the place of deleted ones.
+Status SqliteStore::room_for(std::span<const Write> writes) const {
+  std::uint64_t added = 0;
+  for (const Write& write : writes) added += write.bytes ? write.key.size() + write.bytes->size() : 0;
+  if (added == 0) return {};
+  struct statvfs disk {};
+  if (statvfs(file_.parent_path().c_str(), &disk) != 0) return {};  // not a reason to lose anything
+  const std::uint64_t free = std::uint64_t{disk.f_bavail} * disk.f_frsize;
+  if (free >= options_.min_free_bytes + added) return {};
+  const Result<std::int64_t> reusable =
+      number_of("SELECT freelist_count * page_size FROM pragma_freelist_count, pragma_page_size");
+  if (!reusable) return tl::unexpected(reusable.error());
+  if (static_cast<std::uint64_t>(*reusable) >= 2 * added) return {};  // rows fill pages at least by half
+  return fail(ErrorCode::io, "{}: {} bytes are not stored: {} bytes are free on the disk, {} are to stay free",
+              file_.string(), added, free, options_.min_free_bytes);
+}
+
+Status SqliteStore::write_all(std::span<const Write> writes) const {
+  for (const Write& write : writes) {
+    const TableStatements& of_table = statements(write.table);
+    Use use(write.bytes ? of_table.put : of_table.remove);
+    use.bind(1, write.key);
+    if (write.bytes) {
+      use.bind(2, hash_of(write.key, *write.bytes));
+      use.bind(3, *write.bytes);
+    }
+    if (const int code = use.step(); code != SQLITE_DONE)
+      return failure(code, fmt::format("{}, key x'{}'", write.table, hex(write.key)));
+  }
+  return run("COMMIT");
+}
+
+Status SqliteStore::commit(std::span<const Write> writes) {
+  const std::scoped_lock lock(mutex_);
+  for (const Write& write : writes) {
+    static_cast<void>(statements(write.table));
+    const std::size_t size = write.key.size() + (write.bytes ? write.bytes->size() : 0);
+    if (size > kLongestRow)
+      return fail(ErrorCode::invalid, "{}: {}: a row of {} bytes, at most {} are stored", file_.string(), write.table,
+                  size, kLongestRow);
+  }
+  if (writes.empty()) return {};
+  if (const Status room = room_for(writes); !room) return room;
+  if (const Status begun = run("BEGIN IMMEDIATE"); !begun) return begun;
+  Status done = write_all(writes);
+  if (sqlite3_get_autocommit(database_.get()) == 0) static_cast<void>(run("ROLLBACK"));
+  return done;
+}
+
+Status SqliteStore::check_row(std::string_view table, std::string_view key, std::int64_t hash,
+                              std::string_view bytes) const {
+  if (hash == hash_of(key, bytes)) return {};
+  return fail(ErrorCode::parse, "{}: {}, key x'{}': the row is damaged: its {} bytes do not have its hash",
+              file_.string(), table, hex(key), bytes.size());
+}
+
+Result<std::optional<std::string>> SqliteStore::read(std::string_view table, std::string_view key) const {
+  const std::scoped_lock lock(mutex_);
+  Use use(statements(table).read);
+  use.bind(1, key);
+  const int code = use.step();
+  if (code == SQLITE_DONE) return std::nullopt;
+  if (code != SQLITE_ROW) return failure(code, fmt::format("{}, key x'{}'", table, hex(key)));
+  const std::string_view bytes = use.bytes(1);
+  if (const Status whole = check_row(table, key, use.number(0), bytes); !whole) return tl::unexpected(whole.error());
+  return std::string(bytes);
+}
+
+Status SqliteStore::scan(std::string_view table, std::string_view from, const Visit& visit) const {
+  const std::scoped_lock lock(mutex_);
+  Use use(statements(table).scan);
+  const Scanning scanning(scanning_);
+  use.bind(1, from);
+  std::string last(from);
+  int code = use.step();
+  for (; code == SQLITE_ROW; code = use.step()) {
+    const std::string_view key = use.bytes(0);
+    const std::string_view bytes = use.bytes(2);
+    if (const Status whole = check_row(table, key, use.number(1), bytes); !whole) return whole;
+    if (!visit(key, bytes)) return {};
+    last = key;
+  }
+  if (code != SQLITE_DONE) return failure(code, fmt::format("{}, from key x'{}' on", table, hex(last)));
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<TableStore>> open_sqlite_store(const std::filesystem::path& file, const Schema& schema,
+                                                      const SqliteOptions& options) {
+  auto store = std::make_unique<SqliteStore>(file, options);
+  if (const Status opened = store->open(schema); !opened) return tl::unexpected(opened.error());
+  return store;
+}
+
+}  // namespace tutti::storage
