@@ -13,7 +13,7 @@ find_package(PNG REQUIRED)
 find_package(Threads REQUIRED)
 find_package(spectra REQUIRED)
 
-# SuiteSparse 5.12, LAPACKE, zstd and SQLite ship no CMake configuration that works everywhere: plain imported targets.
+# SuiteSparse 5.12, LAPACKE, zstd, SQLite and NATS ship no CMake configuration that works everywhere: plain imported targets.
 function(tutti_import_library target header)
   cmake_parse_arguments(ARG "" "" "LIBS;SUFFIXES" ${ARGN})
   string(TOUPPER ${target} upper)
@@ -33,6 +33,7 @@ tutti_import_library(tutti::lapacke lapacke.h LIBS lapacke openblas)
 tutti_import_library(tutti::zstd zstd.h LIBS zstd)
 tutti_import_library(tutti::nanoflann nanoflann.hpp)
 tutti_import_library(tutti::sqlite sqlite3.h LIBS sqlite3)
+tutti_import_library(tutti::nats nats/nats.h LIBS nats)
 
 if(TUTTI_BUILD_TESTS)
   find_package(GTest REQUIRED)

@@ -15,6 +15,7 @@ CONFINED = [
     (r"ceres/", r"(estimation/.*\.cpp|.*_test\.cpp)$", "estimation/*.cpp and tests"),
     (r"Spectra/", r"spectral/.*\.cpp$", "spectral/*.cpp"),
     (r"nanoflann", r"(perception|spectral|consistency|evaluation)/.*\.cpp$", "perception/, spectral/, consistency/, evaluation/ *.cpp"),
+    (r"nats(/|\.h)", r"bus/nats_.*\.cpp$", "bus/nats_*.cpp"),
     (r"sqlite3", r"storage/sqlite_.*\.cpp$", "storage/sqlite_*.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),

@@ -8,7 +8,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 packages=(
   cmake ninja-build g++ ccache pkg-config
   libeigen3-dev libsuitesparse-dev libopenblas-dev liblapacke-dev libspectra-dev libnanoflann-dev
-  libprotobuf-dev protobuf-compiler libzstd-dev libpng-dev libsqlite3-dev
+  libprotobuf-dev protobuf-compiler libzstd-dev libpng-dev libsqlite3-dev libnats-dev nats-server
   libexpected-dev libfmt-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
 )
 for option in "$@"; do

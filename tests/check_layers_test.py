@@ -56,6 +56,7 @@ class CheckLayers(unittest.TestCase):
             ("estimation/a.cpp", "#include <Spectra/SymEigsSolver.h>"),
             ("perception/lidar/a.hpp", "#include <nanoflann.hpp>"),
             ("wire/a.cpp", "#include <sqlite3.h>"),
+            ("wire/a.cpp", "#include <nats/nats.h>"),
             ("base/a.hpp", "#include <tbb/parallel_for.h>"),
             ("base/a.cpp", "  std::cout << 1;"),
             ("base/a.cpp", '  printf("");'),

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/nats_child.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <nats/nats.h>
+#include <sys/file.h>
+#include <sys/prctl.h>
+#include <sys/statvfs.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/file.hpp"
+
+namespace tutti::bus {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kLookAgain = std::chrono::milliseconds(3);
+constexpr auto kPolitely = std::chrono::seconds(3);      // then it is killed
+constexpr auto kOthersMayEnd = std::chrono::seconds(2);  // the nats-server of a killed process ends a moment later
+constexpr const char* kElsewhere = "/usr/sbin/nats-server";
+
+struct ToBeClosed {
+  int file = -1;
+  ~ToBeClosed() {
+    if (file >= 0) close(file);
+  }
+};
+
+/// The options that were tried, with the reasons: shared/NATS.md.
+std::string configuration(const fs::path& folder, const NatsChildOptions& options, int port) {
+  return fmt::format(R"(server_name: tutti
+listen: "{}:{}"
+ports_file_dir: "{}"
+max_payload: 8388608
+max_pending: 67108864
+write_deadline: "60s"
+jetstream {{ store_dir: "{}", max_mem: 64MB, max_file: {} }}
+)",
+                     options.host, port == 0 ? -1 : port, folder.string(), (folder / "js").string(),
+                     options.max_store_bytes);
+}
+
+/// The last lines that say that something is wrong, or the last ones.
+std::string complaint_of(const fs::path& log) {
+  const std::string text = read_file(log.string()).value_or("");
+  if (const std::size_t fatal = text.rfind("[FTL]"); fatal != std::string::npos)
+    return text.substr(fatal + 6, text.find('\n', fatal) - fatal - 6);
+  constexpr std::size_t kTail = 400;
+  return text.substr(text.size() - std::min(text.size(), kTail));
+}
+
+/// What nats-server wrote of where it listens; "" when that is not there yet.
+std::string url_in(const fs::path& ports) {
+  std::error_code none;
+  if (!fs::exists(ports, none)) return {};
+  const std::string text = read_file(ports.string()).value_or("");
+  const std::size_t begin = text.find("nats://");
+  const std::size_t end = text.find('"', begin);
+  return begin == std::string::npos || end == std::string::npos ? "" : text.substr(begin, end - begin);
+}
+
+int port_of(const std::string& url) { return std::atoi(url.substr(url.rfind(':') + 1).c_str()); }
+
+/// JetStream answers.
+bool is_ready(const std::string& url) {
+  natsConnection* connection = nullptr;
+  jsCtx* stream = nullptr;
+  jsAccountInfo* account = nullptr;
+  jsOptions options;
+  jsOptions_Init(&options);
+  options.Wait = 500;
+  const bool ready = natsConnection_ConnectTo(&connection, url.c_str()) == NATS_OK &&
+                     natsConnection_JetStream(&stream, connection, &options) == NATS_OK &&
+                     js_GetAccountInfo(&account, stream, &options, nullptr) == NATS_OK;
+  jsAccountInfo_Destroy(account);
+  jsCtx_Destroy(stream);
+  natsConnection_Destroy(connection);
+  return ready;
+}
+
+}  // namespace
+
+bool is_loopback(std::string_view host) {
+  return host == "localhost" || host == "::1" || host == "[::1]" || host.starts_with("127.");
+}
+
+/// The process and the thread that forked it, which waits for its end: the kernel ends the child with that thread.
+class NatsChild::Process {
+ public:
+  Process(const std::string& program, const fs::path& configuration, const fs::path& log, int lock)
+      : log_(open(log.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0600)) {
+    std::vector<std::string> words{program, "-c", configuration.string()};
+    thread_ = std::thread([this, words = std::move(words), lock]() mutable { run(words, lock); });
+    std::unique_lock guard(mutex_);
+    changed_.wait(guard, [&] { return pid_ >= 0 || failure_ != 0; });
+  }
+  ~Process() {
+    {
+      std::unique_lock guard(mutex_);
+      for (const int signal : {SIGINT, SIGKILL}) {
+        if (!ended_ && pid_ > 0) kill(pid_, signal);
+        if (signal == SIGINT) changed_.wait_for(guard, kPolitely, [&] { return ended_; });
+      }
+    }
+    thread_.join();
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  /// errno of what did not let it start.
+  [[nodiscard]] int failure() const {
+    const std::scoped_lock guard(mutex_);
+    return failure_;
+  }
+  [[nodiscard]] bool ended() const {
+    const std::scoped_lock guard(mutex_);
+    return ended_;
+  }
+  [[nodiscard]] int pid() const {
+    const std::scoped_lock guard(mutex_);
+    return pid_;
+  }
+
+ private:
+  void run(std::vector<std::string>& words, int lock) {
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    int errors[2] = {-1, -1};
+    if (pipe2(errors, O_CLOEXEC) != 0) return report(-1, errno);
+    const pid_t parent = getpid();
+    const pid_t child = fork();
+    if (child == 0) {  // only what is allowed between fork and exec
+      prctl(PR_SET_PDEATHSIG, SIGKILL);
+      if (getppid() != parent) _exit(1);
+      sigset_t none;
+      sigemptyset(&none);
+      sigprocmask(SIG_SETMASK, &none, nullptr);
+      setpgid(0, 0);  // Ctrl-C is for us; it is stopped by us
+      dup2(log_.file, STDOUT_FILENO);
+      dup2(log_.file, STDERR_FILENO);
+      fcntl(lock, F_SETFD, 0);
+      execvp(arguments[0], arguments.data());
+      if (errno == ENOENT && std::strcmp(arguments[0], "nats-server") == 0) execv(kElsewhere, arguments.data());
+      const int error = errno;
+      static_cast<void>(!write(errors[1], &error, sizeof error));
+      _exit(1);
+    }
+    int error = child < 0 ? errno : 0;
+    close(errors[1]);
+    static_cast<void>(!read(errors[0], &error, sizeof error));
+    close(errors[0]);
+    report(child, error);
+    if (child < 0) return;
+    siginfo_t ended{};
+    while (waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0 && errno == EINTR) continue;
+    const std::scoped_lock guard(mutex_);  // nobody signals it from here on: its number is free after waitpid
+    waitpid(child, nullptr, 0);
+    ended_ = true;
+    changed_.notify_all();
+  }
+  void report(pid_t child, int failure) {
+    const std::scoped_lock guard(mutex_);
+    pid_ = child;
+    failure_ = failure;
+    if (child < 0) ended_ = true;
+    changed_.notify_all();
+  }
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  ToBeClosed log_;
+  pid_t pid_ = -1;
+  int failure_ = 0;
+  bool ended_ = false;
+  std::thread thread_;
+};
+
+NatsChild::NatsChild(fs::path folder, NatsChildOptions options)
+    : folder_(std::move(folder)), options_(std::move(options)) {}
+
+NatsChild::~NatsChild() {
+  process_.reset();
+  if (lock_ >= 0) close(lock_);
+}
+
+bool NatsChild::running() const { return process_ && !process_->ended(); }
+
+Status NatsChild::lock_folder() {
+  const fs::path file = folder_ / "lock";
+  lock_ = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
+  if (lock_ < 0) return fail(ErrorCode::io, "{}: cannot be made: {}", file.string(), std::strerror(errno));
+  const auto end = Clock::now() + kOthersMayEnd;
+  while (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK) return fail(ErrorCode::io, "{}: {}", file.string(), std::strerror(errno));
+    if (Clock::now() > end)
+      return fail(ErrorCode::io, "{}: another nats-server has this folder: two would destroy its messages",
+                  folder_.string());
+    std::this_thread::sleep_for(kLookAgain);
+  }
+  return {};
+}
+
+Status NatsChild::check_disk(std::uint64_t needed) const {
+  struct statvfs disk {};
+  if (statvfs(folder_.c_str(), &disk) != 0)
+    return fail(ErrorCode::io, "{}: {}", folder_.string(), std::strerror(errno));
+  const std::uint64_t free = std::uint64_t{disk.f_bavail} * disk.f_frsize;
+  if (free >= needed) return {};
+  return fail(ErrorCode::io,
+              "{}: {} bytes are free on this disk, expected at least {}: nats-server hangs on a full one",
+              folder_.string(), free, needed);
+}
+
+/// The port and the address are known, and JetStream answers.
+Status NatsChild::wait_until_ready() {
+  const auto end = Clock::now() + std::chrono::duration<double>(options_.start_timeout_s);
+  const fs::path ports = folder_ / fmt::format("nats-server_{}.ports", pid_);
+  while (true) {
+    if (const std::string url = url_in(ports); !url.empty() && is_ready(url)) {
+      url_ = url;
+      return write_file((folder_ / "port").string(), std::to_string(port_of(url)));
+    }
+    const std::string log = (folder_ / "log").string();
+    if (process_->ended()) return fail(ErrorCode::io, "nats-server: {} ({})", complaint_of(log), log);
+    if (Clock::now() > end)
+      return fail(ErrorCode::io, "nats-server: not ready after {} s: {} ({})", options_.start_timeout_s,
+                  complaint_of(log), log);
+    std::this_thread::sleep_for(kLookAgain);
+  }
+}
+
+Status NatsChild::launch(int port) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder_, ignored))
+    if (entry.path().extension() == ".ports") fs::remove(entry.path(), ignored);  // of killed ones
+  const fs::path file = folder_ / "configuration";
+  if (const Status written = write_file(file.string(), configuration(folder_, options_, port)); !written)
+    return written;
+  process_.reset();
+  process_ = std::make_unique<Process>(options_.program, file, folder_ / "log", lock_);
+  pid_ = process_->pid();
+  if (const int error = process_->failure(); error == ENOENT)
+    return fail(ErrorCode::io, "{}: not installed (Debian: apt install nats-server)", options_.program);
+  else if (error != 0)
+    return fail(ErrorCode::io, "{}: cannot be started: {}", options_.program, std::strerror(error));
+  Status ready = wait_until_ready();
+  if (!ready) process_.reset();
+  return ready;
+}
+
+Result<std::unique_ptr<NatsChild>> NatsChild::start(const fs::path& folder, const NatsChildOptions& options) {
+  if (!options.allow_insecure && !is_loopback(options.host))
+    return fail(ErrorCode::configuration,
+                "host {}: others than this machine could write to it: needs TLS, or "
+                "allow_insecure",
+                options.host);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return fail(ErrorCode::io, "{}: cannot be made: {}", folder.string(), error.message());
+  std::unique_ptr<NatsChild> child(new NatsChild(fs::absolute(folder), options));
+  if (const Status locked = child->lock_folder(); !locked) return tl::unexpected(locked.error());
+  if (const Status room = child->check_disk(options.max_store_bytes + options.min_free_bytes); !room)
+    return tl::unexpected(room.error());
+  const int last = std::atoi(read_file((child->folder_ / "port").string()).value_or("0").c_str());
+  Status launched = child->launch(options.port != 0 ? options.port : last);
+  if (!launched && options.port == 0 && last != 0) launched = child->launch(0);
+  if (!launched) return tl::unexpected(launched.error());
+  return child;
+}
+
+Status NatsChild::tend() {
+  if (const Status room = check_disk(options_.min_free_bytes / 2); !room) {
+    process_.reset();
+    return room;
+  }
+  return running() ? Status() : launch(port_of(url_));
+}
+
+}  // namespace tutti::bus

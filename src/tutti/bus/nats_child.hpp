@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
+
+namespace tutti::bus {
+
+struct NatsChildOptions {
+  std::string program = "nats-server";
+  std::string host = "127.0.0.1";
+  int port = 0;
+  bool allow_insecure = false;
+  std::uint64_t max_store_bytes = std::uint64_t{4} << 30U;
+  std::uint64_t min_free_bytes = std::uint64_t{1} << 30U;
+  double start_timeout_s = 30.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("program", program, any(), "Searched for in PATH, then in /usr/sbin.");
+    v.field("host", host, any(), "Address to listen at.");
+    v.field("port", port, between(0, 65535), "0 = the port of the last time if that is free, else any that is.");
+    v.field("allow_insecure", allow_insecure, any(), "Listen at other addresses than this machine's own, without TLS.");
+    v.field("max_store_bytes", max_store_bytes, greater_than(0.0), "What messages may take on the disk.");
+    v.field("min_free_bytes", min_free_bytes, any(),
+            "Beside max_store_bytes, this must be free on the disk: nats-server hangs on a full one.");
+    v.field("start_timeout_s", start_timeout_s, greater_than(0.0), "It must be ready by then.");
+  }
+};
+
+/// Only reachable from this machine: 127.0.0.0/8, ::1, localhost.
+bool is_loopback(std::string_view host);
+
+/// A nats-server with JetStream as a child process. It ends with this process, however that ends, and its folder,
+/// which holds its configuration, messages and log, belongs to one at a time.
+class NatsChild {
+ public:
+  /// Returns when it takes messages. Makes the folder if it is missing. Errors: not installed, the port is taken,
+  /// the folder is another one's, too little disk, or what its log says.
+  static Result<std::unique_ptr<NatsChild>> start(const std::filesystem::path& folder,
+                                                  const NatsChildOptions& options = {});
+  /// Stops it: first politely.
+  ~NatsChild();
+  NatsChild(const NatsChild&) = delete;
+  NatsChild& operator=(const NatsChild&) = delete;
+
+  [[nodiscard]] const std::string& url() const { return url_; }  ///< "nats://127.0.0.1:40123"
+  [[nodiscard]] int pid() const { return pid_; }
+  [[nodiscard]] bool running() const;
+  /// To be called about once a second: starts it again, at the same address, when it has ended, and stops it for as
+  /// long as less than half of min_free_bytes are free. An error says why it is not running now.
+  Status tend();
+
+ private:
+  class Process;
+  NatsChild(std::filesystem::path folder, NatsChildOptions options);
+  Status lock_folder();
+  Status launch(int port);
+  [[nodiscard]] Status check_disk(std::uint64_t needed) const;
+  [[nodiscard]] Status wait_until_ready();
+
+  std::filesystem::path folder_;
+  NatsChildOptions options_;
+  int lock_ = -1;  ///< Open and locked; the child has it too, so that it holds the lock to its end.
+  std::unique_ptr<Process> process_;
+  std::string url_;
+  int pid_ = -1;
+};
+
+}  // namespace tutti::bus
