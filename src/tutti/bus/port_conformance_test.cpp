@@ -2,15 +2,17 @@
 // What every implementation of Port owes (port.hpp, delivery.hpp), for each of them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
-#include <functional>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "support/bus/nats_network.hpp"
 #include "tutti/bus/port.hpp"
 #include "tutti/bus/simulated_network.hpp"
 
@@ -49,9 +51,63 @@ class Simulated final : public PortNetwork {
   double now_s_ = 0.0;
 };
 
-class PortConformance : public ::testing::TestWithParam<std::function<std::unique_ptr<PortNetwork>()>> {
+class OverNats final : public PortNetwork {
+ public:
+  std::unique_ptr<Port> connect(Endpoint endpoint) override {
+    auto port = network_.open(endpoint);
+    ports_.push_back(port.get());
+    return std::make_unique<Tracked>(*this, std::move(port));
+  }
+  /// Everything sent is on the bus, everything acknowledged is so there; then what is under way has a moment.
+  void settle() override {
+    const auto idle = [](const NatsPort* port) {
+      const NatsState state = port->state();
+      return state.connected && state.waiting_messages == 0 && state.waiting_acknowledgements == 0;
+    };
+    EXPECT_TRUE(cut_ || test::within(10.0, [&] { return std::ranges::all_of(ports_, idle); }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  void cut() override { network_.relay().hold(cut_ = true); }
+  void mend() override { network_.relay().hold(cut_ = false); }
+
+ private:
+  /// Says when it ends.
+  class Tracked final : public Port {
+   public:
+    Tracked(OverNats& network, std::unique_ptr<NatsPort> port) : network_(network), port_(std::move(port)) {}
+    ~Tracked() override { std::erase(network_.ports_, port_.get()); }
+    Status send(Envelope envelope) override { return port_->send(std::move(envelope)); }
+    std::vector<Received> receive() override { return port_->receive(); }
+    void acknowledge(std::uint64_t ticket) override { port_->acknowledge(ticket); }
+    void still_busy(std::uint64_t ticket) override { port_->still_busy(ticket); }
+
+   private:
+    OverNats& network_;
+    std::unique_ptr<NatsPort> port_;
+  };
+  test::NatsNetwork network_;
+  std::vector<const NatsPort*> ports_;
+  bool cut_ = false;
+};
+
+template <class T>
+std::unique_ptr<PortNetwork> make() {
+  return std::make_unique<T>();
+}
+
+struct Implementation {
+  const char* name;
+  std::unique_ptr<PortNetwork> (*make)();
+};
+
+class PortConformance : public ::testing::TestWithParam<Implementation> {
  protected:
   using Messages = std::multiset<std::string>;
+
+  void SetUp() override {
+    if (GetParam().name == std::string("nats")) TUTTI_SKIP_WITHOUT_NATS_SERVER();
+    network = GetParam().make();
+  }
 
   void send(Port& port, Endpoint from, Endpoint to, MessageKind kind, const std::string& id, const std::string& bytes) {
     const Status sent = port.send({from, to, kind, id, std::make_shared<const std::string>(bytes)});
@@ -84,7 +140,7 @@ class PortConformance : public ::testing::TestWithParam<std::function<std::uniqu
     return bytes;
   }
 
-  std::unique_ptr<PortNetwork> network = GetParam()();
+  std::unique_ptr<PortNetwork> network;
   Endpoint server = Endpoint::server(), alpha = Endpoint::of(RobotId{0}), bravo = Endpoint::of(RobotId{1});
   Endpoint first = Endpoint::worker(0), second = Endpoint::worker(1);
 };
@@ -253,7 +309,10 @@ TEST_P(PortConformance, WithoutContactNothingWaitsAndNothingIsLost) {
   EXPECT_EQ(newest(*robot, MessageKind::proxy_graph), "graph");
 }
 
-INSTANTIATE_TEST_SUITE_P(Simulated, PortConformance, ::testing::Values([] { return std::make_unique<Simulated>(); }));
+INSTANTIATE_TEST_SUITE_P(Port, PortConformance,
+                         ::testing::Values(Implementation{"simulated", &make<Simulated>},
+                                           Implementation{"nats", &make<OverNats>}),
+                         [](const auto& of) { return std::string(of.param.name); });
 
 }  // namespace
 }  // namespace tutti::bus

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tutti/bus/internal/nats_connection.hpp"
+#include "tutti/bus/internal/nats_inbox.hpp"
+#include "tutti/bus/internal/nats_outbox.hpp"
+
+namespace tutti::bus {
+
+inline constexpr auto kTick = std::chrono::milliseconds(100);
+inline constexpr auto kTryAgain = std::chrono::milliseconds(500);
+
+/// A connection with where the bus confirms what was sent over it.
+struct Session {
+  std::shared_ptr<NatsConnection> connection;
+  natsSubscription* confirmations = nullptr;
+};
+
+class JetStreamPort final : public NatsPort {
+ public:
+  JetStreamPort(Endpoint self, NatsPortOptions options);
+  ~JetStreamPort() override;
+  JetStreamPort(const JetStreamPort&) = delete;
+  JetStreamPort& operator=(const JetStreamPort&) = delete;
+
+  Status send(Envelope envelope) override;
+  std::vector<Received> receive() override;
+  void acknowledge(std::uint64_t ticket) override;
+  void still_busy(std::uint64_t ticket) override;
+  [[nodiscard]] NatsState state() const override;
+
+ private:
+  // The sender's thread.
+  void send_all();
+  bool connect();
+  bool send_one(const NatsConnection& connection);
+  bool acknowledge_one(const NatsConnection& connection);
+  void say_farewell();
+
+  // The receivers' threads.
+  template <class Make, class Step>
+  void keep(Make make, Step step);
+  void hear_confirmations();
+  void pull(const std::string& stream, const std::string& consumer);
+  /// No more is fetched for now.
+  [[nodiscard]] bool is_full() const;
+  void take_in(natsMsg* message, const NatsConnection& connection);
+  void hear_status();
+  void hear_retained();
+  void put_retained(MessageKind kind, std::string bytes);
+
+  [[nodiscard]] std::shared_ptr<Session> session() const {
+    const std::scoped_lock guard(mutex_);
+    return session_;
+  }
+  void note(const std::string& error) {
+    const std::scoped_lock guard(mutex_);
+    last_error_ = error;
+  }
+  /// False at the end of the port.
+  template <class Duration>
+  bool pause(Duration duration) {
+    std::unique_lock guard(mutex_);
+    return !changed_.wait_for(guard, duration, [&] { return stopping_.load(); });
+  }
+
+  Endpoint self_;
+  NatsPortOptions options_;
+  std::string answer_to_;  ///< Confirmation of piece 7 comes to "ANSWER_TO.7".
+  std::atomic<bool> stopping_ = false;
+  std::atomic<std::uint64_t> cuts_ = 0;     ///< Sessions and reconnections so far.
+  std::atomic<std::size_t> listening_ = 0;  ///< Threads with a subscription.
+  bool renewed_ = false;                    ///< The server's consumers were.
+  std::uint64_t reconnects_ = 0;            ///< Of the present session that the sender knows of.
+  std::map<std::uint64_t, int> tries_;      ///< To acknowledge, by ticket.
+
+  mutable std::mutex mutex_;  ///< For what follows.
+  std::condition_variable changed_;
+  std::shared_ptr<Session> session_;
+  Outbox outbox_;
+  Inbox inbox_;
+  std::vector<std::string> busy_;                ///< Where work is said to go on.
+  std::map<MessageKind, std::string> retained_;  ///< What was last given.
+  std::uint64_t refused_ = 0;
+  std::string last_error_;
+
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace tutti::bus

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <nats/nats.h>
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/bus/nats_port.hpp"
+
+/// The one place with libnats's options, and its objects with owners. No callbacks of libnats's threads: whoever waits
+/// for a message asks for it, so that nothing is called when its owner is gone.
+namespace tutti::bus {
+
+struct NatsFree {
+  void operator()(natsMsg* message) const { natsMsg_Destroy(message); }
+  void operator()(natsOptions* options) const { natsOptions_Destroy(options); }
+  void operator()(natsSubscription* subscription) const { natsSubscription_Destroy(subscription); }
+  void operator()(natsStatistics* statistics) const { natsStatistics_Destroy(statistics); }
+  void operator()(jsStreamInfo* info) const { jsStreamInfo_Destroy(info); }
+  void operator()(jsConsumerInfo* info) const { jsConsumerInfo_Destroy(info); }
+  void operator()(kvStore* store) const { kvStore_Destroy(store); }
+};
+template <class T>
+using NatsOwned = std::unique_ptr<T, NatsFree>;
+
+/// How long the bus is waited for when it is asked something.
+inline constexpr std::chrono::milliseconds kNatsAnswer{5000};
+
+Status check(const NatsPortOptions& options);
+
+class NatsConnection {
+ public:
+  /// Once it is there it comes back by itself, however long it was gone. `name` in the bus's logs and of its inboxes.
+  static Result<std::shared_ptr<NatsConnection>> open(const NatsPortOptions& options, const std::string& name);
+  ~NatsConnection();
+  NatsConnection(const NatsConnection&) = delete;
+  NatsConnection& operator=(const NatsConnection&) = delete;
+
+  [[nodiscard]] natsConnection* get() const { return connection_; }
+  [[nodiscard]] bool connected() const { return natsConnection_Status(connection_) == NATS_CONN_STATUS_CONNECTED; }
+  [[nodiscard]] bool closed() const { return natsConnection_IsClosed(connection_); }
+  [[nodiscard]] std::uint64_t reconnects() const;
+  [[nodiscard]] std::string last_error() const;
+
+  /// Streams and the bucket of retained values.
+  [[nodiscard]] Status prepare(const NatsPortOptions& options) const;
+  /// The server's consumer of a stream, anew: whatever is not acknowledged comes at once.
+  [[nodiscard]] Status renew_consumer(const std::string& stream, const std::string& consumer) const;
+  // What these return is the connection's, which frees it when it is closed: libnats (issue 637) may be at a message
+  // for a subscription that is being destroyed.
+  /// Of a stream with a consumer, which is made if it is missing.
+  [[nodiscard]] Result<natsSubscription*> pull(const std::string& stream, const std::string& consumer);
+  [[nodiscard]] Result<natsSubscription*> subscribe(const std::string& subject);
+
+  /// The value retained at this subject; nothing if there is none.
+  [[nodiscard]] Result<std::optional<std::string>> retained(const std::string& bucket,
+                                                            const std::string& subject) const;
+  /// The message is acknowledged, and the bus has said so.
+  [[nodiscard]] Status acknowledge(const std::string& reply) const;
+  /// Not waiting for an answer; `id` and `answer_to` may be empty.
+  [[nodiscard]] Status publish(const std::string& subject, const std::string& answer_to, const std::string& id,
+                               std::string_view bytes) const;
+  void flush() const { natsConnection_FlushTimeout(connection_, kNatsAnswer.count()); }
+
+ private:
+  explicit NatsConnection(std::string url) : url_(std::move(url)) {}
+  [[nodiscard]] Status add_stream(jsStreamConfig& stream) const;
+  [[nodiscard]] tl::unexpected<Error> failure(natsStatus status, std::string_view doing, int code = 0) const;
+
+  std::string url_;
+  natsConnection* connection_ = nullptr;
+  jsCtx* streams_ = nullptr;
+  std::mutex mutex_;  ///< For what follows.
+  std::vector<NatsOwned<natsSubscription>> subscriptions_;
+};
+
+std::string_view bytes_of(const natsMsg* message);
+
+std::string submap_stream(const std::string& mission);
+std::string verdict_stream(const std::string& mission);
+std::string job_stream(const std::string& mission);
+std::string retained_bucket(const std::string& mission);
+
+}  // namespace tutti::bus

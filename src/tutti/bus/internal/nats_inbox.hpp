@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "tutti/bus/internal/nats_names.hpp"
+#include "tutti/bus/port.hpp"
+
+namespace tutti::bus {
+
+/// What has come to a port, from its first part until it is acknowledged on the bus. A message that comes again
+/// meanwhile is not given again (the bus thinks that 30 s are long), nor for some time after: a bus that is killed
+/// forgets acknowledgements.
+class Inbox {
+ public:
+  explicit Inbox(Endpoint self) : self_(self) {}
+
+  /// A part of a durable message or a job; `reply`: where the bus awaits its acknowledgement. False: it does not fit to
+  /// the parts that came before.
+  bool add_part(Endpoint from, const Part& part, std::string_view bytes, std::string reply);
+  /// In the place of one of its kind that is not taken yet.
+  void put_retained(Endpoint from, MessageKind kind, std::string bytes);
+  /// Of those not taken the oldest go when there are too many.
+  void put_best_effort(Endpoint from, MessageKind kind, std::string bytes);
+
+  std::vector<Received> take();
+  void acknowledge(std::uint64_t ticket);
+  /// Where the bus is to be told that work on the message goes on.
+  [[nodiscard]] std::vector<std::string> replies_of(std::uint64_t ticket) const;
+
+  struct Acknowledgement {
+    std::uint64_t ticket = 0;
+    std::vector<std::string> replies;
+  };
+  /// The oldest that the bus has not been told.
+  [[nodiscard]] std::optional<Acknowledgement> next_acknowledgement() const;
+  /// The bus knows, or cannot be told and will send the message again: it is forgotten here.
+  void forget(std::uint64_t ticket);
+  /// Where messages that came again although they are acknowledged are to be acknowledged once more.
+  [[nodiscard]] std::vector<std::string> take_strays() { return std::exchange(strays_, {}); }
+  [[nodiscard]] std::size_t acknowledgements() const { return acknowledged_.size(); }
+  /// Of all that is not acknowledged, whole or not.
+  [[nodiscard]] std::vector<std::string> unacknowledged() const;
+
+  /// Of whole messages; those that the bus was not told to forget.
+  [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
+  [[nodiscard]] std::size_t held_messages() const { return held_.size(); }
+
+ private:
+  using Name = std::tuple<Endpoint, MessageKind, std::string>;  ///< From, kind, id.
+  struct Message {
+    Assembly assembly;
+    std::uint64_t ticket = 0;  ///< 0: not whole yet.
+    std::uint64_t size = 0;
+    bool acknowledged = false;
+  };
+
+  Endpoint self_;
+  std::uint64_t last_ticket_ = 0;
+  std::uint64_t held_bytes_ = 0;
+  std::map<Name, Message> messages_;
+  std::map<std::uint64_t, Name> held_;  ///< By ticket.
+  std::deque<std::uint64_t> acknowledged_;
+  std::deque<Received> untaken_;
+  std::set<Name> done_;  ///< The last ones that were acknowledged.
+  std::deque<Name> done_in_order_;
+  std::vector<std::string> strays_;
+};
+
+}  // namespace tutti::bus

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/internal/nats_inbox.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace tutti::bus {
+namespace {
+
+using Replies = std::vector<std::string>;
+
+const Endpoint kAlpha = Endpoint::of(RobotId{0});
+const Endpoint kBravo = Endpoint::of(RobotId{1});
+
+Part part(const std::string& id, std::uint32_t index = 0, std::uint32_t count = 1) {
+  return {MessageKind::submap, id, index, count};
+}
+
+TEST(NatsInbox, AMessageIsGivenOnceWhenItIsWholeAndAcknowledgedInAllItsParts) {
+  Inbox inbox(Endpoint::server());
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 1, 2), "def", "r1"));
+  EXPECT_TRUE(inbox.take().empty());
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 0, 2), "abc", "r0"));
+  const auto taken = inbox.take();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(*taken[0].envelope.bytes, "abcdef");
+  EXPECT_EQ(taken[0].envelope.from, kAlpha);
+  EXPECT_EQ(taken[0].envelope.to, Endpoint::server());
+  EXPECT_EQ(inbox.held_bytes(), 6U);
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 0, 2), "abc", "r0 again"));  // after the bus's 30 s
+  EXPECT_TRUE(inbox.take().empty());
+  EXPECT_EQ(inbox.unacknowledged(), (Replies{"r0 again", "r1"}));
+  EXPECT_FALSE(inbox.next_acknowledgement());
+  inbox.acknowledge(taken[0].ticket);
+  inbox.acknowledge(taken[0].ticket);
+  EXPECT_EQ(inbox.next_acknowledgement()->replies, (Replies{"r0 again", "r1"}));
+  EXPECT_TRUE(inbox.unacknowledged().empty());
+  inbox.forget(taken[0].ticket);
+  EXPECT_FALSE(inbox.next_acknowledgement());
+  EXPECT_EQ(inbox.held_bytes(), 0U);
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 0, 2), "abc", "r0"));  // a bus that was killed has forgotten
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 1, 2), "def", "r1"));
+  EXPECT_TRUE(inbox.take().empty());
+  EXPECT_EQ(inbox.take_strays(), (Replies{"r0", "r1"}));
+  EXPECT_TRUE(inbox.take_strays().empty());
+}
+
+TEST(NatsInbox, MessagesOfOneIdButOtherSendersAreOthers) {
+  Inbox inbox(Endpoint::server());
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 0, 2), "abc", "1"));
+  EXPECT_TRUE(inbox.add_part(kBravo, part("a", 1, 2), "def", "2"));
+  EXPECT_TRUE(inbox.take().empty());
+  EXPECT_TRUE(inbox.add_part(kBravo, part("a", 0, 2), "ABC", "3"));
+  const auto taken = inbox.take();
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(*taken[0].envelope.bytes, "ABCdef");
+  EXPECT_FALSE(inbox.add_part(kAlpha, part("a", 1, 3), "of another", "4"));
+}
+
+TEST(NatsInbox, OfRetainedAndBestEffortOnlySoMuchWaits) {
+  Inbox inbox(kAlpha);
+  inbox.put_retained(Endpoint::server(), MessageKind::proxy_graph, "1");
+  inbox.put_retained(Endpoint::server(), MessageKind::receipt, "receipt");
+  inbox.put_retained(Endpoint::server(), MessageKind::proxy_graph, "2");
+  auto taken = inbox.take();
+  ASSERT_EQ(taken.size(), 2U);
+  EXPECT_EQ(*taken[1].envelope.bytes, "2");
+  inbox.acknowledge(taken[0].ticket);  // needless, and allowed
+  EXPECT_FALSE(inbox.next_acknowledgement());
+  for (int i = 0; i < 5000; ++i) inbox.put_best_effort(kBravo, MessageKind::status, std::to_string(i));
+  taken = inbox.take();
+  EXPECT_EQ(taken.size(), 1000U);
+  EXPECT_EQ(*taken.back().envelope.bytes, "4999");
+}
+
+}  // namespace
+}  // namespace tutti::bus

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/internal/nats_names.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/check.hpp"
+#include "tutti/bus/delivery.hpp"
+
+namespace tutti::bus {
+namespace {
+
+constexpr std::array kSent{MessageKind::submap, MessageKind::proxy_graph, MessageKind::receipt,
+                           MessageKind::job,    MessageKind::verdicts,    MessageKind::status};
+
+std::optional<MessageKind> kind_of(std::string_view word) {
+  const auto* found = std::ranges::find_if(kSent, [&](MessageKind kind) { return word_of(kind) == word; });
+  return found == kSent.end() ? std::nullopt : std::optional(*found);
+}
+
+std::optional<std::uint32_t> number_of(std::string_view text) {
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
+}
+
+std::string path_of(Endpoint end) {
+  TUTTI_CHECK(end.role != Endpoint::Role::server, "the server has no subject of its own");
+  return fmt::format("{}.{}", end.role == Endpoint::Role::robot ? "robot" : "worker", end.number);
+}
+
+std::vector<std::string_view> split(std::string_view text, char at) {
+  std::vector<std::string_view> words;
+  for (std::size_t end = text.find(at); end != std::string_view::npos; end = text.find(at)) {
+    words.push_back(text.substr(0, end));
+    text.remove_prefix(end + 1);
+  }
+  words.push_back(text);
+  return words;
+}
+
+}  // namespace
+
+bool is_mission_name(std::string_view mission) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+  };
+  return !mission.empty() && mission.size() <= 32 && std::ranges::all_of(mission, allowed);
+}
+
+std::string word_of(MessageKind kind) {
+  std::string word = wire::name(kind);
+  std::ranges::replace(word, ' ', '_');
+  return word;
+}
+
+std::string subject_of(const std::string& mission, const Envelope& envelope) {
+  switch (delivery_of(envelope.kind)) {
+    case Delivery::retained:
+      return fmt::format("$KV.GRAPH_{}.{}.{}", mission, path_of(envelope.to), word_of(envelope.kind));
+    case Delivery::work_queue:
+      return fmt::format("mission.{}.jobs.loop", mission);
+    case Delivery::durable:
+    case Delivery::best_effort:
+      break;
+  }
+  return fmt::format("mission.{}.{}.{}", mission, path_of(envelope.from), word_of(envelope.kind));
+}
+
+std::optional<Address> address_of(std::string_view subject) {
+  const auto words = split(subject, '.');
+  if (words.size() < 3) return std::nullopt;
+  const std::string_view role = words[words.size() - 3];
+  const auto number = number_of(words[words.size() - 2]);
+  const auto kind = kind_of(words.back());
+  if (!number || !kind || (role != "robot" && role != "worker")) return std::nullopt;
+  return Address{role == "robot" ? Endpoint::of(RobotId{*number}) : Endpoint::worker(*number), *kind};
+}
+
+std::string to_string(const Part& part) {
+  return fmt::format("{}/{}/{}.{}", word_of(part.kind), part.id, part.index, part.count);
+}
+
+std::optional<Part> part_of(std::string_view text) {
+  const std::size_t first = text.find('/');
+  const std::size_t last = text.rfind('/');
+  if (first == last) return std::nullopt;  // none, or one
+  const auto kind = kind_of(text.substr(0, first));
+  const auto numbers = split(text.substr(last + 1), '.');
+  if (!kind || numbers.size() != 2) return std::nullopt;
+  const auto index = number_of(numbers[0]);
+  const auto count = number_of(numbers[1]);
+  if (!index || !count || *count > kMostParts || *index >= *count) return std::nullopt;
+  return Part{*kind, std::string(text.substr(first + 1, last - first - 1)), *index, *count};
+}
+
+bool Assembly::add(const Part& part, std::string_view bytes, std::string reply) {
+  if (count_ == 0) count_ = part.count;
+  if (part.count != count_) return false;
+  if (!taken_) bytes_.try_emplace(part.index, bytes);
+  replies_.insert_or_assign(part.index, std::move(reply));
+  return true;
+}
+
+std::string Assembly::take_bytes() {
+  TUTTI_CHECK(complete() && !taken_, "{} of {} parts", replies_.size(), count_);
+  taken_ = true;
+  std::string all;
+  for (const auto& [index, bytes] : bytes_) all += bytes;
+  bytes_.clear();
+  return all;
+}
+
+}  // namespace tutti::bus

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "tutti/bus/envelope.hpp"
+
+namespace tutti::bus {
+
+/// A message is cut into parts of this size, so that each gets through a slow link within the time for one write
+/// (1 Mbit/s: 1 s).
+inline constexpr std::size_t kPartBytes = 128U << 10U;
+inline constexpr std::uint32_t kMostParts = 128;  ///< 16 MiB
+inline constexpr std::size_t kLargestWhole =
+    (8U << 20U) - (8U << 10U);  ///< Of what is not cut; NATS counts headers too.
+
+/// 1 to 32 letters, digits, '-' or '_'.
+bool is_mission_name(std::string_view mission);
+
+/// "mission.M.robot.3.submap", "mission.M.worker.7.verdicts", "mission.M.jobs.loop", "$KV.GRAPH_M.robot.3.proxy_graph".
+std::string subject_of(const std::string& mission, const Envelope& envelope);
+/// "proxy_graph"
+std::string word_of(MessageKind kind);
+
+/// What a subject of ours says of its message; nothing when it is none of a robot or worker.
+struct Address {
+  Endpoint end;  ///< The robot or worker: who sent it, or of retained ones to whom.
+  MessageKind kind = MessageKind::submap;
+};
+std::optional<Address> address_of(std::string_view subject);
+
+/// Which part of which message. NATS stores one message of an id only: "submap/3/1700000000/4/0.2" is the first of two.
+struct Part {
+  MessageKind kind = MessageKind::submap;
+  std::string id;
+  std::uint32_t index = 0;
+  std::uint32_t count = 1;
+  friend bool operator==(const Part&, const Part&) = default;
+};
+std::string to_string(const Part& part);
+std::optional<Part> part_of(std::string_view text);
+
+/// The parts of one message on their way in: in any order, any of them again.
+class Assembly {
+ public:
+  /// False: the message has another number of parts, and this one is not taken.
+  bool add(const Part& part, std::string_view bytes, std::string reply);
+  [[nodiscard]] bool complete() const { return replies_.size() == count_; }
+  /// Once, when it is complete: the parts' bytes are kept no longer.
+  [[nodiscard]] std::string take_bytes();
+  /// Where each part is acknowledged: that of its newest delivery.
+  [[nodiscard]] const std::map<std::uint32_t, std::string>& replies() const { return replies_; }
+
+ private:
+  std::uint32_t count_ = 0;
+  bool taken_ = false;
+  std::map<std::uint32_t, std::string> bytes_;
+  std::map<std::uint32_t, std::string> replies_;
+};
+
+}  // namespace tutti::bus

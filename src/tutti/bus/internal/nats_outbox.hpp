@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "tutti/base/result.hpp"
+#include "tutti/bus/delivery.hpp"
+#include "tutti/bus/envelope.hpp"
+
+namespace tutti::bus {
+
+/// What a port has to send, in parts, until the bus has confirmed each. Of time it knows what it is told.
+class Outbox {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  struct Piece {
+    std::uint64_t number = 0;
+    Delivery delivery = Delivery::durable;
+    std::string subject;
+    std::string id;  ///< to_string(Part); empty where the bus is to keep each.
+    std::shared_ptr<const std::string> whole;
+    std::size_t begin = 0;
+    std::size_t size = 0;
+    [[nodiscard]] std::string_view bytes() const { return std::string_view(*whole).substr(begin, size); }
+  };
+
+  Outbox(std::string mission, std::uint64_t max_waiting_bytes)
+      : mission_(std::move(mission)), max_waiting_bytes_(max_waiting_bytes) {}
+
+  /// Refused: durable messages and jobs above the limit, anything too large. A retained one takes the place of one
+  /// that waits for the same receiver; status waits for nothing.
+  Status add(const Envelope& envelope);
+  /// What is to be sent now, if anything: at most so many are without confirmation at a time, and of one retained
+  /// value one. It is under way from here on; what is best effort is forgotten.
+  std::optional<Piece> next(Time now);
+  /// The bus has it.
+  void confirm(std::uint64_t number);
+  /// The bus does not take it: again, after a while.
+  void refuse(std::uint64_t number, Time now);
+  /// What was under way for too long waits again.
+  void expire(Time now);
+  /// All that was under way waits again: the connection was gone, and with it maybe the messages.
+  void resend_all();
+  /// What is best effort is not heard without a connection.
+  void forget_best_effort();
+
+  [[nodiscard]] std::size_t messages() const { return waiting_.size() + under_way_.size(); }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  /// First status, then retained values, then the rest; within these as they came.
+  using Order = std::pair<int, std::uint64_t>;
+  struct UnderWay {
+    Piece piece;
+    Time until;
+  };
+  static Order order_of(const Piece& piece);
+  void put_back(Piece piece);
+  void drop_waiting(Delivery delivery, const std::string* subject);
+  [[nodiscard]] bool is_under_way(const std::string& subject) const;
+
+  std::string mission_;
+  std::uint64_t max_waiting_bytes_;
+  std::uint64_t bytes_ = 0;  ///< Of all pieces.
+  std::uint64_t next_number_ = 0;
+  Time not_before_{};
+  std::map<Order, Piece> waiting_;
+  std::map<std::uint64_t, UnderWay> under_way_;
+};
+
+}  // namespace tutti::bus

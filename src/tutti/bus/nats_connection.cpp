@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/internal/nats_connection.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+#include "tutti/bus/internal/nats_names.hpp"
+#include "tutti/bus/nats_child.hpp"
+
+namespace tutti::bus {
+namespace {
+
+// What was measured, and what bites: shared/NATS.md.
+constexpr std::int64_t kReconnect_ms = 500;
+constexpr std::int64_t kReconnectJitter_ms = 200;
+constexpr std::int64_t kConnect_ms = 2000;
+constexpr std::int64_t kPing_ms = 10'000;
+constexpr int kPingsOut = 2;
+constexpr std::int64_t kWrite_ms = 15'000;  // without it a cut blocks for minutes; a part takes 1 s at 1 Mbit/s
+constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+constexpr std::int64_t kAcknowledge_ns = 30'000'000'000;  // then a message comes again
+constexpr std::int64_t kUnacknowledged = 1024;            // parts; more than the robots have under way at a time
+constexpr std::int64_t kDeliveries = 5;                   // of a job: what ends five workers is not given to a sixth
+
+/// Errors are in NatsConnection::last_error(); without a handler libnats prints them.
+void say_nothing(natsConnection* /*connection*/, natsSubscription* /*subscription*/, natsStatus /*status*/,
+                 void* /*closure*/) {}
+
+std::string host_of(std::string_view url) {
+  const std::size_t scheme = url.find("://");
+  if (scheme != std::string_view::npos) url.remove_prefix(scheme + 3);
+  if (const std::size_t user = url.rfind('@'); user != std::string_view::npos) url.remove_prefix(user + 1);
+  const std::size_t port = url.rfind(':');
+  return std::string(port == std::string_view::npos || url.ends_with(']') ? url : url.substr(0, port));
+}
+
+NatsOwned<natsOptions> make_options(const std::string& url, const std::string& name) {
+  natsOptions* made = nullptr;
+  if (natsOptions_Create(&made) != NATS_OK) return nullptr;
+  NatsOwned<natsOptions> options(made);
+  const std::string inbox = "_INBOX_" + name;
+  const bool all =
+      natsOptions_SetURL(made, url.c_str()) == NATS_OK && natsOptions_SetName(made, name.c_str()) == NATS_OK &&
+      natsOptions_SetCustomInboxPrefix(made, inbox.c_str()) == NATS_OK &&
+      natsOptions_SetMaxReconnect(made, -1) == NATS_OK &&
+      natsOptions_SetReconnectWait(made, kReconnect_ms) == NATS_OK &&
+      natsOptions_SetReconnectJitter(made, kReconnectJitter_ms, kReconnectJitter_ms) == NATS_OK &&
+      natsOptions_SetTimeout(made, kConnect_ms) == NATS_OK && natsOptions_SetPingInterval(made, kPing_ms) == NATS_OK &&
+      natsOptions_SetMaxPingsOut(made, kPingsOut) == NATS_OK &&
+      natsOptions_SetWriteDeadline(made, kWrite_ms) == NATS_OK &&
+      natsOptions_SetErrorHandler(made, &say_nothing, nullptr) == NATS_OK;
+  return all ? std::move(options) : nullptr;
+}
+
+}  // namespace
+
+std::string_view bytes_of(const natsMsg* message) {
+  const char* data = natsMsg_GetData(message);
+  return {data == nullptr ? "" : data, static_cast<std::size_t>(natsMsg_GetDataLength(message))};
+}
+
+std::string submap_stream(const std::string& mission) { return "SUBMAPS_" + mission; }
+std::string verdict_stream(const std::string& mission) { return "VERDICTS_" + mission; }
+std::string job_stream(const std::string& mission) { return "JOBS_" + mission; }
+std::string retained_bucket(const std::string& mission) { return "GRAPH_" + mission; }
+
+tl::unexpected<Error> NatsConnection::failure(natsStatus status, std::string_view doing, int code) const {
+  return fail(ErrorCode::io, "{}: {}: {}{}", url_, doing, natsStatus_GetText(status),
+              code == 0 ? "" : fmt::format(" (JetStream error {})", code));
+}
+
+Status check(const NatsPortOptions& options) {
+  if (!is_mission_name(options.mission))
+    return fail(ErrorCode::configuration, "mission '{}': 1 to 32 letters, digits, '-' and '_' were expected",
+                options.mission);
+  if (!options.allow_insecure && !is_loopback(host_of(options.url)))
+    return fail(ErrorCode::configuration, "{}: another machine, and no TLS: needs allow_insecure", options.url);
+  return {};
+}
+
+Result<std::shared_ptr<NatsConnection>> NatsConnection::open(const NatsPortOptions& options, const std::string& name) {
+  std::shared_ptr<NatsConnection> made(new NatsConnection(options.url));
+  const auto settings = make_options(options.url, name);
+  if (!settings) return fail(ErrorCode::configuration, "{}: not an address that NATS understands", options.url);
+  natsStatus status = natsConnection_Connect(&made->connection_, settings.get());
+  if (status != NATS_OK) return made->failure(status, "connecting");
+  jsOptions streams;
+  jsOptions_Init(&streams);
+  streams.Wait = kNatsAnswer.count();
+  status = natsConnection_JetStream(&made->streams_, made->connection_, &streams);
+  if (status != NATS_OK) return made->failure(status, "JetStream");
+  return made;
+}
+
+NatsConnection::~NatsConnection() {
+  natsConnection_Close(connection_);
+  subscriptions_.clear();
+  jsCtx_Destroy(streams_);
+  natsConnection_Destroy(connection_);
+}
+
+std::uint64_t NatsConnection::reconnects() const {
+  natsStatistics* made = nullptr;
+  if (natsStatistics_Create(&made) != NATS_OK) return 0;
+  const NatsOwned<natsStatistics> statistics(made);
+  std::uint64_t reconnects = 0;
+  natsConnection_GetStats(connection_, made);
+  natsStatistics_GetCounts(made, nullptr, nullptr, nullptr, nullptr, &reconnects);
+  return reconnects;
+}
+
+std::string NatsConnection::last_error() const {
+  const char* text = nullptr;
+  natsConnection_GetLastError(connection_, &text);
+  return text == nullptr ? "" : text;
+}
+
+/// To add what is there already would reserve its room once more (error 10047).
+Status NatsConnection::add_stream(jsStreamConfig& stream) const {
+  jsStreamInfo* info = nullptr;
+  jsErrCode code{};
+  natsStatus status = js_GetStreamInfo(&info, streams_, stream.Name, nullptr, &code);
+  NatsOwned<jsStreamInfo> found(info);
+  if (status == NATS_OK && found->Config->MaxBytes == stream.MaxBytes) return {};
+  status = found ? js_UpdateStream(&info, streams_, &stream, nullptr, &code)
+                 : js_AddStream(&info, streams_, &stream, nullptr, &code);
+  const NatsOwned<jsStreamInfo> made(status == NATS_OK ? info : nullptr);
+  if (status != NATS_OK) return failure(status, fmt::format("stream {}", stream.Name), code);
+  return {};
+}
+
+Status NatsConnection::prepare(const NatsPortOptions& options) const {
+  const std::string& mission = options.mission;
+  const auto most = static_cast<std::int64_t>(options.max_stream_bytes);
+  const std::array subjects{fmt::format("mission.{}.robot.*.submap", mission),
+                            fmt::format("mission.{}.worker.*.verdicts", mission),
+                            fmt::format("mission.{}.jobs.loop", mission)};
+  const std::array names{submap_stream(mission), verdict_stream(mission), job_stream(mission)};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    jsStreamConfig stream;
+    jsStreamConfig_Init(&stream);
+    stream.Name = names[i].c_str();
+    const char* subject = subjects[i].c_str();
+    stream.Subjects = &subject;
+    stream.SubjectsLen = 1;
+    stream.Retention = js_WorkQueuePolicy;  // what is acknowledged takes no room
+    stream.Storage = js_FileStorage;
+    stream.Discard = js_DiscardNew;
+    stream.MaxBytes = i == 0 ? most : most / 8;
+    stream.MaxMsgSize = 8U << 20U;
+    stream.Duplicates = kDay_ns;
+    if (const Status done = add_stream(stream); !done) return done;
+  }
+  const std::string bucket = retained_bucket(mission);
+  kvConfig values;
+  kvConfig_Init(&values);
+  values.Bucket = bucket.c_str();
+  values.History = 1;
+  values.MaxValueSize = 8 << 20;
+  values.MaxBytes = most / 8;
+  values.StorageType = js_FileStorage;
+  kvStore* store = nullptr;
+  natsStatus status = js_KeyValue(&store, streams_, bucket.c_str());
+  if (status == NATS_NOT_FOUND) status = js_CreateKeyValue(&store, streams_, &values);
+  const NatsOwned<kvStore> made(store);
+  return status == NATS_OK ? Status() : failure(status, "bucket " + bucket);
+}
+
+Status NatsConnection::renew_consumer(const std::string& stream, const std::string& consumer) const {
+  jsErrCode code{};
+  const natsStatus status = js_DeleteConsumer(streams_, stream.c_str(), consumer.c_str(), nullptr, &code);
+  if (status != NATS_OK && code != JSConsumerNotFoundErr) return failure(status, "consumer of " + stream, code);
+  return {};
+}
+
+Result<natsSubscription*> NatsConnection::pull(const std::string& stream, const std::string& consumer) {
+  jsConsumerConfig config;
+  jsConsumerConfig_Init(&config);
+  config.Durable = consumer.c_str();
+  config.AckPolicy = js_AckExplicit;
+  config.DeliverPolicy = js_DeliverAll;
+  config.AckWait = kAcknowledge_ns;
+  config.MaxAckPending = kUnacknowledged;
+  config.MaxDeliver = stream.starts_with("JOBS_") ? kDeliveries : -1;
+  jsConsumerInfo* info = nullptr;
+  jsErrCode code{};
+  natsStatus status = js_AddConsumer(&info, streams_, stream.c_str(), &config, nullptr, &code);
+  const NatsOwned<jsConsumerInfo> made(info);
+  if (status != NATS_OK) return failure(status, "consumer of " + stream, code);
+  jsSubOptions options;
+  jsSubOptions_Init(&options);
+  options.Stream = stream.c_str();
+  options.Consumer = consumer.c_str();
+  natsSubscription* subscription = nullptr;
+  status = js_PullSubscribe(&subscription, streams_, nullptr, consumer.c_str(), nullptr, &options, &code);
+  if (status != NATS_OK) return failure(status, "consumer of " + stream, code);
+  const std::scoped_lock guard(mutex_);
+  return subscriptions_.emplace_back(subscription).get();
+}
+
+Result<natsSubscription*> NatsConnection::subscribe(const std::string& subject) {
+  natsSubscription* subscription = nullptr;
+  const natsStatus status = natsConnection_SubscribeSync(&subscription, connection_, subject.c_str());
+  if (status != NATS_OK) return failure(status, "listening to " + subject);
+  const std::scoped_lock guard(mutex_);
+  return subscriptions_.emplace_back(subscription).get();
+}
+
+Result<std::optional<std::string>> NatsConnection::retained(const std::string& bucket,
+                                                            const std::string& subject) const {
+  jsDirectGetMsgOptions newest;
+  jsDirectGetMsgOptions_Init(&newest);
+  newest.LastBySubject = subject.c_str();
+  natsMsg* found = nullptr;
+  const natsStatus status = js_DirectGetMsg(&found, streams_, ("KV_" + bucket).c_str(), nullptr, &newest);
+  const NatsOwned<natsMsg> message(found);
+  if (status == NATS_NOT_FOUND) return std::nullopt;
+  if (status != NATS_OK) return failure(status, "asking for " + subject);
+  return std::string(bytes_of(found));
+}
+
+Status NatsConnection::acknowledge(const std::string& reply) const {
+  natsMsg* answer = nullptr;
+  const natsStatus status =
+      natsConnection_RequestString(&answer, connection_, reply.c_str(), "+ACK", kNatsAnswer.count());
+  const NatsOwned<natsMsg> owned(answer);
+  return status == NATS_OK ? Status() : failure(status, "acknowledging");
+}
+
+Status NatsConnection::publish(const std::string& subject, const std::string& answer_to, const std::string& id,
+                               std::string_view bytes) const {
+  natsMsg* made = nullptr;
+  natsStatus status = natsMsg_Create(&made, subject.c_str(), answer_to.empty() ? nullptr : answer_to.c_str(),
+                                     bytes.data(), static_cast<int>(bytes.size()));
+  const NatsOwned<natsMsg> message(made);
+  if (status == NATS_OK && !id.empty()) status = natsMsgHeader_Set(made, "Nats-Msg-Id", id.c_str());
+  if (status == NATS_OK) status = natsConnection_PublishMsg(connection_, made);
+  return status == NATS_OK ? Status() : failure(status, "sending to " + subject);
+}
+
+Status prepare_nats(const NatsPortOptions& options) {
+  if (const Status checked = check(options); !checked) return checked;
+  const auto connection = NatsConnection::open(options, "prepare");
+  return connection ? (*connection)->prepare(options) : Status(tl::unexpected(connection.error()));
+}
+
+}  // namespace tutti::bus

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bus/nats_port.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/bus/internal/jetstream_port.hpp"
+
+namespace tutti::bus {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kFarewell = std::chrono::seconds(3);
+constexpr int kAcknowledgeTries = 5;
+
+std::string name_of(Endpoint end) {
+  constexpr const char* kRoles[] = {"server", "robot", "worker"};
+  return fmt::format("{}_{}", kRoles[static_cast<int>(end.role)], end.number);
+}
+
+}  // namespace
+
+JetStreamPort::JetStreamPort(Endpoint self, NatsPortOptions options)
+    : self_(self),
+      options_(std::move(options)),
+      answer_to_(fmt::format("_INBOX_{}.sent_{}_{}", name_of(self), getpid(), Clock::now().time_since_epoch().count())),
+      outbox_(options_.mission, options_.max_waiting_bytes),
+      inbox_(self) {
+  threads_.emplace_back([this] { send_all(); });
+  threads_.emplace_back([this] { hear_confirmations(); });
+  const std::string& mission = options_.mission;
+  switch (self_.role) {
+    case Endpoint::Role::server:
+      threads_.emplace_back([this, stream = submap_stream(mission)] { pull(stream, "server"); });
+      threads_.emplace_back([this, stream = verdict_stream(mission)] { pull(stream, "server"); });
+      threads_.emplace_back([this] { hear_status(); });
+      break;
+    case Endpoint::Role::robot:
+      threads_.emplace_back([this] { hear_retained(); });
+      break;
+    case Endpoint::Role::worker:
+      threads_.emplace_back([this, stream = job_stream(mission)] { pull(stream, "workers"); });
+      break;
+  }
+}
+
+JetStreamPort::~JetStreamPort() {
+  {
+    const std::scoped_lock guard(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+  say_farewell();
+}
+
+Status JetStreamPort::send(Envelope envelope) {
+  TUTTI_CHECK(envelope.from == self_ && envelope.bytes != nullptr, "not from {}", name_of(self_));
+  const std::scoped_lock guard(mutex_);
+  Status added = outbox_.add(envelope);
+  changed_.notify_all();
+  return added;
+}
+
+std::vector<Received> JetStreamPort::receive() {
+  const std::scoped_lock guard(mutex_);
+  return inbox_.take();
+}
+
+void JetStreamPort::acknowledge(std::uint64_t ticket) {
+  const std::scoped_lock guard(mutex_);
+  inbox_.acknowledge(ticket);
+  changed_.notify_all();
+}
+
+void JetStreamPort::still_busy(std::uint64_t ticket) {
+  const std::scoped_lock guard(mutex_);
+  for (std::string& reply : inbox_.replies_of(ticket)) busy_.push_back(std::move(reply));
+  changed_.notify_all();
+}
+
+NatsState JetStreamPort::state() const {
+  const std::scoped_lock guard(mutex_);
+  const bool listening = listening_ + 1 == threads_.size();  // all but the sender's thread
+  NatsState state{.connected = listening && session_ && session_->connection->connected(),
+                  .reconnects = cuts_ == 0 ? 0 : cuts_ - 1,
+                  .waiting_messages = outbox_.messages(),
+                  .waiting_bytes = outbox_.bytes(),
+                  .waiting_acknowledgements = inbox_.acknowledgements(),
+                  .refused = refused_,
+                  .last_error = last_error_};
+  return state;
+}
+
+/// True: there is a new session.
+bool JetStreamPort::connect() {
+  auto connection = NatsConnection::open(options_, name_of(self_));
+  Status done = connection ? Status() : Status(tl::unexpected(connection.error()));
+  if (done && self_.role == Endpoint::Role::server) {
+    done = (*connection)->prepare(options_);
+    for (const auto& stream : {submap_stream(options_.mission), verdict_stream(options_.mission)})
+      if (done && !renewed_) done = (*connection)->renew_consumer(stream, "server");
+    if (done) renewed_ = true;
+  }
+  auto made = std::make_shared<Session>();
+  if (done) {
+    auto confirmations = (*connection)->subscribe(answer_to_ + ".*");
+    if (confirmations) made->confirmations = *confirmations;
+    if (!confirmations) done = tl::unexpected(confirmations.error());
+  }
+  if (!done) {
+    note(done.error().message);
+    return false;
+  }
+  made->connection = *connection;
+  reconnects_ = 0;
+  const std::scoped_lock guard(mutex_);
+  outbox_.resend_all();
+  session_ = std::move(made);
+  ++cuts_;
+  changed_.notify_all();
+  return true;
+}
+
+/// True: there may be more to do at once.
+bool JetStreamPort::send_one(const NatsConnection& connection) {
+  std::optional<Outbox::Piece> piece;
+  std::vector<std::string> busy;
+  std::vector<std::string> strays;
+  {
+    const std::scoped_lock guard(mutex_);
+    outbox_.expire(Clock::now());
+    piece = outbox_.next(Clock::now());
+    std::swap(busy, busy_);
+    strays = inbox_.take_strays();
+  }
+  for (const std::string& reply : busy) static_cast<void>(connection.publish(reply, "", "", "+WPI"));
+  for (const std::string& reply : strays) static_cast<void>(connection.publish(reply, "", "", "+ACK"));
+  if (!piece) return false;
+  const bool confirmed = piece->delivery != Delivery::best_effort;
+  const std::string answer = confirmed ? fmt::format("{}.{}", answer_to_, piece->number) : "";
+  const Status sent = connection.publish(piece->subject, answer, piece->id, piece->bytes());
+  if (sent) return true;
+  note(sent.error().message);
+  const std::scoped_lock guard(mutex_);
+  outbox_.refuse(piece->number, Clock::now());
+  return false;
+}
+
+bool JetStreamPort::acknowledge_one(const NatsConnection& connection) {
+  std::optional<Inbox::Acknowledgement> next;
+  {
+    const std::scoped_lock guard(mutex_);
+    next = inbox_.next_acknowledgement();
+  }
+  if (!next) return false;
+  Status done;
+  for (const std::string& reply : next->replies)
+    if (done) done = connection.acknowledge(reply);
+  if (!done) note(done.error().message);
+  if (!done && ++tries_[next->ticket] < kAcknowledgeTries) return false;  // what is not told at all comes again
+  tries_.erase(next->ticket);
+  const std::scoped_lock guard(mutex_);
+  inbox_.forget(next->ticket);
+  return true;
+}
+
+void JetStreamPort::send_all() {
+  while (!stopping_) {
+    const auto present = session();
+    if (!present || present->connection->closed()) {
+      if (!connect()) pause(kTryAgain);
+      continue;
+    }
+    const NatsConnection& connection = *present->connection;
+    const bool connected = connection.connected();
+    const std::uint64_t reconnects = connection.reconnects();
+    if (reconnects != reconnects_ || !connected) {
+      const std::scoped_lock guard(mutex_);
+      if (reconnects != reconnects_) outbox_.resend_all();
+      cuts_ += reconnects - reconnects_;
+      if (!connected) outbox_.forget_best_effort();
+      reconnects_ = reconnects;
+    }
+    const bool acknowledged = connected && acknowledge_one(connection);
+    const bool sent = connected && send_one(connection);
+    if (acknowledged || sent) continue;
+    std::unique_lock guard(mutex_);
+    if (!stopping_) changed_.wait_for(guard, kTick);
+  }
+}
+
+/// What was acknowledged is so on the bus; what was not comes to the next one at once, not after a time-out.
+void JetStreamPort::say_farewell() {
+  const auto present = session();
+  if (!present || !present->connection->connected()) return;
+  const NatsConnection& connection = *present->connection;
+  const auto end = Clock::now() + kFarewell;
+  while (Clock::now() < end && acknowledge_one(connection)) continue;
+  const std::scoped_lock guard(mutex_);
+  for (const std::string& reply : inbox_.unacknowledged()) static_cast<void>(connection.publish(reply, "", "", "-NAK"));
+  connection.flush();
+}
+
+Result<std::unique_ptr<NatsPort>> open_nats_port(Endpoint endpoint, const NatsPortOptions& options) {
+  if (const Status checked = check(options); !checked) return tl::unexpected(checked.error());
+  return std::make_unique<JetStreamPort>(endpoint, options);
+}
+
+}  // namespace tutti::bus

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "tutti/base/config.hpp"
+#include "tutti/bus/port.hpp"
+
+namespace tutti::bus {
+
+struct NatsPortOptions {
+  std::string url;
+  std::string mission = "tutti";
+  bool allow_insecure = false;
+  std::uint64_t max_waiting_bytes = std::uint64_t{64} << 20U;
+  std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
+  std::uint64_t max_stream_bytes = std::uint64_t{2} << 30U;
+  template <class V>
+  void describe(V& v) {
+    v.field("url", url, any(), "\"nats://HOST:PORT\"");
+    v.field("mission", mission, any(), "Missions on one bus do not hear each other; letters, digits, '-' and '_'.");
+    v.field("allow_insecure", allow_insecure, any(), "Connect to other machines without TLS.");
+    v.field("max_waiting_bytes", max_waiting_bytes, at_least(0.0),
+            "Durable messages and jobs that wait to be sent; then send() refuses.");
+    v.field("max_held_bytes", max_held_bytes, at_least(0.0),
+            "Messages received and not acknowledged; then the rest stays on the bus.");
+    v.field("max_stream_bytes", max_stream_bytes, at_least(0.0),
+            "Submaps on the bus; then it takes no more. An eighth each for verdicts, jobs and retained values.");
+  }
+};
+
+/// Makes what the mission needs on the bus, and leaves what is there; whoever starts the bus calls it, and the
+/// server's port does.
+Status prepare_nats(const NatsPortOptions& options);
+
+/// How a port stands with its bus.
+struct NatsState {
+  bool connected = false;  ///< And listening.
+  std::uint64_t reconnects = 0;
+  std::size_t waiting_messages = 0;  ///< Their parts: not sent, or not confirmed by the bus.
+  std::uint64_t waiting_bytes = 0;
+  std::size_t waiting_acknowledgements = 0;
+  std::uint64_t refused = 0;  ///< Arrived, and were none of ours.
+  std::string last_error;
+};
+
+/// A port over NATS JetStream. A thread of its own connects, sends and acknowledges, and sends again what the bus has
+/// not confirmed, with the same id: the bus stores each once. What is sent first: status, retained, then the rest in
+/// the order of send(). Without a bus it waits for one. Ends within seconds, after what was acknowledged is so on the
+/// bus, if that can be reached.
+class NatsPort : public Port {
+ public:
+  [[nodiscard]] virtual NatsState state() const = 0;
+};
+
+/// Does not wait for the bus. Errors are of the options.
+Result<std::unique_ptr<NatsPort>> open_nats_port(Endpoint endpoint, const NatsPortOptions& options);
+
+}  // namespace tutti::bus

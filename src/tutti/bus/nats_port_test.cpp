@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What port_conformance_test.cpp does not try: kills, limits, garbage, and links that break.
+#include "tutti/bus/nats_port.hpp"
+
+#include <gtest/gtest.h>
+#include <nats/nats.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <map>
+#include <string>
+
+#include "support/bus/nats_network.hpp"
+#include "tutti/base/random.hpp"
+
+namespace tutti::bus {
+namespace {
+
+using test::NatsNetwork;
+using test::within;
+
+const Endpoint kServer = Endpoint::server();
+const Endpoint kRobot = Endpoint::of(RobotId{3});
+
+std::string bytes_of(int number, std::uint64_t most) {
+  Rng rng(static_cast<std::uint64_t>(number));
+  std::string bytes(rng.index(most), '\0');
+  for (char& c : bytes) c = static_cast<char>(rng.index(256));
+  return bytes;
+}
+
+Status send_submap(Port& robot, const std::string& id, std::string bytes) {
+  return robot.send({kRobot, kServer, MessageKind::submap, id, std::make_shared<const std::string>(std::move(bytes))});
+}
+
+/// What a server does: takes each message, and acknowledges it. How often each id came.
+class Receiver {
+ public:
+  explicit Receiver(std::uint64_t most) : most_(most) {}
+  void take(Port& hub) {
+    for (const Received& received : hub.receive()) {
+      const int number = std::stoi(received.envelope.id);
+      EXPECT_EQ(*received.envelope.bytes, bytes_of(number, most_)) << number;
+      ++came_[number];
+      hub.acknowledge(received.ticket);
+    }
+  }
+  [[nodiscard]] std::size_t heard() const { return came_.size(); }
+  [[nodiscard]] int again() const {
+    int again = 0;
+    for (const auto& [number, times] : came_) again += times - 1;
+    return again;
+  }
+
+ private:
+  std::uint64_t most_;
+  std::map<int, int> came_;
+};
+
+class NatsPortTest : public ::testing::Test {
+ protected:
+  void SetUp() override { TUTTI_SKIP_WITHOUT_NATS_SERVER(); }
+};
+
+TEST_F(NatsPortTest, KilledAndStartedAgainTheBusLosesNothing) {
+  constexpr int kMessages = 300;
+  constexpr std::uint64_t kMost = 200'000;
+  NatsNetwork network;
+  const auto robot = network.open(kRobot);
+  const auto hub = network.open(kServer);
+  Receiver receiver(kMost);
+  int kills = 0;
+  int sent = 0;
+  const bool all = within(60.0, [&] {
+    for (const int most = static_cast<int>(receiver.heard()) + 40; sent < std::min(kMessages, most); ++sent)
+      EXPECT_TRUE(send_submap(*robot, std::to_string(sent), bytes_of(sent, kMost)));
+    if (kills < 3 && receiver.heard() > static_cast<std::size_t>(20 + 80 * kills)) {
+      ++kills;
+      kill(network.child().pid(), SIGKILL);
+      EXPECT_TRUE(within(5.0, [&] { return !network.child().running(); }));
+      const Status tended = network.child().tend();
+      EXPECT_TRUE(tended.has_value()) << tended.error().message;
+    }
+    receiver.take(*hub);
+    return receiver.heard() == kMessages;
+  });
+  EXPECT_TRUE(all) << receiver.heard() << " of " << kMessages << " came; " << robot->state().last_error;
+  EXPECT_EQ(kills, 3);
+  EXPECT_EQ(receiver.again(), 0);
+  EXPECT_TRUE(within(5.0, [&] { return robot->state().waiting_messages == 0; }));
+  EXPECT_GE(robot->state().reconnects, 3U);
+}
+
+TEST_F(NatsPortTest, OverALinkThatBreaksAgainAndAgainNothingIsLost) {
+  constexpr int kMessages = 30;
+  constexpr std::uint64_t kMost = 80'000;
+  NatsNetwork network({.delay_s = 0.05, .bytes_per_s = 1e6, .bytes_between_cuts = 300'000});
+  const auto hub = network.open(kServer);
+  const auto robot = network.open(kRobot);
+  const auto graph = std::make_shared<const std::string>(5000, 'g');
+  for (int i = 0; i < kMessages; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), bytes_of(i, kMost)));
+  ASSERT_TRUE(hub->send({kServer, kRobot, MessageKind::proxy_graph, "", graph}));
+  Receiver receiver(kMost);
+  std::string heard;
+  const auto go_on = [&] {
+    receiver.take(*hub);
+    for (const Received& received : robot->receive()) heard = *received.envelope.bytes;
+  };
+  EXPECT_TRUE(within(20.0, [&] { return go_on(), receiver.heard() > 3; }));
+  network.relay().hold(true);  // out of range, and nobody is told
+  within(1.0, [&] { return go_on(), false; });
+  network.relay().hold(false);
+  EXPECT_TRUE(within(20.0, [&] { return go_on(), receiver.heard() > 10; }));
+  network.relay().refuse(true);
+  const std::size_t before = receiver.heard();
+  within(1.5, [&] { return go_on(), false; });
+  EXPECT_LT(receiver.heard(), static_cast<std::size_t>(kMessages));
+  EXPECT_LE(receiver.heard(), before + 8);  // what was on the bus already
+  network.relay().refuse(false);
+  EXPECT_TRUE(within(60.0, [&] { return go_on(), receiver.heard() == kMessages && heard == *graph; }))
+      << receiver.heard() << " of " << kMessages << " came; " << robot->state().last_error;
+  EXPECT_EQ(receiver.again(), 0);
+  EXPECT_GE(network.relay().cuts(), 3U);
+}
+
+TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
+  NatsNetwork network;
+  NatsPortOptions options = network.options(kServer);
+  options.max_stream_bytes = 1U << 20U;
+  ASSERT_TRUE(prepare_nats(options));
+  const auto robot = network.open(kRobot);
+  for (int i = 0; i < 30; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), bytes_of(i, 200'000)));
+  EXPECT_TRUE(within(10.0, [&] { return robot->state().last_error.find("maximum bytes") != std::string::npos; }))
+      << robot->state().last_error;
+  EXPECT_GT(robot->state().waiting_messages, 0U);
+  const auto hub = open_nats_port(kServer, options);
+  ASSERT_TRUE(hub.has_value());
+  Receiver receiver(200'000);
+  EXPECT_TRUE(within(20.0, [&] { return receiver.take(**hub), receiver.heard() == 30; }));
+  EXPECT_EQ(receiver.again(), 0);
+}
+
+TEST_F(NatsPortTest, HoldsNoMoreThanItMayAndTheRestStaysOnTheBus) {
+  NatsNetwork network;
+  const auto robot = network.open(kRobot);
+  NatsPortOptions options = network.options(kServer);
+  options.max_held_bytes = 500'000;
+  auto hub = open_nats_port(kServer, options);
+  ASSERT_TRUE(hub.has_value());
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), std::string(50'000, 'x')));
+  EXPECT_TRUE(within(10.0, [&] { return robot->state().waiting_messages == 0; }));
+  std::vector<Received> held;
+  within(0.5, [&] {
+    for (Received& received : (*hub)->receive()) held.push_back(std::move(received));
+    return false;
+  });
+  EXPECT_GE(held.size(), 10U);
+  EXPECT_LE(held.size(), 10U + 16U);
+  std::size_t heard = 0;
+  EXPECT_TRUE(within(10.0, [&] {
+    for (const Received& received : held) (*hub)->acknowledge(received.ticket);
+    heard += held.size();
+    held = (*hub)->receive();
+    return heard == 100;
+  }));
+}
+
+/// Not a test: a server that takes everything, acknowledges nothing, and is killed.
+TEST(NatsPortOwner, DISABLED_AcknowledgesNothing) {
+  const auto hub = open_nats_port(
+      kServer, {.url = std::getenv("TUTTI_NATS_URL"), .mission = "test", .max_stream_bytes = 128U << 20U});
+  ASSERT_TRUE(hub.has_value());
+  const int told = std::atoi(std::getenv("TUTTI_NATS_PIPE"));
+  while (true)
+    for (const Received& received : (*hub)->receive())
+      if (write(told, received.envelope.id.data(), 1) != 1) return;
+}
+
+TEST_F(NatsPortTest, WhatAKilledServerHadNotAcknowledgedComesAtOnceToTheNext) {
+  NatsNetwork network;
+  const auto robot = network.open(kRobot);
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), bytes_of(i, 300'000)));
+  int ends[2] = {-1, -1};
+  ASSERT_EQ(pipe(ends), 0);
+  setenv("TUTTI_NATS_URL", network.child().url().c_str(), 1);
+  setenv("TUTTI_NATS_PIPE", std::to_string(ends[1]).c_str(), 1);
+  const pid_t owner = fork();
+  if (owner == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    execl("/proc/self/exe", "owner", "--gtest_filter=NatsPortOwner.*", "--gtest_also_run_disabled_tests", nullptr);
+    _exit(1);
+  }
+  for (int i = 0; i < 5; ++i) {
+    char id = ' ';
+    ASSERT_EQ(read(ends[0], &id, 1), 1);
+  }
+  kill(owner, SIGKILL);
+  waitpid(owner, nullptr, 0);
+  close(ends[0]);
+  close(ends[1]);
+  const auto hub = network.open(kServer);
+  Receiver receiver(300'000);
+  EXPECT_TRUE(within(5.0, [&] { return receiver.take(*hub), receiver.heard() == 5; }));  // not after the bus's 30 s
+}
+
+TEST_F(NatsPortTest, GarbageIsCountedAndInNobodysWay) {
+  NatsNetwork network;
+  const auto hub = network.open(kServer);
+  const auto robot = network.open(kRobot);
+  natsConnection* connection = nullptr;
+  jsCtx* streams = nullptr;
+  ASSERT_EQ(natsConnection_ConnectTo(&connection, network.child().url().c_str()), NATS_OK);
+  ASSERT_EQ(natsConnection_JetStream(&streams, connection, nullptr), NATS_OK);
+  int refused = 0;
+  for (const char* id : {"", "submap", "submap/a/7.3", "verdicts/a/0.1", "submap/b/0.2", "submap/b/1.3"}) {
+    jsPubOptions options;
+    jsPubOptions_Init(&options);
+    if (*id != '\0') options.MsgId = id;
+    EXPECT_EQ(js_Publish(nullptr, streams, "mission.test.robot.5.submap", "junk", 4, &options, nullptr), NATS_OK) << id;
+    if (std::string(id) != "submap/b/0.2") ++refused;  // half a message: it waits for the other half
+  }
+  EXPECT_EQ(natsConnection_PublishString(connection, "mission.test.apple.5.status", "junk"), NATS_OK);
+  jsCtx_Destroy(streams);
+  natsConnection_Destroy(connection);
+  ASSERT_TRUE(send_submap(*robot, "7", bytes_of(7, 1000)));
+  Receiver receiver(1000);
+  EXPECT_TRUE(within(5.0, [&] { return receiver.take(*hub), receiver.heard() == 1; }));
+  EXPECT_TRUE(within(5.0, [&] { return hub->state().refused == static_cast<std::uint64_t>(refused); }))
+      << hub->state().refused;
+  EXPECT_NE(hub->state().last_error.find("none of ours"), std::string::npos) << hub->state().last_error;
+}
+
+TEST(NatsPortOptionsTest, OtherMachinesNeedTlsAndMissionsAName) {
+  const auto refusal = [](const NatsPortOptions& options) {
+    const auto port = open_nats_port(kRobot, options);
+    return port ? "" : port.error().message;
+  };
+  EXPECT_NE(refusal({.url = "nats://10.0.0.1:4222"}).find("10.0.0.1"), std::string::npos);
+  EXPECT_NE(refusal({.url = "nats://user:word@base:4222"}).find("TLS"), std::string::npos);
+  EXPECT_NE(refusal({.url = "nats://127.0.0.1:4222", .mission = "a.b"}).find("'a.b'"), std::string::npos);
+  EXPECT_EQ(refusal({.url = "nats://127.0.0.1:1"}), "");  // waits for one
+  EXPECT_EQ(refusal({.url = "nats://10.0.0.1:4222", .allow_insecure = true}), "");
+}
+
+}  // namespace
+}  // namespace tutti::bus
