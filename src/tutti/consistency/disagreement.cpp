@@ -176,18 +176,29 @@ double DisagreementTest::scale_length_m(int scale) const {
   // White noise has the mean degree as its frequency; the largest one is of the densest place only.
   const auto nodes = static_cast<double>(server_.size());
   const double wanted = std::ldexp(laplacian_.diagonal().sum() / nodes, scale - scales() + 1);
-  const auto frequency = [&] {  // of a wave in no particular direction
-    double sum = 0.0;
-    for (int a = 0; a < laplacian_.outerSize(); ++a)
-      for (spectral::SparseMatrix::InnerIterator entry(laplacian_, a); entry; ++entry) {
-        const auto& from = server_[static_cast<std::size_t>(a)].translation;
-        const auto& to = server_[static_cast<std::size_t>(entry.row())].translation;
-        if (entry.row() != a) sum -= entry.value() * (1.0 - std::cos(std::numbers::pi / length_m * (to - from).norm()));
-      }
-    return sum / nodes;
+  // A wave of half the length L, in no particular direction, has the frequency sum w (1 - cos(pi d / L)) / nodes over
+  // all edges, every one of them twice in the matrix. Half of L doubles the angles, 1 - cos 2x = 2 v (2 - v) with
+  // v = 1 - cos x: two lengths take turns.
+  std::vector<double> weights, distances_m;
+  for (int a = 0; a < laplacian_.outerSize(); ++a)
+    for (spectral::SparseMatrix::InnerIterator entry(laplacian_, a); entry && entry.row() < a; ++entry) {
+      const auto& from = server_[static_cast<std::size_t>(a)].translation;
+      const auto& to = server_[static_cast<std::size_t>(entry.row())].translation;
+      weights.push_back(-2.0 * entry.value());
+      distances_m.push_back((to - from).norm());
+    }
+  const auto weight = Eigen::ArrayXd::Map(weights.data(), static_cast<Index>(weights.size()));
+  const auto distance_m = Eigen::ArrayXd::Map(distances_m.data(), static_cast<Index>(distances_m.size()));
+  const auto raised = [&](double half_wave_m) -> Eigen::ArrayXd {
+    return 2.0 * (0.5 * std::numbers::pi / half_wave_m * distance_m).sin().square();
   };
+  Eigen::ArrayXd now = raised(length_m), next = raised(length_m / std::numbers::sqrt2);
   const double shortest_m = 2.0 * length_m / nodes;
-  while (length_m > shortest_m && frequency() < wanted) length_m /= std::numbers::sqrt2;
+  while (length_m > shortest_m && (weight * now).sum() / nodes < wanted) {
+    length_m /= std::numbers::sqrt2;
+    now = 2.0 * now * (2.0 - now);
+    now.swap(next);
+  }
   return std::max(length_m, shortest_m);
 }
 

@@ -40,7 +40,8 @@ Explanation explain(const ProxyGraph& graph, const ChainId& id, std::span<const 
   out.aligned_rmse_m = internal::aligned_rmse(chain.server, odometry);
   if (uncertainty != nullptr) out.expected_rmse_m = uncertainty->whole.position_m;
   if (!out.disagrees()) return out;  // nothing was born anywhere
-  for (const internal::DriftStretch& stretch : internal::drift_stretches(chain, test, uncertainty, false_alarm_rate)) {
+  for (const internal::DriftStretch& stretch :
+       internal::drift_stretches(chain, out.scale_length_m, uncertainty, false_alarm_rate)) {
     const auto relative = [&](const std::vector<Pose3>& poses) {
       return poses[stretch.first].inverse() * poses[stretch.last];
     };

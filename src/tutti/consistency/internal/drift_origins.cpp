@@ -65,12 +65,12 @@ std::vector<RelativePose> usual_odometry(const TimeChain& chain) {
 /// blocks), by length: scales shorter than the stretch move both ends, of longer ones only the slope counts. Not as it
 /// knows it there: where odometry failed the server is unsure of what lies inside the stretch, but not of how its ends
 /// lie to each other.
-std::vector<PoseSigma> server_variances(const DisagreementTest& test, const ChainUncertainty* uncertainty,
+std::vector<PoseSigma> server_variances(std::span<const double> scale_lengths_m, const ChainUncertainty* uncertainty,
                                         std::size_t nodes) {
   std::vector<PoseSigma> out(nodes);
-  if (uncertainty == nullptr) return out;
-  const double spacing_m = std::max(1e-3, test.scale_length_m(0) / static_cast<double>(nodes));
-  for (std::size_t s = 0; s < uncertainty->scales.size(); ++s) {
+  if (uncertainty == nullptr || scale_lengths_m.empty()) return out;
+  const double spacing_m = std::max(1e-3, scale_lengths_m.front() / static_cast<double>(nodes));
+  for (std::size_t s = 0; s < scale_lengths_m.size(); ++s) {
     std::vector<double> metres, radians;
     for (const PoseSigma& sigma : uncertainty->scales[s].sigma) {
       metres.push_back(sigma.position_m);
@@ -78,7 +78,7 @@ std::vector<PoseSigma> server_variances(const DisagreementTest& test, const Chai
     }
     if (metres.empty()) continue;
     const double usual_m = quantile(metres, 0.25), usual_rad = quantile(radians, 0.25);
-    const double scale_length = std::max(1.0, test.scale_length_m(static_cast<int>(s)) / spacing_m);
+    const double scale_length = std::max(1.0, scale_lengths_m[s] / spacing_m);
     for (std::size_t length = 0; length < nodes; ++length) {
       const double share = 2.0 * std::pow(std::min(1.0, static_cast<double>(length) / scale_length), 2);
       out[length].position_m += share * usual_m * usual_m;
@@ -99,27 +99,30 @@ class Scan {
  public:
   Scan(const TimeChain& chain, std::vector<PoseSigma> server)
       : poses_(chain.server),
+        odometry_(chain.odometry),
         drift_(chain.server, chain.odometry),
         usual_(stretches(chain.server, usual_odometry(chain))),
-        stated_(stretches(chain.server, chain.odometry)),
         server_(std::move(server)) {}
 
-  [[nodiscard]] double statistic(std::size_t a, std::size_t b) const { return statistic(usual_, a, b); }
-  [[nodiscard]] double stated_statistic(std::size_t a, std::size_t b) const { return statistic(stated_, a, b); }
+  [[nodiscard]] double statistic(std::size_t a, std::size_t b) const { return statistic(usual_(a, b), a, b); }
+  [[nodiscard]] double stated_statistic(std::size_t a, std::size_t b) const {
+    const std::size_t nodes = b - a + 1;  // few stretches are asked for: the table is of this one only
+    return statistic(stretches(poses_.subspan(a, nodes), odometry_.subspan(a, nodes))(0, b - a), a, b);
+  }
 
  private:
-  [[nodiscard]] double statistic(const StretchCovariance& odometry, std::size_t a, std::size_t b) const {
+  [[nodiscard]] double statistic(Matrix6d C, std::size_t a, std::size_t b) const {
     Vector6d missed = drift_.missed(a, b);  // turned into the axes of pose b, as the covariance
     const Eigen::Quaterniond to_b = poses_[b].rotation.conjugate();
     missed << to_b * missed.head<3>(), to_b * missed.tail<3>();
-    Matrix6d C = odometry(a, b);
     C.diagonal().head<3>().array() += server_[b - a].position_m + 1e-6;
     C.diagonal().tail<3>().array() += server_[b - a].rotation_rad + 1e-7;
     return missed.dot(C.llt().solve(missed));
   }
   std::span<const Pose3> poses_;
+  std::span<const RelativePose> odometry_;
   OdometryDrift drift_;
-  StretchCovariance usual_, stated_;
+  StretchCovariance usual_;
   std::vector<PoseSigma> server_;  // variances by length
 };
 
@@ -168,12 +171,12 @@ void settle(const Scan& scan, Stretch& s, std::size_t low, std::size_t high) {
 
 }  // namespace
 
-std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const DisagreementTest& test,
+std::vector<DriftStretch> drift_stretches(const TimeChain& chain, std::span<const double> scale_lengths_m,
                                           const ChainUncertainty* uncertainty, double probability) {
   const std::size_t nodes = chain.server.size();
   std::vector<DriftStretch> out;
   if (nodes < 4) return out;
-  const Scan scan(chain, server_variances(test, uncertainty, nodes));
+  const Scan scan(chain, server_variances(scale_lengths_m, uncertainty, nodes));
   // Stretches that overlap tell much the same: about as many independent ones as nodes.
   const double threshold = chi_square_exceeded_with(probability / static_cast<double>(nodes), kDegrees);
   std::vector<Stretch> found = candidates(scan, nodes, threshold);

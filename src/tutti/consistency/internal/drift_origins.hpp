@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <vector>
 
-#include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/internal/time_chain.hpp"
 
 namespace tutti::consistency::internal {
@@ -21,8 +21,9 @@ struct DriftStretch {
 /// then moved node by node, then the rest that do not overlap with it, as long as they stand out: chi-square with 6
 /// degrees of freedom beyond `probability` shared by all stretches. Of stretches that stand out nearly alike the
 /// shortest is meant. Odometry's covariance is taken as it usually is (per metre, median over the run: a covariance
-/// that odometry itself has inflated does not hide anything), plus the server's own uncertainty over the stretch.
-std::vector<DriftStretch> drift_stretches(const TimeChain& chain, const DisagreementTest& test,
+/// that odometry itself has inflated does not hide anything), plus the server's own uncertainty over the stretch, whose
+/// scales speak of these lengths (DisagreementTest::scale_length_m()).
+std::vector<DriftStretch> drift_stretches(const TimeChain& chain, std::span<const double> scale_lengths_m,
                                           const ChainUncertainty* uncertainty, double probability);
 
 }  // namespace tutti::consistency::internal

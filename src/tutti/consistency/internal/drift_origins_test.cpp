@@ -53,8 +53,10 @@ Scene scene(std::uint64_t seed, const std::vector<Failure>& failures) {
 std::vector<DriftStretch> stretches(const Scene& s) {
   std::vector<NodePair> pairs;
   for (std::size_t n = 0; n < kNodes; ++n) pairs.push_back({n, n});
-  return drift_stretches(s.chain, DisagreementTest(s.graph, test::kAlpha, pairs, 1, {}), &s.graph.uncertainties[0],
-                         kRate);
+  const DisagreementTest test(s.graph, test::kAlpha, pairs, 1, {});
+  std::vector<double> lengths_m;
+  for (int scale = 0; scale < test.scales(); ++scale) lengths_m.push_back(test.scale_length_m(scale));
+  return drift_stretches(s.chain, lengths_m, &s.graph.uncertainties[0], kRate);
 }
 
 /// Sorted, apart from each other (they may touch), within the run, above their threshold.
