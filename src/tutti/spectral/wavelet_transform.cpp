@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <map>
+#include <mutex>
 #include <numbers>
 #include <span>
 #include <unsupported/Eigen/FFT>
@@ -172,24 +174,38 @@ ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFi
   return result;
 }
 
+namespace {
+
+/// Of frequencies as shares of the largest, which is all that the kernels of a Meyer bank depend on: made once.
+const Expansion& unit_expansion(int scales) {
+  constexpr Index kTerms = 2048;
+  static std::mutex mutex;
+  static std::map<int, Expansion> made;
+  const std::lock_guard lock(mutex);
+  const auto found = made.find(scales);
+  return found != made.end() ? found->second
+                             : made.emplace(scales, expand(MeyerFilterBank(scales, 1.0), 1.0, kTerms)).first->second;
+}
+
+}  // namespace
+
 struct WaveletFilter::Prepared {
   SparseMatrix laplacian;
   Layout layout;
   MeyerFilterBank bank;
-  Expansion expansion;
-  std::vector<Index> degrees;  ///< Of the polynomials of h_s.
+  const Expansion* expansion = nullptr;  ///< Of the bank over domain * h_s; null: no edges.
+  std::vector<Index> degrees;            ///< Of its polynomials.
 };
 
 WaveletFilter::WaveletFilter(const SparseMatrix& laplacian, int scales, double tolerance) {
   TUTTI_CHECK(scales >= 2 && tolerance > 0.0, "{} scales, tolerance {}", scales, tolerance);
-  constexpr Index kTerms = 2048;
   Layout layout(laplacian, 1e-3);
   const double domain = layout.domain;
-  const MeyerFilterBank bank(scales, domain);
-  auto made = std::make_unique<Prepared>(Prepared{laplacian, std::move(layout), bank, {}, {}});
+  auto made =
+      std::make_unique<Prepared>(Prepared{laplacian, std::move(layout), MeyerFilterBank(scales, domain), nullptr, {}});
   if (domain > 0.0) {
-    made->expansion = expand(bank, domain, kTerms);
-    made->degrees = degrees_for(made->expansion, domain, tolerance, kTerms);
+    made->expansion = &unit_expansion(scales);
+    made->degrees = degrees_for(*made->expansion, 1.0, tolerance, made->expansion->tail.rows());
   }
   prepared_ = std::move(made);
 }
@@ -208,8 +224,8 @@ Eigen::MatrixXd WaveletFilter::operator()(const Eigen::Ref<const Eigen::MatrixXd
   TUTTI_CHECK(signals.rows() == laplacian.rows(), "signals of {} nodes, graph of {}", signals.rows(), laplacian.rows());
   Eigen::MatrixXd out = unfiltered(bank, signals);
   if (degrees.empty()) return out;
-  const Eigen::MatrixXd smoothed = laplacian * signals;
-  for (Index c = 0; c < signals.cols(); ++c) add_filtered(layout, expansion, degrees, smoothed, c, out);
+  const Eigen::MatrixXd smoothed = laplacian * signals / layout.domain;
+  for (Index c = 0; c < signals.cols(); ++c) add_filtered(layout, *expansion, degrees, smoothed, c, out);
   return out;
 }
 
