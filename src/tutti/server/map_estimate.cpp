@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "tutti/base/chi_square.hpp"
+#include "tutti/base/disjoint_sets.hpp"
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
 #include "tutti/geometry/covariance.hpp"
@@ -156,20 +157,11 @@ void record_failure(const estimation::FailedStretch& failed, double min_jump_m, 
 }
 
 void label_components(MapEstimate& map) {
-  std::vector<std::size_t> root(map.nodes.size());
-  std::iota(root.begin(), root.end(), std::size_t{0});
-  const auto find = [&](std::size_t i) {
-    while (root[i] != i) i = root[i] = root[root[i]];
-    return i;
-  };
-  for (const PoseGraphEdge& edge : map.graph.edges) {
-    const auto [low, high] = std::minmax({find(edge.from), find(edge.to)});
-    root[high] = low;
-  }
-  std::unordered_map<std::size_t, std::uint32_t> label;
-  for (std::size_t i = 0; i < map.nodes.size(); ++i)
-    map.nodes[i].component = label.try_emplace(find(i), static_cast<std::uint32_t>(label.size())).first->second;
-  map.components = static_cast<std::uint32_t>(label.size());
+  DisjointSets sets(map.nodes.size());
+  for (const PoseGraphEdge& edge : map.graph.edges) sets.join(edge.from, edge.to);
+  const auto [label, count] = sets.labels();
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].component = static_cast<std::uint32_t>(label[i]);
+  map.components = static_cast<std::uint32_t>(count);
 }
 
 /// What an explanation of the closures makes of the map.
