@@ -87,10 +87,11 @@ class Coefficients {
     const Index group = (count() + kGroups - 1) / kGroups;
     for (Index first = 0; first < count(); first += group)
       groups_.push_back({first, std::min(group, count() - first), scatter(first, std::min(group, count() - first))});
+    sigma_ = sigma_without(nullptr);
   }
 
   /// Per block, from all samples.
-  [[nodiscard]] std::vector<double> sigma() const { return sigma_without(nullptr); }
+  [[nodiscard]] const std::vector<double>& sigma() const { return sigma_; }
 
   [[nodiscard]] Energy energy() const {
     std::vector<double> energies;
@@ -107,7 +108,7 @@ class Coefficients {
     Energy out{mean, std::max(1.0, 2.0 * mean * mean / std::max(largest_variance, 1e-12 * mean * mean))};
     double shifted = 0.0;
     for (Index c = 0; c < shifts_.cols(); c += 3)
-      shifted = std::max(shifted, energy_of(shifts_.middleCols<3>(c), sigma()));
+      shifted = std::max(shifted, energy_of(shifts_.middleCols<3>(c), sigma_));
     out.mean += shifted;
     return out;
   }
@@ -134,9 +135,11 @@ class Coefficients {
     for (Index n = 0; n < sum.rows(); ++n) {
       Eigen::Matrix3d S;
       S << sum(n, 0), sum(n, 1), sum(n, 3), sum(n, 1), sum(n, 2), sum(n, 4), sum(n, 3), sum(n, 4), sum(n, 5);
-      const double sigma = std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + extra_(n));
       double& block = out[static_cast<std::size_t>(n) / ChainUncertainty::kBlock];
-      block = std::max(block, sigma);
+      const double mean = S.trace() / 3.0, apart = std::max(0.0, S.squaredNorm() / 3.0 - mean * mean);
+      const double most = (mean + std::sqrt(2.0 * apart)) / used;  // no eigenvalue is larger (Samuelson 1968)
+      if ((1.0 + 1e-7) * (most + extra_(n)) <= block * block) continue;
+      block = std::max(block, std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + extra_(n)));
     }
     return out;
   }
@@ -150,6 +153,7 @@ class Coefficients {
   MatrixXd samples_, shifts_;
   Eigen::VectorXd extra_;  ///< Variance besides the samples', per node.
   std::vector<Group> groups_;
+  std::vector<double> sigma_;
 };
 
 /// Per scale, how many waves it holds, the constant not counted: the trace of g_s(L)^2, by random signs (Hutchinson
