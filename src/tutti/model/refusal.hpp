@@ -13,7 +13,7 @@ namespace tutti {
 
 /// Why a pair of submaps, or a closure, was refused. The numbers travel and are stored: they are never reused.
 enum class RefusalReason : std::uint8_t {
-  other = 0,  ///< As an older program said it, in words that this one does not know.
+  other = 0,  ///< It was not said.
   // Of a submap, whatever it is compared with.
   too_small = 1,
   too_few_keyframes = 2,

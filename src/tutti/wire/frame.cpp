@@ -48,16 +48,16 @@ const char* name(MessageKind kind) {
   return "unknown";
 }
 
-// What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions. Verdict: the same up to 4,
-// which said why a pair was refused in words only, and not by which version of the finder; 6 has sessions. Proxy graph:
-// up to 5 it told what it is unsure of in other terms, which no robot compares any more; nobody keeps one. Cloud: came
-// with 2, the same since.
+// What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions. Verdict: up to 4 it said why a
+// pair was refused in words only, and not by which version of the finder; 6 has sessions. Proxy graph: up to 5 it told
+// what it is unsure of in other terms, which no robot compares any more; nobody keeps one. Cloud: came with 2, the same
+// since.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
       return {.oldest = 1, .current = 5};
     case MessageKind::verdict:
-      return {.oldest = 1, .current = 6};
+      return {.oldest = 5, .current = 6};
     case MessageKind::proxy_graph:
       return {.oldest = 6, .current = 6};
     case MessageKind::cloud:

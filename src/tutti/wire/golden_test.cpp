@@ -10,7 +10,6 @@
 #include <fstream>
 #include <sstream>
 #include <string>
-#include <utility>
 
 #include "support/paths.hpp"
 #include "tutti/wire/codec.hpp"
@@ -164,43 +163,17 @@ TEST(Golden, ProxyGraph) {
 }
 
 TEST(Golden, Verdict) {
-  const auto of_session = [](std::uint64_t session, std::uint32_t finder_version) {
+  const auto of_session = [](std::uint64_t session) {
     const ChainId one{RobotId{1}, session};
     return ClosureVerdict{
         .pair = {{RobotId{0}, 3}, {one, 4}},
         .closures = {{{RobotId{0}, 31}, {one, 45}, {{kQuarterTurn, {0.1, 0.2, 0.3}}, diagonal(1e-3, 1e-4)}}},
-        .finder_version = finder_version};
+        .finder_version = 3};
   };
-  for_every_version(MessageKind::verdict, encode(of_session(1'700'000'123, 3)), decode_verdict,
+  for_every_version(MessageKind::verdict, encode(of_session(1'700'000'123)), decode_verdict,
                     [&](const ClosureVerdict& decoded, unsigned version) {
-                      EXPECT_EQ(decoded, of_session(version < 6 ? 0 : 1'700'000'123, version < 5 ? 0 : 3));
+                      EXPECT_EQ(decoded, of_session(version < 6 ? 0 : 1'700'000'123));
                     });
-}
-
-// No refusals of version 4 were kept: first_index 3, second_robot 1, second_index 4 and the reason, as protobuf has
-// them.
-TEST(Golden, TheWordsOfAVerdictOfVersion4BecomeAReason) {
-  const std::pair<std::string, RefusalReason> said[] = {
-      {"overlap 0.12, at least 0.3 needed", RefusalReason::overlap},
-      {"too short: 2.5 s, at least 5.0 s needed", RefusalReason::too_short},
-      {"ambiguous: another alignment is 0.97 as good, at most 0.9 allowed", RefusalReason::ambiguous},
-      {"ambiguous: slid along it is 0.97 as good, at most 0.9 allowed", RefusalReason::ambiguous_along},
-      {"no alignment comes near", RefusalReason::no_alignment},
-      {"bad weather", RefusalReason::other},
-      {"", RefusalReason::other}};
-  for (const auto& [words, reason] : said) {
-    std::string payload("\x10\x03\x18\x01\x20\x04", 6);
-    payload.push_back('\x32');
-    payload.push_back(static_cast<char>(words.size()));
-    payload.append(words);
-    std::string frame = pack_frame(MessageKind::verdict, payload);
-    EXPECT_FALSE(decode_verdict(frame).has_value());  // neither closures nor a refusal, in version 5
-    frame.at(2) = 4;
-    const auto decoded = decode_verdict(frame);
-    ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
-    const ClosureVerdict expected{{{RobotId{0}, 3}, {RobotId{1}, 4}}, {}, Refusal{reason}, 0};
-    EXPECT_EQ(*decoded, expected) << words;
-  }
 }
 
 // A cloud alone came with version 2; no bytes of 2 and 3 were kept, but only the number differs from 4.

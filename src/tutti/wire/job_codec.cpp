@@ -154,7 +154,7 @@ Result<Verdicts> decode_verdicts(std::string_view bytes) {
   Verdicts verdicts{
       .job = parsed->message.job(), .verdicts = {}, .failed = std::move(*failed), .why = parsed->message.why()};
   for (const v1::Verdict& in : parsed->message.verdict()) {
-    auto verdict = read_verdict(in, versions(MessageKind::verdict).current);
+    auto verdict = read_verdict(in);
     if (!verdict) return tl::unexpected(verdict.error());
     verdicts.verdicts.push_back(std::move(*verdict));
   }

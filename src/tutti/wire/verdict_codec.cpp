@@ -40,35 +40,8 @@ Result<LoopClosure> read(const v1::LoopClosure& in, const SubmapPair& pair) {
   return closure;
 }
 
-/// Up to version 4 words said why, with the values among them.
-RefusalReason reason_of_words(std::string_view words) {
-  using enum RefusalReason;
-  static constexpr std::pair<std::string_view, RefusalReason> kBeginnings[] = {
-      {"too small", too_small},
-      {"too short", too_short},
-      {"too unlike from above", unlike_from_above},
-      {"no alignment", no_alignment},
-      {"overlap", overlap},
-      {"plane RMSE", plane_rmse},
-      {"misfit", misfit},
-      {"free to slide", free_to_slide},
-      {"viewpoints", viewpoints},
-      {"registered both ways", both_ways_distance},
-      {"contradicted", contradicted},
-      {"ambiguous: slid", ambiguous_along},
-      {"ambiguous", ambiguous},
-      {"one and the same", same_submap},
-      {"no reference", no_reference},
-      {"no keyframes within", no_keyframes_near},
-      {"distant", distant}};
-  for (const auto& [beginning, reason] : kBeginnings)
-    if (words.starts_with(beginning)) return reason;
-  return other;
-}
-
-Result<std::optional<Refusal>> read_refusal(const v1::Verdict& in, unsigned version) {
-  if (version <= 4 && in.closure().empty()) return Refusal{reason_of_words(in.reason())};
-  if (version <= 4 || !in.refused()) return std::nullopt;
+Result<std::optional<Refusal>> read_refusal(const v1::Verdict& in) {
+  if (!in.refused()) return std::nullopt;
   if (in.refusal() >= kRefusalKinds.size())
     return fail(ErrorCode::invalid, "refused for reason {}, at most {} is known", in.refusal(),
                 kRefusalKinds.size() - 1);
@@ -94,7 +67,7 @@ void write(const ClosureVerdict& verdict, v1::Verdict& out) {
   out.set_finder_version(verdict.finder_version);
 }
 
-Result<ClosureVerdict> read_verdict(const v1::Verdict& in, std::uint16_t version) {
+Result<ClosureVerdict> read_verdict(const v1::Verdict& in) {
   ClosureVerdict verdict{.pair = {{{RobotId{in.first_robot()}, in.first_session()}, in.first_index()},
                                   {{RobotId{in.second_robot()}, in.second_session()}, in.second_index()}}};
   for (const v1::LoopClosure& closure : in.closure()) {
@@ -103,7 +76,7 @@ Result<ClosureVerdict> read_verdict(const v1::Verdict& in, std::uint16_t version
     verdict.closures.push_back(*read_closure);
   }
   verdict.finder_version = in.finder_version();
-  const auto refusal = read_refusal(in, version);
+  const auto refusal = read_refusal(in);
   if (!refusal) return in_context("verdict", refusal.error());
   verdict.refusal = *refusal;
   return verdict;
@@ -120,7 +93,7 @@ std::string encode(const ClosureVerdict& verdict) {
 Result<ClosureVerdict> decode_verdict(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Verdict>(MessageKind::verdict, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  auto verdict = read_verdict(parsed->message, parsed->version);
+  auto verdict = read_verdict(parsed->message);
   if (!verdict) return verdict;
   if (auto ok = validate(*verdict); !ok) return tl::unexpected(ok.error());
   return verdict;

@@ -14,7 +14,7 @@ namespace tutti::wire {
 
 /// Of a valid verdict, in the current version.
 void write(const ClosureVerdict& verdict, v1::Verdict& out);
-/// As a program of this version of verdicts wrote it; not validated.
-Result<ClosureVerdict> read_verdict(const v1::Verdict& in, std::uint16_t version);
+/// Not validated.
+Result<ClosureVerdict> read_verdict(const v1::Verdict& in);
 
 }  // namespace tutti::wire
