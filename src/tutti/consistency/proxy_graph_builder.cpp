@@ -2,6 +2,7 @@
 #include "tutti/consistency/proxy_graph_builder.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -89,6 +90,14 @@ void append_reduced(ProxyGraph& graph, const std::vector<ServerNode>& nodes, Rob
                                offset + static_cast<std::uint32_t>(column), -entry.value()});
 }
 
+void note_last_seen(ProxyGraph& graph) {
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    const ProxyNode& node = graph.nodes[i];
+    if (i + 1 == graph.nodes.size() || graph.nodes[i + 1].chain.robot != node.chain.robot)
+      graph.last_seen.push_back({node.chain, node.stamp, node.T_world_body});
+  }
+}
+
 }  // namespace
 
 ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
@@ -111,12 +120,44 @@ ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nod
   if (budget == 0 || nodes.size() <= budget) {
     for (const ServerNode& node : nodes)
       graph.nodes.push_back({node.chain, node.stamp, node.T_world_body, node.covariance});
-    return graph;
+  } else {
+    graph.reduced = true;
+    const auto shares = share_budget(budget, ranges, nodes.size());
+    for (std::size_t r = 0; r < ranges.size(); ++r) append_reduced(graph, nodes, ranges[r], shares[r], config);
   }
-  graph.reduced = true;
-  const auto shares = share_budget(budget, ranges, nodes.size());
-  for (std::size_t r = 0; r < ranges.size(); ++r) append_reduced(graph, nodes, ranges[r], shares[r], config);
+  note_last_seen(graph);
   return graph;
+}
+
+ProxyGraph own_part(const ProxyGraph& whole, RobotId robot) {
+  ProxyGraph own{.epoch = whole.epoch,
+                 .revision = whole.revision,
+                 .radius_m = whole.radius_m,
+                 .sigma_m = whole.sigma_m,
+                 .reduced = whole.reduced};
+  const auto self = std::ranges::find(whole.last_seen, robot, [](const LastSeen& seen) { return seen.chain.robot; });
+  if (self == whole.last_seen.end()) return own;
+  const ChainId chain = self->chain;
+  const auto of_chain = [&](const auto& value) { return value.chain == chain; };
+  const std::span<const ProxyNode> nodes = nodes_of(whole, chain);
+  own.nodes.assign(nodes.begin(), nodes.end());
+  const auto first = static_cast<std::size_t>(nodes.data() - whole.nodes.data());
+  for (const ProxyEdge& edge : whole.edges)
+    if (first <= edge.a && edge.a < first + nodes.size())
+      own.edges.push_back(
+          {edge.a - static_cast<std::uint32_t>(first), edge.b - static_cast<std::uint32_t>(first), edge.weight});
+  std::ranges::copy_if(whole.eliminated, std::back_inserter(own.eliminated), of_chain);
+  std::ranges::copy_if(whole.uncertainties, std::back_inserter(own.uncertainties), of_chain);
+
+  const auto component = component_of(whole, chain);
+  std::ranges::copy_if(whole.last_seen, std::back_inserter(own.last_seen), [&](const LastSeen& seen) {
+    return seen.chain != chain && component_of(whole, seen.chain) == component;
+  });
+  std::ranges::copy_if(whole.components, std::back_inserter(own.components), [&](const ChainComponent& entry) {
+    return of_chain(entry) ||
+           std::ranges::any_of(own.last_seen, [&](const auto& seen) { return seen.chain == entry.chain; });
+  });
+  return own;
 }
 
 }  // namespace tutti::consistency

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "support/consistency/runs.hpp"
+#include "tutti/consistency/chain_uncertainty.hpp"
 
 namespace tutti::consistency {
 namespace {
@@ -119,6 +120,80 @@ TEST(ProxyGraphBuilder, ARepeatedStampIsOurOwnMistake) {
   auto nodes = test::server_nodes(kAlpha, test::corridor(3));
   nodes[2].stamp = nodes[1].stamp;
   EXPECT_THROW(build_proxy_graph(1, nodes, {}, {}), std::logic_error);
+}
+
+/// Up to four robots with up to two sessions each, in two components, with or without reduction.
+ProxyGraph any_graph() {
+  std::vector<ServerNode> nodes;
+  std::vector<ChainComponent> components;
+  const auto robots = *rc::gen::inRange<std::uint32_t>(1, 5);
+  for (std::uint32_t robot = 0; robot < robots; ++robot)
+    for (std::uint64_t session = 0; session < *rc::gen::inRange<std::uint64_t>(1, 3); ++session) {
+      auto more = test::server_nodes(RobotId{robot}, test::corridor(*rc::gen::inRange<std::size_t>(1, 40)));
+      for (ServerNode& node : more) node.chain.session = session;
+      nodes.insert(nodes.end(), more.begin(), more.end());
+      components.push_back({more.front().chain, *rc::gen::inRange<std::uint32_t>(0, 2)});
+    }
+  ProxyGraph graph = build_proxy_graph(7, nodes, components, {.node_budget = *rc::gen::element(0, 30)});
+  graph.epoch = 3;
+  for (const ChainComponent& entry : components)
+    graph.uncertainties.push_back(
+        even_uncertainty(entry.chain, tutti::nodes_of(graph, entry.chain).size(), {0.1, 0.01}));
+  return graph;
+}
+
+RC_GTEST_PROP(ProxyGraphBuilder, ARobotIsLastSeenAtTheEndOfItsNewestChain, ()) {
+  const ProxyGraph graph = any_graph();
+  for (const ProxyNode& node : graph.nodes) {
+    const auto seen = std::ranges::find(graph.last_seen, node.chain.robot, [](const auto& s) { return s.chain.robot; });
+    RC_ASSERT(seen != graph.last_seen.end());
+    RC_ASSERT(std::pair(node.chain, node.stamp) <= std::pair(seen->chain, seen->stamp));
+    RC_ASSERT(std::pair(node.chain, node.stamp) != std::pair(seen->chain, seen->stamp) ||
+              node.T_world_body == seen->T_world_body);
+  }
+  RC_ASSERT(std::ranges::adjacent_find(graph.last_seen, [](const auto& a, const auto& b) {
+              return a.chain.robot >= b.chain.robot;
+            }) == graph.last_seen.end());
+}
+
+RC_GTEST_PROP(OwnPart, IsAllOfTheNewestChainAndWhereTheOthersOfItsMapAre, ()) {
+  const ProxyGraph whole = any_graph();
+  for (const LastSeen& self : whole.last_seen) {
+    const ProxyGraph own = own_part(whole, self.chain.robot);
+    RC_ASSERT(own.age() == whole.age());
+    RC_ASSERT(own.reduced == whole.reduced);
+    RC_ASSERT(std::ranges::equal(own.nodes, tutti::nodes_of(whole, self.chain)));
+    const auto of_chain = [&](const auto& value) { return value.chain == self.chain; };
+    RC_ASSERT(std::ranges::all_of(own.eliminated, of_chain));
+    RC_ASSERT(std::ranges::count_if(whole.eliminated, of_chain) == std::ssize(own.eliminated));
+    RC_ASSERT(own.uncertainties.size() == 1U);
+    RC_ASSERT(own.uncertainties[0] == *uncertainty_of(whole, self.chain));
+    auto edge = own.edges.begin();
+    for (const ProxyEdge& of_whole : whole.edges) {
+      if (!of_chain(whole.nodes[of_whole.a])) continue;
+      RC_ASSERT(edge != own.edges.end());
+      RC_ASSERT(own.nodes.at(edge->a) == whole.nodes[of_whole.a]);
+      RC_ASSERT(own.nodes.at(edge->b) == whole.nodes[of_whole.b]);
+      RC_ASSERT(edge->weight == of_whole.weight);
+      ++edge;
+    }
+    RC_ASSERT(edge == own.edges.end());
+    std::vector<LastSeen> others;
+    std::vector<ChainComponent> components;
+    for (const LastSeen& other : whole.last_seen) {
+      if (component_of(whole, other.chain) != component_of(whole, self.chain)) continue;
+      if (other != self) others.push_back(other);
+      components.push_back({other.chain, *component_of(whole, self.chain)});
+    }
+    RC_ASSERT(own.last_seen == others);
+    RC_ASSERT(own.components == components);
+  }
+}
+
+TEST(OwnPart, OfARobotWithoutNodesIsEmpty) {
+  const ProxyGraph whole = build_proxy_graph(3, two_robots(5, 5), {{kAlpha, 0}, {kBravo, 0}}, {.radius_m = 6.0});
+  const ProxyGraph own = own_part(whole, RobotId{kBravo.value + 1});
+  EXPECT_EQ(own, (ProxyGraph{.revision = 3, .radius_m = 6.0}));
 }
 
 }  // namespace

@@ -48,6 +48,14 @@ struct ChainComponent {
   friend bool operator==(const ChainComponent&, const ChainComponent&) = default;
 };
 
+/// Where a robot was when its map ends: the last node of the newest of its chains that have nodes.
+struct LastSeen {
+  ChainId chain;
+  Timestamp stamp;
+  Pose3 T_world_body;
+  friend bool operator==(const LastSeen&, const LastSeen&) = default;
+};
+
 /// Standard deviations in the direction that is worst.
 struct PoseSigma {
   double position_m = 0.0;
@@ -109,20 +117,21 @@ struct ChainUncertainty {
   friend bool operator==(const ChainUncertainty&, const ChainUncertainty&) = default;
 };
 
-/// The server's map in kilobytes. Unreduced, edges follow from the positions by one rule (radius, sigma; eqs. 1, 2) and
-/// are not carried; reduced, `edges` and `eliminated` are.
+/// The server's map in kilobytes, or what one robot is sent of it (consistency::own_part). Unreduced, edges follow from
+/// the positions by one rule (radius, sigma; eqs. 1, 2) and are not carried; reduced, `edges` and `eliminated` are.
 struct ProxyGraph {
   static constexpr std::size_t kMostChains = 1'000;  ///< Sessions of all robots together.
   std::uint64_t epoch = 0;     ///< Of the server that made it; grows whenever the server starts again.
   std::uint64_t revision = 0;  ///< Counts up with every broadcast of an epoch.
   double radius_m = 7.0;
   double sigma_m = 1.0;
-  std::vector<ProxyNode> nodes;  ///< Sorted by (chain, stamp).
-  std::vector<ChainComponent> components;
+  std::vector<ProxyNode> nodes;            ///< Sorted by (chain, stamp).
+  std::vector<ChainComponent> components;  ///< Sorted by chain.
   bool reduced = false;
   std::vector<ProxyEdge> edges;
   std::vector<EliminatedNode> eliminated;       ///< Sorted by (chain, stamp).
   std::vector<ChainUncertainty> uncertainties;  ///< Sorted by chain; a chain may be missing: nothing is known.
+  std::vector<LastSeen> last_seen;              ///< Sorted by chain, one a robot at most; the chain has a component.
   friend bool operator==(const ProxyGraph&, const ProxyGraph&) = default;
 
   /// The larger one is newer: a server that goes on from an older state than its robots have heard of is heard at once.
@@ -139,6 +148,12 @@ inline std::span<const ProxyNode> nodes_of(const ProxyGraph& graph, const ChainI
 inline const ChainUncertainty* uncertainty_of(const ProxyGraph& graph, const ChainId& chain) {
   const auto found = std::ranges::find(graph.uncertainties, chain, &ChainUncertainty::chain);
   return found == graph.uncertainties.end() ? nullptr : &*found;
+}
+
+/// Nothing for a chain that the graph does not speak of.
+inline std::optional<std::uint32_t> component_of(const ProxyGraph& graph, const ChainId& chain) {
+  const auto found = std::ranges::find(graph.components, chain, &ChainComponent::chain);
+  return found == graph.components.end() ? std::nullopt : std::optional(found->component);
 }
 
 /// T_world_body of one chain's nodes.

@@ -62,7 +62,8 @@ Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes);
 
 /// What every message must fulfil, whoever made it: finite values, unit quaternions, consecutive indices, increasing
 /// stamps, symmetric positive semidefinite covariances, sorted nodes, edges of positive weight, indices in range,
-/// counts within limits, uncertainties of robots with nodes and of the size that those nodes give.
+/// counts within limits, uncertainties of robots with nodes and of the size that those nodes give, robots last seen
+/// once and in a component.
 Status validate(const SubmapMessage& message);
 Status validate(const ProxyGraphMessage& message);
 Status validate(const ClosureVerdict& verdict);

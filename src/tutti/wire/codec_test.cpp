@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "support/wire/messages.hpp"
+#include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/wire/internal/logarithm.hpp"
 #include "tutti/wire/limits.hpp"
 
@@ -163,6 +164,9 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
     const Vector6d sigma = in.nodes[i].covariance.diagonal().cwiseSqrt();
     RC_ASSERT((difference.cwiseAbs().array() <= 0.25 * (sigma * sigma.transpose()).array() + 1e-300).all());
   }
+  RC_ASSERT(std::ranges::equal(in.last_seen, out.last_seen, [](const LastSeen& x, const LastSeen& y) {
+    return x.chain == y.chain && x.stamp == y.stamp && near(x.T_world_body, y.T_world_body, 5e-4, 1e-4);
+  }));
   for (std::size_t i = 0; i < in.edges.size(); ++i) {
     RC_ASSERT(out.edges[i].a == in.edges[i].a);
     RC_ASSERT(out.edges[i].b == in.edges[i].b);
@@ -173,6 +177,20 @@ RC_GTEST_PROP(ProxyGraphCodec, RoundTrip, ()) {
   const auto again = decode_proxy_graph(encode(*decoded));
   RC_ASSERT(again.has_value());
   RC_ASSERT(again->graph == out);
+}
+
+RC_GTEST_PROP(ProxyGraphCodec, ARobotsOwnPartIsWhatItWouldTakeFromTheWhole, ()) {
+  Rng rng = any_rng();
+  ProxyGraphMessage message = test::any_proxy_graph(rng, *rc::gen::inRange<std::size_t>(1, 8),
+                                                    *rc::gen::inRange<std::size_t>(1, 30), *rc::gen::arbitrary<bool>());
+  const ProxyGraph whole = decode_proxy_graph(encode(message))->graph;
+  for (const LastSeen& seen : whole.last_seen) {
+    const RobotId robot = seen.chain.robot;
+    const auto own =
+        decode_proxy_graph(encode(ProxyGraphMessage{message.header, consistency::own_part(message.graph, robot)}));
+    RC_ASSERT(own.has_value());
+    RC_ASSERT(own->graph == consistency::own_part(whole, robot));
+  }
 }
 
 TEST(ProxyGraphCodec, NodesMayBeAsFarApartAsLegalPosesAre) {
@@ -273,6 +291,22 @@ TEST(Codec, BytesOnTheRadio) {
   EXPECT_LT(without_cloud, 700U);
 }
 
+TEST(Codec, BytesToOneRobotHardlyGrowWithTheFleet) {
+  const auto bytes_of_fleet = [](std::size_t robots) {
+    Rng rng(6);
+    ProxyGraphMessage message = test::any_proxy_graph(rng, 2 * robots, 300, false);
+    for (ChainComponent& entry : message.graph.components) entry.component = 0;
+    const ProxyGraphMessage own{message.header, consistency::own_part(message.graph, RobotId{0})};
+    return std::pair(encode(own).size(), encode(message).size());
+  };
+  const auto [own_of_2, all_of_2] = bytes_of_fleet(2);
+  const auto [own_of_16, all_of_16] = bytes_of_fleet(16);
+  std::printf("[ MEASURED ] %zu bytes of 2 robots and %zu of 16, of everybody's %zu and %zu\n", own_of_2, own_of_16,
+              all_of_2, all_of_16);
+  EXPECT_LT(3 * own_of_2, all_of_2);
+  EXPECT_LT(own_of_16, own_of_2 + 14 * 40);  // 10 bytes of these are a random session's number, which is random
+}
+
 /// One corruption of a valid message and a word its complaint must contain.
 template <class Message>
 struct Corruption {
@@ -326,23 +360,31 @@ TEST(Validate, ProxyGraph) {
   Rng rng(7);
   const ProxyGraphMessage good = test::any_proxy_graph(rng, 2, 10, true);
   using M = ProxyGraphMessage;
-  expect_refused<M>(good, {{"radius", [](M& m) { m.graph.radius_m = 0.0; }},
-                           {"sigma", [](M& m) { m.graph.sigma_m = kNan; }},
-                           {"come after", [](M& m) { std::swap(m.graph.nodes[0], m.graph.nodes[1]); }},
-                           {"eliminated node", [](M& m) { m.graph.eliminated[1] = m.graph.eliminated[0]; }},
-                           {"node 3", [](M& m) { m.graph.nodes[3].covariance(0, 0) = kNan; }},
-                           {"node 3", [](M& m) { m.graph.nodes[3].T_world_body.rotation.coeffs().setZero(); }},
-                           {"two components", [](M& m) { m.graph.components[1].chain = m.graph.components[0].chain; }},
-                           {"joins nodes", [](M& m) { m.graph.edges[0].b = 1000; }},
-                           {"joins nodes", [](M& m) { m.graph.edges[0].b = m.graph.edges[0].a; }},
-                           {"joins robots",
-                            [](M& m) {
-                              m.graph.edges[0] = {0, m.graph.edges.back().b, 1.0};
-                            }},
-                           {"weight", [](M& m) { m.graph.edges[0].weight = -1.0; }},
-                           {"weight 0, expected a finite one > 0", [](M& m) { m.graph.edges[0].weight = 0.0; }},
-                           {"weight", [](M& m) { m.graph.edges[0].weight = 1e300; }},
-                           {"unreduced", [](M& m) { m.graph.reduced = false; }}});
+  expect_refused<M>(good,
+                    {{"radius", [](M& m) { m.graph.radius_m = 0.0; }},
+                     {"sigma", [](M& m) { m.graph.sigma_m = kNan; }},
+                     {"come after", [](M& m) { std::swap(m.graph.nodes[0], m.graph.nodes[1]); }},
+                     {"eliminated node", [](M& m) { m.graph.eliminated[1] = m.graph.eliminated[0]; }},
+                     {"node 3", [](M& m) { m.graph.nodes[3].covariance(0, 0) = kNan; }},
+                     {"node 3", [](M& m) { m.graph.nodes[3].T_world_body.rotation.coeffs().setZero(); }},
+                     {"component of robot 0 does not come after",
+                      [](M& m) { m.graph.components[1].chain = m.graph.components[0].chain; }},
+                     {"does not come after robot", [](M& m) { m.graph.last_seen.push_back(m.graph.last_seen[0]); }},
+                     {"has no component", [](M& m) { m.graph.last_seen[0].chain.session += 1; }},
+                     {"has no component", [](M& m) { m.graph.components.pop_back(); }},
+                     {"as last seen: pose", [](M& m) { m.graph.last_seen[0].T_world_body.translation.x() = kNan; }},
+                     {"as last seen: coordinate",
+                      [](M& m) { m.graph.last_seen[0].T_world_body.translation.x() = 2.0 * kMaxCoordinate_m; }},
+                     {"joins nodes", [](M& m) { m.graph.edges[0].b = 1000; }},
+                     {"joins nodes", [](M& m) { m.graph.edges[0].b = m.graph.edges[0].a; }},
+                     {"joins robots",
+                      [](M& m) {
+                        m.graph.edges[0] = {0, m.graph.edges.back().b, 1.0};
+                      }},
+                     {"weight", [](M& m) { m.graph.edges[0].weight = -1.0; }},
+                     {"weight 0, expected a finite one > 0", [](M& m) { m.graph.edges[0].weight = 0.0; }},
+                     {"weight", [](M& m) { m.graph.edges[0].weight = 1e300; }},
+                     {"unreduced", [](M& m) { m.graph.reduced = false; }}});
 }
 
 TEST(Validate, Uncertainties) {

@@ -50,8 +50,8 @@ const char* name(MessageKind kind) {
 
 // What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions. Verdict: up to 4 it said why a
 // pair was refused in words only, and not by which version of the finder; 6 has sessions. Proxy graph: up to 5 it told
-// what it is unsure of in other terms, which no robot compares any more; nobody keeps one. Cloud: came with 2, the same
-// since.
+// what it is unsure of in other terms, which no robot compares any more, and up to 6 not where others were last seen;
+// nobody keeps one. Cloud: came with 2, the same since.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
@@ -59,7 +59,7 @@ Versions versions(MessageKind kind) {
     case MessageKind::verdict:
       return {.oldest = 5, .current = 6};
     case MessageKind::proxy_graph:
-      return {.oldest = 6, .current = 6};
+      return {.oldest = 7, .current = 7};
     case MessageKind::cloud:
       return {.oldest = 2, .current = 4};
     case MessageKind::receipt:

@@ -110,6 +110,8 @@ TEST(Golden, ProxyGraph) {
                           {{{127, -5, 0}, {3, -127, 64}, 2.5, 0.02}},
                           KnownDirection{{1, 127, 0}, {127, 2, -3}, 0.5, 1.5}},
                          {seven, {0.5, 0.01}, {{}, {{{0.03, 0.002}}, {120.0, 14.5}, {90.0, 8.25}}}, {}, {}}};
+  graph.last_seen = {{RobotId{0}, {3'000'000'007}, {kQuarterTurn, {1.5, -0.25, 0}}},
+                     {seven, {2'000'000'008}, {kQuarterTurn, {-9, 100, 2}}}};
   const auto check = [&](const ProxyGraphMessage& decoded, unsigned) {
     EXPECT_EQ(decoded.header, message.header);
     EXPECT_EQ(decoded.graph.epoch, graph.epoch);
@@ -129,6 +131,12 @@ TEST(Golden, ProxyGraph) {
     }
     EXPECT_EQ(decoded.graph.nodes[0].covariance, Matrix6d::Zero().eval());
     EXPECT_NEAR(decoded.graph.nodes[1].covariance(2, 2), 1e-4, 8e-6);
+
+    ASSERT_EQ(decoded.graph.last_seen.size(), 2U);
+    EXPECT_EQ(decoded.graph.last_seen[0].stamp.ns, 3'000'000'007);
+    EXPECT_EQ(decoded.graph.last_seen[1].chain, seven);
+    EXPECT_EQ(decoded.graph.last_seen[1].stamp.ns, 2'000'000'008);
+    EXPECT_LT(local(decoded.graph.last_seen[1].T_world_body, graph.last_seen[1].T_world_body).norm(), 5e-4);
 
     ASSERT_EQ(decoded.graph.uncertainties.size(), 2U);
     const ChainUncertainty& first = decoded.graph.uncertainties[0];

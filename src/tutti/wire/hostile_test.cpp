@@ -5,11 +5,14 @@
 #include <zstd.h>
 
 #include <array>
+#include <limits>
 #include <string>
 
 #include "support/wire/messages.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/integer_coder.hpp"
+#include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -165,6 +168,35 @@ TEST(Hostile, AnUncertaintyNeedsNodes) {
   const auto error = decode(MessageKind::proxy_graph, pack_frame(MessageKind::proxy_graph, payload));
   ASSERT_TRUE(error.has_value());
   EXPECT_NE(error->message.find("no nodes"), std::string::npos) << error->message;
+}
+
+TEST(Hostile, ARobotIsSeenSomewhere) {
+  // radius 1 m, sigma 1 m, robot 0 in component 0, and it was last seen at this x, in steps.
+  const auto seen_at = [](std::int64_t x) {
+    RangeEncoder body;
+    IntegerModel is_seen, stamps;
+    std::array<IntegerModel, 6> poses;
+    is_seen.put(body, 1);
+    stamps.put(body, 7);
+    for (std::size_t i = 0; i < poses.size(); ++i) poses[i].put(body, i == 0 ? x : 0);
+    const std::string one("\x00\x00\x00\x00\x00\x00\xf0\x3f", 8);
+    const std::string bytes = body.finish();
+    const std::string payload = "\x19" + one + "\x21" + one + std::string("\x52\x01\x00\x5a\x01\x00\x92\x01", 8) +
+                                static_cast<char>(bytes.size()) + bytes;
+    return pack_frame(MessageKind::proxy_graph, payload);
+  };
+  const auto good = decode_proxy_graph(seen_at(3000));
+  ASSERT_TRUE(good.has_value()) << good.error().message;
+  ASSERT_EQ(good->graph.last_seen.size(), 1U);
+  EXPECT_EQ(good->graph.last_seen[0].stamp.ns, 7);
+  EXPECT_NEAR(good->graph.last_seen[0].T_world_body.translation.x(), 3000 * kProxyPoseSteps.translation_m, 1e-9);
+  const auto far = static_cast<std::int64_t>(2.0 * kMaxCoordinate_m / kProxyPoseSteps.translation_m);
+  for (const auto& [x, word] :
+       {std::pair(far, "coordinate"), std::pair(std::numeric_limits<std::int64_t>::max(), "out of range")}) {
+    const auto error = decode(MessageKind::proxy_graph, seen_at(x));
+    ASSERT_TRUE(error.has_value());
+    EXPECT_NE(error->message.find(word), std::string::npos) << error->message;
+  }
 }
 
 }  // namespace

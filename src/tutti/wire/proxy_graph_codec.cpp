@@ -212,6 +212,27 @@ class UncertaintyColumns {
   IntegerModel count_, has_sigma_, doubted_, fine_, number_;
 };
 
+/// Where robots were last seen, at most once in each chain of a component; hands them to add(seen). False when a number
+/// is outside what encoding makes.
+template <class Coder, class Add>
+bool code_last_seen(Coder& coder, const std::vector<ChainComponent>& chains, const std::vector<LastSeen>& in, Add add) {
+  IntegerModel is_seen, stamps;
+  std::array<IntegerModel, 6> poses;
+  std::int64_t stamp_ns = 0;
+  for (const ChainComponent& entry : chains) {
+    const auto found = std::ranges::find(in, entry.chain, &LastSeen::chain);
+    if (coder.code(is_seen, found == in.end() ? 0 : 1) == 0) continue;
+    const LastSeen seen = found == in.end() ? LastSeen{} : *found;
+    stamp_ns = sum(stamp_ns, coder.code(stamps, difference(seen.stamp.ns, stamp_ns)));
+    PoseCode pose = quantise(seen.T_world_body, kProxyPoseSteps);
+    for (std::size_t i = 0; i < pose.size(); ++i) pose[i] = coder.code(poses[i], pose[i]);
+    const auto T_world_body = dequantise(pose, kProxyPoseSteps);
+    if (!T_world_body) return false;
+    add(LastSeen{entry.chain, {stamp_ns}, *T_world_body});
+  }
+  return true;
+}
+
 std::vector<Run> runs_of(const ProxyGraph& graph) {
   std::map<ChainId, Run> runs;
   const auto add = [&](const auto& nodes, std::size_t Run::*count) {
@@ -275,11 +296,13 @@ void write_body(const ProxyGraph& graph, const std::vector<Run>& runs, v1::Proxy
   EdgeColumns edges;
   const auto count = static_cast<std::int64_t>(graph.nodes.size());
   for (const ProxyEdge& edge : graph.edges) edges.code(writer, count, edge);
+  TUTTI_CHECK(code_last_seen(writer, graph.components, graph.last_seen, [](const LastSeen&) {}), "robots last seen");
   out.set_edges(static_cast<std::uint32_t>(graph.edges.size()));
   out.set_body(writer.out.finish());
 }
 
-/// Stops as soon as it has read more than there is: what is claimed may be more than what is there.
+/// Stops as soon as it has read more than there is: what is claimed may be more than what is there. Needs the graph's
+/// components.
 Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGraph& graph) {
   if (in.edges() > kMaxProxyEdges)
     return fail(ErrorCode::invalid, "{} edges, at most {} are accepted", in.edges(), kMaxProxyEdges);
@@ -310,6 +333,8 @@ Status read_body(const v1::ProxyGraph& in, const std::vector<Run>& runs, ProxyGr
       return fail(ErrorCode::invalid, "edge {} joins nodes {} and {} of {}", i, edges.a, edges.b, graph.nodes.size());
     graph.edges.push_back(*edge);
   }
+  if (!code_last_seen(reader, graph.components, {}, [&](const LastSeen& seen) { graph.last_seen.push_back(seen); }))
+    return fail(ErrorCode::invalid, "robot {} as last seen is out of range", graph.last_seen.size());
   if (!reader.in.finished())
     return fail(ErrorCode::parse, "body of {} bytes is {} than what it is said to hold", in.body().size(),
                 reader.in.overrun() ? "shorter" : "longer");
@@ -380,8 +405,8 @@ Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes) {
   const std::string where = fmt::format("proxy graph {}", graph.revision);
   const auto runs = read_runs(in);
   if (!runs) return in_context(where, runs.error());
-  if (auto ok = read_body(in, *runs, graph); !ok) return in_context(where, ok.error());
   if (auto ok = read_components(in, graph); !ok) return in_context(where, ok.error());
+  if (auto ok = read_body(in, *runs, graph); !ok) return in_context(where, ok.error());
   if (auto ok = validate(message); !ok) return tl::unexpected(ok.error());
   return message;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -162,6 +161,19 @@ Status check_uncertainties(const ProxyGraph& graph) {
   return {};
 }
 
+Status check_last_seen(const ProxyGraph& graph) {
+  for (std::size_t i = 0; i < graph.last_seen.size(); ++i) {
+    const LastSeen& seen = graph.last_seen[i];
+    const std::string where = "robot " + to_string(seen.chain) + " as last seen";
+    if (i > 0 && seen.chain.robot <= graph.last_seen[i - 1].chain.robot)
+      return fail(ErrorCode::invalid, "{} does not come after robot {}", where,
+                  to_string(graph.last_seen[i - 1].chain));
+    if (!component_of(graph, seen.chain)) return fail(ErrorCode::invalid, "{} has no component", where);
+    if (auto ok = check_pose(seen.T_world_body); !ok) return in_context(where, ok.error());
+  }
+  return {};
+}
+
 Status check_graph(const ProxyGraph& graph) {
   for (const auto& ok : {at_most(graph.nodes.size(), kMaxProxyNodes, "nodes"),
                          at_most(graph.eliminated.size(), kMaxProxyNodes, "eliminated nodes"),
@@ -171,13 +183,14 @@ Status check_graph(const ProxyGraph& graph) {
   for (const double value : {graph.radius_m, graph.sigma_m})
     if (!std::isfinite(value) || value <= 0.0)
       return fail(ErrorCode::invalid, "radius {} m, sigma {} m, expected > 0", graph.radius_m, graph.sigma_m);
-  std::set<ChainId> chains;
-  for (const ChainComponent& component : graph.components)
-    if (!chains.insert(component.chain).second)
-      return fail(ErrorCode::invalid, "robot {} has two components", to_string(component.chain));
+  for (std::size_t i = 1; i < graph.components.size(); ++i)
+    if (graph.components[i].chain <= graph.components[i - 1].chain)
+      return fail(ErrorCode::invalid, "the component of robot {} does not come after robot {}'s",
+                  to_string(graph.components[i].chain), to_string(graph.components[i - 1].chain));
   if (auto ok = check_nodes(graph); !ok) return ok;
   if (auto ok = check_order(graph.eliminated, "eliminated node"); !ok) return ok;
-  if (auto ok = check_uncertainties(graph); !ok) return ok;
+  for (const auto& check : {check_uncertainties, check_last_seen})
+    if (auto ok = check(graph); !ok) return ok;
   return check_edges(graph);
 }
 

@@ -128,6 +128,9 @@ inline ProxyGraphMessage any_proxy_graph(Rng& rng, std::size_t chains, std::size
       const Matrix6d covariance = k == 0 ? Matrix6d::Zero() : odometry_covariance(rng.uniform(0.9, 1.2), turn);
       graph.nodes.push_back({chain, stamp, T, covariance});
     }
+    const ProxyNode& last = graph.nodes.back();
+    if (r % 2 == 1) graph.last_seen.pop_back();  // in the session before
+    graph.last_seen.push_back({chain, last.stamp, last.T_world_body});
     if (r % 2 == 0) graph.uncertainties.push_back(any_uncertainty(rng, chain, graph.nodes.size() - first));
     if (!reduced) continue;
     for (std::size_t a = first; a < graph.nodes.size(); ++a)

@@ -47,12 +47,6 @@ Edges proxy_edges(const ProxyGraph& graph, const std::vector<std::uint32_t>& com
   return out;
 }
 
-std::uint32_t component_of(const ProxyGraph& graph, const ChainId& chain) {
-  for (const auto& entry : graph.components)
-    if (entry.chain == chain) return entry.component;
-  return 0;
-}
-
 /// The largest component: others live in unrelated frames and would be drawn over it.
 struct Plan {
   std::vector<std::uint32_t> component;  ///< Per proxy node.
@@ -68,7 +62,7 @@ Plan plan_of(const MissionRecord& record) {
   std::vector<std::uint32_t> component;
   Points3d box;
   for (const ProxyNode& node : graph.nodes) {
-    component.push_back(component_of(graph, node.chain));
+    component.push_back(component_of(graph, node.chain).value_or(0));
     if (component.back() == shown) box.push_back(T_display_world * node.T_world_body.translation);
   }
   const GroundPlane ground = ground_plane({box});
