@@ -38,6 +38,25 @@ const PolicyRecord& policy(const RobotRecord& robot, const std::string& name) {
   return *found;
 }
 
+TEST(Mission, ARobotDoesTheSameWithItsOwnPartOfTheMap) {
+  MissionConfig config = small_mission();
+  config.compare_policies = {"spectral"};
+  ASSERT_EQ(config.server.broadcast, "own");
+  const MissionRecord own = run(config);
+  config.server.broadcast = "all";
+  const MissionRecord all = run(config);
+  ASSERT_EQ(own.robots.size(), 2U);
+  for (std::size_t r = 0; r < 2; ++r) {
+    EXPECT_LT(own.robots[r].bytes_down, 6 * all.robots[r].bytes_down / 10) << own.robots[r].name;
+    ASSERT_EQ(own.robots[r].policies.size(), 2U);
+    for (std::size_t p = 0; p < 2; ++p)
+      EXPECT_EQ(own.robots[r].policies[p].corrected, all.robots[r].policies[p].corrected);
+    ASSERT_EQ(own.robots[r].whereabouts.size(), 1U);
+    EXPECT_EQ(own.robots[r].whereabouts[0].T_map_body, all.robots[r].whereabouts.at(0).T_map_body);
+  }
+  EXPECT_EQ(own.server.proxy, all.server.proxy);
+}
+
 TEST(Mission, ClosesTheLoop) {
   MissionConfig config = small_mission();
   config.compare_policies = {"spectral", "uniform"};

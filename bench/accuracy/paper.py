@@ -217,7 +217,8 @@ def document(runs):
              "(cloud to cloud; thinned to 0.1 m).", ""] + map_table([tunnel[0], terrace[0]]) + [""]
     text += ["## Table IV: bandwidth, with and without reduction", "",
              "The paper: 320 and 300 kB/s up; 44 kB/s down, 25 after the reduction 1295 -> 691 and 1191 -> 444. Reduced:",
-             f"`--set {budget} --set {compare('spectral')}`, the paper's share of the nodes.", ""]
+             f"`--set {budget} --set {compare('spectral')}`, the paper's share of the nodes. The paper sends everybody's "
+             "nodes to all (`server.broadcast=all`), we send a robot its own.", ""]
     text += bandwidth_table([("tunnel", tunnel, tunnel[0]), ("tunnel, reduced", reduced, tunnel[0])])
     down = [sum(robot["bytes_down"] for robot in run[0]["robots"]) for run in (tunnel, reduced)]
     text += ["", f"With reduction {down[1] / down[0]:.1f} times the bytes: unreduced edges follow from the positions by one "

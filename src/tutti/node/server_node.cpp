@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
@@ -254,8 +255,15 @@ void ServerNode::send_receipt(RobotId robot, Step& step) const {
 
 void ServerNode::send_graph(const ProxyGraphMessage& message, Step& step) {
   broadcast_ = message.graph;
-  const auto bytes = std::make_shared<const std::string>(wire::encode(message));
-  for (const RobotId robot : robots_) step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, bytes));
+  const auto encoded = [](const ProxyGraphMessage& part) {
+    return std::make_shared<const std::string>(wire::encode(part));
+  };
+  const bool is_own = config_.server.broadcast == "own";
+  const auto whole = is_own ? nullptr : encoded(message);
+  for (const RobotId robot : robots_)
+    step.messages.push_back(
+        to_robot(robot, bus::MessageKind::proxy_graph,
+                 is_own ? encoded({message.header, consistency::own_part(message.graph, robot)}) : whole));
 }
 
 Step ServerNode::on_timer(Timestamp now) {

@@ -174,18 +174,9 @@ void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consiste
   if (pairs.empty()) return;
   const Pose3& T_map_newest = smoother_.pose(own[pairs.back().robot].chain_index);  // as corrected now
   const Pose3 T_map_world = T_map_newest * graph.nodes[pairs.back().proxy].T_world_body.inverse();
-  const auto component_of = [&](const ChainId& chain) -> std::optional<std::uint32_t> {
-    for (const ChainComponent& entry : graph.components)
-      if (entry.chain == chain) return entry.component;
-    return std::nullopt;
-  };
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-    const ProxyNode& node = graph.nodes[i];
-    const RobotId robot = node.chain.robot;
-    const bool last = i + 1 == graph.nodes.size() || graph.nodes[i + 1].chain.robot != robot;
-    if (!last || robot == chain_.robot || component_of(node.chain) != component_of(chain_)) continue;
-    state_.whereabouts.push_back({robot, node.stamp, T_map_world * node.T_world_body});
-  }
+  for (const LastSeen& seen : graph.last_seen)
+    if (seen.chain.robot != chain_.robot && component_of(graph, seen.chain) == component_of(graph, chain_))
+      state_.whereabouts.push_back({seen.chain.robot, seen.stamp, T_map_world * seen.T_world_body});
 }
 
 AgentState RobotAgent::state() const {

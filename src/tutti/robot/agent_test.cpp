@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "support/robot/drifting_robot.hpp"
+#include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -56,6 +57,57 @@ TEST_P(AgentPolicies, CorrectsOdometryInThePlaneAndOfUnknownHeight) {
       summary = agent.receive(broadcast(agent, revision, kWorld), 40);
     EXPECT_TRUE(estimation::is_usable(summary.optimised)) << to_string(summary.optimised);
     EXPECT_LT(evaluation::agreement(agent.corrected(), truth)->rmse_m, 0.15 * before) << others;
+  }
+}
+
+/// Two sessions of three robots, side by side on one way, the last of them in a map of its own.
+ProxyGraphMessage everybodys(const RobotAgent& agent, std::uint64_t revision, bool reduced) {
+  const ProxyGraphMessage sent = broadcast(agent, revision, kWorld);
+  std::vector<consistency::ServerNode> nodes;
+  std::vector<ChainComponent> components;
+  for (const std::uint32_t robot : {0U, 1U, 9U, 12U})
+    for (const std::uint64_t session : {agent.chain().session - 1, agent.chain().session}) {
+      const ChainId chain{RobotId{robot}, session};
+      const Pose3 aside{Eigen::Quaterniond::Identity(), {0.0, chain == agent.chain() ? 0.0 : 1.0 + robot, 0.0}};
+      for (const ProxyNode& node : nodes_of(sent.graph, agent.chain()))
+        nodes.push_back({chain, node.stamp, node.T_world_body * aside, node.covariance});
+      components.push_back({chain, robot == 12U ? 1U : 0U});
+    }
+  const int budget = reduced ? static_cast<int>(nodes.size() * 2 / 3) : 0;
+  ProxyGraphMessage message{
+      .header = {}, .graph = consistency::build_proxy_graph(revision, nodes, components, {.node_budget = budget})};
+  message.graph.uncertainties = {
+      consistency::even_uncertainty(agent.chain(), nodes_of(message.graph, agent.chain()).size(), {0.002, 0.001})};
+  return message;
+}
+
+// Of the whole graph nothing else matters to it, not even what is closer than the radius or reduced together.
+TEST_P(AgentPolicies, DoesTheSameWithItsOwnPartOfTheGraph) {
+  for (const bool reduced : {false, true}) {
+    AgentConfig config;
+    config.policy.name = GetParam();
+    RobotAgent with_all(RobotId{1}, 1, config, Rng(1)), with_own(RobotId{1}, 1, config, Rng(1));
+    for (RobotAgent* agent : {&with_all, &with_own}) feed(*agent, drifting_odometry(240));
+    for (std::uint64_t revision = 1; revision <= 3; ++revision) {
+      const ProxyGraphMessage whole = everybodys(with_all, revision, reduced);
+      EXPECT_EQ(whole.graph.reduced, reduced);
+      const ProxyGraphMessage own{whole.header, consistency::own_part(whole.graph, RobotId{1})};
+      EXPECT_LT(7 * own.graph.nodes.size(), whole.graph.nodes.size());
+      const UpdateSummary all = with_all.receive(whole), part = with_own.receive(own);
+      EXPECT_GT(part.constraints, 0U);
+      EXPECT_EQ(part.synchronised, all.synchronised);
+      EXPECT_EQ(part.ledger.added, all.ledger.added);
+      EXPECT_EQ(part.explanation.origins.size(), all.explanation.origins.size());
+    }
+    EXPECT_EQ(with_own.corrected(), with_all.corrected());
+    EXPECT_EQ(with_own.ledger(), with_all.ledger());
+    ASSERT_EQ(with_own.whereabouts().size(), 2U);  // robots 0 and 9, and not 12
+    ASSERT_EQ(with_all.whereabouts().size(), 2U);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(with_own.whereabouts()[i].robot, RobotId{i == 0 ? 0U : 9U});
+      EXPECT_EQ(with_own.whereabouts()[i].stamp, with_all.whereabouts()[i].stamp);
+      EXPECT_EQ(with_own.whereabouts()[i].T_map_body, with_all.whereabouts()[i].T_map_body);
+    }
   }
 }
 
@@ -202,6 +254,7 @@ TEST(Agent, SynchronisesWithItsOwnSessionAndSeesTheOthersInTheirNewest) {
   both.graph.nodes.insert(both.graph.nodes.begin(), older.begin(), older.end());
   both.graph.nodes.push_back(newest);
   both.graph.components = {{{RobotId{1}, 4}, 0}, {agent.chain(), 0}, {RobotId{9}, 1}, {newest.chain, 0}};
+  both.graph.last_seen = {{agent.chain(), at(239), {}}, {newest.chain, newest.stamp, newest.T_world_body}};
 
   RobotAgent alone(RobotId{1}, {}, Rng(1), agent.state());
   const UpdateSummary expected = alone.receive(message), update = agent.receive(both);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -25,12 +26,16 @@ struct ServerConfig {
   MapConfig map;
   consistency::ProxyGraphConfig proxy_graph;
   double update_period_s = 10.0;  ///< Mission time between two optimisations when something new has come.
+  std::string broadcast = "own";
   template <class V>
   void describe(V& v) {
     v.field("map", map);
     v.field("proxy_graph", proxy_graph);
     v.field("update_period_s", update_period_s, greater_than(0.0),
             "Mission time between two optimisations when there is something new.");
+    v.field("broadcast", broadcast, one_of({"own", "all"}),
+            "What a robot is sent of the map: 'own' = the proxy nodes of its newest session, how sure the map is of "
+            "them, and where the others were last seen; 'all' = everybody's (the paper). It does the same with both.");
   }
 };
 
@@ -91,7 +96,7 @@ class MapServer {
 
   /// True when something came since the last optimise().
   [[nodiscard]] bool has_news() const { return news_; }
-  /// Optimises the joint map and returns the proxy graph to broadcast.
+  /// Optimises the joint map and returns its whole proxy graph.
   ProxyGraphMessage optimise();
   /// The last revision's again: for a server that goes on from a state in which nothing has come since.
   ProxyGraphMessage rebuild();
