@@ -34,7 +34,7 @@ class Bytes {
       short_ = true;
       return;
     }
-    std::memcpy(values, left_.data(), count * sizeof(T));
+    if (count > 0) std::memcpy(values, left_.data(), count * sizeof(T));  // of no values there may be no address
     left_.remove_prefix(count * sizeof(T));
   }
   template <class T>
