@@ -62,28 +62,17 @@ void free_of_gauge(const internal::RigidMotion& rigid, Errors& errors) {
   }
 }
 
-double largest_square(const MatrixXd& errors) {
-  double out = 0.0;
-  for (Index c = 0; c < errors.cols(); c += 3) out = std::max(out, errors.middleCols<3>(c).squaredNorm());
-  return out;
-}
-
 /// Root mean square over the nodes.
-double whole(const MatrixXd& samples, const MatrixXd& shifts) {
-  const double squares = 3.0 * samples.squaredNorm() / static_cast<double>(samples.cols());
-  return std::sqrt((squares + largest_square(shifts)) / static_cast<double>(samples.rows()));
+double whole(const MatrixXd& samples) {
+  return std::sqrt(3.0 * samples.squaredNorm() / static_cast<double>(samples.size()));
 }
 
 /// The wavelet coefficients of the errors of one kind at one scale.
 class Coefficients {
  public:
-  /// n x (3 samples) and n x (3 shifts).
-  Coefficients(const Eigen::Ref<const MatrixXd>& samples, const Eigen::Ref<const MatrixXd>& shifts, double rounding)
-      : samples_(samples), shifts_(shifts), extra_(Eigen::VectorXd::Constant(samples.rows(), rounding * rounding)) {
-    Eigen::VectorXd largest = Eigen::VectorXd::Zero(samples.rows());
-    for (Index c = 0; c < shifts.cols(); c += 3)
-      largest = largest.cwiseMax(shifts.middleCols<3>(c).rowwise().squaredNorm());
-    extra_ += largest;
+  /// n x (3 samples).
+  Coefficients(const Eigen::Ref<const MatrixXd>& samples, double rounding)
+      : samples_(samples), rounding_(rounding * rounding) {
     const Index group = (count() + kGroups - 1) / kGroups;
     for (Index first = 0; first < count(); first += group)
       groups_.push_back({first, std::min(group, count() - first), scatter(first, std::min(group, count() - first))});
@@ -105,12 +94,7 @@ class Coefficients {
     const double spare = static_cast<double>(values.size() - 1);
     const double variance = (values.array() - mean).square().sum() / spare;
     const double largest_variance = variance * spare / chi_square_quantile(kCautious, spare);
-    Energy out{mean, std::max(1.0, 2.0 * mean * mean / std::max(largest_variance, 1e-12 * mean * mean))};
-    double shifted = 0.0;
-    for (Index c = 0; c < shifts_.cols(); c += 3)
-      shifted = std::max(shifted, energy_of(shifts_.middleCols<3>(c), sigma_));
-    out.mean += shifted;
-    return out;
+    return {mean, std::max(1.0, 2.0 * mean * mean / std::max(largest_variance, 1e-12 * mean * mean))};
   }
 
  private:
@@ -138,8 +122,8 @@ class Coefficients {
       double& block = out[static_cast<std::size_t>(n) / ChainUncertainty::kBlock];
       const double mean = S.trace() / 3.0, apart = std::max(0.0, S.squaredNorm() / 3.0 - mean * mean);
       const double most = (mean + std::sqrt(2.0 * apart)) / used;  // no eigenvalue is larger (Samuelson 1968)
-      if ((1.0 + 1e-7) * (most + extra_(n)) <= block * block) continue;
-      block = std::max(block, std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + extra_(n)));
+      if ((1.0 + 1e-7) * (most + rounding_) <= block * block) continue;
+      block = std::max(block, std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + rounding_));
     }
     return out;
   }
@@ -150,8 +134,8 @@ class Coefficients {
     return out;
   }
 
-  MatrixXd samples_, shifts_;
-  Eigen::VectorXd extra_;  ///< Variance besides the samples', per node.
+  MatrixXd samples_;
+  double rounding_;  ///< Variance besides the samples'.
   std::vector<Group> groups_;
   std::vector<double> sigma_;
 };
@@ -170,21 +154,18 @@ std::vector<double> waves(const spectral::WaveletFilter& filter, Index nodes) {
   return out;
 }
 
-std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, const Errors& samples,
-                                     const Errors& shifts) {
+std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, const Errors& samples) {
   const spectral::WaveletFilter filter(laplacian, internal::kScales);
   const std::vector<double> held = waves(filter, laplacian.rows());
   const Errors W{filter(samples.position_m), filter(samples.rotation_rad)};
-  const Errors H{filter(shifts.position_m), filter(shifts.rotation_rad)};
-  const Index columns = samples.position_m.cols(), shift_columns = shifts.position_m.cols();
+  const Index columns = samples.position_m.cols();
   std::vector<ScaleUncertainty> out(internal::kScales);
   for (Index s = 0; s < internal::kScales; ++s) {
     ScaleUncertainty& scale = out[static_cast<std::size_t>(s)];
     if (held[static_cast<std::size_t>(s)] < kLeastWaves) continue;
     const double share = std::sqrt(held[static_cast<std::size_t>(s)] / static_cast<double>(laplacian.rows()));
     const auto of = [&](const MatrixXd Errors::*kind, double rounding) {
-      return Coefficients((W.*kind).middleCols(s * columns, columns),
-                          (H.*kind).middleCols(s * shift_columns, shift_columns), share * rounding);
+      return Coefficients((W.*kind).middleCols(s * columns, columns), share * rounding);
     };
     const Coefficients position = of(&Errors::position_m, internal::kRounding.position_m);
     const Coefficients rotation = of(&Errors::rotation_rad, internal::kRounding.rotation_rad);
@@ -245,8 +226,8 @@ std::optional<KnownDirection> coded(Eigen::VectorXd& v) {
   return out;
 }
 
-/// `P`: the map's covariance of the spread nodes seen from the first; `O`: odometry's; `shifts`: of the same.
-std::vector<KnownDirection> directions(const MatrixXd& P, const MatrixXd& O, const MatrixXd& shifts) {
+/// `P`: the map's covariance of the spread nodes seen from the first; `O`: odometry's.
+std::vector<KnownDirection> directions(const MatrixXd& P, const MatrixXd& O) {
   const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(0.5 * (P + P.transpose()), O);
   std::vector<KnownDirection> out;
   if (eigen.info() != Eigen::Success) return out;
@@ -255,7 +236,6 @@ std::vector<KnownDirection> directions(const MatrixXd& P, const MatrixXd& O, con
     auto direction = coded(v);
     if (!direction) continue;
     double variance = std::max(0.0, v.dot(P * v));
-    if (shifts.cols() > 0) variance += (v.transpose() * shifts).array().square().maxCoeff();
     for (Index k = 0; k < v.size(); ++k)
       variance += std::pow(v(k) * (k % 6 < 3 ? internal::kRounding.position_m : internal::kRounding.rotation_rad), 2);
     direction->sigma = std::sqrt(variance);
@@ -289,14 +269,11 @@ ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain
   TUTTI_CHECK(known.shifts.cols() == 0 || known.shifts.rows() == 6 * n, "{} x {} shifts of {} nodes",
               known.shifts.rows(), known.shifts.cols(), n);
   const internal::RigidMotion rigid(nodes);
-  Errors samples = in_world(nodes, known.samples), shifts = in_world(nodes, known.shifts);
+  Errors samples = in_world(nodes, known.samples);
   free_of_gauge(rigid, samples);
-  free_of_gauge(rigid, shifts);
-  ChainUncertainty out{
-      .chain = chain,
-      .whole = {whole(samples.position_m, shifts.position_m), whole(samples.rotation_rad, shifts.rotation_rad)}};
+  ChainUncertainty out{.chain = chain, .whole = {whole(samples.position_m), whole(samples.rotation_rad)}};
   if (n >= 2 && known.samples.cols() >= kLeastSamples)
-    out.scales = scales(internal::chain_laplacian(graph, chain), samples, shifts);
+    out.scales = scales(internal::chain_laplacian(graph, chain), samples);
 
   const std::vector<std::size_t> spread = ChainUncertainty::spread(nodes.size());
   const auto m = static_cast<Index>(spread.size());
@@ -313,9 +290,8 @@ ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain
       spread_shifts.middleRows<6>(6 * k) = known.shifts.middleRows<6>(6 * static_cast<Index>(node));
   }
   const MatrixXd seen = seen_from_first(poses), odometry = by_odometry(poses, known.spread_odometry);
-  spread_shifts = seen * spread_shifts;
-  out.directions = directions(seen * known.spread_covariance * seen.transpose(), odometry, spread_shifts);
-  out.doubted = doubted(odometry, spread_shifts);
+  out.directions = directions(seen * known.spread_covariance * seen.transpose(), odometry);
+  out.doubted = doubted(odometry, seen * spread_shifts);
   return out;
 }
 

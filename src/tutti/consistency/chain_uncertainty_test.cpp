@@ -155,59 +155,6 @@ TEST(ChainUncertainty, SigmasAndEnergiesAreThoseOfTheTrueCovariance) {
   }
 }
 
-// Nodes 50 .. 69 lie 0.3 m beside where they would without one closure.
-TEST(ChainUncertainty, AShiftAddsToWhatIsUnsure) {
-  const auto map = usual_map();
-  Scene scene(test::corridor(kNodes));
-  ChainKnowledge known = map.knowledge(scene.graph, kBravo);
-  const ChainUncertainty without = chain_uncertainty(scene.graph, kBravo, known);
-  auto shifted = scene.server;
-  known.shifts = MatrixXd::Zero(6 * kNodes, 2);
-  MatrixXd errors = MatrixXd::Zero(kNodes, 3);
-  for (Index k = 50; k < 70; ++k) {
-    auto& pose = shifted[static_cast<std::size_t>(k)];
-    pose.translation += 0.3 * Eigen::Vector3d::UnitY();
-    errors(k, 1) = 0.3;
-    known.shifts.col(1).segment<6>(6 * k) = local(scene.server[static_cast<std::size_t>(k)], pose);
-  }
-  const ChainUncertainty with = chain_uncertainty(scene.graph, kBravo, known);
-  const TrueCoefficients truth(scene, map.position_covariance(), true);
-  const MatrixXd W = truth.transformed(errors);
-  EXPECT_GT(with.whole.position_m, without.whole.position_m);
-  EXPECT_EQ(with.whole.rotation_rad, without.whole.rotation_rad);
-  for (std::size_t s = 0; s < 4; ++s) {
-    const ScaleUncertainty &before = without.scales[s], &after = with.scales[s];
-    ASSERT_EQ(before.sigma.size(), after.sigma.size());
-    if (after.sigma.empty()) continue;
-    double energy = 0.0;
-    for (std::size_t b = 0; b < after.sigma.size(); ++b) {
-      double largest = 0.0;  // of the shift's coefficients in this block, squared
-      for (Index n = static_cast<Index>(10 * b); n < static_cast<Index>(10 * b + 10); ++n) {
-        const double square = W.row(n).segment<3>(static_cast<Index>(3 * s)).squaredNorm();
-        largest = std::max(largest, square);
-        energy += (square + truth.covariance(n, static_cast<int>(s)).trace()) / std::pow(after.sigma[b].position_m, 2);
-      }
-      const double old = before.sigma[b].position_m, now = after.sigma[b].position_m;
-      EXPECT_GE(now, old * (1 - 1e-9));
-      EXPECT_GE(now, 0.97 * std::sqrt(largest));
-      EXPECT_LE(now * now, old * old + 1.06 * largest + 1e-5);  // the filter is right to 1 %
-      EXPECT_EQ(after.sigma[b].rotation_rad, before.sigma[b].rotation_rad);
-    }
-    EXPECT_NEAR(after.position.mean / energy, 1.0, 0.3) << s;
-    EXPECT_EQ(after.rotation, before.rotation);
-  }
-  // A robot without that closure is not told that it is wrong.
-  const auto rejected = [&](const ChainUncertainty& uncertainty) {
-    scene.graph.uncertainties = {uncertainty};
-    const DisagreementTest test(scene.graph, kBravo, scene.pairs, 1, {});
-    int out = 0;
-    for (std::uint64_t draw = 0; draw < 20; ++draw) out += test(map.displace(shifted, Rng(draw))).disagrees() ? 1 : 0;
-    return out;
-  };
-  EXPECT_EQ(rejected(without), 20);
-  EXPECT_LE(rejected(with), 1);
-}
-
 /// The combination that a direction speaks of, of what `robot` is off by: its first node is laid on the server's.
 double combination(const KnownDirection& direction, const std::vector<Pose3>& server, const std::vector<Pose3>& robot) {
   const auto spread = ChainUncertainty::spread(server.size());

@@ -89,9 +89,8 @@ struct KnownDirection {
 };
 
 /// How sure the server is of the shape of one chain's trajectory, with the errors seen through the wavelets of the
-/// chain's own proximity graph and through the directions that closures know. Any one closure on which the map hinges
-/// may be wrong: what would change without it counts as uncertainty too, and is doubted where odometry speaks against
-/// it (docs/math.md).
+/// chain's own proximity graph and through the directions that closures know. What hangs on
+/// one closure is doubted where odometry speaks against it (docs/math.md).
 struct ChainUncertainty {
   static constexpr std::size_t kBlock = 10;   ///< Nodes that share a sigma.
   static constexpr std::size_t kSpread = 24;  ///< Evenly spread nodes that directions speak of; fewer on short chains.
