@@ -67,6 +67,33 @@ function(tutti_add_library module)
   add_library(tutti::${module} ALIAS ${target})
 endfunction()
 
+# tutti_add_proto(<target> <file below proto/, without .proto>) makes a library of the code that protoc generates, which is
+# compiled without our warnings; with PYTHON also the module for Python, in the folder that is the target's property
+# PYTHON_FOLDER. (protobuf_generate of CMake 3.25 expects .proto files below the current folder.)
+function(tutti_add_proto target file)
+  cmake_parse_arguments(ARG "PYTHON" "" "" ${ARGN})
+  set(proto "${PROJECT_SOURCE_DIR}/proto/${file}.proto")
+  set(generated "${CMAKE_CURRENT_BINARY_DIR}/generated")
+  file(MAKE_DIRECTORY "${generated}")
+  set(made "${generated}/${file}.pb.cc" "${generated}/${file}.pb.h")
+  set(options --cpp_out "${generated}")
+  if(ARG_PYTHON)
+    list(APPEND made "${generated}/${file}_pb2.py")
+    list(APPEND options --python_out "${generated}")
+  endif()
+  add_custom_command(
+    OUTPUT ${made}
+    COMMAND protobuf::protoc ${options} -I "${PROJECT_SOURCE_DIR}/proto" "${proto}"
+    DEPENDS "${proto}" protobuf::protoc
+    COMMENT "protoc ${file}.proto"
+    VERBATIM)
+  add_library(${target} STATIC ${made})
+  target_include_directories(${target} SYSTEM PUBLIC "${generated}")
+  target_link_libraries(${target} PUBLIC protobuf::libprotobuf-lite)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON PYTHON_FOLDER "${generated}")
+endfunction()
+
 # tutti_add_tests(<module> TESTS a internal/b.. [NOT_SANITIZED c..] [LIBS libs..] [LABEL label] [TIMEOUT seconds])
 # makes one executable test_<module> of a_test.cpp, internal/b_test.cpp.. and one ctest entry "module/a" for each file.
 # NOT_SANITIZED: files that would only repeat under a sanitizer what others have run there. A file that includes
@@ -78,6 +105,12 @@ function(tutti_add_tests module)
   cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "TESTS;NOT_SANITIZED;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
+  endif()
+  if(TUTTI_SANITIZE AND NOT ARG_TESTS)
+    list(TRANSFORM ARG_NOT_SANITIZED PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+    list(TRANSFORM ARG_NOT_SANITIZED APPEND "_test.cpp")
+    set_property(GLOBAL APPEND PROPERTY TUTTI_TEST_FILES ${ARG_NOT_SANITIZED})
+    return()
   endif()
   set(target test_${module})
   add_executable(${target})

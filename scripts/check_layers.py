@@ -11,12 +11,13 @@ import sys
 # (what an #include looks like, which files may have it, in words)
 CONFINED = [
     (r"yaml-cpp/", r"base/config_io\.cpp$", "base/config_io.cpp"),
-    (r"google/protobuf|.*\.pb\.h$", r"(wire|bus)/", "wire/ and bus/"),
+    (r"google/protobuf|.*\.pb\.h$", r"(tests/support/)?(wire|bus|program/feed)/", "wire/, bus/ and program/feed/"),
     (r"ceres/", r"(estimation/.*\.cpp|.*_test\.cpp)$", "estimation/*.cpp and tests"),
     (r"Spectra/", r"spectral/.*\.cpp$", "spectral/*.cpp"),
     (r"nanoflann", r"(perception|spectral|consistency|evaluation)/.*\.cpp$", "perception/, spectral/, consistency/, evaluation/ *.cpp"),
     (r"nats(/|\.h)", r"bus/(nats_.*\.cpp|internal/nats_connection\.hpp)$",
      "bus/nats_*.cpp and their bus/internal/nats_connection.hpp"),
+    (r"(spdlog|systemd)/", r"program/.*\.cpp$", "program/*.cpp"),
     (r"sqlite3", r"storage/sqlite_.*\.cpp$", "storage/sqlite_*.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),
@@ -24,8 +25,9 @@ CONFINED = [
 ]
 # A library returns what it has to say, never ends the program, and knows nothing but its arguments.
 FORBIDDEN = re.compile(
-    r"\bstd::(cout|cerr|clog)\b|\bfmt::print\b|\b(system_clock|random_device)\b|(?<![\w.>])(std::|::)?"
+    r"\bstd::(cout|cerr|clog)\b|\bfmt::print\b|\brandom_device\b|(?<![\w.>])(std::|::)?"
     r"(f?printf|puts|abort|exit|_Exit|quick_exit|terminate|s?rand|getenv)\s*\(")
+CLOCK = re.compile(r"\bsystem_clock\b")  # of the day: for programs
 SUPPORT = "tests/support/"  # what tests share: a folder a module, held to its layer
 INCLUDE = re.compile(r'\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
@@ -74,7 +76,7 @@ def breaches(root):
                 breach = include_breach(order, relative, match.group(1))
             elif not relative.endswith("_test.cpp"):
                 code = re.sub(r'"(\\.|[^"\\])*"', '""', line).split("//")[0]
-                if match := FORBIDDEN.search(code):
+                if match := FORBIDDEN.search(code) or (not relative.startswith("program/") and CLOCK.search(code)):
                     breach = f"a library may not use {match.group().strip(' (')}"
             if breach:
                 yield f"{path}:{number}: {breach}"

@@ -7,7 +7,7 @@ import tempfile
 import unittest
 
 SCRIPT = pathlib.Path(__file__).parents[1] / "scripts/check_layers.py"
-CMAKE = "foreach(module IN ITEMS base geometry estimation perception/lidar robot server wire wire/replay)\nendforeach()\n"
+CMAKE = "foreach(module IN ITEMS base geometry estimation perception/lidar robot server wire wire/replay program)\nendforeach()\n"
 
 
 def check(files):
@@ -31,6 +31,7 @@ class CheckLayers(unittest.TestCase):
             "wire/replay/internal/a.hpp": '#include "tutti/wire/a.hpp"\n#include "tutti/wire/replay/a.hpp"\n',
             "../../tests/support/robot/a.hpp": '#include "tutti/robot/a.hpp"\n#include "support/geometry/a.hpp"\n',
             "robot/a_test.cpp": '#include "support/robot/a.hpp"\n#include "support/paths.hpp"\n',
+            "program/a.cpp": "#include <spdlog/spdlog.h>\nauto now = std::chrono::system_clock::now();\n",
             "wire/a.cpp": '#include "tutti/v1/a.pb.h"\n#include <google/protobuf/message.h>\n',
         })
         self.assertEqual(code, 0, out)
@@ -57,6 +58,8 @@ class CheckLayers(unittest.TestCase):
             ("perception/lidar/a.hpp", "#include <nanoflann.hpp>"),
             ("wire/a.cpp", "#include <sqlite3.h>"),
             ("wire/a.cpp", "#include <nats/nats.h>"),
+            ("program/a.hpp", "#include <spdlog/spdlog.h>"),
+            ("program/a.cpp", '  std::getenv("HOME");'),
             ("base/a.hpp", "#include <tbb/parallel_for.h>"),
             ("base/a.cpp", "  std::cout << 1;"),
             ("base/a.cpp", '  printf("");'),

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """What a person meets at the command line: exit codes and messages. Usage: cli_test.py TUTTI_PROGRAM SOURCE_DIR [CommandLine.TEST...]"""
+import contextlib
 import json
 import math
 import pathlib
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -44,8 +46,18 @@ class CommandLine(unittest.TestCase):
 
     def test_help_of_every_command(self):
         self.expect(tutti("--help"), 0, "run", "demo", "eval", "optimise", "compare")
-        for command in ("run", "demo", "eval", "optimise", "world", "compare", "settings"):
+        for command in ("run", "demo", "eval", "optimise", "world", "compare", "settings", "status", "map", "server", "robot", "worker"):
             self.expect(tutti(command, "--help"), 0, "--help")
+        self.expect(tutti("mission", "up", "--help"), 0, "--workers")
+        for command in ("list", "info", "export", "merge", "closure"):
+            self.expect(tutti("map", command, "--help"), 0, "--help")
+        for command in ("list", "show", "accept", "reject", "withdraw"):
+            self.expect(tutti("map", "closure", command, "--help"), 0, "--help")
+
+    def test_status_without_a_bus(self):
+        self.expect(tutti("status"), 2, "--bus")
+        self.expect(tutti("status", "--bus", "nats://192.0.2.1:4222"), 2, "another machine", "TLS")
+        self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--wait", "0.3"), 1, "no bus at nats://127.0.0.1:1")
 
     def test_usage_errors_exit_2(self):
         self.expect(tutti(), 2)
@@ -176,6 +188,47 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(len(one.stdout.splitlines()), 2, one.stdout)
         self.expect(tutti("settings", "transmissions", "lost"), 0, "link.loss = 0")  # words of its meaning
         self.expect(tutti("settings", "dance"), 1, "no key or meaning contains 'dance'")
+
+    def write_empty_map(self, name):
+        file = self.path / name
+        with contextlib.closing(sqlite3.connect(file)) as database:
+            database.execute("CREATE TABLE store (kind TEXT NOT NULL)")
+            database.execute("INSERT INTO store VALUES('map')")
+            for table in ("submaps", "verdicts", "answers", "words", "meta"):
+                database.execute(f"CREATE TABLE {table} "
+                                 "(key BLOB PRIMARY KEY NOT NULL, hash INTEGER NOT NULL, bytes BLOB NOT NULL)")
+            database.execute(f"PRAGMA application_id={0x54757474}")
+            database.execute("PRAGMA user_version=1")
+            database.commit()
+        return file
+
+    def test_maps_are_listed_and_joined(self):
+        self.expect(tutti("map", "list", self.path), 0, "no maps")
+        one, other = self.write_empty_map("one.tutti"), self.write_empty_map("other.tutti")
+        (self.path / "notes.txt").write_text("none of ours")
+        listed = tutti("map", "list", self.path)
+        self.expect(listed, 0, "one.tutti", "other.tutti", "sessions")
+        self.assertNotIn("notes", listed.stdout)
+        self.expect(tutti("map", "info", one), 0, "submaps      0", "0 accepted")
+        self.expect(tutti("map", "merge", one, other, "-o", self.path / "both"), 0, "0 submaps")
+        self.expect(tutti("map", "info", self.path / "both"), 0, "with news since")
+        self.expect(tutti("map", "merge", one, other, "-o", self.path / "both"), 1, "both", "there already")
+        self.expect(tutti("map", "closure", "list", one), 0, "closure")
+
+    def test_map_says_what_is_wrong(self):
+        self.expect(tutti("map"), 2)
+        self.expect(tutti("map", "list", self.path / "missing"), 1, "missing", "no such folder")
+        self.expect(tutti("map", "info", self.path / "missing"), 1, "missing", "no such file")
+        self.assertFalse((self.path / "missing").exists())
+        (self.path / "text").write_text("x" * 5000)
+        self.expect(tutti("map", "info", self.path / "text"), 1, "not an SQLite file")
+        empty = self.write_empty_map("empty")
+        self.expect(tutti("map", "export", empty), 2, "--g2o")
+        self.expect(tutti("map", "export", empty, "--ply", self.path / "x.ply"), 1, "cloud")
+        self.expect(tutti("map", "closure", "accept", "a/1-b/2"), 2, "--bus")
+        for word in ("accept", "reject", "withdraw"):
+            self.expect(tutti("map", "closure", word, "a/1-b/2", empty), 1, "a/1-b/2", "ROBOT/SUBMAP-ROBOT/SUBMAP")
+        self.expect(tutti("map", "closure", "accept", "a/1-b/2", "--bus", "nats://192.0.2.1:4222"), 1, "TLS")
 
     def test_world_writes_the_walls_of_a_simulated_mission(self):
         mission = self.mission("source: simulation\nclosures: {finder: reference}\n")

@@ -117,10 +117,14 @@ class Mission {
         ended = ended && next_[r] >= odometry.size();
       }
       consider(server_.node->next_timer());
+      for (const auto& robot : robots_) consider(robot.node->next_timer());
       if (!next) break;
       now_ = std::max(now_, *next);
       pump();
       for (std::size_t r = 0; r < robots_.size(); ++r) feed(r);
+      for (auto& robot : robots_)
+        if (robot.node->next_timer() && *robot.node->next_timer() <= now_)
+          static_cast<void>(carry_out(robot, "timer", robot.node->on_timer(now_)));
       pump();
       if (server_.node->next_timer() && *server_.node->next_timer() <= now_) {
         static_cast<void>(carry_out(server_, "timer", server_.node->on_timer(now_)));
@@ -128,6 +132,10 @@ class Mission {
       }
     }
   }
+
+  /// From now on, and how many of how many; such a job is done for the bus, and nobody has answered it.
+  void lose_jobs(double share) { lost_share_ = share; }
+  [[nodiscard]] std::pair<std::size_t, std::size_t> lost_jobs() const { return {lost_, jobs_}; }
 
   [[nodiscard]] const server::MapServer& server() const { return server_.node->map_server(); }
   [[nodiscard]] const robot::RobotAgent& agent(std::size_t r) const { return robots_[r].node->agent(); }
@@ -143,7 +151,7 @@ class Mission {
  private:
   std::unique_ptr<node::ServerNode> open(Program<node::ServerNode>& program) {
     program.store = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(program.saved));
-    node::ServerNodeConfig config{.pairs_per_job = 3};
+    node::ServerNodeConfig config{.pairs_per_job = 3, .job_timeout_s = 30.0};
     config.server.update_period_s = kUpdatePeriod_s;
     return std::move(node::ServerNode::open(world_.robots, world_.finder, config, kEpoch, *program.store).value());
   }
@@ -179,6 +187,8 @@ class Mission {
       if (program.store) program.saved = program.store->tables();
       program.store.reset();
       start(program);
+      if constexpr (std::is_same_v<Node, node::RobotNode>)
+        feed_again(static_cast<std::size_t>(&program - robots_.data()));
       return false;
     };
     if (dies(Part::commit)) return dropped();
@@ -211,33 +221,54 @@ class Mission {
   template <class Node>
   bool hear(Program<Node>& program) {
     const auto received = program.port->receive();
-    for (const bus::Received& message : received)
-      if (!carry_out(program, wire::name(message.envelope.kind), program.node->receive(message.envelope, now_),
-                     message.ticket))
+    for (const bus::Received& message : received) {
+      const bus::MessageKind kind =
+          message.envelope.kind;  // in full or not is up to a server that has no base at first
+      const bool is_graph = kind == bus::MessageKind::proxy_graph_delta;
+      if (kind == bus::MessageKind::job && ++jobs_ > 0 && luck_.bernoulli(lost_share_)) {
+        ++lost_;
+        program.port->acknowledge(message.ticket);
+        continue;
+      }
+      if (!carry_out(program, wire::name(is_graph ? bus::MessageKind::proxy_graph : kind),
+                     program.node->receive(message.envelope, now_), message.ticket))
         break;  // the rest comes again
+    }
     return !received.empty();
   }
 
-  /// The sensors say everything again that the robot has not acknowledged.
+  /// All samples by now.
   void feed(std::size_t r) {
+    const Trajectory& odometry = world_.recordings[r].recording.odometry;
+    while (next_[r] < odometry.size() && odometry[next_[r]].stamp <= now_) feed_until(r, next_[r] + 1);
+  }
+  /// What the robot had taken and not stored, before it hears anything.
+  void feed_again(std::size_t r) {
+    const Trajectory& odometry = world_.recordings[r].recording.odometry;
+    const auto newest = robots_[r].node->agent().newest_sample();
+    const std::size_t until = next_[r];
+    for (next_[r] = 0; newest && next_[r] < until && odometry[next_[r]].stamp < *newest;) ++next_[r];
+    feed_until(r, until);
+  }
+  /// When it is dropped meanwhile, it is fed again up to next_ before this goes on.
+  void feed_until(std::size_t r, std::size_t until) {
+    while (next_[r] < until)
+      if (feed_sample(r, next_[r])) ++next_[r];
+  }
+  /// Of one that it knows already, what belongs to it. False: it was dropped.
+  bool feed_sample(std::size_t r, std::size_t i) {
     Program<node::RobotNode>& robot = robots_[r];
     const Recording& recording = world_.recordings[r].recording;
-    while (next_[r] < recording.odometry.size() && recording.odometry[next_[r]].stamp <= now_) {
-      const std::size_t i = next_[r];
-      const StampedPose& at = recording.odometry[i];
-      const Matrix6d covariance = i == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[i - 1];
-      const auto until_acknowledged = [&](const char* input, const auto& make) {
-        for (bool acknowledged = false; !acknowledged;) {
-          const node::Step step = make();
-          acknowledged = carry_out(robot, step.messages.empty() ? input : "end of a submap", step);
-        }
-      };
-      until_acknowledged("sample", [&] { return robot.node->add_odometry({at.stamp, at.pose, covariance}, now_); });
-      if (robot.node->agent().wants_scan())
-        until_acknowledged("scan", [&] { return robot.node->add_scan(scan(r, at.stamp), now_); });
-      if (++next_[r] == recording.odometry.size())
-        until_acknowledged("sample", [&] { return robot.node->finish(now_); });
-    }
+    const StampedPose& at = recording.odometry[i];
+    const Matrix6d covariance = i == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[i - 1];
+    const auto take = [&](const char* input, const node::Step& step) {
+      return carry_out(robot, step.messages.empty() ? input : "end of a submap", step);
+    };
+    if (robot.node->agent().newest_sample() != at.stamp &&
+        !take("sample", robot.node->add_odometry({at.stamp, at.pose, covariance}, now_)))
+      return false;
+    if (robot.node->agent().wants_scan() && !take("scan", robot.node->add_scan(scan(r, at.stamp), now_))) return false;
+    return i + 1 < recording.odometry.size() || take("sample", robot.node->finish(now_));
   }
 
   static Scan scan(std::size_t r, Timestamp stamp) {
@@ -256,6 +287,9 @@ class Mission {
   std::array<Program<node::WorkerNode>, 2> workers_;
   std::vector<std::size_t> next_;  // of each robot: sample to be fed
   std::vector<std::string> refusals_;
+  Rng luck_{3};
+  double lost_share_ = 0.0;
+  std::size_t lost_ = 0, jobs_ = 0;
 };
 
 void expect_same_map(const server::MapServer& a, const server::MapServer& b) {
@@ -347,6 +381,22 @@ TEST_F(Kill, OnABadRadioTooTheMapIsTheSame) {
     EXPECT_TRUE(mission.refusals().empty()) << mission.refusals().front();
     expect_same_map(undisturbed.server(), mission.server());
   }
+}
+
+TEST_F(Kill, JobsThatTheBusGivesUpAreAskedAgain) {
+  const bus::LinkConfig at_once{.latency_s = 0.0};
+  Killer nobody;
+  Mission undisturbed(world_, at_once, nobody);
+  undisturbed.run();
+  Killer killer = planned(nobody, Rng(7), 1);
+  Mission mission(world_, at_once, killer);
+  mission.lose_jobs(0.5);
+  mission.run();
+  mission.expect_settled();
+  const auto [lost, jobs] = mission.lost_jobs();
+  EXPECT_GT(lost, 10U);
+  EXPECT_LT(lost, jobs);
+  expect_same_map(undisturbed.server(), mission.server());
 }
 
 }  // namespace

@@ -24,8 +24,14 @@ int main(int argc, char** argv) {
   tutti::app::add_eval_command(app, exit_code);
   tutti::app::add_compare_command(app, exit_code);
   tutti::app::add_optimise_command(app, exit_code);
+  tutti::app::add_map_command(app, exit_code);
   tutti::app::add_settings_command(app, exit_code);
+  tutti::app::add_status_command(app, exit_code);
   tutti::app::add_world_command(app, exit_code);
+  tutti::app::add_server_command(app, exit_code);
+  tutti::app::add_robot_command(app, exit_code);
+  tutti::app::add_worker_command(app, exit_code);
+  tutti::app::add_mission_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -58,6 +58,7 @@ def main():
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--missions", type=lambda text: text.split(","), help="only these")
     parser.add_argument("--write-only", action="store_true")
+    parser.add_argument("--note", default="", help="how the machine was, for the document")
     parser.add_argument("--old", help="an older program, whose default policy is recorded")
     arguments = parser.parse_args()
     jobs = Jobs(arguments)

@@ -25,7 +25,6 @@ SHORT_S = 120
 MANY = {"agree": 100, "spin": 100, "height": 100, "revision": 20}
 ABLATIONS = {  # a mechanism switched off: what it takes
     "single coefficients": ["agent.disagreement.without=coefficients"],
-    "energies of scales": ["agent.disagreement.without=energies"],
     "directions": ["agent.disagreement.without=directions"],
     "hinges": ["server.proxy_graph.shape_deletions=0"],
     "a quarter of sigma": ["agent.policy.adaptive_error_share=1000"],

@@ -15,17 +15,22 @@ namespace tutti::bus {
 
 using wire::MessageKind;
 
-/// Who sends and receives: the server, a robot, or a worker, which verifies loop closures for the server.
+/// Who sends and receives: the server, a robot, a worker, which verifies loop closures for the server, or a viewer, who
+/// only looks on.
 struct Endpoint {
-  enum class Role : std::uint8_t { server, robot, worker };
+  enum class Role : std::uint8_t { server, robot, worker, viewer };
   Role role = Role::server;
-  std::uint32_t number = 0;  ///< Of the robot or the worker.
+  std::uint32_t number = 0;  ///< Of the robot, the worker or the viewer.
 
   static Endpoint server() { return {}; }
   static Endpoint of(RobotId id) { return {Role::robot, id.value}; }
   static Endpoint worker(std::uint32_t number) { return {Role::worker, number}; }
   /// Whoever of the workers is free: only as a receiver.
   static Endpoint any_worker() { return worker(std::numeric_limits<std::uint32_t>::max()); }
+
+  static Endpoint viewer(std::uint32_t number) { return {Role::viewer, number}; }
+  /// Each of the viewers: only as a receiver.
+  static Endpoint all_viewers() { return viewer(std::numeric_limits<std::uint32_t>::max()); }
 
   [[nodiscard]] std::optional<RobotId> robot() const {
     return role == Role::robot ? std::optional(RobotId{number}) : std::nullopt;
@@ -43,5 +48,11 @@ struct Envelope {
   std::string id;
   std::shared_ptr<const std::string> bytes;  ///< Never null. Shared by all receivers of a broadcast.
 };
+
+/// "server", "robot", "worker", "viewer"
+constexpr const char* name(Endpoint::Role role) {
+  constexpr const char* kNames[] = {"server", "robot", "worker", "viewer"};
+  return kNames[static_cast<int>(role)];
+}
 
 }  // namespace tutti::bus

@@ -29,6 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
+constexpr auto kWaitForPort = std::chrono::seconds(2);
 constexpr auto kLookAgain = std::chrono::milliseconds(3);
 constexpr auto kPolitely = std::chrono::seconds(3);      // then it is killed
 constexpr auto kOthersMayEnd = std::chrono::seconds(2);  // the nats-server of a killed process ends a moment later
@@ -277,11 +278,25 @@ Result<std::unique_ptr<NatsChild>> NatsChild::start(const fs::path& folder, cons
   if (const Status locked = child->lock_folder(); !locked) return tl::unexpected(locked.error());
   if (const Status room = child->check_disk(options.max_store_bytes + options.min_free_bytes); !room)
     return tl::unexpected(room.error());
-  const int last = std::atoi(read_file((child->folder_ / "port").string()).value_or("0").c_str());
-  Status launched = child->launch(options.port != 0 ? options.port : last);
-  if (!launched && options.port == 0 && last != 0) launched = child->launch(0);
+  const Status launched = options.port != 0 ? child->launch(options.port) : child->launch_anywhere();
   if (!launched) return tl::unexpected(launched.error());
   return child;
+}
+
+/// Where it was the last time: others know it by that address, so one that is still ending is waited for. Otherwise
+/// below the ports that systems give to clients: there a client that looks for a bus which is gone can connect to
+/// itself, and hold its port.
+Status NatsChild::launch_anywhere() {
+  constexpr int kFirst = 20000, kPorts = 10000, kTries = 10;
+  const int last = std::atoi(read_file((folder_ / "port").string()).value_or("0").c_str());
+  const auto end = Clock::now() + kWaitForPort;
+  Status launched = fail(ErrorCode::io, "nats-server: no port yet");
+  while (last != 0 && !launched && Clock::now() < end) {
+    launched = launch(last);
+    if (!launched) std::this_thread::sleep_for(10 * kLookAgain);
+  }
+  for (int i = 0; i < kTries && !launched; ++i) launched = launch(kFirst + (7 * getpid() + i) % kPorts);
+  return launched;
 }
 
 Status NatsChild::tend() {

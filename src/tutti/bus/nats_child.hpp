@@ -23,7 +23,7 @@ struct NatsChildOptions {
   void describe(V& v) {
     v.field("program", program, any(), "Searched for in PATH, then in /usr/sbin.");
     v.field("host", host, any(), "Address to listen at.");
-    v.field("port", port, between(0, 65535), "0 = the port of the last time if that is free, else any that is.");
+    v.field("port", port, between(0, 65535), "0 = the port of the last time if that is free, else any from 20000 on.");
     v.field("allow_insecure", allow_insecure, any(), "Listen at other addresses than this machine's own, without TLS.");
     v.field("max_store_bytes", max_store_bytes, greater_than(0.0), "What messages may take on the disk.");
     v.field("min_free_bytes", min_free_bytes, any(),
@@ -60,6 +60,7 @@ class NatsChild {
   NatsChild(std::filesystem::path folder, NatsChildOptions options);
   Status lock_folder();
   Status launch(int port);
+  Status launch_anywhere();
   [[nodiscard]] Status check_disk(std::uint64_t needed) const;
   [[nodiscard]] Status wait_until_ready();
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -22,6 +23,7 @@ constexpr std::int64_t kWrite_ms = 15'000;  // without it a cut blocks for minut
 constexpr std::int64_t kDay_ns = 86'400'000'000'000;
 constexpr std::int64_t kAcknowledge_ns = 30'000'000'000;  // then a message comes again
 constexpr std::int64_t kUnacknowledged = 1024;            // parts; more than the robots have under way at a time
+constexpr std::uint64_t kMostRemoved = 1000;              // sequences looked at in one go
 constexpr std::int64_t kDeliveries = 5;                   // of a job: what ends five workers is not given to a sixth
 
 /// Errors are in NatsConnection::last_error(); without a handler libnats prints them.
@@ -76,7 +78,8 @@ Status check(const NatsPortOptions& options) {
     return fail(ErrorCode::configuration, "mission '{}': 1 to 32 letters, digits, '-' and '_' were expected",
                 options.mission);
   if (!options.allow_insecure && !is_loopback(host_of(options.url)))
-    return fail(ErrorCode::configuration, "{}: another machine, and no TLS: needs allow_insecure", options.url);
+    return fail(ErrorCode::configuration, "{}: another machine, and no TLS yet: allow_insecure (--insecure) forces it",
+                options.url);
   return {};
 }
 
@@ -123,7 +126,9 @@ Status NatsConnection::add_stream(jsStreamConfig& stream) const {
   jsErrCode code{};
   natsStatus status = js_GetStreamInfo(&info, streams_, stream.Name, nullptr, &code);
   NatsOwned<jsStreamInfo> found(info);
-  if (status == NATS_OK && found->Config->MaxBytes == stream.MaxBytes) return {};
+  if (status == NATS_OK && found->Config->MaxBytes == stream.MaxBytes &&
+      found->Config->SubjectsLen == stream.SubjectsLen)
+    return {};
   status = found ? js_UpdateStream(&info, streams_, &stream, nullptr, &code)
                  : js_AddStream(&info, streams_, &stream, nullptr, &code);
   const NatsOwned<jsStreamInfo> made(status == NATS_OK ? info : nullptr);
@@ -134,17 +139,19 @@ Status NatsConnection::add_stream(jsStreamConfig& stream) const {
 Status NatsConnection::prepare(const NatsPortOptions& options) const {
   const std::string& mission = options.mission;
   const auto most = static_cast<std::int64_t>(options.max_stream_bytes);
-  const std::array subjects{fmt::format("mission.{}.robot.*.submap", mission),
-                            fmt::format("mission.{}.worker.*.verdicts", mission),
-                            fmt::format("mission.{}.jobs.loop", mission)};
+  const std::array<std::vector<std::string>, 3> subjects{
+      {{fmt::format("mission.{}.robot.*.submap", mission)},
+       {fmt::format("mission.{}.worker.*.verdicts", mission), fmt::format("mission.{}.viewer.*.word", mission)},
+       {fmt::format("mission.{}.jobs.loop", mission)}}};
   const std::array names{submap_stream(mission), verdict_stream(mission), job_stream(mission)};
   for (std::size_t i = 0; i < names.size(); ++i) {
     jsStreamConfig stream;
     jsStreamConfig_Init(&stream);
     stream.Name = names[i].c_str();
-    const char* subject = subjects[i].c_str();
-    stream.Subjects = &subject;
-    stream.SubjectsLen = 1;
+    std::vector<const char*> of_stream;
+    for (const std::string& subject : subjects[i]) of_stream.push_back(subject.c_str());
+    stream.Subjects = of_stream.data();
+    stream.SubjectsLen = static_cast<int>(of_stream.size());
     stream.Retention = js_WorkQueuePolicy;  // what is acknowledged takes no room
     stream.Storage = js_FileStorage;
     stream.Discard = js_DiscardNew;
@@ -238,6 +245,57 @@ Status NatsConnection::publish(const std::string& subject, const std::string& an
   if (status == NATS_OK && !id.empty()) status = natsMsgHeader_Set(made, "Nats-Msg-Id", id.c_str());
   if (status == NATS_OK) status = natsConnection_PublishMsg(connection_, made);
   return status == NATS_OK ? Status() : failure(status, "sending to " + subject);
+}
+
+/// Between two equal looks at the stream the consumer's numbers are of the same moment.
+Result<std::optional<NatsConnection::Look>> NatsConnection::look_at(const std::string& stream,
+                                                                    const std::string& consumer) const {
+  jsErrCode code{};
+  const auto look = [&]() -> Result<NatsOwned<jsStreamInfo>> {
+    jsStreamInfo* info = nullptr;
+    const natsStatus status = js_GetStreamInfo(&info, streams_, stream.c_str(), nullptr, &code);
+    if (status != NATS_OK) return failure(status, "stream " + stream, code);
+    return NatsOwned<jsStreamInfo>(info);
+  };
+  const auto before = look();
+  if (!before) return tl::unexpected(before.error());
+  jsConsumerInfo* info = nullptr;
+  const natsStatus status = js_GetConsumerInfo(&info, streams_, stream.c_str(), consumer.c_str(), nullptr, &code);
+  const NatsOwned<jsConsumerInfo> owned(status == NATS_OK ? info : nullptr);
+  if (status == NATS_NOT_FOUND) return std::nullopt;
+  if (status != NATS_OK) return failure(status, "consumer of " + stream, code);
+  const auto after = look();
+  if (!after) return tl::unexpected(after.error());
+  const jsStreamState &a = (*before)->State, &b = (*after)->State;
+  if (a.Msgs != b.Msgs || a.LastSeq != b.LastSeq || a.FirstSeq != b.FirstSeq) return std::nullopt;
+  const auto given = static_cast<std::uint64_t>(info->NumAckPending);
+  return Look{.first = a.FirstSeq,
+              .messages = a.Msgs,
+              .pending = info->NumPending,
+              .given = given,
+              .deliveries = info->Delivered.Consumer,
+              .done_up_to = given == 0 ? info->Delivered.Stream : info->AckFloor.Stream,
+              .asked = info->NumWaiting > 0};
+}
+
+/// One by one: a purge takes what is given for acknowledged (nats-server 2.9.10).
+Result<std::uint64_t> NatsConnection::remove_done(const std::string& stream, const Look& look) const {
+  std::uint64_t removed = 0;
+  const std::uint64_t end = std::min(look.done_up_to, look.first + kMostRemoved);
+  for (std::uint64_t sequence = look.first; sequence <= end; ++sequence) {
+    jsErrCode code{};
+    const natsStatus status = js_DeleteMsg(streams_, stream.c_str(), sequence, nullptr, &code);
+    if (status == NATS_OK) ++removed;
+    if (status == NATS_TIMEOUT || status == NATS_CONNECTION_CLOSED) return failure(status, "emptying " + stream, code);
+  }
+  return removed;
+}
+
+Status NatsConnection::remove_stream(const std::string& stream) const {
+  jsErrCode code{};
+  const natsStatus status = js_DeleteStream(streams_, stream.c_str(), nullptr, &code);
+  if (status == NATS_OK || status == NATS_NOT_FOUND) return {};
+  return failure(status, "removing " + stream, code);
 }
 
 Status prepare_nats(const NatsPortOptions& options) {

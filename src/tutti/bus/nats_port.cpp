@@ -17,10 +17,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kFarewell = std::chrono::seconds(3);
 constexpr int kAcknowledgeTries = 5;
 
-std::string name_of(Endpoint end) {
-  constexpr const char* kRoles[] = {"server", "robot", "worker"};
-  return fmt::format("{}_{}", kRoles[static_cast<int>(end.role)], end.number);
-}
+std::string name_of(Endpoint end) { return fmt::format("{}_{}", name(end.role), end.number); }
 
 }  // namespace
 
@@ -37,13 +34,19 @@ JetStreamPort::JetStreamPort(Endpoint self, NatsPortOptions options)
     case Endpoint::Role::server:
       threads_.emplace_back([this, stream = submap_stream(mission)] { pull(stream, "server"); });
       threads_.emplace_back([this, stream = verdict_stream(mission)] { pull(stream, "server"); });
-      threads_.emplace_back([this] { hear_status(); });
+      threads_.emplace_back([this, all = "mission." + mission + ".*.*.status"] { hear_best_effort(all); });
+      threads_.emplace_back([this, all = "mission." + mission + ".worker.*.submap_request"] { hear_best_effort(all); });
+      threads_.emplace_back([this] { watch(); });
       break;
     case Endpoint::Role::robot:
+    case Endpoint::Role::viewer:
       threads_.emplace_back([this] { hear_retained(); });
       break;
     case Endpoint::Role::worker:
       threads_.emplace_back([this, stream = job_stream(mission)] { pull(stream, "workers"); });
+      threads_.emplace_back([this, own = fmt::format("mission.{}.worker.{}.submap_copy", mission, self_.number)] {
+        hear_best_effort(own);
+      });
       break;
   }
 }
@@ -92,6 +95,8 @@ NatsState JetStreamPort::state() const {
                   .waiting_bytes = outbox_.bytes(),
                   .waiting_acknowledgements = inbox_.acknowledgements(),
                   .refused = refused_,
+                  .streams_made_anew = streams_made_anew_,
+                  .jobs_removed = jobs_removed_,
                   .last_error = last_error_};
   return state;
 }
@@ -155,6 +160,8 @@ bool JetStreamPort::acknowledge_one(const NatsConnection& connection) {
   std::optional<Inbox::Acknowledgement> next;
   {
     const std::scoped_lock guard(mutex_);
+    // A worker remembers nothing: its job is done when the bus has its answer.
+    if (self_.role == Endpoint::Role::worker && outbox_.messages() > 0) return false;
     next = inbox_.next_acknowledgement();
   }
   if (!next) return false;
@@ -186,12 +193,40 @@ void JetStreamPort::send_all() {
       if (!connected) outbox_.forget_best_effort();
       reconnects_ = reconnects;
     }
+    if (connected) make_stream_anew(connection);
     const bool acknowledged = connected && acknowledge_one(connection);
     const bool sent = connected && send_one(connection);
     if (acknowledged || sent) continue;
     std::unique_lock guard(mutex_);
     if (!stopping_) changed_.wait_for(guard, kTick);
   }
+}
+
+/// Its sequence begins again: what was to be acknowledged in the old one must not be in the new one. With it goes the
+/// memory of its ids, so that what is sent again is taken.
+void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
+  std::string stream;
+  {
+    const std::scoped_lock guard(mutex_);
+    stream = stranded_;
+  }
+  if (stream.empty()) return;
+  Status done = connection.remove_stream(stream);
+  if (done) {
+    const std::scoped_lock guard(mutex_);
+    if (stream == submap_stream(options_.mission)) inbox_.forget_stream(MessageKind::submap);
+    if (stream == verdict_stream(options_.mission)) inbox_.forget_stream(MessageKind::verdicts);
+  }
+  if (done) done = connection.prepare(options_);
+  if (!done) return note(done.error().message);  // and again
+  const std::scoped_lock guard(mutex_);
+  ++streams_made_anew_;
+  last_error_ = fmt::format(
+      "the bus did not give what was in its stream {}, as after a power failure: made anew, and "
+      "what was in it is to be sent again",
+      stream);
+  stranded_.clear();
+  changed_.notify_all();
 }
 
 /// What was acknowledged is so on the bus; what was not comes to the next one at once, not after a time-out.

@@ -18,6 +18,7 @@ struct NatsPortOptions {
   std::uint64_t max_waiting_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_stream_bytes = std::uint64_t{2} << 30U;
+  double stranded_s = 30.0;
   template <class V>
   void describe(V& v) {
     v.field("url", url, any(), "\"nats://HOST:PORT\"");
@@ -29,6 +30,10 @@ struct NatsPortOptions {
             "Messages received and not acknowledged; then the rest stays on the bus.");
     v.field("max_stream_bytes", max_stream_bytes, at_least(0.0),
             "Submaps on the bus; then it takes no more. An eighth each for verdicts, jobs and retained values.");
+    v.field("stranded_s", stranded_s, greater_than(0.0),
+            "Messages that the bus has and gives to nobody for so long, as after a power failure, are dropped with "
+            "their stream, which is made anew: who sent them sends them again. A worker's job that has ended five "
+            "workers is removed.");
   }
 };
 
@@ -43,7 +48,9 @@ struct NatsState {
   std::size_t waiting_messages = 0;  ///< Their parts: not sent, or not confirmed by the bus.
   std::uint64_t waiting_bytes = 0;
   std::size_t waiting_acknowledgements = 0;
-  std::uint64_t refused = 0;  ///< Arrived, and were none of ours.
+  std::uint64_t refused = 0;            ///< Arrived, and were none of ours.
+  std::uint64_t streams_made_anew = 0;  ///< Of the server's port: since the bus would not give what was in them.
+  std::uint64_t jobs_removed = 0;       ///< Of the server's port: those that no worker gets any more.
   std::string last_error;
 };
 

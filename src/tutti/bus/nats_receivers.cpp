@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <map>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "tutti/bus/internal/jetstream_port.hpp"
+#include "tutti/bus/internal/nats_names.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -14,6 +18,12 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kListen_ms = 200;
 constexpr int kBatch = 16;
+constexpr std::uint64_t kMostGiven = 1000;  // of 1024; then the bus waits for acknowledgements
+
+void drop_all(natsSubscription* subscription) {
+  natsMsg* heard = nullptr;
+  while (natsSubscription_NextMsg(&heard, subscription, 1) == NATS_OK) natsMsg_Destroy(heard);
+}
 
 }  // namespace
 
@@ -67,15 +77,69 @@ bool JetStreamPort::is_full() const {
 }
 
 void JetStreamPort::pull(const std::string& stream, const std::string& consumer) {
-  keep([&](Session& present) { return present.connection->pull(stream, consumer); },
-       [&](natsSubscription* subscription, Session& present) {
-         if (!present.connection->connected() || is_full()) return pause(kTick / 10);  // no requests pile up in a cut
-         natsMsgList list{};
-         const int batch = self_.role == Endpoint::Role::worker ? 1 : kBatch;
-         const natsStatus status = natsSubscription_Fetch(&list, subscription, batch, kListen_ms, nullptr);
-         for (int i = 0; i < list.Count; ++i) take_in(list.Msgs[i], *present.connection);
-         natsMsgList_Destroy(&list);
-         return status == NATS_OK || status == NATS_TIMEOUT;
+  keep(
+      [&](Session& present) -> Result<natsSubscription*> {
+        if (is_stranded(stream)) return fail(ErrorCode::io, "{}: being made anew", stream);
+        return present.connection->pull(stream, consumer);
+      },
+      [&](natsSubscription* subscription, Session& present) {
+        if (is_stranded(stream)) return false;
+        if (!present.connection->connected() || is_full()) return pause(kTick / 10);  // no requests pile up in a cut
+        natsMsgList list{};
+        const int batch = self_.role == Endpoint::Role::worker ? 1 : kBatch;
+        const natsStatus status = natsSubscription_Fetch(&list, subscription, batch, kListen_ms, nullptr);
+        for (int i = 0; i < list.Count; ++i) take_in(list.Msgs[i], *present.connection);
+        natsMsgList_Destroy(&list);
+        return status == NATS_OK || status == NATS_TIMEOUT;
+      });
+}
+
+/// nats-server 2.9 takes a damaged end of a stream for none, and may go on with sequences that its consumer has behind
+/// it: what is stored then is neither pending nor given. Of jobs it keeps those that were given for the last time.
+void JetStreamPort::watch() {
+  struct Watched {
+    std::optional<Clock::time_point> since;  // they have been in this state
+    std::uint64_t deliveries = 0;
+    bool removed = false;
+  };
+  const std::string jobs = job_stream(options_.mission);
+  std::map<std::string, Watched> all;
+  const auto look_at = [&](const std::string& stream, const std::string& consumer, const NatsConnection& connection) {
+    const auto look = connection.look_at(stream, consumer);
+    if (!look) return note(look.error().message);
+    Watched& watched = all[stream];
+    if (!*look) return;
+    const bool is_left = (*look)->messages > (*look)->pending + (*look)->given;
+    const bool is_held_back = (*look)->pending > 0 && (*look)->asked && (*look)->deliveries == watched.deliveries &&
+                              (*look)->given < kMostGiven && !(stream != jobs && is_full());
+    watched.deliveries = (*look)->deliveries;
+    if (!is_left && !is_held_back) watched = {.since = {}, .deliveries = watched.deliveries, .removed = false};
+    if (!is_left && !is_held_back) return;
+    if (!watched.since) watched.since = Clock::now();
+    if (Clock::now() - *watched.since < std::chrono::duration<double>(options_.stranded_s)) return;
+    if (stream == jobs && is_left && !watched.removed) {
+      const auto removed = connection.remove_done(stream, **look);
+      if (!removed) return note(removed.error().message);
+      watched.removed = *removed > 0 || (*look)->given == 0;  // or a job before these is being worked on
+      if (watched.removed) watched.since = Clock::now();
+      const std::scoped_lock guard(mutex_);
+      jobs_removed_ += *removed;
+      return;
+    }
+    watched.since.reset();
+    watched.removed = false;
+    const std::scoped_lock guard(mutex_);
+    if (stranded_.empty()) stranded_ = stream;
+    changed_.notify_all();
+  };
+  keep([](Session& /*present*/) { return Result<bool>(true); },
+       [&](bool /*made*/, Session& present) {
+         if (present.connection->connected()) {
+           look_at(submap_stream(options_.mission), "server", *present.connection);
+           look_at(verdict_stream(options_.mission), "server", *present.connection);
+           look_at(jobs, "workers", *present.connection);
+         }
+         return pause(std::chrono::duration<double>(options_.stranded_s / 4));
        });
 }
 
@@ -96,8 +160,8 @@ void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) 
   static_cast<void>(connection.publish(reply, "", "", "+TERM"));  // or it would come for ever
 }
 
-void JetStreamPort::hear_status() {
-  keep([&](Session& present) { return present.connection->subscribe("mission." + options_.mission + ".*.*.status"); },
+void JetStreamPort::hear_best_effort(const std::string& subject) {
+  keep([&](Session& present) { return present.connection->subscribe(subject); },
        [&](natsSubscription* subscription, Session& /*present*/) {
          natsMsg* heard = nullptr;
          const natsStatus status = natsSubscription_NextMsg(&heard, subscription, kListen_ms);
@@ -105,7 +169,8 @@ void JetStreamPort::hear_status() {
          if (status != NATS_OK) return status == NATS_TIMEOUT;
          const auto address = address_of(natsMsg_GetSubject(heard));
          const std::scoped_lock guard(mutex_);
-         if (address) inbox_.put_best_effort(address->end, address->kind, std::string(bytes_of(heard)));
+         const Endpoint from = self_.role == Endpoint::Role::server && address ? address->end : Endpoint::server();
+         if (address) inbox_.put_best_effort(from, address->kind, std::string(bytes_of(heard)));
          return true;
        });
 }
@@ -113,14 +178,21 @@ void JetStreamPort::hear_status() {
 /// Values come as they are sent; what was sent when nobody listened is asked for after each connection.
 void JetStreamPort::hear_retained() {
   const std::string bucket = retained_bucket(options_.mission);
-  const std::string subject = fmt::format("$KV.{}.robot.{}.", bucket, self_.number);
+  std::vector<MessageKind> kinds{MessageKind::proxy_graph, MessageKind::proxy_graph_delta, MessageKind::receipt};
+  if (self_.role == Endpoint::Role::viewer) kinds = {MessageKind::mission_status};
+  const auto subject = [&](MessageKind kind) {
+    return subject_of(options_.mission, {.from = Endpoint::server(), .to = self_, .kind = kind});
+  };
+  std::string all = subject(kinds.front());
+  all.replace(all.rfind('.'), std::string::npos, ".*");
   std::uint64_t asked = 0;  // after so many cuts
-  keep([&](Session& present) { return present.connection->subscribe(subject + "*"); },
+  keep([&](Session& present) { return present.connection->subscribe(all); },
        [&](natsSubscription* subscription, Session& present) {
          const std::uint64_t cuts = cuts_;
          if (cuts != asked && present.connection->connected()) {
-           for (const MessageKind kind : {MessageKind::proxy_graph, MessageKind::receipt}) {
-             auto value = present.connection->retained(bucket, subject + word_of(kind));
+           drop_all(subscription);  // from before the cut, and older than what is asked for
+           for (const MessageKind kind : kinds) {
+             auto value = present.connection->retained(bucket, subject(kind));
              if (!value) {
                note(value.error().message);
                return pause(kTryAgain);

@@ -24,14 +24,16 @@ class Port {
   /// worker). What was sent and has not left yet may be lost: whoever needs it sends it again when it starts again.
   virtual ~Port() = default;
   /// Never waits for the network: the message leaves when it can. `envelope.from` is this endpoint. A retained message
-  /// takes the place of the last one to the same receiver. An error: it was not taken (as when too many wait), and is
+  /// takes the place of the last one to the same receiver; another one with the kind and id of one that has not left
+  /// yet changes nothing. An error: it was not taken (as when too many wait), and is
   /// to be sent again later.
   [[nodiscard]] virtual Status send(Envelope envelope) = 0;
   /// What has come, without waiting, each once for every time that it is owed. Of jobs one at a time: the next when the
   /// last one is acknowledged.
   [[nodiscard]] virtual std::vector<Received> receive() = 0;
   /// The receiver has done, and stored, all that the message asks for: it need not come again. Needless, and allowed,
-  /// for what is retained or best effort.
+  /// for what is retained or best effort. Of a worker, which stores nothing, it holds when what it has sent before has
+  /// left.
   virtual void acknowledge(std::uint64_t ticket) = 0;
   /// Work on this message goes on: to be said every few seconds of a long job, or another worker gets it too.
   virtual void still_busy(std::uint64_t ticket) = 0;

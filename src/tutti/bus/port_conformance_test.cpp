@@ -167,6 +167,22 @@ TEST_P(PortConformance, AMessageArrivesAsItWasSent) {
   EXPECT_TRUE(receive(*robot).empty());
 }
 
+TEST_P(PortConformance, AnOperatorsWordWaitsForTheServer) {
+  const Endpoint viewer = Endpoint::viewer(7);
+  const auto port = network->connect(viewer);
+  send(*port, viewer, server, MessageKind::word, "accept/5/1", "word");
+  network->settle();
+  for (int start = 0; start < 2; ++start) {
+    const auto hub = network->connect(server);
+    const auto received = receive(*hub);
+    ASSERT_EQ(received.size(), 1U) << "start " << start;
+    EXPECT_EQ(received[0].envelope.from.role, Endpoint::Role::viewer);
+    EXPECT_EQ(received[0].envelope.kind, MessageKind::word);
+    EXPECT_EQ(*received[0].envelope.bytes, "word");
+    if (start == 1) hub->acknowledge(received[0].ticket);
+  }
+}
+
 TEST_P(PortConformance, DurableMessagesComeUntilTheyAreAcknowledged) {
   const auto robot = network->connect(alpha), worker = network->connect(first);
   auto hub = network->connect(server);
@@ -242,6 +258,29 @@ TEST_P(PortConformance, ARetainedMessageIsItsReceiversOwn) {
   EXPECT_TRUE(receive(*c).empty());
 }
 
+TEST_P(PortConformance, EveryViewerSeesTheNewestMissionStatusALateOneTheLast) {
+  const auto hub = network->connect(server);
+  auto one = network->connect(Endpoint::viewer(1));
+  const auto two = network->connect(Endpoint::viewer(2)), robot = network->connect(alpha);
+  EXPECT_TRUE(receive(*one).empty());
+  for (const char* status : {"1", "2"})
+    send(*hub, server, Endpoint::all_viewers(), MessageKind::mission_status, "", status);
+  const auto seen = receive(*one);
+  ASSERT_FALSE(seen.empty());
+  EXPECT_EQ(seen.back().envelope.from, server);
+  EXPECT_EQ(seen.back().envelope.to, Endpoint::viewer(1));
+  EXPECT_EQ(*seen.back().envelope.bytes, "2");
+  EXPECT_EQ(newest(*two, MessageKind::mission_status), "2");
+  EXPECT_TRUE(receive(*one).empty());
+  EXPECT_TRUE(receive(*robot).empty());
+  EXPECT_TRUE(receive(*hub).empty());
+  one.reset();
+  send(*hub, server, Endpoint::all_viewers(), MessageKind::mission_status, "", "3");
+  one = network->connect(Endpoint::viewer(1));
+  EXPECT_EQ(newest(*one, MessageKind::mission_status), "3");
+  EXPECT_EQ(newest(*two, MessageKind::mission_status), "3");
+}
+
 TEST_P(PortConformance, EveryJobIsDoneByOneOfTheWorkers) {
   const auto hub = network->connect(server);
   const auto one = network->connect(first), two = network->connect(second);
@@ -285,6 +324,41 @@ TEST_P(PortConformance, BestEffortIsHeardOnceByWhoIsThere) {
   network->settle();
   hub = network->connect(server);
   EXPECT_TRUE(receive(*hub).empty());
+}
+
+TEST_P(PortConformance, WorkersAskTheServerForSubmapsAndGetThemAllEachItsOwn) {
+  const Endpoint asker = Endpoint::worker(2);
+  const auto one = network->connect(Endpoint::worker(1)), two = network->connect(asker), hub = network->connect(server);
+  network->settle();
+  send(*two, asker, server, MessageKind::submap_request, "", "which");
+  network->settle();
+  std::vector<Received> asked;
+  for (Received& message : hub->receive()) asked.push_back(std::move(message));
+  ASSERT_EQ(asked.size(), 1U);
+  EXPECT_EQ(asked[0].envelope.from, asker);
+  for (const char* copy : {"first", "second", "third"}) send(*hub, server, asker, MessageKind::submap_copy, "", copy);
+  network->settle();
+  std::set<std::string> came;
+  for (const Received& message : two->receive()) {
+    EXPECT_EQ(message.envelope.kind, MessageKind::submap_copy);
+    EXPECT_EQ(message.envelope.from, server);
+    came.insert(*message.envelope.bytes);
+  }
+  EXPECT_EQ(came, (std::set<std::string>{"first", "second", "third"}));
+  EXPECT_TRUE(one->receive().empty());
+}
+
+TEST_P(PortConformance, SentAgainBeforeItHasLeftItComesOnce) {
+  const auto robot = network->connect(alpha), hub = network->connect(server);
+  network->settle();
+  network->cut();
+  for (int i = 0; i < 3; ++i)
+    for (const char* id : {"a", "a/b"}) send_submap(*robot, id);
+  network->mend();
+  Messages heard;
+  for (int round = 0; round < 50 && heard.size() < 2; ++round) heard.merge(take(*hub));
+  heard.merge(take(*hub));
+  EXPECT_EQ(heard, (Messages{"a", "a/b"}));
 }
 
 TEST_P(PortConformance, WithoutContactNothingWaitsAndNothingIsLost) {

@@ -42,8 +42,10 @@ class SimulatedNetwork::SimulatedPort final : public Port {
 std::unique_ptr<Port> SimulatedNetwork::connect(Endpoint endpoint) {
   TUTTI_CHECK(connected_.insert(endpoint).second, "a second port of one endpoint");
   auto port = std::make_unique<SimulatedPort>(*this, endpoint);
-  for (const auto& [key, envelope] : retained_)
+  for (const auto& [key, envelope] : retained_) {
     if (key.first == endpoint) radio_.send(now_, envelope);
+    if (key.first == Endpoint::all_viewers() && endpoint.role == Endpoint::Role::viewer) show(endpoint, envelope);
+  }
   return port;
 }
 
@@ -62,10 +64,17 @@ bool SimulatedNetwork::is_overtaken(const Arrival& arrival) {
 }
 
 void SimulatedNetwork::send(Envelope envelope) {
-  if (!envelope.from.robot() && !envelope.to.robot()) return arrive(std::move(envelope));
   if (delivery_of(envelope.kind) == Delivery::retained)
     retained_.insert_or_assign(std::pair{envelope.to, envelope.kind}, envelope);
-  radio_.send(now_, std::move(envelope));
+  if (envelope.from.robot() || envelope.to.robot()) return radio_.send(now_, std::move(envelope));
+  if (envelope.to != Endpoint::all_viewers()) return arrive(std::move(envelope));
+  for (const Endpoint endpoint : connected_)
+    if (endpoint.role == Endpoint::Role::viewer) show(endpoint, envelope);
+}
+
+void SimulatedNetwork::show(Endpoint viewer, Envelope envelope) {
+  envelope.to = viewer;
+  arrive(std::move(envelope));
 }
 
 void SimulatedNetwork::arrive(Envelope envelope) {

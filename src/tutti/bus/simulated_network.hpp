@@ -13,9 +13,9 @@
 
 namespace tutti::bus {
 
-/// Ports in virtual time: robots are joined to a broker beside the server by the simulated radio, workers and server
-/// by nothing that takes time. What lies at the broker outlives the ports; what waits at a robot for its radio goes
-/// with the robot's port. One without a port hears nothing; retained values are sent when it is there again.
+/// Ports in virtual time: robots are joined to a broker beside the server by the simulated radio; workers, viewers and
+/// server by nothing that takes time. What lies at the broker outlives the ports; what waits at a robot for its radio
+/// goes with the robot's port. One without a port hears nothing; retained values are sent when it is there again.
 class SimulatedNetwork {
  public:
   explicit SimulatedNetwork(SimulatedRadio radio, Timestamp start) : radio_(std::move(radio)), now_(start) {}
@@ -38,6 +38,7 @@ class SimulatedNetwork {
   };
   void send(Envelope envelope);
   void arrive(Envelope envelope);
+  void show(Endpoint viewer, Envelope envelope);
   /// A newer value of this one has arrived before it.
   [[nodiscard]] bool is_overtaken(const Arrival& arrival);
   [[nodiscard]] std::vector<Received> receive(Endpoint endpoint);

@@ -93,6 +93,9 @@ void SimulatedRadio::send(Timestamp now, Envelope sent) {
   Direction& way = direction(message.from, message.to);
   if (only_latest_counts(message.kind))
     statistics.superseded += std::erase_if(way.queue, [&](const Waiting& w) { return w.message.kind == message.kind; });
+  const auto is_same = [&](const Waiting& w) { return w.message.kind == message.kind && w.message.id == message.id; };
+  if (delivery_of(message.kind) == Delivery::durable && !message.id.empty() && std::ranges::any_of(way.queue, is_same))
+    return;
   if (way.queue.size() >= static_cast<std::size_t>(way.link.queue_messages)) {
     ++statistics_of(way.queue.front().message).dropped;
     way.queue.pop_front();
@@ -116,7 +119,7 @@ void SimulatedRadio::transmit(Direction& way, Timestamp start) {
   Rng rng = rng_.fork(static_cast<std::uint64_t>(message.kind)).fork(front.of_kind);
   int attempts = 1;
   bool arrives = !rng.bernoulli(link.loss);
-  while (!arrives && message.kind != MessageKind::proxy_graph) {
+  while (!arrives && message.kind != MessageKind::proxy_graph_delta) {
     ++attempts;
     arrives = !rng.bernoulli(link.loss);
   }

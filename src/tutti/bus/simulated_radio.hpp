@@ -48,7 +48,8 @@ struct LinkConfig {
     v.field("latency_s", latency_s, between(0.0, kLongestLinkTime_s), "Time from sending to arrival.");
     v.field("jitter_s", jitter_s, between(0.0, kLongestLinkTime_s),
             "Up to this much later, at random; larger than the spacing = reordered.");
-    v.field("loss", loss, between(0.0, 0.95), "Share of transmissions lost; all but proxy graphs are sent again.");
+    v.field("loss", loss, between(0.0, 0.95),
+            "Share of transmissions lost; all but deltas of proxy graphs are sent again.");
     v.field("retransmit_s", retransmit_s, between(0.0, kLongestLinkTime_s),
             "A lost transmission is repeated after this time, once there is contact.");
     v.field("duplicate", duplicate, between(0.0, 1.0), "Share of messages that arrive twice.");

@@ -121,16 +121,16 @@ TEST(SimulatedRadio, OfWaitingProxyGraphsOnlyTheNewestIsSent) {
   EXPECT_EQ(radio.statistics().at({kServer, kAlpha, MessageKind::proxy_graph}).superseded, 4U);
 }
 
-TEST(SimulatedRadio, LossCostsProxyGraphsForGoodAndOthersOnlyTime) {
+TEST(SimulatedRadio, LossCostsDeltasForGoodAndOthersOnlyTime) {
   LinkConfig link;
   link.loss = 0.2;
   SimulatedRadio radio(kStart, link, 3);
   for (int i = 0; i < 2000; ++i) {
-    send(radio, at(i), kServer, kAlpha, MessageKind::proxy_graph, "graph");
+    send(radio, at(i), kServer, kAlpha, MessageKind::proxy_graph_delta, "delta");
     send(radio, at(i), kAlpha, kServer, MessageKind::submap, "submap");
   }
   drain(radio, at(1999));
-  const TopicStatistics down = radio.statistics().at({kServer, kAlpha, MessageKind::proxy_graph});
+  const TopicStatistics down = radio.statistics().at({kServer, kAlpha, MessageKind::proxy_graph_delta});
   const TopicStatistics up = radio.statistics().at({kAlpha, kServer, MessageKind::submap});
   EXPECT_NEAR(static_cast<double>(down.lost), 400.0, 60.0);
   EXPECT_EQ(down.delivered + down.lost, 2000U);

@@ -26,10 +26,6 @@ using Eigen::MatrixXd;
 /// A scale with fewer waves than these is left out: the rigid motion has taken most of it away.
 constexpr double kLeastWaves = 2.0;
 constexpr Index kProbes = 32;
-/// Every sample is left out of the sigmas of its own group, one of so many.
-constexpr Index kGroups = 8;
-/// Quantile of what so few samples say about the spread of an energy: its degrees of freedom are rather too few.
-constexpr double kCautious = 0.16;
 /// Closures know a direction far better than odometry does below this ratio of variances.
 constexpr double kKnownFarBetter = 0.25;
 constexpr Index kMostDirections = 4;
@@ -67,78 +63,28 @@ double whole(const MatrixXd& samples) {
   return std::sqrt(3.0 * samples.squaredNorm() / static_cast<double>(samples.size()));
 }
 
-/// The wavelet coefficients of the errors of one kind at one scale.
-class Coefficients {
- public:
-  /// n x (3 samples).
-  Coefficients(const Eigen::Ref<const MatrixXd>& samples, double rounding)
-      : samples_(samples), rounding_(rounding * rounding) {
-    const Index group = (count() + kGroups - 1) / kGroups;
-    for (Index first = 0; first < count(); first += group)
-      groups_.push_back({first, std::min(group, count() - first), scatter(first, std::min(group, count() - first))});
-    sigma_ = sigma_without(nullptr);
+/// Per block of nodes, the sigma of the wavelet coefficients of one kind at one scale: n x (3 samples). `rounding`:
+/// that of what is sent, at this scale.
+std::vector<double> sigmas(const Eigen::Ref<const MatrixXd>& samples, double rounding) {
+  const double rounding_squared = rounding * rounding;
+  const auto used = static_cast<double>(samples.cols() / 3);
+  MatrixXd products = MatrixXd::Zero(samples.rows(), 6);
+  for (Index k = 0; k < samples.cols(); k += 3)
+    for (Index i = 0, c = 0; i < 3; ++i)
+      for (Index j = 0; j <= i; ++j, ++c) products.col(c) += samples.col(k + i).cwiseProduct(samples.col(k + j));
+  std::vector<double> out(ChainUncertainty::blocks(static_cast<std::size_t>(samples.rows())), 0.0);
+  for (Index n = 0; n < samples.rows(); ++n) {
+    Eigen::Matrix3d S;
+    S << products(n, 0), products(n, 1), products(n, 3), products(n, 1), products(n, 2), products(n, 4), products(n, 3),
+        products(n, 4), products(n, 5);
+    double& block = out[static_cast<std::size_t>(n) / ChainUncertainty::kBlock];
+    const double mean = S.trace() / 3.0, apart = std::max(0.0, S.squaredNorm() / 3.0 - mean * mean);
+    const double most = (mean + std::sqrt(2.0 * apart)) / used;  // no eigenvalue is larger (Samuelson 1968)
+    if ((1.0 + 1e-7) * (most + rounding_squared) <= block * block) continue;
+    block = std::max(block, std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + rounding_squared));
   }
-
-  /// Per block, from all samples.
-  [[nodiscard]] const std::vector<double>& sigma() const { return sigma_; }
-
-  [[nodiscard]] Energy energy() const {
-    std::vector<double> energies;
-    for (const Group& group : groups_) {
-      const std::vector<double> sigma = sigma_without(&group);
-      for (Index k = group.first; k < group.first + group.count; ++k)
-        energies.push_back(energy_of(samples_.middleCols<3>(3 * k), sigma));
-    }
-    const auto values = Eigen::VectorXd::Map(energies.data(), static_cast<Index>(energies.size()));
-    const double mean = values.mean();
-    const double spare = static_cast<double>(values.size() - 1);
-    const double variance = (values.array() - mean).square().sum() / spare;
-    const double largest_variance = variance * spare / chi_square_quantile(kCautious, spare);
-    return {mean, std::max(1.0, 2.0 * mean * mean / std::max(largest_variance, 1e-12 * mean * mean))};
-  }
-
- private:
-  struct Group {
-    Index first, count;
-    MatrixXd scatter;  ///< n x 6, sums of products of coordinates.
-  };
-  [[nodiscard]] Index count() const { return samples_.cols() / 3; }
-  [[nodiscard]] MatrixXd scatter(Index first, Index count) const {
-    MatrixXd out = MatrixXd::Zero(samples_.rows(), 6);
-    for (Index k = 3 * first; k < 3 * (first + count); k += 3)
-      for (Index i = 0, c = 0; i < 3; ++i)
-        for (Index j = 0; j <= i; ++j, ++c) out.col(c) += samples_.col(k + i).cwiseProduct(samples_.col(k + j));
-    return out;
-  }
-  [[nodiscard]] std::vector<double> sigma_without(const Group* left_out) const {
-    MatrixXd sum = MatrixXd::Zero(samples_.rows(), 6);
-    for (const Group& group : groups_)
-      if (&group != left_out) sum += group.scatter;
-    const auto used = static_cast<double>(count() - (left_out == nullptr ? 0 : left_out->count));
-    std::vector<double> out(ChainUncertainty::blocks(static_cast<std::size_t>(sum.rows())), 0.0);
-    for (Index n = 0; n < sum.rows(); ++n) {
-      Eigen::Matrix3d S;
-      S << sum(n, 0), sum(n, 1), sum(n, 3), sum(n, 1), sum(n, 2), sum(n, 4), sum(n, 3), sum(n, 4), sum(n, 5);
-      double& block = out[static_cast<std::size_t>(n) / ChainUncertainty::kBlock];
-      const double mean = S.trace() / 3.0, apart = std::max(0.0, S.squaredNorm() / 3.0 - mean * mean);
-      const double most = (mean + std::sqrt(2.0 * apart)) / used;  // no eigenvalue is larger (Samuelson 1968)
-      if ((1.0 + 1e-7) * (most + rounding_) <= block * block) continue;
-      block = std::max(block, std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + rounding_));
-    }
-    return out;
-  }
-  [[nodiscard]] static double energy_of(const Eigen::Ref<const MatrixXd>& W, const std::vector<double>& sigma) {
-    double out = 0.0;
-    for (Index n = 0; n < W.rows(); ++n)
-      out += W.row(n).squaredNorm() / std::pow(sigma[static_cast<std::size_t>(n) / ChainUncertainty::kBlock], 2);
-    return out;
-  }
-
-  MatrixXd samples_;
-  double rounding_;  ///< Variance besides the samples'.
-  std::vector<Group> groups_;
-  std::vector<double> sigma_;
-};
+  return out;
+}
 
 /// Per scale, how many waves it holds, the constant not counted: the trace of g_s(L)^2, by random signs (Hutchinson
 /// 1990).
@@ -165,14 +111,11 @@ std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, co
     if (held[static_cast<std::size_t>(s)] < kLeastWaves) continue;
     const double share = std::sqrt(held[static_cast<std::size_t>(s)] / static_cast<double>(laplacian.rows()));
     const auto of = [&](const MatrixXd Errors::*kind, double rounding) {
-      return Coefficients((W.*kind).middleCols(s * columns, columns), share * rounding);
+      return sigmas((W.*kind).middleCols(s * columns, columns), share * rounding);
     };
-    const Coefficients position = of(&Errors::position_m, internal::kRounding.position_m);
-    const Coefficients rotation = of(&Errors::rotation_rad, internal::kRounding.rotation_rad);
-    const std::vector<double> metres = position.sigma(), radians = rotation.sigma();
+    const std::vector<double> metres = of(&Errors::position_m, internal::kRounding.position_m);
+    const std::vector<double> radians = of(&Errors::rotation_rad, internal::kRounding.rotation_rad);
     for (std::size_t b = 0; b < metres.size(); ++b) scale.sigma.push_back({metres[b], radians[b]});
-    scale.position = position.energy();
-    scale.rotation = rotation.energy();
   }
   return out;
 }
@@ -302,9 +245,7 @@ ChainUncertainty even_uncertainty(const ChainId& chain, std::size_t nodes, const
   for (int s = 0; s < internal::kScales; ++s) {
     const double waves = std::ldexp(static_cast<double>(nodes), s - internal::kScales);
     ScaleUncertainty& scale = out.scales.emplace_back();
-    if (waves < kLeastWaves) continue;
-    scale.sigma.assign(ChainUncertainty::blocks(nodes), at_each);
-    scale.position = scale.rotation = {.mean = 3.0 * static_cast<double>(nodes), .degrees = 3.0 * waves};
+    if (waves >= kLeastWaves) scale.sigma.assign(ChainUncertainty::blocks(nodes), at_each);
   }
   return out;
 }

@@ -26,10 +26,10 @@ struct ChainKnowledge {
 inline constexpr Eigen::Index kLeastSamples = 16;
 
 /// Passes the samples through the same alignment and filters as the robot passes what it differs by. The sigma of a
-/// coefficient is that of the worst direction, from the samples' covariance shrunk towards its mean (OAS). The energies
-/// of a scale are those of samples left out of the sigmas that they are divided by. Directions: v with the smallest v^T
-/// P v / v^T O v below a quarter, at most four, P the map's covariance of the spread nodes seen from the first, O
-/// odometry's; what is doubted is one shift, the more of it the less likely odometry finds it (docs/math.md).
+/// coefficient is that of the worst direction, from the samples' covariance shrunk towards its mean (OAS). Directions:
+/// v with the smallest v^T P v / v^T O v below a quarter, at most four, P the map's covariance of the spread nodes seen
+/// from the first, O odometry's; what is doubted is one shift, the more of it the less likely odometry finds it
+/// (docs/math.md).
 ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known);
 
 /// The graph with this chain's nodes where a robot should follow them: without what is doubted, which motions of space

@@ -26,8 +26,8 @@ struct DisagreementConfig {
     v.field("false_alarm_rate", false_alarm_rate, between(1e-9, 0.5),
             "Chance that a robot which differs from the server's map only within the map's own uncertainty is told "
             "otherwise, once per mission.");
-    v.field("without", without, one_of({"nothing", "coefficients", "energies", "directions"}),
-            "Leaves out one of the three kinds of tests, to see what it is worth.");
+    v.field("without", without, one_of({"nothing", "coefficients", "directions"}),
+            "Leaves out one of the two kinds of tests, to see what it is worth.");
   }
 };
 
@@ -37,7 +37,6 @@ struct Disagreement {
   Eigen::MatrixXd position_m;           ///< Length of the wavelet coefficient, eq. (8) on one graph for both.
   Eigen::MatrixXd rotation_rad;         ///< The same in rotation.
   Eigen::MatrixXd significance;         ///< The larger of the two; 0 at scales that are not tested.
-  Eigen::VectorXd scale_significance;   ///< Of all of a scale together, which drift raises that stands out nowhere.
   double direction_significance = 0.0;  ///< Of what closures know far better than odometry (KnownDirection).
   [[nodiscard]] double largest() const;
   [[nodiscard]] bool disagrees() const { return largest() > 1.0; }
@@ -48,11 +47,10 @@ struct Disagreement {
 /// graph at the server's positions, as the server has seen draws of its own errors (ChainUncertainty), and along the
 /// directions that closures know.
 ///
-/// A quarter of the false-alarm rate is for single coefficients (chi, 3 degrees of freedom), which find what is local;
-/// a quarter for the energy of whole scales (chi-square), which finds slow drift; half for the directions (chi-square
-/// of all, and each alone), which find that a robot is not back where closures say it is. Updates while the run doubles
-/// in length see much the same and count as one look: look k = 1, 2, ... has the share 1 / (k (k + 1)) of the rate,
-/// which sums to 1 over a mission of any length. docs/math.md.
+/// Half of the false-alarm rate is for single coefficients (chi, 3 degrees of freedom), which find what is local; half
+/// for the directions (chi-square of all, and each alone), which find that a robot is not back where closures say it
+/// is. Updates while the run doubles in length see much the same and count as one look: look k = 1, 2, ... has the
+/// share 1 / (k (k + 1)) of the rate, which sums to 1 over a mission of any length. docs/math.md.
 class DisagreementTest {
  public:
   /// `pairs`: the chain's synchronised nodes in time order, at least two. `update` counts from 1.

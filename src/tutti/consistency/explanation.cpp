@@ -32,7 +32,6 @@ Explanation explain(const ProxyGraph& graph, const ChainId& id, std::span<const 
         k == 0 ? 0.0 : out.distance_m.back() + (chain.server[k].translation - chain.server[k - 1].translation).norm());
   }
   for (int s = 0; s < test.scales(); ++s) out.scale_length_m.push_back(test.scale_length_m(s));
-  out.scale_significance.assign(found.scale_significance.begin(), found.scale_significance.end());
   out.direction_significance = found.direction_significance;
   out.position_m = std::move(found.position_m);
   out.rotation_rad = std::move(found.rotation_rad);

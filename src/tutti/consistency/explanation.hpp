@@ -39,16 +39,13 @@ struct Explanation {
   Eigen::MatrixXd position_m;  ///< Disagreement, nodes x scales.
   Eigen::MatrixXd rotation_rad;
   Eigen::MatrixXd significance;  ///< Disagreement over its threshold, the larger of position and rotation; 1 = at it.
-  std::vector<double> scale_significance;  ///< The same for all of a scale together (Disagreement).
-  double direction_significance = 0.0;     ///< The same for what closures know far better than odometry.
-  double aligned_rmse_m = 0.0;             ///< Of the two estimates after one rigid alignment.
-  double expected_rmse_m = 0.0;            ///< What the server says its own error is; 0 = it does not say.
-  std::vector<SuspectedOrigin> origins;    ///< In time order, none overlapping.
+  double direction_significance = 0.0;   ///< The same for what closures know far better than odometry.
+  double aligned_rmse_m = 0.0;           ///< Of the two estimates after one rigid alignment.
+  double expected_rmse_m = 0.0;          ///< What the server says its own error is; 0 = it does not say.
+  std::vector<SuspectedOrigin> origins;  ///< In time order, none overlapping.
   /// Something stands out of the server's uncertainty: the two do not agree.
   [[nodiscard]] bool disagrees() const {
-    const auto above = [](double s) { return s > 1.0; };
-    return above(direction_significance) || std::ranges::any_of(scale_significance, above) ||
-           (significance.size() > 0 && significance.maxCoeff() > 1.0);
+    return direction_significance > 1.0 || (significance.size() > 0 && significance.maxCoeff() > 1.0);
   }
 };
 

@@ -118,7 +118,6 @@ TEST(Explanation, LaysOutTheRunByTimeAndDistance) {
   }
   EXPECT_EQ(e.significance.rows(), static_cast<Eigen::Index>(kNodes));
   EXPECT_EQ(e.significance.cols(), static_cast<Eigen::Index>(e.scale_length_m.size()));
-  EXPECT_EQ(e.scale_significance.size(), e.scale_length_m.size());
   EXPECT_NEAR(e.scale_length_m.front(), e.distance_m.back(), 0.02 * e.distance_m.back());
   EXPECT_TRUE(std::ranges::is_sorted(e.scale_length_m, std::greater<>()));
 }

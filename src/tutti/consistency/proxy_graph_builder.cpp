@@ -129,6 +129,13 @@ ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nod
   return graph;
 }
 
+void see_last_in(ProxyGraph& graph, const ChainId& chain) {
+  const std::span<const ProxyNode> nodes = nodes_of(graph, chain);
+  if (nodes.empty()) return;
+  for (LastSeen& seen : graph.last_seen)
+    if (seen.chain.robot == chain.robot) seen = {chain, nodes.back().stamp, nodes.back().T_world_body};
+}
+
 ProxyGraph own_part(const ProxyGraph& whole, RobotId robot) {
   ProxyGraph own{.epoch = whole.epoch,
                  .revision = whole.revision,

@@ -60,6 +60,9 @@ struct ProxyGraphConfig {
 ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
                              std::vector<ChainComponent> components, const ProxyGraphConfig& config);
 
+/// `chain` is its robot's newest, whatever the numbers: the robot was last seen in it, if the graph has nodes of it.
+void see_last_in(ProxyGraph& graph, const ChainId& chain);
+
 /// What this robot needs of the graph: all of its newest chain (the one it was last seen in), and where the robots of
 /// the same component were last seen. Of a robot without nodes only what belongs to no chain. Nothing else in the graph
 /// changes what a robot of that chain does with it.

@@ -120,11 +120,13 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
   equations.linearise(poses, {}, true);
   if (candidates.empty() || count == 0 || structure.variables == 0 || !equations.hessian().factorise()) return {};
   std::vector<Pull> pulls;
-  const SelectedInverse inverse(equations.hessian().factor());
-  for (const std::size_t e : candidates) {
-    TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
-    Pull pull = pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, structure.edges[e]));
-    if (pull.distance > least_distance) pulls.push_back(std::move(pull));
+  {  // the inverse is as large as the factor, and goes before the shifts come
+    const SelectedInverse inverse(equations.hessian().factor());
+    for (const std::size_t e : candidates) {
+      TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
+      Pull pull = pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, structure.edges[e]));
+      if (pull.distance > least_distance) pulls.push_back(std::move(pull));
+    }
   }
   if (pulls.empty()) return {};
   std::ranges::stable_sort(pulls, std::greater(), &Pull::distance);

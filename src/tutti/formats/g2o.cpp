@@ -21,8 +21,9 @@ namespace {
 using internal::LineReader;
 using internal::shown;
 
-constexpr double kRounding = 1e-12;   // an eigenvalue this far below zero, as a share of the largest, is zero
-constexpr double kLeastShare = 1e-9;  // of the largest eigenvalue, that takes the place of a negative one
+constexpr double kRounding = 1e-12;    // an eigenvalue this far below zero, as a share of the largest, is zero
+constexpr double kLeastShare = 1e-9;   // of the largest eigenvalue, that takes the place of a negative one
+constexpr double kMaxAngle_rad = 1e6;  // of SE(2): its square stays finite, and its rounding below 1e-9 rad
 constexpr std::array<int, 3> kPlanarAxes = {0, 1, 5};  // x y theta within [tx ty tz rx ry rz]
 
 struct Vertex {
@@ -59,6 +60,8 @@ Result<Pose3> read_pose(const LineReader& line, std::size_t first, bool is_2d) {
     double v[3];
     if (auto ok = line.numbers(first, v); !ok) return tl::unexpected(ok.error());
     if (auto ok = check_position(line, {v[0], v[1], 0.0}); !ok) return tl::unexpected(ok.error());
+    if (std::abs(v[2]) > kMaxAngle_rad)
+      return line.fail(ErrorCode::invalid, "angle is {:g} rad, expected at most {:g}", v[2], kMaxAngle_rad);
     return lift(v[0], v[1], v[2]);
   }
   double v[7];

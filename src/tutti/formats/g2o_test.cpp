@@ -219,6 +219,8 @@ TEST(G2o, ErrorsSayWhereAndWhat) {
   EXPECT_EQ(message_of("VERTEX_SE2 0 1 1e300 0"), "g.g2o:1: position is (1, 1e+300, 0)" + too_far);
   EXPECT_EQ(message_of("VERTEX_SE3:QUAT 0 1 2e9 3 0 0 0 1"), "g.g2o:1: position is (1, 2e+09, 3)" + too_far);
   EXPECT_EQ(message_of("EDGE_SE2 0 1 -1e300 0 0 1 0 0 1 0 1"), "g.g2o:1: position is (-1e+300, 0, 0)" + too_far);
+  EXPECT_EQ(message_of("VERTEX_SE2 0 1 1 1e308"), "g.g2o:1: angle is 1e+308 rad, expected at most 1e+06");
+  EXPECT_EQ(message_of("EDGE_SE2 0 1 1 0 -2e6 1 0 0 1 0 1"), "g.g2o:1: angle is -2e+06 rad, expected at most 1e+06");
   EXPECT_EQ(message_of("VERTEX_SE2 0 1 1"), "g.g2o:1: row has 4 columns, expected 5 (VERTEX_SE2 id x y theta)");
   EXPECT_EQ(message_of("VERTEX_SE2 a 1 1 1"), "g.g2o:1: vertex id in column 2 is 'a', expected a 64-bit integer");
   EXPECT_EQ(message_of("VERTEX_SE2 0 1 inf 1"), "g.g2o:1: column 4 is 'inf', expected a finite number");

@@ -36,10 +36,11 @@ void note_inconsistent_closures(const server::MapEstimate& map, MissionRecord& r
     std::size_t refused = 0, all = 0;
   };
   std::map<std::pair<RobotId, RobotId>, Count> between;
-  for (const auto& [closure, accepted] : map.closures) {
-    Count& count = between[std::minmax({closure.from.chain.robot, closure.to.chain.robot})];
+  for (const server::JudgedClosure& judged : map.closures) {
+    if (judged.by_operator) continue;
+    Count& count = between[std::minmax({judged.closure.from.chain.robot, judged.closure.to.chain.robot})];
     ++count.all;
-    if (!accepted) ++count.refused;
+    if (!judged.accepted) ++count.refused;
   }
   for (const auto& [robots, count] : between) {
     if (count.refused < kEnoughInconsistent ||

@@ -11,6 +11,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/evaluation/agreement.hpp"
 #include "tutti/mission/load_meter.hpp"
+#include "tutti/storage/memory_store.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mission {
@@ -23,7 +24,8 @@ constexpr const char* kBudgetPolicy = "spectral";
 RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
                        const std::vector<std::string>& policies, const evaluation::AssociationConfig& association,
                        Rng rng)
-    : recording_(recording), association_(association), store_(storage::robot_schema()) {
+    : RobotActor(recording, association) {
+  nothing_ = std::make_unique<const storage::MemoryStore>(storage::robot_schema());
   std::vector<std::string> ordered = policies;
   std::stable_partition(ordered.begin(), ordered.end(), [](const std::string& p) { return p == kBudgetPolicy; });
   for (const std::string& policy : ordered) {
@@ -36,10 +38,42 @@ RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConf
       members_.back().shadow = std::make_unique<robot::RobotAgent>(recording.recording.robot, 0, own, rng.fork(policy));
     else
       node_ = node::RobotNode::open(recording.recording.robot, 0, {.agent = own, .keeps_state = false},
-                                    rng.fork(policy), store_)
+                                    rng.fork(policy), *nothing_)
                   .value();
   }
   TUTTI_CHECK(node_ != nullptr, "default policy {} does not run", config.policy.name);
+}
+
+Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& recording,
+                                                     const node::RobotNodeConfig& config,
+                                                     const evaluation::AssociationConfig& association, const Rng& rng,
+                                                     std::uint64_t session, const storage::TableStore& store) {
+  std::unique_ptr<RobotActor> actor(new RobotActor(recording, association));
+  const std::string& policy = config.agent.policy.name;
+  actor->members_.push_back({policy, nullptr, {.robot = recording.recording.name, .policy = policy}});
+  auto node = node::RobotNode::open(recording.recording.robot, session, config, rng.fork(policy), store);
+  if (!node) return tl::unexpected(node.error());
+  actor->node_ = std::move(*node);
+  if (const auto newest = actor->node_->agent().newest_sample()) {
+    const Trajectory& odometry = recording.recording.odometry;
+    const auto next = std::ranges::upper_bound(odometry, *newest, {}, &StampedPose::stamp);
+    actor->next_ = static_cast<std::size_t>(next - odometry.begin());
+  }
+  return actor;
+}
+
+/// The scan of the last sample, and the end of the recording, may not have been stored with it.
+void RobotActor::resume(Timestamp now) {
+  take(node_->resume(now));
+  if (next_ == 0) return;
+  feed_scan(next_ - 1, now);
+  if (next_ == recording_.recording.odometry.size()) take(node_->finish(now));
+}
+
+bool RobotActor::is_whole_in_map() const {
+  const auto& keyframes = node_->agent().keyframes();
+  const auto last = std::ranges::find_if(keyframes.rbegin(), keyframes.rend(), &Keyframe::representative);
+  return last == keyframes.rend() || last->stamp <= mapped_until_;
 }
 
 double RobotActor::next_time() const {
@@ -66,6 +100,7 @@ void RobotActor::replay_next(Timestamp now) {
 
 void RobotActor::take(node::Step step) {
   for (const node::Event& event : step.events) note_event(event);
+  std::ranges::move(step.writes, std::back_inserter(step_.writes));
   std::ranges::move(step.messages, std::back_inserter(step_.messages));
   std::ranges::move(step.events, std::back_inserter(step_.events));
 }
@@ -89,16 +124,22 @@ void RobotActor::feed_scan(std::size_t sample, Timestamp now) {
 }
 
 void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
-  if (envelope.kind != bus::MessageKind::proxy_graph) return take(node_->receive(envelope, now));
-  const auto message = wire::decode_proxy_graph(*envelope.bytes);
-  if (!message) return take(node_->receive(envelope, now));  // which refuses it
+  if (envelope.kind == bus::MessageKind::receipt) return take(node_->receive(envelope, now));
+  const auto graph = node_->graph_in(envelope);
+  if (!graph || !*graph) return take(node_->receive(envelope, now));  // which refuses it, or keeps it
+  const ProxyGraphMessage& message = **graph;
+  if (message.graph.age() >= heard_) {
+    heard_ = message.graph.age();
+    const auto own = nodes_of(message.graph, node_->agent().chain());
+    mapped_until_ = own.empty() ? kFirstTimestamp : own.back().stamp;
+  }
   std::optional<std::size_t> budget;
   const std::size_t updates = updates_.size();
   for (Member& member : members_) {
-    update(member, envelope, *message, agent_of(member).policy().needs_budget() ? budget : std::nullopt, now);
+    update(member, envelope, message, agent_of(member).policy().needs_budget() ? budget : std::nullopt, now);
     if (member.policy == kBudgetPolicy) budget = agent_of(member).ledger().size();
   }
-  if (updates_.size() > updates) score(trajectory_of(message->graph, node_->agent().chain()), updates_.back());
+  if (updates_.size() > updates) score(trajectory_of(message.graph, node_->agent().chain()), updates_.back());
 }
 
 void RobotActor::score(const Trajectory& map, UpdateRecord& update) const {

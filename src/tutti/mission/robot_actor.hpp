@@ -14,7 +14,7 @@
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/node/robot_node.hpp"
-#include "tutti/storage/memory_store.hpp"
+#include "tutti/storage/table_store.hpp"
 
 namespace tutti::mission {
 
@@ -29,12 +29,27 @@ class RobotActor {
   /// `policies`: all that run, the default one (config.policy.name) among them.
   RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
              const std::vector<std::string>& policies, const evaluation::AssociationConfig& association, Rng rng);
+  /// A robot that may be killed: its node keeps its state in `store`, which outlives it, and goes on where the
+  /// recording stood. `rng` as above; without shadows.
+  static Result<std::unique_ptr<RobotActor>> open(const MissionRecording& recording,
+                                                  const node::RobotNodeConfig& config,
+                                                  const evaluation::AssociationConfig& association, const Rng& rng,
+                                                  std::uint64_t session, const storage::TableStore& store);
+  /// Of one that was opened: before anything else, what its node has to say first.
+  void resume(Timestamp now);
+  /// RobotNode::on_timer()
+  void on_timer(Timestamp now) { take(node_->on_timer(now)); }
 
   /// Mission time of the next sample; infinity when there is none left.
   [[nodiscard]] double next_time() const;
   [[nodiscard]] bool has_scans() const { return recording_.recording.scans != nullptr; }
   /// Replays one odometry sample and its scan; after the last one the node closes its last submap.
   void replay_next(Timestamp now);
+  /// Of a robot whose recording is empty, because its samples come from elsewhere; RobotNode's functions of these
+  /// names.
+  void add_odometry(const node::OdometrySample& sample, Timestamp now) { take(node_->add_odometry(sample, now)); }
+  void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
+  void store_all() { take(node_->store_all()); }
   /// Closes the last submap before the recording ends.
   void finish(Timestamp now) { take(node_->finish(now)); }
   /// The budget of policies that need one is what the policy `spectral` holds after the same broadcast.
@@ -43,6 +58,11 @@ class RobotActor {
   node::Step take_step() { return std::exchange(step_, {}); }
 
   [[nodiscard]] const MissionRecording& recording() const { return recording_; }
+  [[nodiscard]] const node::RobotNode& node() const { return *node_; }
+  /// (epoch, revision) of the newest proxy graph that has come since the start; zeros before.
+  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> heard() const { return heard_; }
+  /// That graph speaks of all that the robot can be told of: of its last representative keyframe.
+  [[nodiscard]] bool is_whole_in_map() const;
   [[nodiscard]] RobotId id() const { return recording_.recording.robot; }
   [[nodiscard]] RobotOutcome outcome() const;
   [[nodiscard]] const std::vector<UpdateRecord>& updates() const { return updates_; }
@@ -67,6 +87,9 @@ class RobotActor {
     std::string first;
   };
 
+  RobotActor(const MissionRecording& recording, const evaluation::AssociationConfig& association)
+      : recording_(recording), association_(association) {}
+
   [[nodiscard]] const robot::RobotAgent& agent_of(const Member& member) const {
     return member.shadow ? *member.shadow : node_->agent();
   }
@@ -83,11 +106,13 @@ class RobotActor {
 
   const MissionRecording& recording_;
   const evaluation::AssociationConfig& association_;
-  storage::MemoryStore store_;  // empty: nobody kills the node
+  std::unique_ptr<const storage::TableStore> nothing_;  // of one whom nobody kills
   std::unique_ptr<node::RobotNode> node_;
   node::Step step_;
   std::vector<Member> members_;  // `spectral` first, if it is there: it sets the budget
   std::size_t next_ = 0;
+  std::pair<std::uint64_t, std::uint64_t> heard_;
+  Timestamp mapped_until_ = kFirstTimestamp;  // the last own node in that graph
   std::vector<UpdateRecord> updates_;
   std::optional<consistency::Explanation> explanation_;
   double cpu_s_ = 0.0;

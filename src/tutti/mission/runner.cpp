@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/runner.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <limits>
@@ -11,15 +9,13 @@
 #include <thread>
 
 #include "tutti/base/check.hpp"
-#include "tutti/base/config_io.hpp"
 #include "tutti/bus/simulated_network.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/evaluate.hpp"
-#include "tutti/mission/follow_alerts.hpp"
 #include "tutti/mission/load_meter.hpp"
+#include "tutti/mission/make_record.hpp"
 #include "tutti/mission/mission_events.hpp"
 #include "tutti/mission/parallel.hpp"
-#include "tutti/mission/record_notes.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/server_meter.hpp"
@@ -69,8 +65,9 @@ class MissionRun {
         meter_(make_closure_finder(config.closures, recordings_, options.seed)),
         network_(radio(), kMissionStart),
         store_(storage::map_schema()),
-        server_(node::ServerNode::open(robot_ids(recordings_), meter_.finder(),
-                                       {.server = config.server, .pairs_per_job = wire::kMaxPairs}, kEpoch, store_)
+        server_(node::ServerNode::open(
+                    robot_ids(recordings_), meter_.finder(),
+                    {.server = config.server, .pairs_per_job = wire::kMaxPairs, .job_timeout_s = 0.0}, kEpoch, store_)
                     .value()),
         worker_(kWorker, meter_.finder(), node::SubmapFrames::of(store_),
                 [this](std::size_t count, const auto& call) { for_each_parallel(count, threads_, call); }),
@@ -228,7 +225,7 @@ class MissionRun {
                        events_.updates().empty() ? 0 : events_.updates().back().closures, server.map().components});
   }
 
-  void record_traffic(RobotRecord& robot) const;
+  [[nodiscard]] std::vector<TrafficRecord> traffic_of(const MissionRecording& robot) const;
   void record_timing(MissionRecord& record) const;
 
   const MissionConfig& config_;
@@ -250,24 +247,21 @@ class MissionRun {
   double server_latency_ms_ = 0.0;
 };
 
-void MissionRun::record_traffic(RobotRecord& robot) const {
+std::vector<TrafficRecord> MissionRun::traffic_of(const MissionRecording& robot) const {
+  std::vector<TrafficRecord> traffic;
   for (const auto& [topic, statistics] : network_.radio().statistics()) {
     const auto& [from, to, kind] = topic;
-    const bool up = from.robot() == robot.id;
-    if (!up && to.robot() != robot.id) continue;
-    (up ? robot.bytes_up : robot.bytes_down) += statistics.published_bytes;
-    (up ? robot.messages_up : robot.messages_down) += statistics.published;
-    robot.traffic.push_back({.from = up ? robot.name : "server",
-                             .to = up ? "server" : robot.name,
-                             .kind = wire::name(kind),
-                             .messages = statistics.published,
-                             .bytes = statistics.published_bytes,
-                             .transmitted_bytes = statistics.transmitted_bytes,
-                             .bytes_per_s = robot.duration_s > 0.0
-                                                ? static_cast<double>(statistics.published_bytes) / robot.duration_s
-                                                : 0.0,
-                             .largest_message = statistics.largest_message});
+    const bool up = from.robot() == robot.recording.robot;
+    if (!up && to.robot() != robot.recording.robot) continue;
+    traffic.push_back({.from = up ? robot.recording.name : "server",
+                       .to = up ? "server" : robot.recording.name,
+                       .kind = wire::name(kind),
+                       .messages = statistics.published,
+                       .bytes = statistics.published_bytes,
+                       .transmitted_bytes = statistics.transmitted_bytes,
+                       .largest_message = statistics.largest_message});
   }
+  return traffic;
 }
 
 void MissionRun::record_timing(MissionRecord& record) const {
@@ -285,47 +279,24 @@ void MissionRun::record_timing(MissionRecord& record) const {
 }
 
 MissionRecord MissionRun::record() const {
-  MissionRecord record{.mission = config_.mission,
-                       .description = config_.description,
-                       .input = config_.input,
-                       .notes = config_.notes,
-                       .seed = options_.seed,
-                       .default_policy = config_.agent.policy.name,
-                       .duration_s = duration_s_,
-                       .association = config_.association,
-                       .rpe_interval = fmt::format("{:g} s", kRpeInterval_s),
-                       .version = options_.version,
-                       .effective_config_yaml = to_yaml(dump_config(config_)),
-                       .survey = survey_};
-  std::vector<RobotOutcome> outcomes;
+  FinishedMission mission{.config = config_,
+                          .seed = options_.seed,
+                          .version = options_.version,
+                          .duration_s = duration_s_,
+                          .survey = survey_,
+                          .robots = {},
+                          .server = *server_,
+                          .events = events_,
+                          .undelivered = network_.radio().undelivered()};
   for (const Robot& robot : robots_) {
     const RobotActor& actor = *robot.actor;
-    outcomes.push_back(actor.outcome());
-    record.notes.insert(record.notes.end(), actor.recording().notes.begin(), actor.recording().notes.end());
-    for (std::string& trouble : actor.troubles()) record.notes.push_back(std::move(trouble));
+    mission.robots.push_back({.outcome = actor.outcome(),
+                              .updates = actor.updates(),
+                              .explanation = actor.explanation(),
+                              .troubles = actor.troubles(),
+                              .traffic = traffic_of(actor.recording())});
   }
-  events_.note_refusals(record);
-  const server::MapServer& server = server_->map_server();
-  const ProxyGraph& broadcast = server_->broadcast();
-  record.robots.resize(robots_.size());
-  evaluate_robots(outcomes, server.map(), config_.association, record);
-  note_undelivered(network_.radio().undelivered(), record);
-  note_what_the_map_lacks(server.map(), record);
-  evaluate_server(outcomes, server, config_.association, record);
-  record.server.proxy = broadcast;
-  record.server.updates = events_.updates();
-  for (RobotRecord& robot : record.robots) {
-    record_traffic(robot);
-    const RobotActor& actor = *robots_[robot.id.value].actor;
-    robot.updates = actor.updates();
-    robot.alerts = follow_alerts(robot.updates);
-    robot.explanation = actor.explanation();
-    robot.proxy_nodes =
-        static_cast<std::size_t>(std::count_if(broadcast.nodes.begin(), broadcast.nodes.end(),
-                                               [&](const ProxyNode& node) { return node.chain.robot == robot.id; }));
-    for (const auto& [id, submap] : server.state().submaps) robot.submaps += id.chain.robot == robot.id ? 1 : 0;
-  }
-  record.warnings = warnings_of(record);
+  MissionRecord record = make_record(mission);
   record_timing(record);
   return record;
 }

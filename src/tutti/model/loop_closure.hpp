@@ -33,6 +33,10 @@ struct ClosureVerdict {
   std::vector<LoopClosure> closures;  ///< From keyframes of pair.first to keyframes of pair.second.
   std::optional<Refusal> refusal;     ///< When there are none.
   std::uint32_t finder_version = 0;   ///< server::ClosureFinder::version; 0: of a program that did not say.
+  // For people, and of closures only; the map does not depend on these.
+  std::vector<Refusal> evidence;        ///< What the finder measured, with the limit that each value kept.
+  std::optional<std::uint32_t> worker;  ///< Who verified the pair; nothing: it was not said.
+  std::int64_t verified_ns = 0;         ///< When, by that worker's clock, since the Unix epoch; 0: it was not said.
   friend bool operator==(const ClosureVerdict&, const ClosureVerdict&) = default;
 };
 

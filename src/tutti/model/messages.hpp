@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,16 +34,31 @@ struct ProxyGraphMessage {  ///< server -> every robot
   ProxyGraph graph;
 };
 
-/// server -> one robot: which of its submaps are stored and need not be sent again.
+/// server -> one robot: which of its submaps are stored, or refused for good, and need not be sent again.
 struct Receipt {
+  /// One of two programs that call themselves the same robot.
+  struct Conflict {
+    std::uint64_t session = 0;  ///< That is refused, and
+    std::uint64_t start = 0;    ///< of it this start (NodeStatus): others need not mind.
+    std::string why;
+    friend bool operator==(const Conflict&, const Conflict&) = default;
+  };
   RobotId robot;
-  std::map<std::uint64_t, NumberSet> stored;  ///< Numbers of submaps, by session.
+  std::map<std::uint64_t, NumberSet> stored;   ///< Numbers of submaps, by session.
+  std::map<std::uint64_t, NumberSet> refused;  ///< Likewise, apart from those.
+  std::string why_refused;                     ///< The last of them.
+  std::optional<std::uint64_t> owner_session;  ///< Whose name and number these are, as far as the server was told.
+  std::optional<Conflict> conflict;
 
-  [[nodiscard]] bool contains(SubmapId id) const {
-    const auto session = stored.find(id.chain.session);
-    return id.chain.robot == robot && session != stored.end() && session->second.contains(id.index);
-  }
+  [[nodiscard]] bool contains(SubmapId id) const { return has(stored, id); }
+  [[nodiscard]] bool refuses(SubmapId id) const { return has(refused, id); }
   friend bool operator==(const Receipt&, const Receipt&) = default;
+
+ private:
+  [[nodiscard]] bool has(const std::map<std::uint64_t, NumberSet>& numbers, SubmapId id) const {
+    const auto session = numbers.find(id.chain.session);
+    return id.chain.robot == robot && session != numbers.end() && session->second.contains(id.index);
+  }
 };
 
 /// server -> one of the workers: pairs of submaps to be verified.

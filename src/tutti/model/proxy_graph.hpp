@@ -63,18 +63,10 @@ struct PoseSigma {
   friend bool operator==(const PoseSigma&, const PoseSigma&) = default;
 };
 
-/// What a sum of squared errors is like: chi-square with `degrees` degrees of freedom, scaled to the mean.
-struct Energy {
-  double mean = 0.0;
-  double degrees = 1.0;
-  friend bool operator==(const Energy&, const Energy&) = default;
-};
-
 /// What the wavelet coefficients of a chain's errors are like at one scale.
 struct ScaleUncertainty {
   /// Per block of ChainUncertainty::kBlock nodes the largest of its nodes; empty: too few waves to say anything.
   std::vector<PoseSigma> sigma;
-  Energy position, rotation;  ///< Of the sum over all nodes of (coefficient / sigma)^2.
   friend bool operator==(const ScaleUncertainty&, const ScaleUncertainty&) = default;
 };
 

@@ -91,6 +91,14 @@ constexpr bool is_measured(const Refusal& refusal) {
   return kind_of(refusal.reason).bound != RefusalKind::Bound::none && refusal.value != refusal.limit;
 }
 
+/// The value is beyond its limit.
+constexpr bool misses(const Refusal& measured) {
+  const auto bound = kind_of(measured.reason).bound;
+  return bound == RefusalKind::Bound::at_least
+             ? measured.value < measured.limit
+             : bound == RefusalKind::Bound::at_most && measured.value > measured.limit;
+}
+
 /// "overlap: 0.16, at least 0.30 needed"
 inline std::string to_string(const Refusal& refusal) {
   const auto& [words, bound, unit, digits] = kind_of(refusal.reason);

@@ -9,6 +9,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/bus/envelope.hpp"
+#include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/robot/agent.hpp"
 
@@ -23,7 +24,11 @@ struct VerdictsTaken {  ///< By the server; of those refused there are MessageRe
   std::string job;
   std::size_t pairs = 0;
 };
-struct VerificationFailed {  ///< The pair is asked again, with the next submap.
+struct WordTaken {  ///< By the server, from an operator.
+  SubmapPair pair;
+  Wish wish = Wish::withdraw;
+};
+struct VerificationFailed {  ///< The pair is asked again, with the next submap or after job_timeout_s.
   SubmapPair pair;
   std::string why;
 };
@@ -41,6 +46,16 @@ struct MessageRefused {  ///< It was no good, or what was to be sent was not.
   bus::MessageKind kind = bus::MessageKind::submap;
   std::string why;
 };
+struct RobotJoined {  ///< The server takes this session as the owner of name and number from now on.
+  RobotId robot;
+  std::string name;
+  std::uint64_t session = 0;
+};
+struct RobotRefused {  ///< Another program with a name or number that is in use: told by the server, and by the robot.
+  RobotId robot;
+  std::uint64_t session = 0;
+  std::string why;
+};
 struct SampleRefused {
   RobotId robot;
   std::string why;
@@ -52,8 +67,8 @@ struct ScanRefused {
 
 struct Event {
   Timestamp time;
-  std::variant<SubmapStored, VerdictsTaken, VerificationFailed, MapUpdated, RobotUpdated, MessageRefused, SampleRefused,
-               ScanRefused>
+  std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, MapUpdated, RobotUpdated, MessageRefused,
+               RobotJoined, RobotRefused, SampleRefused, ScanRefused>
       what;
 };
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/robot_node.hpp"
 
+#include <algorithm>
 #include <utility>
 
+#include "tutti/node/status_envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/wire/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
@@ -15,7 +17,8 @@ constexpr const char* kAgent = "agent";  // its one row
 constexpr const char* kJournal = "journal";
 constexpr const char* kOutbox = "outbox";
 constexpr const char* kMeta = "meta";
-constexpr const char* kRobot = "robot";  // whose store it is
+constexpr const char* kRobot = "robot";    // whose store it is
+constexpr const char* kStarts = "starts";  // on it
 
 }  // namespace
 
@@ -26,6 +29,8 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
   if (*whose && **whose != storage::key_of({robot.value}))
     return fail(ErrorCode::invalid, "what is stored is another robot's than {}", robot.value);
   robot::AgentState state{.session = session};
+  const auto starts = store.read(kMeta, kStarts);
+  if (!starts) return tl::unexpected(starts.error());
   const auto checkpoint = store.read(kCheckpoint, kAgent);
   if (!checkpoint) return tl::unexpected(checkpoint.error());
   if (*checkpoint) {
@@ -33,9 +38,10 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
     if (!decoded) return in_context(fmt::format("robot {}: checkpoint", robot.value), decoded.error());
     state = std::move(*decoded);
   }
-  std::unique_ptr<RobotNode> node(new RobotNode(robot, config, std::move(rng), std::move(state)));
+  std::unique_ptr<RobotNode> node(new RobotNode(robot, config, std::move(rng), std::move(state), store));
   node->is_new_ = !*checkpoint;
-  Status ok = node->read_outbox(store);
+  if (const auto before = storage::numbers_of(starts->value_or(""), 1)) node->start_ = before->front() + 1;
+  Status ok = node->read_outbox();
   const auto hear = [&](std::string_view, std::string_view bytes) {
     const auto entry = decode_entry(bytes);
     ok = entry ? node->hear_again(*entry) : Status(tl::unexpected(entry.error()));
@@ -47,7 +53,7 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
   return node;
 }
 
-Status RobotNode::read_outbox(const storage::TableStore& store) {
+Status RobotNode::read_outbox() {
   Status ok;
   const auto read = [&](std::string_view key, std::string_view frame) {
     const auto numbers = storage::numbers_of(key, 3);
@@ -56,11 +62,10 @@ Status RobotNode::read_outbox(const storage::TableStore& store) {
       return false;
     }
     const SubmapId id{{agent_.robot(), (*numbers)[1]}, static_cast<std::uint32_t>((*numbers)[2])};
-    outbox_.insert(id);
-    unsent_.emplace(id, frame);
+    uplink_.add(id, frame.size());
     return true;
   };
-  if (auto scanned = store.scan(kOutbox, {}, read); !scanned) return scanned;
+  if (auto scanned = store_.scan(kOutbox, {}, read); !scanned) return scanned;
   return ok;
 }
 
@@ -76,18 +81,18 @@ Status RobotNode::hear_again(const JournalEntry& entry) {
   const auto& heard = std::get<HeardGraph>(entry);
   const auto message = wire::decode_proxy_graph(heard.frame);
   if (!message) return tl::unexpected(message.error());
-  agent_.receive(*message, heard.budget);
+  note(agent_.receive(*message, heard.budget));
   return {};
 }
 
-Step RobotNode::resume(Timestamp /*now*/) {
+Step RobotNode::resume(Timestamp now) {
   Step step;
   if (std::exchange(is_new_, false) && config_.keeps_state) {
     step.writes.push_back({kMeta, kRobot, storage::key_of({agent_.robot().value})});
     save_checkpoint(step);
   }
-  for (auto& [id, frame] : std::exchange(unsent_, {}))
-    step.messages.push_back(submap_envelope(id, std::make_shared<const std::string>(std::move(frame))));
+  if (config_.keeps_state) step.writes.push_back({kMeta, kStarts, storage::key_of({start_})});
+  send_submaps(now, {}, step);
   return step;
 }
 
@@ -97,7 +102,8 @@ Step RobotNode::add_odometry(const OdometrySample& sample, Timestamp now) {
     step.tell(now, SampleRefused{agent_.robot(), ok.error().message});
     return step;
   }
-  remember(sample, step);
+  finished_ = false;
+  remember(sample, now, step);
   take_outgoing(now, step);
   return step;
 }
@@ -110,28 +116,62 @@ Step RobotNode::add_scan(const Scan& scan, Timestamp now) {
     return step;
   }
   last_scan_ = scan.stamp;
-  remember(scan, step);
+  remember(scan, now, step);
   return step;
 }
 
 Step RobotNode::finish(Timestamp now) {
   Step step;
+  finished_ = true;
   agent_.finish();
   take_outgoing(now, step);
+  write_journal(step);
   return step;
 }
 
-void RobotNode::remember(const JournalEntry& entry, Step& step) {
-  if (config_.keeps_state) step.writes.push_back({kJournal, storage::key_of({journal_++}), encode(entry)});
+Step RobotNode::store_all() {
+  Step step;
+  write_journal(step);
+  return step;
+}
+
+/// Scans wait as odometry does: they come in its order, and one that is lost is fed again with its sample.
+void RobotNode::remember(const JournalEntry& entry, Timestamp now, Step& step) {
+  if (!config_.keeps_state) return;
+  if (unwritten_.empty()) unwritten_since_ = now;
+  unwritten_.push_back(encode(entry));
+  if (now >= unwritten_since_ + config_.journal_period_s) write_journal(step);
+}
+
+void RobotNode::write_journal(Step& step) {
+  for (std::string& entry : unwritten_)
+    step.writes.push_back({kJournal, storage::key_of({journal_++}), std::move(entry)});
+  unwritten_.clear();
+}
+
+std::optional<Timestamp> RobotNode::next_timer() const {
+  std::optional<Timestamp> next = uplink_.next();
+  if (unwritten_.empty()) return next;
+  const Timestamp due = unwritten_since_ + config_.journal_period_s;
+  return next ? std::min(*next, due) : due;
+}
+
+Step RobotNode::on_timer(Timestamp now) {
+  Step step;
+  if (!unwritten_.empty() && now >= unwritten_since_ + config_.journal_period_s) write_journal(step);
+  send_submaps(now, {}, step);
+  return step;
 }
 
 void RobotNode::save_checkpoint(Step& step) {
   if (!config_.keeps_state) return;
   step.writes.push_back({kCheckpoint, kAgent, wire::encode(agent_.state())});
+  unwritten_.clear();
   for (; journal_ > 0; --journal_) step.writes.push_back({kJournal, storage::key_of({journal_ - 1}), std::nullopt});
 }
 
 void RobotNode::take_outgoing(Timestamp now, Step& step) {
+  Frames fresh;
   const auto submaps = agent_.take_outgoing();
   for (const SubmapMessage& message : submaps) {
     if (const Status ok = wire::validate(message); !ok) {
@@ -141,22 +181,42 @@ void RobotNode::take_outgoing(Timestamp now, Step& step) {
     auto frame = std::make_shared<const std::string>(wire::encode(message, {.voxel_m = config_.agent.submap.voxel_m}));
     const SubmapId id = message.submap.id;
     if (config_.keeps_state) {
-      outbox_.insert(id);
+      uplink_.add(id, frame->size());
       step.writes.push_back({kOutbox, key_of(id), *frame});
+      fresh.emplace(id, std::move(frame));
+    } else {
+      step.messages.push_back(submap_envelope(id, std::move(frame)));
     }
-    step.messages.push_back(submap_envelope(id, std::move(frame)));
   }
-  if (!submaps.empty()) save_checkpoint(step);
+  if (submaps.empty()) return;
+  save_checkpoint(step);
+  send_submaps(now, fresh, step);
+}
+
+void RobotNode::send_submaps(Timestamp now, const Frames& fresh, Step& step) {
+  for (const SubmapId id : uplink_.take(now)) {
+    if (const auto found = fresh.find(id); found != fresh.end()) {
+      step.messages.push_back(submap_envelope(id, found->second));
+      continue;
+    }
+    auto row = store_.read(kOutbox, key_of(id));
+    if (row && *row)
+      step.messages.push_back(submap_envelope(id, std::make_shared<const std::string>(std::move(**row))));
+    else
+      step.tell(now, MessageRefused{
+                         bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
+                         row ? fmt::format("submap {} is not in the outbox", to_string(id)) : row.error().message});
+  }
 }
 
 bus::Envelope RobotNode::submap_envelope(SubmapId id, std::shared_ptr<const std::string> frame) const {
-  return {bus::Endpoint::of(agent_.robot()), bus::Endpoint::server(), bus::MessageKind::submap,
-          fmt::format("{}/{}/{}", id.chain.robot.value, id.chain.session, id.index), std::move(frame)};
+  return {bus::Endpoint::of(agent_.robot()), bus::Endpoint::server(), bus::MessageKind::submap, message_id(id),
+          std::move(frame)};
 }
 
 Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget) {
   Step step;
-  if (envelope.kind == bus::MessageKind::proxy_graph)
+  if (envelope.kind == bus::MessageKind::proxy_graph || envelope.kind == bus::MessageKind::proxy_graph_delta)
     receive_graph(envelope, now, budget, step);
   else if (envelope.kind == bus::MessageKind::receipt)
     receive_receipt(envelope, now, step);
@@ -167,14 +227,36 @@ Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now, std::optio
 
 void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget,
                               Step& step) {
-  const auto message = wire::decode_proxy_graph(*envelope.bytes);
-  if (!message) {
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, message.error().message});
+  const auto graph = graph_in(envelope);
+  if (!graph) {
+    step.tell(now, MessageRefused{envelope.from, envelope.kind, graph.error().message});
     return;
   }
-  if (!agent_.is_news(message->graph)) return;
-  remember(HeardGraph{*envelope.bytes, budget}, step);
-  step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(*message, budget, observer_)});
+  if (envelope.kind == bus::MessageKind::proxy_graph_delta)
+    delta_ = envelope.bytes;
+  else
+    base_ = wire::decode_proxy_graph(*envelope.bytes).value().graph;
+  if (!*graph || !agent_.is_news((*graph)->graph)) return;
+  if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph), budget}, now, step);
+  write_journal(step);  // what is told of it holds
+  step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, budget, observer_)});
+  note(std::get<RobotUpdated>(step.events.back().what).summary);
+  updated_ = now;
+}
+
+void RobotNode::note(const robot::UpdateSummary& summary) {
+  alerts_ = static_cast<std::uint64_t>(
+      std::ranges::count_if(summary.explanation.origins, [](const auto& origin) { return origin.alert; }));
+}
+
+Result<std::optional<ProxyGraphMessage>> RobotNode::graph_in(const bus::Envelope& envelope) const {
+  if (envelope.kind == bus::MessageKind::proxy_graph_delta)
+    return wire::decode_delta(*envelope.bytes, base_ ? *base_ : ProxyGraph{});
+  auto message = wire::decode_proxy_graph(*envelope.bytes);
+  if (!message) return tl::unexpected(message.error());
+  auto newer = delta_ ? wire::decode_delta(*delta_, message->graph) : std::nullopt;
+  if (newer && *newer) return newer;
+  return std::optional(std::move(*message));
 }
 
 void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -184,11 +266,50 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
     step.tell(now, MessageRefused{envelope.from, envelope.kind, why});
     return;
   }
-  std::erase_if(outbox_, [&](SubmapId id) {
-    if (!receipt->contains(id)) return false;
+  std::vector<SubmapId> known;
+  for (const auto& [id, bytes] : uplink_.submaps()) {
+    const bool is_refused = !receipt->contains(id) && receipt->refuses(id);
+    if (is_refused)
+      step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
+                                    fmt::format("submap {} is refused by the server, which last said: {}",
+                                                to_string(id), receipt->why_refused)});
+    if (is_refused || receipt->contains(id)) known.push_back(id);
+  }
+  for (const SubmapId id : known) {
+    uplink_.remove(id);
     step.writes.push_back({kOutbox, key_of(id), std::nullopt});
-    return true;
-  });
+  }
+  note_conflict(*receipt, now, step);
+  send_submaps(now, {}, step);
+}
+
+void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step) {
+  owner_session_ = receipt.owner_session;
+  const std::optional<std::string> before = std::exchange(conflict_, std::nullopt);
+  const auto& conflict = receipt.conflict;
+  if (!conflict || conflict->session != agent_.chain().session || conflict->start != start_) return;
+  conflict_ = conflict->why;
+  if (conflict_ != before) step.tell(now, RobotRefused{agent_.robot(), conflict->session, conflict->why});
+}
+
+NodeStatus RobotNode::status(Timestamp now) const {
+  NodeStatus status{.name = config_.name.empty() ? default_name(bus::Endpoint::of(agent_.robot())) : config_.name,
+                    .session = agent_.chain().session,
+                    .start = start_,
+                    .version = {},
+                    .backlog_submaps = uplink_.submaps().size(),
+                    .backlog_bytes = uplink_.bytes(),
+                    .heard_epoch = agent_.newest_heard().first,
+                    .heard_revision = agent_.newest_heard().second,
+                    .update_age_s = {},
+                    .keyframes = agent_.keyframes().size(),
+                    .T_odom_body = agent_.T_odom_body(),
+                    .alerts = alerts_,
+                    .finished = finished_,
+                    .jobs_done = 0,
+                    .trouble = {}};
+  if (updated_) status.update_age_s = now - *updated_;
+  return status;
 }
 
 }  // namespace tutti::node

@@ -5,10 +5,13 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
+#include <string>
+#include <vector>
 
+#include "tutti/model/status.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/node/step.hpp"
+#include "tutti/node/uplink.hpp"
 #include "tutti/robot/agent.hpp"
 
 namespace tutti::node {
@@ -17,16 +20,22 @@ struct RobotNodeConfig {
   robot::AgentConfig agent;
   /// Remember everything in the store, at the price of writing it. Without, a robot that starts again is a new one.
   bool keeps_state = true;
+  std::string name;  ///< Empty: "robot_7".
+  UplinkConfig uplink;
+  /// Odometry and scans are written together, at most this much mission time after the first of them: a kill loses no
+  /// more, and the disk is not asked at every sample.
+  double journal_period_s = 0.5;
 };
 
 /// A robot round RobotAgent: odometry, scans and proxy graphs in; submaps out, and kept until the server has stored
 /// them. Its store (storage::robot_schema()) holds the agent's state when the last submap ended, what it has heard
-/// since, and the submaps that are not known to be stored.
+/// since, and the submaps that are not known to be stored. Whoever can feed odometry and scans again, as a replay can,
+/// does so after a start from agent().newest_sample() on, of that one the scan too: then nothing is lost.
 class RobotNode {
  public:
   /// On an empty store a new chain of this session, which is larger than any before (ChainId); otherwise the robot goes
   /// on as if nothing had happened, with the same configuration and randomness as then. An error: what is stored is no
-  /// state, or another robot's.
+  /// state, or another robot's. The store must outlive the node.
   static Result<std::unique_ptr<RobotNode>> open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
                                                  Rng rng, const storage::TableStore& store);
 
@@ -37,37 +46,71 @@ class RobotNode {
   Step add_odometry(const OdometrySample& sample, Timestamp now);
   Step add_scan(const Scan& scan, Timestamp now);
   Step finish(Timestamp now);
+  /// Writes what waits to be written, as before a planned end.
+  Step store_all();
   /// What has come to the robot. `budget`: for policies that need one.
   Step receive(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget = std::nullopt);
+  /// The newest graph that the robot would know with this message; nothing: none, or one in terms of a graph that has
+  /// not come. An error: garbage.
+  [[nodiscard]] Result<std::optional<ProxyGraphMessage>> graph_in(const bus::Envelope& envelope) const;
+  /// When on_timer() is to be called next: for what waits to be written or sent.
+  [[nodiscard]] std::optional<Timestamp> next_timer() const;
+  /// Does what is due; otherwise nothing.
+  Step on_timer(Timestamp now);
   /// Told when each stage of an update ends, for whoever has a clock.
   void observe(robot::StageObserver observer) { observer_ = std::move(observer); }
 
+  /// How it is, but for what the host knows: version, trouble.
+  [[nodiscard]] NodeStatus status(Timestamp now) const;
+  /// Why the server says that another program owns this robot's name or number; nothing: it does not say so of this
+  /// session and start.
+  [[nodiscard]] const std::optional<std::string>& conflict() const { return conflict_; }
+  /// What the server was last heard to say of whose they are.
+  [[nodiscard]] std::optional<std::uint64_t> owner_session() const { return owner_session_; }
+
   [[nodiscard]] const robot::RobotAgent& agent() const { return agent_; }
-  /// Submaps that the server is not known to have stored.
-  [[nodiscard]] const std::set<SubmapId>& backlog() const { return outbox_; }
+  /// Submaps that the server is not known to have stored, with the bytes of each.
+  [[nodiscard]] const std::map<SubmapId, std::size_t>& backlog() const { return uplink_.submaps(); }
 
  private:
-  RobotNode(RobotId robot, const RobotNodeConfig& config, Rng rng, robot::AgentState state)
-      : config_(config), agent_(robot, config.agent, std::move(rng), std::move(state)) {}
+  RobotNode(RobotId robot, const RobotNodeConfig& config, Rng rng, robot::AgentState state,
+            const storage::TableStore& store)
+      : config_(config), store_(store), agent_(robot, config.agent, std::move(rng), std::move(state)) {}
 
   Status hear_again(const JournalEntry& entry);
-  Status read_outbox(const storage::TableStore& store);
-  void remember(const JournalEntry& entry, Step& step);
+  Status read_outbox();
+  void remember(const JournalEntry& entry, Timestamp now, Step& step);
+  void write_journal(Step& step);
   /// Takes submaps that have ended; then the journal may go.
   void take_outgoing(Timestamp now, Step& step);
   void save_checkpoint(Step& step);
+  using Frames = std::map<SubmapId, std::shared_ptr<const std::string>>;
+  /// What may go now; `fresh`: what is not in the store yet.
+  void send_submaps(Timestamp now, const Frames& fresh, Step& step);
   void receive_graph(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget, Step& step);
+  void note_conflict(const Receipt& receipt, Timestamp now, Step& step);
+  void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);
   [[nodiscard]] bus::Envelope submap_envelope(SubmapId id, std::shared_ptr<const std::string> frame) const;
 
   RobotNodeConfig config_;
+  const storage::TableStore& store_;
   robot::RobotAgent agent_;
   robot::StageObserver observer_;
-  std::set<SubmapId> outbox_;
-  std::map<SubmapId, std::string> unsent_;  // found in the store; sent by resume()
-  std::optional<Timestamp> last_scan_;      // since the checkpoint
-  std::uint64_t journal_ = 0;               // entries since the checkpoint
-  bool is_new_ = false;                     // there is no checkpoint yet
+  Uplink uplink_{config_.uplink};             // of what is in the outbox
+  std::optional<ProxyGraph> base_;            // the last that came in full
+  std::shared_ptr<const std::string> delta_;  // the last that came in terms of one
+  std::optional<Timestamp> last_scan_;        // since the checkpoint
+  std::uint64_t journal_ = 0;                 // entries since the checkpoint that are written
+  std::vector<std::string> unwritten_;        // and those that are not
+  Timestamp unwritten_since_;
+  bool is_new_ = false;      // there is no checkpoint yet
+  std::uint64_t start_ = 1;  // of all on this store
+  bool finished_ = false;
+  std::optional<Timestamp> updated_;
+  std::uint64_t alerts_ = 0;  // after the last update
+  std::optional<std::string> conflict_;
+  std::optional<std::uint64_t> owner_session_;
 };
 
 }  // namespace tutti::node

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "support/robot/drifting_robot.hpp"
@@ -34,11 +35,15 @@ class RobotNodeTest : public testing::Test {
   }
   Step done(Step step) {
     EXPECT_TRUE(store_->commit(step.writes).has_value());
+    if (!step.writes.empty()) ++transactions_;
     for (const bus::Envelope& message : step.messages) sent_.push_back(message);
     return step;
   }
+  /// In mission time that is the recording's, and all timers.
   void walk(int from, int to) {
     for (int i = from; i < to; ++i) {
+      now_ = std::max(now_, Timestamp{} + (odometry_[i].stamp - odometry_[0].stamp));
+      if (node_->next_timer() && *node_->next_timer() <= now_) done(node_->on_timer(now_));
       done(node_->add_odometry({odometry_[i].stamp, odometry_[i].pose, robot::test::kStepCovariance}, now_));
       if (!node_->agent().wants_scan()) continue;
       PointCloud cloud;
@@ -47,8 +52,10 @@ class RobotNodeTest : public testing::Test {
     }
   }
   Step hear(std::uint64_t revision) {
-    const auto message = robot::test::broadcast(node_->agent(), revision, robot::test::kWorld);
-    return done(node_->receive(from_server(MessageKind::proxy_graph, wire::encode(message)), now_));
+    return done(node_->receive(from_server(MessageKind::proxy_graph, wire::encode(graph(revision))), now_));
+  }
+  ProxyGraphMessage graph(std::uint64_t revision) {
+    return robot::test::broadcast(node_->agent(), revision, robot::test::kWorld);
   }
   Step confirm(const std::vector<SubmapId>& ids, RobotId robot = kRobot) {
     Receipt receipt{.robot = robot, .stored = {}};
@@ -61,6 +68,7 @@ class RobotNodeTest : public testing::Test {
   RobotNodeConfig config_;
   std::unique_ptr<storage::MemoryStore> store_;
   std::unique_ptr<RobotNode> node_;
+  std::size_t transactions_ = 0;
   Step resumed_;
   std::vector<bus::Envelope> sent_;
   std::uint64_t starts_ = 0;
@@ -71,6 +79,8 @@ TEST_F(RobotNodeTest, GoesOnFromItsStoreToTheBit) {
   walk(0, 130);
   hear(1);
   walk(130, 160);
+  now_ = now_ + config_.journal_period_s;
+  done(node_->on_timer(now_));
   const std::string before = wire::encode(node_->agent().state());
   ASSERT_GT(node_->agent().ledger().size(), 0U);
   ASSERT_GT(rows("journal"), 0U);
@@ -86,7 +96,11 @@ TEST_F(RobotNodeTest, GoesOnFromItsStoreToTheBit) {
 
 TEST_F(RobotNodeTest, KeepsSubmapsUntilTheServerHasStoredThem) {
   walk(0, 100);
-  const std::set<SubmapId> all = node_->backlog();
+  std::set<SubmapId> all;
+  std::size_t bytes = 0;
+  for (const auto& [id, size] : node_->backlog()) all.insert(id), bytes += size;
+  EXPECT_EQ(node_->status(now_).backlog_submaps, all.size());
+  EXPECT_EQ(node_->status(now_).backlog_bytes, bytes);
   ASSERT_GE(all.size(), 4U);
   EXPECT_EQ(rows("outbox"), all.size());
   ASSERT_EQ(sent_.size(), all.size());
@@ -97,13 +111,143 @@ TEST_F(RobotNodeTest, KeepsSubmapsUntilTheServerHasStoredThem) {
   EXPECT_EQ(rows("outbox"), all.size() - 2);
   const std::vector<bus::Envelope> before = std::exchange(sent_, {});
   restart();
-  ASSERT_EQ(sent_.size(), all.size() - 2);  // the others once more, as they were
-  EXPECT_EQ(*sent_[0].bytes, *before[1].bytes);
-  EXPECT_EQ(sent_[0].id, before[1].id);
+  ASSERT_EQ(sent_.size(), all.size() - 2);  // the others once more, as they were, the newest first
+  EXPECT_EQ(*sent_.back().bytes, *before[1].bytes);
+  EXPECT_EQ(sent_.back().id, before[1].id);
+  EXPECT_EQ(sent_.front().id, before[before.size() - 2].id);
   confirm({first, last});
   confirm({all.begin(), all.end()});
   EXPECT_TRUE(node_->backlog().empty());
   EXPECT_EQ(rows("outbox"), 0U);
+}
+
+TEST_F(RobotNodeTest, WhatTheServerRefusesForGoodLeavesTheOutboxAndIsTold) {
+  walk(0, 100);
+  const SubmapId bad = node_->backlog().begin()->first;
+  Receipt receipt{.robot = kRobot, .why_refused = "no good"};
+  receipt.refused[bad.chain.session].insert(bad.index);
+  const bus::Envelope envelope = from_server(MessageKind::receipt, wire::encode(receipt));
+  const Step step = done(node_->receive(envelope, now_));
+  EXPECT_FALSE(node_->backlog().contains(bad));
+  EXPECT_EQ(rows("outbox"), node_->backlog().size());
+  ASSERT_EQ(step.events.size(), 1U);
+  const std::string why = std::get<MessageRefused>(step.events[0].what).why;
+  EXPECT_NE(why.find("1:101/0"), std::string::npos) << why;
+  EXPECT_NE(why.find("no good"), std::string::npos) << why;
+  EXPECT_TRUE(done(node_->receive(envelope, now_)).events.empty());
+}
+
+TEST_F(RobotNodeTest, SaysHowItIs) {
+  config_.name = "alpha";
+  restart();
+  EXPECT_EQ(node_->status(now_).name, "alpha");
+  EXPECT_EQ(node_->status(now_).session, 101U);  // the store's
+  EXPECT_EQ(node_->status(now_).start, 2U);
+  EXPECT_EQ(node_->status(now_).update_age_s, std::nullopt);
+  walk(0, 130);
+  now_ = now_ + 5.0;
+  hear(3);
+  now_ = now_ + 2.0;
+  const NodeStatus status = node_->status(now_);
+  EXPECT_TRUE(wire::validate(status).has_value());
+  EXPECT_EQ(status.heard_revision, 3U);
+  EXPECT_EQ(status.update_age_s, 2.0);
+  EXPECT_EQ(status.keyframes, 130U);
+  EXPECT_LT(local(status.T_odom_body, odometry_[129].pose).norm(), 1e-12);
+  EXPECT_FALSE(status.finished);
+  done(node_->finish(now_));
+  EXPECT_TRUE(node_->status(now_).finished);
+  walk(130, 131);  // not quite
+  EXPECT_FALSE(node_->status(now_).finished);
+}
+
+TEST_F(RobotNodeTest, KnowsWhenItsNameIsSomebodyElses) {
+  const auto told = [&](std::uint64_t session, std::uint64_t start, const std::string& why) {
+    Receipt receipt{.robot = kRobot, .owner_session = 7, .conflict = Receipt::Conflict{session, start, why}};
+    return done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_)).events.size();
+  };
+  EXPECT_EQ(node_->owner_session(), std::nullopt);
+  EXPECT_EQ(told(101, 7, "of another start"), 0U);
+  EXPECT_EQ(node_->owner_session(), 7U);
+  EXPECT_EQ(told(55, 1, "of another session"), 0U);
+  EXPECT_EQ(node_->conflict(), std::nullopt);
+  EXPECT_EQ(told(101, 1, "alpha is there"), 1U);
+  EXPECT_EQ(node_->conflict(), "alpha is there");
+  EXPECT_EQ(told(101, 1, "alpha is there"), 0U);
+  walk(0, 100);
+  EXPECT_FALSE(sent_.empty());  // it goes on
+  confirm({});
+  EXPECT_EQ(node_->conflict(), std::nullopt);
+  EXPECT_EQ(told(101, 1, "alpha is there"), 1U);
+  restart();
+  EXPECT_EQ(told(101, 1, "alpha is there"), 0U);  // what was said before it started again
+}
+
+TEST_F(RobotNodeTest, AKillLosesNoMoreThanThePeriodAndWhatIsFedAgainMakesTheSame) {
+  config_.journal_period_s = 3.5;  // seven samples
+  store_.reset();
+  restart();
+  walk(0, 130);
+  hear(1);  // at once
+  walk(130, 158);
+  const auto whole = wire::encode(node_->agent().state());
+  restart();
+  const Timestamp newest = node_->agent().newest_sample().value();
+  EXPECT_LT(newest, odometry_[157].stamp);
+  EXPECT_LE(odometry_[157].stamp - newest, config_.journal_period_s);
+  int again = 0;
+  while (odometry_[again].stamp < newest) ++again;
+  walk(again, 158);  // its own scan too
+  EXPECT_EQ(wire::encode(node_->agent().state()), whole);
+}
+
+TEST_F(RobotNodeTest, APlannedEndLosesNothing) {
+  walk(0, 128);
+  const auto whole = wire::encode(node_->agent().state());
+  done(node_->store_all());
+  restart();
+  EXPECT_EQ(wire::encode(node_->agent().state()), whole);
+}
+
+TEST_F(RobotNodeTest, TheDiskIsAskedOnceAPeriodAndWhenSomethingIsSent) {
+  config_.journal_period_s = 0.0;
+  restart();
+  transactions_ = 0;
+  walk(0, 150);
+  const std::size_t before = std::exchange(transactions_, 0);
+  config_.journal_period_s = 10.0;
+  store_.reset();
+  now_ = {};
+  sent_.clear();
+  restart();
+  transactions_ = 0;
+  walk(0, 150);             // 75 s
+  EXPECT_GE(before, 250U);  // samples and scans
+  EXPECT_LE(transactions_, 8U + sent_.size());
+  EXPECT_TRUE(node_->next_timer().has_value());
+}
+
+TEST_F(RobotNodeTest, TheNewestGoesFirstAndAgainAfterAMinute) {
+  config_.uplink.max_under_way_bytes = 1;
+  store_.reset();
+  restart();
+  walk(0, 100);
+  ASSERT_EQ(sent_.size(), 1U);
+  EXPECT_EQ(sent_[0].id, "1/102/0");
+  const SubmapId newest = node_->backlog().rbegin()->first;
+  ASSERT_GE(newest.index, 2U);
+  confirm({{newest.chain, 0}});
+  ASSERT_EQ(sent_.size(), 2U);
+  EXPECT_EQ(sent_[1].id, message_id(newest));
+  EXPECT_EQ(*sent_[1].bytes, *store_->read("outbox", key_of(newest)).value());
+  now_ = now_ + 59.0;
+  done(node_->on_timer(now_));
+  EXPECT_EQ(sent_.size(), 2U);
+  now_ = now_ + 1.0;
+  ASSERT_LE(node_->next_timer().value(), now_);
+  done(node_->on_timer(now_));
+  ASSERT_EQ(sent_.size(), 3U);
+  EXPECT_EQ(sent_[2].id, sent_[1].id);
 }
 
 TEST_F(RobotNodeTest, RefusesWhatIsNotForIt) {
@@ -127,6 +271,8 @@ TEST_F(RobotNodeTest, AScanThatComesAgainCountsOnce) {
   cloud.points.emplace_back(1.0F, 5.0F, 1.0F);
   const Scan again{odometry_[50].stamp, std::make_shared<const PointCloud>(cloud), {}};
   EXPECT_TRUE(done(node_->add_scan(again, now_)).writes.empty());
+  now_ = now_ + config_.journal_period_s;
+  done(node_->on_timer(now_));
   restart();
   EXPECT_TRUE(done(node_->add_scan(again, now_)).writes.empty());
   EXPECT_EQ(node_->agent().state().submaps.scans.size(), scans);
@@ -153,6 +299,32 @@ TEST_F(RobotNodeTest, AnotherRobotsStoreOrADamagedOneIsRefused) {
     const storage::MemoryStore damaged(storage::robot_schema(), tables);
     EXPECT_FALSE(RobotNode::open(kRobot, 1, config_, Rng(1), damaged).has_value()) << table;
   }
+}
+
+TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {
+  walk(0, 130);
+  const std::string first = wire::encode(graph(1));
+  const ProxyGraph base = wire::decode_proxy_graph(first)->graph;
+  const auto delta = from_server(MessageKind::proxy_graph_delta, wire::encode_delta(graph(2), base));
+  EXPECT_TRUE(done(node_->receive(delta, now_)).events.empty());  // it waits
+  const Step step = done(node_->receive(from_server(MessageKind::proxy_graph, first), now_));
+  ASSERT_EQ(step.events.size(), 1U);  // for both
+  EXPECT_EQ(std::get<RobotUpdated>(step.events[0].what).summary.revision, 2U);
+  const std::string heard = wire::encode(node_->agent().state());
+
+  restart();  // the journal does without the base
+  EXPECT_EQ(wire::encode(node_->agent().state()), heard);
+  EXPECT_TRUE(done(node_->receive(delta, now_)).events.empty());
+  EXPECT_TRUE(done(node_->receive(from_server(MessageKind::proxy_graph, first), now_)).events.empty());  // old
+  const auto newer = from_server(MessageKind::proxy_graph_delta, wire::encode_delta(graph(3), base));
+  EXPECT_EQ(done(node_->receive(newer, now_)).events.size(), 1U);
+  const auto of_another = from_server(MessageKind::proxy_graph_delta, wire::encode_delta(graph(4), graph(3).graph));
+  EXPECT_TRUE(done(node_->receive(of_another, now_)).events.empty());
+  hear(5);  // in full; the waiting delta is of no use any more
+  EXPECT_EQ(node_->agent().state().revision, 5U);
+  const Step garbage = done(node_->receive(from_server(MessageKind::proxy_graph_delta, "garbage"), now_));
+  ASSERT_EQ(garbage.events.size(), 1U);
+  EXPECT_TRUE(std::holds_alternative<MessageRefused>(garbage.events[0].what));
 }
 
 }  // namespace

@@ -7,15 +7,19 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/node/map_meta.hpp"
+#include "tutti/node/words.hpp"
+#include "tutti/node/worker_node.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
 namespace {
 
-constexpr const char* kMeta = "meta";
-constexpr const char* kMap = "map";  // the one row of `meta` that is the node's own
-
-std::string key_of(const SubmapPair& pair) { return node::key_of(pair.first) + node::key_of(pair.second); }
+constexpr const char* kMeta = "meta";        // with the rows of map_meta.hpp
+constexpr const char* kRefused = "refused";  // and receipts of what is refused for good
+constexpr std::size_t kMostRefusedSessions = 100;
+constexpr std::size_t kMostRefusedStretches = 500;  // in each of these
 
 bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<const std::string> bytes) {
   return {bus::Endpoint::server(), bus::Endpoint::of(robot), kind, {}, std::move(bytes)};
@@ -47,6 +51,7 @@ Status read_rows(const storage::TableStore& store, const char* table, Decode&& d
 struct ServerNode::Opened {
   server::MapServerState state;
   std::map<RobotId, Receipt> receipts;
+  RobotRegistry registry;
   std::uint64_t epoch = 0;
   std::uint64_t start = 0;
   bool news = false;
@@ -54,6 +59,7 @@ struct ServerNode::Opened {
   static Result<Opened> from(const storage::TableStore& store, std::uint32_t finder_version);
 
  private:
+  Status read_meta(const storage::TableStore& store);
   void add(SubmapMessage message);
   void add(ClosureVerdict verdict);
 };
@@ -68,6 +74,25 @@ void ServerNode::Opened::add(SubmapMessage message) {
   Receipt& receipt = receipts[id.chain.robot];
   receipt.robot = id.chain.robot;
   receipt.stored[id.chain.session].insert(id.index);
+  registry.note_session(id.chain);
+}
+
+Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
+  Status ok;
+  const auto visit = [&](std::string_view key, std::string_view bytes) {
+    if (const auto robot = RobotRegistry::robot_of(key)) {
+      if (!registry.restore(*robot, bytes)) ok = fail(ErrorCode::parse, "the map's row '{}' is damaged", key);
+    } else if (key.starts_with(kRefused)) {
+      auto receipt = wire::decode_receipt(bytes);
+      if (receipt)
+        receipts[receipt->robot] = std::move(*receipt);
+      else
+        ok = in_context(fmt::format("the map's row '{}'", key), receipt.error());
+    }
+    return ok.has_value();
+  };
+  if (auto scanned = store.scan(kMeta, {}, visit); !scanned) return scanned;
+  return ok;
 }
 
 /// As MapServer::take() leaves it: the answers of older finders hold until the pair is asked again, but their refusals
@@ -76,7 +101,7 @@ void ServerNode::Opened::add(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
   const bool counts = verdict.refusal && verdict.finder_version == state.finder_version;
   if (verdict.finder_version < state.finder_version) {
-    if (!verdict.refusal) state.verdicts.insert_or_assign(pair, std::move(verdict));
+    if (!verdict.refusal) state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
     return;
   }
   if (state.answered.contains(pair) && verdict.refusal) return;
@@ -84,25 +109,27 @@ void ServerNode::Opened::add(ClosureVerdict verdict) {
   if (counts)
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state.refused);
   else
-    state.verdicts.insert_or_assign(pair, std::move(verdict));
+    state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
 }
 
 Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& store, std::uint32_t finder_version) {
   Opened opened;
   opened.state.finder_version = finder_version;
-  const auto meta = store.read(kMeta, kMap);
+  const auto meta = read_map_meta(store);
   if (!meta) return tl::unexpected(meta.error());
   if (!*meta) return opened;
-  const auto numbers = storage::numbers_of(**meta, 4);
-  if (!numbers) return fail(ErrorCode::parse, "the map's own row has {} bytes, expected 32", (*meta)->size());
-  opened.epoch = (*numbers)[0];
-  opened.state.revision = (*numbers)[1];
-  opened.news = (*numbers)[2] != 0;
-  opened.start = (*numbers)[3];
+  opened.epoch = (*meta)->epoch;
+  opened.state.revision = (*meta)->revision;
+  opened.news = (*meta)->news;
+  opened.start = (*meta)->start;
   const auto add = [&](auto decoded) { opened.add(std::move(decoded)); };
   const auto add_refusals = [&](Verdicts answer) {
     for (ClosureVerdict& verdict : answer.verdicts) opened.add(std::move(verdict));
   };
+  if (auto ok = opened.read_meta(store); !ok) return tl::unexpected(ok.error());
+  auto words = read_words(store);
+  if (!words) return tl::unexpected(words.error());
+  opened.state.words = std::move(*words);
   if (auto ok = read_rows(store, "submaps", wire::decode_submap, add); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_refusals); !ok)
@@ -119,33 +146,43 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
   auto opened = Opened::from(store, finder->version());
   if (!opened) return tl::unexpected(opened.error());
   if (opened->epoch > 0) epoch = opened->epoch;
+  if (config.accepts_others) {
+    for (const auto& [robot, receipt] : opened->receipts) robots.insert(robot);
+    for (const auto& [robot, entry] : opened->registry.robots()) robots.insert(robot);
+  }
   return std::unique_ptr<ServerNode>(
       new ServerNode(std::move(robots), std::move(finder), config, epoch, SubmapFrames::of(store), std::move(*opened)));
 }
 
 ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
-                       const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> clouds,
+                       const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
                        Opened opened)
     : robots_(robots),
       config_(config),
-      server_(std::move(robots), std::move(finder), std::move(clouds), config.server, epoch, std::move(opened.state)),
+      frames_(frames),
+      server_(std::move(robots), std::move(finder), std::move(frames), config.server, epoch, std::move(opened.state)),
       receipts_(std::move(opened.receipts)),
+      registry_(std::move(opened.registry)),
       start_(opened.start + 1),
       had_news_(opened.news) {}
 
 storage::Write ServerNode::meta() const {
   const server::MapServerState& state = server_.state();
-  return {kMeta, kMap, storage::key_of({state.epoch, state.revision, server_.has_news() ? 1U : 0U, start_})};
+  return to_row(MapMeta{state.epoch, state.revision, server_.has_news(), start_});
 }
 
 Step ServerNode::resume(Timestamp now) {
   Step step;
+  registry_.start(now);
+  for (auto& [robot, receipt] : receipts_)
+    if (const auto owner = registry_.owner(robot)) receipt.owner_session = owner->session;
   const bool is_whole = server_.state().revision > 0 && !had_news_;
   if (is_whole) send_graph(server_.rebuild(), step);
   if (server_.has_news()) timer_ = next_update(now, config_.server.update_period_s);
   step.writes.push_back(meta());
+  step.writes.push_back(to_row(config_.server));
   for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
-  send_jobs(std::nullopt, step);
+  send_jobs(std::nullopt, now, 0, step);
   return step;
 }
 
@@ -156,8 +193,14 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
     receive_submap(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::verdicts)
     receive_verdicts(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::submap_request)
+    send_copies(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::status)
+    receive_status(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::word)
+    receive_word(envelope, now, step);
   else
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, "not for a server"});
+    refuse(envelope, "not for a server", now, step);
   for (const Error& error : server_.take_late_errors())
     step.tell(now, MessageRefused{envelope.from, bus::MessageKind::verdicts, error.message});
   note_news(now, before, step);
@@ -170,82 +213,90 @@ void ServerNode::note_news(Timestamp now, bool before, Step& step) {
   step.writes.push_back(meta());
 }
 
+void ServerNode::refuse(const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step) {
+  step.tell(now, MessageRefused{envelope.from, envelope.kind, why});
+  note_refusal(envelope.from.role, envelope.kind, why);
+}
+
+bool ServerNode::admit(RobotId robot) {
+  if (robots_.contains(robot)) return true;
+  if (!config_.accepts_others || robots_.size() >= ProxyGraph::kMostChains) return false;
+  robots_.insert(robot);
+  server_.add_robot(robot);
+  return true;
+}
+
 void ServerNode::receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  const auto refuse = [&](const Error& error) {
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, error.message});
-  };
+  const Status taken = take_submap(envelope, now, step);
+  if (taken) return;
+  refuse(envelope, taken.error().message, now, step);
+  const auto id = submap_of(envelope.id);
+  const bool may_be_good_later = taken.error().code == ErrorCode::io;
+  if (id && id->chain.robot == envelope.from.robot() && robots_.contains(id->chain.robot) && !may_be_good_later)
+    note_refused(*id, taken.error().message, step);
+}
+
+Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto message = wire::decode_submap(*envelope.bytes);
-  if (!message) return refuse(message.error());
+  if (!message) return tl::unexpected(message.error());
   const SubmapId id = message->submap.id;
   if (envelope.from.robot() != id.chain.robot)
-    return refuse({ErrorCode::unknown_robot, fmt::format("submap {} from somebody else", to_string(id))});
+    return fail(ErrorCode::unknown_robot, "submap {} from somebody else", to_string(id));
+  if (submap_of(envelope.id) != id)
+    return fail(ErrorCode::invalid, "submap {} in a message with the id '{}'", to_string(id), envelope.id);
+  admit(id.chain.robot);
   const bool is_new = !server_.state().submaps.contains(id);
-  if (const Status taken = server_.receive(*message); !taken) return refuse(taken.error());
-  Receipt& receipt = receipts_[id.chain.robot];
-  receipt.robot = id.chain.robot;
-  receipt.stored[id.chain.session].insert(id.index);
+  if (!is_new) {
+    const auto stored = frames_->frame(id);
+    if (!stored) return tl::unexpected(stored.error());
+    if (*stored != *envelope.bytes)
+      return fail(ErrorCode::invalid, "submap {} comes with other content than the one in the map, which stays",
+                  to_string(id));
+  }
+  if (auto taken = server_.receive(*message); !taken) return taken;
   if (is_new) {
+    Receipt& receipt = receipts_[id.chain.robot];
+    receipt.robot = id.chain.robot;
+    receipt.stored[id.chain.session].insert(id.index);
+    registry_.note_session(id.chain);
     step.writes.push_back({"submaps", key_of(id), *envelope.bytes});
     step.tell(now, SubmapStored{id});
   }
   send_receipt(id.chain.robot, step);
-  send_jobs(id, step);
-}
-
-void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  const auto answer = wire::decode_verdicts(*envelope.bytes);
-  if (!answer) {
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, answer.error().message});
-    return;
-  }
-  Verdicts refused{.job = answer->job, .verdicts = {}, .failed = {}, .why = {}};
-  for (const ClosureVerdict& verdict : answer->verdicts)
-    if (const Status taken = take(verdict, refused, step); !taken)
-      step.tell(now, MessageRefused{envelope.from, envelope.kind, taken.error().message});
-  if (!refused.verdicts.empty()) step.writes.push_back({"answers", answer->job, wire::encode(refused)});
-  const server::SubmapSet& submaps = server_.state().submaps;
-  for (const SubmapPair& pair : answer->failed) {
-    const auto first = submaps.find(pair.first), second = submaps.find(pair.second);
-    if (first == submaps.end() || second == submaps.end()) continue;
-    step.tell(now, VerificationFailed{pair, answer->why});
-    server_.give_back({pair, first->second, second->second});
-  }
-  step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
-}
-
-Status ServerNode::take(const ClosureVerdict& verdict, Verdicts& refused, Step& step) {
-  const server::VerdictSet& kept = server_.state().verdicts;
-  const auto find = [&]() -> std::optional<ClosureVerdict> {
-    const auto found = kept.find(verdict.pair);
-    return found == kept.end() ? std::nullopt : std::optional(found->second);
-  };
-  const auto before = find();
-  const bool was_answered = server_.state().answered.contains(verdict.pair);
-  if (auto ok = server_.receive(verdict); !ok) return ok;
-  const auto after = find();
-  const bool is_answered = server_.state().answered.contains(verdict.pair);
-  if (before != after) {
-    std::optional<std::string> row;
-    if (after) row = wire::encode(*after);
-    step.writes.push_back({"verdicts", key_of(verdict.pair), std::move(row)});
-  }
-  if (verdict.refusal && !after && (before || was_answered != is_answered)) refused.verdicts.push_back(verdict);
+  send_jobs(id, now, 0, step);
   return {};
 }
 
-/// A job is one submap against others: `newest`, if it is in the pair.
-void ServerNode::send_jobs(std::optional<SubmapId> newest, Step& step) {
-  std::map<SubmapId, std::vector<SubmapPair>> pairs;
-  for (const server::VerificationJob& job : server_.take_jobs())
-    pairs[job.pair.first == newest ? job.pair.first : job.pair.second].push_back(job.pair);
-  for (const auto& [submap, of_it] : pairs)
-    for (std::size_t first = 0; first < of_it.size(); first += config_.pairs_per_job) {
-      const std::size_t last = std::min(of_it.size(), first + config_.pairs_per_job);
-      const auto at = [&](std::size_t i) { return of_it.begin() + static_cast<std::ptrdiff_t>(i); };
-      const Job job{.id = fmt::format("{}/{}", start_, jobs_++), .pairs = {at(first), at(last)}};
-      step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::job, job.id,
-                               std::make_shared<const std::string>(wire::encode(job))});
-    }
+/// Bounded, so that nobody's garbage fills the receipt; beyond, a robot keeps what it is not told of.
+void ServerNode::note_refused(SubmapId id, const std::string& why, Step& step) {
+  Receipt& receipt = receipts_[id.chain.robot];
+  receipt.robot = id.chain.robot;
+  const bool is_bounded = receipt.refused.size() < kMostRefusedSessions || receipt.refused.contains(id.chain.session);
+  if (!receipt.contains(id) && !receipt.refuses(id) && is_bounded &&
+      receipt.refused[id.chain.session].stretches().size() < kMostRefusedStretches) {
+    receipt.refused[id.chain.session].insert(id.index);
+    receipt.why_refused = wire::plain_text(why);
+    const Receipt kept{.robot = receipt.robot, .refused = receipt.refused, .why_refused = receipt.why_refused};
+    step.writes.push_back({kMeta, fmt::format("{}/{}", kRefused, id.chain.robot.value), wire::encode(kept)});
+  }
+  send_receipt(id.chain.robot, step);
+}
+
+/// What a worker asked for; what it does not get it asks for again.
+void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  if (envelope.from.role != bus::Endpoint::Role::worker) return refuse(envelope, "only workers get copies", now, step);
+  const auto request = wire::decode_submap_request(*envelope.bytes);
+  if (!request) return refuse(envelope, request.error().message, now, step);
+  for (std::size_t i = 0; i < std::min(request->submaps.size(), WorkerNode::kMostAsked); ++i) {
+    auto frame = frames_->frame(request->submaps[i]);
+    if (!frame) return refuse(envelope, frame.error().message, now, step);
+    step.messages.push_back(
+        {bus::Endpoint::server(),
+         envelope.from,
+         bus::MessageKind::submap_copy,
+         {},
+         std::make_shared<const std::string>(wire::encode(SubmapCopy{request->submaps[i], std::move(*frame)}))});
+  }
 }
 
 void ServerNode::send_receipt(RobotId robot, Step& step) const {
@@ -253,23 +304,42 @@ void ServerNode::send_receipt(RobotId robot, Step& step) const {
                                    std::make_shared<const std::string>(wire::encode(receipts_.at(robot)))));
 }
 
-void ServerNode::send_graph(const ProxyGraphMessage& message, Step& step) {
-  broadcast_ = message.graph;
-  const auto encoded = [](const ProxyGraphMessage& part) {
-    return std::make_shared<const std::string>(wire::encode(part));
-  };
-  const bool is_own = config_.server.broadcast == "own";
-  const auto whole = is_own ? nullptr : encoded(message);
+void ServerNode::send_graph(ProxyGraphMessage message, Step& step) {
   for (const RobotId robot : robots_)
-    step.messages.push_back(
-        to_robot(robot, bus::MessageKind::proxy_graph,
-                 is_own ? encoded({message.header, consistency::own_part(message.graph, robot)}) : whole));
+    if (const auto owner = registry_.owner(robot)) consistency::see_last_in(message.graph, *owner);
+  broadcast_ = message.graph;
+  if (config_.server.broadcast == "own") {
+    for (const RobotId robot : robots_) step.messages.push_back(own_graph(robot, message));
+    return;
+  }
+  const auto whole = std::make_shared<const std::string>(wire::encode(message));
+  for (const RobotId robot : robots_) step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, whole));
+}
+
+/// Deltas grow as the map leaves the base behind. The mean of what is sent is smallest when the full graph is sent
+/// again as soon as a delta is larger than that mean.
+bus::Envelope ServerNode::own_graph(RobotId robot, const ProxyGraphMessage& message) {
+  const ProxyGraphMessage part{message.header, consistency::own_part(message.graph, robot)};
+  Base& base = bases_[robot];
+  if (base.messages > 0) {
+    auto delta = std::make_shared<const std::string>(wire::encode_delta(part, base.graph));
+    if (base.messages * delta->size() <= base.bytes) {
+      ++base.messages;
+      base.bytes += delta->size();
+      return to_robot(robot, bus::MessageKind::proxy_graph_delta, std::move(delta));
+    }
+  }
+  auto full = std::make_shared<const std::string>(wire::encode(part));
+  base = {wire::decode_proxy_graph(*full).value().graph, 1, full->size()};
+  return to_robot(robot, bus::MessageKind::proxy_graph, std::move(full));
 }
 
 Step ServerNode::on_timer(Timestamp now) {
   Step step;
+  ask_again(now, step);
   if (!timer_ || now < *timer_) return step;
   timer_.reset();
+  ++changes_;
   send_graph(server_.optimise(), step);
   step.writes.push_back(meta());
   const auto accepted = std::ranges::count_if(server_.map().closures, &server::JudgedClosure::accepted);

@@ -6,9 +6,14 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "tutti/node/robot_registry.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/submap_frames.hpp"
+#include "tutti/server/closure_names.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::node {
@@ -16,12 +21,16 @@ namespace tutti::node {
 struct ServerNodeConfig {
   server::ServerConfig server;
   std::size_t pairs_per_job = 256;  ///< At most: what one worker does before others can help.
+  /// Mission time without any answer after which the pairs of a job are asked again, as a new job; a job that waits
+  /// behind others has its time from the last answer to one of these. Every further time twice as long. 0: never.
+  double job_timeout_s = 600.0;
+  bool accepts_others = false;  ///< Robots that it was not told of, up to ProxyGraph::kMostChains in all.
 };
 
-/// The mapping server round MapServer: submaps and verdicts in; receipts, jobs and proxy graphs out. Its store is the
-/// map (storage::map_schema()): submaps and verdicts as they came, and what became of the other pairs; all else is
-/// computed from these. What was sent is never ahead of what is stored, so a server that starts again on its own store
-/// keeps its epoch.
+/// The mapping server round MapServer: submaps, verdicts and operators' words in; receipts, jobs and proxy graphs out.
+/// Its store is the map (storage::map_schema()): submaps, verdicts and words as they came, and what became of the other
+/// pairs; all else is computed from these. What was sent is never ahead of what is stored, so a server that starts
+/// again on its own store keeps its epoch.
 class ServerNode {
  public:
   /// On an empty store a new map of this epoch, which is larger than any before (server::MapServer); otherwise the map
@@ -33,12 +42,19 @@ class ServerNode {
 
   /// The first step after every start.
   Step resume(Timestamp now);
-  /// What has come to the server.
+  /// What has come to the server. A submap that it will never take is in the robot's receipt as refused. A second robot
+  /// with a name or number that is in use (RobotRegistry) is told so by the receipt, and its submaps are taken, but
+  /// what is sent to that number is the owner's.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// When on_timer() is to be called next; nothing while there is no news.
-  [[nodiscard]] std::optional<Timestamp> next_timer() const { return timer_; }
-  /// Optimises the map when it is time; otherwise does nothing.
+  /// When on_timer() is to be called next; nothing while there is no news and every job is answered.
+  [[nodiscard]] std::optional<Timestamp> next_timer() const;
+  /// Optimises the map and asks again when it is time; otherwise does nothing.
   Step on_timer(Timestamp now);
+
+  /// All that is known of the mission, but for what the host knows: version, wall_ns, trouble.
+  [[nodiscard]] MissionStatus mission_status(Timestamp now) const;
+  /// Grows when it should be sent before its time.
+  [[nodiscard]] std::uint64_t changes() const { return changes_; }
 
   [[nodiscard]] const server::MapServer& map_server() const { return server_; }
   [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_; }  ///< The last one; empty before.
@@ -46,28 +62,68 @@ class ServerNode {
  private:
   struct Opened;  // what was found in the store
   ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
-             const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> clouds, Opened opened);
+             const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames, Opened opened);
 
+  /// Told, and counted.
+  void refuse(const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
+  void note_refusal(bus::Endpoint::Role from, bus::MessageKind kind, const std::string& why);
+  /// Whether it is one of the mission's robots, from now on if it was not.
+  bool admit(RobotId robot);
+  void receive_status(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
+  Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
+  /// For good: the robot need not send it again.
+  void note_refused(SubmapId id, const std::string& why, Step& step);
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
+  Status take_word(const bus::Envelope& envelope, Timestamp now, Step& step);
+  [[nodiscard]] server::ClosureNames closure_names() const;
+  void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Takes one verdict of these; a refusal that now holds is kept in `refused`.
   Status take(const ClosureVerdict& verdict, Verdicts& refused, Step& step);
-  void send_jobs(std::optional<SubmapId> newest, Step& step);
+  /// Pairs that were asked for and have no answer yet.
+  struct OpenJob {
+    std::vector<SubmapPair> pairs;
+    Timestamp since;     // it was sent, or had its turn at the earliest
+    unsigned asked = 0;  // before
+  };
+  void send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, Step& step);
+  void note_answer(const std::string& job, Timestamp now);
+  [[nodiscard]] Timestamp due(const OpenJob& job) const;
+  void ask_again(Timestamp now, Step& step);
+  /// False: a submap of it is not there.
+  bool give_back(const SubmapPair& pair);
   void send_receipt(RobotId robot, Step& step) const;
-  void send_graph(const ProxyGraphMessage& message, Step& step);
+  void send_graph(ProxyGraphMessage message, Step& step);
+  /// In full, or in terms of the last one that was, whichever makes fewer bytes in the long run.
+  [[nodiscard]] bus::Envelope own_graph(RobotId robot, const ProxyGraphMessage& message);
   /// Sets the timer when something new has come, and remembers in the store whether it has.
   void note_news(Timestamp now, bool before, Step& step);
   [[nodiscard]] storage::Write meta() const;
 
   std::set<RobotId> robots_;
   ServerNodeConfig config_;
+  std::shared_ptr<const SubmapFrames> frames_;
   server::MapServer server_;
   std::map<RobotId, Receipt> receipts_;
+  RobotRegistry registry_;
+  std::map<std::uint32_t, MissionStatus::Worker> workers_;
+  std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
+  std::map<std::uint64_t, OpenJob> open_jobs_;  // of this start, by number
+  std::optional<Timestamp> given_back_;         // when the first pair was that no worker could verify
+  std::uint64_t changes_ = 0;
   std::uint64_t start_ = 0;  // of all on this store; names jobs
   std::uint64_t jobs_ = 0;   // sent in this start
   bool had_news_ = false;    // when the store was opened
   std::optional<Timestamp> timer_;
   ProxyGraph broadcast_;
+  /// What a robot was sent in full, as it knows it, and what has come in terms of it since.
+  struct Base {
+    ProxyGraph graph;
+    std::size_t messages = 0, bytes = 0;  // the full one among them
+  };
+  std::map<RobotId, Base> bases_;
 };
 
 }  // namespace tutti::node

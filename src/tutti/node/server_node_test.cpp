@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "support/node/submaps.hpp"
+#include "tutti/node/words.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
+#include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
 namespace {
@@ -75,6 +77,25 @@ class ServerNodeTest : public testing::Test {
   Timestamp now_ = Timestamp{} + 3.0;
 };
 
+TEST_F(ServerNodeTest, GivesWorkersCopiesOfWhatItHasStored) {
+  const SubmapMessage stored = test::submap(kAlpha, 0);
+  receive(stored);
+  bus::Envelope request{
+      Endpoint::worker(5),
+      Endpoint::server(),
+      MessageKind::submap_request,
+      {},
+      std::make_shared<const std::string>(wire::encode(SubmapRequest{{stored.submap.id, {kBravo, 7}}}))};
+  const Step step = receive(request);
+  ASSERT_EQ(step.messages.size(), 1U);
+  EXPECT_EQ(step.messages[0].to, Endpoint::worker(5));
+  EXPECT_EQ(wire::decode_submap_copy(*step.messages[0].bytes).value(),
+            (SubmapCopy{stored.submap.id, *test::envelope(stored).bytes}));
+  EXPECT_EQ(told<MessageRefused>(step), 1U);  // what it has not got
+  request.from = Endpoint::of(RobotId{0});
+  EXPECT_TRUE(receive(request).messages.empty());
+}
+
 TEST_F(ServerNodeTest, SaysWhatItHasStoredAndAsksForTheNewPairs) {
   EXPECT_TRUE(resumed_.messages.empty());
   receive(test::submap(kAlpha, 0));
@@ -110,6 +131,7 @@ TEST_F(ServerNodeTest, RefusesWhatIsNoGoodAndStoresNothingOfIt) {
   bus::Envelope stranger = test::envelope(test::submap({RobotId{9}, 7}, 0));
   bus::Envelope garbage = test::envelope(test::submap(kAlpha, 0));
   garbage.bytes = std::make_shared<const std::string>("TU garbage");
+  garbage.id = "of no submap";
   bus::Envelope other = garbage;
   other.kind = MessageKind::verdicts;
   bus::Envelope misplaced = forged;
@@ -140,6 +162,36 @@ TEST_F(ServerNodeTest, UpdatesTheMapOnTimeAndOnlyWithNews) {
   EXPECT_TRUE(done(node_->on_timer(now_)).messages.empty());
   receive(test::submap(kAlpha, 0));  // no news
   EXPECT_EQ(node_->next_timer(), std::nullopt);
+}
+
+TEST_F(ServerNodeTest, SendsDeltasWhileTheyAreSmallerThanWhatIsSentOnAverage) {
+  std::optional<ProxyGraph> base;
+  std::size_t full = 0, deltas = 0, messages = 0, bytes = 0;
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    receive(test::submap(kAlpha, i));
+    now_ = *node_->next_timer();
+    for (const bus::Envelope& sent : done(node_->on_timer(now_)).messages) {
+      if (sent.to != Endpoint::of(kAlpha.robot)) continue;
+      ProxyGraphMessage message;
+      if (sent.kind == MessageKind::proxy_graph) {
+        message = wire::decode_proxy_graph(*sent.bytes).value();
+        base = message.graph;
+        messages = bytes = 0;
+        ++full;
+      } else {
+        message = wire::decode_delta(*sent.bytes, base.value()).value().value();
+        EXPECT_LE(sent.bytes->size() * messages, bytes);
+        ++deltas;
+      }
+      ++messages;
+      bytes += sent.bytes->size();
+      EXPECT_EQ(message.graph.age(), node_->broadcast().age());
+      const auto own = consistency::own_part(node_->broadcast(), kAlpha.robot);
+      EXPECT_EQ(message.graph, wire::decode_proxy_graph(wire::encode({message.header, own}))->graph);
+    }
+  }
+  EXPECT_GT(full, 1U);
+  EXPECT_GT(deltas, 2 * full);
 }
 
 TEST_F(ServerNodeTest, GoesOnFromItsStoreAsIfNothingHadHappened) {
@@ -194,20 +246,145 @@ TEST_F(ServerNodeTest, AsksAgainUntilItIsAnswered) {
   EXPECT_EQ(counts.at(RefusalReason::overlap).intra, 2U);
 }
 
-TEST_F(ServerNodeTest, APairThatCouldNotBeVerifiedComesAgainWithTheNextSubmap) {
+TEST_F(ServerNodeTest, AsksAgainWhatNobodyAnswersEveryTimeLater) {
+  receive(test::submap(kAlpha, 0));
+  const Step asked = receive(test::submap(kBravo, 0));
+  const SubmapPair pair{{kAlpha, 0}, {kBravo, 0}};
+  ASSERT_EQ(pairs_of(asked), std::set<SubmapPair>{pair});
+  done(node_->on_timer(*node_->next_timer()));  // the map
+  std::set<std::string> ids{of_kind(asked, MessageKind::job)[0].id};
+  for (const double wait_s : {600.0, 1200.0, 2400.0}) {
+    ASSERT_EQ(node_->next_timer(), now_ + wait_s);
+    EXPECT_TRUE(done(node_->on_timer(now_ + wait_s - 0.1)).messages.empty());
+    now_ = now_ + wait_s;
+    const Step again = done(node_->on_timer(now_));
+    EXPECT_EQ(pairs_of(again), std::set<SubmapPair>{pair});
+    EXPECT_EQ(told<VerificationFailed>(again), 1U);
+    EXPECT_TRUE(of_kind(again, MessageKind::proxy_graph).empty());
+    EXPECT_TRUE(ids.insert(of_kind(again, MessageKind::job)[0].id).second);  // or a broker would drop it
+    EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
+  }
+  answer(asked);  // the first one, after all
+  now_ = *node_->next_timer();
+  done(node_->on_timer(now_));  // the map
+  now_ = *node_->next_timer();
+  EXPECT_TRUE(done(node_->on_timer(now_)).messages.empty());
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, 0U);
+}
+
+TEST_F(ServerNodeTest, AJobThatWaitsBehindOthersIsNotAskedAgain) {
+  std::vector<Step> asked;
+  for (std::uint32_t i = 0; i < 4; ++i) asked.push_back(receive(test::submap(kAlpha, i)));
+  done(node_->on_timer(*node_->next_timer()));
+  now_ = now_ + 500.0;
+  answer(asked[1]);
+  if (const auto map = node_->next_timer(); map && *map < now_ + 50.0) done(node_->on_timer(*map));
+  EXPECT_EQ(node_->next_timer(), now_ + 600.0);
+  now_ = now_ + 500.0;
+  answer(asked[3]);  // the one before it had its turn
+  if (const auto map = node_->next_timer(); map && *map < now_ + 50.0) done(node_->on_timer(*map));
+  EXPECT_EQ(node_->next_timer(), now_ + 100.0);
+  EXPECT_EQ(pairs_of(done(node_->on_timer(now_ + 100.0))), pairs_of(asked[2]));
+}
+
+TEST_F(ServerNodeTest, APairThatCouldNotBeVerifiedComesAgainWithTheNextSubmapOrLater) {
   receive(test::submap(kAlpha, 0));
   const SubmapPair pair{{kAlpha, 0}, {kBravo, 0}};
   const Step asked = receive(test::submap(kBravo, 0));
   ASSERT_EQ(pairs_of(asked), std::set<SubmapPair>{pair});
-  const Verdicts failed{.job = "1/0", .verdicts = {}, .failed = {pair}, .why = "no cloud"};
-  const Step step = receive({Endpoint::worker(0), Endpoint::server(), MessageKind::verdicts, "1/0",
-                             std::make_shared<const std::string>(wire::encode(failed))});
-  EXPECT_EQ(told<VerificationFailed>(step), 1U);
+  const std::string job = of_kind(asked, MessageKind::job).at(0).id;
+  const Verdicts failed{.job = job, .verdicts = {}, .failed = {pair}, .why = "no cloud"};
+  const bus::Envelope answer{Endpoint::worker(0), Endpoint::server(), MessageKind::verdicts, job,
+                             std::make_shared<const std::string>(wire::encode(failed))};
+  EXPECT_EQ(told<VerificationFailed>(receive(answer)), 1U);
+  done(node_->on_timer(*node_->next_timer()));
+  ASSERT_EQ(node_->next_timer(), now_ + 600.0);
+  now_ = now_ + 600.0;
+  EXPECT_EQ(pairs_of(done(node_->on_timer(now_))), std::set<SubmapPair>{pair});
+  EXPECT_EQ(told<VerificationFailed>(receive(answer)), 1U);
   EXPECT_TRUE(pairs_of(receive(test::submap(kAlpha, 1))).contains(pair));
+}
+
+bus::Envelope envelope(const ClosureWord& word) {
+  return {Endpoint::viewer(7), Endpoint::server(), MessageKind::word, fmt::format("{}/{}", word.closure, word.given_ns),
+          std::make_shared<const std::string>(wire::encode(word))};
+}
+
+TEST_F(ServerNodeTest, AnOperatorsWordIsStoredAndSurvivesEveryRestart) {
+  fill();
+  now_ = Timestamp{} + 20.0;
+  done(node_->on_timer(now_));
+  const auto accepted = [&] {
+    return std::ranges::count_if(node_->map_server().map().closures, &server::JudgedClosure::accepted);
+  };
+  const auto all = accepted();
+  const SubmapPair pair{{kAlpha, 0}, {kBravo, 2}};
+  const Step step = receive(envelope({"0/0-1/2", Wish::reject, "ada", 5}));
+  EXPECT_EQ(told<WordTaken>(step), 1U);
+  ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);
+  for (int start = 0; start < 2; ++start) {
+    restart();
+    ASSERT_EQ(node_->map_server().state().words.size(), 1U);
+    EXPECT_EQ(node_->map_server().state().words.at(pair), (ClosureWord{"0/0-1/2", Wish::reject, "ada", 5}));
+    ASSERT_EQ(node_->next_timer(), Timestamp{} + 20.0);  // the map has not followed yet
+  }
+  done(node_->on_timer(now_));
+  EXPECT_EQ(accepted(), all - 1);
+  restart();
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+  EXPECT_EQ(accepted(), all - 1);
+
+  const auto before = store_->tables();  // late, and once more
+  EXPECT_EQ(told<WordTaken>(receive(envelope({"0/0-1/2", Wish::accept, "eve", 4}))), 0U);
+  EXPECT_EQ(told<WordTaken>(receive(envelope({"0/0-1/2", Wish::reject, "ada", 5}))), 0U);
+  EXPECT_EQ(store_->tables(), before);
+  receive(envelope({"1/2-0/0", Wish::withdraw, "ada", 6}));
+  restart();
+  done(node_->on_timer(now_));
+  EXPECT_EQ(accepted(), all);
+}
+
+TEST_F(ServerNodeTest, NobodyElseHasAWordAndNotOnWhatIsNotThere) {
+  fill();
+  const auto before = store_->tables();
+  const ClosureWord word{"0/0-1/2", Wish::reject, "ada", 5};
+  for (const Endpoint from : {Endpoint::of(RobotId{0}), Endpoint::worker(0)}) {
+    bus::Envelope forged = envelope(word);
+    forged.from = from;
+    EXPECT_EQ(told<MessageRefused>(receive(forged)), 1U);
+  }
+  bus::Envelope garbage = envelope(word);
+  garbage.bytes = std::make_shared<const std::string>("garbage");
+  EXPECT_EQ(told<MessageRefused>(receive(garbage)), 1U);
+  for (const char* closure : {"nobody/0-1/2", "0/0-1/99", "0/0", "0/0-0/0"})
+    EXPECT_EQ(told<MessageRefused>(receive(envelope({closure, Wish::reject, "ada", 5}))), 1U) << closure;
+  EXPECT_EQ(told<MessageRefused>(receive(envelope({"0/0-1/1", Wish::accept, "ada", 5}))), 1U);  // no closure there
+  EXPECT_EQ(store_->tables(), before);
+}
+
+TEST_F(ServerNodeTest, TheMapSaysWhoVerifiedAClosureAndWhenButTheServerDoesNotCare) {
+  receive(test::submap(kAlpha, 0));
+  const Step asked = receive(test::submap(kBravo, 0));
+  WorkerNode worker(Endpoint::worker(4), finder_, SubmapFrames::of(*store_));
+  worker.set_clock([] { return std::int64_t{1'700'000'000'000'000'000}; });
+  for (const auto& job : of_kind(asked, MessageKind::job))
+    for (const auto& verdicts : worker.receive(job, now_).messages) receive(verdicts);
+  const SubmapPair pair{{kAlpha, 0}, {kBravo, 0}};
+  const auto row = wire::decode_verdict(store_->tables().at("verdicts").at(key_of(pair)));
+  ASSERT_TRUE(row.has_value());
+  EXPECT_EQ(row->worker, 4U);
+  EXPECT_EQ(row->verified_ns, 1'700'000'000'000'000'000);
+  EXPECT_EQ(row->finder_version, 3U);
+  const auto verdicts = node_->map_server().state().verdicts;
+  EXPECT_EQ(verdicts.at(pair).worker, std::nullopt);
+  restart();
+  EXPECT_EQ(node_->map_server().state().verdicts, verdicts);
 }
 
 TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
   fill();
+  receive(envelope({"0/0-1/2", Wish::reject, "ada", 5}));
   for (const auto& [table, rows] : store_->tables()) {
     if (rows.empty()) continue;
     auto tables = store_->tables();

@@ -1,11 +1,31 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/submap_frames.hpp"
 
+#include <charconv>
+
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
 
 std::string key_of(SubmapId id) { return storage::key_of({id.chain.robot.value, id.chain.session, id.index}); }
+
+std::string message_id(SubmapId id) {
+  return fmt::format("{}/{}/{}", id.chain.robot.value, id.chain.session, id.index);
+}
+
+std::optional<SubmapId> submap_of(std::string_view message_id) {
+  SubmapId id;
+  const char* at = message_id.data();
+  const char* const end = at + message_id.size();
+  const auto read = [&](auto& number, char after) {
+    const auto [stop, error] = std::from_chars(at, end, number);
+    if (error != std::errc() || (after == 0 ? stop != end : stop == end || *stop != after)) return false;
+    at = after == 0 ? stop : stop + 1;
+    return true;
+  };
+  if (!read(id.chain.robot.value, '/') || !read(id.chain.session, '/') || !read(id.index, '\0')) return std::nullopt;
+  return id;
+}
 
 std::shared_ptr<SubmapFrames> SubmapFrames::of(const storage::TableStore& map) {
   return std::make_shared<SubmapFrames>([&map](SubmapId id) -> Result<std::string> {

@@ -5,7 +5,9 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "tutti/model/submap.hpp"
@@ -27,6 +29,9 @@ class SubmapFrames final : public server::CloudStore {
   [[nodiscard]] Result<std::shared_ptr<const Submap>> submap(SubmapId id) const;
   static constexpr std::size_t kMostKept = 4000;
 
+  /// As it came.
+  [[nodiscard]] Result<std::string> frame(SubmapId id) const { return fetch_(id); }
+
   /// Nothing to do: a submap's frame is stored with the step that takes it.
   Status put(SubmapId, const std::shared_ptr<const PointCloud>&) override { return {}; }
   [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override;
@@ -41,5 +46,8 @@ class SubmapFrames final : public server::CloudStore {
 
 /// The key of a submap's row.
 std::string key_of(SubmapId id);
+/// The id of the message that carries it: "robot/session/index".
+std::string message_id(SubmapId id);
+std::optional<SubmapId> submap_of(std::string_view message_id);
 
 }  // namespace tutti::node

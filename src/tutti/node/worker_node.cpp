@@ -1,12 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/worker_node.hpp"
 
+#include <algorithm>
 #include <utility>
 
+#include "tutti/base/check.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/limits.hpp"
+#include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
+namespace {
+
+std::set<SubmapId> submaps_of(const Job& job) {
+  std::set<SubmapId> ids;
+  for (const auto& [first, second] : job.pairs) ids.insert({first, second});
+  return ids;
+}
+
+}  // namespace
 
 void WorkerNode::one_by_one(std::size_t count, const std::function<void(std::size_t)>& call) {
   for (std::size_t i = 0; i < count; ++i) call(i);
@@ -15,6 +27,14 @@ void WorkerNode::one_by_one(std::size_t count, const std::function<void(std::siz
 WorkerNode::WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder,
                        std::shared_ptr<const SubmapFrames> submaps, ForEach for_each)
     : self_(self), finder_(std::move(finder)), submaps_(std::move(submaps)), for_each_(std::move(for_each)) {}
+
+WorkerNode::WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder,
+                       std::shared_ptr<FrameCache> cache, ForEach for_each)
+    : self_(self),
+      finder_(std::move(finder)),
+      cache_(std::move(cache)),
+      submaps_(std::make_shared<const SubmapFrames>([frames = cache_](SubmapId id) { return frames->get(id); })),
+      for_each_(std::move(for_each)) {}
 
 Result<ClosureVerdict> WorkerNode::verify(const SubmapPair& pair) const {
   const auto first = submaps_->submap(pair.first);
@@ -29,27 +49,103 @@ Result<ClosureVerdict> WorkerNode::verify(const SubmapPair& pair) const {
 
 Step WorkerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   Step step;
-  const auto job = envelope.kind == bus::MessageKind::job
-                       ? wire::decode_job(*envelope.bytes)
-                       : fail(ErrorCode::invalid, "a {} to a worker", wire::name(envelope.kind));
+  if (envelope.kind == bus::MessageKind::job)
+    receive_job(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::submap_copy)
+    receive_copy(envelope, now, step);
+  else
+    step.tell(now, MessageRefused{envelope.from, envelope.kind, "not for a worker"});
+  return step;
+}
+
+void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  TUTTI_CHECK(!held_, "a second job");
+  auto job = wire::decode_job(*envelope.bytes);
   if (!job) {
     step.tell(now, MessageRefused{envelope.from, envelope.kind, job.error().message});
+    return;
+  }
+  std::set<SubmapId> missing;
+  if (cache_)
+    for (const SubmapId& id : submaps_of(*job))
+      if (!cache_->contains(id)) missing.insert(id);
+  if (missing.empty()) return answer(*job, step);
+  held_ = Held{.job = std::move(*job), .missing = std::move(missing), .asked = {}, .last_came = now};
+  ask(now, step);
+}
+
+/// What is no good, or was not asked for, is left where it is.
+void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  const auto refuse = [&](const std::string& why) {
+    step.tell(now, MessageRefused{envelope.from, envelope.kind, why});
+  };
+  auto copy = wire::decode_submap_copy(*envelope.bytes);
+  if (!copy) return refuse(copy.error().message);
+  if (!held_ || !held_->missing.contains(copy->id)) return;  // it came twice
+  const auto message = wire::decode_submap(copy->frame);
+  if (!message) return refuse(message.error().message);
+  if (message->submap.id != copy->id) return refuse("another submap than it says");
+  cache_->put(copy->id, std::move(copy->frame));
+  held_->missing.erase(copy->id);
+  held_->asked.erase(copy->id);
+  held_->last_came = now;
+  if (!held_->missing.empty()) return ask(now, step);
+  const Held held = *std::exchange(held_, std::nullopt);
+  answer(held.job, step);
+  cache_->trim({});
+}
+
+void WorkerNode::ask(Timestamp now, Step& step) {
+  Held& held = *held_;
+  std::erase_if(held.asked, [&](const auto& asked) { return now - asked.second >= kAskAgain_s; });
+  SubmapRequest request;
+  for (const SubmapId& id : held.missing) {
+    if (held.asked.size() >= kMostAsked) break;
+    if (held.asked.emplace(id, now).second) request.submaps.push_back(id);
+  }
+  if (request.submaps.empty()) return;
+  step.messages.push_back({self_,
+                           bus::Endpoint::server(),
+                           bus::MessageKind::submap_request,
+                           {},
+                           std::make_shared<const std::string>(wire::encode(request))});
+  cache_->trim(submaps_of(held.job));
+}
+
+std::optional<Timestamp> WorkerNode::next_timer() const {
+  if (!held_) return std::nullopt;
+  Timestamp next = held_->last_came + kPatience_s;
+  for (const auto& [id, asked] : held_->asked) next = std::min(next, asked + kAskAgain_s);
+  return next;
+}
+
+Step WorkerNode::on_timer(Timestamp now) {
+  Step step;
+  if (!held_) return step;
+  if (now - held_->last_came < kPatience_s) {
+    ask(now, step);
     return step;
   }
-  std::vector<Result<ClosureVerdict>> results(job->pairs.size());
-  for_each_(job->pairs.size(), [&](std::size_t i) { results[i] = verify(job->pairs[i]); });
-  Verdicts answer{.job = job->id, .verdicts = {}, .failed = {}, .why = {}};
+  const Held held = *std::exchange(held_, std::nullopt);
+  answer(held.job, step);  // without them: those pairs have failed
+  return step;
+}
+
+void WorkerNode::answer(const Job& job, Step& step) const {
+  std::vector<Result<ClosureVerdict>> results(job.pairs.size());
+  for_each_(job.pairs.size(), [&](std::size_t i) { results[i] = verify(job.pairs[i]); });
+  Verdicts answer{.job = job.id, .verdicts = {}, .failed = {}, .why = {}};
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i]) {
+      if (clock_ && !results[i]->closures.empty()) results[i]->verified_ns = clock_();
       answer.verdicts.push_back(std::move(*results[i]));
       continue;
     }
     if (answer.failed.empty()) answer.why = results[i].error().message.substr(0, wire::kMaxReasonBytes);
-    answer.failed.push_back(job->pairs[i]);
+    answer.failed.push_back(job.pairs[i]);
   }
-  step.messages.push_back({self_, bus::Endpoint::server(), bus::MessageKind::verdicts, job->id,
+  step.messages.push_back({self_, bus::Endpoint::server(), bus::MessageKind::verdicts, job.id,
                            std::make_shared<const std::string>(wire::encode(answer))});
-  return step;
 }
 
 }  // namespace tutti::node

@@ -3,10 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <thread>
 #include <vector>
 
 #include "support/node/submaps.hpp"
+#include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
 namespace {
@@ -54,6 +56,108 @@ TEST_F(WorkerNodeTest, AnswersEveryPairOfAJobTheSameOnAnyNumberOfThreads) {
   });
   EXPECT_EQ(answer(many.receive(envelope(job), Timestamp{})), verdicts);
   EXPECT_EQ(answer(many.receive(envelope(job), Timestamp{})), verdicts);  // again
+}
+
+/// What a worker asks the server for, and the server's answers.
+class DistantWorkerTest : public WorkerNodeTest {
+ protected:
+  static Job job_of(std::uint32_t count) {
+    Job job{.id = "1/0", .pairs = {}};
+    for (std::uint32_t i = 0; i < count; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
+    return job;
+  }
+  static std::vector<SubmapId> asked(const Step& step) {
+    std::vector<SubmapId> ids;
+    for (const bus::Envelope& message : step.messages)
+      if (message.kind == bus::MessageKind::submap_request) {
+        const SubmapRequest request = wire::decode_submap_request(*message.bytes).value();
+        ids.insert(ids.end(), request.submaps.begin(), request.submaps.end());
+      }
+    return ids;
+  }
+  static bus::Envelope copy(SubmapId id, SubmapId inside) {
+    const std::string frame = wire::encode(test::submap(inside.chain, inside.index));
+    return {bus::Endpoint::server(),
+            kWorker,
+            bus::MessageKind::submap_copy,
+            {},
+            std::make_shared<const std::string>(wire::encode(SubmapCopy{id, frame}))};
+  }
+  std::shared_ptr<FrameCache> cache_ = std::make_shared<FrameCache>(1U << 20U);
+  WorkerNode worker_{kWorker, finder_, cache_};
+};
+
+TEST_F(DistantWorkerTest, AsksForWhatItLacksAndHoldsTheJobUntilItHasAll) {
+  const Job job = job_of(3);
+  std::vector<SubmapId> open = asked(worker_.receive(envelope(job), Timestamp{}));
+  EXPECT_EQ(open.size(), 4U);
+  while (open.size() > 1) {
+    EXPECT_TRUE(worker_.receive(copy(open.back(), open.back()), Timestamp{}).messages.empty());
+    EXPECT_TRUE(worker_.holds_job());
+    open.pop_back();
+  }
+  const Step last = worker_.receive(copy(open[0], open[0]), Timestamp{});
+  EXPECT_FALSE(worker_.holds_job());
+  WorkerNode near(kWorker, finder_, frames());
+  EXPECT_EQ(answer(last), answer(near.receive(envelope(job), Timestamp{})));
+  EXPECT_EQ(answer(worker_.receive(envelope(job), Timestamp{})), answer(last));  // it has them now
+}
+
+TEST_F(DistantWorkerTest, AsksAgainForWhatDoesNotComeAndAtLastAnswersWithout) {
+  const Job job = job_of(2);
+  const std::vector<SubmapId> open = asked(worker_.receive(envelope(job), Timestamp{}));
+  ASSERT_EQ(open.size(), 3U);
+  static_cast<void>(worker_.receive(copy({kBravo, 2}, {kBravo, 2}), Timestamp{} + 1.0));
+  EXPECT_EQ(worker_.next_timer(), Timestamp{} + 2.0);
+  EXPECT_EQ(asked(worker_.on_timer(Timestamp{} + 2.0)), (std::vector<SubmapId>{{kAlpha, 0}, {kAlpha, 1}}));
+  EXPECT_TRUE(asked(worker_.on_timer(Timestamp{} + 3.0)).empty());
+  static_cast<void>(worker_.receive(copy({kAlpha, 0}, {kAlpha, 0}), Timestamp{} + 4.0));
+  const Verdicts without = answer(worker_.on_timer(Timestamp{} + 4.0 + WorkerNode::kPatience_s));
+  EXPECT_EQ(without.verdicts.size(), 1U);
+  EXPECT_EQ(without.failed, (std::vector<SubmapPair>{job.pairs[1]}));
+  EXPECT_FALSE(worker_.holds_job());
+  EXPECT_FALSE(worker_.next_timer().has_value());
+}
+
+TEST_F(DistantWorkerTest, AsksForFewAtATime) {
+  Job job{.id = "1/0", .pairs = {}};
+  for (std::uint32_t i = 0; i < 40; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
+  std::vector<SubmapId> open = asked(worker_.receive(envelope(job), Timestamp{}));
+  std::size_t most = open.size(), came = 0;
+  while (!open.empty()) {
+    const SubmapId id = open.back();
+    open.pop_back();
+    const Step step = worker_.receive(copy(id, id), Timestamp{});
+    for (const SubmapId& more : asked(step)) open.push_back(more);
+    most = std::max(most, open.size());
+    ++came;
+  }
+  EXPECT_EQ(came, 41U);
+  EXPECT_EQ(most, WorkerNode::kMostAsked);
+  EXPECT_FALSE(worker_.holds_job());
+}
+
+TEST_F(DistantWorkerTest, AnotherSubmapThanWasAskedForIsNotTaken) {
+  static_cast<void>(worker_.receive(envelope(job_of(1)), Timestamp{}));
+  EXPECT_EQ(worker_.receive(copy({kAlpha, 0}, {kAlpha, 1}), Timestamp{}).events.size(), 1U);
+  bus::Envelope bad = copy({kAlpha, 0}, {kAlpha, 0});
+  bad.bytes = std::make_shared<const std::string>(wire::encode(SubmapCopy{{kAlpha, 0}, "no frame"}));
+  EXPECT_EQ(worker_.receive(bad, Timestamp{}).events.size(), 1U);
+  static_cast<void>(worker_.receive(copy({kBravo, 3}, {kBravo, 3}), Timestamp{}));  // nobody asked
+  EXPECT_EQ(cache_->bytes(), 0U);
+  EXPECT_TRUE(worker_.holds_job());
+}
+
+TEST(FrameCache, KeepsWhatWasUsedLastAndWhatIsNeeded) {
+  FrameCache cache(10);
+  for (std::uint32_t i = 0; i < 4; ++i) cache.put({kAlpha, i}, "12345");
+  EXPECT_TRUE(cache.get({kAlpha, 1}).has_value());
+  cache.trim({{kAlpha, 0}});
+  EXPECT_EQ(cache.bytes(), 10U);
+  EXPECT_TRUE(cache.contains({kAlpha, 0}) && cache.contains({kAlpha, 1}));
+  EXPECT_FALSE(cache.get({kAlpha, 3}).has_value());
+  cache.put({kAlpha, 0}, "1");
+  EXPECT_EQ(cache.bytes(), 6U);
 }
 
 TEST_F(WorkerNodeTest, WhatIsNoJobIsRefused) {

@@ -9,6 +9,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/robot/map_covariance.hpp"
 
 namespace tutti::robot {
 namespace {
@@ -51,8 +52,14 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given,
   const Matrix6d covariance =
       invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
   const std::uint32_t submap = submaps_.current_submap();
+  const bool is_first = state_.keyframes.empty();
   const auto step = submaps_.add_odometry(stamp, T_odom_body, covariance);
   if (!step) return tl::unexpected(step.error());
+  if (!is_first) {
+    const Matrix6d moved =
+        compound_covariance(state_.T_odom_body.inverse() * T_odom_body, state_.covariance, covariance);
+    state_.covariance = 0.5 * (moved + moved.transpose());
+  }
   state_.T_odom_body = T_odom_body;
   if (*step) add_keyframe(**step, submap);
   return {};
@@ -146,6 +153,8 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
   }
   state_.T_map_odom =
       state_.ledger.size() == 0 ? Pose3{} : smoother_.poses().back() * state_.keyframes.back().T_odom_body.inverse();
+  state_.covariance = covariance_by(message.graph);
+  state_.component = component_of(message.graph, chain_);
   locate_others(message.graph, own, comparison.pairs);
   ended(UpdateStage::optimise);
 
@@ -165,6 +174,15 @@ estimation::Termination RobotAgent::optimise() {
     constraints.push_back({.from = c.from, .to = c.to, .measurement = c.measurement});
   smoother_.set_constraints(std::move(constraints));
   return smoother_.solve().termination;
+}
+
+Matrix6d RobotAgent::covariance_by(const ProxyGraph& graph) const {
+  if (state_.keyframes.empty()) return Matrix6d::Zero();
+  std::vector<Timestamp> stamps;
+  for (const Keyframe& keyframe : state_.keyframes) stamps.push_back(keyframe.stamp);
+  const Matrix6d at_keyframe = map_covariance(graph, chain_, stamps, state_.ledger, smoother_.state());
+  const RelativePose& since = submaps_.state().since_keyframe;
+  return compound_covariance(since.T_a_b, at_keyframe, since.covariance);
 }
 
 // Frames differ by an unknown transform; the newest common node ties them together where this robot is now.

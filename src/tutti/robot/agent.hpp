@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/random.hpp"
@@ -82,7 +83,10 @@ struct AgentState {
   RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   Pose3 T_odom_body;  ///< Newest sample.
   Pose3 T_map_odom;
+  Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance().
   std::vector<Whereabouts> whereabouts;
+  /// Of the map, by the newest proxy graph; nothing: it does not know this chain.
+  std::optional<std::uint32_t> component;
 };
 
 /// One robot: odometry and scans in, submaps out; proxy graphs in, corrected trajectory out. No threads, sockets or
@@ -106,6 +110,8 @@ class RobotAgent {
   Status add_scan(const Scan& scan);
   /// The latest odometry sample is a keyframe; a scan elsewhere is hardly worth taking.
   [[nodiscard]] bool wants_scan() const { return submaps_.wants_scan(); }
+  /// Stamp of the latest odometry sample.
+  [[nodiscard]] std::optional<Timestamp> newest_sample() const { return submaps_.newest_sample(); }
   /// Ends the run: the last, shorter submap becomes an outgoing message.
   void finish();
   /// Submaps ready to be sent, oldest first; taken once. Their scans are merged here, which add_odometry() and
@@ -118,9 +124,10 @@ class RobotAgent {
                         const StageObserver& stage_ended = {});
 
   /// Newer than any that was received; another one changes nothing.
-  [[nodiscard]] bool is_news(const ProxyGraph& graph) const {
-    return graph.age() > std::pair(state_.epoch, state_.revision);
-  }
+  [[nodiscard]] bool is_news(const ProxyGraph& graph) const { return graph.age() > newest_heard(); }
+
+  /// ProxyGraph::age() of the newest; (0, 0): none.
+  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> newest_heard() const { return {state_.epoch, state_.revision}; }
 
   [[nodiscard]] AgentState state() const;
   [[nodiscard]] RobotId robot() const { return chain_.robot; }
@@ -134,13 +141,22 @@ class RobotAgent {
   [[nodiscard]] Trajectory corrected() const;
   /// Takes odometry into the corrected map. Only receive() changes it; the identity while nothing is corrected.
   [[nodiscard]] const Pose3& T_map_odom() const { return state_.T_map_odom; }
+  [[nodiscard]] const Pose3& T_odom_body() const { return state_.T_odom_body; }  ///< The newest sample.
   /// The corrected pose at the newest odometry sample: T_map_odom * T_odom_body. It jumps when receive() corrects.
   [[nodiscard]] Pose3 T_map_body() const { return state_.T_map_odom * state_.T_odom_body; }
+  /// Newest proxy graph heard; zeros: none.
+  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> map_age() const { return {state_.epoch, state_.revision}; }
+  /// Of T_map_body(), right tangent: how far the body may be from there, seen from where `map` begins (the first
+  /// sample). It grows with odometry, and is what the map allows for when receive() corrects (map_covariance.hpp).
+  [[nodiscard]] const Matrix6d& covariance() const { return state_.covariance; }
+  /// Of the newest proxy graph; nothing: it does not know this chain, or none was heard.
+  [[nodiscard]] std::optional<std::uint32_t> component() const { return state_.component; }
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:
   void add_keyframe(const KeyframeStep& step, std::uint32_t submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
+  [[nodiscard]] Matrix6d covariance_by(const ProxyGraph& graph) const;
   estimation::Termination optimise();
   void locate_others(const ProxyGraph& graph, std::span<const consistency::RobotNode> own,
                      std::span<const consistency::NodePair> pairs);

@@ -83,6 +83,11 @@ class SubmapBuilder {
     return !state_.keyframes.empty() && state_.keyframes.back().stamp == state_.recent.back().stamp;
   }
 
+  /// Stamp of the latest odometry sample.
+  [[nodiscard]] std::optional<Timestamp> newest_sample() const {
+    return state_.recent.empty() ? std::nullopt : std::optional(state_.recent.back().stamp);
+  }
+
   /// The oldest finished submap that was not taken yet. Merges its scans, which takes long where they are large: adding
   /// odometry or a scan never does.
   std::optional<Submap> take_submap();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -105,10 +106,10 @@ std::vector<Matrix6d> spread_odometry(const MapEstimate& map, std::span<const st
 }
 
 /// How sure the map is of every chain in the graph. The random numbers are always the same: the result is a function of
-/// the map.
+/// the map. The posterior goes when it is not needed any more: it is as large as what the closures' influence takes.
 std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyGraph& graph,
                                             const std::map<ChainId, std::vector<std::size_t>>& chosen,
-                                            const estimation::JointPosterior& posterior,
+                                            std::unique_ptr<const estimation::JointPosterior> posterior,
                                             std::span<const double> weights,
                                             const consistency::ProxyGraphConfig& config) {
   std::vector<std::size_t> kept;  // indices into map.nodes of graph.nodes
@@ -119,21 +120,32 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyG
         kept.push_back(i);
   TUTTI_CHECK(kept.size() == graph.nodes.size(), "{} of {} nodes found", kept.size(), graph.nodes.size());
   const Eigen::MatrixXd samples =
-      posterior.samples(kept, static_cast<std::size_t>(config.shape_samples), Rng(0).fork("uncertainty"));
+      posterior->samples(kept, static_cast<std::size_t>(config.shape_samples), Rng(0).fork("uncertainty"));
   std::vector<ChainUncertainty> out;
   if (!samples.allFinite()) return out;
-  const Eigen::MatrixXd shifts = shifts_without_a_closure(map, kept, static_cast<std::size_t>(config.shape_deletions));
-  for (std::size_t begin = 0, end = 0; begin < kept.size(); begin = end) {
-    const ChainId chain = graph.nodes[begin].chain;
-    while (end < kept.size() && graph.nodes[end].chain == chain) ++end;
+  struct Chain {
+    std::size_t begin = 0, end = 0;  // in `kept`
     std::vector<std::size_t> spread;
-    for (const std::size_t node : ChainUncertainty::spread(end - begin)) spread.push_back(kept[begin + node]);
-    const auto first = static_cast<Eigen::Index>(6 * begin), rows = static_cast<Eigen::Index>(6 * (end - begin));
-    out.push_back(consistency::chain_uncertainty(graph, chain,
+    Eigen::MatrixXd covariance;
+  };
+  std::vector<Chain> chains;
+  for (std::size_t begin = 0; begin < kept.size(); begin = chains.back().end) {
+    Chain& chain = chains.emplace_back(Chain{.begin = begin, .end = begin});
+    while (chain.end < kept.size() && graph.nodes[chain.end].chain == graph.nodes[begin].chain) ++chain.end;
+    for (const std::size_t node : ChainUncertainty::spread(chain.end - begin))
+      chain.spread.push_back(kept[begin + node]);
+    chain.covariance = posterior->covariance(chain.spread);
+  }
+  posterior.reset();
+  const Eigen::MatrixXd shifts = shifts_without_a_closure(map, kept, static_cast<std::size_t>(config.shape_deletions));
+  for (Chain& chain : chains) {
+    const auto first = static_cast<Eigen::Index>(6 * chain.begin);
+    const auto rows = static_cast<Eigen::Index>(6 * (chain.end - chain.begin));
+    out.push_back(consistency::chain_uncertainty(graph, graph.nodes[chain.begin].chain,
                                                  {.samples = samples.middleRows(first, rows),
                                                   .shifts = shifts.middleRows(first, rows),
-                                                  .spread_covariance = posterior.covariance(spread),
-                                                  .spread_odometry = spread_odometry(map, spread, weights)}));
+                                                  .spread_covariance = std::move(chain.covariance),
+                                                  .spread_odometry = spread_odometry(map, chain.spread, weights)}));
   }
   return out;
 }
@@ -158,8 +170,8 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     for (const auto& [first, last] : repairs(map, chain, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
   }
   const std::vector<double> weights = honest_weights(map);
-  const estimation::JointPosterior posterior(map.graph, map.graph.poses, stretches, weights);
-  const std::vector<Matrix6d> covariances = posterior.relative_covariances();
+  auto posterior = std::make_unique<const estimation::JointPosterior>(map.graph, map.graph.poses, stretches, weights);
+  const std::vector<Matrix6d> covariances = posterior->relative_covariances();
 
   std::vector<consistency::ServerNode> nodes;
   std::vector<ChainComponent> components;
@@ -196,7 +208,8 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     }
   }
   ProxyGraph graph = consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
-  if (config.shape_samples > 0) graph.uncertainties = uncertainties(map, graph, chosen, posterior, weights, config);
+  if (config.shape_samples > 0)
+    graph.uncertainties = uncertainties(map, graph, chosen, std::move(posterior), weights, config);
   return graph;
 }
 

@@ -10,6 +10,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/gnc.hpp"
 #include "tutti/estimation/who_is_wrong/settings.hpp"
+#include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
@@ -31,9 +32,23 @@ struct MapNode {
   std::uint32_t component = 0;  ///< Nodes of different components have unrelated world frames.
 };
 
+/// Why a closure is not in the map.
+enum class Objection {
+  none,          ///< It is.
+  operators,     ///< An operator has rejected it.
+  contradicted,  ///< Odometry and the other closures tell otherwise (who_is_wrong.hpp).
+  too_few,       ///< Too few closures join these two pieces of odometry.
+  misfit,        ///< It does not fit the map that the others make.
+  lone,          ///< With those of its place it contradicts all the rest of the map.
+  no_map         ///< The map could not be solved.
+};
+const char* to_string(Objection objection);  ///< For people; empty for none.
+
 struct JudgedClosure {
   LoopClosure closure;
   bool accepted = false;
+  bool by_operator = false;  ///< By an operator's word, whatever the map says.
+  Objection objection = Objection::none;
 };
 
 /// Odometry that the closures show to have failed: between these two keyframes of one chain it is not believed.
@@ -89,8 +104,9 @@ struct MapConfig {
 std::vector<OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
                                            const std::vector<std::optional<Matrix6d>>& step_to);
 
-/// The map of a set of submaps and verdicts: attaches submaps by their shared keyframes, judges closures and odometry,
-/// optimises. Pure: the same sets give the same map, whatever the order they came in.
-MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config);
+/// The map of a set of submaps, verdicts and words: attaches submaps by their shared keyframes, judges closures and
+/// odometry, optimises. Pure: the same sets give the same map, whatever the order they came in.
+MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
+                         const WordSet& words = {});
 
 }  // namespace tutti::server

@@ -197,7 +197,8 @@ bool MapServer::is_asked(const SubmapPair& pair) const {
 
 std::optional<std::uint32_t> MapServer::answered_by(const SubmapPair& pair) const {
   if (const auto found = state_.verdicts.find(pair); found != state_.verdicts.end())
-    return found->second.finder_version;
+    return says(state_.words, pair, Wish::accept) ? std::numeric_limits<std::uint32_t>::max()
+                                                  : found->second.finder_version;
   return state_.answered.contains(pair) ? std::optional(state_.finder_version) : std::nullopt;
 }
 
@@ -277,6 +278,28 @@ void MapServer::take(const ClosureVerdict& verdict) {
   }
 }
 
+Status MapServer::receive(const SubmapPair& pair, const ClosureWord& word) {
+  const auto where = [&] {
+    return fmt::format("word on submaps {} and {}", to_string(pair.first), to_string(pair.second));
+  };
+  if (!(pair.first < pair.second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where());
+  for (const SubmapId& id : {pair.first, pair.second})
+    if (!state_.submaps.contains(id))
+      return fail(ErrorCode::invalid, "{}: submap {} is not in the map", where(), to_string(id));
+  const auto known = state_.words.find(pair);
+  if (known != state_.words.end() && !holds_over(word, known->second)) return {};
+  const auto verdict = state_.verdicts.find(pair);
+  const bool has_closures = verdict != state_.verdicts.end() && !verdict->second.closures.empty();
+  if (word.wish == Wish::accept && !has_closures)
+    return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", where());
+  const bool was_accepted = known != state_.words.end() && known->second.wish == Wish::accept;
+  const bool changes = known == state_.words.end() ? word.wish != Wish::withdraw : known->second.wish != word.wish;
+  state_.words.insert_or_assign(pair, word);
+  if (was_accepted && word.wish != Wish::accept) plan_verification(pair);  // newer finders were not asked
+  if (changes && has_closures) news_ = true;
+  return {};
+}
+
 RefusalCounts MapServer::refusals() const {
   RefusalCounts counts = state_.refused;
   for (const auto& [pair, verdict] : state_.verdicts)
@@ -291,7 +314,7 @@ ProxyGraphMessage MapServer::optimise() {
 
 ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
-  map_ = estimate_map(state_.submaps, state_.verdicts, config_.map);
+  map_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
                             .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};
   message.graph.epoch = state_.epoch;

@@ -56,6 +56,7 @@ struct MapServerState {
   /// `finder_version`. Refusals by other versions, which are few, stand here too.
   VerdictSet verdicts;
   std::uint32_t finder_version = 0;
+  WordSet words;            ///< Of operators.
   AnsweredPairs answered;   ///< By a finder at least as new as the server's, or not to be asked.
   RefusalCounts refused;    ///< By `finder_version`.
   std::uint64_t epoch = 0;  ///< Of the server that this is the state of.
@@ -75,6 +76,9 @@ class MapServer {
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
             const ServerConfig& config, std::uint64_t epoch, MapServerState state);
 
+  /// One more that submaps may come from. Each has the less room for sessions, the more there are.
+  void add_robot(RobotId robot) { robots_.insert(robot); }
+
   /// A submap, in any order, any number of times, of any session of a known robot. Unknown robots, malformed submaps
   /// and sessions beyond a robot's share of ProxyGraph::kMostChains are refused; what is already mapped stays. So is
   /// one whose cloud the store cannot keep; it may be sent again. One that comes again puts its cloud back if the store
@@ -87,6 +91,10 @@ class MapServer {
   /// then; it is an error when kMostWaiting wait already, and costs only that the pair is asked again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
+  /// What an operator says of the closures of a pair, any number of times; the map follows at the next optimise(). An
+  /// error, and nothing changes: its submaps are not there, or there are no closures to accept. Of two words on one
+  /// pair the later one holds. A verdict whose closures are accepted stays as it is, whatever newer finders say.
+  Status receive(const SubmapPair& pair, const ClosureWord& word);
   /// Why verdicts that had waited were no good when their submaps came, since the last call.
   std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }
   /// Verifications to be done; each is handed out once.

@@ -10,9 +10,8 @@
 namespace tutti::simulation {
 namespace {
 
-std::string name_of(const SimulationConfig& config, std::size_t i) {
+std::string name_by_place(std::size_t i) {
   constexpr std::array kNames = {"alpha", "bravo", "charlie", "delta", "echo", "foxtrot", "golf", "hotel"};
-  if (!config.robots[i].name.empty()) return config.robots[i].name;
   return i < kNames.size() ? kNames[i] : "robot" + std::to_string(i);
 }
 
@@ -25,7 +24,7 @@ Status check_robots(const SimulationConfig& config, const CorridorWorld& network
   if (config.robots.empty()) return fail(ErrorCode::configuration, "simulation.robots is empty, expected a robot");
   std::set<std::string> names;
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
-    const std::string name = name_of(config, i);
+    const std::string& name = config.robots[i].name;
     if (!names.insert(name).second)
       return fail(ErrorCode::configuration, "simulation.robots.{}: name '{}' is taken", i, name);
     if (auto ok = check_walk(network, config.robots[i].walk, given_start(config.robots[i])); !ok)
@@ -60,6 +59,7 @@ std::vector<SimulatedRobotConfig> single_robots(const std::vector<SimulatedRobot
       out.push_back(robot);
       out.back().copies = 1;
       if (robot.copies > 1 && !robot.name.empty()) out.back().name += std::to_string(k);
+      if (robot.name.empty()) out.back().name = name_by_place(out.size() - 1);
     }
   return out;
 }
@@ -84,7 +84,7 @@ Result<SimulatedWorld> simulate_recordings(const SimulationConfig& fleet, Timest
     if (robot.walk.route.empty()) junction = given_start(robot).value_or(starts[i]);
     Recording recording = simulate_robot(robot, world.network, junction, start + robot.start_s, rng.fork(i));
     recording.robot = RobotId{static_cast<std::uint32_t>(i)};
-    recording.name = name_of(config, i);
+    recording.name = config.robots[i].name;
     if (walls)
       recording.scans =
           std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar, rng.fork(i).fork("lidar"));

@@ -186,7 +186,13 @@ void pass(A& a, AgentState& state) {
   pass(a, state.since_node);
   pass(a, state.T_odom_body);
   pass(a, state.T_map_odom);
+  for (double& x : state.covariance.reshaped()) a.number(x);
   pass(a, state.whereabouts);
+  bool has_component = state.component.has_value();
+  std::uint32_t component = state.component.value_or(0);
+  pass(a, has_component);
+  pass(a, component);
+  state.component = has_component ? std::optional(component) : std::nullopt;
 }
 
 bool is_sound(const Pose3& T) { return is_valid(T) && T.translation.cwiseAbs().maxCoeff() <= kMaxCoordinate_m; }
@@ -248,7 +254,8 @@ const char* what_is_wrong(const AgentState& state) {
     return "its nodes are not those of its keyframes";
   if (!is_sound(state.submaps) || state.submaps.keyframes.empty() != state.keyframes.empty())
     return "its open submap is none";
-  if (!is_sound(state.T_odom_body) || !is_sound(state.T_map_odom) || !all_sound(state.whereabouts))
+  if (!is_sound(state.T_odom_body) || !is_sound(state.T_map_odom) || !state.covariance.allFinite() ||
+      !all_sound(state.whereabouts))
     return "it is nowhere";
   return nullptr;
 }

@@ -2,14 +2,17 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/model/point_cloud.hpp"
+#include "tutti/model/status.hpp"
 #include "tutti/wire/message_kind.hpp"
 
 /// Messages as bytes and back. Every message is one frame: "TU", version of the kind (2 bytes, little endian), kind (1
@@ -43,18 +46,34 @@ Result<SubmapMessage> decode_submap(std::string_view bytes);
 /// variance in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4. Shape: 5 %.
 std::string encode(const ProxyGraphMessage& message);
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
+/// The same, to the bit, in fewer bytes for who has `base`, an earlier graph as decoded. Nothing: the delta is against
+/// another graph.
+std::string encode_delta(const ProxyGraphMessage& message, const ProxyGraph& base);
+Result<std::optional<ProxyGraphMessage>> decode_delta(std::string_view bytes, const ProxyGraph& base);
 
 /// Exact (job results and snapshots must not depend on having travelled).
 std::string encode(const ClosureVerdict& verdict);
 Result<ClosureVerdict> decode_verdict(std::string_view bytes);
 
-/// Exact, with names of jobs of 1 to kMaxIdBytes plain letters.
+/// Exact, with names of jobs of 1 to kMaxIdBytes plain letters, and reasons in receipts as plain_text() makes them.
 std::string encode(const Receipt& receipt);
 Result<Receipt> decode_receipt(std::string_view bytes);
 std::string encode(const Job& job);
 Result<Job> decode_job(std::string_view bytes);
 std::string encode(const Verdicts& verdicts);
 Result<Verdicts> decode_verdicts(std::string_view bytes);
+
+/// Exact, with texts as plain_text() makes them.
+std::string encode(const NodeStatus& status);
+Result<NodeStatus> decode_status(std::string_view bytes);
+std::string encode(const MissionStatus& status);
+Result<MissionStatus> decode_mission_status(std::string_view bytes);
+/// At most kMaxReasonBytes of it, each that is no printable ASCII as '?': safe on any terminal.
+std::string plain_text(std::string_view text);
+
+/// Exact. The closure's name has 1 to kMaxIdBytes bytes.
+std::string encode(const ClosureWord& word);
+Result<ClosureWord> decode_word(std::string_view bytes);
 
 /// A cloud alone, with points within kMaxCloudRange_m; an empty one stays empty.
 std::string encode(const PointCloud& cloud, const CloudCodec& codec = {});
@@ -71,5 +90,8 @@ Status validate(const PointCloud& cloud);
 Status validate(const Receipt& receipt);
 Status validate(const Job& job);
 Status validate(const Verdicts& verdicts);
+Status validate(const NodeStatus& status);
+Status validate(const MissionStatus& status);
+Status validate(const ClosureWord& word);
 
 }  // namespace tutti::wire

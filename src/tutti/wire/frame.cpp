@@ -20,7 +20,8 @@ constexpr int level_of(MessageKind kind) { return kind == MessageKind::agent_sta
 constexpr std::size_t most_bytes(MessageKind kind) {
   return kind == MessageKind::agent_state ? kMaxStateBytes : kMaxMessageBytes;
 }
-constexpr auto kLastKind = static_cast<unsigned>(MessageKind::agent_state);
+constexpr std::string_view kUnknown = "unknown";
+constexpr auto kLastKind = static_cast<unsigned>(MessageKind::proxy_graph_delta);
 
 }  // namespace
 
@@ -44,30 +45,50 @@ const char* name(MessageKind kind) {
       return "status";
     case MessageKind::agent_state:
       return "agent state";
+    case MessageKind::submap_request:
+      return "submap request";
+    case MessageKind::submap_copy:
+      return "submap copy";
+    case MessageKind::mission_status:
+      return "mission status";
+    case MessageKind::word:
+      return "word";
+    case MessageKind::proxy_graph_delta:
+      return "proxy graph delta";
   }
-  return "unknown";
+  return kUnknown.data();
 }
 
 // What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions. Verdict: up to 4 it said why a
-// pair was refused in words only, and not by which version of the finder; 6 has sessions. Proxy graph: up to 5 it told
-// what it is unsure of in other terms, which no robot compares any more, and up to 6 not where others were last seen;
-// nobody keeps one. Cloud: came with 2, the same since.
+// pair was refused in words only, and not by which version of the finder; 6 has sessions, 7 evidence. Verdicts of a
+// job: from 2 on with evidence. Proxy graph: up to 5 it told what it is unsure of in other terms, which no robot
+// compares any more, up to 6 not where others were last seen, and 7 said more of whole scales than anybody needs;
+// nobody keeps one. Cloud: came with 2, the same since. Receipt: 2 says what is refused, and whose the number is. Agent
+// state: 1 did not say how sure the robot is of where it is.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
       return {.oldest = 1, .current = 5};
     case MessageKind::verdict:
-      return {.oldest = 5, .current = 6};
+      return {.oldest = 5, .current = 7};
     case MessageKind::proxy_graph:
-      return {.oldest = 7, .current = 7};
+      return {.oldest = 8, .current = 8};
     case MessageKind::cloud:
       return {.oldest = 2, .current = 4};
-    case MessageKind::receipt:
-    case MessageKind::job:
     case MessageKind::verdicts:
+      return {.oldest = 1, .current = 2};
+    case MessageKind::receipt:
+      return {.oldest = 1, .current = 2};
+    case MessageKind::job:
     case MessageKind::status:
-    case MessageKind::agent_state:
+    case MessageKind::word:
+    case MessageKind::submap_request:
+    case MessageKind::submap_copy:
+    case MessageKind::proxy_graph_delta:
+    case MessageKind::mission_status:
       return {.oldest = 1, .current = 1};
+    case MessageKind::agent_state:
+      return {.oldest = 2, .current = 2};
   }
   return {};
 }
@@ -84,7 +105,7 @@ Result<Header> read_header(std::string_view bytes) {
     return fail(ErrorCode::parse, "frame: {} bytes, a header alone has {}", bytes.size(), kHeaderBytes);
   if (!bytes.starts_with(kMagic)) return fail(ErrorCode::parse, "frame: does not begin with \"{}\"", kMagic);
   const auto byte = [&](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(bytes[i])); };
-  if (byte(4) < 1 || byte(4) > kLastKind)
+  if (byte(4) < 1 || byte(4) > kLastKind || name(static_cast<MessageKind>(byte(4))) == kUnknown)
     return fail(ErrorCode::unsupported, "frame: unknown message kind {}", byte(4));
   const Header header{static_cast<MessageKind>(byte(4)), static_cast<std::uint16_t>(byte(2) | (byte(3) << 8U))};
   const auto [oldest, current] = versions(header.kind);
@@ -95,6 +116,12 @@ Result<Header> read_header(std::string_view bytes) {
 }
 
 }  // namespace
+
+std::uint16_t version_of(std::string_view frame) {
+  const Result<Header> header = read_header(frame);
+  TUTTI_CHECK(header.has_value(), "{}", header.error().message);
+  return header->version;
+}
 
 std::string pack_frame(MessageKind kind, std::string_view payload) {
   TUTTI_CHECK(payload.size() <= most_bytes(kind), "message of {} bytes", payload.size());

@@ -24,4 +24,7 @@ struct Unpacked {
 /// over is an error.
 Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame);
 
+/// The version that a frame which could be read is of.
+std::uint16_t version_of(std::string_view frame);
+
 }  // namespace tutti::wire

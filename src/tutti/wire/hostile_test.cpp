@@ -14,20 +14,46 @@
 #include "tutti/wire/internal/integer_coder.hpp"
 #include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/limits.hpp"
+#include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::wire {
 namespace {
 
-constexpr std::array kKinds = {MessageKind::submap,  MessageKind::proxy_graph, MessageKind::verdict, MessageKind::cloud,
-                               MessageKind::receipt, MessageKind::job,         MessageKind::verdicts};
+constexpr std::array kKinds = {MessageKind::submap,     MessageKind::proxy_graph,
+                               MessageKind::verdict,    MessageKind::cloud,
+                               MessageKind::receipt,    MessageKind::job,
+                               MessageKind::verdicts,   MessageKind::proxy_graph_delta,
+                               MessageKind::status,     MessageKind::mission_status,
+                               MessageKind::word,       MessageKind::submap_request,
+                               MessageKind::submap_copy};
+
+/// What deltas are against.
+const ProxyGraph& base() {
+  static const ProxyGraph graph = [] {
+    Rng rng(9);
+    return decode_proxy_graph(encode(test::any_proxy_graph(rng, 2, 30, true)))->graph;
+  }();
+  return graph;
+}
 
 std::string sample(MessageKind kind, Rng rng) {
   if (kind == MessageKind::submap) return encode(test::any_submap(rng, 6, 30));
   if (kind == MessageKind::proxy_graph) return encode(test::any_proxy_graph(rng, 2, 30, true));
+  if (kind == MessageKind::proxy_graph_delta) {
+    ProxyGraphMessage message{{}, base()};
+    ++message.graph.revision;
+    message.graph.nodes.back().T_world_body.translation.x() += 0.1;
+    return encode_delta(message, base());
+  }
   if (kind == MessageKind::cloud) return encode(*test::any_submap(rng, 1, 30).submap.cloud);
   if (kind == MessageKind::receipt) return encode(test::any_receipt(rng));
   if (kind == MessageKind::job) return encode(Job{"1/7", test::any_pairs(rng, 5)});
   if (kind == MessageKind::verdicts) return encode(test::any_verdicts(rng));
+  if (kind == MessageKind::submap_request) return encode(test::any_submap_request(rng));
+  if (kind == MessageKind::submap_copy) return encode(test::any_submap_copy(rng));
+  if (kind == MessageKind::status) return encode(test::any_status(rng));
+  if (kind == MessageKind::mission_status) return encode(test::any_mission_status(rng));
+  if (kind == MessageKind::word) return encode(test::any_word(rng));
   return encode(test::any_verdict(rng, 2));
 }
 
@@ -46,10 +72,20 @@ std::optional<Error> outcome(const Result<Message>& result) {
 std::optional<Error> decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::submap) return outcome(decode_submap(bytes));
   if (kind == MessageKind::proxy_graph) return outcome(decode_proxy_graph(bytes));
+  if (kind == MessageKind::proxy_graph_delta) {
+    const auto delta = decode_delta(bytes, base());
+    if (!delta) return outcome(Result<ProxyGraphMessage>(tl::unexpected(delta.error())));
+    return *delta ? outcome(Result<ProxyGraphMessage>(**delta)) : Error{ErrorCode::invalid, "another base"};
+  }
   if (kind == MessageKind::verdict) return outcome(decode_verdict(bytes));
   if (kind == MessageKind::receipt) return outcome(decode_receipt(bytes));
   if (kind == MessageKind::job) return outcome(decode_job(bytes));
   if (kind == MessageKind::verdicts) return outcome(decode_verdicts(bytes));
+  if (kind == MessageKind::submap_request) return outcome(decode_submap_request(bytes));
+  if (kind == MessageKind::submap_copy) return outcome(decode_submap_copy(bytes));
+  if (kind == MessageKind::status) return outcome(decode_status(bytes));
+  if (kind == MessageKind::mission_status) return outcome(decode_mission_status(bytes));
+  if (kind == MessageKind::word) return outcome(decode_word(bytes));
   const auto cloud = decode_cloud(bytes);
   return outcome(cloud ? Result<PointCloud>(**cloud) : tl::unexpected(cloud.error()));
 }

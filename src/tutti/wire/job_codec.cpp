@@ -50,20 +50,60 @@ Status check_job_id(const std::string& id) {
               kMaxIdBytes);
 }
 
+Status check_numbers(const std::map<std::uint64_t, NumberSet>& sessions) {
+  std::size_t stretches = 0;
+  for (const auto& [session, numbers] : sessions) {
+    stretches += numbers.stretches().size();
+    if (!numbers.stretches().empty() && numbers.stretches().back().end > std::uint64_t{1} << 32U)
+      return fail(ErrorCode::invalid, "a submap with a number of more than 32 bits");
+  }
+  if (sessions.size() <= ProxyGraph::kMostChains && stretches <= kMaxStretches) return {};
+  return fail(ErrorCode::invalid, "{} sessions and {} stretches, at most {} and {} are accepted", sessions.size(),
+              stretches, ProxyGraph::kMostChains, kMaxStretches);
+}
+
+using Sessions = google::protobuf::RepeatedPtrField<v1::NumbersOfSession>;
+
+void write(const std::map<std::uint64_t, NumberSet>& sessions, Sessions& out) {
+  for (const auto& [session, numbers] : sessions) {
+    v1::NumbersOfSession& entry = *out.Add();
+    entry.set_session(session);
+    std::uint64_t last = 0;
+    for (const auto& [begin, end] : numbers.stretches()) {
+      entry.add_bound(begin - last);
+      entry.add_bound(end - begin);
+      last = end;
+    }
+  }
+}
+
+Result<std::map<std::uint64_t, NumberSet>> read(const Sessions& in) {
+  std::map<std::uint64_t, NumberSet> sessions;
+  for (const v1::NumbersOfSession& entry : in) {
+    const auto [numbers, is_new] = sessions.try_emplace(entry.session());
+    if (!is_new) return fail(ErrorCode::invalid, "receipt: session {} twice", entry.session());
+    std::uint64_t last = 0;
+    for (int i = 0; i + 1 < entry.bound_size(); i += 2) {
+      const std::uint64_t begin = last + entry.bound(i);
+      last = begin + entry.bound(i + 1);
+      if (!numbers->second.append({begin, last})) return fail(ErrorCode::invalid, "receipt: stretches that touch");
+    }
+  }
+  return sessions;
+}
+
 void expect_valid(const Status& valid) { TUTTI_CHECK(valid.has_value(), "{}", valid.error().message); }
 
 }  // namespace
 
 Status validate(const Receipt& receipt) {
-  std::size_t stretches = 0;
-  for (const auto& [session, numbers] : receipt.stored) {
-    stretches += numbers.stretches().size();
-    if (!numbers.stretches().empty() && numbers.stretches().back().end > std::uint64_t{1} << 32U)
-      return fail(ErrorCode::invalid, "receipt: a submap with a number of more than 32 bits");
-  }
-  if (receipt.stored.size() <= ProxyGraph::kMostChains && stretches <= kMaxStretches) return {};
-  return fail(ErrorCode::invalid, "receipt: {} sessions and {} stretches, at most {} and {} are accepted",
-              receipt.stored.size(), stretches, ProxyGraph::kMostChains, kMaxStretches);
+  if (auto ok = check_numbers(receipt.stored); !ok) return in_context("receipt", ok.error());
+  if (auto ok = check_numbers(receipt.refused); !ok) return in_context("receipt", ok.error());
+  for (const std::string& text : {receipt.why_refused, receipt.conflict ? receipt.conflict->why : std::string()})
+    if (text.size() > kMaxReasonBytes || text != plain_text(text))
+      return fail(ErrorCode::invalid, "receipt: a reason of {} bytes, expected at most {}, all of printable ASCII",
+                  text.size(), kMaxReasonBytes);
+  return {};
 }
 
 Status validate(const Job& job) {
@@ -87,15 +127,15 @@ std::string encode(const Receipt& receipt) {
   expect_valid(validate(receipt));
   v1::Receipt out;
   out.set_robot(receipt.robot.value);
-  for (const auto& [session, numbers] : receipt.stored) {
-    v1::NumbersOfSession& stored = *out.add_stored();
-    stored.set_session(session);
-    std::uint64_t last = 0;
-    for (const auto& [begin, end] : numbers.stretches()) {
-      stored.add_bound(begin - last);
-      stored.add_bound(end - begin);
-      last = end;
-    }
+  write(receipt.stored, *out.mutable_stored());
+  write(receipt.refused, *out.mutable_refused());
+  out.set_why_refused(receipt.why_refused);
+  if (receipt.owner_session) out.set_owner_session(*receipt.owner_session);
+  if (receipt.conflict) {
+    v1::Conflict& conflict = *out.mutable_conflict();
+    conflict.set_session(receipt.conflict->session);
+    conflict.set_start(receipt.conflict->start);
+    conflict.set_why(receipt.conflict->why);
   }
   return pack_frame(MessageKind::receipt, out.SerializeAsString());
 }
@@ -103,17 +143,20 @@ std::string encode(const Receipt& receipt) {
 Result<Receipt> decode_receipt(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Receipt>(MessageKind::receipt, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  Receipt receipt{.robot = RobotId{parsed->message.robot()}, .stored = {}};
-  for (const v1::NumbersOfSession& stored : parsed->message.stored()) {
-    const auto [numbers, is_new] = receipt.stored.try_emplace(stored.session());
-    if (!is_new) return fail(ErrorCode::invalid, "receipt: session {} twice", stored.session());
-    std::uint64_t last = 0;
-    for (int i = 0; i + 1 < stored.bound_size(); i += 2) {
-      const std::uint64_t begin = last + stored.bound(i);
-      last = begin + stored.bound(i + 1);
-      if (!numbers->second.append({begin, last})) return fail(ErrorCode::invalid, "receipt: stretches that touch");
-    }
-  }
+  const v1::Receipt& in = parsed->message;
+  auto stored = read(in.stored());
+  if (!stored) return tl::unexpected(stored.error());
+  auto refused = read(in.refused());
+  if (!refused) return tl::unexpected(refused.error());
+  Receipt receipt{.robot = RobotId{in.robot()},
+                  .stored = std::move(*stored),
+                  .refused = std::move(*refused),
+                  .why_refused = in.why_refused(),
+                  .owner_session = {},
+                  .conflict = {}};
+  if (in.has_owner_session()) receipt.owner_session = in.owner_session();
+  if (in.has_conflict())
+    receipt.conflict = Receipt::Conflict{in.conflict().session(), in.conflict().start(), in.conflict().why()};
   if (auto ok = validate(receipt); !ok) return tl::unexpected(ok.error());
   return receipt;
 }

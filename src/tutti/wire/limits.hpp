@@ -16,7 +16,11 @@ inline constexpr std::size_t kMaxClosures = 1'000;  ///< Per verdict.
 inline constexpr std::size_t kMaxPairs = 10'000;    ///< Of submaps, per job.
 inline constexpr std::size_t kMaxIdBytes = 200;
 inline constexpr std::size_t kMaxReasonBytes = 1'000;
-inline constexpr std::size_t kMaxStretches = 100'000;  ///< Per receipt.
+inline constexpr std::size_t kMaxRequested = 1'000;     ///< Submaps, per request.
+inline constexpr std::size_t kMaxNameBytes = 64;        ///< Of a robot or a worker.
+inline constexpr std::size_t kMaxRobots = 10'000;       ///< Per mission status; of workers as many.
+inline constexpr std::size_t kMaxRefusalKinds = 1'000;  ///< Per mission status.
+inline constexpr std::size_t kMaxStretches = 100'000;   ///< Per receipt.
 
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.
 inline constexpr double kMaxVariance = 1e20;

@@ -74,6 +74,7 @@ Status decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::submap) return status(decode_submap(bytes));
   if (kind == MessageKind::proxy_graph) return status(decode_proxy_graph(bytes));
   if (kind == MessageKind::verdict) return status(decode_verdict(bytes));
+  if (kind == MessageKind::mission_status) return status(decode_mission_status(bytes));
   return status(decode_cloud(bytes));
 }
 
@@ -106,6 +107,10 @@ TEST(Memory, NoPayloadOfALegalSizeTakesMuchMoreThanItsBytes) {
       {MessageKind::submap, "clouds", filled(field(9, ""))},
       {MessageKind::submap, "clouds that become one", filled(cloud)},
       {MessageKind::submap, "headers", filled(field(1, ""))},
+      {MessageKind::mission_status, "robots", filled(field(11, field(7, "")))},
+      {MessageKind::mission_status, "workers", filled(field(12, ""))},
+      {MessageKind::mission_status, "refusals", filled(field(13, ""))},
+      {MessageKind::mission_status, "numbers of a pose", field(11, field(7, field(11, zeros(kMaxMessageBytes - 24))))},
       {MessageKind::cloud, "points", field(3, zeros(kMaxMessageBytes - 5))},
   };
   for (const auto& bomb : bombs) {
@@ -133,6 +138,7 @@ TEST(Memory, CountsUpToTheLimitsAreAcceptedAndNoMore) {
     EXPECT_EQ(accepted(MessageKind::submap, field(8, zeros(9) + repeated(covariances - 9 + more, "\xff\x01"))),
               more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(9, field(3, zeros(kMaxCloudPoints + more)))), more == 0);
+    EXPECT_EQ(accepted(MessageKind::mission_status, repeated(kMaxRobots + more, field(11, ""))), more == 0);
     EXPECT_EQ(accepted(MessageKind::cloud, field(3, zeros(10)) + field(3, zeros(kMaxCloudPoints - 10 + more))),
               more == 0);
   }

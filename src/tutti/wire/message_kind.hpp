@@ -15,8 +15,13 @@ enum class MessageKind : std::uint8_t {
   receipt = 5,   ///< Which submaps of a robot the server has stored.
   job = 6,       ///< Pairs of submaps to be verified.
   verdicts = 7,  ///< The answer to a job.
-  status = 8,
+  status = 8,    ///< Of a robot or a worker.
   agent_state = 9,
+  mission_status = 10,
+  submap_request = 13,     ///< Which submaps a worker lacks.
+  submap_copy = 14,        ///< One of them.
+  word = 15,               ///< What an operator says of a closure.
+  proxy_graph_delta = 17,  ///< A proxy graph in terms of an earlier one.
 };
 
 /// In words: "submap", "proxy graph", ...

@@ -116,10 +116,6 @@ Status check_scale(const ScaleUncertainty& scale, std::size_t nodes) {
     if (!(sigma.position_m > 0.0 && sigma.rotation_rad > 0.0))
       return fail(ErrorCode::invalid, "a sigma of {} m, {} rad, expected > 0", sigma.position_m, sigma.rotation_rad);
   }
-  for (const Energy& energy : {scale.position, scale.rotation})
-    if (!(std::isfinite(energy.mean) && energy.mean > 0.0 && std::isfinite(energy.degrees) && energy.degrees > 0.0))
-      return fail(ErrorCode::invalid, "an energy of {} with {} degrees of freedom, expected finite ones > 0",
-                  energy.mean, energy.degrees);
   return {};
 }
 
@@ -233,6 +229,14 @@ Status validate(const ClosureVerdict& verdict) {
   if (verdict.refusal && !(std::isfinite(verdict.refusal->value) && std::isfinite(verdict.refusal->limit)))
     return fail(ErrorCode::invalid, "{}: refused for a value of {} at a limit of {}, expected finite ones", where,
                 verdict.refusal->value, verdict.refusal->limit);
+  if (auto ok = at_most(verdict.evidence.size(), kRefusalKinds.size(), "values as evidence"); !ok)
+    return in_context(where, ok.error());
+  if (verdict.refusal && (!verdict.evidence.empty() || verdict.worker || verdict.verified_ns != 0))
+    return fail(ErrorCode::invalid, "{}: a refusal with evidence, expected it with closures", where);
+  for (const Refusal& measured : verdict.evidence)
+    if (!std::isfinite(measured.value) || !std::isfinite(measured.limit))
+      return fail(ErrorCode::invalid, "{}: evidence of {} at a limit of {}, expected finite ones", where,
+                  measured.value, measured.limit);
   for (const LoopClosure& closure : verdict.closures) {
     if (closure.from.chain != first.chain || closure.to.chain != second.chain)
       return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where, to_string(closure.from.chain),

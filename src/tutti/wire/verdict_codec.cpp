@@ -40,12 +40,26 @@ Result<LoopClosure> read(const v1::LoopClosure& in, const SubmapPair& pair) {
   return closure;
 }
 
-Result<std::optional<Refusal>> read_refusal(const v1::Verdict& in) {
-  if (!in.refused()) return std::nullopt;
-  if (in.refusal() >= kRefusalKinds.size())
-    return fail(ErrorCode::invalid, "refused for reason {}, at most {} is known", in.refusal(),
-                kRefusalKinds.size() - 1);
-  return Refusal{static_cast<RefusalReason>(in.refusal()), in.value(), in.limit()};
+Result<Refusal> read_measured(std::uint32_t reason, double value, double limit) {
+  if (reason >= kRefusalKinds.size())
+    return fail(ErrorCode::invalid, "refused for reason {}, at most {} is known", reason, kRefusalKinds.size() - 1);
+  return Refusal{static_cast<RefusalReason>(reason), value, limit};
+}
+
+Status read_evidence(const v1::Verdict& in, ClosureVerdict& verdict) {
+  if (in.gate_size() != in.gate_value_size() || in.gate_size() != in.gate_limit_size())
+    return fail(ErrorCode::parse, "{} gates with {} values and {} limits", in.gate_size(), in.gate_value_size(),
+                in.gate_limit_size());
+  for (int i = 0; i < in.gate_size(); ++i) {
+    const auto measured = read_measured(in.gate(i), in.gate_value(i), in.gate_limit(i));
+    if (!measured) return tl::unexpected(measured.error());
+    verdict.evidence.push_back(*measured);
+  }
+  if (in.worker() > std::uint64_t{1} << 32U)
+    return fail(ErrorCode::invalid, "verified by worker {}, expected a number of 32 bits", in.worker() - 1);
+  if (in.worker() > 0) verdict.worker = static_cast<std::uint32_t>(in.worker() - 1);
+  verdict.verified_ns = in.verified_ns();
+  return {};
 }
 
 }  // namespace
@@ -65,6 +79,13 @@ void write(const ClosureVerdict& verdict, v1::Verdict& out) {
     out.set_limit(verdict.refusal->limit);
   }
   out.set_finder_version(verdict.finder_version);
+  for (const Refusal& measured : verdict.evidence) {
+    out.add_gate(static_cast<std::uint32_t>(measured.reason));
+    out.add_gate_value(measured.value);
+    out.add_gate_limit(measured.limit);
+  }
+  if (verdict.worker) out.set_worker(std::uint64_t{*verdict.worker} + 1);
+  out.set_verified_ns(verdict.verified_ns);
 }
 
 Result<ClosureVerdict> read_verdict(const v1::Verdict& in) {
@@ -76,9 +97,12 @@ Result<ClosureVerdict> read_verdict(const v1::Verdict& in) {
     verdict.closures.push_back(*read_closure);
   }
   verdict.finder_version = in.finder_version();
-  const auto refusal = read_refusal(in);
-  if (!refusal) return in_context("verdict", refusal.error());
-  verdict.refusal = *refusal;
+  if (in.refused()) {
+    const auto refusal = read_measured(in.refusal(), in.value(), in.limit());
+    if (!refusal) return in_context("verdict", refusal.error());
+    verdict.refusal = *refusal;
+  }
+  if (auto ok = read_evidence(in, verdict); !ok) return in_context("verdict", ok.error());
   return verdict;
 }
 

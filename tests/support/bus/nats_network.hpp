@@ -52,6 +52,7 @@ class NatsNetwork {
     EXPECT_TRUE(port.has_value()) << port.error().message;
     return std::move(*port);
   }
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] bus::NatsChild& child() { return *child_; }
   [[nodiscard]] TcpRelay& relay() { return *relay_; }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/bus/envelope.hpp"
+#include "tutti/node/submap_frames.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -31,7 +32,7 @@ inline SubmapMessage submap(ChainId chain, std::uint32_t index) {
 
 inline bus::Envelope envelope(const SubmapMessage& message) {
   return {bus::Endpoint::of(message.header.robot), bus::Endpoint::server(), bus::MessageKind::submap,
-          to_string(message.submap.id), std::make_shared<const std::string>(wire::encode(message))};
+          message_id(message.submap.id), std::make_shared<const std::string>(wire::encode(message))};
 }
 
 /// Asks for every pair; those of even numbers are in one place, the others refused. Needs both clouds.

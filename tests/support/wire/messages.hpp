@@ -6,8 +6,11 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/messages.hpp"
+#include "tutti/model/status.hpp"
+#include "tutti/model/submap_copy.hpp"
 
 /// Valid messages for the tests of wire/.
 namespace tutti::wire::test {
@@ -84,8 +87,6 @@ inline ChainUncertainty any_uncertainty(Rng& rng, const ChainId& chain, std::siz
     ScaleUncertainty& scale = out.scales.emplace_back();
     if (s == 1) continue;
     for (std::size_t b = 0; b < ChainUncertainty::blocks(nodes); ++b) scale.sigma.push_back(sigma(8.0 / (1 + s)));
-    scale.position = {rng.uniform(10.0, 1000.0), rng.uniform(1.0, 100.0)};
-    scale.rotation = {rng.uniform(10.0, 1000.0), rng.uniform(1.0, 100.0)};
   }
   const std::size_t spread = ChainUncertainty::spread(nodes).size();
   for (std::size_t d = spread == 0 ? 0 : rng.index(5); d-- > 0;) {
@@ -150,6 +151,11 @@ inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
                                 {any_pose(rng, 5.0), any_covariance(rng)}});
   if (closures == 0) verdict.refusal = Refusal{RefusalReason::overlap, rng.uniform(0.0, 0.3), 0.3};
   verdict.finder_version = static_cast<std::uint32_t>(rng.index(3));
+  if (closures > 0 && rng.bernoulli(0.7)) {
+    verdict.evidence = {{RefusalReason::overlap, rng.uniform(0.3, 1.0), 0.3}, {RefusalReason::plane_rmse, 0.02, 0.1}};
+    verdict.worker = static_cast<std::uint32_t>(rng.index(3));
+    verdict.verified_ns = 1'700'000'000'000'000'000;
+  }
   return verdict;
 }
 
@@ -169,7 +175,84 @@ inline Receipt any_receipt(Rng& rng) {
     NumberSet& numbers = receipt.stored[any_session(rng)];
     for (int i = 0; i < 20; ++i) numbers.insert(rng.index(40));
   }
+  for (std::uint64_t sessions = rng.index(3); sessions > 0; --sessions) receipt.refused[any_session(rng)].insert(7);
+  if (!receipt.refused.empty()) receipt.why_refused = "its odometry is no odometry";
+  if (rng.bernoulli(0.5)) receipt.owner_session = any_session(rng);
+  if (rng.bernoulli(0.5)) receipt.conflict = {any_session(rng), rng.index(9), "somebody else is alpha"};
   return receipt;
+}
+
+inline SubmapRequest any_submap_request(Rng& rng) {
+  SubmapRequest request;
+  for (std::uint64_t count = 1 + rng.index(5); count > 0; --count)
+    request.submaps.push_back({{RobotId{static_cast<std::uint32_t>(rng.index(5))}, any_session(rng)},
+                               static_cast<std::uint32_t>(rng.index(1000))});
+  return request;
+}
+
+inline SubmapCopy any_submap_copy(Rng& rng) {
+  SubmapCopy copy{.id = any_submap_request(rng).submaps.front(), .frame = "TU"};
+  for (int i = 0; i < 50; ++i) copy.frame.push_back(static_cast<char>(rng.index(256)));
+  return copy;
+}
+
+inline NodeStatus any_status(Rng& rng) {
+  const auto count = [&] { return rng.bernoulli(0.3) ? 0 : rng.index(~std::uint64_t{0}); };
+  NodeStatus status{.name = rng.bernoulli(0.5) ? "alpha" : "Robot_2-b",
+                    .session = any_session(rng),
+                    .start = count(),
+                    .version = "0.9.1",
+                    .backlog_submaps = count(),
+                    .backlog_bytes = count(),
+                    .heard_epoch = count(),
+                    .heard_revision = count(),
+                    .update_age_s = {},
+                    .keyframes = count(),
+                    .T_odom_body = rng.bernoulli(0.5) ? any_pose(rng, 100.0) : Pose3{},
+                    .alerts = count(),
+                    .finished = rng.bernoulli(0.5),
+                    .jobs_done = count(),
+                    .trouble = rng.bernoulli(0.5) ? "no room: 3 bytes left" : ""};
+  if (rng.bernoulli(0.5)) status.update_age_s = rng.uniform(0.0, 1e4);
+  return status;
+}
+
+inline MissionStatus any_mission_status(Rng& rng) {
+  const auto stamp = [&] { return Timestamp{static_cast<std::int64_t>(rng.index(std::uint64_t{1} << 62U))}; };
+  MissionStatus status{.time = stamp(),
+                       .wall_ns = -1,
+                       .version = "0.9.1",
+                       .epoch = rng.index(1000),
+                       .revision = rng.index(1000),
+                       .submaps = rng.index(1000),
+                       .closures = rng.index(1000),
+                       .components = rng.index(1000),
+                       .pending_jobs = rng.index(1000),
+                       .has_news = rng.bernoulli(0.5),
+                       .robots = {},
+                       .workers = {},
+                       .refusals = {},
+                       .trouble = "none"};
+  for (std::uint32_t i = 0; i < rng.index(4); ++i) {
+    MissionStatus::Robot& robot = status.robots.emplace_back();
+    robot.robot = RobotId{3 * i};
+    if (rng.bernoulli(0.5)) robot.last_seen = stamp();
+    if (rng.bernoulli(0.5)) robot.last_update = stamp();
+    robot.submaps = rng.index(1000);
+    robot.refused = rng.index(1000);
+    robot.conflict = rng.bernoulli(0.5) ? "two of them" : "";
+    robot.status = any_status(rng);
+  }
+  for (std::uint32_t i = 0; i < rng.index(3); ++i) status.workers.push_back({7 + i, stamp(), any_status(rng)});
+  for (std::uint64_t i = rng.index(3); i > 0; --i) status.refusals.push_back({"robot", "submap", i, "no good"});
+  return status;
+}
+
+inline ClosureWord any_word(Rng& rng) {
+  return {.closure = "alpha/12-\xff/7",
+          .wish = static_cast<Wish>(1 + rng.index(3)),
+          .by = rng.bernoulli(0.5) ? "ada" : "",
+          .given_ns = static_cast<std::int64_t>(rng.index(1U << 30U)) - 5};
 }
 
 inline Verdicts any_verdicts(Rng& rng) {

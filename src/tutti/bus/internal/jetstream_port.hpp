@@ -47,6 +47,8 @@ class JetStreamPort final : public NatsPort {
   bool send_one(const NatsConnection& connection);
   bool acknowledge_one(const NatsConnection& connection);
   void say_farewell();
+  /// Of this thread alone: no acknowledgement is on its way to a stream that is being made anew.
+  void make_stream_anew(const NatsConnection& connection);
 
   // The receivers' threads.
   template <class Make, class Step>
@@ -56,8 +58,14 @@ class JetStreamPort final : public NatsPort {
   /// No more is fetched for now.
   [[nodiscard]] bool is_full() const;
   void take_in(natsMsg* message, const NatsConnection& connection);
-  void hear_status();
+  void hear_best_effort(const std::string& subject);
   void hear_retained();
+  /// Over the streams, whether they give what they have.
+  void watch();
+  [[nodiscard]] bool is_stranded(const std::string& stream) const {
+    const std::scoped_lock guard(mutex_);
+    return stranded_ == stream;
+  }
   void put_retained(MessageKind kind, std::string bytes);
 
   [[nodiscard]] std::shared_ptr<Session> session() const {
@@ -92,6 +100,9 @@ class JetStreamPort final : public NatsPort {
   Inbox inbox_;
   std::vector<std::string> busy_;                ///< Where work is said to go on.
   std::map<MessageKind, std::string> retained_;  ///< What was last given.
+  std::string stranded_;                         ///< The stream to be made anew; "": none.
+  std::uint64_t streams_made_anew_ = 0;
+  std::uint64_t jobs_removed_ = 0;
   std::uint64_t refused_ = 0;
   std::string last_error_;
 

@@ -53,6 +53,21 @@ class NatsConnection {
   [[nodiscard]] Status prepare(const NatsPortOptions& options) const;
   /// The server's consumer of a stream, anew: whatever is not acknowledged comes at once.
   [[nodiscard]] Status renew_consumer(const std::string& stream, const std::string& consumer) const;
+  /// What a stream has, and what its consumer is to get of it.
+  struct Look {
+    std::uint64_t first = 0;       ///< Sequence in the stream.
+    std::uint64_t messages = 0;    ///< In the stream.
+    std::uint64_t pending = 0;     ///< Of these: to be given for the first time;
+    std::uint64_t given = 0;       ///< given and not acknowledged.
+    std::uint64_t deliveries = 0;  ///< So far.
+    std::uint64_t done_up_to = 0;  ///< What is in the stream up to this sequence is given to nobody any more.
+    bool asked = false;            ///< Somebody waits for messages.
+  };
+  /// Nothing: there is no consumer, or the stream does not hold still for long enough.
+  [[nodiscard]] Result<std::optional<Look>> look_at(const std::string& stream, const std::string& consumer) const;
+  /// How many messages that are given to nobody any more were removed.
+  [[nodiscard]] Result<std::uint64_t> remove_done(const std::string& stream, const Look& look) const;
+  [[nodiscard]] Status remove_stream(const std::string& stream) const;
   // What these return is the connection's, which frees it when it is closed: libnats (issue 637) may be at a message
   // for a subscription that is being destroyed.
   /// Of a stream with a consumer, which is made if it is missing.

@@ -70,6 +70,14 @@ std::optional<Inbox::Acknowledgement> Inbox::next_acknowledgement() const {
   return Acknowledgement{acknowledged_.front(), replies_of(acknowledged_.front())};
 }
 
+void Inbox::forget_stream(MessageKind kind) {
+  std::erase_if(messages_,
+                [&](const auto& entry) { return std::get<1>(entry.first) == kind && entry.second.ticket == 0; });
+  for (auto& [name, message] : messages_)
+    if (std::get<1>(name) == kind) message.assembly.forget_replies();
+  strays_.clear();  // of other kinds too: these come again
+}
+
 void Inbox::forget(std::uint64_t ticket) {
   const auto found = held_.find(ticket);
   if (found == held_.end()) return;

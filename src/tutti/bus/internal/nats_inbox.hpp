@@ -42,6 +42,9 @@ class Inbox {
   };
   /// The oldest that the bus has not been told.
   [[nodiscard]] std::optional<Acknowledgement> next_acknowledgement() const;
+  /// What was acknowledged where is void: the bus has lost its stream of these. Parts of messages that are not whole
+  /// are forgotten; whole ones are still to be acknowledged, and nobody is told.
+  void forget_stream(MessageKind kind);
   /// The bus knows, or cannot be told and will send the message again: it is forgotten here.
   void forget(std::uint64_t ticket);
   /// Where messages that came again although they are acknowledged are to be acknowledged once more.

@@ -47,6 +47,24 @@ TEST(NatsInbox, AMessageIsGivenOnceWhenItIsWholeAndAcknowledgedInAllItsParts) {
   EXPECT_TRUE(inbox.take_strays().empty());
 }
 
+TEST(NatsInbox, OfAStreamThatTheBusHasLostNothingIsAcknowledgedAndHalvesAreForgotten) {
+  Inbox inbox(Endpoint::server());
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("half", 0, 2), "abc", "1"));
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("whole", 0, 1), "abc", "2"));
+  EXPECT_TRUE(inbox.add_part(kAlpha, {MessageKind::verdicts, "other", 0, 1}, "abc", "3"));
+  const auto taken = inbox.take();
+  ASSERT_EQ(taken.size(), 2U);
+  for (const Received& received : taken) inbox.acknowledge(received.ticket);
+  inbox.forget_stream(MessageKind::submap);
+  EXPECT_EQ(inbox.next_acknowledgement()->replies, Replies{});
+  inbox.forget(taken[0].ticket);
+  EXPECT_EQ(inbox.next_acknowledgement()->replies, Replies{"3"});
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("half", 1, 2), "def", "4"));
+  EXPECT_TRUE(inbox.take().empty());
+  EXPECT_TRUE(inbox.add_part(kAlpha, part("half", 0, 2), "ABC", "5"));
+  EXPECT_EQ(*inbox.take().at(0).envelope.bytes, "ABCdef");
+}
+
 TEST(NatsInbox, MessagesOfOneIdButOtherSendersAreOthers) {
   Inbox inbox(Endpoint::server());
   EXPECT_TRUE(inbox.add_part(kAlpha, part("a", 0, 2), "abc", "1"));

@@ -15,8 +15,18 @@
 namespace tutti::bus {
 namespace {
 
-constexpr std::array kSent{MessageKind::submap, MessageKind::proxy_graph, MessageKind::receipt,
-                           MessageKind::job,    MessageKind::verdicts,    MessageKind::status};
+constexpr std::array kSent{MessageKind::submap,
+                           MessageKind::proxy_graph,
+                           MessageKind::proxy_graph_delta,
+                           MessageKind::receipt,
+                           MessageKind::job,
+                           MessageKind::verdicts,
+                           MessageKind::status,
+                           MessageKind::mission_status,
+                           MessageKind::word,
+
+                           MessageKind::submap_request,
+                           MessageKind::submap_copy};
 
 std::optional<MessageKind> kind_of(std::string_view word) {
   const auto* found = std::ranges::find_if(kSent, [&](MessageKind kind) { return word_of(kind) == word; });
@@ -31,7 +41,7 @@ std::optional<std::uint32_t> number_of(std::string_view text) {
 
 std::string path_of(Endpoint end) {
   TUTTI_CHECK(end.role != Endpoint::Role::server, "the server has no subject of its own");
-  return fmt::format("{}.{}", end.role == Endpoint::Role::robot ? "robot" : "worker", end.number);
+  return fmt::format("{}.{}", name(end.role), end.role == Endpoint::Role::viewer ? 0 : end.number);
 }
 
 std::vector<std::string_view> split(std::string_view text, char at) {
@@ -69,7 +79,8 @@ std::string subject_of(const std::string& mission, const Envelope& envelope) {
     case Delivery::best_effort:
       break;
   }
-  return fmt::format("mission.{}.{}.{}", mission, path_of(envelope.from), word_of(envelope.kind));
+  const Endpoint& other = envelope.from.role == Endpoint::Role::server ? envelope.to : envelope.from;
+  return fmt::format("mission.{}.{}.{}", mission, path_of(other), word_of(envelope.kind));
 }
 
 std::optional<Address> address_of(std::string_view subject) {
@@ -78,7 +89,9 @@ std::optional<Address> address_of(std::string_view subject) {
   const std::string_view role = words[words.size() - 3];
   const auto number = number_of(words[words.size() - 2]);
   const auto kind = kind_of(words.back());
-  if (!number || !kind || (role != "robot" && role != "worker")) return std::nullopt;
+  if (!number || !kind) return std::nullopt;
+  if (role == "viewer") return Address{Endpoint::all_viewers(), *kind};
+  if (role != "robot" && role != "worker") return std::nullopt;
   return Address{role == "robot" ? Endpoint::of(RobotId{*number}) : Endpoint::worker(*number), *kind};
 }
 

@@ -22,14 +22,15 @@ inline constexpr std::size_t kLargestWhole =
 /// 1 to 32 letters, digits, '-' or '_'.
 bool is_mission_name(std::string_view mission);
 
-/// "mission.M.robot.3.submap", "mission.M.worker.7.verdicts", "mission.M.jobs.loop", "$KV.GRAPH_M.robot.3.proxy_graph".
+/// "mission.M.robot.3.submap", "mission.M.worker.7.verdicts", "mission.M.jobs.loop", "$KV.GRAPH_M.robot.3.proxy_graph",
+/// "$KV.GRAPH_M.viewer.0.mission_status" for all viewers.
 std::string subject_of(const std::string& mission, const Envelope& envelope);
 /// "proxy_graph"
 std::string word_of(MessageKind kind);
 
-/// What a subject of ours says of its message; nothing when it is none of a robot or worker.
+/// What a subject of ours says of its message; nothing when it is none of a robot, a worker or the viewers.
 struct Address {
-  Endpoint end;  ///< The robot or worker: who sent it, or of retained ones to whom.
+  Endpoint end;  ///< Who sent it, or of retained ones to whom.
   MessageKind kind = MessageKind::submap;
 };
 std::optional<Address> address_of(std::string_view subject);
@@ -55,6 +56,8 @@ class Assembly {
   [[nodiscard]] std::string take_bytes();
   /// Where each part is acknowledged: that of its newest delivery.
   [[nodiscard]] const std::map<std::uint32_t, std::string>& replies() const { return replies_; }
+  /// Of one that is complete.
+  void forget_replies() { replies_.clear(); }
 
  private:
   std::uint32_t count_ = 0;

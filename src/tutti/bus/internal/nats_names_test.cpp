@@ -26,6 +26,8 @@ TEST(NatsNames, SubjectsSayWhoseMessageItIs) {
   EXPECT_EQ(subject(kServer, Endpoint::any_worker(), MessageKind::job), "mission.m1.jobs.loop");
   EXPECT_EQ(subject(kServer, kRobot, MessageKind::proxy_graph), "$KV.GRAPH_m1.robot.3.proxy_graph");
   EXPECT_EQ(subject(kServer, kRobot, MessageKind::receipt), "$KV.GRAPH_m1.robot.3.receipt");
+  EXPECT_EQ(subject(kWorker, kServer, MessageKind::submap_request), "mission.m1.worker.7.submap_request");
+  EXPECT_EQ(subject(kServer, kWorker, MessageKind::submap_copy), "mission.m1.worker.7.submap_copy");
   for (const MessageKind kind : {MessageKind::submap, MessageKind::status, MessageKind::proxy_graph}) {
     const auto address = address_of(subject(kRobot, kRobot, kind));
     ASSERT_TRUE(address.has_value());
@@ -33,6 +35,9 @@ TEST(NatsNames, SubjectsSayWhoseMessageItIs) {
     EXPECT_EQ(address->kind, kind);
   }
   EXPECT_EQ(address_of("mission.m1.worker.7.verdicts")->end, kWorker);
+  for (const Endpoint viewer : {Endpoint::all_viewers(), Endpoint::viewer(5)})
+    EXPECT_EQ(subject(kServer, viewer, MessageKind::mission_status), "$KV.GRAPH_m1.viewer.0.mission_status");
+  EXPECT_EQ(address_of("$KV.GRAPH_m1.viewer.0.mission_status")->end, Endpoint::all_viewers());
 }
 
 TEST(NatsNames, WhatIsNotOursIsNothing) {

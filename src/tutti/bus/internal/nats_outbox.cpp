@@ -30,11 +30,12 @@ Status Outbox::add(const Envelope& envelope) {
     return fail(ErrorCode::invalid, "{} {}: {} bytes, at most {} can be sent", word_of(envelope.kind), envelope.id,
                 size, most);
   const bool bounded = cut || delivery == Delivery::work_queue;
+  if (bounded && waits(envelope)) return {};
   if (bounded && bytes_ + size > max_waiting_bytes_)
     return fail(ErrorCode::io, "{} {}: {} bytes wait to be sent already, {} may", word_of(envelope.kind), envelope.id,
                 bytes_, max_waiting_bytes_);
   Piece piece{.delivery = delivery, .subject = subject_of(mission_, envelope), .whole = envelope.bytes};
-  if (!bounded) drop_waiting(delivery, &piece.subject);
+  if (!bounded && envelope.kind != MessageKind::submap_copy) drop_waiting(delivery, &piece.subject);
   const auto parts =
       cut ? static_cast<std::uint32_t>(std::max<std::size_t>(1, (size + kPartBytes - 1) / kPartBytes)) : 1;
   for (std::uint32_t i = 0; i < parts; ++i) {
@@ -46,6 +47,16 @@ Status Outbox::add(const Envelope& envelope) {
     waiting_.emplace(order_of(piece), piece);
   }
   return {};
+}
+
+/// Its last part goes last.
+bool Outbox::waits(const Envelope& envelope) const {
+  const std::string id = word_of(envelope.kind) + "/" + envelope.id + "/";
+  const auto is_part = [&](const Piece& piece) {
+    return piece.id.starts_with(id) && piece.id.find('/', id.size()) == std::string::npos;
+  };
+  return std::ranges::any_of(waiting_, [&](const auto& other) { return is_part(other.second); }) ||
+         std::ranges::any_of(under_way_, [&](const auto& other) { return is_part(other.second.piece); });
 }
 
 bool Outbox::is_under_way(const std::string& subject) const {

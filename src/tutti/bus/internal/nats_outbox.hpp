@@ -34,8 +34,8 @@ class Outbox {
   Outbox(std::string mission, std::uint64_t max_waiting_bytes)
       : mission_(std::move(mission)), max_waiting_bytes_(max_waiting_bytes) {}
 
-  /// Refused: durable messages and jobs above the limit, anything too large. A retained one takes the place of one
-  /// that waits for the same receiver; status waits for nothing.
+  /// Refused: durable messages and jobs above the limit, anything too large. One that is here already changes nothing.
+  /// A retained one takes the place of one that waits for the same receiver; status waits for nothing.
   Status add(const Envelope& envelope);
   /// What is to be sent now, if anything: at most so many are without confirmation at a time, and of one retained
   /// value one. It is under way from here on; what is best effort is forgotten.
@@ -64,6 +64,7 @@ class Outbox {
   static Order order_of(const Piece& piece);
   void put_back(Piece piece);
   void drop_waiting(Delivery delivery, const std::string* subject);
+  [[nodiscard]] bool waits(const Envelope& envelope) const;
   [[nodiscard]] bool is_under_way(const std::string& subject) const;
 
   std::string mission_;

@@ -56,6 +56,20 @@ TEST(NatsOutbox, ALargeMessageIsCutAndOnlySoMuchIsUnderWay) {
   EXPECT_FALSE(outbox.next(kStart));
 }
 
+TEST(NatsOutbox, WhatIsHereAlreadyDoesNotWaitTwice) {
+  Outbox outbox("m", 64U << 20U);
+  for (int i = 0; i < 3; ++i)
+    for (const char* id : {"a", "a/1"}) ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, id, 1'000'000)));
+  EXPECT_EQ(outbox.messages(), 16U);
+  while (const auto piece = outbox.next(kStart)) {
+    ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, "a/1", 1'000'000)));
+    outbox.confirm(piece->number);
+  }
+  EXPECT_EQ(outbox.messages(), 0U);
+  ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, "a", 1'000'000)));
+  EXPECT_EQ(outbox.messages(), 8U);
+}
+
 TEST(NatsOutbox, BoundsAreKept) {
   Outbox outbox("m", 1000);
   ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, "a", 900)));

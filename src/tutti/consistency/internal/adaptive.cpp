@@ -45,18 +45,6 @@ bool split(Joints& joints, const Eigen::VectorXd& value, std::size_t most_links)
   return !added.empty();
 }
 
-/// How strongly each node speaks against the rest: its own coefficients, and at scales that stand out as a whole, which
-/// no one node does, its share of them.
-Eigen::VectorXd blame(const Disagreement& rest) {
-  Eigen::VectorXd out = rest.significance.rowwise().maxCoeff();
-  for (Eigen::Index s = 0; s < rest.significance.cols(); ++s) {
-    const double largest = rest.significance.col(s).maxCoeff();
-    if (rest.scale_significance(s) > 1.0 && largest > 0.0)
-      out = out.cwiseMax(rest.scale_significance(s) / largest * rest.significance.col(s));
-  }
-  return out;
-}
-
 }  // namespace
 
 Selection AdaptivePolicy::choose(const PolicyInput& input) const {
@@ -83,7 +71,7 @@ Selection AdaptivePolicy::choose(const PolicyInput& input) const {
     while (split_at(error())) {
     }
     const Disagreement left = (*input.test)(displaced(chain.server, rest));
-    again = left.disagrees() && left.significance.size() > 0 && split_at(blame(left));
+    again = left.disagrees() && left.significance.size() > 0 && split_at(left.significance.rowwise().maxCoeff());
   }
   for (std::size_t j = 1; j < joints.size(); ++j) collector.add({joints[j - 1], joints[j]}, ConstraintKind::other);
   return std::move(collector).take();

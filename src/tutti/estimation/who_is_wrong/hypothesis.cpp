@@ -26,8 +26,12 @@ constexpr double kManyRefused = 0.1;
 }  // namespace
 
 HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
-                                   const WhoIsWrongConfig& config, const GncConfig& gnc)
-    : odometry_(odometry), config_(config), gnc_(gnc), limit_(chi_square_quantile(gnc.confidence, 6)) {
+                                   const WhoIsWrongConfig& config, const GncConfig& gnc, std::vector<bool> certain)
+    : odometry_(odometry),
+      config_(config),
+      gnc_(gnc),
+      limit_(chi_square_quantile(gnc.confidence, 6)),
+      certain_(std::move(certain)) {
   std::vector<EdgeRole> roles(graph.edges.size(), EdgeRole::robust);
   std::fill_n(roles.begin(), odometry_edges, EdgeRole::trusted);
   reduced_ = internal::reduce_chains(graph, roles);
@@ -86,6 +90,8 @@ Window HypothesisSolver::around(std::size_t run) const {
 Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
   std::vector<double> truncation(reduced_.graph.edges.size(), limit_);
   for (const std::size_t run : runs_) truncation[run] = kInfinite;
+  for (std::size_t c = 0; c < closures_.size(); ++c)
+    if (certain_[c]) truncation[closures_[c]] = kInfinite;
   for (const Window& window : hypothesis.windows)
     for (std::size_t run = window.first; run <= window.last; ++run) truncation[runs_[run]] = limit_;
   if (hypothesis.wrong.empty())
@@ -121,7 +127,8 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const
     for (const std::size_t c : group) out.accepted[c] = 0;
   out.misfit += config_.least_places * static_cast<double>(out.hypothesis.wrong.size());
   for (std::size_t c = 0; c < closures_.size(); ++c) {
-    out.misfit += votes_[c] * (out.accepted[c] ? std::min(error(closures_[c]), 1.0) : 1.0);
+    const double most = certain_[c] ? kInfinite : 1.0;
+    out.misfit += votes_[c] * (out.accepted[c] ? std::min(error(closures_[c]), most) : 1.0);
     if (!out.accepted[c]) out.unexplained += votes_[c];
   }
   double strain = 0.0;

@@ -38,9 +38,9 @@ struct Solution {
 /// Solves a pose graph under hypotheses, on the graph of the closures' ends.
 class HypothesisSolver {
  public:
-  /// All must outlive this.
+  /// All must outlive this. `certain`: of each closure, whether it is right whatever it strains.
   HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
-                   const WhoIsWrongConfig& config, const GncConfig& gnc);
+                   const WhoIsWrongConfig& config, const GncConfig& gnc, std::vector<bool> certain);
 
   [[nodiscard]] Solution solve(Hypothesis hypothesis) const;
   /// What the optimum of another hypothesis with the same wrong groups is worth under this one, if that lets nothing go
@@ -67,6 +67,7 @@ class HypothesisSolver {
   PoseGraphSolution all_held_;         // with nothing let go or refused, where every solution begins
   std::vector<std::size_t> runs_;      // edges of the reduced graph, by their begin
   std::vector<std::size_t> closures_;  // edges of the reduced graph
+  std::vector<bool> certain_;          // per closure
   std::vector<double> votes_;          // per closure
 };
 

@@ -133,10 +133,18 @@ double failure_size_at(const OdometryWays& odometry, const FailedStretch& failed
 
 Explanation explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
                              std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,
-                             const GncConfig& gnc) {
+                             const GncConfig& gnc, const std::vector<bool>& certain) {
   TUTTI_CHECK(odometry_edges <= graph.edges.size(), "{} of {} edges", odometry_edges, graph.edges.size());
   const std::span<const PoseGraphEdge> closures = std::span(graph.edges).subspan(odometry_edges);
-  const std::vector<bool> supported = supported_closures(odometry, closures, config);
+  TUTTI_CHECK(certain.empty() || certain.size() == closures.size(), "{} of {} closures", certain.size(),
+              closures.size());
+  const auto is_certain = [&](std::size_t c) { return !certain.empty() && certain[c]; };
+  std::vector<bool> supported = supported_closures(odometry, closures, config);
+  std::vector<bool> considered_certain;
+  for (std::size_t c = 0; c < closures.size(); ++c) {
+    if (is_certain(c)) supported[c] = true;
+    if (supported[c]) considered_certain.push_back(is_certain(c));
+  }
   PoseGraph considered{
       .poses = graph.poses,
       .edges = {graph.edges.begin(), graph.edges.begin() + static_cast<std::ptrdiff_t>(odometry_edges)}};
@@ -152,9 +160,9 @@ Explanation explain_closures(const PoseGraph& graph, const OdometryWays& odometr
   for (const auto& group : groups) {
     auto& own = considered_groups.emplace_back();
     for (const std::size_t c : group)
-      if (supported[c]) own.push_back(position[c]);
+      if (supported[c] && !is_certain(c)) own.push_back(position[c]);
   }
-  const HypothesisSolver solver(considered, odometry, odometry_edges, config, gnc);
+  const HypothesisSolver solver(considered, odometry, odometry_edges, config, gnc, std::move(considered_certain));
   const Solution best = Search(solver, config).run(std::move(considered_groups));
 
   Explanation out{.accepted = std::vector<bool>(closures.size(), false), .failed = {}, .solved = best.solved};

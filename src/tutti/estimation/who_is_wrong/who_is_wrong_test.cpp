@@ -160,7 +160,8 @@ TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
     const OdometryWays ways = laps.ways();
     const WhoIsWrongConfig config;
     const GncConfig gnc;
-    const HypothesisSolver solver(laps.graph, ways, laps.odometry_edges, config, gnc);
+    const std::vector<bool> certain(laps.graph.edges.size() - laps.odometry_edges, false);
+    const HypothesisSolver solver(laps.graph, ways, laps.odometry_edges, config, gnc, certain);
     const Solution all = solver.solve({{{0, solver.runs() - 1}}, {}});
     const auto run = static_cast<std::size_t>(std::ranges::find(all.let_go, 1) - all.let_go.begin());
     ASSERT_LT(run, solver.runs());

@@ -23,12 +23,11 @@ std::string more(std::size_t rows, const char* what) {
 
 std::string scales_table(const TrajectoryComparison& c, const PictureClock& clock) {
   TextTable table(0);
-  table.add({"scale", "all along", "over threshold", "worst at", "position", "rotation", "above since"});
+  table.add({"scale", "over threshold", "worst at", "position", "rotation", "above since"});
   table.rule();
   for (const ScaleSummary& s : scale_summaries(c.explanation))
-    table.add({fmt::format("{:.1f} m", s.length_m), format_significance(s.whole), format_significance(s.significance),
-               format_moment(clock(s.worst)), format_metres(s.position_m), degrees(s.rotation_rad),
-               s.since ? format_moment(clock(*s.since)) : "-"});
+    table.add({fmt::format("{:.1f} m", s.length_m), format_significance(s.significance), format_moment(clock(s.worst)),
+               format_metres(s.position_m), degrees(s.rotation_rad), s.since ? format_moment(clock(*s.since)) : "-"});
   return table.str();
 }
 
@@ -102,7 +101,6 @@ std::vector<ScaleSummary> scale_summaries(const consistency::Explanation& e) {
     Eigen::Index worst = 0;
     const double largest = e.significance.col(s).maxCoeff(&worst);
     ScaleSummary row{.length_m = e.scale_length_m[static_cast<std::size_t>(s)],
-                     .whole = e.scale_significance[static_cast<std::size_t>(s)],
                      .significance = largest,
                      .worst = e.stamps[static_cast<std::size_t>(worst)],
                      .position_m = e.position_m(worst, s),

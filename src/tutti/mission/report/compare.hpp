@@ -28,7 +28,6 @@ std::string compare_html(const CompareReport& report);
 /// One row of the disagreement map in figures.
 struct ScaleSummary {
   double length_m = 0.0;      ///< Explanation::scale_length_m
-  double whole = 0.0;         ///< Of the scale as a whole, over its threshold.
   double significance = 0.0;  ///< The largest at one node, over its threshold; at `worst`.
   Timestamp worst;
   double position_m = 0.0;  ///< There.

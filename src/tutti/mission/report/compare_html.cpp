@@ -41,10 +41,9 @@ std::string top_view(const TrajectoryComparison& c, const PictureClock& clock) {
 }
 
 std::string scales_html(const TrajectoryComparison& c, const PictureClock& clock) {
-  HtmlTable table{
-      {"scale", "all along", "over threshold", "worst at", "position there", "rotation there", "above since"}, {}, 1};
+  HtmlTable table{{"scale", "over threshold", "worst at", "position there", "rotation there", "above since"}, {}, 1};
   for (const ScaleSummary& s : scale_summaries(c.explanation))
-    table.rows.push_back({fmt::format("{:.1f} m", s.length_m), format_significance(s.whole),
+    table.rows.push_back({fmt::format("{:.1f} m", s.length_m),
                           s.significance > 1.0 ? "<b>" + format_significance(s.significance) + "</b>"
                                                : format_significance(s.significance),
                           format_moment(clock(s.worst)), format_metres(s.position_m),

@@ -14,9 +14,7 @@ void add_moment(Json& out, const std::string& name, Timestamp stamp, const Traje
 Json scales_json(const TrajectoryComparison& c) {
   Json out = Json::array();
   for (const ScaleSummary& s : scale_summaries(c.explanation)) {
-    Json row{{"length_m", number(s.length_m)},
-             {"significance", number(s.significance)},
-             {"scale_significance", number(s.whole)}};
+    Json row{{"length_m", number(s.length_m)}, {"significance", number(s.significance)}};
     add_moment(row, "worst", s.worst, c);
     row["position_m"] = number(s.position_m);
     row["rotation_rad"] = number(s.rotation_rad);
@@ -108,7 +106,7 @@ std::string compare_json(const CompareReport& report) {
     disagree = disagree || c.explanation.disagrees();
     robots.push_back(robot_json(c));
   }
-  const Json out{{"format", 1},  // raised when a key changes its meaning or goes
+  const Json out{{"format", 2},  // raised when a key changes its meaning or goes
                  {"a", report.a},
                  {"b", report.b},
                  {"disagree", disagree},

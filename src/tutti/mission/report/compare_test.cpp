@@ -65,7 +65,6 @@ TEST(ScaleSummaries, SayHowMuchWhereAndSinceWhen) {
   e.significance(50, 2) = 1.5;
   e.significance(70, 2) = 6.0;
   e.significance(70, 4) = 0.9;
-  test::judge(e);
   const auto scales = scale_summaries(e);
   ASSERT_EQ(scales.size(), 6U);
   EXPECT_EQ(scales[2].since, e.stamps[50]);

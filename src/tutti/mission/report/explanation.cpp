@@ -20,8 +20,7 @@ using consistency::SuspectedOrigin;
 
 constexpr double kLeastShown = 0.1;  // of the threshold: below, all look the same
 constexpr double kLeft_px = 96.0;
-constexpr double kRight_px = 62.0;
-constexpr double kWhole_px = 34.0;  // squares for whole scales, right of the map
+constexpr double kRight_px = 16.0;
 constexpr double kTop_px = 8.0;
 constexpr double kBar_px = 12.0;
 constexpr double kThinnest_px = 3.0;
@@ -174,13 +173,6 @@ std::string explanation_svg(const ExplanationPicture& picture, double width_px) 
     svg.text({kLeft_px - 8.0, top + 0.5 * row + 4.0}, format_scale(e, static_cast<int>(s)), "tick", "end");
   }
   svg.segments(rows, "rowline");
-  const std::vector<double>& whole = e.scale_significance;
-  for (std::size_t s = 0; s < std::min(whole.size(), static_cast<std::size_t>(scales)); ++s)
-    svg.rect({right + 10.0, kTop_px + row * static_cast<double>(s)}, {kWhole_px, row - 1.0}, "cell",
-             fmt::format("scale {}, all along the way: {} the threshold", format_scale(e, static_cast<int>(s)),
-                         format_significance(whole[s])),
-             hex(significance_colour(whole[s])));
-  if (!whole.empty()) svg.text({right + 10.0 + 0.5 * kWhole_px, map_bottom + 14.0}, "all along", "tick", "middle");
   svg.vertical_text({13.0, 0.5 * (kTop_px + map_bottom)}, "scale: length of way", "axis");
   draw_hover_cells(svg, picture, x);
 
@@ -249,9 +241,7 @@ void draw_origins(Svg& svg, std::span<const SuspectedOrigin> origins, const Traj
 }
 
 double largest_significance(const Explanation& e) {
-  double largest = e.significance.size() > 0 ? e.significance.maxCoeff() : 0.0;
-  for (const double whole : e.scale_significance) largest = std::max(largest, whole);
-  return std::max(largest, e.direction_significance);
+  return std::max(e.significance.size() > 0 ? e.significance.maxCoeff() : 0.0, e.direction_significance);
 }
 
 std::string format_moment(double value_s) { return std::isfinite(value_s) ? fmt::format("{:.1f} s", value_s) : "-"; }

@@ -88,10 +88,8 @@ Json explanation_json(const RobotRecord& robot) {
   Json lengths = Json::array();
   for (const double length_m : e.scale_length_m) lengths.push_back(number(length_m));
   Json largest = Json::array();
-  Json whole = Json::array();
   for (Eigen::Index s = 0; s < e.significance.cols() && e.significance.rows() > 0; ++s)
     largest.push_back(number(e.significance.col(s).maxCoeff()));
-  for (const double significance : e.scale_significance) whole.push_back(number(significance));
   Json origins = Json::array();
   for (const auto& origin : e.origins) origins.push_back(origin_json(robot, origin));
   return {{"disagrees", e.disagrees()},
@@ -100,7 +98,6 @@ Json explanation_json(const RobotRecord& robot) {
           {"expected_rmse_m", e.expected_rmse_m > 0.0 ? number(e.expected_rmse_m) : Json(nullptr)},
           {"scale_length_m", std::move(lengths)},
           {"largest_significance", std::move(largest)},
-          {"scale_significance", std::move(whole)},
           {"direction_significance", number(e.direction_significance)},
           {"suspected_origins", std::move(origins)}};
 }
@@ -258,7 +255,7 @@ Json load_json(const ServerLoadRecord& load) {
 }
 
 /// Of report.json and timing.json; keys are added without a new one.
-constexpr int kFormat = 1;
+constexpr int kFormat = 2;
 
 /// Foreign text with broken UTF-8 must not make the writer throw.
 std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }

@@ -19,6 +19,7 @@ ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerificati
   closure.measurement.covariance = Ad_b * verification.covariance * Ad_b.transpose() +
                                    Ad_from * from.covariance * Ad_from.transpose() + to.covariance;
   verdict.closures.push_back(closure);
+  verdict.evidence = verification.evidence;
   return verdict;
 }
 

@@ -141,25 +141,25 @@ double allowed_misfit(double min_eigenvalue, const LidarClosureConfig& c) {
   return 1.0 + (c.max_misfit - 1.0) * min_eigenvalue / c.sure_eigenvalue;
 }
 
+/// What every gate measures, with its limit.
+std::vector<Refusal> gates(const PairVerification& v, const LidarClosureConfig& c) {
+  using enum RefusalReason;
+  return {{overlap, v.overlap, c.min_overlap},
+          {plane_rmse, v.plane_rmse_m, c.max_plane_rmse_m},
+          {misfit, v.misfit, allowed_misfit(v.min_eigenvalue, c)},
+          {free_to_slide, v.min_eigenvalue, c.min_eigenvalue},
+          {viewpoints, v.viewpoint_distance_m, c.max_viewpoint_distance_m},
+          {both_ways_distance, v.forward_backward_m, kMaxForwardBackward_m},
+          {both_ways_angle, v.forward_backward_deg, kMaxForwardBackward_deg},
+          {contradicted, v.contradiction, c.max_contradiction},
+          {ambiguous, v.rival_ratio, c.max_rival_ratio},
+          {ambiguous_along, v.slid_ratio, kMaxSlidRatio}};
+}
+
 /// Nothing when every gate is passed.
 std::optional<Refusal> why_refused(const PairVerification& v, const LidarClosureConfig& c) {
-  using enum RefusalReason;
-  const auto below = [](RefusalReason reason, double value, double least) {
-    return value < least ? std::optional(Refusal{reason, value, least}) : std::nullopt;
-  };
-  const auto above = [](RefusalReason reason, double value, double most) {
-    return value > most ? std::optional(Refusal{reason, value, most}) : std::nullopt;
-  };
-  for (const auto& refusal :
-       {below(overlap, v.overlap, c.min_overlap), above(plane_rmse, v.plane_rmse_m, c.max_plane_rmse_m),
-        above(misfit, v.misfit, allowed_misfit(v.min_eigenvalue, c)),
-        below(free_to_slide, v.min_eigenvalue, c.min_eigenvalue),
-        above(viewpoints, v.viewpoint_distance_m, c.max_viewpoint_distance_m),
-        above(both_ways_distance, v.forward_backward_m, kMaxForwardBackward_m),
-        above(both_ways_angle, v.forward_backward_deg, kMaxForwardBackward_deg),
-        above(contradicted, v.contradiction, c.max_contradiction), above(ambiguous, v.rival_ratio, c.max_rival_ratio),
-        above(ambiguous_along, v.slid_ratio, kMaxSlidRatio)})
-    if (refusal) return refusal;
+  for (const Refusal& gate : gates(v, c))
+    if (misses(gate)) return gate;
   return std::nullopt;
 }
 
@@ -200,6 +200,7 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
     out.refusal = why_refused(out, config);
   }
   out.accepted = !out.refusal;
+  if (out.accepted) out.evidence = gates(out, config);
   return out;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/loop_closure.hpp"
@@ -32,6 +33,7 @@ struct PairVerification {
   double rival_ratio = 0.0;    ///< Quality of the second best alignment over that of the best.
   double slid_ratio = 0.0;     ///< The same, a few metres along the direction that is constrained least.
   double correlation_score = 0.0;
+  std::vector<Refusal> evidence;  ///< When accepted: every gate's value and limit.
 };
 
 /// Decides from the two submaps alone whether they show the same place. Computed in the order of the submap ids, so

@@ -26,8 +26,8 @@ struct Field {
   std::span<const Field> inside = {};  ///< Of a message.
 };
 
-using v1::AgentState, v1::Cloud, v1::Job, v1::NumbersOfSession, v1::ProxyGraph, v1::Receipt, v1::SubmapPairs,
-    v1::Verdicts, v1::Submap, v1::Verdict;
+using v1::AgentState, v1::Cloud, v1::Job, v1::MissionStatus, v1::NumbersOfSession, v1::ProxyGraph, v1::Receipt,
+    v1::SubmapPairs, v1::SubmapRequest, v1::Verdicts, v1::Submap, v1::Verdict;
 constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;
 
 constexpr std::array kCloud = {Field{Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
@@ -43,10 +43,12 @@ constexpr std::array kProxyGraph = {
     Field{ProxyGraph::kComponentRobotFieldNumber, kMostChains, "robots of components"},
     Field{ProxyGraph::kComponentSessionFieldNumber, kMostChains, "sessions of components"},
     Field{ProxyGraph::kComponentFieldNumber, kMostChains, "components"}};
-constexpr std::array kVerdict = {Field{Verdict::kClosureFieldNumber, kMaxClosures, "closures", true}};
+constexpr std::array kVerdict = {Field{Verdict::kClosureFieldNumber, kMaxClosures, "closures", true},
+                                 Field{Verdict::kGateFieldNumber, kMaxClosures, "values as evidence"}};
 
 constexpr std::array kNumbers = {Field{NumbersOfSession::kBoundFieldNumber, 2 * kMaxStretches, "bounds"}};
-constexpr std::array kReceipt = {Field{Receipt::kStoredFieldNumber, kMostChains, "sessions", true, kNumbers}};
+constexpr std::array kReceipt = {Field{Receipt::kStoredFieldNumber, kMostChains, "sessions", true, kNumbers},
+                                 Field{Receipt::kRefusedFieldNumber, kMostChains, "sessions", true, kNumbers}};
 constexpr std::array kPairs = {Field{SubmapPairs::kFirstRobotFieldNumber, kMaxPairs, "pairs"},
                                Field{SubmapPairs::kFirstSessionFieldNumber, kMaxPairs, "pairs"},
                                Field{SubmapPairs::kFirstIndexFieldNumber, kMaxPairs, "pairs"},
@@ -58,11 +60,19 @@ constexpr std::array kVerdicts = {Field{Verdicts::kVerdictFieldNumber, kMaxPairs
                                   Field{Verdicts::kFailedFieldNumber, 1, "lists of pairs", true, kPairs}};
 constexpr std::array kAgentState = {Field{AgentState::kIntegerFieldNumber, kMaxStateBytes / 32, "integers"}};
 
+constexpr std::array kRequest = {Field{SubmapRequest::kRobotFieldNumber, kMaxRequested, "submaps"},
+                                 Field{SubmapRequest::kSessionFieldNumber, kMaxRequested, "submaps"},
+                                 Field{SubmapRequest::kIndexFieldNumber, kMaxRequested, "submaps"}};
+constexpr std::array kMissionStatus = {Field{MissionStatus::kRobotFieldNumber, kMaxRobots, "robots", true},
+                                       Field{MissionStatus::kWorkerFieldNumber, kMaxRobots, "workers", true},
+                                       Field{MissionStatus::kRefusalsFieldNumber, kMaxRefusalKinds, "refusals", true}};
+
 std::span<const Field> fields_of(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
       return kSubmap;
     case MessageKind::proxy_graph:
+    case MessageKind::proxy_graph_delta:
       return kProxyGraph;
     case MessageKind::verdict:
       return kVerdict;
@@ -76,7 +86,13 @@ std::span<const Field> fields_of(MessageKind kind) {
       return kJob;
     case MessageKind::verdicts:
       return kVerdicts;
-    case MessageKind::status:  // of no use yet
+    case MessageKind::submap_request:
+      return kRequest;
+    case MessageKind::mission_status:
+      return kMissionStatus;
+    case MessageKind::submap_copy:
+    case MessageKind::word:
+    case MessageKind::status:  // have no lists
       return {};
   }
   return {};

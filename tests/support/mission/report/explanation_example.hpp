@@ -11,13 +11,6 @@
 /// For tests of what people are shown: a made-up explanation with plausible shapes.
 namespace tutti::mission::test {
 
-/// Fills in what follows from the significance of the nodes.
-inline void judge(consistency::Explanation& e) {
-  e.scale_significance.clear();
-  for (Eigen::Index s = 0; s < e.significance.cols(); ++s)
-    e.scale_significance.push_back(e.significance.col(s).maxCoeff());
-}
-
 /// Nodes are the poses of `way`. Around every origin the disagreement stands out, wider at larger scales; elsewhere it
 /// is a third of its threshold.
 inline consistency::Explanation example_explanation(const Trajectory& way,
@@ -50,7 +43,6 @@ inline consistency::Explanation example_explanation(const Trajectory& way,
   e.aligned_rmse_m = 0.71;
   e.expected_rmse_m = 0.02;
   e.origins = std::move(origins);
-  judge(e);
   return e;
 }
 

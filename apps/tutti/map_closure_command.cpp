@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// tutti map closure: why closures are in a map or not, and the operator's word on them.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <thread>
+
+#include "commands.hpp"
+#include "map_command.hpp"
+#include "options.hpp"
+#include "tutti/bus/nats_port.hpp"
+#include "tutti/mapfile/closures.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::app {
+namespace {
+
+constexpr const char* kCommand = "map closure";
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+constexpr auto kHandOver = std::chrono::seconds(10);
+
+struct Options {
+  std::string map, closure, by, bus;
+  bool insecure = false, rejected = false;
+};
+
+std::string time_of(std::int64_t ns) {
+  return fmt::format("{:%F %T} UTC", fmt::gmtime(static_cast<std::time_t>(ns / 1'000'000'000)));
+}
+
+Result<std::vector<mapfile::ClosureInfo>> closures_of(const std::string& file) {
+  const auto map = mapfile::open(file);
+  if (!map) return tl::unexpected(map.error());
+  const auto content = mapfile::read(**map);
+  if (!content) return tl::unexpected(content.error());
+  return mapfile::closures(*content, mapfile::estimate(*content));
+}
+
+int list(const Options& options) {
+  const auto closures = closures_of(options.map);
+  if (!closures) return complain(kCommand, closures.error().message);
+  fmt::print("{:<32} {:<10} {}\n", "closure", "state", "why");
+  for (const mapfile::ClosureInfo& info : *closures)
+    if (!options.rejected || info.state == mapfile::ClosureState::rejected)
+      fmt::print("{:<32} {:<10} {}\n", info.name, to_string(info.state), info.reason);
+  return 0;
+}
+
+void print(const mapfile::ClosureFit& fit) {
+  const RelativePose& measured = fit.closure.measurement;
+  const Eigen::Vector3d& t = measured.T_a_b.translation;
+  const Eigen::Quaterniond& q = measured.T_a_b.rotation;
+  const Vector6d sigma = measured.covariance.diagonal().cwiseSqrt();
+  fmt::print("\nkeyframes    {} and {}: {}{}{}\n", fit.closure.from.index, fit.closure.to.index, to_string(fit.state),
+             fit.objection == server::Objection::none ? "" : ", ", to_string(fit.objection));
+  fmt::print("measured     x y z {:.3f} {:.3f} {:.3f} m, quaternion x y z w {:.5f} {:.5f} {:.5f} {:.5f}\n", t.x(),
+             t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  fmt::print("sigma        {:.3f} {:.3f} {:.3f} m, {:.2f} {:.2f} {:.2f} deg\n", sigma(0), sigma(1), sigma(2),
+             kDegPerRad * sigma(3), kDegPerRad * sigma(4), kDegPerRad * sigma(5));
+  if (fit.misfit)
+    fmt::print("off the map  {:.3f} m, {:.2f} deg; squared error {:.3g} (6 degrees of freedom)\n",
+               fit.misfit->position_m, kDegPerRad * fit.misfit->rotation_rad, fit.misfit->chi2);
+  else
+    fmt::print("off the map  nothing ties its two ends\n");
+}
+
+/// Who says what of it, and what was measured.
+void print_origin(const mapfile::ClosureInfo& info) {
+  if (info.word)
+    fmt::print("word         {}{} at {}\n", to_string(info.word->wish),
+               info.word->by.empty() ? "" : " by " + info.word->by, time_of(info.word->given_ns));
+  if (info.verdict) {
+    const ClosureVerdict& verdict = *info.verdict;
+    fmt::print("verified     by {}{}, finder version {}\n",
+               verdict.worker ? fmt::format("worker {}", *verdict.worker) : "an unknown worker",
+               verdict.verified_ns != 0 ? " at " + time_of(verdict.verified_ns) : "", verdict.finder_version);
+    for (const Refusal& measured : verdict.evidence) {
+      const RefusalKind& kind = kind_of(measured.reason);
+      fmt::print("  {:<40} {:>8.3f} {:<4} {} {:.3f}\n", kind.words, measured.value, kind.unit,
+                 kind.bound == RefusalKind::Bound::at_least ? "at least" : "at most", measured.limit);
+    }
+  }
+}
+
+int show(const Options& options) {
+  const auto map = mapfile::open(options.map);
+  if (!map) return complain(kCommand, map.error().message);
+  const auto content = mapfile::read(**map);
+  if (!content) return complain(kCommand, content.error().message);
+  const auto pair = content->closure_names().find(options.closure);
+  if (!pair) return complain(kCommand, pair.error().message);
+  const auto closures = mapfile::closures(*content, mapfile::estimate(*content));
+  const auto found = std::ranges::find(closures, *pair, &mapfile::ClosureInfo::pair);
+  if (found == closures.end()) return complain(kCommand, options.closure + ": no closure was found there");
+  fmt::print("closure      {}\nstate        {}{}{}\n", found->name, to_string(found->state),
+             found->reason.empty() ? "" : ": ", found->reason);
+  print_origin(*found);
+  for (const mapfile::ClosureFit& fit : found->closures) print(fit);
+  return 0;
+}
+
+/// To the server that has the map open.
+Status send(const Options& options, const ClosureWord& word) {
+  const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
+  auto port = bus::open_nats_port(self, {.url = options.bus, .allow_insecure = options.insecure});
+  if (!port) return tl::unexpected(port.error());
+  const bus::Envelope envelope{self, bus::Endpoint::server(), bus::MessageKind::word,
+                               fmt::format("{}/{}/{}", to_string(word.wish), word.given_ns, getpid()),
+                               std::make_shared<const std::string>(wire::encode(word))};
+  if (auto sent = (*port)->send(envelope); !sent) return sent;
+  const auto end = std::chrono::steady_clock::now() + kHandOver;
+  while ((*port)->state().waiting_messages > 0) {
+    if (std::chrono::steady_clock::now() > end)
+      return fail(ErrorCode::io, "{}: the bus has not taken the word within {} s: {}", options.bus, kHandOver.count(),
+                  (*port)->state().last_error);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return {};
+}
+
+int say(const Options& options, Wish wish) {
+  if (options.map.empty() == options.bus.empty())
+    return complain(kCommand, "expected a map's file, or --bus URL of the server that has it open", 2);
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const ClosureWord word{options.closure, wish, options.by,
+                         std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+  if (auto ok = wire::validate(word); !ok) return complain(kCommand, ok.error().message, 2);
+  if (!options.bus.empty()) {
+    if (auto sent = send(options, word); !sent) return complain(kCommand, sent.error().message);
+    fmt::print("{} {}: handed to the bus; the server's events say whether it was taken\n", to_string(wish),
+               options.closure);
+    return 0;
+  }
+  const auto map = mapfile::open(options.map);
+  if (!map) return complain(kCommand, map.error().message);
+  if (auto stored = mapfile::put_word(**map, word); !stored) return complain(kCommand, stored.error().message);
+  fmt::print("{} {}: stored; the server follows when it opens the map\n", to_string(wish), options.closure);
+  return 0;
+}
+
+void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_code) {
+  const auto options = std::make_shared<Options>();
+  const char* user = std::getenv("USER");
+  if (user != nullptr) options->by = user;
+  CLI::App* word = command.add_subcommand(to_string(wish), help);
+  word->add_option("closure", options->closure, "As `closure list` names it, e.g. alpha/12-bravo/7.")
+      ->type_name("ID")
+      ->required();
+  word->add_option("map", options->map, "The map's file (a server's STATE/map.tutti), when no server has it open.")
+      ->type_name("MAP");
+  word->add_option("--bus", options->bus, "The bus of the server that has the map open, instead of a file.")
+      ->type_name("nats://HOST:PORT");
+  word->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet.");
+  word->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
+  word->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });
+}
+
+}  // namespace
+
+void add_map_closure_command(CLI::App& map, int& exit_code) {
+  CLI::App* closure =
+      map.add_subcommand("closure", "Loop closures: why they are in the map or not, and your word on them.");
+  closure->require_subcommand(1);
+  closure->footer(
+      "A closure's name is that of its two submaps: alpha/12-bravo/7; alpha.2/3 is of alpha's second session.\n"
+      "Your word stands above the server's judgement, survives restarts, and the map follows at its next update.\n");
+  const auto listing = std::make_shared<Options>(), showing = std::make_shared<Options>();
+  CLI::App* all = closure->add_subcommand("list", "Every pair of submaps with closures, accepted or not, and why.");
+  all->add_option("map", listing->map, "The map's file.")->type_name("MAP")->required();
+  all->add_flag("--rejected", listing->rejected, "Only those that are not in the map.");
+  all->callback([listing, &exit_code] { exit_code = list(*listing); });
+  CLI::App* one =
+      closure->add_subcommand("show", "The evidence for one: what was measured, by whom, and how it fits the map.");
+  one->add_option("closure", showing->closure, "As `closure list` names it.")->type_name("ID")->required();
+  one->add_option("map", showing->map, "The map's file.")->type_name("MAP")->required();
+  one->callback([showing, &exit_code] { exit_code = show(*showing); });
+  add_word(*closure, Wish::accept, "It is right: in the map, with its covariance, whatever contradicts it.", exit_code);
+  add_word(*closure, Wish::reject, "It is wrong: never in the map.", exit_code);
+  add_word(*closure, Wish::withdraw, "Take your word back: the server judges again.", exit_code);
+}
+
+}  // namespace tutti::app

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// tutti map: maps as files that no server has open.
+#include "map_command.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "tutti/mapfile/closures.hpp"
+#include "tutti/mapfile/export.hpp"
+#include "tutti/mapfile/merge.hpp"
+#include "tutti/server/map_components.hpp"
+
+namespace tutti::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// As storage/sqlite_store.cpp marks its files; what kind of store it is, opening it tells.
+bool looks_like_ours(const fs::path& file) {
+  std::string head(72, '\0');
+  std::ifstream(file, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head.starts_with("SQLite format 3") && head.substr(68, 4) == "Tutt";
+}
+
+/// Of the file, and of the log that is part of it after a crash.
+std::string last_change(const fs::path& file) {
+  std::error_code failure;
+  fs::file_time_type last = fs::last_write_time(file, failure);
+  const auto log = fs::last_write_time(file.string() + "-wal", failure);
+  if (!failure) last = std::max(last, log);
+  const auto time = std::chrono::file_clock::to_sys(last);
+  return fmt::format(
+      "{:%F %H:%M}",
+      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::time_point_cast<std::chrono::seconds>(time))));
+}
+
+std::string size_of(std::uint64_t bytes) {
+  return bytes < 1'000'000 ? fmt::format("{:.1f} kB", 1e-3 * static_cast<double>(bytes))
+                           : fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
+}
+
+struct Counts {
+  std::size_t robots = 0, sessions = 0, pairs = 0;
+};
+
+Counts count(const mapfile::Content& content) {
+  std::set<RobotId> robots;
+  std::set<ChainId> chains;
+  for (const auto& [id, submap] : content.submaps) {
+    robots.insert(id.chain.robot);
+    chains.insert(id.chain);
+  }
+  const auto found = std::ranges::count_if(content.verdicts, [](const auto& v) { return !v.second.closures.empty(); });
+  return {robots.size(), chains.size(), static_cast<std::size_t>(found)};
+}
+
+int list_maps(const fs::path& folder) {
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure)) return complain("map list", folder.string() + ": no such folder");
+  std::vector<fs::path> files;
+  const auto options = fs::directory_options::skip_permission_denied;
+  for (auto at = fs::recursive_directory_iterator(folder, options, failure); at != fs::end(at); at.increment(failure)) {
+    if (at.depth() > 2) at.disable_recursion_pending();
+    if (at->is_regular_file(failure) && looks_like_ours(at->path())) files.push_back(at->path());
+  }
+  std::ranges::sort(files);
+  bool any = false;
+  const auto print = [&](const auto&... columns) {
+    if (!any)
+      fmt::print("{:<32} {:>10} {:>7} {:>9} {:>8} {:>9}  {}\n", "map", "size", "robots", "sessions", "submaps",
+                 "closures", "last change (UTC)");
+    any = true;
+    fmt::print("{:<32} {:>10} {:>7} {:>9} {:>8} {:>9}  {}\n", columns...);
+  };
+  for (const fs::path& file : files) {
+    const std::string changed = last_change(file), name = fs::relative(file, folder, failure).string();
+    const std::string size = size_of(fs::file_size(file, failure));
+    const auto map = mapfile::open(file);
+    if (!map && map.error().message.find("holds a") != std::string::npos) continue;  // a robot's
+    const auto content = map ? mapfile::read(**map) : tl::unexpected(map.error());
+    if (!content) {
+      fmt::print(stderr, "{}\n", content.error().message);
+      print(name, size, "?", "?", "?", "?", changed);
+      continue;
+    }
+    const Counts counts = count(*content);
+    print(name, size, counts.robots, counts.sessions, content->submaps.size(), counts.pairs, changed);
+  }
+  if (!any) fmt::print("{}: no maps\n", folder.string());
+  return 0;
+}
+
+void print_tables(const mapfile::Content& content) {
+  fmt::print("\n{:<10} {:>8} {:>12}  {}\n", "table", "rows", "bytes", "rows by version of their message");
+  for (const auto& [name, table] : content.tables) {
+    std::string versions;
+    for (const auto& [version, rows] : table.versions)
+      versions += fmt::format("{}v{}: {}", versions.empty() ? "" : ", ", version, rows);
+    fmt::print("{:<10} {:>8} {:>12}  {}\n", name, table.rows, table.bytes, versions);
+  }
+}
+
+void print_robots(const mapfile::Content& content, const server::MapEstimate& map) {
+  const server::ClosureNames names = content.closure_names();
+  const server::MapComponents components = server::choose_components(map);
+  struct Session {
+    std::size_t submaps = 0, keyframes = 0;
+    Timestamp first = kLastTimestamp, last = kFirstTimestamp;
+  };
+  std::map<ChainId, Session> sessions;
+  for (const auto& [id, submap] : content.submaps) {
+    Session& session = sessions[id.chain];
+    ++session.submaps;
+    session.first = std::min(session.first, submap->keyframes.front().stamp);
+    session.last = std::max(session.last, submap->keyframes.back().stamp);
+  }
+  for (const server::MapNode& node : map.nodes) ++sessions[node.id.chain].keyframes;
+  fmt::print("\n{:<20} {:>10} {:>20} {:>8} {:>9} {:>8}  {}\n", "robot", "number", "session", "submaps", "keyframes",
+             "minutes", "in the joint map");
+  for (const auto& [chain, session] : sessions) {
+    const auto component = components.of_chain.find(chain);
+    const bool joined = component != components.of_chain.end() && component->second == components.largest;
+    fmt::print("{:<20} {:>10} {:>20} {:>8} {:>9} {:>8.1f}  {}\n", names.of(chain), chain.robot.value, chain.session,
+               session.submaps, session.keyframes, (session.last - session.first) / 60.0, joined ? "yes" : "no");
+  }
+}
+
+int show_map(const fs::path& file) {
+  const std::string changed = last_change(file);
+  const auto map = mapfile::open(file);
+  if (!map) return complain("map info", map.error().message);
+  const auto content = mapfile::read(**map);
+  if (!content) return complain("map info", content.error().message);
+  const server::MapEstimate estimate = mapfile::estimate(*content);
+  std::error_code failure;
+  std::map<std::string, std::size_t> states;
+  std::map<std::uint32_t, std::size_t> finders;
+  std::size_t by_operator = 0;
+  for (const mapfile::ClosureInfo& info : mapfile::closures(*content, estimate)) {
+    ++states[to_string(info.state)];
+    if (info.word && info.word->wish != Wish::withdraw) ++by_operator;
+    if (info.verdict) ++finders[info.verdict->finder_version];
+  }
+  fmt::print(
+      "map          {}\nsize         {}\nlast change  {} UTC\nserver       epoch {}, revision {}, opened {} times{}\n",
+      file.string(), size_of(fs::file_size(file, failure)), changed, content->meta.epoch, content->meta.revision,
+      content->meta.start, content->meta.news ? ", with news since" : "");
+  fmt::print("submaps      {}\nclosures     {} accepted, {} rejected, {} candidates; {} by an operator's word\n",
+             content->submaps.size(), states["accepted"], states["rejected"], states["candidate"], by_operator);
+  for (const auto& [version, pairs] : finders) {
+    fmt::print("finder       version {}: closures between {} pairs, {} refused\n", version, pairs,
+               content->refused.contains(version) ? content->refused.at(version) : 0);
+  }
+  for (const auto& [version, pairs] : content->refused)
+    if (!finders.contains(version))
+      fmt::print("finder       version {}: closures between 0 pairs, {} refused\n", version, pairs);
+  fmt::print("joint map    {} keyframes, {} components\n", estimate.nodes.size(), estimate.components);
+  print_robots(*content, estimate);
+  print_tables(*content);
+  return 0;
+}
+
+struct ExportOptions {
+  std::string map, g2o, tum, ply;
+};
+
+int export_map(const ExportOptions& options) {
+  if (options.g2o.empty() && options.tum.empty() && options.ply.empty())
+    return complain("map export", "nothing to write: expected --g2o, --tum or --ply", 2);
+  const auto map = mapfile::open(options.map);
+  if (!map) return complain("map export", map.error().message);
+  const auto content = mapfile::read(**map);
+  if (!content) return complain("map export", content.error().message);
+  const server::MapEstimate estimate = mapfile::estimate(*content);
+  if (estimate.components > 1)
+    fmt::print("note: {} components, of which each has a frame of its own\n", estimate.components);
+  if (!options.g2o.empty()) {
+    if (auto ok = mapfile::export_g2o(estimate, options.g2o); !ok) return complain("map export", ok.error().message);
+    fmt::print("{}: {} vertices, {} edges\n", options.g2o, estimate.graph.poses.size(), estimate.graph.edges.size());
+  }
+  if (!options.tum.empty()) {
+    const auto files = mapfile::export_tum(*content, estimate, options.tum);
+    if (!files) return complain("map export", files.error().message);
+    for (const std::string& file : *files) fmt::print("{}\n", (fs::path(options.tum) / file).string());
+  }
+  if (!options.ply.empty()) {
+    const auto cloud = mapfile::export_ply(**map, *content, estimate, options.ply);
+    if (!cloud) return complain("map export", cloud.error().message);
+    if (cloud->points == 0) return complain("map export", options.map + ": no submap of the joint map has a cloud");
+    fmt::print("{}: {} points of {} submaps{}\n", options.ply, cloud->points, cloud->submaps,
+               cloud->left_out > 0 ? fmt::format("; {} are not tied to the joint map", cloud->left_out) : "");
+  }
+  return 0;
+}
+
+struct MergeOptions {
+  std::vector<std::string> maps;
+  std::string out;
+};
+
+int merge_maps(const MergeOptions& options) {
+  const auto merged = mapfile::merge(fs::path(options.maps[0]), fs::path(options.maps[1]), fs::path(options.out));
+  if (!merged) return complain("map merge", merged.error().message);
+  fmt::print("{}: {} submaps, of which {} were in both\n", options.out, merged->submaps, merged->shared);
+  return 0;
+}
+
+}  // namespace
+
+void add_map_command(CLI::App& app, int& exit_code) {
+  CLI::App* map = app.add_subcommand(
+      "map",
+      "Look into maps, export and join them, and say which closures are right. On files that no server has open.");
+  map->require_subcommand(1);
+
+  const auto folder = std::make_shared<std::string>(".");
+  CLI::App* list =
+      map->add_subcommand("list", "The maps in a folder: size, robots, sessions, submaps, pairs with closures.");
+  list->add_option("folder", *folder, "Where to look, three levels deep.")->type_name("DIR")->capture_default_str();
+  list->callback([folder, &exit_code] { exit_code = list_maps(*folder); });
+
+  const auto file = std::make_shared<std::string>();
+  CLI::App* info = map->add_subcommand("info", "What one map holds: sessions, closures, bytes and versions.");
+  info->add_option("map", *file, "The map's file.")->type_name("MAP")->required();
+  info->callback([file, &exit_code] { exit_code = show_map(*file); });
+
+  const auto options = std::make_shared<ExportOptions>();
+  CLI::App* out = map->add_subcommand("export", "Write the joint map for other programs.");
+  out->add_option("map", options->map, "The map's file.")->type_name("MAP")->required();
+  out->add_option("--g2o", options->g2o, "The joint pose graph; beside it which keyframe each vertex is.")
+      ->type_name("FILE.g2o");
+  out->add_option("--tum", options->tum, "Every session's trajectory in the joint map, as NAME.tum.")->type_name("DIR");
+  out->add_option("--ply", options->ply, "What all robots saw, thinned to voxels of 0.1 m.")->type_name("FILE.ply");
+  out->callback([options, &exit_code] { exit_code = export_map(*options); });
+
+  const auto merging = std::make_shared<MergeOptions>();
+  CLI::App* merge = map->add_subcommand("merge", "Join two maps into a third; the two stay as they are.");
+  merge->footer(
+      "The server that opens it looks for closures between them. A robot that is in both, with sessions of its own in "
+      "each, has them\nside by side. Refused: one number for two robots, one submap with two contents.\n"
+      "Example: tutti map merge monday/map tuesday/map -o both/map\n");
+  merge->add_option("maps", merging->maps, "The two maps.")->type_name("MAP")->required()->expected(2);
+  merge->add_option("-o,--output", merging->out, "The map to be made; it must not be there.")
+      ->type_name("MAP")
+      ->required();
+  merge->callback([merging, &exit_code] { exit_code = merge_maps(*merging); });
+
+  add_map_closure_command(*map, exit_code);
+}
+
+}  // namespace tutti::app

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace tutti::app {
+
+/// `tutti map closure ...`, below `tutti map`.
+void add_map_closure_command(CLI::App& map, int& exit_code);
+
+}  // namespace tutti::app

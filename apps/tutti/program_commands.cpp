@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The programs that talk over a bus: server, robot, worker, and all of them at once: mission up.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "program_options.hpp"
+#include "tutti/program/robot_program.hpp"
+#include "tutti/program/server_program.hpp"
+#include "tutti/program/stop.hpp"
+#include "tutti/program/worker_program.hpp"
+
+namespace tutti::app {
+namespace {
+
+void add_bus_option(CLI::App& command, std::string& bus, bool& insecure) {
+  command.add_option("--bus", bus, "The bus, as the server prints it")->type_name("nats://HOST:PORT")->required();
+  command.add_flag("--insecure", insecure, "Use a bus on another machine although there is no TLS yet");
+}
+
+void add_state_option(CLI::App& command, std::filesystem::path& state, const std::string& what) {
+  command.add_option("--state", state, what)->type_name("DIR")->required();
+}
+
+}  // namespace
+
+void add_server_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<program::ServerOptions>();
+  const auto common = std::make_shared<ProgramArguments>();
+  options->version = TUTTI_VERSION;
+  CLI::App* command = app.add_subcommand(
+      "server",
+      "The mapping server: joins the maps of all robots of its bus into one file, STATE/map.tutti, and sends each "
+      "robot\n"
+      "what it needs. Without --bus it starts a nats-server of its own. Prints one line: the command that starts a "
+      "robot.\n"
+      "Killed at any moment and started again with the same --state it goes on; SIGTERM or Ctrl-C stop it.");
+  add_state_option(*command, options->state, "Folder of this server: map, log, events, bus; made if missing");
+  command->add_option("--bus", options->bus, "A NATS bus that runs already")->type_name("nats://HOST:PORT");
+  command
+      ->add_option("--listen", options->listen,
+                   "Where the server's own bus is to be reached; default: from this machine only, the port of the last "
+                   "time, else any from 20000 on")
+      ->type_name("HOST[:PORT]");
+  command->add_flag(
+      "--insecure", options->insecure,
+      "Let other machines in although there is no TLS yet: whoever reaches the port can write to the map");
+  add_mission_argument(*command, *common, "Names of the robots and all settings; without it any robot is welcome");
+  command->add_option("--threads", options->threads, "Threads that verify loop closures here; 0 = only workers do")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  add_rate_option(*command, options->rate,
+                  "How fast mission time passes, for robots that replay faster than real time");
+  add_program_options(*command, *common);
+  options->announce = [](const std::string& line) {
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+  };
+  command->callback([options, common, &exit_code] {
+    options->mission = common->mission;
+    exit_code = run_program("server", *common, options->console,
+                            [&] { return program::run_server(*options, program::stop_asked()); });
+  });
+}
+
+void add_robot_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<program::RobotOptions>();
+  const auto common = std::make_shared<ProgramArguments>();
+  options->version = TUTTI_VERSION;
+  CLI::App* command = app.add_subcommand(
+      "robot",
+      "One robot: takes odometry and scans from a live feed, or replays its recording in a mission, sends submaps to "
+      "the\n"
+      "server and corrects itself by what the server sends back. Needs no link: what the server has not stored waits "
+      "in\n"
+      "STATE. Killed at any moment and started again with the same --state it goes on where it stood. Ends when the\n"
+      "recording has and the server has everything.");
+  command->add_option("--name", options->name, "Its name in the mission; with --feed any, another for each robot")
+      ->type_name("NAME")
+      ->required();
+  add_bus_option(*command, options->bus, options->insecure);
+  add_state_option(*command, options->state,
+                   "Folder of this robot: what it knows, and what is not sent yet; made if missing");
+  add_mission_argument(*command, *common,
+                       "The mission whose recording is replayed, or 'demo'; with --feed: only names and settings");
+  command
+      ->add_option("--feed", options->feed,
+                   "Take odometry and scans on this Unix socket and answer with where the robot is (docs/protocol.md)")
+      ->type_name("SOCKET");
+  add_number(*command, "--uplink-budget", options->uplink_bytes_per_s,
+             "What its submaps may take of the link, the newest first; 0 = no limit", "BYTES_PER_S", within(0.0, 1e12));
+  add_rate_option(*command, options->rate, "Times real time: the recording; with --feed, mission time");
+  command->add_flag("--stay", options->stay, "Go on listening after the recording, until SIGTERM");
+  command->add_option("--session", options->session, "Number of its session; default: when STATE was made")
+      ->check(whole_number())
+      ->group("");
+  add_program_options(*command, *common);
+  command->callback([options, common, &exit_code] {
+    options->mission = common->mission;
+    if (options->feed.empty() && options->mission.file.empty()) {
+      exit_code = complain("robot", "expected a mission, whose recording is replayed, or --feed SOCKET", 2);
+      return;
+    }
+    exit_code = run_program("robot", *common, options->console,
+                            [&] { return program::run_robot(*options, program::stop_asked()); });
+  });
+}
+
+void add_worker_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<program::WorkerOptions>();
+  const auto common = std::make_shared<ProgramArguments>();
+  options->version = TUTTI_VERSION;
+  CLI::App* command = app.add_subcommand(
+      "worker",
+      "Verifies loop closures for the server of a bus: any number of them, on any machine, come and go as they like.\n"
+      "Keeps nothing: killed in the middle of a job it costs time only, the job goes to another. SIGTERM or Ctrl-C "
+      "stop "
+      "it.");
+  add_bus_option(*command, options->bus, options->insecure);
+  add_mission_argument(*command, *common, "As the server has it, for how closures are found; without it from LiDAR");
+  command->add_option("--threads", options->threads, "Pairs that are verified at a time; 0 = one on each core")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  add_program_options(*command, *common);
+  command->callback([options, common, &exit_code] {
+    options->mission = common->mission;
+    exit_code = run_program("worker", *common, options->console,
+                            [&] { return program::run_worker(*options, program::stop_asked()); });
+  });
+}
+
+}  // namespace tutti::app

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "tutti/bus/nats_port.hpp"
+#include "tutti/node/status_text.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kFresh_s = 6.0;  // three of the server's periods: it is there
+
+struct StatusOptions {
+  std::string bus;
+  bool insecure = false;
+  bool json = false;
+  bool watch = false;
+  double wait_s = 6.0;
+};
+
+double since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
+
+/// What this viewer has seen of the server.
+class View {
+ public:
+  /// Whether there is something new.
+  bool look(bus::Port& port) {
+    bool is_new = false;
+    for (const bus::Received& received : port.receive()) {
+      auto decoded = wire::decode_mission_status(*received.envelope.bytes);
+      if (!decoded) {
+        problem_ = decoded.error().message;
+        continue;
+      }
+      status_ = std::move(*decoded);
+      ++seen_;
+      came_ = Clock::now();
+      is_new = true;
+    }
+    return is_new;
+  }
+  [[nodiscard]] const std::optional<MissionStatus>& status() const { return status_; }
+  [[nodiscard]] const std::string& problem() const { return problem_; }
+  /// For how long the server has said nothing. The first status may be an old one that the bus has kept: its age is
+  /// what the clocks on the walls say, until a second one comes.
+  [[nodiscard]] double silent_s() const {
+    if (!status_) return 0.0;
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    const double by_wall_s =
+        1e-9 *
+        static_cast<double>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count() - status_->wall_ns);
+    return seen_ > 1 || status_->wall_ns == 0 ? since(came_) : std::max(0.0, by_wall_s);
+  }
+  /// A server whose clock is another one is there when it is heard twice.
+  [[nodiscard]] bool is_there() const {
+    return status_ && silent_s() < kFresh_s && (seen_ > 1 || status_->wall_ns != 0);
+  }
+
+ private:
+  std::optional<MissionStatus> status_;
+  std::string problem_;
+  std::size_t seen_ = 0;
+  Clock::time_point came_;
+};
+
+Json json_of(const NodeStatus& status) {
+  Json out{{"name", status.name},
+           {"session", status.session},
+           {"version", status.version},
+           {"backlog_submaps", status.backlog_submaps},
+           {"backlog_bytes", status.backlog_bytes},
+           {"heard_epoch", status.heard_epoch},
+           {"heard_revision", status.heard_revision},
+           {"keyframes", status.keyframes},
+           {"alerts", status.alerts},
+           {"finished", status.finished},
+           {"jobs_done", status.jobs_done},
+           {"trouble", status.trouble}};
+  return out;
+}
+
+Json seconds_before(Timestamp time, const std::optional<Timestamp>& then) {
+  return then ? Json(time - *then) : Json(nullptr);
+}
+
+Json json_of(const MissionStatus& status, double silent_s) {
+  Json out{{"server_silent_s", silent_s},
+           {"time_s", status.time - Timestamp{}},
+           {"version", status.version},
+           {"epoch", status.epoch},
+           {"revision", status.revision},
+           {"submaps", status.submaps},
+           {"closures", status.closures},
+           {"components", status.components},
+           {"pending_jobs", status.pending_jobs},
+           {"has_news", status.has_news},
+           {"trouble", status.trouble},
+           {"robots", Json::array()},
+           {"workers", Json::array()},
+           {"refusals", Json::array()}};
+  for (const MissionStatus::Robot& robot : status.robots) {
+    Json entry = json_of(robot.status);
+    entry["number"] = robot.robot.value;
+    entry["last_seen_s_ago"] = seconds_before(status.time, robot.last_seen);
+    entry["last_update_s_ago"] = seconds_before(status.time, robot.last_update);
+    entry["submaps"] = robot.submaps;
+    entry["refused_submaps"] = robot.refused;
+    entry["conflict"] = robot.conflict;
+    out["robots"].push_back(std::move(entry));
+  }
+  for (const MissionStatus::Worker& worker : status.workers) {
+    Json entry = json_of(worker.status);
+    entry["number"] = worker.number;
+    entry["last_seen_s_ago"] = status.time - worker.last_seen;
+    out["workers"].push_back(std::move(entry));
+  }
+  for (const MissionStatus::Refusals& refusals : status.refusals)
+    out["refusals"].push_back(
+        {{"from", refusals.from}, {"kind", refusals.kind}, {"count", refusals.count}, {"last_why", refusals.last_why}});
+  return out;
+}
+
+void show(const View& view, const StatusOptions& options) {
+  const double silent_s = view.is_there() ? 0.0 : view.silent_s();
+  if (options.json) {
+    fmt::print("{}\n", json_of(*view.status(), silent_s).dump());
+  } else {
+    if (options.watch && isatty(STDOUT_FILENO) != 0) fmt::print("\033[H\033[2J");
+    fmt::print("{}", node::mission_status_text(*view.status(), silent_s));
+  }
+  std::fflush(stdout);
+}
+
+/// Until something is to be seen, or it is clear that nothing is. The exit code.
+int look_once(bus::NatsPort& port, View& view, const StatusOptions& options) {
+  bool connected = false;
+  for (const auto begin = Clock::now(); since(begin) < options.wait_s && !view.is_there();
+       std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
+    view.look(port);
+    connected = connected || port.state().connected;
+  }
+  if (view.status()) {
+    show(view, options);
+    return view.is_there() ? 0 : 1;
+  }
+  const std::string error = view.problem().empty() ? port.state().last_error : view.problem();
+  if (!connected) return complain("status", fmt::format("no bus at {} ({})", options.bus, error));
+  return complain("status", fmt::format("there is a bus at {}, but no server has said anything on it{}", options.bus,
+                                        error.empty() ? "" : " (" + error + ")"));
+}
+
+int watch(bus::NatsPort& port, View& view, const StatusOptions& options) {
+  if (const int code = look_once(port, view, options); code != 0 && !view.status()) return code;
+  for (auto shown = Clock::now();; std::this_thread::sleep_for(std::chrono::milliseconds(50))) {
+    if (!view.look(port) && since(shown) < kFresh_s) continue;  // of a silent server, how long it is silent
+    show(view, options);
+    shown = Clock::now();
+  }
+}
+
+int run(const StatusOptions& options) {
+  auto port = bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())),
+                                  {.url = options.bus, .allow_insecure = options.insecure});
+  if (!port) return complain("status", port.error().message, 2);
+  View view;
+  return options.watch ? watch(**port, view, options) : look_once(**port, view, options);
+}
+
+}  // namespace
+
+void add_status_command(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<StatusOptions>();
+  auto* command = app.add_subcommand(
+      "status", "Who is there, and how the mission stands: what the server on this bus says every two seconds.");
+  command->footer(
+      "Exit codes: 0 the server is there; 1 no bus, or no server (then what it said last); 2 usage.\n"
+      "Example: tutti status --bus nats://127.0.0.1:4222 --watch\n");
+  command->add_option("--bus", options->bus, "The bus, as the server prints it")
+      ->type_name("nats://HOST:PORT")
+      ->required();
+  command->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet");
+  command->add_flag("--json", options->json, "One JSON object on a line instead of a table");
+  command->add_flag("--watch", options->watch, "Go on, and show it again whenever something is new");
+  add_number(*command, "--wait", options->wait_s, "How long to listen for a server at most", "S");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace tutti::app

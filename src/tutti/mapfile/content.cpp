@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/content.hpp"
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "tutti/node/submap_frames.hpp"
+#include "tutti/node/words.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+/// Counts a table's rows; hands each, decoded, to `take`; the first error ends it.
+template <class Decode, class Take>
+Status read_table(const storage::TableStore& map, const std::string& name, Decode&& decode, Take&& take,
+                  Content& content) {
+  Content::Table& table = content.tables[name];
+  Status ok;
+  const auto scanned = map.scan(name, {}, [&](std::string_view key, std::string_view bytes) {
+    ++table.rows;
+    table.bytes += key.size() + bytes.size();
+    auto decoded = decode(bytes);
+    if (!decoded) {
+      ok = in_context(fmt::format("the map's table '{}'", name), decoded.error());
+      return false;
+    }
+    ++table.versions[wire::version_of(bytes)];
+    take(key, std::move(*decoded));
+    return true;
+  });
+  return scanned ? ok : scanned;
+}
+
+Status read_submaps(const storage::TableStore& map, Content& content) {
+  const auto take = [&](std::string_view, SubmapMessage message) {
+    const SubmapId id = message.submap.id;
+    if (message.submap.cloud != nullptr) content.cloud_points[id] = message.submap.cloud->points.size();
+    message.submap.cloud.reset();
+    content.submaps[id] = std::make_shared<const Submap>(std::move(message.submap));
+  };
+  return read_table(map, "submaps", wire::decode_submap, take, content);
+}
+
+Status read_verdicts(const storage::TableStore& map, Content& content) {
+  const auto take = [&](std::string_view, ClosureVerdict verdict) {
+    if (verdict.refusal) ++content.refused[verdict.finder_version];
+    content.verdicts.insert_or_assign(verdict.pair, std::move(verdict));
+  };
+  const auto count = [&](std::string_view, const Verdicts& answer) {
+    for (const ClosureVerdict& verdict : answer.verdicts) ++content.refused[verdict.finder_version];
+  };
+  if (auto ok = read_table(map, "verdicts", wire::decode_verdict, take, content); !ok) return ok;
+  return read_table(map, "answers", wire::decode_verdicts, count, content);
+}
+
+Status read_words(const storage::TableStore& map, Content& content) {
+  auto words = node::read_words(map);
+  if (!words) return tl::unexpected(words.error());
+  content.words = std::move(*words);
+  return read_table(
+      map, "words", wire::decode_word, [](auto&&...) {}, content);
+}
+
+Status read_meta(const storage::TableStore& map, Content& content) {
+  const auto meta = node::read_map_meta(map);
+  if (!meta) return tl::unexpected(meta.error());
+  content.meta = meta->value_or(node::MapMeta{});
+  auto settings = node::read_settings(map);
+  if (!settings) return tl::unexpected(settings.error());
+  content.settings = std::move(*settings);
+  auto names = node::read_robot_names(map);
+  if (!names) return tl::unexpected(names.error());
+  content.names = std::move(*names);
+  Content::Table& table = content.tables["meta"];
+  return map.scan("meta", {}, [&](std::string_view key, std::string_view bytes) {
+    ++table.rows;
+    table.bytes += key.size() + bytes.size();
+    return true;
+  });
+}
+
+}  // namespace
+
+server::ClosureNames Content::closure_names() const {
+  std::set<ChainId> chains;
+  for (const auto& [id, submap] : submaps) chains.insert(chains.end(), id.chain);
+  return {names, chains};
+}
+
+Result<Content> read(const storage::TableStore& map) {
+  Content content;
+  for (const auto& part : {read_meta, read_submaps, read_verdicts, read_words})
+    if (auto ok = part(map, content); !ok) return tl::unexpected(ok.error());
+  return content;
+}
+
+server::MapEstimate estimate(const Content& content) {
+  return server::estimate_map(content.submaps, content.verdicts, content.settings.map, content.words);
+}
+
+Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(file, failure))
+    return fail(ErrorCode::io, "{}: no such file, expected a map", file.string());
+  return storage::open_sqlite_store(file, storage::map_schema());
+}
+
+Status put_word(storage::TableStore& map, const ClosureWord& word) {
+  const auto content = read(map);
+  if (!content) return tl::unexpected(content.error());
+  const auto pair = content->closure_names().find(word.closure);
+  if (!pair) return tl::unexpected(pair.error());
+  for (const SubmapId& id : {pair->first, pair->second})
+    if (!content->submaps.contains(id))
+      return fail(ErrorCode::invalid, "{}: submap {} is not in the map", word.closure, content->closure_names().of(id));
+  const auto verdict = content->verdicts.find(*pair);
+  const bool has_closures = verdict != content->verdicts.end() && !verdict->second.closures.empty();
+  if (word.wish == Wish::accept && !has_closures)
+    return fail(ErrorCode::invalid, "{}: no closure was found there that could be accepted", word.closure);
+  const auto known = content->words.find(*pair);
+  if (known != content->words.end() && !holds_over(word, known->second))
+    return fail(ErrorCode::invalid, "{}: a later word holds: {} of {} ns", word.closure, to_string(known->second.wish),
+                known->second.given_ns);
+  node::MapMeta meta = content->meta;
+  meta.news = true;  // whoever opens it makes the next revision
+  const std::vector<storage::Write> writes{{"words", node::key_of(*pair), wire::encode(word)}, node::to_row(meta)};
+  return map.commit(writes);
+}
+
+}  // namespace tutti::mapfile

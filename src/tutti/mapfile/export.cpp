@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/export.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "tutti/base/file.hpp"
+#include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/ply.hpp"
+#include "tutti/formats/trajectory_file.hpp"
+#include "tutti/node/submap_frames.hpp"
+#include "tutti/perception/lidar/voxel_filter.hpp"
+#include "tutti/server/map_components.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+constexpr double kVoxel_m = 0.1;
+constexpr std::size_t kThinAt = 1'000'000;  // points, so that a long map's cloud stays small in memory
+
+/// T_world_submap of a submap in this component.
+std::optional<Pose3> place(const Submap& submap, const server::MapEstimate& map, std::uint32_t component) {
+  const Keyframe& first = submap.keyframes.front();
+  const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
+  const KeyframeId id{submap.id.chain, middle.index};
+  const auto node = std::ranges::lower_bound(map.nodes, id, {}, &server::MapNode::id);
+  if (node == map.nodes.end() || node->id != id || node->component != component) return std::nullopt;
+  return node->T_world_body * middle.T_odom_body.inverse() * first.T_odom_body;
+}
+
+}  // namespace
+
+Status export_g2o(const server::MapEstimate& map, const std::filesystem::path& file) {
+  std::string csv = "id,robot,keyframe,stamp_ns\n";
+  for (std::size_t i = 0; i < map.nodes.size(); ++i)
+    csv += fmt::format("{},{},{},{}\n", i, map.nodes[i].id.chain.robot.value, map.nodes[i].id.index,
+                       map.nodes[i].stamp.ns);
+  if (auto status = formats::write_g2o(file.string(), map.graph); !status) return status;
+  return write_file(formats::stamps_beside(file.string()), csv);
+}
+
+Result<std::vector<std::string>> export_tum(const Content& content, const server::MapEstimate& map,
+                                            const std::filesystem::path& folder) {
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure) return fail(ErrorCode::io, "{}: cannot make the folder: {}", folder.string(), failure.message());
+  std::map<ChainId, Trajectory> trajectories;
+  for (const server::MapNode& node : map.nodes) trajectories[node.id.chain].push_back({node.stamp, node.T_world_body});
+  const server::ClosureNames names = content.closure_names();
+  std::vector<std::string> files;
+  for (const auto& [chain, trajectory] : trajectories) {
+    files.push_back(names.of(chain) + ".tum");
+    if (auto status = formats::write_tum((folder / files.back()).string(), trajectory); !status)
+      return tl::unexpected(status.error());
+  }
+  return files;
+}
+
+Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
+                                 const server::MapEstimate& map, const std::filesystem::path& file) {
+  const std::uint32_t component = server::choose_components(map).largest;
+  const auto clouds = node::SubmapFrames::of(store);
+  ExportedCloud out;
+  PointCloud joint;
+  std::size_t thin_at = kThinAt;
+  for (const auto& [id, points] : content.cloud_points) {
+    const auto T_world_submap = place(*content.submaps.at(id), map, component);
+    if (!T_world_submap) {
+      ++out.left_out;
+      continue;
+    }
+    const auto cloud = clouds->get(id);
+    if (!cloud) return tl::unexpected(cloud.error());
+    ++out.submaps;
+    const Eigen::Isometry3d T(T_world_submap->matrix());
+    for (const Eigen::Vector3f& p : (*cloud)->points) joint.points.push_back((T * p.cast<double>()).cast<float>());
+    if (joint.points.size() < thin_at) continue;
+    joint = lidar::voxel_downsample(joint, kVoxel_m);
+    thin_at = 2 * joint.points.size() + kThinAt;
+  }
+  joint = lidar::voxel_downsample(joint, kVoxel_m);
+  out.points = joint.points.size();
+  if (joint.points.empty()) return out;
+  if (auto status = formats::write_ply(file.string(), joint.points); !status) return tl::unexpected(status.error());
+  return out;
+}
+
+}  // namespace tutti::mapfile

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tutti/mapfile/content.hpp"
+
+namespace tutti::mapfile {
+
+/// The joint pose graph, odometry and accepted closures, as a mission's report writes it: vertices are numbered by
+/// their place, and beside "x.g2o" lies "x_stamps.csv" (formats/graph_stamps.hpp).
+Status export_g2o(const server::MapEstimate& map, const std::filesystem::path& file);
+
+/// Every session's trajectory in the joint map as FOLDER/NAME.tum, NAME as in closures' names; the folder is made.
+/// Returns the files' names. Sessions that nothing ties together have unrelated frames (server::choose_components).
+Result<std::vector<std::string>> export_tum(const Content& content, const server::MapEstimate& map,
+                                            const std::filesystem::path& folder);
+
+struct ExportedCloud {
+  std::size_t points = 0;
+  std::size_t submaps = 0;
+  std::size_t left_out = 0;  ///< Submaps with a cloud that are not in the largest component.
+};
+/// What all robots of the largest component saw, in its frame, thinned to voxels of 0.1 m. Where none saw anything, no
+/// file. A submap hangs on the keyframe in its middle.
+Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
+                                 const server::MapEstimate& map, const std::filesystem::path& file);
+
+}  // namespace tutti::mapfile

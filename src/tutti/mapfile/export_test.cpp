@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/export.hpp"
+
+#include <gtest/gtest.h>
+
+#include "support/mapfile/small_map.hpp"
+#include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/ply.hpp"
+#include "tutti/formats/trajectory_file.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+using test::Mapper;
+namespace fs = std::filesystem;
+
+class Export : public testing::Test {
+ protected:
+  Export() {
+    fs::create_directories(folder_);
+    Mapper mapper({RobotId{0}, RobotId{1}}, store_);
+    for (const ChainId& chain : {ChainId(RobotId{0}, 5), ChainId(RobotId{0}, 6), ChainId(RobotId{1}, 5)})
+      mapper.walk(chain);
+    poses_ = mapper.server().map().graph.poses;
+    edges_ = mapper.server().map().graph.edges.size();
+  }
+  ~Export() override { fs::remove_all(folder_); }
+
+  storage::MemoryStore store_{storage::map_schema()};
+  fs::path folder_ = fs::path(testing::TempDir()) / ("export_" + std::to_string(getpid()));
+  std::vector<Pose3> poses_;
+  std::size_t edges_ = 0;
+};
+
+TEST_F(Export, GraphTrajectoriesAndCloudAreThoseOfTheServersMap) {
+  const Content content = read(store_).value();
+  const server::MapEstimate map = estimate(content);
+  ASSERT_TRUE(export_g2o(map, folder_ / "graph.g2o").has_value());
+  const auto graph = formats::read_g2o((folder_ / "graph.g2o").string());
+  ASSERT_TRUE(graph.has_value()) << graph.error().message;
+  EXPECT_EQ(graph->graph.poses, poses_);
+  EXPECT_EQ(graph->graph.edges.size(), edges_);
+  const auto stamps = formats::read_graph_stamps((folder_ / "graph_stamps.csv").string());
+  ASSERT_TRUE(stamps.has_value()) << stamps.error().message;
+  ASSERT_EQ(stamps->size(), map.nodes.size());
+  EXPECT_EQ(stamps->back().stamp, map.nodes.back().stamp);
+
+  const auto files = export_tum(content, map, folder_ / "tum");
+  ASSERT_TRUE(files.has_value()) << files.error().message;
+  EXPECT_EQ(*files, (std::vector<std::string>{"0.tum", "0.2.tum", "1.tum"}));
+  std::size_t poses = 0;
+  for (const std::string& file : *files) {
+    const auto trajectory = formats::read_trajectory((folder_ / "tum" / file).string(), "tum");
+    ASSERT_TRUE(trajectory.has_value()) << trajectory.error().message;
+    for (const StampedPose& pose : *trajectory) EXPECT_EQ(pose.pose, poses_.at(poses++));
+  }
+  EXPECT_EQ(poses, poses_.size());
+
+  const auto cloud = export_ply(store_, content, map, folder_ / "map.ply");
+  ASSERT_TRUE(cloud.has_value()) << cloud.error().message;
+  EXPECT_EQ(cloud->submaps, content.submaps.size());
+  EXPECT_EQ(cloud->left_out, 0U);
+  const auto points = formats::read_ply((folder_ / "map.ply").string());
+  ASSERT_TRUE(points.has_value());
+  EXPECT_EQ(points->points.size(), cloud->points);
+  // Where the middle keyframe of a submap is, its one point is.
+  const Submap& first = *content.submaps.begin()->second;
+  const Keyframe& middle = first.keyframes[first.keyframes.size() / 2];
+  const auto node = std::ranges::find(map.nodes, KeyframeId{first.id.chain, middle.index}, &server::MapNode::id);
+  const Pose3 T = node->T_world_body * middle.T_odom_body.inverse() * first.keyframes.front().T_odom_body;
+  const Eigen::Vector3d expected = T * Eigen::Vector3d(1.0, 2.0, 0.0);
+  double nearest = 1e9;
+  for (const Eigen::Vector3f& point : points->points)
+    nearest = std::min(nearest, (point.cast<double>() - expected).norm());
+  EXPECT_LT(nearest, 0.15);  // a voxel, and the wire's rounding
+}
+
+TEST_F(Export, AFolderThatCannotBeMadeIsAnError) {
+  const Content content = read(store_).value();
+  const server::MapEstimate map = estimate(content);
+  EXPECT_FALSE(export_g2o(map, folder_ / "nowhere" / "graph.g2o").has_value());
+  EXPECT_FALSE(export_tum(content, map, "/dev/null/x").has_value());
+  EXPECT_FALSE(export_ply(store_, content, map, folder_ / "nowhere" / "map.ply").has_value());
+}
+
+}  // namespace
+}  // namespace tutti::mapfile

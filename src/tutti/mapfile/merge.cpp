@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/merge.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/node/robot_registry.hpp"
+#include "tutti/node/words.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+namespace fs = std::filesystem;
+using storage::TableStore, storage::Write;
+
+/// Commits rows in portions, so that a large map does not have to fit into memory.
+class Writer {
+ public:
+  explicit Writer(TableStore& out) : out_(out) {}
+  Status put(Write write) {
+    bytes_ += write.bytes->size();
+    writes_.push_back(std::move(write));
+    return bytes_ < kPortion ? Status() : flush();
+  }
+  Status flush() {
+    const Status done = out_.commit(writes_);
+    writes_.clear();
+    bytes_ = 0;
+    return done;
+  }
+
+ private:
+  static constexpr std::size_t kPortion = 16U << 20U;
+  TableStore& out_;
+  std::vector<Write> writes_;
+  std::size_t bytes_ = 0;
+};
+
+/// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
+using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
+
+/// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.
+Result<std::size_t> join(const TableStore& a, const TableStore& b, const std::string& table, const Choose& choose,
+                         Writer& out) {
+  std::size_t shared = 0;
+  Status ok;
+  const auto copy = [&](const TableStore& from, const TableStore* other, bool first) {
+    const auto scanned = from.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
+      const auto there = other->read(table, key);
+      if (!there) {
+        ok = tl::unexpected(there.error());
+      } else if (!*there) {
+        ok = out.put({table, std::string(key), std::string(bytes)});
+      } else if (first) {
+        ++shared;
+        auto taken = **there == bytes ? Result<std::string>(std::string(bytes))
+                                      : choose(key, std::string(bytes), std::move(**there));
+        ok = taken ? out.put({table, std::string(key), std::move(*taken)}) : tl::unexpected(taken.error());
+      }
+      return ok.has_value();
+    });
+    return scanned ? ok : scanned;
+  };
+  if (auto done = copy(a, &b, true); !done) return tl::unexpected(done.error());
+  if (auto done = copy(b, &a, false); !done) return tl::unexpected(done.error());
+  return shared;
+}
+
+Status check_robots(const Content& a, const Content& b) {
+  for (const auto& [robot, name] : a.names) {
+    const auto other = b.names.find(robot);
+    if (other != b.names.end() && other->second != name)
+      return fail(ErrorCode::invalid,
+                  "robot number {} is '{}' in the first map and '{}' in the second: two robots, and bytes that are "
+                  "kept as they came keep their numbers; give robots that are to meet numbers of their own",
+                  robot.value, name, other->second);
+    for (const auto& [number, twin] : b.names)
+      if (twin == name && number != robot)
+        return fail(ErrorCode::invalid, "robot '{}' has number {} in the first map and {} in the second, expected one",
+                    name, robot.value, number.value);
+  }
+  return {};
+}
+
+Result<std::string> no_two_submaps(std::string_view key, const std::string&, const std::string& b) {
+  const auto message = wire::decode_submap(b);
+  return fail(ErrorCode::invalid, "submap {} is in both maps and differs: one session was used twice",
+              message ? to_string(message->submap.id) : std::string(key));
+}
+
+/// The newer finder's; of one version a refusal, as the server has it.
+Result<std::string> newer_verdict(std::string_view, std::string a, std::string b) {
+  const auto one = wire::decode_verdict(a), other = wire::decode_verdict(b);
+  if (!one) return tl::unexpected(one.error());
+  if (!other) return tl::unexpected(other.error());
+  if (one->finder_version != other->finder_version) return one->finder_version > other->finder_version ? a : b;
+  return other->refusal && !one->refusal ? b : a;
+}
+
+Result<std::string> later_word(std::string_view, std::string a, std::string b) {
+  const auto one = wire::decode_word(a), other = wire::decode_word(b);
+  if (!one) return tl::unexpected(one.error());
+  if (!other) return tl::unexpected(other.error());
+  return holds_over(*other, *one) ? b : a;
+}
+
+/// Of what both know of a robot: its newest session, and that it had the others before. Of the rest the first map's.
+Result<std::string> joined_meta(std::string_view key, std::string a, std::string b) {
+  if (!node::RobotRegistry::robot_of(key)) return a;
+  const auto one = node::decode_robot(a), other = node::decode_robot(b);
+  if (!one || !other) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
+  node::RobotRow row = one->session >= other->session ? *one : *other;
+  for (const auto* from : {&*one, &*other}) {
+    row.former.insert(from->former.begin(), from->former.end());
+    row.rivals.insert(from->rivals.begin(), from->rivals.end());
+    row.former.insert(from->session);
+  }
+  row.former.erase(row.session);
+  row.rivals.erase(row.session);
+  for (auto* sessions : {&row.former, &row.rivals})  // as many as a server keeps, the newest
+    while (sessions->size() > node::RobotRow::kMostSessions) sessions->erase(sessions->begin());
+  return encode(row);
+}
+
+/// Answers are named after jobs, which servers count: one name, two jobs.
+Status join_answers(const TableStore& a, const TableStore& b, Writer& out) {
+  Status ok;
+  const auto put = [&](std::string key, std::string_view bytes) {
+    ok = out.put({"answers", std::move(key), std::string(bytes)});
+    return ok.has_value();
+  };
+  const auto as_it_is = [&](std::string_view key, std::string_view bytes) { return put(std::string(key), bytes); };
+  const auto renamed = [&](std::string_view key, std::string_view bytes) {
+    std::string free(key);
+    for (auto there = a.read("answers", free);; there = a.read("answers", free)) {
+      if (!there) ok = tl::unexpected(there.error());
+      if (!ok || !*there) break;
+      if (**there == bytes) return true;
+      free += '+';
+    }
+    return ok && put(std::move(free), bytes);
+  };
+  if (auto scanned = a.scan("answers", {}, as_it_is); !scanned || !ok) return scanned ? ok : scanned;
+  const auto scanned = b.scan("answers", {}, renamed);
+  return scanned ? ok : scanned;
+}
+
+/// Not in the place of a file that somebody else has made meanwhile, where the file system can tell.
+bool take_name(const fs::path& part, const fs::path& out) {
+  if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, out.c_str(), RENAME_NOREPLACE) == 0) return true;
+  return errno == EINVAL && ::rename(part.c_str(), out.c_str()) == 0;
+}
+
+}  // namespace
+
+Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) {
+  const auto one = read(a), other = read(b);
+  if (!one) return in_context("the first map", one.error());
+  if (!other) return in_context("the second map", other.error());
+  if (auto ok = check_robots(*one, *other); !ok) return tl::unexpected(ok.error());
+  Writer writer(out);
+  const auto shared = join(a, b, "submaps", no_two_submaps, writer);
+  if (!shared) return tl::unexpected(shared.error());
+  for (const auto& [table, choose] :
+       {std::pair<const char*, Choose>{"verdicts", newer_verdict}, {"words", later_word}, {"meta", joined_meta}})
+    if (const auto done = join(a, b, table, choose, writer); !done) return tl::unexpected(done.error());
+  if (auto done = join_answers(a, b, writer); !done) return tl::unexpected(done.error());
+  const node::MapMeta meta{.epoch = std::max(one->meta.epoch, other->meta.epoch) + 1,
+                           .revision = std::max(one->meta.revision, other->meta.revision),
+                           .news = true,
+                           .start = std::max(one->meta.start, other->meta.start)};
+  if (auto done = writer.put(node::to_row(meta)); !done) return tl::unexpected(done.error());
+  if (auto done = writer.flush(); !done) return tl::unexpected(done.error());
+  return Merged{one->submaps.size() + other->submaps.size() - *shared, *shared};
+}
+
+Result<Merged> merge(const fs::path& a, const fs::path& b, const fs::path& out) {
+  std::error_code failure;
+  if (fs::exists(out, failure)) return fail(ErrorCode::io, "{}: is there already", out.string());
+  if (fs::equivalent(a, b, failure)) return fail(ErrorCode::invalid, "{} and {}: one map", a.string(), b.string());
+  const auto one = open(a), other = open(b);
+  for (const auto* opened : {&one, &other})
+    if (!*opened) return tl::unexpected(opened->error());
+  fs::path part = out;
+  part += fmt::format(".part-{}", getpid());
+  const auto forget = [&] {
+    for (const char* end : {"", "-wal", "-shm", "-journal"}) fs::remove(part.string() + end, failure);
+  };
+  forget();
+  Result<Merged> merged;
+  {
+    auto made = storage::open_sqlite_store(part, storage::map_schema());
+    merged = made ? merge(**one, **other, **made) : tl::unexpected(made.error());
+  }  // closed: one file
+  if (merged && !take_name(part, out))
+    merged = fail(ErrorCode::io, "{}: cannot be written: {}", out.string(), std::generic_category().message(errno));
+  forget();
+  if (!merged) return merged;
+  const fs::path folder = out.has_parent_path() ? out.parent_path() : fs::path(".");
+  if (const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY); fd >= 0) {  // the name, too, is on the disk
+    ::fsync(fd);
+    ::close(fd);
+  }
+  return merged;
+}
+
+}  // namespace tutti::mapfile

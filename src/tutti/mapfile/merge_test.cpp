@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/merge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "support/mapfile/small_map.hpp"
+#include "tutti/base/file.hpp"
+#include "tutti/mapfile/closures.hpp"
+#include "tutti/node/robot_registry.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+using storage::MemoryStore, storage::Write;
+using test::Mapper;
+namespace fs = std::filesystem;
+
+const RobotId kAlpha{0}, kBravo{1}, kCharlie{2};
+
+std::unique_ptr<MemoryStore> map_of(const std::vector<ChainId>& chains, std::uint64_t epoch = 1000) {
+  auto store = std::make_unique<MemoryStore>(storage::map_schema());
+  Mapper mapper({kAlpha, kBravo, kCharlie}, *store, epoch);
+  for (const ChainId& chain : chains) mapper.walk(chain);
+  return store;
+}
+void call(MemoryStore& store, RobotId robot, const std::string& name, std::uint64_t session = 5) {
+  ASSERT_TRUE(
+      store.commit(std::vector<Write>{{"meta", node::RobotRegistry::key(robot), encode(node::RobotRow{name, session})}})
+          .has_value());
+}
+/// The closures that are in a map, with their bytes.
+std::vector<LoopClosure> accepted(const server::MapEstimate& map) {
+  std::vector<LoopClosure> out;
+  for (const auto& judged : map.closures)
+    if (judged.accepted) out.push_back(judged.closure);
+  return out;
+}
+
+TEST(Merge, TheServerFindsTheClosuresBetweenTheTwoAndTheMapIsAsIfItHadHadBoth) {
+  const auto a = map_of({{kAlpha, 5}}), b = map_of({{kBravo, 6}, {kAlpha, 7}}, 2000);
+  const auto before_a = a->tables(), before_b = b->tables();
+  MemoryStore both(storage::map_schema());
+  const auto merged = merge(*a, *b, both);
+  ASSERT_TRUE(merged.has_value()) << merged.error().message;
+  EXPECT_EQ(merged->submaps, before_a.at("submaps").size() + before_b.at("submaps").size());
+  EXPECT_EQ(merged->shared, 0U);
+  EXPECT_EQ(a->tables(), before_a);
+  EXPECT_EQ(b->tables(), before_b);
+  for (const auto* tables : {&before_a, &before_b})
+    for (const char* table : {"submaps", "verdicts"})
+      for (const auto& [key, bytes] : tables->at(table)) EXPECT_EQ(both.read(table, key).value(), bytes);
+
+  Mapper mapper({kAlpha, kBravo, kCharlie}, both);
+  mapper.update();
+  EXPECT_EQ(mapper.server().state().epoch, 2001U);  // robots of both take it for new
+  EXPECT_EQ(mapper.server().map().components, 1U);
+  MemoryStore whole_store(storage::map_schema());
+  Mapper whole({kAlpha, kBravo, kCharlie}, whole_store);
+  for (const ChainId& chain : {ChainId(kAlpha, 5), ChainId(kBravo, 6), ChainId(kAlpha, 7)}) whole.walk(chain);
+  EXPECT_EQ(mapper.server().state().verdicts, whole.server().state().verdicts);
+  EXPECT_EQ(accepted(mapper.server().map()), accepted(whole.server().map()));
+  EXPECT_EQ(mapper.server().map().graph.poses, whole.server().map().graph.poses);
+}
+
+TEST(Merge, WhatIsInBothIsTakenOnce) {
+  const auto a = map_of({{kAlpha, 5}, {kBravo, 6}}), b = map_of({{kAlpha, 5}, {kCharlie, 7}});
+  MemoryStore both(storage::map_schema()), again(storage::map_schema());
+  const auto merged = merge(*a, *b, both);
+  ASSERT_TRUE(merged.has_value()) << merged.error().message;
+  const std::size_t per_robot = a->tables().at("submaps").size() / 2;
+  EXPECT_EQ(merged->shared, per_robot);
+  EXPECT_EQ(merged->submaps, 3 * per_robot);
+  ASSERT_TRUE(merge(*a, both, again).has_value());
+  EXPECT_EQ(again.tables().at("submaps"), both.tables().at("submaps"));
+  EXPECT_EQ(again.tables().at("verdicts"), both.tables().at("verdicts"));
+  EXPECT_EQ(again.tables().at("answers").size(), both.tables().at("answers").size());
+}
+
+TEST(Merge, OneNumberForTwoRobotsIsRefusedWithBothNames) {
+  const auto a = map_of({{kAlpha, 5}}), b = map_of({{kAlpha, 6}});
+  call(*a, kAlpha, "alpha");
+  call(*b, kAlpha, "zulu");
+  MemoryStore both(storage::map_schema());
+  const auto merged = merge(*a, *b, both);
+  ASSERT_FALSE(merged.has_value());
+  for (const char* word : {"alpha", "zulu", "number 0"})
+    EXPECT_NE(merged.error().message.find(word), std::string::npos) << merged.error().message;
+  call(*b, kAlpha, "bravo");
+  call(*a, kBravo, "bravo");
+  EXPECT_FALSE(merge(*a, *b, both).has_value());
+  call(*b, kAlpha, "alpha");
+  EXPECT_TRUE(merge(*a, *b, both).has_value());
+  EXPECT_EQ(node::read_robot_names(both).value(),
+            (std::map<RobotId, std::string>{{kAlpha, "alpha"}, {kBravo, "bravo"}}));
+}
+
+TEST(Merge, ARobotHasItsNewestSessionAndHadTheOthers) {
+  const auto a = map_of({{kAlpha, 5}}), b = map_of({{kAlpha, 6}});
+  call(*a, kAlpha, "alpha", 5);
+  call(*b, kAlpha, "alpha", 6);
+  for (const auto& [one, other] : {std::pair(a.get(), b.get()), std::pair(b.get(), a.get())}) {
+    MemoryStore both(storage::map_schema());
+    ASSERT_TRUE(merge(*one, *other, both).has_value());
+    const auto row = node::decode_robot(both.read("meta", node::RobotRegistry::key(kAlpha)).value().value());
+    ASSERT_TRUE(row.has_value());
+    EXPECT_EQ(row->session, 6U);
+    EXPECT_EQ(row->former, std::set<std::uint64_t>{5});
+    EXPECT_EQ(row->name, "alpha");
+  }
+}
+
+TEST(Merge, ASubmapWithTwoContentsIsRefusedByName) {
+  const auto a = map_of({{kAlpha, 5}});
+  MemoryStore b(storage::map_schema());
+  Mapper({kAlpha}, b).walk({kAlpha, 5}, 99);
+  MemoryStore both(storage::map_schema());
+  const auto merged = merge(*a, b, both);
+  ASSERT_FALSE(merged.has_value());
+  EXPECT_NE(merged.error().message.find("submap 0:5/0 "), std::string::npos) << merged.error().message;
+}
+
+TEST(Merge, TheLaterWordHoldsWhicheverMapItIsIn) {
+  const auto a = map_of({{kAlpha, 5}}), b = map_of({{kAlpha, 5}});
+  const Content content = read(*a).value();
+  const std::string name = closures(content, estimate(content)).front().name;
+  ASSERT_TRUE(put_word(*a, {name, Wish::reject, "ada", 5}).has_value());
+  ASSERT_TRUE(put_word(*b, {name, Wish::accept, "bob", 6}).has_value());
+  for (const auto& [one, other] : {std::pair(a.get(), b.get()), std::pair(b.get(), a.get())}) {
+    MemoryStore both(storage::map_schema());
+    ASSERT_TRUE(merge(*one, *other, both).has_value());
+    const auto words = read(both).value().words;
+    ASSERT_EQ(words.size(), 1U);
+    EXPECT_EQ(words.begin()->second.by, "bob");
+  }
+}
+
+class MergedFiles : public testing::Test {
+ protected:
+  MergedFiles() { fs::create_directories(folder_); }
+  ~MergedFiles() override { fs::remove_all(folder_); }
+  fs::path file(const std::string& name, const std::vector<ChainId>& chains) {
+    auto store = storage::open_sqlite_store(folder_ / name, storage::map_schema(), {.min_free_bytes = 0}).value();
+    Mapper mapper({kAlpha, kBravo}, *store);
+    for (const ChainId& chain : chains) mapper.walk(chain);
+    return folder_ / name;
+  }
+  std::set<std::string> files() {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename());
+    return names;
+  }
+  fs::path folder_ = fs::path(testing::TempDir()) / ("merge_" + std::to_string(getpid()));
+};
+
+TEST_F(MergedFiles, AppearWholeAndTheirSourcesStay) {
+  const fs::path a = file("a", {{kAlpha, 5}}), b = file("b", {{kBravo, 5}});
+  const std::string bytes_a = read_file(a.string()).value(), bytes_b = read_file(b.string()).value();
+  const auto merged = merge(a, b, folder_ / "c");
+  ASSERT_TRUE(merged.has_value()) << merged.error().message;
+  EXPECT_EQ(files(), (std::set<std::string>{"a", "b", "c"}));
+  EXPECT_EQ(read_file(a.string()).value(), bytes_a);
+  EXPECT_EQ(read_file(b.string()).value(), bytes_b);
+  EXPECT_EQ(read(**open(folder_ / "c")).value().submaps.size(), merged->submaps);
+  const std::string bytes_c = read_file((folder_ / "c").string()).value();
+  EXPECT_FALSE(merge(a, b, folder_ / "c").has_value());  // there already
+  EXPECT_EQ(read_file((folder_ / "c").string()).value(), bytes_c);
+}
+
+TEST_F(MergedFiles, AreNotThereWhenItFails) {
+  const fs::path a = file("a", {{kAlpha, 5}});
+  EXPECT_FALSE(merge(a, folder_ / "missing", folder_ / "c").has_value());
+  EXPECT_FALSE(merge(a, a, folder_ / "c").has_value());
+  EXPECT_FALSE(merge(a, a, folder_ / "nowhere" / "c").has_value());
+  const fs::path b = file("b", {});
+  {
+    auto store = open(b).value();
+    Mapper({kAlpha}, *store).walk({kAlpha, 5}, 99);
+  }
+  EXPECT_FALSE(merge(a, b, folder_ / "c").has_value());
+  EXPECT_EQ(files(), (std::set<std::string>{"a", "b"}));
+}
+
+}  // namespace
+}  // namespace tutti::mapfile

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/make_record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tutti/base/config_io.hpp"
+#include "tutti/mission/follow_alerts.hpp"
+#include "tutti/mission/record_notes.hpp"
+
+namespace tutti::mission {
+namespace {
+
+void record_traffic(const std::vector<TrafficRecord>& traffic, RobotRecord& robot) {
+  for (TrafficRecord row : traffic) {
+    const bool up = row.from == robot.name;
+    (up ? robot.bytes_up : robot.bytes_down) += row.bytes;
+    (up ? robot.messages_up : robot.messages_down) += row.messages;
+    row.bytes_per_s = robot.duration_s > 0.0 ? static_cast<double>(row.bytes) / robot.duration_s : 0.0;
+    robot.traffic.push_back(std::move(row));
+  }
+}
+
+}  // namespace
+
+MissionRecord make_record(const FinishedMission& mission) {
+  const MissionConfig& config = mission.config;
+  MissionRecord record{.mission = config.mission,
+                       .description = config.description,
+                       .input = config.input,
+                       .notes = config.notes,
+                       .seed = mission.seed,
+                       .default_policy = config.agent.policy.name,
+                       .duration_s = mission.duration_s,
+                       .association = config.association,
+                       .rpe_interval = fmt::format("{:g} s", kRpeInterval_s),
+                       .version = mission.version,
+                       .effective_config_yaml = to_yaml(dump_config(config)),
+                       .survey = mission.survey};
+  std::vector<RobotOutcome> outcomes;
+  for (const FinishedRobot& robot : mission.robots) {
+    outcomes.push_back(robot.outcome);
+    const auto note = [&](const std::vector<std::string>& notes) {
+      record.notes.insert(record.notes.end(), notes.begin(), notes.end());
+    };
+    note(robot.outcome.recording->notes);
+    note(robot.troubles);
+  }
+  mission.events.note_refusals(record);
+  const server::MapServer& server = mission.server.map_server();
+  const ProxyGraph& broadcast = mission.server.broadcast();
+  record.robots.resize(mission.robots.size());
+  evaluate_robots(outcomes, server.map(), config.association, record);
+  note_undelivered(mission.undelivered, record);
+  note_what_the_map_lacks(server.map(), record);
+  evaluate_server(outcomes, server, config.association, record);
+  record.server.proxy = broadcast;
+  record.server.updates = mission.events.updates();
+  for (RobotRecord& robot : record.robots) {
+    const FinishedRobot& finished = mission.robots[robot.id.value];
+    record_traffic(finished.traffic, robot);
+    robot.updates = finished.updates;
+    robot.alerts = follow_alerts(robot.updates);
+    robot.explanation = finished.explanation;
+    robot.proxy_nodes = static_cast<std::size_t>(
+        std::ranges::count_if(broadcast.nodes, [&](const ProxyNode& node) { return node.chain.robot == robot.id; }));
+    for (const auto& [id, submap] : server.state().submaps) robot.submaps += id.chain.robot == robot.id ? 1 : 0;
+  }
+  record.warnings = warnings_of(record);
+  return record;
+}
+
+}  // namespace tutti::mission

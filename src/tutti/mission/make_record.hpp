@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/bus/simulated_radio.hpp"
+#include "tutti/mission/evaluate.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/mission_events.hpp"
+#include "tutti/mission/record.hpp"
+#include "tutti/node/server_node.hpp"
+
+namespace tutti::mission {
+
+/// One robot when its mission is over.
+struct FinishedRobot {
+  RobotOutcome outcome;
+  std::vector<UpdateRecord> updates;
+  std::optional<consistency::Explanation> explanation;  ///< Of the last update.
+  std::vector<std::string> troubles;
+  std::vector<TrafficRecord> traffic;  ///< Without bytes_per_s.
+};
+
+/// A mission that is over, however it was run.
+struct FinishedMission {
+  const MissionConfig& config;
+  std::uint64_t seed = 1;
+  std::string version;
+  double duration_s = 0.0;
+  std::shared_ptr<const PointCloud> survey;
+  std::vector<FinishedRobot> robots;  ///< By their numbers, from 0.
+  const node::ServerNode& server;
+  const MissionEvents& events;
+  std::map<bus::SimulatedRadio::Topic, std::size_t> undelivered;
+};
+
+/// Everything but the timing.
+MissionRecord make_record(const FinishedMission& mission);
+
+}  // namespace tutti::mission

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/map_meta.hpp"
+
+#include "tutti/base/config_io.hpp"
+#include "tutti/node/robot_registry.hpp"
+
+namespace tutti::node {
+namespace {
+
+constexpr const char* kMeta = "meta";
+constexpr const char* kMap = "map";
+constexpr const char* kSettings = "settings";
+
+}  // namespace
+
+storage::Write to_row(const MapMeta& meta) {
+  return {kMeta, kMap, storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
+}
+
+Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
+  const auto row = map.read(kMeta, kMap);
+  if (!row) return tl::unexpected(row.error());
+  if (!*row) return std::nullopt;
+  const auto numbers = storage::numbers_of(**row, 4);
+  if (!numbers) return fail(ErrorCode::parse, "the map's own row has {} bytes, expected 32", (*row)->size());
+  return MapMeta{(*numbers)[0], (*numbers)[1], (*numbers)[2] != 0, (*numbers)[3]};
+}
+
+storage::Write to_row(const server::ServerConfig& settings) {
+  return {kMeta, kSettings, to_yaml(dump_config(settings))};
+}
+
+Result<server::ServerConfig> read_settings(const storage::TableStore& map) {
+  server::ServerConfig settings;
+  const auto row = map.read(kMeta, kSettings);
+  if (!row) return tl::unexpected(row.error());
+  if (!*row) return settings;
+  const auto node = parse_yaml(**row, "the map's settings");
+  if (!node) return tl::unexpected(node.error());
+  if (auto ok = load_config(*node, settings, "the map's settings"); !ok) return tl::unexpected(ok.error());
+  return settings;
+}
+
+std::string encode(const RobotRow& row) {
+  std::string bytes = storage::key_of({row.session, row.former.size(), row.rivals.size()});
+  for (const auto* sessions : {&row.former, &row.rivals})
+    for (const std::uint64_t session : *sessions) bytes += storage::key_of({session});
+  return bytes + row.name;
+}
+
+std::optional<RobotRow> decode_robot(std::string_view bytes) {
+  const auto head = storage::numbers_of(bytes.substr(0, 24), 3);
+  if (!head || (*head)[1] > RobotRow::kMostSessions || (*head)[2] > RobotRow::kMostSessions) return std::nullopt;
+  bytes.remove_prefix(24);
+  RobotRow row{.session = (*head)[0]};
+  for (std::size_t which = 1; which <= 2; ++which)
+    for (std::uint64_t i = 0; i < (*head)[which]; ++i) {
+      const auto session = storage::numbers_of(bytes.substr(0, 8), 1);
+      if (!session) return std::nullopt;
+      (which == 1 ? row.former : row.rivals).insert(session->front());
+      bytes.remove_prefix(8);
+    }
+  row.name = bytes;
+  return row;
+}
+
+Result<std::map<RobotId, std::string>> read_robot_names(const storage::TableStore& map) {
+  std::map<RobotId, std::string> names;
+  const auto scanned = map.scan(kMeta, {}, [&](std::string_view key, std::string_view bytes) {
+    const auto robot = RobotRegistry::robot_of(key);
+    const auto row = robot ? decode_robot(bytes) : std::nullopt;
+    if (row) names[*robot] = row->name;
+    return true;
+  });
+  if (!scanned) return tl::unexpected(scanned.error());
+  return names;
+}
+
+}  // namespace tutti::node

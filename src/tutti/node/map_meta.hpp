@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "tutti/server/map_server.hpp"
+#include "tutti/storage/table_store.hpp"
+
+/// The rows of a map's table `meta`.
+namespace tutti::node {
+
+/// The row `map`: what the server itself was about.
+struct MapMeta {
+  std::uint64_t epoch = 0;
+  std::uint64_t revision = 0;
+  bool news = false;        ///< Something has come since the last revision.
+  std::uint64_t start = 0;  ///< How often the map has been opened; names jobs.
+};
+storage::Write to_row(const MapMeta& meta);
+/// Nothing: no server has had this map yet.
+Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map);
+
+/// The row `settings`: what the server judges closures by, so that whoever reads the map sees it as the server does.
+storage::Write to_row(const server::ServerConfig& settings);
+/// The defaults where there is none. An error: it is of another program's version, or damaged.
+Result<server::ServerConfig> read_settings(const storage::TableStore& map);
+
+/// A row `robot/NUMBER` (RobotRegistry::key()): a robot's name, and the sessions that go by it. 8 bytes each: its
+/// session, how many it had before, how many others were refused, these; then the name.
+struct RobotRow {
+  static constexpr std::size_t kMostSessions = 100;  ///< Former ones and rivals each.
+  std::string name;
+  std::uint64_t session = 0;
+  std::set<std::uint64_t> former;
+  std::set<std::uint64_t> rivals;
+};
+std::string encode(const RobotRow& row);
+/// Nothing: the bytes are none.
+std::optional<RobotRow> decode_robot(std::string_view bytes);
+Result<std::map<RobotId, std::string>> read_robot_names(const storage::TableStore& map);
+
+}  // namespace tutti::node

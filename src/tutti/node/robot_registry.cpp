@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/robot_registry.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "tutti/node/map_meta.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::node {
+namespace {
+
+constexpr std::string_view kKey = "robot/";
+
+/// Of too many the oldest are forgotten.
+void remember(std::set<std::uint64_t>& sessions, std::uint64_t session) {
+  sessions.insert(session);
+  if (sessions.size() > RobotRow::kMostSessions) sessions.erase(sessions.begin());
+}
+
+}  // namespace
+
+std::optional<ChainId> RobotRegistry::owner(RobotId robot) const {
+  const auto found = robots_.find(robot);
+  if (found == robots_.end() || !found->second.is_claimed) return std::nullopt;
+  return ChainId(robot, found->second.status.session);
+}
+
+/// To a session that was refused before, an owner that has not had the time to be heard yet is there; to a new one,
+/// which starts with yesterday's map, it is not.
+bool RobotRegistry::is_there(const Robot& robot, std::uint64_t rival, Timestamp now) const {
+  if (!robot.is_claimed) return false;
+  if (robot.last_seen) return now - *robot.last_seen < kOwnerIsThere_s;
+  return robot.rivals.contains(rival) && now - started_ < kOwnerIsThere_s;
+}
+
+std::string RobotRegistry::objection(RobotId id, const NodeStatus& status, Timestamp now) const {
+  for (const auto& [other, robot] : robots_)
+    if (other != id && robot.status.name == status.name && is_there(robot, status.session, now))
+      return fmt::format("the name '{}' is in use by robot number {}, session {}; this one has number {}", status.name,
+                         other.value, robot.status.session, id.value);
+  const auto found = robots_.find(id);
+  if (found == robots_.end() || !found->second.is_claimed) return {};
+  const auto& [is_claimed, owner, former, rivals, seen, updated, conflicted, conflict] = found->second;
+  if (owner.name != status.name)
+    return fmt::format("number {} belongs to robot '{}' in this map, not to '{}'", id.value, owner.name, status.name);
+  if (owner.session == status.session) return {};
+  if (former.contains(status.session))
+    return fmt::format("session {} of robot '{}' has been replaced by session {}", status.session, owner.name,
+                       owner.session);
+  if (is_there(found->second, status.session, now))
+    return fmt::format("another robot '{}' is there, session {}; this one is session {}", owner.name, owner.session,
+                       status.session);
+  return {};
+}
+
+void RobotRegistry::take_over(RobotId id, Robot& robot, const NodeStatus& status) const {
+  if (robot.is_claimed)
+    remember(robot.former, robot.status.session);
+  else if (const auto mapped = mapped_.find(id); mapped != mapped_.end())
+    for (const std::uint64_t session : mapped->second) remember(robot.former, session);
+  robot.former.erase(status.session);
+  robot.rivals.erase(status.session);
+  robot.is_claimed = true;
+}
+
+RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, Timestamp now) {
+  Heard heard{.accepted = false, .must_be_stored = false, .why = objection(id, status, now)};
+  Robot& robot = robots_[id];
+  if (!heard.why.empty()) {
+    robot.conflict = heard.why;
+    robot.last_conflict = now;
+    if (robot.is_claimed) {
+      const std::size_t before = robot.rivals.size();
+      if (!robot.former.contains(status.session) && robot.status.session != status.session)
+        remember(robot.rivals, status.session);
+      heard.must_be_stored = robot.rivals.size() > before;
+    } else {
+      robot.status = status;
+      robot.last_seen = now;
+    }
+    return heard;
+  }
+  heard.accepted = true;
+  if (!robot.is_claimed || robot.status.session != status.session) {
+    take_over(id, robot, status);
+    heard.must_be_stored = true;
+  }
+  robot.status = status;
+  robot.last_seen = now;
+  if (status.update_age_s) robot.last_update = now - *status.update_age_s;
+  return heard;
+}
+
+std::string RobotRegistry::key(RobotId robot) { return fmt::format("{}{}", kKey, robot.value); }
+
+std::optional<RobotId> RobotRegistry::robot_of(std::string_view key) {
+  RobotId robot;
+  if (!key.starts_with(kKey)) return std::nullopt;
+  const char* const end = key.data() + key.size();
+  const auto [stop, error] = std::from_chars(key.data() + kKey.size(), end, robot.value);
+  return error == std::errc() && stop == end ? std::optional(robot) : std::nullopt;
+}
+
+std::string RobotRegistry::row(RobotId id) const {
+  const Robot& robot = robots_.at(id);
+  return encode(RobotRow{robot.status.name, robot.status.session, robot.former, robot.rivals});
+}
+
+bool RobotRegistry::restore(RobotId id, std::string_view row) {
+  auto known = decode_robot(row);
+  if (!known) return false;
+  Robot robot{.is_claimed = true, .status = {.name = std::move(known->name), .session = known->session}};
+  robot.former = std::move(known->former);
+  robot.rivals = std::move(known->rivals);
+  if (!wire::validate(robot.status)) return false;
+  robots_.insert_or_assign(id, std::move(robot));
+  return true;
+}
+
+}  // namespace tutti::node

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/robot_registry.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace tutti::node {
+namespace {
+
+constexpr RobotId kOne{1}, kTwo{2};
+
+NodeStatus status(const std::string& name, std::uint64_t session) { return {.name = name, .session = session}; }
+Timestamp at(double s) { return Timestamp{} + s; }
+
+class Registry : public testing::Test {
+ protected:
+  Registry() { registry_.start(at(0)); }
+  /// Whether it is accepted.
+  bool hear(RobotId robot, const std::string& name, std::uint64_t session, double s) {
+    const auto heard = registry_.hear(robot, status(name, session), at(s));
+    EXPECT_EQ(heard.accepted, heard.why.empty());
+    why_ = heard.why;
+    return heard.accepted;
+  }
+  void restart(double s) {
+    RobotRegistry fresh;
+    fresh.start(at(s));
+    for (const auto& [robot, entry] : registry_.robots())
+      if (entry.is_claimed) {
+        EXPECT_TRUE(fresh.restore(robot, registry_.row(robot)));
+      }
+    registry_ = fresh;
+  }
+  [[nodiscard]] std::uint64_t owner(RobotId robot) const { return registry_.owner(robot).value().session; }
+  RobotRegistry registry_;
+  std::string why_;
+};
+
+TEST_F(Registry, ANameAndANumberBelongToOneSessionWhileItIsThere) {
+  EXPECT_EQ(registry_.owner(kOne), std::nullopt);
+  EXPECT_TRUE(hear(kOne, "alpha", 10, 0));
+  EXPECT_TRUE(hear(kOne, "alpha", 10, 2));
+  EXPECT_FALSE(hear(kOne, "alpha", 11, 3));
+  EXPECT_NE(why_.find("another robot 'alpha' is there, session 10"), std::string::npos) << why_;
+  EXPECT_FALSE(hear(kTwo, "alpha", 11, 3));
+  EXPECT_NE(why_.find("the name 'alpha' is in use by robot number 1"), std::string::npos) << why_;
+  EXPECT_FALSE(hear(kOne, "bravo", 10, 3));
+  EXPECT_NE(why_.find("number 1 belongs to robot 'alpha'"), std::string::npos) << why_;
+  EXPECT_TRUE(hear(kTwo, "bravo", 5, 3));
+  EXPECT_EQ(owner(kOne), 10U);
+  EXPECT_EQ(registry_.robots().at(kOne).last_seen, at(2));
+}
+
+TEST_F(Registry, AfterThirtySecondsANewSessionTakesItsPlaceForGood) {
+  hear(kOne, "alpha", 10, 0);
+  EXPECT_FALSE(hear(kOne, "alpha", 11, 29.9));
+  EXPECT_TRUE(hear(kOne, "alpha", 11, 30.1));
+  for (const double s : {31.0, 40.0, 1000.0}) {  // whether the newer one is there or not
+    EXPECT_FALSE(hear(kOne, "alpha", 10, s));
+    EXPECT_NE(why_.find("session 10 of robot 'alpha' has been replaced by session 11"), std::string::npos) << why_;
+  }
+  EXPECT_EQ(owner(kOne), 11U);
+  EXPECT_FALSE(hear(kOne, "bravo", 12, 1000));  // a number keeps its name
+}
+
+TEST_F(Registry, WhatLiesInTheMapIsOlderThanWhoeverComesFirst) {
+  registry_.note_session({kOne, 99});
+  EXPECT_EQ(registry_.owner(kOne), std::nullopt);
+  EXPECT_TRUE(hear(kOne, "alpha", 10, 0));  // its clock is behind that of its last start
+  EXPECT_FALSE(hear(kOne, "alpha", 99, 500));
+  EXPECT_EQ(owner(kOne), 10U);
+}
+
+TEST_F(Registry, YesterdaysOwnerDoesNotKeepTodaysOut) {
+  hear(kOne, "alpha", 10, 0);
+  hear(kOne, "alpha", 66, 1);  // refused
+  restart(1000);
+  EXPECT_EQ(owner(kOne), 10U);
+  EXPECT_FALSE(hear(kOne, "alpha", 66, 1001));  // whoever was refused is not the first after the server's restart
+  EXPECT_TRUE(hear(kOne, "alpha", 20, 1001));
+  EXPECT_FALSE(hear(kOne, "alpha", 10, 1100));
+  restart(2000);
+  EXPECT_FALSE(hear(kOne, "alpha", 10, 2100));
+  EXPECT_TRUE(hear(kOne, "alpha", 66, 2100));
+}
+
+TEST_F(Registry, RowsThatAreDamagedAreNotTaken) {
+  hear(kOne, "alpha", 10, 0);
+  hear(kOne, "alpha", 11, 40);
+  const std::string row = registry_.row(kOne);
+  RobotRegistry fresh;
+  for (std::size_t size = 0; size < row.size() - 4; ++size) EXPECT_FALSE(fresh.restore(kOne, row.substr(0, size)));
+  EXPECT_FALSE(fresh.restore(kOne, row + "\n"));
+  EXPECT_TRUE(fresh.restore(kOne, row));
+  EXPECT_EQ(fresh.row(kOne), row);
+  EXPECT_EQ(RobotRegistry::robot_of(RobotRegistry::key(kTwo)), kTwo);
+  for (const char* key : {"map", "robot/", "robot/x", "robot/1 ", "robot/-1"})
+    EXPECT_FALSE(RobotRegistry::robot_of(key)) << key;
+}
+
+/// Whatever programs say and however often the server starts again: a session that has lost its place never has it
+/// again, and only one that was not heard for 30 s loses it.
+RC_GTEST_PROP(RegistryProperty, OwnersChangeOnlyWhenTheyAreGoneAndNeverBack, ()) {
+  RobotRegistry registry;
+  registry.start(at(0));
+  double now = 0.0;
+  std::vector<std::uint64_t> owners;
+  double owner_seen = -1.0;  // since the last start; negative: not
+  for (int step = 0; step < 60; ++step) {
+    now += *rc::gen::element(1.0, 10.0, 31.0);
+    if (*rc::gen::inRange(0, 10) == 0 && !owners.empty()) {
+      RobotRegistry fresh;
+      fresh.start(at(now));
+      RC_ASSERT(fresh.restore(kOne, registry.row(kOne)));
+      registry = fresh;
+      owner_seen = -1.0;
+    }
+    const auto session = *rc::gen::inRange<std::uint64_t>(0, 6);
+    const bool accepted = registry.hear(kOne, status("alpha", session), at(now)).accepted;
+    const std::uint64_t owner = registry.owner(kOne)->session;
+    RC_ASSERT(accepted == (owner == session));
+    if (owners.empty() || owners.back() != owner) {
+      RC_ASSERT(std::ranges::find(owners, owner) == owners.end());
+      RC_ASSERT(owner_seen < 0.0 || now - owner_seen >= RobotRegistry::kOwnerIsThere_s);
+      owners.push_back(owner);
+    }
+    if (accepted) owner_seen = now;
+  }
+}
+
+}  // namespace
+}  // namespace tutti::node

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a ServerNode asks its workers, and what they answer.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <iterator>
+#include <system_error>
+#include <utility>
+
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/words.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::node {
+namespace {
+
+constexpr unsigned kMostDoubled = 10;
+
+}  // namespace
+
+void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  auto answer = wire::decode_verdicts(*envelope.bytes);
+  if (!answer) return refuse(envelope, answer.error().message, now, step);
+  note_answer(answer->job, now);
+  Verdicts refused{.job = answer->job, .verdicts = {}, .failed = {}, .why = {}};
+  for (ClosureVerdict& verdict : answer->verdicts) {
+    const bool is_workers = envelope.from.role == bus::Endpoint::Role::worker && !verdict.closures.empty();
+    verdict.worker = is_workers ? std::optional(envelope.from.number) : std::nullopt;
+    if (const Status taken = take(verdict, refused, step); !taken) refuse(envelope, taken.error().message, now, step);
+  }
+  if (!refused.verdicts.empty()) step.writes.push_back({"answers", answer->job, wire::encode(refused)});
+  for (const SubmapPair& pair : answer->failed)
+    if (give_back(pair)) {
+      step.tell(now, VerificationFailed{pair, answer->why});
+      if (!given_back_) given_back_ = now;
+    }
+  step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
+}
+
+Status ServerNode::take(const ClosureVerdict& verdict, Verdicts& refused, Step& step) {
+  const server::VerdictSet& kept = server_.state().verdicts;
+  const auto find = [&]() -> std::optional<ClosureVerdict> {
+    const auto found = kept.find(verdict.pair);
+    return found == kept.end() ? std::nullopt : std::optional(found->second);
+  };
+  const auto before = find();
+  const bool was_answered = server_.state().answered.contains(verdict.pair);
+  if (auto ok = server_.receive(without_evidence(verdict)); !ok) return ok;
+  const auto after = find();
+  const bool is_answered = server_.state().answered.contains(verdict.pair);
+  if (before != after) {
+    std::optional<std::string> row;
+    if (after) row = wire::encode(verdict);
+    step.writes.push_back({"verdicts", key_of(verdict.pair), std::move(row)});
+  }
+  if (verdict.refusal && !after && (before || was_answered != is_answered)) refused.verdicts.push_back(verdict);
+  return {};
+}
+
+/// A job is one submap against others: `newest`, if it is in the pair. Its name is no other map's: a bus takes one job
+/// of a name. `asked`: how often before.
+void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, Step& step) {
+  given_back_.reset();
+  std::map<SubmapId, std::vector<SubmapPair>> pairs;
+  for (const server::VerificationJob& job : server_.take_jobs())
+    pairs[job.pair.first == newest ? job.pair.first : job.pair.second].push_back(job.pair);
+  for (const auto& [submap, of_it] : pairs)
+    for (std::size_t first = 0; first < of_it.size(); first += config_.pairs_per_job) {
+      const std::size_t last = std::min(of_it.size(), first + config_.pairs_per_job);
+      const auto at = [&](std::size_t i) { return of_it.begin() + static_cast<std::ptrdiff_t>(i); };
+      const Job job{.id = fmt::format("{}/{}/{}", server_.state().epoch, start_, jobs_),
+                    .pairs = {at(first), at(last)}};
+      open_jobs_.emplace(jobs_++, OpenJob{job.pairs, now, asked});
+      step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::job, job.id,
+                               std::make_shared<const std::string>(wire::encode(job))});
+    }
+}
+
+/// The jobs that were sent later have not had their turn, as long as it goes on: a long queue is no reason to ask
+/// again.
+void ServerNode::note_answer(const std::string& job, Timestamp now) {
+  const std::string mine = fmt::format("{}/{}/", server_.state().epoch, start_);
+  std::uint64_t number = 0;
+  if (!job.starts_with(mine)) return;  // of an earlier start, or nobody's
+  const char* end = job.data() + job.size();
+  if (const auto read = std::from_chars(job.data() + mine.size(), end, number);
+      read.ec != std::errc() || read.ptr != end)
+    return;
+  if (number >= jobs_) return;
+  open_jobs_.erase(number);
+  for (auto later = open_jobs_.upper_bound(number); later != open_jobs_.end(); ++later) later->second.since = now;
+}
+
+bool ServerNode::give_back(const SubmapPair& pair) {
+  const server::SubmapSet& submaps = server_.state().submaps;
+  const auto first = submaps.find(pair.first), second = submaps.find(pair.second);
+  if (first == submaps.end() || second == submaps.end()) return false;
+  server_.give_back({pair, first->second, second->second});
+  return true;
+}
+
+/// Every time twice as long: without workers the bus fills slowly.
+Timestamp ServerNode::due(const OpenJob& job) const {
+  return job.since + config_.job_timeout_s * static_cast<double>(1U << std::min(job.asked, kMostDoubled));
+}
+
+std::optional<Timestamp> ServerNode::next_timer() const {
+  std::optional<Timestamp> next = timer_;
+  if (config_.job_timeout_s <= 0.0) return next;
+  const auto consider = [&](Timestamp t) { next = next ? std::min(*next, t) : t; };
+  for (const auto& [number, job] : open_jobs_) consider(due(job));
+  if (given_back_) consider(*given_back_ + config_.job_timeout_s);
+  return next;
+}
+
+/// The bus gives up a job that has ended five workers, and may lose one. An answer that comes after all does no harm.
+void ServerNode::ask_again(Timestamp now, Step& step) {
+  if (config_.job_timeout_s <= 0.0) return;
+  if (given_back_ && *given_back_ + config_.job_timeout_s <= now) send_jobs(std::nullopt, now, 0, step);
+  std::vector<OpenJob> late;
+  for (auto job = open_jobs_.begin(); job != open_jobs_.end();) {
+    const auto next = std::next(job);
+    if (due(job->second) <= now) late.push_back(std::move(open_jobs_.extract(job).mapped()));
+    job = next;
+  }
+  for (const OpenJob& job : late) {
+    const std::size_t before = step.messages.size();
+    for (const SubmapPair& pair : job.pairs) give_back(pair);
+    send_jobs(std::nullopt, now, job.asked + 1, step);
+    if (step.messages.size() > before)
+      step.tell(now, VerificationFailed{job.pairs.front(), fmt::format("no worker has answered for {:g} s: asked again",
+                                                                       now - job.since)});
+  }
+}
+
+}  // namespace tutti::node

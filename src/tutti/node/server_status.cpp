@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a ServerNode knows of the others, and says of the whole.
+#include <algorithm>
+
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/status_envelope.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/limits.hpp"
+
+namespace tutti::node {
+namespace {
+
+constexpr double kWorkerIsGone_s = 300.0;
+
+std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
+  std::uint64_t all = 0;
+  for (const auto& [session, numbers] : sessions)
+    for (const auto& [begin, end] : numbers.stretches()) all += end - begin;
+  return all;
+}
+
+}  // namespace
+
+void ServerNode::note_refusal(bus::Endpoint::Role from, bus::MessageKind kind, const std::string& why) {
+  MissionStatus::Refusals& refusals = refusals_[{from, kind}];
+  if (refusals.count == 0) ++changes_;
+  refusals = {bus::name(from), wire::name(kind), refusals.count + 1, wire::plain_text(why)};
+}
+
+void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  const auto status = wire::decode_status(*envelope.bytes);
+  if (!status) return refuse(envelope, status.error().message, now, step);
+  if (envelope.from.role == bus::Endpoint::Role::worker) {
+    std::erase_if(workers_, [&](const auto& entry) { return now - entry.second.last_seen > kWorkerIsGone_s; });
+    if (workers_.size() >= wire::kMaxRobots && !workers_.contains(envelope.from.number)) return;
+    workers_.insert_or_assign(envelope.from.number, MissionStatus::Worker{envelope.from.number, now, *status});
+    return;
+  }
+  const auto robot = envelope.from.robot();
+  if (!robot) return refuse(envelope, "the status of neither a robot nor a worker", now, step);
+  if (!admit(*robot))
+    return refuse(envelope, fmt::format("robot {} is none of the mission's {}", robot->value, robots_.size()), now,
+                  step);
+  receive_status_of_robot(*robot, *status, now, step);
+}
+
+void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step) {
+  const auto before = registry_.owner(robot);
+  const auto heard = registry_.hear(robot, status, now);
+  if (heard.must_be_stored) step.writes.push_back({"meta", RobotRegistry::key(robot), registry_.row(robot)});
+  Receipt& receipt = receipts_[robot];
+  receipt.robot = robot;
+  const auto owner = registry_.owner(robot);
+  const Receipt old = receipt;
+  if (owner) receipt.owner_session = owner->session;
+  if (!heard.accepted) {
+    note_refusal(bus::Endpoint::Role::robot, bus::MessageKind::status, heard.why);
+    receipt.conflict = {status.session, status.start, wire::plain_text(heard.why)};
+    if (receipt.conflict != old.conflict) step.tell(now, RobotRefused{robot, status.session, heard.why});
+  } else {
+    if (receipt.conflict && receipt.conflict->session == status.session) receipt.conflict.reset();
+    if (before != owner) step.tell(now, RobotJoined{robot, status.name, status.session});
+  }
+  if (receipt == old) return;
+  ++changes_;
+  send_receipt(robot, step);
+}
+
+MissionStatus ServerNode::mission_status(Timestamp now) const {
+  const server::MapServerState& state = server_.state();
+  const auto accepted = std::ranges::count_if(server_.map().closures, &server::JudgedClosure::accepted);
+  MissionStatus out{.time = now,
+                    .epoch = state.epoch,
+                    .revision = state.revision,
+                    .submaps = state.submaps.size(),
+                    .closures = static_cast<std::uint64_t>(accepted),
+                    .components = server_.map().components,
+                    .pending_jobs = open_jobs_.size(),
+                    .has_news = server_.has_news()};
+  for (const RobotId robot : robots_) {
+    if (out.robots.size() == wire::kMaxRobots) break;
+    MissionStatus::Robot& entry = out.robots.emplace_back();
+    entry.robot = robot;
+    if (const auto found = receipts_.find(robot); found != receipts_.end()) {
+      entry.submaps = count(found->second.stored);
+      entry.refused = count(found->second.refused);
+    }
+    if (const auto found = registry_.robots().find(robot); found != registry_.robots().end()) {
+      const RobotRegistry::Robot& known = found->second;
+      entry.last_seen = known.last_seen;
+      entry.last_update = known.last_update;
+      entry.status = known.status;
+      if (known.last_conflict && now - *known.last_conflict < RobotRegistry::kOwnerIsThere_s)
+        entry.conflict = wire::plain_text(known.conflict);
+    }
+    if (entry.status.name.empty()) entry.status.name = default_name(bus::Endpoint::of(robot));
+  }
+  for (const auto& [number, worker] : workers_) out.workers.push_back(worker);
+  for (const auto& [from, refusals] : refusals_) out.refusals.push_back(refusals);
+  return out;
+}
+
+}  // namespace tutti::node

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a ServerNode knows of robots and workers, and tells them and viewers.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "support/node/submaps.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/status_envelope.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::node {
+namespace {
+
+using bus::Endpoint, bus::MessageKind;
+constexpr RobotId kAlpha{0}, kStranger{77};
+
+class ServerStatus : public testing::Test {
+ protected:
+  ServerStatus() { restart(); }
+  void restart() {
+    store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
+                                                    store_ ? store_->tables() : storage::MemoryStore::Tables{});
+    node_ = ServerNode::open({kAlpha}, std::make_shared<test::EvenFinder>(), {.accepts_others = accepts_others_}, 1000,
+                             *store_)
+                .value();
+    done(node_->resume(now_));
+  }
+  Step done(Step step) {
+    EXPECT_TRUE(store_->commit(step.writes).has_value());
+    for (const bus::Envelope& message : step.messages) {
+      if (message.kind == MessageKind::receipt) receipts_[message.to] = wire::decode_receipt(*message.bytes).value();
+      if (message.kind == MessageKind::proxy_graph)
+        bases_[message.to] = wire::decode_proxy_graph(*message.bytes).value().graph;
+    }
+    return step;
+  }
+  Step receive(const bus::Envelope& envelope) { return done(node_->receive(envelope, now_)); }
+  Step hear(RobotId robot, const std::string& name, std::uint64_t session) {
+    return receive(to_server(Endpoint::of(robot), {.name = name, .session = session, .start = 2}));
+  }
+  /// The submap's number in what the robot is told.
+  Step send(const SubmapMessage& message, const std::string& id) {
+    bus::Envelope envelope = test::envelope(message);
+    envelope.id = id;
+    return receive(envelope);
+  }
+  /// Of whose session the robot's proxy nodes are; nothing: it was sent none.
+  std::optional<std::uint64_t> graph_of(RobotId robot) {
+    now_ = now_ + 30.0;
+    const Step step = done(node_->on_timer(now_));
+    for (const bus::Envelope& message : step.messages) {
+      if (message.to != Endpoint::of(robot)) continue;
+      const ProxyGraph& base = bases_[message.to];
+      const ProxyGraph graph = message.kind == MessageKind::proxy_graph
+                                   ? base
+                                   : wire::decode_delta(*message.bytes, base).value().value().graph;
+      if (!graph.nodes.empty()) return graph.nodes.front().chain.session;
+    }
+    return std::nullopt;
+  }
+  template <class What>
+  static std::size_t told(const Step& step) {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(step.events, [](const Event& e) { return std::holds_alternative<What>(e.what); }));
+  }
+  [[nodiscard]] const Receipt& receipt(RobotId robot) const { return receipts_.at(Endpoint::of(robot)); }
+
+  bool accepts_others_ = true;
+  std::unique_ptr<storage::MemoryStore> store_;
+  std::unique_ptr<ServerNode> node_;
+  std::map<Endpoint, Receipt> receipts_;
+  std::map<Endpoint, ProxyGraph> bases_;  // the last that came in full
+  Timestamp now_ = Timestamp{} + 3.0;
+};
+
+TEST_F(ServerStatus, FoldsWhatItKnowsOfEverybody) {
+  NodeStatus status{.name = "alpha", .session = 7, .backlog_submaps = 4, .update_age_s = 1.0, .finished = true};
+  receive(to_server(Endpoint::of(kAlpha), status));
+  receive(to_server(Endpoint::worker(5), {.name = "worker_5", .jobs_done = 9}));
+  receive(test::envelope(test::submap({kAlpha, 7}, 0)));
+  receive(test::envelope(test::submap({kAlpha, 7}, 1)));
+  bus::Envelope garbage = to_server(Endpoint::of(kStranger), {.name = "x"});
+  garbage.bytes = std::make_shared<const std::string>("TU\n");
+  receive(garbage);
+  receive(garbage);
+  const std::uint64_t changes = node_->changes();
+  now_ = now_ + 20.0;
+  done(node_->on_timer(now_));
+  EXPECT_GT(node_->changes(), changes);
+  const MissionStatus mission = node_->mission_status(now_);
+  EXPECT_TRUE(wire::validate(mission).has_value());
+  EXPECT_EQ(mission.time, now_);
+  EXPECT_EQ(mission.epoch, 1000U);
+  EXPECT_EQ(mission.revision, 1U);
+  EXPECT_EQ(mission.submaps, 2U);
+  EXPECT_EQ(mission.components, 1U);
+  EXPECT_EQ(mission.pending_jobs, 1U);
+  EXPECT_FALSE(mission.has_news);
+  ASSERT_EQ(mission.robots.size(), 1U);
+  EXPECT_EQ(mission.robots[0].status, status);
+  EXPECT_EQ(mission.robots[0].submaps, 2U);
+  EXPECT_EQ(mission.robots[0].last_seen, now_ - 20.0);
+  EXPECT_EQ(mission.robots[0].last_update, now_ - 21.0);
+  ASSERT_EQ(mission.workers.size(), 1U);
+  EXPECT_EQ(mission.workers[0].status.jobs_done, 9U);
+  ASSERT_EQ(mission.refusals.size(), 1U);
+  EXPECT_EQ(mission.refusals[0].from, "robot");
+  EXPECT_EQ(mission.refusals[0].kind, "status");
+  EXPECT_EQ(mission.refusals[0].count, 2U);
+  EXPECT_EQ(wire::decode_mission_status(*to_viewers(mission).bytes).value(), mission);
+}
+
+TEST_F(ServerStatus, WorkersThatAreSilentAreForgottenRobotsAreNot) {
+  receive(to_server(Endpoint::worker(5), {.name = "worker_5"}));
+  hear(kAlpha, "alpha", 7);
+  now_ = now_ + 400.0;
+  receive(to_server(Endpoint::worker(6), {.name = "worker_6"}));
+  const MissionStatus mission = node_->mission_status(now_);
+  ASSERT_EQ(mission.workers.size(), 1U);
+  EXPECT_EQ(mission.workers[0].number, 6U);
+  EXPECT_EQ(mission.robots[0].last_seen, now_ - 400.0);
+}
+
+TEST_F(ServerStatus, ASecondRobotOfTheNameIsToldWhoIsThere) {
+  EXPECT_EQ(told<RobotJoined>(hear(kAlpha, "alpha", 7)), 1U);
+  EXPECT_EQ(receipt(kAlpha).owner_session, 7U);
+  EXPECT_TRUE(hear(kAlpha, "alpha", 7).messages.empty());  // no news
+  EXPECT_EQ(told<RobotRefused>(hear(kAlpha, "alpha", 8)), 1U);
+  EXPECT_EQ(receipt(kAlpha).owner_session, 7U);
+  ASSERT_TRUE(receipt(kAlpha).conflict.has_value());
+  EXPECT_EQ(receipt(kAlpha).conflict->session, 8U);
+  EXPECT_EQ(receipt(kAlpha).conflict->start, 2U);
+  EXPECT_NE(receipt(kAlpha).conflict->why.find("session 7"), std::string::npos);
+  const Step again = hear(kAlpha, "alpha", 8);
+  EXPECT_TRUE(again.messages.empty() && again.events.empty() && again.writes.empty());
+  EXPECT_EQ(node_->mission_status(now_).robots[0].status.session, 7U);
+  EXPECT_FALSE(node_->mission_status(now_).robots[0].conflict.empty());
+  EXPECT_EQ(node_->mission_status(now_).refusals.at(0).count, 2U);
+  EXPECT_EQ(told<RobotRefused>(hear(kStranger, "alpha", 9)), 1U);  // by its name
+  EXPECT_EQ(receipt(kStranger).conflict->session, 9U);
+  now_ = now_ + 31.0;
+  EXPECT_EQ(told<RobotJoined>(hear(kAlpha, "alpha", 8)), 1U);
+  EXPECT_EQ(receipt(kAlpha).owner_session, 8U);
+  EXPECT_FALSE(receipt(kAlpha).conflict.has_value());
+}
+
+TEST_F(ServerStatus, NoOtherSessionTakesTheGraphOfTheNewestWhateverItsNumber) {
+  const auto fill = [&](std::uint64_t session) {
+    for (std::uint32_t i = 0; i < 2; ++i) receive(test::envelope(test::submap({kAlpha, session}, i)));
+  };
+  hear(kAlpha, "alpha", 50);
+  fill(50);
+  EXPECT_EQ(graph_of(kAlpha), 50U);
+  hear(kAlpha, "alpha", 50);
+  fill(99);
+  EXPECT_EQ(graph_of(kAlpha), 50U);  // submaps alone do not count
+  hear(kAlpha, "alpha", 50);
+  hear(kAlpha, "alpha", 99);
+  fill(10);
+  EXPECT_EQ(graph_of(kAlpha), 50U);
+  restart();
+  hear(kAlpha, "alpha", 99);  // refused before the restart
+  receive(test::envelope(test::submap({kAlpha, 50}, 5)));
+  EXPECT_EQ(graph_of(kAlpha), 50U);
+  now_ = now_ + 60.0;
+  hear(kAlpha, "alpha", 10);  // a new start whose clock is behind: the others are gone
+  receive(test::envelope(test::submap({kAlpha, 50}, 7)));
+  EXPECT_EQ(graph_of(kAlpha), 10U);
+  now_ = now_ + 60.0;
+  hear(kAlpha, "alpha", 50);
+  receive(test::envelope(test::submap({kAlpha, 50}, 8)));
+  EXPECT_EQ(graph_of(kAlpha), 10U);
+}
+
+TEST_F(ServerStatus, RobotsItWasNotToldOfAreTakenIfItIsOpen) {
+  hear(kStranger, "stranger", 7);
+  receive(test::envelope(test::submap({kStranger, 7}, 0)));
+  receive(test::envelope(test::submap({kStranger, 7}, 1)));
+  receive(test::envelope(test::submap({RobotId{78}, 3}, 0)));  // before it has said who it is
+  EXPECT_TRUE(receipt(kStranger).contains({{kStranger, 7}, 0}));
+  EXPECT_EQ(graph_of(kStranger), 7U);
+  EXPECT_EQ(node_->mission_status(now_).robots.size(), 3U);
+  EXPECT_EQ(node_->mission_status(now_).robots[2].status.name, "robot_78");
+  restart();
+  EXPECT_EQ(node_->mission_status(now_).robots.size(), 3U);
+  EXPECT_EQ(node_->mission_status(now_).robots[1].status.name, "stranger");
+  EXPECT_EQ(node_->mission_status(now_).robots[1].last_seen, std::nullopt);
+  receive(test::envelope(test::submap({kStranger, 7}, 2)));
+  EXPECT_EQ(graph_of(kStranger), 7U);
+}
+
+TEST_F(ServerStatus, AndRefusedIfItIsNot) {
+  accepts_others_ = false;
+  restart();
+  EXPECT_EQ(told<MessageRefused>(hear(kStranger, "stranger", 7)), 1U);
+  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(test::submap({kStranger, 7}, 0)))), 1U);
+  EXPECT_TRUE(receipts_.empty());
+  EXPECT_EQ(node_->mission_status(now_).robots.size(), 1U);
+  EXPECT_EQ(node_->mission_status(now_).refusals.size(), 2U);
+}
+
+TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
+  const ChainId chain{kAlpha, 7};
+  receive(test::envelope(test::submap(chain, 0)));
+  bus::Envelope garbage = test::envelope(test::submap(chain, 1));
+  garbage.bytes = std::make_shared<const std::string>("TU garbage");
+  SubmapMessage torn = test::submap(chain, 2);
+  torn.submap.odometry[0].T_a_b.translation.x() += 5.0;
+  for (const bus::Envelope& bad : {garbage, test::envelope(torn)}) EXPECT_EQ(told<MessageRefused>(receive(bad)), 1U);
+  EXPECT_EQ(told<MessageRefused>(send(test::submap(chain, 3), "0/7/4")), 1U);  // not what it is called
+  const auto check = [&] {
+    for (std::uint32_t i = 0; i < 6; ++i) {
+      EXPECT_EQ(receipt(kAlpha).contains({chain, i}), i == 0) << i;
+      EXPECT_EQ(receipt(kAlpha).refuses({chain, i}), i == 1 || i == 2 || i == 4) << i;
+    }
+    EXPECT_NE(receipt(kAlpha).why_refused.find("0/7/4"), std::string::npos) << receipt(kAlpha).why_refused;
+  };
+  check();
+  EXPECT_EQ(store_->tables().at("submaps").size(), 1U);
+  EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 3U);
+  receipts_.clear();
+  restart();
+  check();
+}
+
+TEST_F(ServerStatus, OfOneIdTheFirstContentStays) {
+  const ChainId chain{kAlpha, 7};
+  const SubmapMessage first = test::submap(chain, 0);
+  SubmapMessage other = first;
+  other.submap.cloud = std::make_shared<const PointCloud>(PointCloud{{{9.0F, 9.0F, 1.0F}}});
+  receive(test::envelope(first));
+  const auto tables = store_->tables();
+  const Step step = receive(test::envelope(other));
+  EXPECT_EQ(told<MessageRefused>(step), 1U);
+  EXPECT_EQ(store_->tables(), tables);
+  EXPECT_TRUE(receipt(kAlpha).contains({chain, 0}));  // it need not come once more
+  EXPECT_FALSE(receipt(kAlpha).refuses({chain, 0}));
+  EXPECT_EQ(told<MessageRefused>(receive(test::envelope(first))), 0U);
+}
+
+TEST_F(ServerStatus, NobodysGarbageFillsTheReceipt) {
+  bus::Envelope garbage = test::envelope(test::submap({kAlpha, 7}, 0));
+  garbage.bytes = std::make_shared<const std::string>("TU garbage");
+  for (std::uint64_t session = 0; session < 300; ++session) {
+    garbage.id = message_id({{kAlpha, session}, 0});
+    receive(garbage);
+  }
+  for (std::uint32_t i = 0; i < 3000; i += 2) {
+    garbage.id = message_id({{kAlpha, 3}, i});
+    receive(garbage);
+  }
+  EXPECT_LE(receipt(kAlpha).refused.size(), 100U);
+  EXPECT_LE(receipt(kAlpha).refused.at(3).stretches().size(), 500U);
+  EXPECT_EQ(node_->mission_status(now_).refusals.at(0).count, 1800U);
+}
+
+}  // namespace
+}  // namespace tutti::node

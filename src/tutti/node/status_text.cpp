@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/status_text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <vector>
+
+namespace tutti::node {
+namespace {
+
+std::string duration(double s) {
+  if (s < 120.0) return fmt::format("{:.0f} s", std::max(0.0, s));
+  if (s < 7200.0) return fmt::format("{:.0f} min", s / 60.0);
+  return fmt::format("{:.0f} h", s / 3600.0);
+}
+
+std::string ago(Timestamp now, const std::optional<Timestamp>& then) {
+  return then ? duration(now - *then) + " ago" : "never";
+}
+
+std::string size(std::uint64_t bytes) {
+  const auto number = static_cast<double>(bytes);
+  if (bytes < 1000) return fmt::format("{} B", bytes);
+  return bytes < 1'000'000 ? fmt::format("{:.1f} kB", number / 1e3) : fmt::format("{:.1f} MB", number / 1e6);
+}
+
+std::string backlog(const NodeStatus& status) {
+  return status.backlog_submaps == 0 ? "-" : fmt::format("{} ({})", status.backlog_submaps, size(status.backlog_bytes));
+}
+
+using Row = std::vector<std::string>;
+
+void append_table(const std::vector<Row>& rows, std::string& out) {
+  std::vector<std::size_t> widths(rows.front().size(), 0);
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) line += fmt::format("{:<{}}  ", row[i], widths[i]);
+    line.erase(line.find_last_not_of(' ') + 1);
+    out += line + "\n";
+  }
+}
+
+std::string state(const MissionStatus::Robot& robot) {
+  std::string state = robot.status.finished ? "finished" : "maps";
+  if (!robot.last_seen) state = "not seen since the server started";
+  if (!robot.status.trouble.empty()) state += ": " + robot.status.trouble;
+  return state;
+}
+
+}  // namespace
+
+std::string mission_status_text(const MissionStatus& status, double silent_s) {
+  std::string out;
+  const auto say = [&out]<class... Args>(fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(out), format, std::forward<Args>(args)...);
+  };
+  if (silent_s > 0.0) say("No server: last seen {} ago. What it said then:\n", duration(silent_s));
+  say("server {}: {} submaps, {} closures, {}; revision {}{}{}\n", status.version, status.submaps, status.closures,
+      status.components > 1 ? fmt::format("{} parts that nothing joins yet", status.components) : "one map",
+      status.revision, status.has_news ? ", the next is due" : "",
+      status.pending_jobs > 0 ? fmt::format(", {} jobs wait", status.pending_jobs) : "");
+  if (!status.trouble.empty()) say("trouble: {}\n", status.trouble);
+  if (status.robots.empty() && status.workers.empty()) say("Nobody is there: no robot and no worker.\n");
+  if (!status.robots.empty()) {
+    std::vector<Row> rows{{"robot", "last seen", "backlog", "last update", "revision", "submaps", "alerts", "state"}};
+    for (const MissionStatus::Robot& robot : status.robots)
+      rows.push_back({robot.status.name, ago(status.time, robot.last_seen), backlog(robot.status),
+                      ago(status.time, robot.last_update),
+                      robot.status.heard_epoch == status.epoch ? std::to_string(robot.status.heard_revision) : "-",
+                      std::to_string(robot.submaps), std::to_string(robot.status.alerts), state(robot)});
+    append_table(rows, out);
+  }
+  if (!status.workers.empty()) {
+    std::vector<Row> rows{{"worker", "last seen", "jobs done", "state"}};
+    for (const MissionStatus::Worker& worker : status.workers)
+      rows.push_back({worker.status.name, ago(status.time, worker.last_seen), std::to_string(worker.status.jobs_done),
+                      worker.status.trouble});
+    append_table(rows, out);
+  }
+  for (const MissionStatus::Robot& robot : status.robots) {
+    if (!robot.conflict.empty()) say("two robots: {}\n", robot.conflict);
+    if (robot.refused > 0) say("{}: {} submaps are no good and not in the map\n", robot.status.name, robot.refused);
+  }
+  for (const MissionStatus::Refusals& refusals : status.refusals)
+    say("refused from {}s: {} x {}, the last because: {}\n", refusals.from, refusals.count, refusals.kind,
+        refusals.last_why);
+  return out;
+}
+
+}  // namespace tutti::node

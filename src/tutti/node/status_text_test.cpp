@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/status_text.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::node {
+namespace {
+
+const NodeStatus kAlpha{.name = "alpha",
+                        .backlog_submaps = 12,
+                        .backlog_bytes = 3'400'000,
+                        .heard_epoch = 9,
+                        .heard_revision = 41,
+                        .alerts = 2,
+                        .trouble = "the disk is full"};
+
+TEST(StatusText, SaysWhoIsThereAndHowItStands) {
+  const MissionStatus status{.time = Timestamp{} + 1000.0,
+                             .version = "0.9",
+                             .epoch = 9,
+                             .revision = 42,
+                             .submaps = 31,
+                             .closures = 17,
+                             .components = 2,
+                             .pending_jobs = 4,
+                             .robots = {{RobotId{0}, Timestamp{} + 998.0, Timestamp{} + 400.0, 30, 1,
+                                         "another robot 'alpha' is there", kAlpha},
+                                        {RobotId{1}, {}, {}, 1, 0, "", {.name = "bravo"}}},
+                             .workers = {{3, Timestamp{} + 999.0, {.name = "worker_3", .jobs_done = 77}}},
+                             .refusals = {{"robot", "submap", 5, "no good"}}};
+  EXPECT_EQ(mission_status_text(status, 0.0),
+            "server 0.9: 31 submaps, 17 closures, 2 parts that nothing joins yet; revision 42, 4 jobs wait\n"
+            "robot  last seen  backlog      last update  revision  submaps  alerts  state\n"
+            "alpha  2 s ago    12 (3.4 MB)  10 min ago   41        30       2       maps: the disk is full\n"
+            "bravo  never      -            never        -         1        0       not seen since the server started\n"
+            "worker    last seen  jobs done  state\n"
+            "worker_3  1 s ago    77\n"
+            "two robots: another robot 'alpha' is there\n"
+            "alpha: 1 submaps are no good and not in the map\n"
+            "refused from robots: 5 x submap, the last because: no good\n");
+}
+
+TEST(StatusText, SaysWhenNobodyIsThere) {
+  const std::string text = mission_status_text({.version = "0.9"}, 200.0);
+  EXPECT_EQ(text,
+            "No server: last seen 3 min ago. What it said then:\n"
+            "server 0.9: 0 submaps, 0 closures, one map; revision 0\n"
+            "Nobody is there: no robot and no worker.\n");
+}
+
+}  // namespace
+}  // namespace tutti::node

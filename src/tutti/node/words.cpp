@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/words.hpp"
+
+#include "tutti/node/submap_frames.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::node {
+
+std::string key_of(const SubmapPair& pair) { return key_of(pair.first) + key_of(pair.second); }
+
+std::optional<SubmapPair> pair_of(std::string_view key) {
+  const auto numbers = storage::numbers_of(key, 6);
+  if (!numbers) return std::nullopt;
+  const auto id = [&](std::size_t at) {
+    return SubmapId{{RobotId{static_cast<std::uint32_t>((*numbers)[at])}, (*numbers)[at + 1]},
+                    static_cast<std::uint32_t>((*numbers)[at + 2])};
+  };
+  const SubmapPair pair{id(0), id(3)};
+  return key == key_of(pair) ? std::optional(pair) : std::nullopt;  // numbers of 32 bits
+}
+
+Result<WordSet> read_words(const storage::TableStore& map) {
+  WordSet words;
+  Status ok;
+  const auto scanned = map.scan("words", {}, [&](std::string_view key, std::string_view bytes) {
+    const auto pair = pair_of(key);
+    auto word = wire::decode_word(bytes);
+    if (!pair)
+      ok = fail(ErrorCode::parse, "the map's table 'words': a key that is no pair of submaps");
+    else if (!word)
+      ok = in_context("the map's table 'words'", word.error());
+    else
+      words.insert_or_assign(*pair, std::move(*word));
+    return ok.has_value();
+  });
+  if (!scanned) return tl::unexpected(scanned.error());
+  if (!ok) return tl::unexpected(ok.error());
+  return words;
+}
+
+ClosureVerdict without_evidence(ClosureVerdict verdict) {
+  verdict.evidence.clear();
+  verdict.worker.reset();
+  verdict.verified_ns = 0;
+  return verdict;
+}
+
+}  // namespace tutti::node

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/collect_mission.hpp"
+
+#include <memory>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/mission/make_record.hpp"
+#include "tutti/mission/robot_actor.hpp"
+#include "tutti/program/event_log.hpp"
+#include "tutti/program/robot_program.hpp"
+#include "tutti/program/server_program.hpp"
+#include "tutti/program/update_json.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A robot's store and what was made of it; the store lives as long.
+struct Robot {
+  std::unique_ptr<storage::TableStore> store;
+  std::unique_ptr<mission::RobotActor> actor;
+  mission::FinishedRobot finished;
+  mission::PolicyTiming timing;
+};
+
+mission::TrafficRecord traffic_of(const Json& row, const std::string& robot) {
+  const bool sent = row.at("sent").get<bool>();
+  const auto bytes = row.at("bytes").get<std::uint64_t>();
+  return {.from = sent ? robot : "server",
+          .to = sent ? "server" : robot,
+          .kind = row.at("kind").get<std::string>(),
+          .messages = row.at("messages").get<std::uint64_t>(),
+          .bytes = bytes,
+          .transmitted_bytes = bytes,
+          .largest_message = row.at("largest").get<std::uint64_t>()};
+}
+
+/// One event of a robot program.
+Status take(const Json& event, const std::string& name, Robot& robot) {
+  const std::string what = event.value("event", "");
+  if (what == kUpdateScored) {
+    auto update = update_of(event);
+    if (!update) return tl::unexpected(update.error());
+    robot.finished.updates.push_back(std::move(*update));
+  }
+  if (what != kEnded) return {};
+  try {
+    robot.finished.traffic.clear();
+    for (const Json& row : event.at("traffic")) robot.finished.traffic.push_back(traffic_of(row, name));
+    robot.finished.troubles = event.at("troubles").get<std::vector<std::string>>();
+    robot.timing.update_ms = event.at("update_ms").get<std::vector<double>>();
+    robot.timing.comparison_ms = event.at("comparison_ms").get<std::vector<double>>();
+    robot.timing.optimisation_ms = event.at("optimisation_ms").get<std::vector<double>>();
+  } catch (const Json::exception& error) {
+    return fail(ErrorCode::parse, "an event '{}': {}", kEnded, error.what());
+  }
+  return {};
+}
+
+/// What the robot would say of the last map, once more: its own odometry against it, whatever it has corrected.
+consistency::Explanation explain_again(const mission::RobotActor& actor, const mission::MissionConfig& config,
+                                       const ProxyGraph& map) {
+  robot::AgentState state = actor.node().agent().state();
+  state.epoch = state.revision = 0;                // as if it had not heard it,
+  if (state.comparisons > 0) --state.comparisons;  // nor compared it
+  robot::RobotAgent again(actor.id(), config.agent, Rng(1), std::move(state));
+  const ProxyGraphMessage own{{}, consistency::own_part(map, actor.id())};
+  const auto sent = wire::decode_proxy_graph(wire::encode(own));
+  return again.receive(sent ? *sent : own).explanation;
+}
+
+Result<Robot> read_robot(const mission::MissionConfig& config, const MissionSource& source,
+                         const mission::MissionRecording& recording, const fs::path& folder) {
+  const std::string& name = recording.recording.name;
+  Robot robot;
+  auto store = storage::open_sqlite_store(folder / kRobotFile, storage::robot_schema());
+  if (!store) return tl::unexpected(store.error());
+  robot.store = std::move(*store);
+  auto actor = mission::RobotActor::open(recording, {.agent = config.agent, .name = name}, config.association,
+                                         agent_randomness(source.seed, name), 0, *robot.store);
+  if (!actor) return in_context((folder / kRobotFile).string(), actor.error());
+  robot.actor = std::move(*actor);
+  robot.timing = {.robot = name, .policy = config.agent.policy.name};
+  Status taken;
+  const Status read = read_events(folder, [&](const Json& event) {
+    if (taken) taken = take(event, name, robot);
+  });
+  if (!read || !taken) return in_context(folder.string(), (read ? taken : read).error());
+  robot.finished.outcome = robot.actor->outcome();
+  return robot;
+}
+
+/// The server's course: what it told.
+Result<mission::MissionEvents> read_course(const fs::path& folder) {
+  mission::MissionEvents course;
+  std::set<std::string> failed;  // pairs that could not be verified are tried again and again
+  const auto take = [&](const Json& event) {
+    const std::string what = event.value("event", "");
+    const Timestamp time = Timestamp{} + event.value("time_s", 0.0);
+    if (what == "map_updated")
+      course.take(
+          {time, node::MapUpdated{event.value("revision", std::uint64_t{0}), event.value("submaps", std::size_t{0}),
+                                  event.value("accepted", std::size_t{0})}});
+    const bool is_new_failure = what == "verification_failed" &&
+                                failed.insert(event.value("first", "") + " " + event.value("second", "")).second;
+    if (what == "message_refused" || is_new_failure)
+      course.take({time, node::MessageRefused{{}, bus::MessageKind::verdicts, event.value("why", "")}});
+  };
+  if (const Status read = read_events(folder, take); !read) return tl::unexpected(read.error());
+  return course;
+}
+
+}  // namespace
+
+Result<mission::MissionRecord> collect_mission(const mission::MissionConfig& config, const MissionSource& source,
+                                               const fs::path& state, const std::string& version) {
+  auto input = mission::load_input(config, source.data, source.seed);
+  if (!input) return tl::unexpected(input.error());
+  std::vector<Robot> robots;
+  std::set<RobotId> ids;
+  for (const mission::MissionRecording& recording : input->robots) {
+    auto robot = read_robot(config, source, recording, state / "robots" / recording.recording.name);
+    if (!robot) return tl::unexpected(robot.error());
+    robots.push_back(std::move(*robot));
+    ids.insert(recording.recording.robot);
+  }
+  auto finder = make_finder(config, source);
+  if (!finder) return tl::unexpected(finder.error());
+  const fs::path map = state / "server" / kMapFile;
+  const auto store = storage::open_sqlite_store(map, storage::map_schema());
+  if (!store) return tl::unexpected(store.error());
+  const auto server = node::ServerNode::open(ids, *finder, {.server = config.server}, 1, **store);
+  if (!server) return in_context(map.string(), server.error());
+  static_cast<void>((*server)->resume(Timestamp{}));  // computes the map
+  const auto course = read_course(state / "server");
+  if (!course) return tl::unexpected(course.error());
+  mission::FinishedMission finished{.config = config,
+                                    .seed = source.seed,
+                                    .version = version,
+                                    .duration_s = duration_of(config, input->robots),
+                                    .survey = input->survey,
+                                    .robots = {},
+                                    .server = **server,
+                                    .events = *course,
+                                    .undelivered = {}};
+  for (Robot& robot : robots) {
+    if (config.agent.explain && !robot.finished.updates.empty())
+      robot.finished.explanation = explain_again(*robot.actor, config, (*server)->broadcast());
+    finished.robots.push_back(std::move(robot.finished));
+  }
+  mission::MissionRecord record = mission::make_record(finished);
+  for (Robot& robot : robots) record.timing.policies.push_back(std::move(robot.timing));
+  return record;
+}
+
+}  // namespace tutti::program

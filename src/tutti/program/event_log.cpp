@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/event_log.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/logger.h>
+#include <spdlog/sinks/rotating_file_sink.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <unistd.h>
+
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "tutti/wire/message_kind.hpp"
+
+namespace tutti::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kEvents = "events.jsonl";
+constexpr const char* kOlderEvents = "events.1.jsonl";
+constexpr std::array<std::pair<const char*, spdlog::level::level_enum>, 4> kLevels{{{"debug", spdlog::level::debug},
+                                                                                    {"info", spdlog::level::info},
+                                                                                    {"warning", spdlog::level::warn},
+                                                                                    {"error", spdlog::level::err}}};
+
+spdlog::level::level_enum of_spdlog(Level level) { return kLevels.at(static_cast<std::size_t>(level)).second; }
+
+/// What an event says, for programs and for people, and how much it matters to these.
+struct Told {
+  Json json;
+  std::string sentence;
+  Level level = Level::info;
+};
+
+std::string name_of(const bus::Endpoint& end) {
+  if (end.role == bus::Endpoint::Role::server) return "server";
+  if (end.role == bus::Endpoint::Role::viewer) return "a viewer";
+  return fmt::format("{} {}", name(end.role), end.number);
+}
+
+Told tell(const node::SubmapStored& stored) {
+  return {{{"event", "submap_stored"}, {"submap", to_string(stored.id)}},
+          fmt::format("submap {} stored", to_string(stored.id)),
+          Level::debug};
+}
+Told tell(const node::VerdictsTaken& taken) {
+  return {{{"event", "verdicts_taken"}, {"job", taken.job}, {"pairs", taken.pairs}},
+          fmt::format("job {}: {} pairs verified", taken.job, taken.pairs),
+          Level::debug};
+}
+Told tell(const node::WordTaken& taken) {
+  return {{{"event", "word_taken"},
+           {"first", to_string(taken.pair.first)},
+           {"second", to_string(taken.pair.second)},
+           {"wish", to_string(taken.wish)}},
+          fmt::format("an operator's word on the closures between submaps {} and {}: {}", to_string(taken.pair.first),
+                      to_string(taken.pair.second), to_string(taken.wish))};
+}
+Told tell(const node::VerificationFailed& failed) {
+  const std::string pair = to_string(failed.pair.first) + " and " + to_string(failed.pair.second);
+  return {{{"event", "verification_failed"},
+           {"first", to_string(failed.pair.first)},
+           {"second", to_string(failed.pair.second)},
+           {"why", failed.why}},
+          fmt::format("submaps {} could not be verified, and will be asked again: {}", pair, failed.why),
+          Level::warning};
+}
+Told tell(const node::MapUpdated& map) {
+  return {{{"event", "map_updated"}, {"revision", map.revision}, {"submaps", map.submaps}, {"accepted", map.accepted}},
+          fmt::format("map revision {}: {} submaps, {} closures", map.revision, map.submaps, map.accepted)};
+}
+Told tell(const node::RobotUpdated& robot) {
+  const robot::UpdateSummary& update = robot.summary;
+  return {{{"event", "robot_updated"},
+           {"robot", robot.robot.value},
+           {"revision", update.revision},
+           {"synchronised", update.synchronised},
+           {"constraints", update.constraints},
+           {"optimised", to_string(update.optimised)},
+           {"taken_back", update.taken_back}},
+          fmt::format("heard map revision {}: {} nodes compared, {} constraints held", update.revision,
+                      update.synchronised, update.constraints)};
+}
+Told tell(const node::MessageRefused& refused) {
+  return {{{"event", "message_refused"},
+           {"from", name_of(refused.from)},
+           {"kind", wire::name(refused.kind)},
+           {"why", refused.why}},
+          fmt::format("a {} from {} was refused: {}", wire::name(refused.kind), name_of(refused.from), refused.why),
+          Level::warning};
+}
+Told tell(const node::RobotJoined& joined) {
+  return {
+      {{"event", "robot_joined"}, {"robot", joined.robot.value}, {"name", joined.name}, {"session", joined.session}},
+      fmt::format("robot {} ({}) is here, session {}", joined.robot.value, joined.name, joined.session)};
+}
+Told tell(const node::RobotRefused& refused) {
+  return {
+      {{"event", "robot_refused"}, {"robot", refused.robot.value}, {"session", refused.session}, {"why", refused.why}},
+      "a second robot was refused: " + refused.why,
+      Level::warning};
+}
+Told tell(const node::SampleRefused& refused) {
+  return {{{"event", "sample_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
+          "an odometry sample was refused: " + refused.why,
+          Level::warning};
+}
+Told tell(const node::ScanRefused& refused) {
+  return {{{"event", "scan_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
+          "a scan was refused: " + refused.why,
+          Level::warning};
+}
+
+Told tell_event(const node::Event& event) {
+  Told told = std::visit([](const auto& what) { return tell(what); }, event.what);
+  Json json{{"time_s", static_cast<double>(event.time.ns) * 1e-9}};
+  json.update(told.json);
+  told.json = std::move(json);
+  return told;
+}
+
+}  // namespace
+
+Result<Level> level_of(const std::string& word) {
+  for (std::size_t i = 0; i < kLevels.size(); ++i)
+    if (word == kLevels.at(i).first) return static_cast<Level>(i);
+  return fail(ErrorCode::configuration, "log level '{}', expected debug, info, warning or error", word);
+}
+
+Json to_json(const node::Event& event) { return tell_event(event).json; }
+
+std::unique_ptr<EventLog> EventLog::on_console(const std::string& name, Level console) {
+  std::unique_ptr<EventLog> log(new EventLog());
+  const auto sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+  sink->set_level(of_spdlog(console));
+  sink->set_pattern("%n: %l: %v");
+  log->people_ = std::make_shared<spdlog::logger>(name, sink);
+  log->people_->set_level(spdlog::level::debug);
+  log->console_ = console;
+  return log;
+}
+
+Result<std::unique_ptr<EventLog>> EventLog::open(const fs::path& folder, const std::string& name, Level console) {
+  auto log = on_console(name, console);
+  try {
+    const auto file =
+        std::make_shared<spdlog::sinks::rotating_file_sink_mt>((folder / "log.txt").string(), kMaxLogBytes, 1);
+    file->set_level(spdlog::level::info);
+    file->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
+    log->people_->sinks().push_back(file);
+  } catch (const spdlog::spdlog_ex& error) {
+    return fail(ErrorCode::io, "{}: {}", (folder / "log.txt").string(), error.what());
+  }
+  log->people_->set_error_handler([](const std::string& /*a full disk*/) {});
+  log->people_->flush_on(spdlog::level::info);
+  log->file_ = folder / kEvents;
+  std::error_code error;
+  log->bytes_ = fs::exists(log->file_, error) ? fs::file_size(log->file_, error) : 0;
+  log->events_.open(log->file_, std::ios::app);
+  if (!log->events_) return fail(ErrorCode::io, "{}: cannot be opened", log->file_.string());
+  if (log->bytes_ > 0) log->append("");  // ends a line that a kill has torn
+  return log;
+}
+
+EventLog::~EventLog() { show(""); }
+
+void EventLog::append(const std::string& line) {
+  if (file_.empty()) return;
+  if (bytes_ > kMaxEventBytes) {
+    events_.close();
+    std::error_code ignored;
+    fs::rename(file_, file_.parent_path() / kOlderEvents, ignored);
+    events_.open(file_, std::ios::trunc);
+    bytes_ = 0;
+  }
+  events_.clear();
+  events_ << line << '\n' << std::flush;
+  bytes_ += line.size() + 1;
+}
+
+void EventLog::write(const node::Event& event) {
+  const Told told = tell_event(event);
+  write(told.json);
+  say(told.level, told.sentence);
+}
+
+void EventLog::write(const Json& line) {
+  const std::scoped_lock guard(mutex_);
+  append(line.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void EventLog::say(Level level, const std::string& sentence) {
+  const std::scoped_lock guard(mutex_);
+  const bool over_line = !shown_.empty() && level >= console_;
+  if (over_line) static_cast<void>(!::write(STDERR_FILENO, "\r\033[K", 4));
+  people_->log(of_spdlog(level), sentence);
+  if (over_line) static_cast<void>(!::write(STDERR_FILENO, shown_.data(), shown_.size()));
+}
+
+void EventLog::show(const std::string& line) {
+  const std::scoped_lock guard(mutex_);
+  if (line == shown_ || isatty(STDERR_FILENO) == 0) return;
+  const std::string all = line.empty() ? "\n" : "\r\033[K" + line;
+  shown_ = line;
+  static_cast<void>(!::write(STDERR_FILENO, all.data(), all.size()));
+}
+
+Status read_events(const fs::path& folder, const std::function<void(const Json&)>& take) {
+  for (const char* name : {kOlderEvents, kEvents}) {
+    std::ifstream in(folder / name);
+    if (!in && name == std::string_view(kEvents))
+      return fail(ErrorCode::io, "{}: cannot be read", (folder / name).string());
+    for (std::string line; std::getline(in, line);) {
+      const Json json = Json::parse(line, nullptr, false);
+      if (json.is_object()) take(json);
+    }
+  }
+  return {};
+}
+
+}  // namespace tutti::program

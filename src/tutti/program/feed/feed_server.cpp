@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/feed_server.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+namespace tutti::program {
+namespace {
+
+constexpr std::size_t kReadBytes = 256U << 10U;  // at most, of one client, before the others have their turn
+
+bool would_wait() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR; }
+
+/// A file left there by a program that was killed goes; an error when it is in use or no socket.
+Status make_way(const std::string& path, const sockaddr_un& address) {
+  struct stat found {};
+  if (lstat(path.c_str(), &found) != 0) return {};
+  if (!S_ISSOCK(found.st_mode)) return fail(ErrorCode::io, "{}: exists and is no socket", path);
+  const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool in_use = connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  close(probe);
+  if (in_use) return fail(ErrorCode::io, "{}: another program listens there", path);
+  unlink(path.c_str());
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FeedServer>> FeedServer::listen(const std::string& path, FeedTarget& target,
+                                                       const FeedSettings& settings) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path)
+    return fail(ErrorCode::io, "'{}': a socket's path has 1 to {} bytes, this one {}", path,
+                sizeof address.sun_path - 1, path.size());
+  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  if (auto ok = make_way(path, address); !ok) return tl::unexpected(ok.error());
+  const int listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const auto failed = [&](const char* what) {
+    const int why = errno;
+    if (listener >= 0) close(listener);
+    return fail(ErrorCode::io, "{}: cannot {}: {}", path, what, std::strerror(why));
+  };
+  if (listener < 0) return failed("make a socket");
+  // Before anybody can connect: nobody can until listen().
+  if (bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return failed("bind a socket");
+  if (chmod(path.c_str(), S_IRUSR | S_IWUSR) != 0) return failed("keep the socket to this user");
+  if (::listen(listener, settings.max_clients) != 0) return failed("listen");
+  return std::unique_ptr<FeedServer>(new FeedServer(path, listener, target, settings));
+}
+
+FeedServer::~FeedServer() {
+  for (const auto& [client, file] : files_) close(file);
+  close(listener_);
+  unlink(path_.c_str());
+}
+
+void FeedServer::serve(int timeout_ms) {
+  session_.refresh();
+  std::vector<pollfd> wanted{{.fd = listener_, .events = POLLIN, .revents = 0}};
+  std::vector<FeedSession::Client> clients;
+  for (const auto& [client, file] : files_) {
+    const auto events = (session_.is_over(client) ? 0 : POLLIN) | (session_.output(client).empty() ? 0 : POLLOUT);
+    wanted.push_back({.fd = file, .events = static_cast<short>(events), .revents = 0});
+    clients.push_back(client);
+  }
+  if (poll(wanted.data(), wanted.size(), timeout_ms) <= 0) return;
+  for (std::size_t i = 0; i < clients.size(); ++i) {
+    const short ready = wanted[i + 1].revents;
+    const int file = wanted[i + 1].fd;
+    // One that has said all it has to say may still read.
+    if ((ready & POLLIN) != 0 ? !read_from(clients[i], file) : (ready & (POLLERR | POLLHUP | POLLNVAL)) != 0) {
+      static_cast<void>(write_to(clients[i], file));
+      drop(clients[i]);
+    }
+  }
+  if ((wanted[0].revents & POLLIN) != 0) accept_one();
+  for (const auto& [client, file] : std::map(files_))
+    if (!write_to(client, file)) drop(client);
+}
+
+void FeedServer::accept_one() {
+  const int file = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (file < 0) return;
+  if (files_.size() >= static_cast<std::size_t>(settings_.max_clients)) {
+    close(file);
+    return;
+  }
+  files_[next_] = file;
+  session_.connect(next_++);
+}
+
+bool FeedServer::read_from(FeedSession::Client client, int file) {
+  std::array<char, 64U << 10U> bytes;  // NOLINT: filled by recv
+  for (std::size_t all = 0; all < kReadBytes && !session_.is_over(client);) {
+    const ssize_t count = recv(file, bytes.data(), bytes.size(), 0);
+    if (count < 0) return would_wait();
+    if (count == 0) return false;
+    session_.receive(client, {bytes.data(), static_cast<std::size_t>(count)});
+    all += static_cast<std::size_t>(count);
+  }
+  return true;
+}
+
+bool FeedServer::write_to(FeedSession::Client client, int file) {
+  for (std::string_view bytes = session_.output(client); !bytes.empty(); bytes = session_.output(client)) {
+    const ssize_t count = send(file, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (count < 0) return would_wait();
+    session_.sent(client, static_cast<std::size_t>(count));
+  }
+  return !session_.is_over(client);
+}
+
+void FeedServer::drop(FeedSession::Client client) {
+  session_.disconnect(client);
+  close(files_.at(client));
+  files_.erase(client);
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "tutti/program/feed/feed_session.hpp"
+
+namespace tutti::program {
+
+/// FeedSession on a Unix socket. Without a thread of its own: its program calls serve() again and again, which may be
+/// what it waits in.
+class FeedServer {
+ public:
+  /// Only this user may connect. A socket that a killed program left there is replaced; an error when somebody listens
+  /// on it, or it is another kind of file. `target` outlives the server.
+  static Result<std::unique_ptr<FeedServer>> listen(const std::string& path, FeedTarget& target,
+                                                    const FeedSettings& settings);
+  ~FeedServer();
+  FeedServer(const FeedServer&) = delete;
+  FeedServer& operator=(const FeedServer&) = delete;
+
+  /// Waits for something to do, at most so long (0: not at all), and does what can be done without waiting.
+  void serve(int timeout_ms);
+  [[nodiscard]] FeedSession& session() { return session_; }
+  [[nodiscard]] std::size_t clients() const { return files_.size(); }
+
+ private:
+  FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings)
+      : path_(std::move(path)), listener_(listener), settings_(settings), session_(target, settings) {}
+  void accept_one();
+  /// False: the connection has ended.
+  bool read_from(FeedSession::Client client, int file);
+  bool write_to(FeedSession::Client client, int file);
+  void drop(FeedSession::Client client);
+
+  std::string path_;
+  int listener_ = -1;
+  FeedSettings settings_;
+  FeedSession session_;
+  std::map<FeedSession::Client, int> files_;
+  FeedSession::Client next_ = 0;
+};
+
+}  // namespace tutti::program

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "tutti/program/feed/feed_frames.hpp"
+#include "tutti/program/feed/feed_settings.hpp"
+#include "tutti/program/feed/feed_target.hpp"
+#include "tutti/program/feed/smooth_map.hpp"
+
+namespace tutti::program {
+
+/// The live feed of one robot, without sockets: bytes of clients in, bytes to them out. One client feeds, the others
+/// listen. A client that does not read holds up nobody: beyond FeedSettings::max_queue_kb it loses the oldest
+/// corrections (and is told how many), and when what cannot be left out alone is more, its connection.
+class FeedSession {
+ public:
+  using Client = std::uint64_t;
+  /// `target` outlives it. Corrections begin with the target's T_map_odom of now.
+  FeedSession(FeedTarget& target, const FeedSettings& settings);
+
+  void connect(Client client) { clients_[client]; }
+  /// Whoever feeds may come again, or another; the robot goes on where it stood.
+  void disconnect(Client client);
+  /// Carries out every message that is whole now.
+  void receive(Client client, std::string_view bytes);
+  /// The robot may have heard something: says so to those who listen, if it matters to them.
+  void refresh();
+
+  /// What is to be written next; empty: nothing.
+  [[nodiscard]] std::string_view output(Client client) const;
+  /// So many bytes of output() were.
+  void sent(Client client, std::size_t bytes);
+  /// Nothing more is to be read from this client; with no output() left, the connection ends.
+  [[nodiscard]] bool is_over(Client client) const { return clients_.at(client).over; }
+  [[nodiscard]] bool has_feeder() const { return feeder_.has_value(); }
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< Corrections, for all clients.
+
+ private:
+  struct Frame {
+    std::string bytes;
+    bool is_correction = false;
+  };
+  struct Connection {
+    FrameReader reader;
+    std::deque<Frame> queue;
+    std::size_t queued = 0;  ///< Bytes, those of the first frame that were sent among them.
+    std::size_t sent = 0;    ///< Of the first frame.
+    std::uint64_t dropped = 0;
+    bool greeted = false;
+    bool over = false;
+    bool ended = false;  ///< It said that the recording has.
+  };
+
+  void close(Client client, const std::string& why);
+  void put(Connection& connection, std::string frame, bool is_correction = false);
+  void make_room(Connection& connection);
+  /// To all that were greeted.
+  void broadcast(const std::string& frame);
+  void take(Client client, const FromClient& message);
+  void greet(Client client, const FeedHello& hello);
+  void take_odometry(Client client, const node::OdometrySample& sample);
+  void take_scan(Client client, const Scan& scan);
+
+  FeedTarget& target_;
+  FeedSettings settings_;
+  SmoothMap map_;
+  std::string situation_;  ///< The frame that was last told.
+  std::map<Client, Connection> clients_;
+  std::optional<Client> feeder_;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace tutti::program

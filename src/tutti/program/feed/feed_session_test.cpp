@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/feed_session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "support/program/feed/client.hpp"
+
+namespace tutti::program {
+namespace {
+
+using Feed = v1::Feed;
+
+/// Takes samples of increasing stamps; what else it knows is set by hand.
+class ScriptedTarget final : public FeedTarget {
+ public:
+  Status add_odometry(const node::OdometrySample& sample) override {
+    if (known.newest && sample.stamp <= known.newest->stamp) return fail(ErrorCode::invalid, "stamps must increase");
+    known.newest = {sample.stamp, sample.T_odom_body};
+    return {};
+  }
+  Status add_scan(const Scan& scan) override {
+    if (!known.newest || scan.stamp != known.newest->stamp) return fail(ErrorCode::invalid, "not of the newest sample");
+    scans.push_back(scan.stamp);
+    return {};
+  }
+  Status finish() override {
+    ++finished;
+    return {};
+  }
+  [[nodiscard]] FeedState state() const override { return known; }
+
+  FeedState known{.chain = {RobotId{4}, 77}, .name = "alpha", .newest = {}};
+  std::vector<Timestamp> scans;
+  int finished = 0;
+};
+
+class FeedSessionTest : public testing::Test {
+ protected:
+  static std::string sample(std::int64_t ns) { return test::odometry({{ns}, {}}, Matrix6d::Identity()); }
+  /// All that waits for the client, read by it.
+  std::vector<Feed> read(FeedSession::Client client) {
+    std::string bytes;
+    while (!session_.output(client).empty()) {
+      const std::string_view part = session_.output(client).substr(0, 100);
+      bytes += part;
+      session_.sent(client, part.size());
+    }
+    return test::messages(bytes);
+  }
+  std::vector<Feed> say(FeedSession::Client client, const std::string& bytes) {
+    session_.receive(client, bytes);
+    return read(client);
+  }
+  /// A client that was greeted, as number `client`.
+  void join(FeedSession::Client client, bool listens_only = false) {
+    session_.connect(client);
+    ASSERT_EQ(say(client, test::hello(listens_only)).size(), 2U);
+  }
+
+  ScriptedTarget target_;
+  FeedSettings settings_{.max_queue_kb = 8};
+  FeedSession session_{target_, settings_};
+};
+
+TEST_F(FeedSessionTest, AnswersHelloAndEverySample) {
+  session_.connect(1);
+  const auto greeting = say(1, test::hello());
+  ASSERT_EQ(greeting.size(), 2U);
+  EXPECT_EQ(greeting[0].welcome().robot_name(), "alpha");
+  EXPECT_EQ(greeting[0].welcome().robot(), 4U);
+  EXPECT_EQ(greeting[0].welcome().session(), 77U);
+  EXPECT_FALSE(greeting[0].welcome().has_odometry());
+  EXPECT_TRUE(greeting[1].has_situation());
+  target_.known.wants_scan = true;
+  target_.known.map_age = {2, 9};
+  target_.known.covariance = 0.01 * Matrix6d::Identity();
+  const auto answer = say(1, sample(10));
+  ASSERT_EQ(answer.size(), 1U);
+  const Feed::Correction& correction = answer[0].correction();
+  EXPECT_EQ(correction.stamp_ns(), 10);
+  EXPECT_EQ(correction.map_epoch(), 2U);
+  EXPECT_EQ(correction.map_revision(), 9U);
+  EXPECT_TRUE(correction.wants_scan());
+  EXPECT_FALSE(correction.in_map());
+  ASSERT_EQ(correction.t_map_odom_covariance_size(), 36);
+  EXPECT_NEAR(correction.t_map_odom_covariance(7), 0.01, 1e-12);
+  EXPECT_TRUE(say(1, test::scan({10}, 5)).empty());
+  target_.known.wants_scan = false;
+  EXPECT_TRUE(say(1, test::scan({10}, 5)).empty());  // of no use: left out
+  EXPECT_EQ(target_.scans.size(), 1U);
+  EXPECT_TRUE(say(1, test::end_of_recording())[0].has_ended());
+  EXPECT_EQ(target_.finished, 1);
+  EXPECT_EQ(say(1, sample(20))[0].refused().why(), "the recording has ended");
+}
+
+TEST_F(FeedSessionTest, RefusesWhatIsNoGoodAndGoesOn) {
+  join(1);
+  EXPECT_TRUE(say(1, sample(10))[0].has_correction());
+  const auto late = say(1, sample(10));
+  ASSERT_EQ(late.size(), 1U);
+  EXPECT_EQ(late[0].refused().stamp_ns(), 10);
+  EXPECT_EQ(late[0].refused().why(), "stamps must increase");
+  EXPECT_TRUE(say(1, test::scan({9}, 5))[0].has_refused());
+  Feed half;
+  half.mutable_odometry()->set_stamp_ns(11);
+  EXPECT_TRUE(say(1, test::framed(half))[0].has_refused());
+  EXPECT_FALSE(session_.is_over(1));
+  EXPECT_TRUE(say(1, sample(12))[0].has_correction());
+}
+
+TEST_F(FeedSessionTest, ClosesAfterGarbage) {
+  const std::string cut = test::framed({}).substr(0, 4);  // an empty message
+  Feed from_robot;
+  from_robot.mutable_ended();
+  const std::vector<std::string> bad{std::string("\xff\xff\xff\xff", 4), std::string("\x02\0\0\0\xff\xff", 6), cut,
+                                     test::framed(from_robot), test::hello()};
+  FeedSession::Client client = 0;
+  for (const std::string& bytes : bad) {
+    join(++client);
+    const auto answer = say(client, bytes);
+    ASSERT_EQ(answer.size(), 1U);
+    EXPECT_TRUE(answer[0].has_closed()) << client;
+    EXPECT_TRUE(session_.is_over(client));
+    EXPECT_FALSE(session_.has_feeder());  // so that the next may
+    EXPECT_TRUE(say(client, sample(50)).empty());
+  }
+  EXPECT_FALSE(target_.known.newest.has_value());
+  for (const std::string& first : {sample(1), test::hello(false, 2), test::end_of_recording()}) {
+    session_.connect(++client);
+    EXPECT_TRUE(say(client, first)[0].has_closed());
+    EXPECT_TRUE(session_.is_over(client));
+  }
+}
+
+TEST_F(FeedSessionTest, OneFeedsAndManyListen) {
+  join(1);
+  join(2, true);
+  join(3, true);
+  session_.receive(1, sample(10));
+  for (const FeedSession::Client client : {1U, 2U, 3U}) EXPECT_EQ(read(client)[0].correction().stamp_ns(), 10);
+  EXPECT_NE(say(2, sample(11))[0].closed().why().find("only listens"), std::string::npos);
+  session_.connect(4);
+  EXPECT_NE(say(4, test::hello())[0].closed().why().find("another client feeds"), std::string::npos);
+  // It comes again where it stood, and what it says again is refused.
+  session_.disconnect(1);
+  session_.connect(5);
+  const auto greeting = say(5, test::hello());
+  EXPECT_TRUE(greeting[0].welcome().has_odometry());
+  EXPECT_EQ(greeting[0].welcome().last_stamp_ns(), 10);
+  EXPECT_TRUE(say(5, sample(10))[0].has_refused());
+  EXPECT_TRUE(say(5, sample(11))[0].has_correction());
+  EXPECT_EQ(read(3).size(), 1U);
+}
+
+TEST_F(FeedSessionTest, TellsWhatChangesOnce) {
+  join(1);
+  join(2, true);
+  target_.known.component = 3;
+  target_.known.team_mates = {{RobotId{8}, "bravo", {5}, Pose3{}}, {RobotId{9}, "charlie", {6}, std::nullopt}};
+  target_.known.alerts = {{"odd", {1}, {2}, {3}}};
+  session_.refresh();
+  session_.refresh();
+  for (const FeedSession::Client client : {1U, 2U}) {
+    const auto told = read(client);
+    ASSERT_EQ(told.size(), 1U);
+    const Feed::Situation& situation = told[0].situation();
+    EXPECT_TRUE(situation.in_map());
+    EXPECT_EQ(situation.component(), 3U);
+    ASSERT_EQ(situation.team_mate_size(), 2);
+    EXPECT_EQ(situation.team_mate(0).name(), "bravo");
+    EXPECT_TRUE(situation.team_mate(0).same_component());
+    EXPECT_FALSE(situation.team_mate(1).same_component());
+    EXPECT_FALSE(situation.team_mate(1).has_t_map_body());
+    ASSERT_EQ(situation.alert_size(), 1);
+    EXPECT_EQ(situation.alert(0).until_stamp_ns(), 3);
+  }
+}
+
+TEST_F(FeedSessionTest, AnnouncesAJumpBeforeItIsMade) {
+  join(1);
+  static_cast<void>(say(1, sample(10)));
+  target_.known.T_map_odom.translation.x() = 5.0;
+  target_.known.map_age = {1, 42};
+  const auto answer = say(1, sample(20));
+  ASSERT_EQ(answer.size(), 2U);
+  EXPECT_EQ(answer[0].jump().stamp_ns(), 20);
+  EXPECT_NEAR(answer[0].jump().translation_m(), 5.0, 1e-12);
+  EXPECT_NE(answer[0].jump().why().find("revision 42"), std::string::npos);
+  EXPECT_EQ(answer[0].jump().t_map_odom_to().x(), 5.0);
+  EXPECT_EQ(answer[1].correction().t_map_odom().x(), 5.0);
+}
+
+TEST_F(FeedSessionTest, ASlowClientLosesOldCorrectionsAndNothingElse) {
+  join(1);
+  join(2, true);
+  session_.receive(1, sample(1));
+  session_.sent(2, 10);  // the first one has left in part
+  for (std::int64_t ns = 2; ns <= 100; ++ns) {
+    target_.known.T_map_odom.translation.x() = ns == 40 ? 5.0 : target_.known.T_map_odom.translation.x();
+    EXPECT_GE(say(1, sample(ns)).size(), 1U);
+  }
+  EXPECT_FALSE(session_.is_over(2));
+  std::string bytes(4, '\0');  // of which the ten that were sent count
+  std::string rest;
+  while (!session_.output(2).empty()) {
+    const std::string_view part = session_.output(2);
+    rest += part;
+    session_.sent(2, part.size());
+  }
+  EXPECT_LE(rest.size(), 8192U);
+  EXPECT_GT(rest.size(), 6000U);
+  // The rest of the first, then the jump at 40, then the newest corrections.
+  std::uint32_t first_size = static_cast<std::uint32_t>(test::framed({}).size());
+  for (first_size = 0; first_size < rest.size(); ++first_size) {
+    const auto whole = test::messages(std::string_view(rest).substr(first_size));
+    if (whole.size() < 5 || !whole[0].has_jump()) continue;
+    EXPECT_EQ(whole[0].jump().stamp_ns(), 40);
+    for (std::size_t i = 1; i < whole.size(); ++i)
+      EXPECT_EQ(whole[i].correction().stamp_ns(), 100 - static_cast<std::int64_t>(whole.size() - 1 - i));
+    EXPECT_EQ(session_.dropped(), 100 - 1 - (whole.size() - 1));
+    const auto next = say(1, sample(200));
+    EXPECT_EQ(next.back().correction().dropped(), 0U);
+    EXPECT_EQ(read(2).back().correction().dropped(), session_.dropped());
+    return;
+  }
+  FAIL() << "no jump in what was left";
+}
+
+TEST_F(FeedSessionTest, AClientThatLosesWhatItMustHaveIsDropped) {
+  join(1);
+  session_.receive(1, sample(1));
+  for (int i = 0; i < 1000; ++i) session_.receive(1, sample(1));  // refused, and it never reads why
+  EXPECT_TRUE(session_.is_over(1));
+  EXPECT_TRUE(session_.output(1).empty());
+}
+
+}  // namespace
+}  // namespace tutti::program

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/ids.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/model/trajectory.hpp"
+#include "tutti/node/journal.hpp"
+
+namespace tutti::program {
+
+struct TeamMate {
+  RobotId robot;
+  std::string name;
+  Timestamp stamp;                  ///< When it was last seen, in its own time.
+  std::optional<Pose3> T_map_body;  ///< Where, in this robot's map; nothing in another component.
+  friend bool operator==(const TeamMate&, const TeamMate&) = default;
+};
+
+/// A stretch of odometry where localisation failed, or the map is wrong.
+struct FeedAlert {
+  std::string text;
+  Timestamp since;  ///< The newest sample when it was first raised.
+  Timestamp from, until;
+  friend bool operator==(const FeedAlert&, const FeedAlert&) = default;
+};
+
+/// What a robot knows, as its live feed tells it.
+struct FeedState {
+  ChainId chain;
+  std::string name;
+  std::optional<StampedPose> newest;       ///< T_odom_body of the newest sample taken.
+  Pose3 T_map_odom;                        ///< RobotAgent::T_map_odom(): jumps with every correction.
+  Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance(): of T_map_odom * newest, right tangent.
+  std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age() of the newest one heard; zeros: none yet.
+  std::optional<std::uint32_t> component;           ///< Nothing: the map does not know this chain.
+  bool wants_scan = false;                          ///< A scan of the newest sample would be used.
+  std::vector<TeamMate> team_mates;
+  std::vector<FeedAlert> alerts;
+};
+
+/// The robot behind a live feed.
+class FeedTarget {
+ public:
+  virtual ~FeedTarget() = default;
+  /// An error: it was refused, and why; nothing has changed.
+  virtual Status add_odometry(const node::OdometrySample& sample) = 0;
+  virtual Status add_scan(const Scan& scan) = 0;
+  virtual Status finish() = 0;
+  [[nodiscard]] virtual FeedState state() const = 0;
+};
+
+}  // namespace tutti::program

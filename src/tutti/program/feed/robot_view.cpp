@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/robot_view.hpp"
+
+#include <fmt/format.h>
+
+#include "tutti/geometry/so3.hpp"
+#include "tutti/mission/follow_alerts.hpp"
+
+namespace tutti::program {
+
+void RobotView::note(const node::Event& event, const node::RobotNode& node) {
+  const auto* update = std::get_if<node::RobotUpdated>(&event.what);
+  const auto newest = node.agent().newest_sample();
+  if (update == nullptr || update->summary.synchronised == 0 || !newest) return;
+  if (!first_) first_ = *newest;
+  mission::UpdateRecord record{.time_s = *newest - *first_, .revision = update->summary.revision};
+  for (const auto& origin : update->summary.explanation.origins)
+    if (origin.alert) record.origins.push_back(origin);
+  if (updates_.empty() && record.origins.empty()) return;  // before the first alert there is nothing to follow
+  updates_.push_back(std::move(record));
+  alerts_.clear();
+  for (const mission::AlertRecord& alert : mission::follow_alerts(updates_)) {
+    if (alert.withdrawn_s) continue;
+    const consistency::SuspectedOrigin& origin = alert.origin;
+    alerts_.push_back({fmt::format("odometry and map part by {:.2f} m and {:.1f} degrees within {:.1f} m of way, more "
+                                   "than odometry allows for: localisation failed there, or the map is wrong",
+                                   origin.translation_m, origin.rotation_rad / kRadPerDeg, origin.length_m),
+                       *first_ + alert.known_since_s, origin.from, origin.until});
+  }
+  if (alerts_.empty()) updates_.clear();
+}
+
+FeedState RobotView::state(const node::RobotNode& node) const {
+  const robot::RobotAgent& agent = node.agent();
+  FeedState out{.chain = agent.chain(),
+                .name = name_,
+                .newest = {},
+                .T_map_odom = agent.T_map_odom(),
+                .covariance = agent.covariance(),
+                .map_age = agent.map_age(),
+                .component = agent.component(),
+                .wants_scan = agent.wants_scan(),
+                .team_mates = {},
+                .alerts = alerts_};
+  if (const auto stamp = agent.newest_sample()) out.newest = {*stamp, agent.T_odom_body()};
+  for (const robot::Whereabouts& other : agent.whereabouts()) {
+    const auto name = names_.find(other.robot);
+    out.team_mates.push_back({other.robot,
+                              name == names_.end() ? fmt::format("robot {}", other.robot.value) : name->second,
+                              other.stamp, other.T_map_body});
+  }
+  return out;
+}
+
+Status taken(const node::Step& step) {
+  for (const node::Event& event : step.events) {
+    if (const auto* sample = std::get_if<node::SampleRefused>(&event.what))
+      return fail(ErrorCode::invalid, "{}", sample->why);
+    if (const auto* scan = std::get_if<node::ScanRefused>(&event.what))
+      return fail(ErrorCode::invalid, "{}", scan->why);
+  }
+  return {};
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/mission/record.hpp"
+#include "tutti/node/robot_node.hpp"
+#include "tutti/program/feed/feed_target.hpp"
+
+namespace tutti::program {
+
+/// What a live feed tells of a robot, from its node and its node's events.
+class RobotView {
+ public:
+  /// `names`: of the others, as far as they are known.
+  explicit RobotView(std::string name, std::map<RobotId, std::string> names = {})
+      : name_(std::move(name)), names_(std::move(names)) {}
+
+  void set_name(RobotId robot, std::string name) { names_[robot] = std::move(name); }
+  /// Every event of the node's steps.
+  void note(const node::Event& event, const node::RobotNode& node);
+  [[nodiscard]] FeedState state(const node::RobotNode& node) const;
+
+ private:
+  std::string name_;
+  std::map<RobotId, std::string> names_;
+  std::optional<Timestamp> first_;  ///< The newest sample at the first update; times of updates_ count from it.
+  std::vector<mission::UpdateRecord> updates_;
+  std::vector<FeedAlert> alerts_;
+};
+
+/// An error when the node refused the sample or scan that this step is of.
+Status taken(const node::Step& step);
+
+}  // namespace tutti::program

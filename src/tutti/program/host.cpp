@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/host.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <thread>
+
+#include "tutti/base/check.hpp"
+#include "tutti/bus/delivery.hpp"
+#include "tutti/program/state_folder.hpp"
+
+namespace tutti::program {
+
+void Hosted::wait(double wall_s) {
+  if (wall_s > 0.0) std::this_thread::sleep_for(std::chrono::duration<double>(wall_s));
+}
+
+Host::~Host() { close(); }
+
+Status Host::open() {
+  auto port = parts_.open_port();
+  if (!port) return tl::unexpected(port.error());
+  auto node = parts_.open_node(**port);
+  if (!node) return tl::unexpected(node.error());
+  port_ = std::move(*port);
+  node_ = std::move(*node);
+  add(node_->start(clock_.now()));
+  if (carry_out()) return {};
+  return fail(ErrorCode::io, "{}", trouble_);
+}
+
+void Host::close() {
+  node_.reset();  // which may hold the port
+  port_.reset();
+  said_ = {};
+  said_bytes_ = 0;
+  waiting_.clear();  // what was never sent follows from what is stored
+  reopen_s_ = clock_.wall_s() + kReopen_s;
+}
+
+void Host::reopen() {
+  if (const Status opened = open(); !opened) {
+    trouble_ = opened.error().message;
+    return close();
+  }
+  log_.say(Level::info, "works again, from what is stored");
+  trouble_.clear();
+}
+
+double Host::turn() {
+  const double wall_s = clock_.wall_s();
+  if (parts_.each_second && wall_s >= second_s_) {
+    second_s_ = wall_s + 1.0;
+    parts_.each_second();
+  }
+  if (!node_) {
+    if (wall_s >= reopen_s_) reopen();
+    tell_status();
+    return kLongestSleep_s;
+  }
+  send_waiting();
+  for (const bus::Received& message : port_->receive()) {
+    count(false, message.envelope);
+    add(node_->receive(message, clock_.now()));
+    if (said_bytes_ > kMostUncommitted && !carry_out()) return kLongestSleep_s;
+  }
+  if (!carry_out()) return kLongestSleep_s;  // receipts do not wait for long work
+  if (const auto next = node_->next_work(); next && *next <= clock_.now()) add(node_->work(clock_.now()));
+  if (wall_s >= report_s_) {
+    report_s_ = wall_s + kReport_s;
+    add(node_->report(clock_.now()));
+  }
+  if (!carry_out()) return kLongestSleep_s;
+  tell_status();
+  const auto next = node_->next_work();
+  return next ? std::min(kLongestSleep_s, clock_.wall_s_until(*next)) : kLongestSleep_s;
+}
+
+void Host::run(const std::atomic<bool>& stop) {
+  while (!stop && !(node_ && node_->finished())) {
+    const double wait_s = turn();
+    if (node_)
+      node_->wait(wait_s);
+    else
+      std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
+    if (std::exchange(lost_, false)) close();
+  }
+  if (node_) {
+    add(node_->end());
+    add(node_->report(clock_.now()));  // how it stays; lost when the port goes sooner
+    static_cast<void>(carry_out());
+  }
+  status_s_ = 0.0;
+  tell_status();
+}
+
+void Host::add(Answer answer) {
+  for (const storage::Write& write : answer.step.writes)
+    said_bytes_ += write.key.size() + (write.bytes ? write.bytes->size() : 0);
+  const auto append = [](auto& to, auto& from) { std::ranges::move(from, std::back_inserter(to)); };
+  append(said_.step.writes, answer.step.writes);
+  append(said_.step.messages, answer.step.messages);
+  append(said_.step.events, answer.step.events);
+  append(said_.done, answer.done);
+}
+
+Status Host::carry_out(node::Step step) {
+  if (lost_) return fail(ErrorCode::io, "{}", trouble_);
+  add({std::move(step), {}});
+  Status carried_out = carry_out_said();
+  lost_ = !carried_out;
+  return carried_out;
+}
+
+/// False: it could not be committed, and the node is gone.
+bool Host::carry_out() {
+  if (carry_out_said()) return true;
+  close();
+  return false;
+}
+
+Status Host::carry_out_said() {
+  Answer said = std::exchange(said_, {});
+  said_bytes_ = 0;
+  TUTTI_CHECK(parts_.store != nullptr || said.step.writes.empty(), "writes without a store");
+  if (!said.step.writes.empty())
+    if (const Status committed = parts_.store->commit(said.step.writes); !committed) {
+      trouble_ = fmt::format("cannot store anything, tries again every {} s: {}", kReopen_s, committed.error().message);
+      log_.say(Level::error, trouble_);
+      return fail(ErrorCode::io, "{}", trouble_);
+    }
+  std::ranges::move(said.step.messages, std::back_inserter(waiting_));
+  send_waiting();
+  for (const node::Event& event : said.step.events) log_.write(event);
+  for (const std::uint64_t ticket : said.done) port_->acknowledge(ticket);
+  return {};
+}
+
+/// What the port refuses waits; what it can never take, or what nobody needs later, goes. A retained value takes the
+/// place of the one that waits before it.
+void Host::send_waiting() {
+  std::deque<bus::Envelope> refused;
+  for (bus::Envelope& message : waiting_) {
+    const bus::Delivery delivery = bus::delivery_of(message.kind);
+    const Status sent = port_->send(message);
+    if (sent) {
+      count(true, message);
+      continue;
+    }
+    if (sent.error().code == ErrorCode::invalid) {
+      log_.write(node::Event{clock_.now(), node::MessageRefused{message.from, message.kind, sent.error().message}});
+      continue;
+    }
+    if (delivery == bus::Delivery::best_effort) continue;
+    if (delivery == bus::Delivery::retained)
+      std::erase_if(refused,
+                    [&](const bus::Envelope& other) { return other.kind == message.kind && other.to == message.to; });
+    refused.push_back(std::move(message));
+  }
+  waiting_ = std::move(refused);
+}
+
+void Host::count(bool sent, const bus::Envelope& message) {
+  Traffic& traffic = traffic_[{sent, message.kind}];
+  ++traffic.messages;
+  traffic.bytes += message.bytes->size();
+  traffic.largest = std::max<std::uint64_t>(traffic.largest, message.bytes->size());
+}
+
+void Host::tell_status() {
+  const double wall_s = clock_.wall_s();
+  if (wall_s < status_s_) return;
+  status_s_ = wall_s + kStatus_s;
+  Json status = node_ ? node_->status(clock_.now()) : Json{{"line", trouble_}};
+  if (!trouble_.empty()) status["trouble"] = trouble_;
+  if (status.contains("line")) log_.show(status.value("line", ""));
+  if (!parts_.status_file.empty()) static_cast<void>(replace_file(parts_.status_file, status.dump() + "\n", false));
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/bus/port.hpp"
+#include "tutti/node/step.hpp"
+#include "tutti/program/clock.hpp"
+#include "tutti/program/event_log.hpp"
+#include "tutti/storage/table_store.hpp"
+
+namespace tutti::program {
+
+/// A step, and the messages that are done with when it is carried out.
+struct Answer {
+  node::Step step;
+  std::vector<std::uint64_t> done;  ///< Tickets of the port.
+};
+
+/// A node as its host sees it. It is made from its store, and may have to go at any time.
+class Hosted {
+ public:
+  virtual ~Hosted() = default;
+  /// The first step.
+  virtual Answer start(Timestamp now) = 0;
+  virtual Answer receive(const bus::Received& message, Timestamp now) = 0;
+  /// When there is something to do without a message; nothing: never.
+  [[nodiscard]] virtual std::optional<Timestamp> next_work() const { return std::nullopt; }
+  virtual Answer work(Timestamp /*now*/) { return {}; }
+  /// Waits at most so many wall seconds: for what it hears otherwise than by the port, too. Its steps of then go to
+  /// Host::carry_out().
+  virtual void wait(double wall_s);
+  /// The last step, before the host ends.
+  virtual Answer end() { return {}; }
+  /// Every kReport_s: what others are told of it.
+  virtual Answer report(Timestamp /*now*/) { return {}; }
+  /// How it stands, for STATE/status.json and, "line", for the console.
+  [[nodiscard]] virtual Json status(Timestamp now) const = 0;
+  /// Nothing is left to be done: the host ends.
+  [[nodiscard]] virtual bool finished() const { return false; }
+};
+
+struct Traffic {
+  std::uint64_t messages = 0;
+  std::uint64_t bytes = 0;
+  std::uint64_t largest = 0;  ///< Bytes.
+};
+
+/// Carries out what a node says, as node/step.hpp asks for: all steps of one turn in one transaction. When that cannot
+/// be committed the node goes and is made again from its store, every few seconds until it works; what had come to it
+/// comes again, since nothing was acknowledged. One thread.
+class Host {
+ public:
+  static constexpr double kReport_s = 2.0;
+  static constexpr double kStatus_s = 0.5;
+  static constexpr double kReopen_s = 3.0;
+  static constexpr double kLongestSleep_s = 0.05;
+  static constexpr std::size_t kMostUncommitted = 8U << 20U;  ///< Bytes.
+
+  struct Parts {
+    storage::TableStore* store = nullptr;  ///< Null: the node writes nothing.
+    std::function<Result<std::unique_ptr<bus::Port>>()> open_port;
+    std::function<Result<std::unique_ptr<Hosted>>(bus::Port& port)> open_node;
+    std::function<void()> each_second;  ///< May be empty.
+    std::filesystem::path status_file;  ///< Empty: none.
+  };
+  Host(Parts parts, const Clock& clock, EventLog& log) : parts_(std::move(parts)), clock_(clock), log_(log) {}
+  ~Host();
+  Host(const Host&) = delete;
+  Host& operator=(const Host&) = delete;
+
+  /// Opens port and node and carries out its first step. An error: it cannot be; run() and turn() are of no use.
+  Status open();
+  /// What is there to be done now. Returns after how many wall seconds to call it again.
+  double turn();
+  /// Turns until the node has finished or `stop`. Then all that it said is stored.
+  void run(const std::atomic<bool>& stop);
+  /// A step from within Hosted::wait(). An error: it cannot be stored, and the node goes when it has waited.
+  Status carry_out(node::Step step);
+
+  /// Null while it cannot be committed.
+  [[nodiscard]] Hosted* hosted() const { return node_.get(); }
+  /// By direction (true: sent) and kind.
+  using TrafficTable = std::map<std::pair<bool, bus::MessageKind>, Traffic>;
+  [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }
+
+ private:
+  void add(Answer answer);
+  [[nodiscard]] bool carry_out();
+  Status carry_out_said();
+  void send_waiting();
+  void close();
+  void reopen();
+  void tell_status();
+  void count(bool sent, const bus::Envelope& message);
+
+  Parts parts_;
+  const Clock& clock_;
+  EventLog& log_;
+  std::unique_ptr<bus::Port> port_;
+  std::unique_ptr<Hosted> node_;
+  Answer said_;  // not carried out yet
+  std::size_t said_bytes_ = 0;
+  std::deque<bus::Envelope> waiting_;  // refused by the port
+  double reopen_s_ = 0.0;
+  double report_s_ = 0.0, status_s_ = 0.0, second_s_ = 0.0;
+  std::string trouble_;
+  bool lost_ = false;  // a step from within Hosted::wait()
+  TrafficTable traffic_;
+};
+
+}  // namespace tutti::program

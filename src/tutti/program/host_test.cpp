@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/host.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::program {
+namespace {
+
+using bus::Endpoint;
+using bus::MessageKind;
+
+/// What happened, in order, as all of the parts below tell it.
+using Diary = std::vector<std::string>;
+
+class DiaryStore final : public storage::TableStore {
+ public:
+  explicit DiaryStore(Diary& diary) : diary_(diary), rows_({"test", 1, {"rows"}}) {}
+  Status commit(std::span<const storage::Write> writes) override {
+    if (full) return fail(ErrorCode::io, "disk full");
+    diary_.push_back("commit " + std::to_string(writes.size()));
+    return rows_.commit(writes);
+  }
+  [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override {
+    return rows_.read(table, key);
+  }
+  [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override {
+    return rows_.scan(table, from, visit);
+  }
+  bool full = false;
+
+ private:
+  Diary& diary_;
+  storage::MemoryStore rows_;
+};
+
+/// What has come and is not acknowledged, whatever ports come and go.
+struct Mail {
+  std::map<std::uint64_t, bus::Envelope> owed;
+  ErrorCode refuses_with{};
+  bool refuses = false;
+};
+
+class DiaryPort final : public bus::Port {
+ public:
+  DiaryPort(Diary& diary, Mail& mail) : diary_(diary), mail_(mail), untaken_(mail.owed) {}
+  Status send(bus::Envelope envelope) override {
+    if (mail_.refuses) return tl::unexpected(Error{mail_.refuses_with, "no"});
+    diary_.push_back("send " + *envelope.bytes);
+    return {};
+  }
+  std::vector<bus::Received> receive() override {
+    std::vector<bus::Received> all;
+    for (const auto& [ticket, envelope] : std::exchange(untaken_, {})) all.push_back({envelope, ticket});
+    return all;
+  }
+  void acknowledge(std::uint64_t ticket) override {
+    diary_.push_back("acknowledge " + std::to_string(ticket));
+    mail_.owed.erase(ticket);
+  }
+  void still_busy(std::uint64_t) override {}
+
+ private:
+  Diary& diary_;
+  Mail& mail_;
+  std::map<std::uint64_t, bus::Envelope> untaken_;
+};
+
+bus::Envelope letter(MessageKind kind, const std::string& text) {
+  return {Endpoint::server(), Endpoint::of(RobotId{1}), kind, "", std::make_shared<const std::string>(text)};
+}
+
+/// Writes down and passes on whatever comes; works every second.
+class Postman final : public Hosted {
+ public:
+  explicit Postman(const std::function<void()>& waits) : waits_(waits) {}
+  void wait(double) override { waits_(); }
+  Answer end() override { return {{.writes = {{"rows", "end", "goodbye"}}}, {}}; }
+  Answer start(Timestamp) override { return {{.messages = {letter(MessageKind::job, "hello")}}, {}}; }
+  Answer receive(const bus::Received& message, Timestamp) override {
+    return {{.writes = {{"rows", std::to_string(message.ticket), *message.envelope.bytes}},
+             .messages = {letter(MessageKind::job, *message.envelope.bytes)}},
+            {message.ticket}};
+  }
+  [[nodiscard]] std::optional<Timestamp> next_work() const override { return Timestamp{} + next_s_; }
+  Answer work(Timestamp) override {
+    next_s_ += 1.0;
+    return {{.messages = {letter(MessageKind::job, "work")}}, {}};
+  }
+  Answer report(Timestamp) override { return {{.messages = {letter(MessageKind::status, "report")}}, {}}; }
+  [[nodiscard]] Json status(Timestamp) const override { return {{"line", "fine"}}; }
+
+ private:
+  const std::function<void()>& waits_;
+  double next_s_ = 10.0;
+};
+
+class HostTest : public testing::Test {
+ protected:
+  HostTest() {
+    Host::Parts parts;
+    parts.store = &store_;
+    parts.open_port = [this]() -> Result<std::unique_ptr<bus::Port>> {
+      return std::make_unique<DiaryPort>(diary_, mail_);
+    };
+    parts.open_node = [this](bus::Port&) -> Result<std::unique_ptr<Hosted>> {
+      return std::make_unique<Postman>(waits_);
+    };
+    host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
+  }
+  Diary said() { return std::exchange(diary_, {}); }
+
+  double wall_s_ = 0.0;
+  Clock clock_{2.0, 0.0, [this] { return wall_s_; }};
+  std::unique_ptr<EventLog> log_ = EventLog::on_console("test", Level::error);
+  Diary diary_;
+  Mail mail_;
+  DiaryStore store_{diary_};
+  std::function<void()> waits_ = [] {};
+  std::unique_ptr<Host> host_;
+};
+
+TEST_F(HostTest, CommitsThenSendsThenAcknowledges) {
+  mail_.owed = {{1, letter(MessageKind::submap, "a")}, {2, letter(MessageKind::submap, "b")}};
+  ASSERT_TRUE(host_->open().has_value());
+  EXPECT_EQ(said(), Diary{"send hello"});
+  host_->turn();
+  EXPECT_EQ(said(), (Diary{"commit 2", "send a", "send b", "acknowledge 1", "acknowledge 2", "send report"}));
+  EXPECT_EQ(host_->traffic().at({false, MessageKind::submap}).messages, 2U);
+  EXPECT_EQ(host_->traffic().at({true, MessageKind::job}).bytes, std::string("helloab").size());
+}
+
+TEST_F(HostTest, WorksWhenItIsTimeAndNotBefore) {
+  ASSERT_TRUE(host_->open().has_value());
+  host_->turn();
+  wall_s_ = 4.99;  // mission time 9.98
+  EXPECT_NEAR(host_->turn(), 0.01, 1e-6);
+  EXPECT_EQ(std::ranges::count(said(), "send work"), 0);
+  wall_s_ = 5.0;
+  host_->turn();
+  EXPECT_EQ(std::ranges::count(said(), "send work"), 1);
+  host_->turn();
+  EXPECT_EQ(std::ranges::count(said(), "send work"), 0);
+}
+
+TEST_F(HostTest, WhatCannotBeCommittedIsNeitherSentNorAcknowledgedAndComesAgain) {
+  ASSERT_TRUE(host_->open().has_value());
+  mail_.owed = {{7, letter(MessageKind::submap, "a")}};
+  store_.full = true;
+  ASSERT_TRUE(host_->open().has_value());  // a port that has the letter
+  said();
+  host_->turn();
+  EXPECT_EQ(said(), Diary{});
+  EXPECT_EQ(host_->hosted(), nullptr);
+  wall_s_ += 0.9 * Host::kReopen_s;
+  store_.full = false;
+  host_->turn();
+  EXPECT_EQ(host_->hosted(), nullptr);
+  wall_s_ += 0.2 * Host::kReopen_s;
+  host_->turn();  // opens
+  host_->turn();
+  const Diary after = said();
+  EXPECT_EQ((Diary{after.begin(), after.begin() + 4}), (Diary{"send hello", "commit 1", "send a", "acknowledge 7"}));
+  EXPECT_TRUE(mail_.owed.empty());
+  EXPECT_EQ(*store_.read("rows", "7").value(), "a");
+}
+
+TEST_F(HostTest, WhatThePortRefusesWaitsInItsOrder) {
+  ASSERT_TRUE(host_->open().has_value());
+  mail_ = {.owed = {{1, letter(MessageKind::submap, "a")}, {2, letter(MessageKind::submap, "b")}},
+           .refuses_with = ErrorCode::io,
+           .refuses = true};
+  ASSERT_TRUE(host_->open().has_value());
+  host_->turn();
+  said();
+  host_->turn();
+  EXPECT_EQ(said(), Diary{});
+  mail_.refuses = false;
+  host_->turn();
+  EXPECT_EQ(said(), (Diary{"send hello", "send a", "send b"}));  // the report is too old by now
+}
+
+TEST_F(HostTest, WhatCanNeverBeSentDoesNotWait) {
+  mail_ = {.owed = {{1, letter(MessageKind::submap, "a")}}, .refuses_with = ErrorCode::invalid, .refuses = true};
+  ASSERT_TRUE(host_->open().has_value());
+  host_->turn();
+  mail_.refuses = false;
+  said();
+  host_->turn();
+  EXPECT_EQ(said(), Diary{});
+}
+
+TEST_F(HostTest, ItsLastWordsAreStored) {
+  mail_.owed = {{1, letter(MessageKind::submap, "a")}};
+  ASSERT_TRUE(host_->open().has_value());
+  host_->turn();
+  const std::atomic<bool> stop = true;
+  host_->run(stop);
+  host_.reset();
+  EXPECT_TRUE(store_.read("rows", "1").value().has_value());
+  EXPECT_TRUE(store_.read("rows", "end").value().has_value());
+}
+
+TEST_F(HostTest, CarriesOutWhatIsSaidWhileItWaitsUntilThatCannotBeStored) {
+  std::atomic<bool> stop = false;
+  const auto carry_out = [&](const std::string& text) {
+    return host_->carry_out({.writes = {{"rows", text, text}}, .messages = {letter(MessageKind::job, text)}});
+  };
+  waits_ = [&] {
+    said();
+    EXPECT_TRUE(carry_out("a").has_value());
+    EXPECT_EQ(said(), (Diary{"commit 1", "send a"}));
+    store_.full = true;
+    EXPECT_FALSE(carry_out("b").has_value());
+    store_.full = false;
+    EXPECT_FALSE(carry_out("c").has_value());  // may rest on b
+    EXPECT_NE(host_->hosted(), nullptr);       // it is in the middle of wait()
+    EXPECT_EQ(said(), Diary{});
+    stop = true;
+  };
+  ASSERT_TRUE(host_->open().has_value());
+  host_->run(stop);
+  EXPECT_EQ(host_->hosted(), nullptr);
+  wall_s_ += Host::kReopen_s;
+  host_->turn();
+  EXPECT_EQ(said(), Diary{"send hello"});
+  EXPECT_TRUE(carry_out("d").has_value());
+}
+
+}  // namespace
+}  // namespace tutti::program

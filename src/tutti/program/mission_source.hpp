@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/server/closure_finder.hpp"
+
+namespace tutti::program {
+
+/// What a program is told of its mission.
+struct MissionSource {
+  std::string file;  ///< MISSION.yaml; "demo": the built-in one; empty: none, and every setting has its default.
+  std::filesystem::path data;
+  std::vector<std::string> assignments;  ///< KEY=VALUE
+  std::uint64_t seed = 1;
+};
+
+Result<mission::MissionConfig> load(const MissionSource& source);
+
+/// The robots of the mission by their place in it, which is their number; empty when there is no mission.
+std::vector<std::string> robot_names(const mission::MissionConfig& config);
+/// Of a name that is in no mission: the same everywhere, and none that a mission gives.
+RobotId robot_id_of(const std::string& name);
+
+/// Reads the recordings only if the finder needs them.
+Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const mission::MissionConfig& config,
+                                                                 const MissionSource& source);
+/// What a robot's agent draws from: as in `tutti run`.
+Rng agent_randomness(std::uint64_t seed, const std::string& robot);
+/// When the mission ends, in mission seconds.
+double duration_of(const mission::MissionConfig& config, const std::vector<mission::MissionRecording>& recordings);
+
+}  // namespace tutti::program

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/mission_up.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/file.hpp"
+#include "tutti/bus/nats_port.hpp"
+#include "tutti/mission/load_meter.hpp"
+#include "tutti/program/children.hpp"
+#include "tutti/program/collect_mission.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::program {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kLookAgain = std::chrono::milliseconds(200);
+constexpr auto kServerStarts = std::chrono::seconds(120);
+
+/// The server knows all that is to be known of the robots' submaps, and every robot has heard it: a robot says that it
+/// has finished and that everything is stored only after it was.
+bool is_over(const MissionStatus& status, const std::vector<std::string>& names) {
+  if (status.has_news || status.pending_jobs > 0) return false;
+  return std::ranges::all_of(names, [&](const std::string& name) {
+    const auto robot = std::ranges::find(status.robots, name, [](const auto& r) { return r.status.name; });
+    if (robot == status.robots.end() || !robot->status.finished || robot->status.backlog_submaps > 0) return false;
+    return robot->status.heard_epoch == status.epoch && robot->status.heard_revision == status.revision;
+  });
+}
+
+class MissionUp {
+ public:
+  MissionUp(const MissionUpOptions& options, mission::MissionConfig config)
+      : options_(options), config_(std::move(config)), names_(robot_names(config_)), state_(options.out / "state") {}
+  Status start(const std::atomic<bool>& stop);
+  Status watch(const std::atomic<bool>& stop);
+  void end();
+  Result<mission::MissionRecord> collect() const;
+
+ private:
+  [[nodiscard]] std::vector<std::string> words(const std::string& command, const fs::path& folder, bool replays) const;
+  Status start_server(const std::atomic<bool>& stop);
+  void tell(const MissionStatus& status) const;
+
+  const MissionUpOptions& options_;
+  mission::MissionConfig config_;
+  std::vector<std::string> names_;
+  fs::path state_;
+  Children children_;
+  std::string bus_;
+  Clock::time_point begin_ = Clock::now();
+  double wall_s_ = 0.0;
+};
+
+/// What all programs are told.
+std::vector<std::string> MissionUp::words(const std::string& command, const fs::path& folder, bool replays) const {
+  const MissionSource& mission = options_.mission;
+  std::vector<std::string> out{options_.program.string(), command, mission.file, "--seed",
+                               std::to_string(mission.seed)};
+  const auto add = [&](std::initializer_list<std::string> more) { out.insert(out.end(), more); };
+  if (!mission.data.empty()) add({"--data", mission.data.string()});
+  for (const std::string& assignment : mission.assignments) add({"--set", assignment});
+  if (!folder.empty()) add({"--state", folder.string()});
+  if (replays) add({"--rate", fmt::format("{}", options_.rate)});
+  if (!bus_.empty()) add({"--bus", bus_});
+  add({"--end-with-parent", std::to_string(getpid())});
+  return out;
+}
+
+Status MissionUp::start_server(const std::atomic<bool>& stop) {
+  std::error_code error;
+  if (fs::exists(state_, error))
+    return fail(ErrorCode::io, "{}: there is one of an earlier mission; another --out is needed, or remove it",
+                state_.string());
+  fs::create_directories(state_, error);
+  if (error) return fail(ErrorCode::io, "{}: cannot be made: {}", state_.string(), error.message());
+  auto server = words("server", state_ / "server", true);
+  server.insert(server.end(), {"--threads", std::to_string(options_.workers > 0 ? 0 : options_.threads)});
+  const fs::path output = state_ / "server.out";
+  if (Status started = children_.start("server", server, output); !started) return started;
+  const auto until = Clock::now() + kServerStarts;
+  while (bus_.empty()) {
+    if (Status runs = children_.check(); !runs) return runs;
+    if (stop) return fail(ErrorCode::io, "stopped");
+    if (Clock::now() > until) return fail(ErrorCode::io, "the server does not start: {}", output.string());
+    const std::string text = read_file(output.string()).value_or("");
+    const std::size_t begin = text.find("--bus ");
+    const std::size_t end = text.find(' ', begin == std::string::npos ? begin : begin + 6);
+    if (begin != std::string::npos && end != std::string::npos) bus_ = text.substr(begin + 6, end - begin - 6);
+    std::this_thread::sleep_for(kLookAgain / 10);
+  }
+  return {};
+}
+
+Status MissionUp::start(const std::atomic<bool>& stop) {
+  if (Status started = start_server(stop); !started) return started;
+  for (int i = 0; i < options_.workers; ++i) {
+    auto worker = words("worker", {}, false);
+    worker.insert(worker.end(), {"--threads", std::to_string(options_.threads)});
+    const std::string name = fmt::format("worker{}", i + 1);
+    if (Status started = children_.start(name, worker, state_ / (name + ".out")); !started) return started;
+  }
+  for (const std::string& name : names_) {
+    auto robot = words("robot", state_ / "robots" / name, true);
+    robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0"});
+    if (Status started = children_.start("robot " + name, robot, state_ / (name + ".out")); !started) return started;
+  }
+  return {};
+}
+
+Status MissionUp::watch(const std::atomic<bool>& stop) {
+  const auto port = bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), {.url = bus_});
+  if (!port) return tl::unexpected(port.error());
+  while (true) {
+    for (const bus::Received& message : (*port)->receive()) {
+      const auto status = wire::decode_mission_status(*message.envelope.bytes);
+      if (!status) return tl::unexpected(status.error());
+      tell(*status);
+      if (is_over(*status, names_)) return {};
+    }
+    if (Status runs = children_.check(); !runs) return runs;
+    if (stop)
+      return fail(ErrorCode::io, "stopped before the mission was over; what is there lies in {}", state_.string());
+    std::this_thread::sleep_for(kLookAgain);
+  }
+}
+
+void MissionUp::tell(const MissionStatus& status) const {
+  if (!options_.progress) return;
+  std::uint64_t backlog = 0;
+  for (const MissionStatus::Robot& robot : status.robots) backlog += robot.status.backlog_submaps;
+  const auto finished = std::ranges::count_if(status.robots, [](const auto& robot) { return robot.status.finished; });
+  options_.progress(
+      fmt::format("{:.0f} s   {} of {} robots have finished; {} submaps, {} on their way, {} jobs open, {} "
+                  "closures, {} maps",
+                  status.time - Timestamp{}, finished, names_.size(), status.submaps, backlog, status.pending_jobs,
+                  status.closures, status.components));
+}
+
+/// The server last: it still takes what the others say.
+void MissionUp::end() {
+  wall_s_ = std::chrono::duration<double>(Clock::now() - begin_).count();
+  std::vector<std::string> others;
+  for (const std::string& name : names_) others.push_back("robot " + name);
+  for (int i = 0; i < options_.workers; ++i) others.push_back(fmt::format("worker{}", i + 1));
+  children_.stop(others);
+  children_.stop_all();
+}
+
+Result<mission::MissionRecord> MissionUp::collect() const {
+  auto record = collect_mission(config_, options_.mission, state_, options_.version);
+  if (!record) return record;
+  record->notes.push_back(
+      fmt::format("Run as {} programs on one machine, which talked over NATS, at {:g} times real time.",
+                  1 + names_.size() + static_cast<std::size_t>(options_.workers), options_.rate));
+  record->timing.machine = mission::machine_description();
+  record->timing.wall_s = wall_s_;
+  record->timing.rate = options_.rate;
+  return record;
+}
+
+}  // namespace
+
+Result<mission::MissionRecord> mission_up(const MissionUpOptions& options, const std::atomic<bool>& stop) {
+  auto config = load(options.mission);
+  if (!config) return tl::unexpected(config.error());
+  MissionUp mission(options, std::move(*config));
+  if (Status started = mission.start(stop); !started) return tl::unexpected(started.error());
+  const Status watched = mission.watch(stop);
+  mission.end();
+  if (!watched) return tl::unexpected(watched.error());
+  return mission.collect();
+}
+
+}  // namespace tutti::program

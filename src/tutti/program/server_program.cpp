@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/server_program.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "tutti/bus/nats_child.hpp"
+#include "tutti/bus/nats_port.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/status_envelope.hpp"
+#include "tutti/program/host.hpp"
+#include "tutti/program/state_folder.hpp"
+#include "tutti/program/stop.hpp"
+#include "tutti/program/worker_program.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+
+namespace tutti::program {
+namespace {
+
+class HostedServer final : public Hosted {
+ public:
+  HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, const std::string& trouble)
+      : node_(std::move(node)), version_(std::move(version)), trouble_(trouble) {}
+  Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
+  Answer receive(const bus::Received& message, Timestamp now) override {
+    return {node_->receive(message.envelope, now), {message.ticket}};
+  }
+  [[nodiscard]] std::optional<Timestamp> next_work() const override { return node_->next_timer(); }
+  Answer work(Timestamp now) override {
+    Answer answer{node_->on_timer(now), {}};
+    if (node_->changes() != told_changes_) answer.step.messages.push_back(mission_status(now));
+    return answer;
+  }
+  Answer report(Timestamp now) override { return {{.messages = {mission_status(now)}}, {}}; }
+  [[nodiscard]] Json status(Timestamp now) const override;
+
+ private:
+  bus::Envelope mission_status(Timestamp now) {
+    told_changes_ = node_->changes();
+    MissionStatus status = node_->mission_status(now);
+    status.version = version_;
+    status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
+    status.trouble = trouble_;
+    return node::to_viewers(std::move(status));
+  }
+
+  std::unique_ptr<node::ServerNode> node_;
+  std::string version_;
+  const std::string& trouble_;
+  std::uint64_t told_changes_ = 0;
+};
+
+Json HostedServer::status(Timestamp now) const {
+  const MissionStatus status = node_->mission_status(now);
+  return {{"program", "server"},
+          {"time_s", now - Timestamp{}},
+          {"revision", status.revision},
+          {"submaps", status.submaps},
+          {"closures", status.closures},
+          {"pending_jobs", status.pending_jobs},
+          {"has_news", status.has_news},
+          {"line", fmt::format("map revision {}: {} submaps of {} robots, {} closures, {} maps{}", status.revision,
+                               status.submaps, status.robots.size(), status.closures, status.components,
+                               status.has_news ? ", news" : "")}};
+}
+
+/// The server's own worker: on a thread of its own, over a port of its own, with the map's file at hand.
+class OwnWorker {
+ public:
+  OwnWorker(const bus::NatsPortOptions& where, std::shared_ptr<const server::ClosureFinder> finder,
+            const storage::TableStore& map, const std::string& version, std::size_t threads, const Clock& clock,
+            EventLog& log)
+      : host_(
+            {.store = nullptr,
+             .open_port = [where]() -> Result<std::unique_ptr<bus::Port>> { return bus::open_nats_port(kSelf, where); },
+             .open_node = [this, finder, version, threads, &map](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
+               const auto make = [&](node::WorkerNode::ForEach for_each) {
+                 return node::WorkerNode(kSelf, finder, node::SubmapFrames::of(map), std::move(for_each));
+               };
+               return std::make_unique<HostedWorker>(kSelf, version, make, threads, port, stop_);
+             },
+             .each_second = {},
+             .status_file = {}},
+            clock, log) {}
+  ~OwnWorker() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  OwnWorker(const OwnWorker&) = delete;
+  OwnWorker& operator=(const OwnWorker&) = delete;
+  Status start() {
+    if (Status opened = host_.open(); !opened) return opened;
+    thread_ = std::thread([this] { host_.run(stop_); });
+    return {};
+  }
+
+ private:
+  static constexpr bus::Endpoint kSelf{bus::Endpoint::Role::worker, 0};
+  std::atomic<bool> stop_ = false;
+  Host host_;
+  std::thread thread_;
+};
+
+struct Address {
+  std::string host;
+  int port = 0;
+};
+/// "HOST", "HOST:PORT", "[::1]:PORT".
+Result<Address> address_of(const std::string& listen) {
+  Address address{.host = listen.empty() ? "127.0.0.1" : listen};
+  const std::size_t colon = address.host.rfind(':');
+  if (colon == std::string::npos || address.host.ends_with(']')) return address;
+  const char* end = address.host.data() + address.host.size();
+  const auto [last, error] = std::from_chars(address.host.data() + colon + 1, end, address.port);
+  if (error != std::errc() || last != end || address.port < 1 || address.port > 65535 || colon == 0)
+    return fail(ErrorCode::configuration, "--listen {}: expected HOST or HOST:PORT", listen);
+  address.host.resize(colon);
+  return address;
+}
+
+Result<std::unique_ptr<bus::NatsChild>> start_bus(const ServerOptions& options, const Address& address,
+                                                  const std::filesystem::path& folder) {
+  return bus::NatsChild::start(folder,
+                               {.host = address.host, .port = address.port, .allow_insecure = options.insecure});
+}
+
+Status check_addresses(const ServerOptions& options, const Address& address) {
+  if (!options.bus.empty() && !options.listen.empty())
+    return fail(ErrorCode::configuration, "--bus and --listen: either a bus that runs, or one of its own");
+  if (options.insecure || bus::is_loopback(address.host)) return {};
+  return fail(ErrorCode::configuration,
+              "--listen {}: anybody who reaches this address could write to the map: there is no TLS yet; --insecure "
+              "forces it",
+              options.listen);
+}
+
+/// All that a running server holds, in the order in which it is made.
+class ServerProgram {
+ public:
+  explicit ServerProgram(const ServerOptions& options) : options_(options) {}
+  Status start();
+  void run(const std::atomic<bool>& stop);
+
+ private:
+  Result<std::unique_ptr<Hosted>> open_node();
+  void tend_bus();
+  [[nodiscard]] std::string robot_command() const;
+
+  const ServerOptions& options_;
+  mission::MissionConfig config_;
+  std::vector<std::string> names_;
+  std::optional<StateFolder> folder_;
+  std::unique_ptr<EventLog> log_;
+  std::unique_ptr<bus::NatsChild> child_;
+  bus::NatsPortOptions bus_;
+  std::unique_ptr<storage::TableStore> store_;
+  std::shared_ptr<const server::ClosureFinder> finder_;
+  std::optional<Clock> clock_;
+  std::optional<Host> host_;
+  std::optional<OwnWorker> worker_;
+  std::string trouble_;  // of the bus
+};
+
+Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
+  node::ServerNodeConfig config{.server = config_.server, .accepts_others = config_.closures.finder == "lidar"};
+  config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time
+  std::set<RobotId> robots;
+  for (std::uint32_t i = 0; i < names_.size(); ++i) robots.insert(RobotId{i});
+  auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
+  if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
+  return std::make_unique<HostedServer>(std::move(*node), options_.version, trouble_);
+}
+
+/// Once a second: the bus may have ended, or its disk may be full.
+void ServerProgram::tend_bus() {
+  if (!child_) return;
+  const Status runs = child_->tend();
+  if (!runs && trouble_.empty()) log_->say(Level::error, "the bus does not run: " + runs.error().message);
+  if (runs && !trouble_.empty()) log_->say(Level::info, "the bus runs again");
+  trouble_ = runs ? "" : "the bus does not run: " + runs.error().message;
+}
+
+std::string ServerProgram::robot_command() const {
+  return fmt::format("tutti robot --name NAME --bus {} --state DIR {}", bus_.url,
+                     options_.mission.file.empty() ? "--feed SOCKET" : options_.mission.file);
+}
+
+Status ServerProgram::start() {
+  const auto address = address_of(options_.listen);
+  if (!address) return tl::unexpected(address.error());
+  if (Status ok = check_addresses(options_, *address); !ok) return ok;
+  auto config = load(options_.mission);
+  if (!config) return tl::unexpected(config.error());
+  config_ = std::move(*config);
+  if (!options_.mission.file.empty()) names_ = robot_names(config_);
+  bus_ = {.url = options_.bus, .allow_insecure = options_.insecure};
+  auto folder = StateFolder::open(options_.state, "server");
+  if (!folder) return tl::unexpected(folder.error());
+  folder_.emplace(std::move(*folder));
+  auto log = EventLog::open(folder_->path(), "server", options_.console);
+  if (!log) return tl::unexpected(log.error());
+  log_ = std::move(*log);
+  auto finder = make_finder(config_, options_.mission);
+  if (!finder) return tl::unexpected(finder.error());
+  finder_ = std::move(*finder);
+  auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema());
+  if (!store) return tl::unexpected(store.error());
+  store_ = std::move(*store);
+  if (options_.bus.empty()) {
+    auto child = start_bus(options_, *address, folder_->path() / "bus");
+    if (!child) return tl::unexpected(child.error());
+    child_ = std::move(*child);
+    bus_.url = child_->url();
+  }
+  clock_.emplace(options_.rate, options_.rate * folder_->age_s());
+  host_.emplace(Host::Parts{.store = store_.get(),
+                            .open_port = [this]() -> Result<std::unique_ptr<bus::Port>> {
+                              return bus::open_nats_port(bus::Endpoint::server(), bus_);
+                            },
+                            .open_node = [this](bus::Port&) { return open_node(); },
+                            .each_second = [this] { tend_bus(); },
+                            .status_file = folder_->path() / kStatusFile},
+                *clock_, *log_);
+  if (Status opened = host_->open(); !opened) return opened;
+  if (options_.threads == 0) return {};
+  worker_.emplace(bus_, finder_, *store_, options_.version, static_cast<std::size_t>(options_.threads), *clock_, *log_);
+  return worker_->start();
+}
+
+void ServerProgram::run(const std::atomic<bool>& stop) {
+  log_->say(Level::info, fmt::format("runs in {}, bus {}, {} threads of its own verify closures",
+                                     folder_->path().string(), bus_.url, options_.threads));
+  if (options_.announce) options_.announce(robot_command());
+  tell_service_manager("READY=1");
+  host_->run(stop);
+  tell_service_manager("STOPPING=1");
+  log_->say(Level::info, "stops; the map is stored");
+}
+
+}  // namespace
+
+Status run_server(const ServerOptions& options, const std::atomic<bool>& stop) {
+  ServerProgram program(options);
+  if (Status started = program.start(); !started) return started;
+  program.run(stop);
+  return {};
+}
+
+}  // namespace tutti::program

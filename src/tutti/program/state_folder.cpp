@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/state_folder.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+
+#include "tutti/base/file.hpp"
+#include "tutti/program/clock.hpp"
+
+namespace tutti::program {
+
+namespace fs = std::filesystem;
+
+double StateFolder::age_s() const {
+  const std::uint64_t now_ns = wall_clock_ns();
+  return now_ns > made_ns_ ? static_cast<double>(now_ns - made_ns_) * 1e-9 : 0.0;  // clocks are set back at times
+}
+
+Status replace_file(const fs::path& file, const std::string& text, bool durable) {
+  const fs::path beside = file.string() + ".new";
+  if (Status written = write_file(beside.string(), text); !written) return written;
+  if (const int written = durable ? ::open(beside.c_str(), O_RDONLY | O_CLOEXEC) : -1; written >= 0) {
+    fsync(written);
+    close(written);
+  }
+  std::error_code error;
+  fs::rename(beside, file, error);
+  if (error) return fail(ErrorCode::io, "{}: cannot be written: {}", file.string(), error.message());
+  return {};
+}
+
+Result<StateFolder> StateFolder::open(const fs::path& folder, const std::string& owner) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return fail(ErrorCode::io, "state folder {}: cannot be made: {}", folder.string(), error.message());
+  StateFolder made(fs::absolute(folder));
+  if (Status locked = made.lock(); !locked) return tl::unexpected(locked.error());
+  if (Status read = made.read_or_make(owner); !read) return tl::unexpected(read.error());
+  return made;
+}
+
+StateFolder::~StateFolder() {
+  if (lock_ >= 0) close(lock_);
+}
+
+Status StateFolder::lock() {
+  const fs::path file = path_ / "lock";
+  lock_ = ::open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
+  if (lock_ < 0) return fail(ErrorCode::io, "{}: cannot be made: {}", file.string(), std::strerror(errno));
+  if (flock(lock_, LOCK_EX | LOCK_NB) == 0) return {};
+  return fail(ErrorCode::io, "state folder {}: another program that is running has it; two would spoil it",
+              path_.string());
+}
+
+/// "tutti robot alpha" and the nanoseconds, a line each.
+Status StateFolder::read_or_make(const std::string& owner) {
+  const fs::path file = path_ / "owner";
+  const std::string first = "tutti " + owner;
+  std::error_code error;
+  if (fs::exists(file, error)) {
+    const auto text = read_file(file.string());
+    if (!text) return tl::unexpected(text.error());
+    const std::size_t end = text->find('\n');
+    if (text->substr(0, end) != first)
+      return fail(ErrorCode::io, "state folder {}: it is that of '{}', not of '{}'; every program has its own",
+                  path_.string(), text->substr(0, end), first);
+    made_ns_ = end == std::string::npos ? 0 : std::strtoull(text->c_str() + end + 1, nullptr, 10);
+    if (made_ns_ > 0) return {};
+    return fail(ErrorCode::parse, "{}: does not say when the folder was made", file.string());
+  }
+  for (const auto& entry : fs::directory_iterator(path_, error))
+    if (entry.path().filename() != "lock")
+      return fail(ErrorCode::io, "state folder {}: holds '{}' and is none of tutti's; a new or an empty one is needed",
+                  path_.string(), entry.path().filename().string());
+  is_new_ = true;
+  made_ns_ = wall_clock_ns();
+  return replace_file(file, fmt::format("{}\n{}\n", first, made_ns_), true);
+}
+
+}  // namespace tutti::program

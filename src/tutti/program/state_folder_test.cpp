@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/state_folder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tutti/program/event_log.hpp"
+
+namespace tutti::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+class StateFolderTest : public testing::Test {
+ protected:
+  StateFolderTest() { fs::remove_all(folder_); }
+  ~StateFolderTest() override { fs::remove_all(folder_); }
+  const fs::path folder_ = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+TEST_F(StateFolderTest, KeepsItsNumber) {
+  std::uint64_t made_ns = 0;
+  {
+    const auto folder = StateFolder::open(folder_ / "new" / "deep", "robot alpha");
+    ASSERT_TRUE(folder.has_value()) << folder.error().message;
+    EXPECT_TRUE(folder->is_new());
+    made_ns = folder->made_ns();
+    EXPECT_GT(made_ns, 1'600'000'000'000'000'000U);
+  }
+  const auto folder = StateFolder::open(folder_ / "new" / "deep", "robot alpha");
+  ASSERT_TRUE(folder.has_value()) << folder.error().message;
+  EXPECT_FALSE(folder->is_new());
+  EXPECT_EQ(folder->made_ns(), made_ns);
+}
+
+TEST_F(StateFolderTest, IsOneOwnersAndOneProgramsAtATime) {
+  const auto refused = [&](const std::string& owner) {
+    const auto folder = StateFolder::open(folder_, owner);
+    return folder ? std::string() : folder.error().message;
+  };
+  {
+    const auto first = StateFolder::open(folder_, "robot alpha");
+    ASSERT_TRUE(first.has_value());
+    EXPECT_NE(refused("robot alpha").find("another program"), std::string::npos);
+  }
+  EXPECT_NE(refused("robot bravo").find("robot alpha"), std::string::npos);
+  EXPECT_NE(refused("server").find("robot alpha"), std::string::npos);
+  EXPECT_EQ(refused("robot alpha"), "");
+}
+
+TEST_F(StateFolderTest, AFolderWithOtherThingsIsNotTaken) {
+  fs::create_directories(folder_);
+  std::ofstream(folder_ / "thesis.tex") << "important";
+  const auto folder = StateFolder::open(folder_, "server");
+  ASSERT_FALSE(folder.has_value());
+  EXPECT_NE(folder.error().message.find("thesis.tex"), std::string::npos);
+}
+
+TEST_F(StateFolderTest, EventsComeBackInTheirOrderAndWithoutWhatAKillHasTorn) {
+  fs::create_directories(folder_);
+  {
+    const auto log = EventLog::open(folder_, "test", Level::error).value();
+    log->write(node::Event{Timestamp{1'500'000'000}, node::MapUpdated{3, 20, 7}});
+  }
+  std::ofstream(folder_ / "events.jsonl", std::ios::app) << R"({"time_s": 2, "even)";
+  {
+    const auto log = EventLog::open(folder_, "test", Level::error).value();
+    log->write(node::Event{Timestamp{2'500'000'000}, node::SubmapStored{{RobotId{1}, 2}}});
+  }
+  std::vector<Json> events;
+  ASSERT_TRUE(read_events(folder_, [&](const Json& event) { events.push_back(event); }).has_value());
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0].dump(), R"({"time_s":1.5,"event":"map_updated","revision":3,"submaps":20,"accepted":7})");
+  EXPECT_EQ(events[1]["submap"], "1/2");
+  EXPECT_FALSE(read_events(folder_ / "nowhere", [](const Json&) {}).has_value());
+}
+
+}  // namespace
+}  // namespace tutti::program

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/stop.hpp"
+
+#include <sys/prctl.h>
+#include <systemd/sd-daemon.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+
+#include "tutti/program/clock.hpp"
+
+namespace tutti::program {
+namespace {
+
+std::atomic<bool> asked = false;
+static_assert(std::atomic<bool>::is_always_lock_free);  // a handler writes it
+
+void ask(int /*signal*/) { asked = true; }
+
+}  // namespace
+
+const std::atomic<bool>& stop_asked() { return asked; }
+
+void stop_on_signals() {
+  struct sigaction action {};
+  action.sa_handler = &ask;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+}
+
+void end_with_parent(int parent) {
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (getppid() != parent) asked = true;
+}
+
+void tell_service_manager(const char* state) { sd_notify(0, state); }
+
+std::uint64_t wall_clock_ns() {
+  return static_cast<std::uint64_t>(
+      std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count());
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/worker_program.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <limits>
+#include <thread>
+#include <utility>
+
+#include "tutti/base/random.hpp"
+#include "tutti/bus/nats_port.hpp"
+#include "tutti/mission/parallel.hpp"
+#include "tutti/node/status_envelope.hpp"
+#include "tutti/program/stop.hpp"
+
+namespace tutti::program {
+namespace {
+
+constexpr auto kStillBusy = std::chrono::seconds(5);  // the bus gives a job to another after 30 s of silence
+constexpr std::size_t kCacheBytes = std::size_t{512} << 20U;
+
+/// Thrown through the verification of a job when the program is to end.
+struct Stopped {};
+
+/// Of this start and no other, nor the server's own worker, which is 0.
+std::uint32_t any_number() {
+  const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid()));
+  return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
+}
+
+}  // namespace
+
+HostedWorker::HostedWorker(bus::Endpoint self, std::string version, const Make& make, std::size_t threads,
+                           bus::Port& port, const std::atomic<bool>& stop)
+    : self_(self),
+      version_(std::move(version)),
+      port_(port),
+      stop_(stop),
+      threads_(threads),
+      node_(make([this](std::size_t count, const std::function<void(std::size_t)>& call) { for_each(count, call); })) {
+  node_.set_clock([] { return static_cast<std::int64_t>(wall_clock_ns()); });
+}
+
+/// The port is this thread's: it says that work goes on while others do it.
+void HostedWorker::for_each(std::size_t count, const std::function<void(std::size_t)>& call) {
+  auto done = std::async(std::launch::async, [&] {
+    mission::for_each_parallel(count, threads_, [&](std::size_t i) {
+      if (stop_) throw Stopped();
+      call(i);
+    });
+  });
+  while (done.wait_for(kStillBusy) != std::future_status::ready)
+    if (job_) port_.still_busy(*job_);
+  done.get();
+}
+
+template <class F>
+Answer HostedWorker::carry_on(F&& step) {
+  try {
+    Answer answer{step(), {}};
+    if (!job_ || node_.holds_job()) return answer;
+    answer.done.push_back(*std::exchange(job_, std::nullopt));
+    ++jobs_;
+    return answer;
+  } catch (const Stopped&) {
+    return {};
+  }
+}
+
+Answer HostedWorker::receive(const bus::Received& message, Timestamp now) {
+  if (message.envelope.kind == bus::MessageKind::job) job_ = message.ticket;
+  return carry_on([&] { return node_.receive(message.envelope, now); });
+}
+
+/// Called every few seconds while submaps are awaited.
+Answer HostedWorker::work(Timestamp now) {
+  if (job_) port_.still_busy(*job_);
+  return carry_on([&] { return node_.on_timer(now); });
+}
+
+Answer HostedWorker::report(Timestamp /*now*/) {
+  NodeStatus status{.name = node::default_name(self_), .version = version_, .jobs_done = jobs_};
+  return {{.messages = {node::to_server(self_, std::move(status))}}, {}};
+}
+
+Json HostedWorker::status(Timestamp /*now*/) const {
+  return {{"program", "worker"}, {"jobs", jobs_}, {"waits", node_.holds_job()}};
+}
+
+Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
+  const auto config = load(options.mission);
+  if (!config) return tl::unexpected(config.error());
+  const auto finder = make_finder(*config, options.mission);
+  if (!finder) return tl::unexpected(finder.error());
+  const auto log = EventLog::on_console("worker", options.console);
+  const bus::Endpoint self = bus::Endpoint::worker(any_number());
+  const bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
+  const std::size_t threads = options.threads > 0 ? static_cast<std::size_t>(options.threads)
+                                                  : std::max(1U, std::thread::hardware_concurrency());
+  const auto cache = std::make_shared<node::FrameCache>(kCacheBytes);
+  const auto make = [&](node::WorkerNode::ForEach for_each) {
+    return node::WorkerNode(self, *finder, cache, std::move(for_each));
+  };
+  const Clock clock;
+  Host host({.store = nullptr,
+             .open_port = [&]() -> Result<std::unique_ptr<bus::Port>> { return bus::open_nats_port(self, where); },
+             .open_node = [&](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
+               return std::make_unique<HostedWorker>(self, options.version, make, threads, port, stop);
+             },
+             .each_second = {},
+             .status_file = {}},
+            clock, *log);
+  if (Status opened = host.open(); !opened) return opened;
+  log->say(Level::info, fmt::format("worker {} runs, bus {}, {} threads", self.number, options.bus, threads));
+  tell_service_manager("READY=1");
+  host.run(stop);
+  tell_service_manager("STOPPING=1");
+  return {};
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "tutti/node/worker_node.hpp"
+#include "tutti/program/host.hpp"
+#include "tutti/program/mission_source.hpp"
+
+namespace tutti::program {
+
+struct WorkerOptions {
+  std::string bus;  ///< "nats://HOST:PORT"
+  bool insecure = false;
+  MissionSource mission;
+  int threads = 1;  ///< 0: as many as the machine has.
+  Level console = Level::warning;
+  std::string version;
+};
+
+/// Until `stop`. Any number of them, anywhere.
+Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop);
+
+/// A worker as its host sees it. While it has a job it says so on the bus every few seconds. When `stop` becomes true
+/// it leaves the job in hand, which another worker then gets.
+class HostedWorker final : public Hosted {
+ public:
+  using Make = std::function<node::WorkerNode(node::WorkerNode::ForEach)>;
+  /// `port` and `stop` outlive it. `threads`: pairs verified at a time.
+  HostedWorker(bus::Endpoint self, std::string version, const Make& make, std::size_t threads, bus::Port& port,
+               const std::atomic<bool>& stop);
+  Answer start(Timestamp /*now*/) override { return {}; }
+  Answer receive(const bus::Received& message, Timestamp now) override;
+  [[nodiscard]] std::optional<Timestamp> next_work() const override { return node_.next_timer(); }
+  Answer work(Timestamp now) override;
+  Answer report(Timestamp now) override;
+  [[nodiscard]] Json status(Timestamp now) const override;
+
+ private:
+  void for_each(std::size_t count, const std::function<void(std::size_t)>& call);
+  /// Calls `step` of the node; the job is done with when it holds none any more.
+  template <class F>
+  Answer carry_on(F&& step);
+
+  bus::Endpoint self_;
+  std::string version_;
+  bus::Port& port_;
+  const std::atomic<bool>& stop_;
+  std::size_t threads_;
+  node::WorkerNode node_;
+  std::optional<std::uint64_t> job_;  // ticket
+  std::uint64_t jobs_ = 0;            // done
+};
+
+}  // namespace tutti::program

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/wire/submap_copy_codec.hpp"
+
+#include "tutti/base/check.hpp"
+#include "tutti/v1/messages.pb.h"
+#include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/payload.hpp"
+#include "tutti/wire/limits.hpp"
+
+namespace tutti::wire {
+namespace {
+
+constexpr std::size_t kRoomForId = 64;
+
+}  // namespace
+
+Status validate(const SubmapRequest& request) {
+  if (request.submaps.size() <= kMaxRequested) return {};
+  return fail(ErrorCode::invalid, "submap request: {} submaps, at most {} are accepted", request.submaps.size(),
+              kMaxRequested);
+}
+
+Status validate(const SubmapCopy& copy) {
+  if (!copy.frame.empty() && copy.frame.size() <= kMaxMessageBytes - kRoomForId) return {};
+  return fail(ErrorCode::invalid, "submap copy: a frame of {} bytes, expected 1 to {}", copy.frame.size(),
+              kMaxMessageBytes - kRoomForId);
+}
+
+std::string encode(const SubmapRequest& request) {
+  const Status valid = validate(request);
+  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  v1::SubmapRequest out;
+  for (const SubmapId& id : request.submaps) {
+    out.add_robot(id.chain.robot.value);
+    out.add_session(id.chain.session);
+    out.add_index(id.index);
+  }
+  return pack_frame(MessageKind::submap_request, out.SerializeAsString());
+}
+
+Result<SubmapRequest> decode_submap_request(std::string_view bytes) {
+  const auto parsed = parse_frame<v1::SubmapRequest>(MessageKind::submap_request, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const v1::SubmapRequest& in = parsed->message;
+  if (in.session_size() != in.robot_size() || in.index_size() != in.robot_size())
+    return fail(ErrorCode::parse, "submap request: columns of {}, {} and {}", in.robot_size(), in.session_size(),
+                in.index_size());
+  SubmapRequest request;
+  for (int i = 0; i < in.robot_size(); ++i)
+    request.submaps.push_back({{RobotId{in.robot(i)}, in.session(i)}, in.index(i)});
+  if (auto ok = validate(request); !ok) return tl::unexpected(ok.error());
+  return request;
+}
+
+std::string encode(const SubmapCopy& copy) {
+  const Status valid = validate(copy);
+  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  v1::SubmapCopy out;
+  out.set_robot(copy.id.chain.robot.value);
+  out.set_session(copy.id.chain.session);
+  out.set_index(copy.id.index);
+  out.set_frame(copy.frame);
+  return pack_frame(MessageKind::submap_copy, out.SerializeAsString());
+}
+
+Result<SubmapCopy> decode_submap_copy(std::string_view bytes) {
+  auto parsed = parse_frame<v1::SubmapCopy>(MessageKind::submap_copy, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  v1::SubmapCopy& in = parsed->message;
+  SubmapCopy copy{.id = {{RobotId{in.robot()}, in.session()}, in.index()}, .frame = std::move(*in.mutable_frame())};
+  if (auto ok = validate(copy); !ok) return tl::unexpected(ok.error());
+  return copy;
+}
+
+}  // namespace tutti::wire

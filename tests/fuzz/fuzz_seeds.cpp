@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <initializer_list>
+#include <memory>
+
+#include "fuzz/fuzz_target.hpp"
+#include "support/robot/drifting_robot.hpp"
+#include "support/wire/messages.hpp"
+#include "tutti/formats/ply.hpp"
+#include "tutti/node/journal.hpp"
+#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
+#include "tutti/wire/submap_copy_codec.hpp"
+
+namespace tutti::fuzz {
+namespace {
+
+using wire::MessageKind;
+
+/// (GCC 12 warns of strings that are added.)
+std::string joined(std::initializer_list<std::string_view> parts) {
+  std::string out;
+  for (const std::string_view part : parts) out += part;
+  return out;
+}
+
+/// As a frame, and what is in it (fuzz_targets.cpp, frame()).
+std::vector<std::string> both(MessageKind kind, const std::string& frame) {
+  return {joined({std::string_view("\0", 1), frame}), joined({"\1", wire::unpack_frame(kind, frame)->payload})};
+}
+
+std::string agent_state(bool corrected) {
+  robot::RobotAgent agent(RobotId{1}, 7, {}, Rng(1));
+  const Trajectory odometry = robot::test::drifting_odometry(30);
+  for (std::size_t i = 0; i < odometry.size(); ++i) {
+    static_cast<void>(agent.add_odometry(odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance));
+    PointCloud cloud{{{1.0F, 2.0F, 3.0F}, {4.0F, 5.0F, 6.0F}}};
+    static_cast<void>(agent.add_scan({odometry[i].stamp, std::make_shared<const PointCloud>(cloud), {}}));
+  }
+  if (corrected) agent.receive(robot::test::broadcast(agent, 1, robot::test::kWorld));
+  return wire::encode(agent.state());
+}
+
+std::string little(const std::vector<float>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float)};
+}
+
+constexpr std::string_view kPcd =
+    "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z t\nSIZE 4 4 4 4\nTYPE F F F F\n"
+    "COUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ";
+
+/// {length, bytes} of a Feed message.
+std::string fed(const std::string& payload) {
+  const char size = static_cast<char>(payload.size());
+  return joined({std::string_view(&size, 1), std::string_view("\0\0\0", 3), payload});
+}
+
+}  // namespace
+
+std::map<std::string, std::vector<std::string>> seeds() {
+  using namespace wire::test;
+  Rng rng(5);
+  std::map<std::string, std::vector<std::string>> out;
+  out["submap"] = both(MessageKind::submap, wire::encode(any_submap(rng, 6, 40)));
+  out["proxy_graph"] = both(MessageKind::proxy_graph, wire::encode(any_proxy_graph(rng, 3, 30, false)));
+  for (std::string& seed : both(MessageKind::proxy_graph, wire::encode(any_proxy_graph(rng, 2, 30, true))))
+    out["proxy_graph"].push_back(std::move(seed));
+  ProxyGraph newer = delta_base();
+  ++newer.revision;
+  for (ProxyNode& node : newer.nodes) node.T_world_body.translation.x() += rng.normal(0.1);
+  out["proxy_graph_delta"] = both(MessageKind::proxy_graph_delta, wire::encode_delta({.graph = newer}, delta_base()));
+  out["verdict"] = both(MessageKind::verdict, wire::encode(any_verdict(rng, 3)));
+  out["verdicts"] = both(MessageKind::verdicts, wire::encode(any_verdicts(rng)));
+  out["receipt"] = both(MessageKind::receipt, wire::encode(any_receipt(rng)));
+  out["status"] = both(MessageKind::status, wire::encode(any_status(rng)));
+  out["mission_status"] = both(MessageKind::mission_status, wire::encode(any_mission_status(rng)));
+  out["job"] = both(MessageKind::job, wire::encode(Job{"1/7", any_pairs(rng, 5)}));
+  out["cloud"] = both(MessageKind::cloud, wire::encode(*any_submap(rng, 1, 40).submap.cloud));
+  out["word"] = both(MessageKind::word, wire::encode(any_word(rng)));
+  for (const bool corrected : {false, true})
+    for (std::string& seed : both(MessageKind::agent_state, agent_state(corrected)))
+      out["agent_state"].push_back(std::move(seed));
+  out["submap_request"] = both(MessageKind::submap_request, wire::encode(any_submap_request(rng)));
+  out["submap_copy"] = both(MessageKind::submap_copy, wire::encode(any_submap_copy(rng)));
+
+  const Scan scan{{5},
+                  std::make_shared<const PointCloud>(PointCloud{{{1, 2, 3}, {4, 5, 6}}}),
+                  std::make_shared<const std::vector<float>>(2, 0.1F)};
+  out["journal"] = {node::encode(node::OdometrySample{.stamp = {5}}), node::encode(scan),
+                    node::encode(node::HeardGraph{"frame", 7})};
+
+  // hello, odometry, scan, end (proto/tutti/v1/feed.proto)
+  const std::string one("\0\0\0\0\0\0\xf0\x3f", 8);
+  const std::string hello("\x0a\x04\x08\x01\x12\x00", 6), end("\x22\x00", 2);
+  const std::string of_sample = joined({"\x08\x05\x12\x09\x39", one, "\x1a\x30", one, one, one, one, one, one});
+  const std::string sample = joined({"\x12", std::string(1, static_cast<char>(of_sample.size())), of_sample});
+  const std::string points = joined({"\x1a\x10\x08\x05\x12\x0c", little({1.0F, 2.0F, 3.0F})});
+  out["feed_message"] = {hello, sample, points, end};
+  out["feed"] = {joined({fed(hello), fed(sample), fed(points), fed(end)})};
+
+  out["tum"] = {"# t x y z qx qy qz qw\n1700000000.000000001 1 2 3 0 0 0 1\n1700000000.5 1.5 2 3 0 0 0.6 0.8\n"};
+  out["euroc_csv"] = {"#timestamp, p, q\n1403636579758555392,4.6,-1.7,0.6,0.5,-0.5,0.5,0.5,0.1\n"};
+  out["kitti_poses"] = {"1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 2 1 0 0 3 0 0 1 4\n"};
+  out["transform"] = {"1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n"};
+  out["times"] = {"0.000000e+00\n1.037393e-01\n0.5\n1700000000.000000001\n"};
+  out["kitti_scan"] = {little({1.0F, 2.0F, 3.0F, 0.5F, 4.0F, 5.0F, 6.0F, 0.25F})};
+  out["g2o"] = {
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n"
+      "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\nFIX 0\n",
+      "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.5\nEDGE_SE2 0 1 1 0 0.5 9 0 0 9 0 9\n"};
+  out["graph_stamps"] = {"id,robot,keyframe,stamp_ns\n0,1,0,1700000000000000000\n1,1:77,1,1700000000500000000\n"};
+  out["pcd"] = {joined({kPcd, "ascii\n1 2 3 0.5\n4 5 6 0.25\n"}),
+                joined({kPcd, "binary\n", little({1.0F, 2.0F, 3.0F, 0.5F, 4.0F, 5.0F, 6.0F, 0.25F})}),
+                joined({kPcd, "binary_compressed\n", std::string_view("\x22\0\0\0\x20\0\0\0\x1f", 9),
+                        little({1.0F, 4.0F, 2.0F, 5.0F, 3.0F, 6.0F, 0.5F, 0.25F})})};
+  out["ply"] = {formats::to_ply(std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6}}),
+                "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
+                "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n4 5 6\n3 0 1 0\n"};
+  return out;
+}
+
+}  // namespace tutti::fuzz

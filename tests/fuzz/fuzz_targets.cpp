@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <utility>
+
+#include "fuzz/fuzz_target.hpp"
+#include "support/wire/messages.hpp"
+#include "tutti/base/check.hpp"
+#include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/kitti.hpp"
+#include "tutti/formats/pcd.hpp"
+#include "tutti/formats/ply.hpp"
+#include "tutti/formats/trajectory_file.hpp"
+#include "tutti/node/journal.hpp"
+#include "tutti/program/feed/feed_frames.hpp"
+#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/frame.hpp"
+#include "tutti/wire/limits.hpp"
+#include "tutti/wire/submap_copy_codec.hpp"
+
+namespace tutti::fuzz {
+namespace {
+
+using wire::MessageKind;
+
+/// What was decoded can be encoded and decoded again. The first byte says whether the others are a frame, or what is
+/// in one: few mutations of a frame pass its checksum.
+template <class Decode>
+void frame(MessageKind kind, std::string_view bytes, const Decode& decode) {
+  if (bytes.empty()) return;
+  const std::string_view rest = bytes.substr(1);
+  if (bytes.front() != '\0' && rest.size() > wire::kMaxMessageBytes) return;
+  const auto value = bytes.front() == '\0' ? decode(rest) : decode(wire::pack_frame(kind, rest));
+  if (!value) return;
+  const auto again = decode([&] {
+    if constexpr (requires { wire::encode(**value); })
+      return wire::encode(**value);
+    else
+      return wire::encode(*value);
+  }());
+  TUTTI_CHECK(again.has_value(), "{}: what was decoded is refused: {}", wire::name(kind), again.error().message);
+}
+
+void submap(std::string_view bytes) { frame(MessageKind::submap, bytes, wire::decode_submap); }
+void proxy_graph(std::string_view bytes) { frame(MessageKind::proxy_graph, bytes, wire::decode_proxy_graph); }
+void verdict(std::string_view bytes) { frame(MessageKind::verdict, bytes, wire::decode_verdict); }
+void verdicts(std::string_view bytes) { frame(MessageKind::verdicts, bytes, wire::decode_verdicts); }
+void word(std::string_view bytes) { frame(MessageKind::word, bytes, wire::decode_word); }
+void receipt(std::string_view bytes) { frame(MessageKind::receipt, bytes, wire::decode_receipt); }
+void job(std::string_view bytes) { frame(MessageKind::job, bytes, wire::decode_job); }
+void status(std::string_view bytes) { frame(MessageKind::status, bytes, wire::decode_status); }
+void mission_status(std::string_view bytes) { frame(MessageKind::mission_status, bytes, wire::decode_mission_status); }
+void cloud(std::string_view bytes) { frame(MessageKind::cloud, bytes, wire::decode_cloud); }
+void submap_request(std::string_view bytes) { frame(MessageKind::submap_request, bytes, wire::decode_submap_request); }
+void submap_copy(std::string_view bytes) { frame(MessageKind::submap_copy, bytes, wire::decode_submap_copy); }
+void agent_state(std::string_view bytes) { frame(MessageKind::agent_state, bytes, wire::decode_agent_state); }
+
+void proxy_graph_delta(std::string_view bytes) {
+  frame(MessageKind::proxy_graph_delta, bytes, [](std::string_view frame) -> Result<ProxyGraphMessage> {
+    // An answer is a whole graph, which is encoded as one.
+    if (auto whole = wire::decode_proxy_graph(frame)) return whole;
+    auto graph = wire::decode_delta(frame, delta_base());
+    if (!graph) return tl::unexpected(graph.error());
+    if (!*graph) return fail(ErrorCode::invalid, "against another graph");
+    return std::move(**graph);
+  });
+}
+
+void journal(std::string_view bytes) {
+  const auto entry = node::decode_entry(bytes);
+  if (entry) TUTTI_CHECK(node::encode(*entry) == bytes, "an entry comes back changed");
+}
+
+void feed(std::string_view bytes) {
+  program::FrameReader reader;
+  for (std::string_view left = bytes; !left.empty();) {
+    const auto payload = reader.take(left);
+    if (!payload) return;
+    if (*payload) static_cast<void>(program::decode_from_client(**payload));
+  }
+}
+void feed_message(std::string_view bytes) { static_cast<void>(program::decode_from_client(bytes)); }
+
+/// Whatever it is: an error or a value.
+template <auto parse>
+void file(std::string_view bytes) {
+  static_cast<void>(parse(bytes, "fuzz"));
+}
+void tum(std::string_view bytes) {
+  const auto trajectory = formats::parse_tum(bytes, "fuzz");
+  if (trajectory)
+    TUTTI_CHECK(formats::parse_tum(formats::to_tum(*trajectory), "again").has_value(), "what was read is refused");
+}
+void g2o(std::string_view bytes) {
+  const auto graph = formats::parse_g2o(bytes, "fuzz");
+  if (graph) TUTTI_CHECK(formats::parse_g2o(formats::to_g2o(*graph), "again").has_value(), "what was read is refused");
+}
+void kitti_poses(std::string_view bytes) {
+  static_cast<void>(formats::parse_kitti_poses(bytes, "fuzz", 10.0, Timestamp{0}));
+}
+
+}  // namespace
+
+const ProxyGraph& delta_base() {
+  static const ProxyGraph base = [] {
+    Rng rng(9);
+    return wire::decode_proxy_graph(wire::encode(wire::test::any_proxy_graph(rng, 3, 30, false)))->graph;
+  }();
+  return base;
+}
+
+const std::map<std::string, Target>& targets() {
+  static const std::map<std::string, Target> all{
+      {"agent_state", agent_state},
+      {"cloud", cloud},
+      {"euroc_csv", file<formats::parse_euroc_csv>},
+      {"feed", feed},
+      {"feed_message", feed_message},
+      {"g2o", g2o},
+      {"graph_stamps", file<formats::parse_graph_stamps>},
+      {"job", job},
+      {"journal", journal},
+      {"kitti_poses", kitti_poses},
+      {"kitti_scan", file<formats::parse_kitti_scan>},
+      {"mission_status", mission_status},
+      {"pcd", file<formats::parse_timed_pcd>},
+      {"ply", file<formats::parse_ply>},
+      {"proxy_graph", proxy_graph},
+      {"proxy_graph_delta", proxy_graph_delta},
+      {"receipt", receipt},
+      {"status", status},
+      {"submap", submap},
+      {"submap_copy", submap_copy},
+      {"submap_request", submap_request},
+      {"times", file<formats::parse_times>},
+      {"transform", file<formats::parse_transform>},
+      {"tum", tum},
+      {"verdict", verdict},
+      {"verdicts", verdicts},
+      {"word", word},
+  };
+  return all;
+}
+
+}  // namespace tutti::fuzz

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/server/world.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/worker_node.hpp"
+#include "tutti/storage/memory_store.hpp"
+#include "tutti/wire/codec.hpp"
+
+/// Maps made by a server node, with a worker beside it, of robots that walk in circles (support/server/world.hpp).
+namespace tutti::mapfile::test {
+
+/// True relative poses with evidence; every fourth is wrong. Sessions of one robot walk the same way at other times.
+class ExplainingFinder final : public server::ClosureFinder {
+ public:
+  [[nodiscard]] std::uint32_t version() const override { return finder_.version(); }
+  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return finder_.is_candidate(first, second);
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::CloudStore& clouds) const override {
+    auto verdict = finder_.verify(first, second, clouds);
+    verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
+    return verdict;
+  }
+
+ private:
+  server::test::TestFinder finder_{7, 4};
+};
+
+/// A server on a store, everything that it asks for answered by a worker.
+class Mapper {
+ public:
+  Mapper(std::set<RobotId> robots, storage::TableStore& store, std::uint64_t epoch = 1000) : store_(store) {
+    auto opened = node::ServerNode::open(std::move(robots), finder_, {}, epoch, store);
+    EXPECT_TRUE(opened.has_value()) << opened.error().message;
+    node_ = std::move(*opened);
+    take(node_->resume(now_));
+  }
+  /// All submaps of a session, each with one point as its cloud; then the map is updated.
+  void walk(const ChainId& chain, std::uint64_t seed = 1) {
+    for (Submap& submap :
+         server::test::make_submaps(chain, {}, Rng(seed).fork(chain.robot.value).fork(chain.session))) {
+      PointCloud cloud;
+      cloud.points.emplace_back(1.0F, 2.0F, 0.5F * static_cast<float>(submap.id.index));
+      submap.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+      for (Keyframe& keyframe : submap.keyframes)
+        keyframe.stamp.ns += static_cast<std::int64_t>(chain.session) * 1'000'000'000'000;
+      const SubmapMessage message{{chain.robot, chain.session, submap.id.index}, std::move(submap)};
+      take(node_->receive(
+          {bus::Endpoint::of(chain.robot), bus::Endpoint::server(), bus::MessageKind::submap,
+           node::message_id(message.submap.id), std::make_shared<const std::string>(wire::encode(message))},
+          now_));
+    }
+    update();
+  }
+  void update() {
+    now_ = now_ + 100.0;
+    take(node_->on_timer(now_));
+  }
+  [[nodiscard]] const server::MapServer& server() const { return node_->map_server(); }
+
+ private:
+  void take(node::Step step) {
+    EXPECT_TRUE(store_.commit(step.writes).has_value());
+    for (const node::Event& event : step.events)
+      if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) ADD_FAILURE() << refused->why;
+    node::WorkerNode worker(bus::Endpoint::worker(2), finder_, node::SubmapFrames::of(store_));
+    for (const bus::Envelope& message : step.messages)
+      if (message.kind == bus::MessageKind::job)
+        for (const bus::Envelope& answer : worker.receive(message, now_).messages) take(node_->receive(answer, now_));
+  }
+
+  storage::TableStore& store_;
+  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<ExplainingFinder>();
+  std::unique_ptr<node::ServerNode> node_;
+  Timestamp now_;
+};
+
+}  // namespace tutti::mapfile::test

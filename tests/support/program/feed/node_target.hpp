@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/program/feed/robot_view.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::program::test {
+
+/// A robot on a store in memory, whose steps are committed.
+class NodeTarget final : public FeedTarget {
+ public:
+  explicit NodeTarget(RobotId robot = RobotId{1}, const robot::AgentConfig& config = {})
+      : store_(storage::robot_schema()),
+        node_(node::RobotNode::open(robot, 7, {.agent = config}, Rng(1), store_).value()),
+        view_("alpha") {
+    carry_out(node_->resume({}));
+  }
+  Status add_odometry(const node::OdometrySample& sample) override {
+    return carry_out(node_->add_odometry(sample, {}));
+  }
+  Status add_scan(const Scan& scan) override { return carry_out(node_->add_scan(scan, {})); }
+  Status finish() override { return carry_out(node_->finish({})); }
+  [[nodiscard]] FeedState state() const override { return view_.state(*node_); }
+
+  void receive(const bus::Envelope& envelope) { static_cast<void>(carry_out(node_->receive(envelope, {}))); }
+  [[nodiscard]] const node::RobotNode& node() const { return *node_; }
+  /// Sent since the last call.
+  std::vector<bus::Envelope> take_sent() { return std::exchange(sent_, {}); }
+
+ private:
+  Status carry_out(const node::Step& step) {
+    if (auto ok = store_.commit(step.writes); !ok) return ok;
+    for (const node::Event& event : step.events) view_.note(event, *node_);
+    sent_.insert(sent_.end(), step.messages.begin(), step.messages.end());
+    return taken(step);
+  }
+  storage::MemoryStore store_;
+  std::unique_ptr<node::RobotNode> node_;
+  RobotView view_;
+  std::vector<bus::Envelope> sent_;
+};
+
+}  // namespace tutti::program::test

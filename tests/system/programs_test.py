@@ -1,0 +1,314 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Server, robots and workers as programs, over a nats-server of their own; skips where none is installed.
+
+usage: programs_test.py TUTTI_PROGRAM SOURCE_DIR [Programs.TEST...]
+"""
+import json
+import os
+import pathlib
+import random
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+TUTTI, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
+MISSION = SOURCE / "tests/system/small_mission.yaml"
+HAS_NATS = shutil.which("nats-server") or os.path.exists("/usr/sbin/nats-server")
+RATE = ["--rate", "40"]  # 150 s in about 4
+PATIENCE_S = 120.0  # a busy machine
+
+
+def run(*arguments):
+    return subprocess.run([TUTTI, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE_S)
+
+
+def rows(file, table):
+    """(key, bytes) of a map that nobody has open."""
+    with sqlite3.connect(f"file:{file}?immutable=1", uri=True) as store:
+        return store.execute(f"SELECT key, bytes FROM {table} ORDER BY key").fetchall()
+
+
+def children(parent):
+    """Of a process."""
+    found = []
+    for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
+        try:
+            number, _, rest = stat.read_text().partition(" (")
+        except OSError:  # it has ended
+            continue
+        if rest.rpartition(") ")[2].split()[1] == str(parent):
+            found.append(int(number))
+    return found
+
+
+def submaps(file):
+    return len(rows(file, "submaps"))
+
+
+def report(folder):
+    return json.loads((folder / "report.json").read_text())
+
+
+def vertices(folder):
+    """Positions of the map's keyframes, by their number."""
+    words = [line.split() for line in (folder / "graph.g2o").read_text().splitlines()]
+    return {int(w[1]): [float(x) for x in w[2:5]] for w in words if w and w[0].startswith("VERTEX")}
+
+
+def edges(folder):
+    words = [line.split() for line in (folder / "graph.g2o").read_text().splitlines()]
+    return sorted((int(w[1]), int(w[2])) for w in words if w and w[0].startswith("EDGE"))
+
+
+class Program:
+    """One of tutti's programs while it runs."""
+
+    def __init__(self, *arguments, env=None):
+        self.process = subprocess.Popen([TUTTI, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                        text=True, env={**os.environ, **(env or {})})
+
+    def line(self):
+        return self.process.stdout.readline().strip()
+
+    def kill(self):
+        self.process.kill()
+        self.process.communicate()
+
+    def end(self, stop=True):
+        """Exit code and what it said."""
+        if stop:
+            self.process.send_signal(signal.SIGTERM)
+        out, err = self.process.communicate(timeout=PATIENCE_S)
+        return self.process.returncode, out + err
+
+
+@unittest.skipUnless(HAS_NATS, "nats-server is not installed")
+class Programs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.common = tempfile.TemporaryDirectory()
+        cls.expected = pathlib.Path(cls.common.name) / "run"
+        done = run("run", MISSION, "--out", cls.expected)
+        assert done.returncode == 0, done.stderr
+        assert report(cls.expected)["server"]["closures_accepted"] > 5
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.common.cleanup()
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.path = pathlib.Path(folder.name)
+
+    def start(self, *arguments, env=None):
+        program = Program(*arguments, env=env)
+        self.addCleanup(lambda: program.process.poll() is None and program.kill())
+        return program
+
+    def start_server(self, *more, rate=RATE, env=None):
+        server = self.start("server", "--state", self.path / "server", MISSION, *rate, *more, env=env)
+        line = server.line()
+        self.assertIn("tutti robot --name NAME --bus nats://127.0.0.1:", line, server.process.poll())
+        words = line.split()
+        return server, words[words.index("--bus") + 1]
+
+    def start_robot(self, name, bus, *more):
+        return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, MISSION, *RATE,
+                          "--session", "0", *more)
+
+    def status(self, who):
+        try:
+            return json.loads((self.path / who / "status.json").read_text())
+        except (OSError, ValueError):
+            return {}
+
+    def wait_for(self, condition, what):
+        end = time.monotonic() + PATIENCE_S
+        while not condition():
+            self.assertLess(time.monotonic(), end, f"{what}: {self.status('server')} {self.status('alpha')}")
+            time.sleep(0.02)
+
+    def expect_same_map(self, out):
+        self.assertEqual(edges(out), edges(self.expected))
+        expected, found = vertices(self.expected), vertices(out)
+        self.assertEqual(found.keys(), expected.keys())
+        for number, position in expected.items():
+            for a, b in zip(position, found[number]):
+                self.assertLess(abs(a - b), 1e-3)
+
+    def expect_same_map_file(self):
+        done = run("map", "export", self.path / "server/map.tutti", "--g2o", self.path / "graph.g2o")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.expect_same_map(self.path)
+
+    def mission_up(self, *more):
+        out = self.path / "up"
+        done = run("mission", "up", MISSION, "--out", out, *RATE, *more)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.expect_same_map(out)
+        here, there = report(out), report(self.expected)
+        for key in ("closures_accepted", "rejections", "rmse_m", "failed_odometry"):
+            self.assertEqual(here["server"][key], there["server"][key])
+        return out
+
+    def test_mission_up_is_tutti_run(self):
+        out = self.mission_up()
+        again = run("mission", "up", MISSION, "--out", out)
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("earlier mission", again.stderr)
+
+    def test_workers_elsewhere_find_the_same(self):
+        out = self.mission_up("--workers", "2")
+        told = [json.loads(line) for line in (out / "state/server/events.jsonl").read_text().splitlines()]
+        self.assertTrue(any(event["event"] == "verdicts_taken" for event in told))
+
+    def test_a_killed_worker_costs_only_time(self):
+        server, bus = self.start_server("--threads", "0")
+        robots = [self.start_robot(name, bus) for name in ("alpha", "bravo")]
+        workers = [self.start("worker", "--bus", bus, MISSION) for _ in range(2)]
+        self.wait_for(lambda: self.status("server").get("submaps", 0) >= 6, "submaps")
+        workers[0].kill()
+        for robot in robots:
+            self.assertEqual(robot.end(stop=False)[0], 0)
+        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "end")
+        self.assertEqual(workers[1].end()[0], 0)
+        self.assertEqual(server.end()[0], 0)
+        self.expect_same_map_file()
+
+    def test_a_killed_server_and_a_killed_robot_go_on(self):
+        server, bus = self.start_server()
+        robots = {name: self.start_robot(name, bus) for name in ("alpha", "bravo")}
+        self.wait_for(lambda: self.status("server").get("submaps", 0) >= 4, "submaps")
+        server.kill()  # its bus goes with it
+        self.wait_for(lambda: self.status("alpha").get("time_s", 0) > 75, "half of it")
+        robots["alpha"].kill()
+        server, same_bus = self.start_server()
+        self.assertEqual(same_bus, bus)
+        robots["alpha"] = self.start_robot("alpha", bus)
+        for name, robot in robots.items():
+            code, said = robot.end(stop=False)
+            self.assertEqual(code, 0, f"{name}: {said}")
+            self.assertEqual(self.status(name)["backlog"], 0)
+        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "end")
+        code, said = server.end()
+        self.assertEqual(code, 0, said)
+        self.expect_same_map_file()
+
+    def test_kills_at_random_instants_lose_nothing(self):
+        """TUTTI_SEED: which instants (bench/soak/kills.py tries many)."""
+        rng = random.Random(int(os.environ.get("TUTTI_SEED", "1")))
+        slow = ["--rate", "15"]
+        server, bus = self.start_server("--threads", "0", rate=slow)
+
+        def start(name):
+            if name in ("alpha", "bravo"):
+                return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, MISSION, *slow,
+                                  "--session", "0", "--stay")
+            return self.start("worker", "--bus", bus, MISSION)
+
+        others = {name: start(name) for name in ("alpha", "bravo", "worker 1", "worker 2")}
+        killed = []
+        while len(killed) < 20:
+            time.sleep(rng.uniform(0.0, 0.6))
+            name = rng.choice([*others, "server", "bus"])
+            killed.append(name)
+            if name == "server":
+                server.kill()  # its bus goes with it
+                server, same_bus = self.start_server("--threads", "0", rate=slow)
+                self.assertEqual(same_bus, bus)
+            elif name == "bus":
+                for bus_server in children(server.process.pid):
+                    os.kill(bus_server, signal.SIGKILL)
+            else:
+                others[name].kill()
+                others[name] = start(name)
+        for name in ("alpha", "bravo"):
+            self.wait_for(lambda: self.status(name).get("finished") and self.status(name)["backlog"] == 0, f"{name} {killed}")
+        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"],
+                      f"the map {killed}")
+        for program in (*others.values(), server):
+            code, said = program.end()
+            self.assertEqual(code, 0, said)
+        self.expect_same_map_file()
+
+    def test_sigterm_is_a_clean_stop(self):
+        server, bus = self.start_server()
+        robot = self.start_robot("alpha", bus)
+        self.wait_for(lambda: self.status("server").get("submaps", 0) >= 2, "submaps")
+        for program in (robot, server):
+            begin = time.monotonic()
+            code, said = program.end()
+            self.assertEqual(code, 0, said)
+            self.assertLess(time.monotonic() - begin, 20.0)
+        stored = submaps(self.path / "server/map.tutti")
+        self.assertGreaterEqual(stored, 2)
+        self.assertFalse((self.path / "server/map.tutti-wal").exists())
+        self.assertLess(self.status("alpha")["time_s"], 150)
+        server, bus = self.start_server()
+        robot = self.start_robot("alpha", bus)
+        self.assertEqual(robot.end(stop=False)[0], 0)
+        self.assertEqual(server.end()[0], 0)
+        self.assertGreater(submaps(self.path / "server/map.tutti"), stored)
+
+    def test_a_second_robot_of_a_name_is_refused(self):
+        _, bus = self.start_server(rate=[])  # names are held for 30 s of mission time
+        words = ["robot", "--name", "alpha", "--bus", bus, MISSION, "--stay"]
+        first = self.start(*words, "--state", self.path / "alpha")
+
+        def known():
+            done = run("status", "--bus", bus, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return [robot["name"] for robot in json.loads(done.stdout)["robots"] if robot["last_seen_s_ago"] is not None]
+
+        self.wait_for(lambda: known() == ["alpha"], "alpha's status")
+        code, said = self.start(*words, "--state", self.path / "second").end(stop=False)
+        self.assertEqual(code, 1, said)
+        self.assertIn("alpha", said)
+        self.assertIn("another name", said)
+        self.assertIsNone(first.process.poll())
+
+    def test_tells_the_service_manager(self):
+        import socket
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+            listener.bind(str(self.path / "notify"))
+            listener.settimeout(PATIENCE_S)
+            server, _ = self.start_server(env={"NOTIFY_SOCKET": str(self.path / "notify")})
+            self.assertEqual(listener.recv(100), b"READY=1")
+            self.assertEqual(server.end()[0], 0)
+            self.assertEqual(listener.recv(100), b"STOPPING=1")
+
+    def test_refusals(self):
+        def refused(code, *words, args):
+            done = run(*args)
+            self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+            for word in words:
+                self.assertIn(word, done.stderr + done.stdout)
+
+        state = self.path / "server"
+        refused(2, "--state", args=["server"])
+        refused(2, "TLS", "--insecure", args=["server", "--state", state, "--listen", "0.0.0.0:4222"])
+        refused(2, "TLS", args=["server", "--state", state, "--bus", "nats://192.0.2.1:4222"])
+        refused(2, "TLS", args=["robot", "--name", "alpha", "--bus", "nats://192.0.2.1:4222", "--state",
+                                self.path / "alpha", MISSION])
+        refused(2, "charlie", "alpha, bravo", args=["robot", "--name", "charlie", "--bus", "nats://127.0.0.1:1",
+                                                    "--state", self.path / "charlie", MISSION])
+        refused(2, "mission", args=["robot", "--name", "alpha", "--bus", "nats://127.0.0.1:1", "--state", state])
+        (self.path / "other").mkdir()
+        (self.path / "other" / "thesis.tex").write_text("important")
+        refused(1, "thesis.tex", args=["server", "--state", self.path / "other"])
+        server, bus = self.start_server()
+        refused(1, "another program", args=["server", "--state", state])
+        refused(1, "server", args=["robot", "--name", "alpha", "--bus", bus, "--state", state, MISSION])
+        self.assertEqual(server.end()[0], 0)
+        refused(1, "server", args=["robot", "--name", "alpha", "--bus", bus, "--state", state, MISSION])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
