@@ -9,6 +9,7 @@
 #include "tutti/base/timestamp.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/relative_pose.hpp"
+#include "tutti/model/visual.hpp"
 
 namespace tutti {
 
@@ -28,6 +29,7 @@ struct Submap {
   std::vector<Keyframe> keyframes;          ///< Consecutive indices, increasing stamps, at least one.
   std::vector<RelativePose> odometry;       ///< Raw odometry from keyframe k to k + 1; one fewer than keyframes.
   std::shared_ptr<const PointCloud> cloud;  ///< Submap frame, voxel-downsampled; null or empty when no range sensor.
+  std::shared_ptr<const VisualPayload> visual;  ///< Null when there is no camera.
 };
 
 }  // namespace tutti
