@@ -12,6 +12,7 @@
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/model/visual.hpp"
 
 namespace tutti {
 
@@ -21,6 +22,17 @@ class ScanSource {
   virtual ~ScanSource() = default;
   /// The sweep that ends at this odometry sample; nothing when there is none.
   [[nodiscard]] virtual Result<std::optional<Scan>> scan(std::size_t sample) const = 0;
+};
+
+/// Where a recording's tracked images come from: a file, or a tracker over images. It has a state, the tracks: one
+/// thread asks, sample after sample.
+class VisualSource {
+ public:
+  virtual ~VisualSource() = default;
+  [[nodiscard]] virtual const std::vector<Camera>& cameras() const = 0;
+  /// The images taken at this odometry sample, one per camera at most; none when there is none. An error is of this
+  /// image alone (a missing or corrupt file): the next samples can be asked for.
+  [[nodiscard]] virtual Result<std::vector<TrackedImage>> images(std::size_t sample) = 0;
 };
 
 /// Where simulated odometry really went wrong. Known to the evaluation only.
@@ -41,7 +53,10 @@ struct Recording {
   std::vector<Matrix6d> increment_covariance;  ///< Of odometry k -> k + 1; one fewer than odometry.
   Trajectory reference;                     ///< T_reference_body, one frame for all robots; empty when there is none.
   std::shared_ptr<const ScanSource> scans;  ///< Null when there is no range sensor.
-  std::vector<DriftOrigin> drift_origins;   ///< In time order; empty when unknown.
+  std::shared_ptr<VisualSource> visual;     ///< Null when there is no camera.
+  std::vector<ImuSample> imu;               ///< Increasing stamps; empty when there is no IMU.
+  ImuNoise imu_noise;
+  std::vector<DriftOrigin> drift_origins;  ///< In time order; empty when unknown.
 };
 
 }  // namespace tutti

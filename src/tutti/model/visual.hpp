@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "tutti/base/timestamp.hpp"
 #include "tutti/geometry/camera.hpp"
 #include "tutti/geometry/pose3.hpp"
 
@@ -42,6 +43,39 @@ struct Observation {
   std::uint32_t landmark = kNoIndex;    ///< Index into VisualPayload::landmarks: what it is a view of.
   std::uint32_t descriptor = kNoIndex;  ///< Row of VisualPayload::descriptors; a byte budget leaves many without.
   friend bool operator==(const Observation&, const Observation&) = default;
+};
+
+/// A keypoint as the tracker leaves it.
+struct TrackedKeypoint {
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+  float sigma_px = 1.0F;
+  std::uint64_t track = 0;  ///< The same number in several images is the same point; 0: seen in this one alone.
+  friend bool operator==(const TrackedKeypoint&, const TrackedKeypoint&) = default;
+};
+
+/// What a robot's tracker (or a file) says of one image: the robot's input, as a scan is a LiDAR's.
+struct TrackedImage {
+  std::uint32_t camera = 0;  ///< Index into the robot's cameras.
+  std::vector<TrackedKeypoint> keypoints;
+  Descriptors descriptors;  ///< One per keypoint, or none.
+  friend bool operator==(const TrackedImage&, const TrackedImage&) = default;
+};
+
+/// What the IMU said at a moment, in the body frame.
+struct ImuSample {
+  Timestamp stamp;
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();           ///< rad/s
+  Eigen::Vector3d accelerometer = Eigen::Vector3d::Zero();  ///< m/s^2, +9.81 upwards at rest.
+  friend bool operator==(const ImuSample&, const ImuSample&) = default;
+};
+
+/// Noise densities of an IMU, as calibrated (EuRoC's sensor.yaml has them under these names).
+struct ImuNoise {
+  double gyro_noise_density = 1.7e-4;         ///< rad/s/sqrt(Hz)
+  double gyro_random_walk = 2e-5;             ///< rad/s^2/sqrt(Hz)
+  double accelerometer_noise_density = 2e-3;  ///< m/s^2/sqrt(Hz)
+  double accelerometer_random_walk = 3e-3;    ///< m/s^3/sqrt(Hz)
+  friend bool operator==(const ImuNoise&, const ImuNoise&) = default;
 };
 
 /// One image, at the stamp of a keyframe.
