@@ -59,11 +59,11 @@ server::MapEstimate final_map(server::MapServer& server) {
 
 /// Every message once, in order, verdicts at once.
 server::MapEstimate map_in_order(const SmallMission& mission) {
-  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {}, 1);
+  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryPayloadStore>(), {}, 1);
   for (const std::string& bytes : mission.uploads) {
     EXPECT_TRUE(server.receive(*wire::decode_submap(bytes)).has_value());
     for (const auto& job : server.take_jobs())
-      EXPECT_TRUE(server.receive(*mission.finder->verify(*job.first, *job.second, server.clouds())).has_value());
+      EXPECT_TRUE(server.receive(*mission.finder->verify(*job.first, *job.second, server.payloads())).has_value());
   }
   return final_map(server);
 }
@@ -78,7 +78,7 @@ server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
     if (rng.bernoulli(0.2)) uploads.push_back(bytes);
   shuffle(uploads);
 
-  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryCloudStore>(), {}, 1);
+  server::MapServer server(mission.robots, mission.finder, std::make_shared<server::MemoryPayloadStore>(), {}, 1);
   std::vector<ClosureVerdict> late;
   const auto hand_in = [&](double share) {
     shuffle(late);
@@ -94,7 +94,7 @@ server::MapEstimate map_in_disorder(const SmallMission& mission, Rng rng) {
   for (const std::string& bytes : uploads) {
     EXPECT_TRUE(server.receive(*wire::decode_submap(bytes)).has_value());
     for (const auto& job : server.take_jobs())
-      late.push_back(*mission.finder->verify(*job.first, *job.second, server.clouds()));
+      late.push_back(*mission.finder->verify(*job.first, *job.second, server.payloads()));
     if (rng.bernoulli(0.3)) hand_in(rng.uniform(0.0, 1.0));
     if (rng.bernoulli(0.03)) server.optimise();
   }

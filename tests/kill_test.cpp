@@ -304,14 +304,14 @@ void expect_same_map(const server::MapServer& a, const server::MapServer& b) {
     ASSERT_EQ(a.map().closures[i].accepted, b.map().closures[i].accepted);
   }
   EXPECT_EQ(a.state().verdicts, b.state().verdicts);
-  EXPECT_EQ(a.state().cloud_sizes, b.state().cloud_sizes);
+  EXPECT_EQ(a.state().payload_sizes, b.state().payload_sizes);
   ASSERT_EQ(a.refusals().size(), b.refusals().size());
   for (const auto& [reason, count] : a.refusals()) {
     EXPECT_EQ(b.refusals().at(reason).intra, count.intra);
     EXPECT_EQ(b.refusals().at(reason).inter, count.inter);
   }
-  for (const auto& [id, size] : a.state().cloud_sizes)
-    ASSERT_EQ((*a.clouds().get(id))->points, (*b.clouds().get(id))->points);
+  for (const auto& [id, size] : a.state().payload_sizes)
+    ASSERT_EQ((*a.payloads().cloud(id))->points, (*b.payloads().cloud(id))->points);
 }
 
 class Kill : public testing::Test {

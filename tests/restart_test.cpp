@@ -65,7 +65,7 @@ class Restart : public testing::Test {
     finder_ = mission::make_closure_finder(closures, recordings_, 5);
     for (const mission::MissionRecording& robot : recordings_)
       walkers_.push_back({&robot.recording, robot::RobotAgent(robot.recording.robot, kFirstSession, {}, Rng(1))});
-    server_ = std::make_unique<server::MapServer>(ids_, finder_, clouds_, server::ServerConfig{}, 1);
+    server_ = std::make_unique<server::MapServer>(ids_, finder_, payloads_, server::ServerConfig{}, 1);
   }
 
   void upload() {
@@ -79,7 +79,7 @@ class Restart : public testing::Test {
   }
   void answer_jobs() {
     for (const auto& job : server_->take_jobs()) {
-      const auto verdict = finder_->verify(*job.first, *job.second, *clouds_);
+      const auto verdict = finder_->verify(*job.first, *job.second, *payloads_);
       ASSERT_TRUE(verdict.has_value()) << verdict.error().message;
       const auto decoded = wire::decode_verdict(wire::encode(*verdict));
       ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
@@ -111,7 +111,7 @@ class Restart : public testing::Test {
   std::set<RobotId> ids_;
   std::vector<mission::MissionRecording> recordings_;
   std::shared_ptr<const server::ClosureFinder> finder_;
-  std::shared_ptr<server::CloudStore> clouds_ = std::make_shared<server::MemoryCloudStore>();
+  std::shared_ptr<server::PayloadStore> payloads_ = std::make_shared<server::MemoryPayloadStore>();
   std::unique_ptr<server::MapServer> server_;
   std::vector<Walker> walkers_;
   double last_s_ = 0.0;
@@ -157,7 +157,7 @@ TEST_F(Restart, AServerBackFromAnOlderStateIsHeardAtOnce) {
   go_on_until(200.0);
   const ProxyGraphMessage late = wire::decode_proxy_graph(wire::encode(server_->optimise())).value();
 
-  server_ = std::make_unique<server::MapServer>(ids_, finder_, clouds_, server::ServerConfig{}, 1, saved);
+  server_ = std::make_unique<server::MapServer>(ids_, finder_, payloads_, server::ServerConfig{}, 1, saved);
   answer_jobs();
   const ProxyGraphMessage heard = broadcast();
   ASSERT_LT(heard.graph.revision, late.graph.revision);

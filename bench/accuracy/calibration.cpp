@@ -128,7 +128,7 @@ void run(const Options& options, const mission::MissionConfig& config,
     speakers.emplace_back(robot, config.agent);
   }
   const auto finder = mission::make_closure_finder(config.closures, robots, options.seed);
-  const auto clouds = std::make_shared<server::MemoryCloudStore>();
+  const auto clouds = std::make_shared<server::MemoryPayloadStore>();
   server::MapServer server(ids, finder, clouds, config.server, 1);
   std::size_t update = 0;
   const double end_s = config.duration_s > 0.0 ? config.duration_s : std::numeric_limits<double>::infinity();

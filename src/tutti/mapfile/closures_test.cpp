@@ -115,7 +115,7 @@ TEST_F(ClosuresOfAMap, BytesAndVersionsOfEveryTableAreCounted) {
     EXPECT_EQ(content.tables.at(name).bytes, bytes);
   }
   EXPECT_EQ(content.tables.at("submaps").versions.size(), 1U);
-  EXPECT_EQ(content.cloud_points.size(), content.submaps.size());
+  EXPECT_EQ(content.payload_sizes.size(), content.submaps.size());
 }
 
 }  // namespace

@@ -38,9 +38,8 @@ Status read_table(const storage::TableStore& map, const std::string& name, Decod
 Status read_submaps(const storage::TableStore& map, Content& content) {
   const auto take = [&](std::string_view, SubmapMessage message) {
     const SubmapId id = message.submap.id;
-    if (message.submap.cloud != nullptr) content.cloud_points[id] = message.submap.cloud->points.size();
-    message.submap.cloud.reset();
-    content.submaps[id] = std::make_shared<const Submap>(std::move(message.submap));
+    if (const PayloadSize size = payload_size(message.submap); size != PayloadSize()) content.payload_sizes[id] = size;
+    content.submaps[id] = std::make_shared<const Submap>(without_payloads(std::move(message.submap)));
   };
   return read_table(map, "submaps", wire::decode_submap, take, content);
 }

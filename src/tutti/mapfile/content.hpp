@@ -20,8 +20,8 @@ struct Content {
   node::MapMeta meta;
   server::ServerConfig settings;
   server::SubmapSet submaps;
-  std::map<SubmapId, std::size_t> cloud_points;  ///< Of submaps that have a cloud.
-  server::VerdictSet verdicts;                   ///< With their evidence.
+  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of submaps that carry any.
+  server::VerdictSet verdicts;                    ///< With their evidence.
   WordSet words;
   std::map<RobotId, std::string> names;
   std::map<std::uint32_t, std::size_t> refused;  ///< Pairs that were refused, by the version of their finder.

@@ -68,13 +68,14 @@ Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content
   ExportedCloud out;
   PointCloud joint;
   std::size_t thin_at = kThinAt;
-  for (const auto& [id, points] : content.cloud_points) {
+  for (const auto& [id, size] : content.payload_sizes) {
+    if (size.points == 0) continue;
     const auto T_world_submap = place(*content.submaps.at(id), map, component);
     if (!T_world_submap) {
       ++out.left_out;
       continue;
     }
-    const auto cloud = clouds->get(id);
+    const auto cloud = clouds->cloud(id);
     if (!cloud) return tl::unexpected(cloud.error());
     ++out.submaps;
     const Eigen::Isometry3d T(T_world_submap->matrix());

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -23,7 +24,7 @@ bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second)
 }
 
 Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Submap& second,
-                                                  const server::CloudStore& clouds) const {
+                                                  const server::PayloadStore& payloads) const {
   const auto features_a = features_of(first, clouds);
   if (!features_a) return tl::unexpected(features_a.error());
   const auto features_b = features_of(second, clouds);
@@ -39,9 +40,9 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
 }
 
 Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
-    const Submap& submap, const server::CloudStore& clouds) const {
+    const Submap& submap, const server::PayloadStore& payloads) const {
   return cache_.get(submap.id, [&]() -> Result<FeatureCache::Features> {
-    auto cloud = clouds.get(submap.id);
+    auto cloud = payloads.cloud(submap.id);
     if (!cloud) return tl::unexpected(cloud.error());
     Submap seen = submap;
     seen.cloud = std::move(*cloud);
@@ -120,6 +121,39 @@ std::shared_ptr<const server::ClosureFinder> make_reference_finder(const Closure
 }
 
 }  // namespace
+
+JointClosureFinder::JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders)
+    : finders_(std::move(finders)) {}
+
+std::uint32_t JointClosureFinder::version() const {
+  std::uint32_t sum = 0;
+  for (const auto& finder : finders_) sum += finder->version();
+  return sum;
+}
+
+bool JointClosureFinder::can_compare(const PayloadSize& first, const PayloadSize& second) const {
+  return std::ranges::any_of(finders_, [&](const auto& finder) { return finder->can_compare(first, second); });
+}
+
+bool JointClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
+  return std::ranges::any_of(finders_, [&](const auto& finder) { return finder->is_candidate(first, second); });
+}
+
+Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Submap& second,
+                                                  const server::PayloadStore& payloads) const {
+  ClosureVerdict out{.pair = {first.id, second.id}, .finder_version = version()};
+  for (const auto& finder : finders_) {
+    if (!finder->is_candidate(first, second)) continue;
+    auto verdict = finder->verify(first, second, payloads);
+    if (!verdict) return verdict;
+    std::ranges::move(verdict->closures, std::back_inserter(out.closures));
+    std::ranges::move(verdict->evidence, std::back_inserter(out.evidence));
+    // Of a submap without a payload of the kind it says no more than that.
+    if (!out.refusal || out.refusal->reason == RefusalReason::too_small) out.refusal = verdict->refusal;
+  }
+  if (!out.closures.empty()) out.refusal.reset();
+  return out;
+}
 
 std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
                                                                  const std::vector<MissionRecording>& recordings,

@@ -22,19 +22,36 @@ class LidarClosureFinder final : public server::ClosureFinder {
  public:
   LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
   [[nodiscard]] std::uint32_t version() const override;
-  [[nodiscard]] bool needs_clouds() const override { return true; }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return first.points > 0 && second.points > 0;
+  }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore& clouds) const override;
+                                              const server::PayloadStore& payloads) const override;
   [[nodiscard]] const FeatureCache& cache() const { return cache_; }
 
  private:
   [[nodiscard]] Result<std::shared_ptr<const lidar::SubmapFeatures>> features_of(
-      const Submap& submap, const server::CloudStore& clouds) const;
+      const Submap& submap, const server::PayloadStore& payloads) const;
 
   lidar::LidarClosureConfig config_;
   std::uint32_t min_submap_gap_;
   mutable FeatureCache cache_;
+};
+
+/// Several finders, one per kind of payload: a pair is compared by each that can. Mixed fleets meet through the robots
+/// that carry both kinds.
+class JointClosureFinder final : public server::ClosureFinder {
+ public:
+  explicit JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders);
+  [[nodiscard]] std::uint32_t version() const override;  ///< The sum: larger when any of them changes.
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override;
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::PayloadStore& payloads) const override;
+
+ private:
+  std::vector<std::shared_ptr<const server::ClosureFinder>> finders_;
 };
 
 /// A planted closure in terms of robots and stamps.
@@ -54,12 +71,12 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
   ReferenceClosureFinder(std::map<RobotId, Trajectory> reference, const simulation::ReferenceClosureConfig& config,
                          std::uint64_t seed, std::vector<PlantedClosure> planted = {});
   [[nodiscard]] std::uint32_t version() const override { return simulation::ReferenceClosures::kVersion; }
-  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return planted_in(first, second) || closures_.is_candidate(first, second);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore&) const override {
+                                              const server::PayloadStore&) const override {
     if (const auto planted = planted_in(first, second))
       return ClosureVerdict{{first.id, second.id}, {*planted}, std::nullopt, version()};
     return closures_.verify(first, second);

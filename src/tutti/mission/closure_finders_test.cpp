@@ -15,21 +15,24 @@ namespace tutti::mission {
 namespace {
 
 /// Counts how often each cloud is looked at: as often as features are computed.
-class CountingStore final : public server::CloudStore {
+class CountingStore final : public server::PayloadStore {
  public:
-  Status put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) override { return inner_.put(id, cloud); }
-  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override {
+  Status put(const Submap& submap) override { return inner_.put(submap); }
+  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> cloud(SubmapId id) const override {
     ++gets;
-    return inner_.get(id);
+    return inner_.cloud(id);
+  }
+  [[nodiscard]] Result<std::shared_ptr<const VisualPayload>> visual(SubmapId id) const override {
+    return inner_.visual(id);
   }
   mutable std::atomic<std::size_t> gets{0};
 
  private:
-  server::MemoryCloudStore inner_;
+  server::MemoryPayloadStore inner_;
 };
 
 /// A room with a cupboard, seen while walking through it; its size depends on the submap.
-Submap room(SubmapId id, server::CloudStore& store) {
+Submap room(SubmapId id, server::PayloadStore& store) {
   Rng rng(id.index % 3);
   const double length = 10.0 + id.index % 3, width = 7.0;
   auto cloud = std::make_shared<PointCloud>();
@@ -42,7 +45,7 @@ Submap room(SubmapId id, server::CloudStore& store) {
     if (face == 2) cloud->points.emplace_back(x, y, 1.0 + 3.0 * side);
     if (face == 3) cloud->points.emplace_back(2.0 + side, 1.0 + 0.3 * y, z);
   }
-  EXPECT_TRUE(store.put(id, cloud).has_value());
+  EXPECT_TRUE(store.put({.id = id, .cloud = cloud}).has_value());
   Submap submap{.id = id};
   for (std::uint32_t k = 0; k < 11; ++k) {
     submap.keyframes.push_back({k, {1'000'000'000LL * k}, {Eigen::Quaterniond::Identity(), {0.3 * k, 0.0, 0.0}}, true});

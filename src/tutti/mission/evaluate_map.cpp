@@ -54,8 +54,9 @@ std::optional<Pose3> place(const Submap& submap, const Trajectory& estimate) {
 
 /// What a submap saw, in its own frame: the only place that knows where clouds lie. Null when it saw nothing.
 std::shared_ptr<const PointCloud> cloud_of(const server::MapServer& server, SubmapId id, MissionRecord& record) {
-  if (!server.state().cloud_sizes.contains(id)) return nullptr;
-  auto cloud = server.clouds().get(id);
+  const auto size = server.state().payload_sizes.find(id);
+  if (size == server.state().payload_sizes.end() || size->second.points == 0) return nullptr;
+  auto cloud = server.payloads().cloud(id);
   if (cloud) return *cloud;
   record.notes.push_back("Missing in the map: " + cloud.error().message + ".");
   return nullptr;

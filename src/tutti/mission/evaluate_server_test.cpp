@@ -12,9 +12,10 @@ namespace {
 class NoClosures final : public server::ClosureFinder {
  public:
   [[nodiscard]] std::uint32_t version() const override { return 1; }
-  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return false; }
-  [[nodiscard]] Result<ClosureVerdict> verify(const Submap&, const Submap&, const server::CloudStore&) const override {
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap&, const Submap&,
+                                              const server::PayloadStore&) const override {
     return fail(ErrorCode::invalid, "not asked for");
   }
 };
@@ -46,7 +47,7 @@ class EvaluateServer : public ::testing::Test {
       outcomes.push_back(
           {&run.recording, "adaptive", {{"adaptive", &run.agent}}, run.recording.recording.odometry.size()});
     }
-    server::MapServer server(ids, std::make_shared<const NoClosures>(), std::make_shared<server::MemoryCloudStore>(),
+    server::MapServer server(ids, std::make_shared<const NoClosures>(), std::make_shared<server::MemoryPayloadStore>(),
                              server::ServerConfig{}, 1);
     for (const SubmapMessage& message : messages_) EXPECT_TRUE(server.receive(message));
     server.optimise();

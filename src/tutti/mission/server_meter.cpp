@@ -7,7 +7,7 @@
 namespace tutti::mission {
 
 Result<ClosureVerdict> MeasuredFinder::verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore& clouds) const {
+                                              const server::PayloadStore& payloads) const {
   double cpu_s = 0.0;
   Stopwatch watch;
   auto verdict = [&] {

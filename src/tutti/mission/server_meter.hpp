@@ -20,12 +20,14 @@ class MeasuredFinder final : public server::ClosureFinder {
  public:
   explicit MeasuredFinder(std::shared_ptr<const server::ClosureFinder> finder) : finder_(std::move(finder)) {}
   [[nodiscard]] std::uint32_t version() const override { return finder_->version(); }
-  [[nodiscard]] bool needs_clouds() const override { return finder_->needs_clouds(); }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return finder_->can_compare(first, second);
+  }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return finder_->is_candidate(first, second);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore& clouds) const override;
+                                              const server::PayloadStore& payloads) const override;
 
   [[nodiscard]] const std::vector<double>& took_ms() const { return took_ms_; }  ///< Not while it verifies.
   [[nodiscard]] double cpu_s() const { return cpu_s_; }

@@ -23,7 +23,7 @@ TEST(ServerMeter, MeasuresFromASubmapsArrivalToTheUpdateThatContainsIt) {
   meter.serve(3.0, [] { return stored("1/1"); });
   meter.serve(4.0, nothing);  // a duplicate
   meter.verify("1/1", [&] {
-    const server::MemoryCloudStore none;
+    const server::MemoryPayloadStore none;
     const Submap a = node::test::submap(RobotId{0}, 0).submap, b = node::test::submap(RobotId{0}, 1).submap;
     EXPECT_FALSE(meter.finder()->verify(a, b, none).has_value());
     return node::Step{};

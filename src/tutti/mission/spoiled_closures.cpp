@@ -56,7 +56,7 @@ bool SpoiledClosureFinder::is_candidate(const Submap& first, const Submap& secon
 }
 
 Result<ClosureVerdict> SpoiledClosureFinder::verify(const Submap& first, const Submap& second,
-                                                    const server::CloudStore& clouds) const {
+                                                    const server::PayloadStore& payloads) const {
   auto verdict = inner_->verify(first, second, clouds);
   if (!verdict) return verdict;
   const auto error = draw_error(verdict->pair, wrong_share_, config_, seed_);

@@ -30,10 +30,12 @@ class SpoiledClosureFinder final : public server::ClosureFinder {
   SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                        const SpoiledClosureConfig& config, std::uint64_t seed);
   [[nodiscard]] std::uint32_t version() const override { return inner_->version(); }
-  [[nodiscard]] bool needs_clouds() const override { return inner_->needs_clouds(); }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return inner_->can_compare(first, second);
+  }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore& clouds) const override;
+                                              const server::PayloadStore& payloads) const override;
 
  private:
   std::shared_ptr<const server::ClosureFinder> inner_;

@@ -27,10 +27,10 @@ Submap submap(std::uint32_t robot, std::uint32_t index) {
 class Perfect final : public server::ClosureFinder {
  public:
   [[nodiscard]] std::uint32_t version() const override { return 7; }
-  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore&) const override {
+                                              const server::PayloadStore&) const override {
     const Keyframe& a = first.keyframes[1];
     const Keyframe& b = second.keyframes[1];
     return ClosureVerdict{{first.id, second.id},
@@ -49,13 +49,13 @@ class Spoiled : public testing::Test {
     const SpoiledClosureFinder finder(std::make_shared<Perfect>(), 0.3, config_, seed);
     const Submap first = submap(0, i);
     const Submap second = submap(1, j);
-    const LoopClosure closure = finder.verify(first, second, clouds_)->closures.at(0);
+    const LoopClosure closure = finder.verify(first, second, payloads_)->closures.at(0);
     const Pose3 T_odom_claimed = first.keyframes[1].T_odom_body * closure.measurement.T_a_b;
     const Pose3& anchor = first.keyframes[i % 2 == 0 ? 2 : 0].T_odom_body;
     return anchor.inverse() * T_odom_claimed * second.keyframes[1].T_odom_body.inverse() * anchor;
   }
   SpoiledClosureConfig config_;
-  server::MemoryCloudStore clouds_;
+  server::MemoryPayloadStore payloads_;
 };
 
 TEST_F(Spoiled, TheShareIsWrongByWhatWasAskedFor) {
@@ -105,7 +105,7 @@ class Planted : public testing::Test {
         std::vector<PlantedClosure>{{RobotId{1}, Timestamp{} + 21.2, RobotId{0}, Timestamp{} + 4.9, error_}});
   }
   const Pose3 error_{so3_exp({0.0, 0.0, 0.1}), {1.5, -0.5, 0.0}};
-  server::MemoryCloudStore clouds_;
+  server::MemoryPayloadStore payloads_;
   std::shared_ptr<ReferenceClosureFinder> finder_;
 };
 
@@ -113,7 +113,7 @@ TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
   int found = 0;
   for (std::uint32_t i = 0; i < 20; ++i)
     for (std::uint32_t j = 0; j < 20; ++j) {
-      const auto verdict = finder_->verify(submap(0, i), submap(1, j), clouds_);
+      const auto verdict = finder_->verify(submap(0, i), submap(1, j), payloads_);
       EXPECT_EQ(finder_->is_candidate(submap(0, i), submap(1, j)), !verdict->closures.empty());
       EXPECT_EQ(verdict->refusal.has_value(), verdict->closures.empty());
       EXPECT_EQ(verdict->finder_version, simulation::ReferenceClosures::kVersion);
@@ -129,8 +129,8 @@ TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
 }
 
 TEST_F(Planted, TheOrderOfThePairOnlyInvertsTheClosure) {
-  const LoopClosure forth = finder_->verify(submap(0, 2), submap(1, 10), clouds_)->closures.at(0);
-  const LoopClosure back = finder_->verify(submap(1, 10), submap(0, 2), clouds_)->closures.at(0);
+  const LoopClosure forth = finder_->verify(submap(0, 2), submap(1, 10), payloads_)->closures.at(0);
+  const LoopClosure back = finder_->verify(submap(1, 10), submap(0, 2), payloads_)->closures.at(0);
   EXPECT_EQ(back.from, forth.to);
   EXPECT_EQ(back.to, forth.from);
   EXPECT_LT(local(back.measurement.T_a_b, forth.measurement.T_a_b.inverse()).norm(), 1e-9);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -31,5 +32,17 @@ struct Submap {
   std::shared_ptr<const PointCloud> cloud;  ///< Submap frame, voxel-downsampled; null or empty when no range sensor.
   std::shared_ptr<const VisualPayload> visual;  ///< Null when there is no camera.
 };
+
+/// How much a submap carries of each kind; what remains known of a submap whose payloads lie in a store.
+struct PayloadSize {
+  std::size_t points = 0;        ///< Of its cloud.
+  std::size_t observations = 0;  ///< Of its images.
+  friend bool operator==(const PayloadSize&, const PayloadSize&) = default;
+};
+
+PayloadSize payload_size(const Submap& submap);
+
+/// Its keyframes and odometry alone.
+Submap without_payloads(Submap submap);
 
 }  // namespace tutti

@@ -66,10 +66,8 @@ struct ServerNode::Opened {
 
 void ServerNode::Opened::add(SubmapMessage message) {
   const SubmapId id = message.submap.id;
-  if (message.submap.cloud != nullptr && !message.submap.cloud->points.empty())
-    state.cloud_sizes[id] = message.submap.cloud->points.size();
-  message.submap.cloud.reset();
-  state.submaps[id] = std::make_shared<const Submap>(std::move(message.submap));
+  if (const PayloadSize size = payload_size(message.submap); size != PayloadSize()) state.payload_sizes[id] = size;
+  state.submaps[id] = std::make_shared<const Submap>(without_payloads(std::move(message.submap)));
   state.answered.add_submap(id);
   Receipt& receipt = receipts[id.chain.robot];
   receipt.robot = id.chain.robot;

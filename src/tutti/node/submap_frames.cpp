@@ -53,19 +53,23 @@ Result<std::shared_ptr<const Submap>> SubmapFrames::submap(SubmapId id) const {
   }
   auto decoded = decode(id);
   if (!decoded) return tl::unexpected(decoded.error());
-  decoded->cloud.reset();
-  const auto submap = std::make_shared<const Submap>(std::move(*decoded));
+  const auto submap = std::make_shared<const Submap>(without_payloads(std::move(*decoded)));
   const std::scoped_lock lock(mutex_);
   if (kept_.size() >= kMostKept) kept_.clear();
   kept_.insert_or_assign(id, submap);
   return submap;
 }
 
-Result<std::shared_ptr<const PointCloud>> SubmapFrames::get(SubmapId id) const {
+Result<std::shared_ptr<const PointCloud>> SubmapFrames::cloud(SubmapId id) const {
   auto decoded = decode(id);
   if (!decoded) return tl::unexpected(decoded.error());
-  if (decoded->cloud == nullptr) return fail(ErrorCode::invalid, "submap {} has no cloud", to_string(id));
   return std::move(decoded->cloud);
+}
+
+Result<std::shared_ptr<const VisualPayload>> SubmapFrames::visual(SubmapId id) const {
+  auto decoded = decode(id);
+  if (!decoded) return tl::unexpected(decoded.error());
+  return std::move(decoded->visual);
 }
 
 }  // namespace tutti::node

@@ -11,21 +11,21 @@
 #include <utility>
 
 #include "tutti/model/submap.hpp"
-#include "tutti/server/cloud_store.hpp"
+#include "tutti/server/payload_store.hpp"
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::node {
 
-/// Submaps and their clouds, decoded when they are asked for from the frames in which they came, so that no memory
+/// Submaps and their payloads, decoded when they are asked for from the frames in which they came, so that no memory
 /// grows with what robots saw. May be called from several threads.
-class SubmapFrames final : public server::CloudStore {
+class SubmapFrames final : public server::PayloadStore {
  public:
   using Fetch = std::function<Result<std::string>(SubmapId)>;
   explicit SubmapFrames(Fetch fetch) : fetch_(std::move(fetch)) {}
   /// Those in the table `submaps` of a map's store, which must outlive this.
   static std::shared_ptr<SubmapFrames> of(const storage::TableStore& map);
 
-  /// Never null, without its cloud. The last kMostKept need not be decoded again.
+  /// Never null, without its payloads. The last kMostKept need not be decoded again.
   [[nodiscard]] Result<std::shared_ptr<const Submap>> submap(SubmapId id) const;
   static constexpr std::size_t kMostKept = 4000;
 
@@ -33,8 +33,9 @@ class SubmapFrames final : public server::CloudStore {
   [[nodiscard]] Result<std::string> frame(SubmapId id) const { return fetch_(id); }
 
   /// Nothing to do: a submap's frame is stored with the step that takes it.
-  Status put(SubmapId, const std::shared_ptr<const PointCloud>&) override { return {}; }
-  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override;
+  Status put(const Submap&) override { return {}; }
+  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> cloud(SubmapId id) const override;
+  [[nodiscard]] Result<std::shared_ptr<const VisualPayload>> visual(SubmapId id) const override;
 
  private:
   [[nodiscard]] Result<Submap> decode(SubmapId id) const;

@@ -6,13 +6,13 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/submap.hpp"
-#include "tutti/server/cloud_store.hpp"
+#include "tutti/server/payload_store.hpp"
 
 namespace tutti::server {
 
 /// How loop closures are found: from scans, images, or a reference. Injected, so the server never knows the sensor (or
 /// the simulator). Both calls depend on the two submaps alone, never on the map or on the order of calls, may be called
-/// from several threads at once, and get the submaps in the order of their ids and without their clouds.
+/// from several threads at once, and get the submaps in the order of their ids and without their payloads.
 class ClosureFinder {
  public:
   virtual ~ClosureFinder() = default;
@@ -22,14 +22,14 @@ class ClosureFinder {
   /// with smaller numbers asks every pair again, and keeps the old closures until they are answered. Nothing notices a
   /// change that leaves it as it was. A finder that takes another's place has a larger number than it had. At least 1.
   [[nodiscard]] virtual std::uint32_t version() const = 0;
-  /// Does verify() look at clouds? Then submaps that have none are in no pair.
-  [[nodiscard]] virtual bool needs_clouds() const = 0;
+  /// Do submaps that carry so much have what verify() looks at? Else they are no pair.
+  [[nodiscard]] virtual bool can_compare(const PayloadSize& first, const PayloadSize& second) const = 0;
   /// Cheap: is the pair worth a verification?
   [[nodiscard]] virtual bool is_candidate(const Submap& first, const Submap& second) const = 0;
-  /// Expensive: runs in a worker. What it needs of the clouds it gets from the store, when it needs it. An error, never
-  /// a verdict, when a cloud cannot be read: the pair may be verified another time.
+  /// Expensive: runs in a worker. What it needs of the payloads it gets from the store, when it needs it. An error,
+  /// never a verdict, when one cannot be read: the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                                      const CloudStore& clouds) const = 0;
+                                                      const PayloadStore& payloads) const = 0;
 };
 
 }  // namespace tutti::server

@@ -26,7 +26,7 @@ Inputs make_inputs(const TestFinder& finder, std::uint64_t seed) {
   for (auto a = in.submaps.begin(); a != in.submaps.end(); ++a)
     for (auto b = std::next(a); b != in.submaps.end(); ++b)
       if (finder.is_candidate(*a->second, *b->second))
-        in.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+        in.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
   return in;
 }
 
@@ -141,19 +141,20 @@ class WordsToAServer : public testing::Test {
       if (verdict.closures.front() == refused_) pair_ = pair;
   }
   static MapServer make(std::shared_ptr<const ClosureFinder> finder, MapServerState state = {}) {
-    return {{RobotId{0}, RobotId{1}}, std::move(finder), std::make_shared<MemoryCloudStore>(), {}, 1, std::move(state)};
+    return {{RobotId{0}, RobotId{1}}, std::move(finder), std::make_shared<MemoryPayloadStore>(), {}, 1,
+            std::move(state)};
   }
   static void answer(MapServer& server, const ClosureFinder& finder) {
     for (const VerificationJob& job : server.take_jobs())
-      EXPECT_TRUE(server.receive(*finder.verify(*job.first, *job.second, MemoryCloudStore())).has_value());
+      EXPECT_TRUE(server.receive(*finder.verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
   }
   /// Nothing is found anywhere, says a newer version.
   class Newer final : public ClosureFinder {
    public:
     [[nodiscard]] std::uint32_t version() const override { return 2; }
-    [[nodiscard]] bool needs_clouds() const override { return false; }
+    [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
     [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
-    [[nodiscard]] Result<ClosureVerdict> verify(const Submap& a, const Submap& b, const CloudStore&) const override {
+    [[nodiscard]] Result<ClosureVerdict> verify(const Submap& a, const Submap& b, const PayloadStore&) const override {
       return ClosureVerdict{{a.id, b.id}, {}, Refusal{RefusalReason::overlap, 0.1, 0.3}, 2};
     }
   };
@@ -197,9 +198,9 @@ TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverNewerFindersSay) {
   const auto jobs = server.take_jobs();
   EXPECT_TRUE(std::ranges::none_of(jobs, [&](const VerificationJob& job) { return job.pair == pair_; }));
   for (const VerificationJob& job : jobs)
-    ASSERT_TRUE(server.receive(*newer->verify(*job.first, *job.second, MemoryCloudStore())).has_value());
+    ASSERT_TRUE(server.receive(*newer->verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
   const auto late = newer->verify(*server.state().submaps.at(pair_.first), *server.state().submaps.at(pair_.second),
-                                  MemoryCloudStore());
+                                  MemoryPayloadStore());
   ASSERT_TRUE(server.receive(*late).has_value());
   server.optimise();
   ASSERT_EQ(server.map().closures.size(), 1U);

@@ -22,7 +22,7 @@ VerdictSet verdicts_of(const SubmapSet& submaps, const test::TestFinder& finder)
   for (auto a = submaps.begin(); a != submaps.end(); ++a)
     for (auto b = std::next(a); b != submaps.end(); ++b)
       if (finder.is_candidate(*a->second, *b->second))
-        out[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+        out[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
   return out;
 }
 

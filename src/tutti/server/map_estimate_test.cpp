@@ -29,7 +29,7 @@ Inputs make_inputs(std::uint32_t robots, const TestFinder& finder, std::uint64_t
   for (auto a = in.submaps.begin(); a != in.submaps.end(); ++a)
     for (auto b = std::next(a); b != in.submaps.end(); ++b)
       if (finder.is_candidate(*a->second, *b->second))
-        in.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+        in.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
   return in;
 }
 

@@ -105,18 +105,18 @@ bool holds_over(const ClosureVerdict& a, const ClosureVerdict& b) {
 }  // namespace
 
 MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
-                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config, std::uint64_t epoch)
-    : MapServer(std::move(robots), std::move(finder), std::move(clouds), config, epoch, MapServerState{}) {}
+                     std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch)
+    : MapServer(std::move(robots), std::move(finder), std::move(payloads), config, epoch, MapServerState{}) {}
 
 MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
-                     std::shared_ptr<CloudStore> clouds, const ServerConfig& config, std::uint64_t epoch,
+                     std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
                      MapServerState state)
     : robots_(std::move(robots)),
       finder_(std::move(finder)),
-      clouds_(std::move(clouds)),
+      payloads_(std::move(payloads)),
       config_(config),
       state_(std::move(state)) {
-  TUTTI_CHECK(finder_ != nullptr && clouds_ != nullptr, "no finder or no store of clouds");
+  TUTTI_CHECK(finder_ != nullptr && payloads_ != nullptr, "no finder or no store of payloads");
   TUTTI_CHECK(finder_->version() > 0, "a finder without a version");
   state_.epoch = std::max(epoch, state_.epoch + 1);
   if (state_.finder_version < finder_->version()) {
@@ -140,19 +140,16 @@ Status MapServer::receive(const SubmapMessage& message) {
                 to_string(id), message.header.robot.value, message.header.session, robots_.size());
   if (auto ok = check_submap(message.submap); !ok) return ok;
   if (const auto known = state_.submaps.find(id); known != state_.submaps.end()) {
-    if (known->second->keyframes == message.submap.keyframes) return replace_lost_cloud(message.submap);
+    if (known->second->keyframes == message.submap.keyframes) return replace_lost_payload(message.submap);
     return fail(ErrorCode::invalid, "submap {} differs from the one in the map: robot {} has used session {} before",
                 to_string(id), id.chain.robot.value, id.chain.session);
   }
   if (auto ok = check_room_for(id.chain); !ok) return ok;
-  const std::shared_ptr<const PointCloud>& cloud = message.submap.cloud;
-  if (cloud != nullptr && !cloud->points.empty()) {
-    if (auto ok = clouds_->put(id, cloud); !ok) return ok;
-    state_.cloud_sizes[id] = cloud->points.size();
+  if (const PayloadSize size = payload_size(message.submap); size != PayloadSize()) {
+    if (auto ok = payloads_->put(message.submap); !ok) return ok;
+    state_.payload_sizes[id] = size;
   }
-  Submap submap = message.submap;
-  submap.cloud.reset();
-  state_.submaps[id] = std::make_shared<const Submap>(std::move(submap));
+  state_.submaps[id] = std::make_shared<const Submap>(without_payloads(message.submap));
   state_.answered.add_submap(id);
   judge_waiting();
   for (const auto& [other, there] : state_.submaps)
@@ -176,23 +173,25 @@ Status MapServer::check_room_for(const ChainId& chain) const {
               chain.robot.value, chain.session, others, most);
 }
 
-Status MapServer::replace_lost_cloud(const Submap& duplicate) {
-  const auto size = state_.cloud_sizes.find(duplicate.id);
-  if (size == state_.cloud_sizes.end() || duplicate.cloud == nullptr ||
-      duplicate.cloud->points.size() != size->second || clouds_->get(duplicate.id))
-    return {};
-  return clouds_->put(duplicate.id, duplicate.cloud);
+Status MapServer::replace_lost_payload(const Submap& duplicate) {
+  const PayloadSize size = size_of(duplicate.id);
+  if (size == PayloadSize() || payload_size(duplicate) != size) return {};
+  const bool is_there = (size.points == 0 || payloads_->cloud(duplicate.id)) &&
+                        (size.observations == 0 || payloads_->visual(duplicate.id));
+  return is_there ? Status() : payloads_->put(duplicate);
 }
 
-bool MapServer::may_be_verified(SubmapId id) const {
-  return !finder_->needs_clouds() || state_.cloud_sizes.contains(id);
+PayloadSize MapServer::size_of(SubmapId id) const {
+  const auto found = state_.payload_sizes.find(id);
+  return found == state_.payload_sizes.end() ? PayloadSize() : found->second;
 }
 
 bool MapServer::is_asked(const SubmapPair& pair) const {
   const auto first = state_.submaps.find(pair.first);
   const auto second = state_.submaps.find(pair.second);
-  return first != state_.submaps.end() && second != state_.submaps.end() && may_be_verified(pair.first) &&
-         may_be_verified(pair.second) && finder_->is_candidate(*first->second, *second->second);
+  return first != state_.submaps.end() && second != state_.submaps.end() &&
+         finder_->can_compare(size_of(pair.first), size_of(pair.second)) &&
+         finder_->is_candidate(*first->second, *second->second);
 }
 
 std::optional<std::uint32_t> MapServer::answered_by(const SubmapPair& pair) const {

@@ -16,8 +16,8 @@
 #include "tutti/model/messages.hpp"
 #include "tutti/server/answered_pairs.hpp"
 #include "tutti/server/closure_finder.hpp"
-#include "tutti/server/cloud_store.hpp"
 #include "tutti/server/map_estimate.hpp"
+#include "tutti/server/payload_store.hpp"
 #include "tutti/server/refusal_counts.hpp"
 
 namespace tutti::server {
@@ -39,19 +39,19 @@ struct ServerConfig {
   }
 };
 
-/// Heavy work that leaves the server as a message; ClosureFinder::verify(*first, *second, clouds) answers it, anywhere
-/// that the clouds can be got at.
+/// Heavy work that leaves the server as a message; ClosureFinder::verify(*first, *second, payloads) answers it,
+/// anywhere that the payloads can be got at.
 struct VerificationJob {
   SubmapPair pair;
   std::shared_ptr<const Submap> first;
   std::shared_ptr<const Submap> second;
 };
 
-/// The server's whole state, by value, but for the clouds, which lie in its store: kill it, restore it with the same
+/// The server's whole state, by value, but for the payloads, which lie in its store: kill it, restore it with the same
 /// store, and it goes on with the same map.
 struct MapServerState {
-  SubmapSet submaps;                            ///< Without their clouds.
-  std::map<SubmapId, std::size_t> cloud_sizes;  ///< Points of each submap's cloud; of those that have one.
+  SubmapSet submaps;                              ///< Without their payloads.
+  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of those that carry any.
   /// Those with closures. Refusals are only counted: a pair that is answered and not among these is refused by
   /// `finder_version`. Refusals by other versions, which are few, stand here too.
   VerdictSet verdicts;
@@ -68,13 +68,14 @@ class MapServer {
  public:
   /// Whoever starts it gives the epoch: larger than at any start before, as the time of the start is. Robots drop what
   /// an earlier epoch broadcast as late.
-  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
-            const ServerConfig& config, std::uint64_t epoch);
+  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+            std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch);
   /// Goes on from a saved state; verifications that had no verdict yet become jobs again. All of them when the finder
   /// is newer than the state's: what older ones found stays in the map until it is answered. The epoch becomes larger
   /// than the saved one if it is not; only the starter's number tells two starts from one saved state apart.
-  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder, std::shared_ptr<CloudStore> clouds,
-            const ServerConfig& config, std::uint64_t epoch, MapServerState state);
+  MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
+            std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
+            MapServerState state);
 
   /// One more that submaps may come from. Each has the less room for sessions, the more there are.
   void add_robot(RobotId robot) { robots_.insert(robot); }
@@ -114,13 +115,13 @@ class MapServer {
   /// Pairs by the reason they were refused for. One that a newer finder than the server's has refused again counts
   /// twice.
   [[nodiscard]] RefusalCounts refusals() const;
-  [[nodiscard]] const CloudStore& clouds() const { return *clouds_; }
+  [[nodiscard]] const PayloadStore& payloads() const { return *payloads_; }
 
  private:
   [[nodiscard]] Status check_room_for(const ChainId& chain) const;
   /// If it is the cloud that was there.
-  Status replace_lost_cloud(const Submap& duplicate);
-  [[nodiscard]] bool may_be_verified(SubmapId id) const;
+  Status replace_lost_payload(const Submap& duplicate);
+  [[nodiscard]] PayloadSize size_of(SubmapId id) const;
   /// Both submaps are there and the finder wants the pair.
   [[nodiscard]] bool is_asked(const SubmapPair& pair) const;
   /// The version of the finder whose answer holds, if there is one.
@@ -135,7 +136,7 @@ class MapServer {
 
   std::set<RobotId> robots_;
   std::shared_ptr<const ClosureFinder> finder_;
-  std::shared_ptr<CloudStore> clouds_;
+  std::shared_ptr<PayloadStore> payloads_;
   ServerConfig config_;
   MapServerState state_;
   std::vector<VerificationJob> jobs_;

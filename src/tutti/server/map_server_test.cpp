@@ -19,7 +19,7 @@ SubmapMessage message_of(const Submap& submap) {
 }
 
 void do_job(MapServer& server, const ClosureFinder& finder, const VerificationJob& job) {
-  const auto verdict = finder.verify(*job.first, *job.second, server.clouds());
+  const auto verdict = finder.verify(*job.first, *job.second, server.payloads());
   ASSERT_TRUE(verdict.has_value()) << verdict.error().message;
   ASSERT_TRUE(server.receive(*verdict).has_value());
 }
@@ -28,7 +28,7 @@ void do_jobs(MapServer& server, const ClosureFinder& finder) {
   for (const VerificationJob& job : server.take_jobs()) do_job(server, finder, job);
 }
 
-std::shared_ptr<CloudStore> some_store() { return std::make_shared<MemoryCloudStore>(); }
+std::shared_ptr<PayloadStore> some_store() { return std::make_shared<MemoryPayloadStore>(); }
 
 MapServer filled_server(const std::shared_ptr<const TestFinder>& finder) {
   MapServer server(kRobots, finder, some_store(), {}, 1);
@@ -224,15 +224,17 @@ TEST(MapServer, WithTwoSessionsTheMapIsAFunctionOfTheSet) {
 class CloudReader final : public ClosureFinder {
  public:
   [[nodiscard]] std::uint32_t version() const override { return 1; }
-  [[nodiscard]] bool needs_clouds() const override { return true; }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return first.points > 0 && second.points > 0;
+  }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return first.cloud == nullptr && second.cloud == nullptr;  // as promised
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const CloudStore& clouds) const override {
+                                              const PayloadStore& payloads) const override {
     double seen = 0.0;
     for (const SubmapId id : {first.id, second.id}) {
-      const auto cloud = clouds.get(id);
+      const auto cloud = payloads.cloud(id);
       if (!cloud) return tl::unexpected(cloud.error());
       EXPECT_EQ((*cloud)->points.front().x(), static_cast<float>((*cloud)->points.size()));
       seen = 10.0 * seen + static_cast<double>((*cloud)->points.size());
@@ -242,24 +244,27 @@ class CloudReader final : public ClosureFinder {
 };
 
 /// Forgets what it is told to, and cannot keep what it is told not to.
-class BrokenStore final : public CloudStore {
+class BrokenStore final : public PayloadStore {
  public:
-  Status put(SubmapId id, const std::shared_ptr<const PointCloud>& cloud) override {
+  Status put(const Submap& submap) override {
     if (is_full) return fail(ErrorCode::io, "disk full");
     ++puts;
-    lost.erase(id);
-    return inner_.put(id, cloud);
+    lost.erase(submap.id);
+    return inner_.put(submap);
   }
-  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> get(SubmapId id) const override {
+  [[nodiscard]] Result<std::shared_ptr<const PointCloud>> cloud(SubmapId id) const override {
     if (lost.contains(id)) return fail(ErrorCode::io, "cloud of submap {}/{} is lost", id.chain.robot.value, id.index);
-    return inner_.get(id);
+    return inner_.cloud(id);
+  }
+  [[nodiscard]] Result<std::shared_ptr<const VisualPayload>> visual(SubmapId id) const override {
+    return inner_.visual(id);
   }
   bool is_full = false;
   std::size_t puts = 0;
   std::set<SubmapId> lost;
 
  private:
-  MemoryCloudStore inner_;
+  MemoryPayloadStore inner_;
 };
 
 /// Of robot 0; the odd ones have clouds.
@@ -282,8 +287,8 @@ TEST(MapServer, KeepsCloudsInTheStoreOnlyAndHandsThemToTheFinder) {
   MapServer server(kRobots, finder, store, {}, 1);
   for (const SubmapMessage& message : submaps_with_some_clouds()) ASSERT_TRUE(server.receive(message).has_value());
   for (const auto& [id, submap] : server.state().submaps) EXPECT_EQ(submap->cloud, nullptr);
-  EXPECT_EQ(server.state().cloud_sizes.size(), 4U);  // of submaps 1, 3, 5, 7 of 0 ... 8
-  EXPECT_EQ(server.state().cloud_sizes.at({RobotId{0}, 5}), 5U);
+  EXPECT_EQ(server.state().payload_sizes.size(), 4U);  // of submaps 1, 3, 5, 7 of 0 ... 8
+  EXPECT_EQ(server.state().payload_sizes.at({RobotId{0}, 5}).points, 5U);
 
   const auto jobs = server.take_jobs();
   EXPECT_EQ(jobs.size(), 4U * 3U / 2U);
@@ -309,7 +314,7 @@ TEST(MapServer, ACloudThatIsLostOrCannotBeKeptCostsNothingElse) {
   store->lost = {{RobotId{0}, 3}};
   std::size_t failures = 0;
   for (const VerificationJob& job : server.take_jobs()) {
-    const auto verdict = finder->verify(*job.first, *job.second, server.clouds());
+    const auto verdict = finder->verify(*job.first, *job.second, server.payloads());
     failures += verdict ? 0 : 1;
     if (!verdict) continue;
     EXPECT_TRUE(server.receive(*verdict).has_value());

@@ -26,7 +26,7 @@ Room one_room(std::uint32_t submaps) {
   for (auto a = out.submaps.begin(); a != out.submaps.end(); ++a)
     for (auto b = std::next(a); b != out.submaps.end(); ++b)
       if (a->first.chain != b->first.chain || b->first.index > a->first.index + 1)
-        out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+        out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
   return out;
 }
 

@@ -24,12 +24,12 @@ class Refuser final : public ClosureFinder {
  public:
   explicit Refuser(std::uint32_t version = 1) : version_(version) {}
   [[nodiscard]] std::uint32_t version() const override { return version_; }
-  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return first.id.chain != second.id.chain || second.id.index - first.id.index > 1;
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const CloudStore&) const override {
+                                              const PayloadStore&) const override {
     return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::overlap, 0.1, 0.3}, version_};
   }
 
@@ -38,7 +38,7 @@ class Refuser final : public ClosureFinder {
 };
 
 MapServer make_server(std::shared_ptr<const ClosureFinder> finder, MapServerState state = {}) {
-  return {kRobots, std::move(finder), std::make_shared<MemoryCloudStore>(), {}, 1, std::move(state)};
+  return {kRobots, std::move(finder), std::make_shared<MemoryPayloadStore>(), {}, 1, std::move(state)};
 }
 
 /// Two keyframes a submap, the second that of the next one.
@@ -56,7 +56,7 @@ void send_small_submaps(MapServer& server, std::uint32_t from, std::uint32_t unt
 }
 
 ClosureVerdict answer(const ClosureFinder& finder, const VerificationJob& job) {
-  return *finder.verify(*job.first, *job.second, MemoryCloudStore());
+  return *finder.verify(*job.first, *job.second, MemoryPayloadStore());
 }
 
 std::set<SubmapPair> pairs_of(const std::vector<VerificationJob>& jobs) {

@@ -60,7 +60,7 @@ World wild_world(std::uint64_t seed) {
   for (auto a = out.submaps.begin(); a != out.submaps.end(); ++a)
     for (auto b = std::next(a); b != out.submaps.end(); ++b)
       if (finder.is_candidate(*a->second, *b->second))
-        out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryCloudStore());
+        out.verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
   return out;
 }
 

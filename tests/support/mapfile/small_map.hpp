@@ -23,12 +23,12 @@ namespace tutti::mapfile::test {
 class ExplainingFinder final : public server::ClosureFinder {
  public:
   [[nodiscard]] std::uint32_t version() const override { return finder_.version(); }
-  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return finder_.is_candidate(first, second);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore& clouds) const override {
+                                              const server::PayloadStore& payloads) const override {
     auto verdict = finder_.verify(first, second, clouds);
     verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
     return verdict;

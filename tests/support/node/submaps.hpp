@@ -39,12 +39,14 @@ inline bus::Envelope envelope(const SubmapMessage& message) {
 class EvenFinder final : public server::ClosureFinder {
  public:
   [[nodiscard]] std::uint32_t version() const override { return 3; }
-  [[nodiscard]] bool needs_clouds() const override { return true; }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return first.points > 0 && second.points > 0;
+  }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const server::CloudStore& clouds) const override {
+                                              const server::PayloadStore& payloads) const override {
     for (const Submap* submap : {&first, &second})
-      if (const auto cloud = clouds.get(submap->id); !cloud) return tl::unexpected(cloud.error());
+      if (const auto cloud = payloads.cloud(submap->id); !cloud) return tl::unexpected(cloud.error());
     ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder_version = version()};
     if (first.id.index % 2 == 0 && second.id.index % 2 == 0)
       verdict.closures.push_back({{first.id.chain, first.keyframes.front().index},

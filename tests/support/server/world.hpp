@@ -73,14 +73,14 @@ class TestFinder final : public ClosureFinder {
       : seed_(seed), wrong_every_(wrong_every), version_(version) {}
 
   [[nodiscard]] std::uint32_t version() const override { return version_; }
-  [[nodiscard]] bool needs_clouds() const override { return false; }
+  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     if (first.id.chain == second.id.chain && second.id.index - first.id.index < 3) return false;
     const auto [a, b] = middles(first, second);
     return (true_pose(a.chain.robot, a.index).translation - true_pose(b.chain.robot, b.index).translation).norm() < 4.0;
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
-                                              const CloudStore&) const override {
+                                              const PayloadStore&) const override {
     const auto [a, b] = middles(first, second);
     const std::uint64_t key = (std::uint64_t{first.id.chain.robot.value} << 48U) ^
                               (std::uint64_t{first.id.index} << 32U) ^
