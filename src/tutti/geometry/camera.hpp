@@ -38,7 +38,7 @@ std::optional<Eigen::Vector2d> project(const CameraModel& camera, const Eigen::V
 /// The unit direction that a pixel sees, in the camera frame: the inverse of project(); nothing where there is none.
 std::optional<Eigen::Vector3d> unproject(const CameraModel& camera, const Eigen::Vector2d& pixel);
 
-/// Is the pixel in the image, at least `border_px` from its edge?
+/// Is the pixel in the image, at least `border_px` from its edge? The edge is half a pixel outside the outer centres.
 bool in_image(const CameraModel& camera, const Eigen::Vector2d& pixel, double border_px = 0.0);
 
 }  // namespace tutti
