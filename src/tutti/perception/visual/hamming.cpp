@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/perception/visual/hamming.hpp"
+
+#include <bit>
+#include <cstddef>
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::visual {
+namespace {
+
+/// Words is the number of words where it is known when this is compiled, otherwise 0.
+template <std::uint32_t Words>
+[[gnu::always_inline]] inline void distances_to_rows(const std::uint64_t* query, const std::uint64_t* rows,
+                                                     std::uint32_t words, std::span<std::uint16_t> out) {
+  const std::uint32_t n = Words == 0 ? words : Words;
+  for (std::size_t i = 0; i < out.size(); ++i, rows += n) {
+    int bits = 0;
+    for (std::uint32_t w = 0; w < n; ++w) bits += std::popcount(query[w] ^ rows[w]);
+    out[i] = static_cast<std::uint16_t>(bits);
+  }
+}
+
+[[gnu::always_inline]] inline void distances_to_all(const std::uint64_t* query, const Descriptors& rows,
+                                                    std::span<std::uint16_t> out) {
+  switch (rows.words) {
+    case 4:
+      return distances_to_rows<4>(query, rows.bits.data(), 4, out);
+    case 6:
+      return distances_to_rows<6>(query, rows.bits.data(), 6, out);
+    case 8:
+      return distances_to_rows<8>(query, rows.bits.data(), 8, out);
+    default:
+      return distances_to_rows<0>(query, rows.bits.data(), rows.words, out);
+  }
+}
+
+#ifdef __x86_64__
+[[gnu::target("popcnt")]] void with_popcnt(const std::uint64_t* query, const Descriptors& rows,
+                                           std::span<std::uint16_t> out) {
+  distances_to_all(query, rows, out);
+}
+bool has_popcnt() {
+  static const bool has = __builtin_cpu_supports("popcnt") != 0;
+  return has;
+}
+#endif
+
+}  // namespace
+
+std::uint32_t hamming_distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b) {
+  TUTTI_CHECK(a.size() == b.size(), "descriptors of {} and {} words", a.size(), b.size());
+  int bits = 0;
+  for (std::size_t w = 0; w < a.size(); ++w) bits += std::popcount(a[w] ^ b[w]);
+  return static_cast<std::uint32_t>(bits);
+}
+
+void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& rows,
+                       std::span<std::uint16_t> distances) {
+  TUTTI_CHECK(query.size() == rows.words && distances.size() == rows.size(),
+              "{} words against rows of {}, {} distances of {} rows", query.size(), rows.words, distances.size(),
+              rows.size());
+#ifdef __x86_64__
+  if (has_popcnt()) return with_popcnt(query.data(), rows, distances);
+#endif
+  distances_to_all(query.data(), rows, distances);
+}
+
+TwoNearest two_nearest(std::span<const std::uint16_t> distances, std::span<const std::uint32_t> groups) {
+  TUTTI_CHECK(groups.empty() || groups.size() == distances.size());
+  const auto same_group = [&](std::uint32_t i, std::uint32_t j) {
+    return j != kNoIndex && !groups.empty() && groups[i] == groups[j];
+  };
+  TwoNearest out;
+  for (std::uint32_t i = 0; i < distances.size(); ++i) {
+    const std::uint32_t d = distances[i];
+    if (d >= out.second_distance) continue;
+    if (d < out.distance) {
+      if (!same_group(i, out.nearest)) {
+        out.second = out.nearest;
+        out.second_distance = out.distance;
+      }
+      out.nearest = i;
+      out.distance = d;
+    } else if (!same_group(i, out.nearest)) {
+      out.second = i;
+      out.second_distance = d;
+    }
+  }
+  return out;
+}
+
+}  // namespace tutti::visual
