@@ -142,6 +142,16 @@ Result<std::int64_t> LineReader::integer(std::size_t column, std::string_view wh
               shown(columns_[column]));
 }
 
+Result<Timestamp> LineReader::next_stamp(Timestamp last) const {
+  const auto ns = integer(0, "stamp");
+  if (!ns) return tl::unexpected(ns.error());
+  if (!is_in_range({*ns})) return fail(ErrorCode::invalid, "stamp is {} ns, expected at most 2^61 either way", *ns);
+  if (Timestamp{*ns} <= last)
+    return fail(ErrorCode::invalid, "stamp {} ns does not come after the previous {} ns, expected increasing stamps",
+                *ns, last.ns);
+  return Timestamp{*ns};
+}
+
 Result<Eigen::Quaterniond> to_unit(const LineReader& where, const Eigen::Quaterniond& q) {
   constexpr double kRounding = 1e-14;  // of a normalised quaternion's squared norm
   if (std::abs(q.squaredNorm() - 1.0) <= kRounding) return q;

@@ -59,6 +59,8 @@ class LineReader {
   /// Fills `out` from the columns that start at `first` (they must exist); every number must be finite.
   [[nodiscard]] Status numbers(std::size_t first, std::span<double> out) const;
   [[nodiscard]] Result<std::int64_t> integer(std::size_t column, std::string_view what) const;
+  /// Nanoseconds in the first column, within range and after `last`.
+  [[nodiscard]] Result<Timestamp> next_stamp(Timestamp last) const;
 
  private:
   static constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // of UTF-8

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/model/visual.hpp"
+
+/// Which image files a recording has and when they were taken; no pixel is read. Errors name file, line and value.
+namespace tutti::formats {
+
+struct ImageFile {
+  Timestamp stamp;  ///< By the body's clock: the camera's time offset is in it.
+  std::string path;
+};
+
+/// The images of one camera, by increasing stamps.
+struct CameraImages {
+  Camera camera;
+  std::vector<ImageFile> images;
+};
+
+/// A calibrated camera and its clock.
+struct CameraCalibration {
+  Camera camera;
+  double time_offset_s = 0.0;  ///< Added to its images' stamps gives the body's time (Kalibr's timeshift_cam_imu).
+};
+
+/// Our own calibration file: a list `cameras` of `model` (pinhole, equidistant, double_sphere), `width_px`,
+/// `height_px`, `intrinsics` [fx, fy, cx, cy], `distortion` (four numbers, as geometry/camera.hpp orders them; two for
+/// the double sphere; none for none), `T_body_camera` (4 x 4, row by row) and `time_offset_s`.
+Result<std::vector<CameraCalibration>> read_cameras(const std::string& path);
+
+/// Images listed in a csv `stamp[ns],file of camera 0,file of camera 1,...`, files relative to `folder`; an empty cell:
+/// this camera took none then.
+Result<std::vector<CameraImages>> read_image_list(const std::string& list, const std::string& folder,
+                                                  const std::vector<CameraCalibration>& cameras);
+
+/// A recording in the layout of EuRoC MAV ("ASL"): mav0/cam0, cam1, ... and mav0/imu0.
+struct EurocFolder {
+  std::vector<CameraImages> cameras;
+  std::vector<ImuSample> imu;  ///< Empty when the folder has no imu0.
+  ImuNoise imu_noise;
+};
+
+/// `folder` is mav0 or holds it. The body is the IMU: imu0's T_BS must be the identity.
+Result<EurocFolder> read_euroc_folder(const std::string& folder);
+
+}  // namespace tutti::formats
