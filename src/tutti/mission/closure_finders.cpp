@@ -10,6 +10,7 @@
 #include "tutti/geometry/so3.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/verify.hpp"
+#include "tutti/perception/visual/verify.hpp"
 
 namespace tutti::mission {
 
@@ -25,9 +26,9 @@ bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second)
 
 Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Submap& second,
                                                   const server::PayloadStore& payloads) const {
-  const auto features_a = features_of(first, clouds);
+  const auto features_a = features_of(first, payloads);
   if (!features_a) return tl::unexpected(features_a.error());
-  const auto features_b = features_of(second, clouds);
+  const auto features_b = features_of(second, payloads);
   if (!features_b) return tl::unexpected(features_b.error());
   const auto& a = *features_a;
   const auto& b = *features_b;
@@ -41,7 +42,7 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
 
 Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
     const Submap& submap, const server::PayloadStore& payloads) const {
-  return cache_.get(submap.id, [&]() -> Result<FeatureCache::Features> {
+  return cache_.get(submap.id, [&]() -> Result<FeatureCache<lidar::SubmapFeatures>::Features> {
     auto cloud = payloads.cloud(submap.id);
     if (!cloud) return tl::unexpected(cloud.error());
     Submap seen = submap;
@@ -122,6 +123,36 @@ std::shared_ptr<const server::ClosureFinder> make_reference_finder(const Closure
 
 }  // namespace
 
+VisualClosureFinder::VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap,
+                                         std::size_t cache_bytes)
+    : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
+
+std::uint32_t VisualClosureFinder::version() const { return visual::kFinderVersion; }
+
+bool VisualClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
+  return visual::is_candidate(first, second, min_submap_gap_, config_);
+}
+
+Result<ClosureVerdict> VisualClosureFinder::verify(const Submap& first, const Submap& second,
+                                                   const server::PayloadStore& payloads) const {
+  const auto a = features_of(first, payloads);
+  if (!a) return tl::unexpected(a.error());
+  const auto b = features_of(second, payloads);
+  if (!b) return tl::unexpected(b.error());
+  return visual::verify_pair(**a, **b, config_);
+}
+
+Result<VisualClosureFinder::Features> VisualClosureFinder::features_of(const Submap& submap,
+                                                                       const server::PayloadStore& payloads) const {
+  return cache_.get(submap.id, [&]() -> Result<Features> {
+    auto payload = payloads.visual(submap.id);
+    if (!payload) return tl::unexpected(payload.error());
+    Submap seen = submap;
+    seen.visual = std::move(*payload);
+    return std::make_shared<const visual::SubmapFeatures>(visual::extract_features(seen, config_));
+  });
+}
+
 JointClosureFinder::JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders)
     : finders_(std::move(finders)) {}
 
@@ -159,9 +190,20 @@ std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureCo
                                                                  const std::vector<MissionRecording>& recordings,
                                                                  std::uint64_t seed) {
   std::shared_ptr<const server::ClosureFinder> finder;
+  const auto cache_bytes = static_cast<std::size_t>(config.feature_cache_mb * 1e6);
+  const auto lidar = [&] {
+    return std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap, cache_bytes);
+  };
+  const auto visual = [&] {
+    return std::make_shared<VisualClosureFinder>(config.visual, config.min_submap_gap, cache_bytes);
+  };
   if (config.finder == "lidar")
-    finder = std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap,
-                                                  static_cast<std::size_t>(config.feature_cache_mb * 1e6));
+    finder = lidar();
+  else if (config.finder == "visual")
+    finder = visual();
+  else if (config.finder == "sensors")
+    finder = std::make_shared<JointClosureFinder>(
+        std::vector<std::shared_ptr<const server::ClosureFinder>>{lidar(), visual()});
   else
     finder = make_reference_finder(config, recordings, seed);
   if (config.wrong_share == 0.0) return finder;

@@ -12,6 +12,7 @@
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
+#include "tutti/perception/visual/submap_features.hpp"
 #include "tutti/server/closure_finder.hpp"
 
 namespace tutti::mission {
@@ -28,7 +29,7 @@ class LidarClosureFinder final : public server::ClosureFinder {
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
-  [[nodiscard]] const FeatureCache& cache() const { return cache_; }
+  [[nodiscard]] const FeatureCache<lidar::SubmapFeatures>& cache() const { return cache_; }
 
  private:
   [[nodiscard]] Result<std::shared_ptr<const lidar::SubmapFeatures>> features_of(
@@ -36,7 +37,28 @@ class LidarClosureFinder final : public server::ClosureFinder {
 
   lidar::LidarClosureConfig config_;
   std::uint32_t min_submap_gap_;
-  mutable FeatureCache cache_;
+  mutable FeatureCache<lidar::SubmapFeatures> cache_;
+};
+
+/// From what cameras saw alone. Features are kept as the LiDAR's are.
+class VisualClosureFinder final : public server::ClosureFinder {
+ public:
+  VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
+  [[nodiscard]] std::uint32_t version() const override;
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return first.observations > 0 && second.observations > 0;
+  }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::PayloadStore& payloads) const override;
+
+ private:
+  using Features = FeatureCache<visual::SubmapFeatures>::Features;
+  [[nodiscard]] Result<Features> features_of(const Submap& submap, const server::PayloadStore& payloads) const;
+
+  visual::VisualClosureConfig config_;
+  std::uint32_t min_submap_gap_;
+  mutable FeatureCache<visual::SubmapFeatures> cache_;
 };
 
 /// Several finders, one per kind of payload: a pair is compared by each that can. Mixed fleets meet through the robots

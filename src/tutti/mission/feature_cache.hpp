@@ -11,16 +11,17 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
-#include "tutti/perception/lidar/submap_features.hpp"
 
 namespace tutti::mission {
 
 /// Features of the newest submaps, as many as fit into a budget of bytes. Every new submap meets all others in turn: by
 /// the time an old one is wanted again all the others were, so that of those used last hardly any would be there. Those
 /// kept by their own age are there every time, and a new one always finds room. Safe to call from several threads.
+/// What the features take in memory, bytes_of(features) says, a function beside their type.
+template <class F>
 class FeatureCache {
  public:
-  using Features = std::shared_ptr<const lidar::SubmapFeatures>;
+  using Features = std::shared_ptr<const F>;
 
   explicit FeatureCache(std::size_t budget_bytes) : budget_bytes_(budget_bytes) {}
 
@@ -44,5 +45,43 @@ class FeatureCache {
   std::map<Age, Entry> entries_;
   std::map<Age, std::shared_future<Result<Features>>> under_way_;
 };
+
+template <class F>
+auto FeatureCache<F>::get(SubmapId id, const std::function<Result<Features>()>& compute) -> Result<Features> {
+  std::promise<Result<Features>> promise;
+  Age age = 0;
+  {
+    std::unique_lock lock(mutex_);
+    age = ages_.try_emplace(id, ages_.size()).first->second;
+    if (const auto kept = entries_.find(age); kept != entries_.end()) return kept->second.features;
+    if (const auto other = under_way_.find(age); other != under_way_.end()) {
+      const auto made = other->second;
+      lock.unlock();
+      return made.get();
+    }
+    under_way_.emplace(age, promise.get_future().share());
+  }
+  Result<Features> made = compute();
+  promise.set_value(made);
+  const std::lock_guard lock(mutex_);
+  under_way_.erase(age);
+  if (made) keep(age, *made);
+  return made;
+}
+
+template <class F>
+void FeatureCache<F>::keep(Age age, const Features& features) {
+  const std::size_t bytes = bytes_of(*features);
+  if (bytes > budget_bytes_) return;
+  entries_[age] = {features, bytes};
+  for (held_bytes_ += bytes; held_bytes_ > budget_bytes_; entries_.erase(entries_.begin()))
+    held_bytes_ -= entries_.begin()->second.bytes;
+}
+
+template <class F>
+std::size_t FeatureCache<F>::held_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return held_bytes_;
+}
 
 }  // namespace tutti::mission

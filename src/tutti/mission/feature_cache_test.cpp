@@ -19,7 +19,7 @@ namespace {
 constexpr SubmapId id_of(std::uint32_t index) { return {RobotId{index % 3}, index / 3}; }
 
 /// Features that say whose they are, of `cells` wall cells.
-FeatureCache::Features features_of(SubmapId id, std::size_t cells = 100) {
+FeatureCache<lidar::SubmapFeatures>::Features features_of(SubmapId id, std::size_t cells = 100) {
   lidar::SubmapFeatures features{.id = id};
   features.view.walls.resize(cells);
   return std::make_shared<const lidar::SubmapFeatures>(std::move(features));
@@ -31,14 +31,14 @@ struct Counted {
   /// Were they computed?
   bool get(std::uint32_t index, std::size_t cells = 100) {
     const std::size_t before = computed;
-    const auto features = cache.get(id_of(index), [&]() -> Result<FeatureCache::Features> {
+    const auto features = cache.get(id_of(index), [&]() -> Result<FeatureCache<lidar::SubmapFeatures>::Features> {
       ++computed;
       return features_of(id_of(index), cells);
     });
     EXPECT_TRUE(features && (*features)->id == id_of(index));
     return computed > before;
   }
-  FeatureCache cache;
+  FeatureCache<lidar::SubmapFeatures> cache;
   std::atomic<std::size_t> computed{0};
 };
 
@@ -80,21 +80,24 @@ RC_GTEST_PROP(FeatureCache, TheNewestAreThereAndTheBudgetHolds, ()) {
 }
 
 TEST(FeatureCache, AnErrorIsNotKept) {
-  FeatureCache cache(10 * kOne);
-  const auto failing = [] { return Result<FeatureCache::Features>(fail(ErrorCode::io, "gone")); };
+  FeatureCache<lidar::SubmapFeatures> cache(10 * kOne);
+  const auto failing = [] {
+    return Result<FeatureCache<lidar::SubmapFeatures>::Features>(fail(ErrorCode::io, "gone"));
+  };
   EXPECT_FALSE(cache.get(id_of(1), failing));
-  EXPECT_TRUE(cache.get(id_of(1), [] { return Result<FeatureCache::Features>(features_of(id_of(1))); }));
+  EXPECT_TRUE(
+      cache.get(id_of(1), [] { return Result<FeatureCache<lidar::SubmapFeatures>::Features>(features_of(id_of(1))); }));
   EXPECT_TRUE(cache.get(id_of(1), failing));
 }
 
 TEST(FeatureCache, ThreadsThatAskAtTheSameTimeShareTheWork) {
-  FeatureCache cache(10 * kOne);
+  FeatureCache<lidar::SubmapFeatures> cache(10 * kOne);
   std::atomic<int> computed{0};
   for_each_parallel(4, 4, [&](std::size_t) {
     const auto features = cache.get(id_of(1), [&] {
       ++computed;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      return Result<FeatureCache::Features>(features_of(id_of(1)));
+      return Result<FeatureCache<lidar::SubmapFeatures>::Features>(features_of(id_of(1)));
     });
     EXPECT_TRUE(features.has_value());
   });

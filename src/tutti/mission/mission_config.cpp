@@ -47,7 +47,10 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
     if (robot.name.empty()) problem(path + ".name: missing");
     check_name(robot.name, path, problem);
     if (!names.insert(robot.name).second) problem(fmt::format("{}.name: '{}' is there twice", path, robot.name));
-    if (robot.odometry.file.empty()) problem(path + ".odometry.file: missing");
+    const bool sees = !robot.images.maplab_submaps.empty();
+    if (robot.odometry.file.empty() && !sees) problem(path + ".odometry.file: missing");
+    if (!robot.odometry.file.empty() && sees)
+      problem(path + ".odometry.file: given, but images.maplab_submaps have the odometry");
     if (!robot.reference_offset_m.empty() && robot.reference_offset_m.size() != 3)
       problem(fmt::format("{}.reference_offset_m: {} numbers, expected 3", path, robot.reference_offset_m.size()));
     if (const auto T_body_lidar = to_pose(robot.T_body_lidar); !T_body_lidar)
@@ -58,6 +61,8 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
       problem(path + ".reference.file: missing, but closures.finder is 'reference'");
     if (config.closures.finder == "lidar" && robot.scans.empty())
       problem(path + ".scans: missing, but closures.finder is 'lidar'");
+    if (config.closures.finder == "visual" && !sees)
+      problem(path + ".images: missing, but closures.finder is 'visual'");
   }
   for (std::size_t i = 0; i < config.simulation.robots.size(); ++i)  // without a name: named by place
     check_name(config.simulation.robots[i].name, fmt::format("simulation.robots.{}", i), problem);

@@ -9,9 +9,11 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/bus/simulated_radio.hpp"
+#include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/mission/spoiled_closures.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
+#include "tutti/perception/visual/closure_config.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/simulation/bounds.hpp"
@@ -51,6 +53,17 @@ struct LidarPoseConfig {
 /// The pose, or what is wrong with it.
 Result<Pose3> to_pose(const LidarPoseConfig& config);
 
+/// Where a robot's images, or what a tracker made of them, come from: one of these, or none.
+struct ImagesConfig {
+  std::vector<std::string> maplab_submaps;  ///< Consecutive folders; the odometry is theirs, too.
+  template <class V>
+  void describe(V& v) {
+    v.field("maplab_submaps", maplab_submaps, any(),
+            "Folders of consecutive maplab submaps (keyframes, keypoints with tracks and descriptors, calibration); "
+            "their keyframe poses are the odometry, without an odometry.file.");
+  }
+};
+
 /// One robot whose recording is replayed.
 struct RobotConfig {
   std::string name;
@@ -64,6 +77,7 @@ struct RobotConfig {
   std::string scans_deskewed = "auto";
   std::string scan_time_unit = "auto";
   std::string scan_pose_at = "end";
+  ImagesConfig images;
   double start_s = 0.0;     ///< Mission time of its first sample.
   double from_share = 0.0;  ///< Part of the recording to replay.
   double to_share = 1.0;
@@ -90,6 +104,7 @@ struct RobotConfig {
             "Of the points' times; auto: the one in which a scan lasts 1 to 500 ms.");
     v.field("scan_pose_at", scan_pose_at, one_of({"end", "begin"}),
             "Of which moment of a sweep its odometry pose is, unless points have times of the odometry's clock.");
+    v.field("images", images);
     v.field("start_s", start_s, between(0.0, simulation::kLongest_s), "Mission time of the first sample.");
     v.field("from_share", from_share, between(0.0, 1.0), "First part of the recording to replay.");
     v.field("to_share", to_share, between(0.0, 1.0), "Last part of the recording to replay.");
@@ -102,24 +117,27 @@ struct RobotConfig {
 struct ClosureConfig {
   std::string finder = "lidar";
   int min_submap_gap =
-      2;  ///< lidar: submaps of one robot nearer than this are not compared; neighbours overlap anyway.
+      2;  ///< lidar, visual: submaps of one robot nearer than this are not compared; neighbours overlap anyway.
   double feature_cache_mb = 1000.0;  ///< lidar: about 2,400 submaps of 5,000 points.
   lidar::LidarClosureConfig lidar;
+  visual::VisualClosureConfig visual;
   simulation::ReferenceClosureConfig reference;
   double wrong_share = 0.0;
   SpoiledClosureConfig wrong;
   std::vector<PlantedClosureConfig> planted;
   template <class V>
   void describe(V& v) {
-    v.field("finder", finder, one_of({"lidar", "reference"}),
-            "lidar: from the submap clouds; reference: true relative poses plus noise and a share of wrong ones.");
+    v.field("finder", finder, one_of({"lidar", "visual", "sensors", "reference"}),
+            "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry; "
+            "reference: true relative poses plus noise and a share of wrong ones.");
     v.field("min_submap_gap", min_submap_gap, at_least(1.0),
-            "lidar: submaps of one robot nearer than this are not compared.");
+            "lidar, visual: submaps of one robot nearer than this are not compared.");
     v.field(
         "feature_cache_mb", feature_cache_mb, between(16.0, 1e6),
         "lidar: memory for what was computed of the newest submaps, about 0.4 MB each; where it is full, every pair "
         "with an older one takes tens of milliseconds instead of less than one.");
     v.field("lidar", lidar);
+    v.field("visual", visual);
     v.field("reference", reference);
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the closures found that are made wrong on purpose.");
@@ -151,6 +169,7 @@ struct MissionConfig {
   simulation::SimulationConfig simulation;
   robot::AgentConfig agent;
   server::ServerConfig server;
+  bundle::RefinementConfig refinement;
   ClosureConfig closures;
   bus::LinkConfig link;
   std::vector<RobotLinkConfig> robot_links;
@@ -168,6 +187,7 @@ struct MissionConfig {
     v.field("simulation", simulation);
     v.field("agent", agent);
     v.field("server", server);
+    v.field("refinement", refinement);
     v.field("closures", closures);
     v.field("link", link);
     v.field("robot_links", robot_links, any(), "Radios of single robots.");

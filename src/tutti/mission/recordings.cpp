@@ -6,11 +6,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "tutti/base/random.hpp"
 #include "tutti/formats/kitti.hpp"
+#include "tutti/formats/maplab_submaps.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/mission/listed_images.hpp"
 #include "tutti/mission/scan_folder.hpp"
 #include "tutti/simulation/surface.hpp"
 
@@ -40,8 +43,30 @@ bool is_degraded(const simulation::DegradeConfig& degrade) {
   return degrade.yaw_deg_per_m != 0.0 || degrade.scale_percent != 0.0;
 }
 
+Result<formats::MaplabRecording> read_maplab(const RobotConfig& robot, const fs::path& data) {
+  std::vector<std::string> folders;
+  for (const std::string& folder : robot.images.maplab_submaps) folders.push_back((data / folder).string());
+  return formats::read_maplab_submaps(folders);
+}
+
+/// The images of the samples to replay.
+std::shared_ptr<VisualSource> listed(const formats::MaplabRecording& from, const Trajectory& samples,
+                                     std::size_t first) {
+  const auto cameras = std::make_shared<const std::vector<Camera>>(from.cameras);
+  std::vector<TrackedImages> moments;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    moments.push_back({samples[i].stamp, cameras, {from.images[first + i]}});
+  return std::make_shared<ListedImages>(std::move(moments));
+}
+
 Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, Rng rng) {
-  auto odometry = read_trajectory(robot.odometry, data);
+  std::optional<formats::MaplabRecording> maplab;
+  if (!robot.images.maplab_submaps.empty()) {
+    auto read = read_maplab(robot, data);
+    if (!read) return tl::unexpected(read.error());
+    maplab = std::move(*read);
+  }
+  auto odometry = maplab ? Result<Trajectory>(maplab->odometry) : read_trajectory(robot.odometry, data);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
   if (!robot.reference.file.empty()) {
@@ -75,6 +100,14 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     if (!scans) return tl::unexpected(scans.error());
     out.notes.push_back(fmt::format("{}: {}", robot.name, (*scans)->note()));
     out.recording.scans = *scans;
+  }
+  if (maplab) {
+    const auto& [keyframes, keypoints, landmarks, joined, conflicts] = maplab->summary;
+    out.notes.push_back(
+        fmt::format("{}: maplab submaps with {} keyframes, {} keypoints, {} good landmarks; {} continued "
+                    "in the next submap, {} conflicts",
+                    robot.name, keyframes, keypoints, landmarks, joined, conflicts));
+    out.recording.visual = listed(*maplab, raw, from);
   }
   out.recording.increment_covariance = simulation::increment_covariances(raw, robot.covariance);
   out.recording.odometry = std::move(raw);

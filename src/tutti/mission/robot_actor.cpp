@@ -67,6 +67,7 @@ void RobotActor::resume(Timestamp now) {
   take(node_->resume(now));
   if (next_ == 0) return;
   feed_scan(next_ - 1, now);
+  feed_images(next_ - 1, now);
   if (next_ == recording_.recording.odometry.size()) take(node_->finish(now));
 }
 
@@ -95,6 +96,7 @@ void RobotActor::replay_next(Timestamp now) {
     }
   }
   feed_scan(next_, now);
+  feed_images(next_, now);
   if (++next_ == recording.odometry.size()) take(node_->finish(now));
 }
 
@@ -108,6 +110,7 @@ void RobotActor::take(node::Step step) {
 void RobotActor::note_event(const node::Event& event) {
   if (const auto* sample = std::get_if<node::SampleRefused>(&event.what)) note(refused_odometry_, sample->why);
   if (const auto* scan = std::get_if<node::ScanRefused>(&event.what)) note(refused_scans_, scan->why);
+  if (const auto* images = std::get_if<node::ImagesRefused>(&event.what)) note(refused_images_, images->why);
   if (const auto* update = std::get_if<node::RobotUpdated>(&event.what)) note_update(*update, event.time);
 }
 
@@ -121,6 +124,19 @@ void RobotActor::feed_scan(std::size_t sample, Timestamp now) {
   const std::size_t refused = refused_scans_.count;
   take(node_->add_scan(**scan, now));
   if (refused == refused_scans_.count) ++taken_scans_;
+}
+
+/// Every image is tracked, those of keyframes are kept.
+void RobotActor::feed_images(std::size_t sample, Timestamp now) {
+  const Recording& recording = recording_.recording;
+  if (!recording.visual) return;
+  const auto images = recording.visual->images(sample);
+  if (!images) return note(refused_images_, images.error().message);
+  if (images->images.empty() || !node_->agent().wants_scan()) return;
+  const CpuScope cpu(cpu_s_);
+  const std::size_t refused = refused_images_.count;
+  take(node_->add_images(*images, now));
+  if (refused == refused_images_.count) ++taken_images_;
 }
 
 void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
@@ -223,14 +239,19 @@ std::vector<std::string> RobotActor::troubles() const {
   };
   add(refused_odometry_, "odometry samples refused");
   add(refused_scans_, "keyframes without a scan");
+  add(refused_images_, "times images refused");
   add(failed_updates_, "updates without a correction");
   return out;
 }
 
-Status RobotActor::check_scans() const {
-  if (taken_scans_ > 0 || refused_scans_.count == 0) return {};
-  return fail(ErrorCode::invalid, "robot {}: not one scan could be read: {} of {} failed, the first because: {}",
-              recording_.recording.name, refused_scans_.count, refused_scans_.count, refused_scans_.first);
+Status RobotActor::check_sensors() const {
+  const auto check = [&](const char* what, std::size_t taken, const Trouble& refused) -> Status {
+    if (taken > 0 || refused.count == 0) return {};
+    return fail(ErrorCode::invalid, "robot {}: not one {} could be read: {} of {} failed, the first because: {}",
+                recording_.recording.name, what, refused.count, refused.count, refused.first);
+  };
+  if (auto ok = check("scan", taken_scans_, refused_scans_); !ok) return ok;
+  return check("image", taken_images_, refused_images_);
 }
 
 }  // namespace tutti::mission

@@ -73,8 +73,8 @@ class RobotActor {
   /// What went wrong (bad samples or scans refused, updates without a correction): one line per kind with a count and
   /// the first case.
   [[nodiscard]] std::vector<std::string> troubles() const;
-  /// Fails when scans were asked for and all of them failed.
-  [[nodiscard]] Status check_scans() const;
+  /// Fails when scans or images were asked for and all of them failed.
+  [[nodiscard]] Status check_sensors() const;
 
  private:
   struct Member {
@@ -102,6 +102,7 @@ class RobotActor {
   /// How far every estimate is from the reference at the nodes of the broadcast.
   void score(const Trajectory& map, UpdateRecord& update) const;
   void feed_scan(std::size_t sample, Timestamp now);
+  void feed_images(std::size_t sample, Timestamp now);
   static void note(Trouble& trouble, const std::string& message);
 
   const MissionRecording& recording_;
@@ -119,6 +120,8 @@ class RobotActor {
   Trouble refused_odometry_;
   Trouble refused_scans_;
   std::size_t taken_scans_ = 0;
+  Trouble refused_images_;
+  std::size_t taken_images_ = 0;
   Trouble failed_updates_;
 };
 

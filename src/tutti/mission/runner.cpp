@@ -10,6 +10,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/bus/simulated_network.hpp"
+#include "tutti/mission/bundle_refiner.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/load_meter.hpp"
@@ -65,9 +66,12 @@ class MissionRun {
         meter_(make_closure_finder(config.closures, recordings_, options.seed)),
         network_(radio(), kMissionStart),
         store_(storage::map_schema()),
-        server_(node::ServerNode::open(
-                    robot_ids(recordings_), meter_.finder(),
-                    {.server = config.server, .pairs_per_job = wire::kMaxPairs, .job_timeout_s = 0.0}, kEpoch, store_)
+        server_(node::ServerNode::open(robot_ids(recordings_), meter_.finder(),
+                                       {.server = config.server,
+                                        .pairs_per_job = wire::kMaxPairs,
+                                        .job_timeout_s = 0.0,
+                                        .refiner = make_refiner(config)},
+                                       kEpoch, store_)
                     .value()),
         worker_(kWorker, meter_.finder(), node::SubmapFrames::of(store_),
                 [this](std::size_t count, const auto& call) { for_each_parallel(count, threads_, call); }),
@@ -111,10 +115,10 @@ class MissionRun {
     }
   }
 
-  /// Fails when a robot was to have scans and not one could be taken.
-  [[nodiscard]] Status check_scans() const {
+  /// Fails when a robot was to have scans or images and not one could be taken.
+  [[nodiscard]] Status check_sensors() const {
     for (const Robot& robot : robots_)
-      if (auto ok = robot.actor->check_scans(); !ok) return ok;
+      if (auto ok = robot.actor->check_sensors(); !ok) return ok;
     return {};
   }
   MissionRecord record() const;
@@ -317,7 +321,7 @@ Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions&
   if (const auto ok = check_links(config, input->robots); !ok) return tl::unexpected(ok.error());
   MissionRun mission(config, options, std::move(*input));
   mission.run();
-  if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());
+  if (const auto ok = mission.check_sensors(); !ok) return tl::unexpected(ok.error());
   return mission.record();
 }
 

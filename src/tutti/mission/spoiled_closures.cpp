@@ -57,7 +57,7 @@ bool SpoiledClosureFinder::is_candidate(const Submap& first, const Submap& secon
 
 Result<ClosureVerdict> SpoiledClosureFinder::verify(const Submap& first, const Submap& second,
                                                     const server::PayloadStore& payloads) const {
-  auto verdict = inner_->verify(first, second, clouds);
+  auto verdict = inner_->verify(first, second, payloads);
   if (!verdict) return verdict;
   const auto error = draw_error(verdict->pair, wrong_share_, config_, seed_);
   if (!error) return verdict;

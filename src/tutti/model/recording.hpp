@@ -29,10 +29,10 @@ class ScanSource {
 class VisualSource {
  public:
   virtual ~VisualSource() = default;
-  [[nodiscard]] virtual const std::vector<Camera>& cameras() const = 0;
-  /// The images taken at this odometry sample, one per camera at most; none when there is none. An error is of this
-  /// image alone (a missing or corrupt file): the next samples can be asked for.
-  [[nodiscard]] virtual Result<std::vector<TrackedImage>> images(std::size_t sample) = 0;
+  /// The images taken at this odometry sample, with its stamp; no images when there are none. Tracks that begin after a
+  /// restart in the middle have other numbers than those before. An error is of this moment alone (a missing or corrupt
+  /// file): the next samples can be asked for.
+  [[nodiscard]] virtual Result<TrackedImages> images(std::size_t sample) = 0;
 };
 
 /// Where simulated odometry really went wrong. Known to the evaluation only.

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -60,6 +60,17 @@ struct TrackedImage {
   Descriptors descriptors;  ///< One per keypoint, or none.
   friend bool operator==(const TrackedImage&, const TrackedImage&) = default;
 };
+
+/// The images of all cameras at one moment.
+struct TrackedImages {
+  Timestamp stamp;
+  std::shared_ptr<const std::vector<Camera>> cameras;  ///< Never null, the same for all images of a robot.
+  std::vector<TrackedImage> images;                    ///< At most one per camera.
+};
+
+/// There are cameras, each sound; each image is of one of them, has finite keypoints with positive sigmas, no track
+/// twice, and as many descriptors as keypoints or none.
+Status check_images(const TrackedImages& images);
 
 /// What the IMU said at a moment, in the body frame.
 struct ImuSample {

@@ -64,11 +64,15 @@ struct ScanRefused {
   RobotId robot;
   std::string why;
 };
+struct ImagesRefused {
+  RobotId robot;
+  std::string why;
+};
 
 struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, MapUpdated, RobotUpdated, MessageRefused,
-               RobotJoined, RobotRefused, SampleRefused, ScanRefused>
+               RobotJoined, RobotRefused, SampleRefused, ScanRefused, ImagesRefused>
       what;
 };
 

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/wire/agent_state.hpp"
+
 namespace tutti::node {
 namespace {
 
@@ -100,6 +102,8 @@ void read(Bytes& in, HeardGraph& graph) {
   graph.frame = in.take_rest();
 }
 
+void write(const TrackedImages& images, std::string& out) { out += wire::encode(images); }
+
 template <class Entry>
 Result<JournalEntry> read_entry(Bytes in) {
   Entry entry;
@@ -126,6 +130,11 @@ Result<JournalEntry> decode_entry(std::string_view bytes) {
       return read_entry<Scan>(rest);
     case 2:
       return read_entry<HeardGraph>(rest);
+    case 3: {
+      auto images = wire::decode_tracked_images(bytes.substr(1));
+      if (!images) return tl::unexpected(images.error());
+      return JournalEntry(std::move(*images));
+    }
     default:
       return fail(ErrorCode::parse, "journal: an entry of unknown kind {}", static_cast<int>(bytes.front()));
   }

@@ -10,6 +10,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
+#include "tutti/model/visual.hpp"
 
 /// What a robot has heard since its last checkpoint: an agent that hears it again knows the same, to the bit.
 namespace tutti::node {
@@ -23,7 +24,7 @@ struct HeardGraph {
   std::string frame;                  ///< Of the ProxyGraphMessage.
   std::optional<std::size_t> budget;  ///< RobotAgent::receive().
 };
-using JournalEntry = std::variant<OdometrySample, Scan, HeardGraph>;
+using JournalEntry = std::variant<OdometrySample, Scan, HeardGraph, TrackedImages>;
 
 /// Exact, for this machine: its bytes are not for others.
 std::string encode(const JournalEntry& entry);

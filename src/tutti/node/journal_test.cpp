@@ -22,6 +22,15 @@ JournalEntry any_entry(Rng& rng) {
     for (double& x : sample.increment_covariance.reshaped()) x = rng.normal();
     return sample;
   }
+  if (rng.bernoulli(0.3)) {
+    TrackedImage image{.camera = 0, .keypoints = {}, .descriptors = {DescriptorKind::orb, 4, {}}};
+    for (std::size_t i = rng.index(20); i > 0; --i) {
+      image.keypoints.push_back({{rng.normal(), rng.normal()}, 0.8F, i});
+      for (int word = 0; word < 4; ++word) image.descriptors.bits.push_back(~std::uint64_t{0} / (i + 1));
+    }
+    const std::vector<Camera> cameras{{.model = {CameraKind::equidistant, 752, 480, 1.0, 2.0, 3.0, 4.0, {5.0}}}};
+    return TrackedImages{{7}, std::make_shared<const std::vector<Camera>>(cameras), {image}};
+  }
   PointCloud cloud;
   for (std::size_t i = rng.index(20); i > 0; --i) cloud.points.emplace_back(rng.normal(), rng.normal(), rng.normal());
   Scan scan{{-5}, std::make_shared<const PointCloud>(cloud), {}};

@@ -78,6 +78,10 @@ Status RobotNode::hear_again(const JournalEntry& entry) {
     last_scan_ = scan->stamp;
     return agent_.add_scan(*scan);
   }
+  if (const auto* images = std::get_if<TrackedImages>(&entry)) {
+    last_images_ = images->stamp;
+    return agent_.add_images(*images);
+  }
   const auto& heard = std::get<HeardGraph>(entry);
   const auto message = wire::decode_proxy_graph(heard.frame);
   if (!message) return tl::unexpected(message.error());
@@ -120,6 +124,18 @@ Step RobotNode::add_scan(const Scan& scan, Timestamp now) {
   return step;
 }
 
+Step RobotNode::add_images(const TrackedImages& images, Timestamp now) {
+  Step step;
+  if (images.stamp == last_images_) return step;  // again
+  if (auto ok = agent_.add_images(images); !ok) {
+    step.tell(now, ImagesRefused{agent_.robot(), ok.error().message});
+    return step;
+  }
+  last_images_ = images.stamp;
+  remember(images, now, step);
+  return step;
+}
+
 Step RobotNode::finish(Timestamp now) {
   Step step;
   finished_ = true;
@@ -135,7 +151,7 @@ Step RobotNode::store_all() {
   return step;
 }
 
-/// Scans wait as odometry does: they come in its order, and one that is lost is fed again with its sample.
+/// Scans and images wait as odometry does: they come in its order, and one that is lost is fed again with its sample.
 void RobotNode::remember(const JournalEntry& entry, Timestamp now, Step& step) {
   if (!config_.keeps_state) return;
   if (unwritten_.empty()) unwritten_since_ = now;
@@ -173,6 +189,8 @@ void RobotNode::save_checkpoint(Step& step) {
 void RobotNode::take_outgoing(Timestamp now, Step& step) {
   Frames fresh;
   const auto submaps = agent_.take_outgoing();
+  for (Error& error : agent_.take_image_errors())
+    step.tell(now, ImagesRefused{agent_.robot(), std::move(error.message)});
   for (const SubmapMessage& message : submaps) {
     if (const Status ok = wire::validate(message); !ok) {
       step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap, ok.error().message});

@@ -41,10 +41,11 @@ class RobotNode {
 
   /// The first step after every start.
   Step resume(Timestamp now);
-  /// RobotAgent::add_odometry(), add_scan(), finish(); what it refuses is told as an event. One that comes again, as
-  /// after a restart, is refused or changes nothing.
+  /// RobotAgent::add_odometry(), add_scan(), add_images(), finish(); what it refuses is told as an event. One that
+  /// comes again, as after a restart, is refused or changes nothing.
   Step add_odometry(const OdometrySample& sample, Timestamp now);
   Step add_scan(const Scan& scan, Timestamp now);
+  Step add_images(const TrackedImages& images, Timestamp now);
   Step finish(Timestamp now);
   /// Writes what waits to be written, as before a planned end.
   Step store_all();
@@ -101,6 +102,7 @@ class RobotNode {
   std::optional<ProxyGraph> base_;            // the last that came in full
   std::shared_ptr<const std::string> delta_;  // the last that came in terms of one
   std::optional<Timestamp> last_scan_;        // since the checkpoint
+  std::optional<Timestamp> last_images_;      // since the checkpoint
   std::uint64_t journal_ = 0;                 // entries since the checkpoint that are written
   std::vector<std::string> unwritten_;        // and those that are not
   Timestamp unwritten_since_;

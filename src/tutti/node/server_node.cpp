@@ -162,7 +162,9 @@ ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::C
       receipts_(std::move(opened.receipts)),
       registry_(std::move(opened.registry)),
       start_(opened.start + 1),
-      had_news_(opened.news) {}
+      had_news_(opened.news) {
+  if (config.refiner != nullptr) server_.refine_with(config.refiner);
+}
 
 storage::Write ServerNode::meta() const {
   const server::MapServerState& state = server_.state();

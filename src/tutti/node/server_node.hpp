@@ -24,7 +24,8 @@ struct ServerNodeConfig {
   /// Mission time without any answer after which the pairs of a job are asked again, as a new job; a job that waits
   /// behind others has its time from the last answer to one of these. Every further time twice as long. 0: never.
   double job_timeout_s = 600.0;
-  bool accepts_others = false;  ///< Robots that it was not told of, up to ProxyGraph::kMostChains in all.
+  std::shared_ptr<const server::MapRefiner> refiner;  ///< Null: the map is its pose graph's.
+  bool accepts_others = false;                        ///< Robots that it was not told of, up to ProxyGraph::kMostChains in all.
 };
 
 /// The mapping server round MapServer: submaps, verdicts and operators' words in; receipts, jobs and proxy graphs out.

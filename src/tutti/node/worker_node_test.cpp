@@ -174,9 +174,9 @@ TEST_F(WorkerNodeTest, WhatIsNoJobIsRefused) {
 TEST_F(WorkerNodeTest, AFrameOfAnotherSubmapIsNoAnswer) {
   const SubmapFrames frames([](SubmapId) { return wire::encode(test::submap(kAlpha, 1)); });
   EXPECT_TRUE(frames.submap({kAlpha, 1}).has_value());
-  EXPECT_TRUE(frames.get({kAlpha, 1}).has_value());
+  EXPECT_TRUE(frames.cloud({kAlpha, 1}).has_value());
   EXPECT_FALSE(frames.submap({kAlpha, 2}).has_value());
-  EXPECT_FALSE(frames.get({kBravo, 1}).has_value());
+  EXPECT_FALSE(frames.cloud({kBravo, 1}).has_value());
 }
 
 }  // namespace

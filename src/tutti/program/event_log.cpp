@@ -112,6 +112,11 @@ Told tell(const node::ScanRefused& refused) {
           "a scan was refused: " + refused.why,
           Level::warning};
 }
+Told tell(const node::ImagesRefused& refused) {
+  return {{{"event", "images_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
+          "images were refused: " + refused.why,
+          Level::warning};
+}
 
 Told tell_event(const node::Event& event) {
   Told told = std::visit([](const auto& what) { return tell(what); }, event.what);

@@ -21,9 +21,8 @@ Result<mission::MissionConfig> load(const MissionSource& source) {
     if (const auto ok = apply_override(*root, assignment); !ok) return tl::unexpected(ok.error());
   mission::MissionConfig config;
   if (const auto ok = load_config(*root, config, "--set"); !ok) return tl::unexpected(ok.error());
-  if (config.closures.finder != "lidar")
-    return fail(ErrorCode::configuration, "closures.finder is '{}': without a mission there is nothing but 'lidar'",
-                config.closures.finder);
+  if (config.closures.finder == "reference")
+    return fail(ErrorCode::configuration, "closures.finder is 'reference': without a mission there is none");
   return config;
 }
 
@@ -45,7 +44,7 @@ RobotId robot_id_of(const std::string& name) {
 
 Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const mission::MissionConfig& config,
                                                                  const MissionSource& source) {
-  if (config.closures.finder == "lidar") return mission::make_closure_finder(config.closures, {}, source.seed);
+  if (config.closures.finder != "reference") return mission::make_closure_finder(config.closures, {}, source.seed);
   const auto input = mission::load_input(config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
   return mission::make_closure_finder(config.closures, input->robots, source.seed);

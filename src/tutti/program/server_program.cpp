@@ -14,6 +14,7 @@
 
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/nats_port.hpp"
+#include "tutti/mission/bundle_refiner.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/host.hpp"
@@ -170,7 +171,9 @@ class ServerProgram {
 };
 
 Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
-  node::ServerNodeConfig config{.server = config_.server, .accepts_others = config_.closures.finder == "lidar"};
+  node::ServerNodeConfig config{.server = config_.server,
+                                .refiner = mission::make_refiner(config_),
+                                .accepts_others = config_.closures.finder != "reference"};
   config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time
   std::set<RobotId> robots;
   for (std::uint32_t i = 0; i < names_.size(); ++i) robots.insert(RobotId{i});

@@ -108,6 +108,8 @@ class RobotAgent {
   /// (geometry/covariance.hpp).
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
   Status add_scan(const Scan& scan);
+  /// SubmapBuilder::add_images()
+  Status add_images(const TrackedImages& images) { return submaps_.add_images(images); }
   /// The latest odometry sample is a keyframe; a scan elsewhere is hardly worth taking.
   [[nodiscard]] bool wants_scan() const { return submaps_.wants_scan(); }
   /// Stamp of the latest odometry sample.
@@ -117,6 +119,8 @@ class RobotAgent {
   /// Submaps ready to be sent, oldest first; taken once. Their scans are merged here, which add_odometry() and
   /// add_scan() need not wait for: until then they are kept whole, so ask regularly.
   std::vector<SubmapMessage> take_outgoing();
+  /// SubmapBuilder::take_image_errors()
+  std::vector<Error> take_image_errors() { return submaps_.take_image_errors(); }
 
   /// Compares the server's map with the own one and adds the constraints it takes. An older revision than the newest
   /// seen changes nothing (synchronised = 0). `budget` limits policies that need one.

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/robot/submap_builder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "tutti/base/check.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/way.hpp"
@@ -19,6 +21,21 @@ Status check_sample(RobotId robot, Timestamp stamp, const Pose3& T_odom_body, co
   if (auto ok = check_covariance(covariance); !ok)
     return in_context(fmt::format("robot {}: odometry at {} ns", robot.value, stamp.ns), ok.error());
   return {};
+}
+
+/// What the cameras saw along the submap.
+Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>& images,
+                          const visual::VisualSubmapConfig& config) {
+  std::vector<visual::KeyframeImages> seen;
+  for (const TrackedImages& moment : images) {
+    const auto keyframe = std::ranges::find(submap.keyframes, moment.stamp, &Keyframe::stamp);
+    TUTTI_CHECK(keyframe != submap.keyframes.end(), "images at {} ns of no keyframe", moment.stamp.ns);
+    seen.push_back({keyframe->index, submap.keyframes.front().T_odom_body.inverse() * keyframe->T_odom_body,
+                    moment.images});
+  }
+  auto payload = visual::make_visual_payload(seen, *images.front().cameras, config);
+  if (!payload) return in_context("images of submap " + to_string(submap.id), payload.error());
+  return payload;
 }
 
 }  // namespace
@@ -57,6 +74,7 @@ Result<std::optional<KeyframeStep>> SubmapBuilder::add_odometry(Timestamp stamp,
     state_.since_keyframe = compound(state_.since_keyframe, {step, increment_covariance});
   }
   remember(stamp, T_odom_body);
+  if (!state_.finished.empty()) state_.finished.back().awaits_images = false;
   if (!is_keyframe(stamp, T_odom_body)) return std::optional<KeyframeStep>{};
 
   const bool first = state_.keyframes.empty();
@@ -74,6 +92,7 @@ Result<std::optional<KeyframeStep>> SubmapBuilder::add_odometry(Timestamp stamp,
   state_.odometry.push_back(out.odometry);
   if (is_full()) {
     close_submap();
+    state_.finished.back().awaits_images = !state_.finished.back().images.empty();
     start_submap(keyframe);
   }
   return std::optional(out);
@@ -92,10 +111,30 @@ Status SubmapBuilder::add_scan(const Scan& scan) {
   return {};
 }
 
+Status SubmapBuilder::add_images(const TrackedImages& images) {
+  const auto where = [&] { return fmt::format("robot {}: images at {} ns", chain_.robot.value, images.stamp.ns); };
+  if (!wants_scan() || images.stamp != state_.recent.back().stamp)
+    return fail(ErrorCode::invalid, "{}: no keyframe has their stamp (latest sample: {} ns)", where(),
+                state_.recent.empty() ? 0 : state_.recent.back().stamp.ns);
+  if (auto ok = check_images(images); !ok) return in_context(where(), ok.error());
+  if (!state_.images.empty() && *state_.images.back().cameras != *images.cameras)
+    return fail(ErrorCode::invalid, "{}: other cameras than those of the images before", where());
+  if (!state_.images.empty() && state_.images.back().stamp == images.stamp)
+    return fail(ErrorCode::invalid, "{}: there are some already", where());
+  state_.images.push_back(images);
+  // The keyframe that two submaps share shows both the same.
+  if (!state_.finished.empty() && state_.finished.back().awaits_images) {
+    state_.finished.back().images.push_back(images);
+    state_.finished.back().awaits_images = false;
+  }
+  return {};
+}
+
 void SubmapBuilder::start_submap(const Keyframe& first) {
   state_.keyframes = {first};
   state_.odometry.clear();
   state_.scans.clear();
+  state_.images.clear();
 }
 
 /// Travel is counted between keyframes: from sample to sample, noise alone would add up to metres.
@@ -107,16 +146,24 @@ bool SubmapBuilder::is_full() const {
 void SubmapBuilder::close_submap() {
   state_.finished.push_back(
       {{.id = {chain_, state_.next_submap++}, .keyframes = state_.keyframes, .odometry = state_.odometry},
-       std::move(state_.scans)});
+       std::move(state_.scans),
+       std::move(state_.images)});
 }
 
 std::optional<Submap> SubmapBuilder::take_submap() {
-  if (state_.finished.empty()) return std::nullopt;
+  if (state_.finished.empty() || state_.finished.front().awaits_images) return std::nullopt;
   FinishedSubmap next = std::move(state_.finished.front());
   state_.finished.erase(state_.finished.begin());
   if (!next.scans.empty())
     next.submap.cloud = std::make_shared<const PointCloud>(
         lidar::merge_scans(next.scans, config_.voxel_m, {config_.min_range_m, config_.max_range_m}));
+  if (!next.images.empty()) {
+    auto payload = see(next.submap, next.images, config_.visual);
+    if (payload)
+      next.submap.visual = std::make_shared<const VisualPayload>(std::move(*payload));
+    else
+      image_errors_.push_back(std::move(payload.error()));
+  }
   return std::move(next.submap);
 }
 

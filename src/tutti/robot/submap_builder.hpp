@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/config.hpp"
@@ -10,6 +11,7 @@
 #include "tutti/model/submap.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
+#include "tutti/perception/visual/visual_payload.hpp"
 
 namespace tutti::robot {
 
@@ -23,6 +25,7 @@ struct SubmapConfig {
   double voxel_m = 0.3;                    ///< Edge of the voxels a submap cloud is reduced to.
   double min_range_m = 0.5;                ///< Scan points nearer than this are the robot itself.
   double max_range_m = 60.0;               ///< Scan points farther than this are not used.
+  visual::VisualSubmapConfig visual;
   template <class V>
   void describe(V& v) {
     v.field("duration_s", duration_s, greater_than(0.0), "Longest submap in time.");
@@ -35,6 +38,7 @@ struct SubmapConfig {
     v.field("voxel_m", voxel_m, between(0.1, 10.0), "Voxel edge of a submap cloud.");
     v.field("min_range_m", min_range_m, at_least(0.0), "Nearer scan points are dropped.");
     v.field("max_range_m", max_range_m, greater_than(0.0), "Farther scan points are dropped.");
+    v.field("visual", visual);
   }
 };
 
@@ -48,6 +52,8 @@ struct KeyframeStep {
 struct FinishedSubmap {
   Submap submap;
   std::vector<lidar::PosedCloud> scans;
+  std::vector<TrackedImages> images;
+  bool awaits_images = false;  ///< Those of its last keyframe, which come after the odometry sample that ended it.
 };
 
 /// All that a builder knows.
@@ -56,6 +62,7 @@ struct SubmapBuilderState {
   std::vector<Keyframe> keyframes;     ///< Of the open submap.
   std::vector<RelativePose> odometry;  ///< Between them.
   std::vector<lidar::PosedCloud> scans;
+  std::vector<TrackedImages> images;     ///< At keyframes.
   std::vector<FinishedSubmap> finished;  ///< Not taken yet, oldest first.
   RelativePose since_keyframe{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   Trajectory recent;                       ///< Raw odometry that covers the longest sweep ending now.
@@ -78,6 +85,9 @@ class SubmapBuilder {
   /// A scan that ends at the latest odometry sample's stamp; points in the body frame. A sweep with ages is undistorted
   /// by the odometry; it must not begin before the first sample, nor more than `kSweepHistoryS` ago.
   Status add_scan(const Scan& scan);
+  /// The images of a keyframe: the latest odometry sample is one, and has their stamp. Cameras are checked and stay the
+  /// same; keypoints are finite, tracks no two keypoints of one image, descriptors one per keypoint or none.
+  Status add_images(const TrackedImages& images);
   /// The latest odometry sample became a keyframe: a scan there shows something new. Others are accepted, too.
   [[nodiscard]] bool wants_scan() const {
     return !state_.keyframes.empty() && state_.keyframes.back().stamp == state_.recent.back().stamp;
@@ -88,9 +98,12 @@ class SubmapBuilder {
     return state_.recent.empty() ? std::nullopt : std::optional(state_.recent.back().stamp);
   }
 
-  /// The oldest finished submap that was not taken yet. Merges its scans, which takes long where they are large: adding
-  /// odometry or a scan never does.
+  /// The oldest finished submap that was not taken yet. Merges its scans and triangulates its landmarks, which takes
+  /// long: adding odometry, a scan or images never does.
   std::optional<Submap> take_submap();
+  /// Why submaps that were taken go without what their cameras saw: it contradicts itself or the odometry. Told once.
+  std::vector<Error> take_image_errors() { return std::exchange(image_errors_, {}); }
+
   /// Ends the last, shorter submap; nothing ends when no keyframe was added since the previous one.
   void finish();
 
@@ -109,6 +122,7 @@ class SubmapBuilder {
   ChainId chain_;
   SubmapConfig config_;
   SubmapBuilderState state_;
+  std::vector<Error> image_errors_;
 };
 
 }  // namespace tutti::robot

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <numbers>
 
 #include "tutti/base/random.hpp"
 #include "tutti/model/way.hpp"
@@ -210,6 +211,93 @@ TEST(SubmapBuilder, BadInputIsRefusedAndChangesNothing) {
   EXPECT_EQ(last->keyframes.size(), 2U);
   builder.finish();  // nothing since
   EXPECT_FALSE(builder.take_submap().has_value());
+}
+
+/// A wall of points 3 m to the left of the way, seen by a camera that looks there.
+TrackedImages images_at(Timestamp stamp, double way_m, bool swapped = false) {
+  const Eigen::Quaterniond left(Eigen::AngleAxisd(-std::numbers::pi / 2, Eigen::Vector3d::UnitX()));
+  const Camera camera{.model = {CameraKind::pinhole, 752, 480, 400.0, 400.0, 376.0, 240.0, {}},
+                      .T_body_camera = {left, Eigen::Vector3d::Zero()}};
+  TrackedImage image;
+  for (std::uint64_t track = 1; track <= 200; ++track) {
+    const Eigen::Vector3d point(0.15 * static_cast<double>(track) - 2.0, 3.0 + 0.1 * static_cast<double>(track % 7),
+                                0.2 * static_cast<double>(track % 5) - 0.4);
+    const auto pixel = project(camera.model, camera.T_body_camera.inverse() * (ahead(way_m).inverse() * point));
+    if (!pixel || !in_image(camera.model, *pixel)) continue;
+    const Eigen::Vector2d seen = swapped ? Eigen::Vector2d(pixel->y(), pixel->x()) : *pixel;
+    image.keypoints.push_back({seen.cast<float>(), 0.5F, track});
+  }
+  return {stamp, std::make_shared<const std::vector<Camera>>(1, camera), {image}};
+}
+
+/// As drive(), with images at keyframes; submaps are taken as soon as they can be.
+std::vector<Submap> look_around(SubmapBuilder& builder, double seconds, bool swapped = false) {
+  std::vector<Submap> out;
+  const auto take = [&] {
+    while (auto submap = builder.take_submap()) out.push_back(std::move(*submap));
+  };
+  for (int i = 0; i <= static_cast<int>(std::lround(seconds * 10)); ++i) {
+    const double t = 0.1 * i;
+    EXPECT_TRUE(builder.add_odometry(at(t), ahead(0.5 * t), kStepCovariance).has_value());
+    take();
+    if (builder.wants_scan()) {
+      EXPECT_TRUE(builder.add_images(images_at(at(t), 0.5 * t, swapped && i % 2 == 0)).has_value());
+      take();
+    }
+  }
+  builder.finish();
+  take();
+  return out;
+}
+
+TEST(SubmapBuilder, TheSharedKeyframesImagesAreInBothSubmaps) {
+  SubmapBuilder builder(RobotId{3}, {});
+  const std::vector<Submap> submaps = look_around(builder, 34.0);
+  ASSERT_EQ(submaps.size(), 4U);
+  for (std::size_t i = 0; i < submaps.size(); ++i) {
+    ASSERT_NE(submaps[i].visual, nullptr);
+    const VisualPayload& seen = *submaps[i].visual;
+    ASSERT_EQ(seen.frames.size(), submaps[i].keyframes.size());
+    EXPECT_GT(seen.landmarks.size(), 30U);
+    EXPECT_EQ(seen.frames.front().keyframe, submaps[i].keyframes.front().index);
+    EXPECT_EQ(seen.frames.back().keyframe, submaps[i].keyframes.back().index);
+    // In the submap's frame, the body of its first keyframe: on the wall.
+    for (const Landmark& landmark : seen.landmarks) {
+      EXPECT_GT(landmark.position.y(), 2.9F);
+      EXPECT_LT(landmark.position.y(), 3.7F);
+    }
+  }
+  EXPECT_TRUE(builder.take_image_errors().empty());
+}
+
+TEST(SubmapBuilder, ImagesThatContradictTheOdometryAreLeftOutAndSaidSo) {
+  SubmapBuilder builder(RobotId{3}, {});
+  const std::vector<Submap> submaps = look_around(builder, 12.0, true);
+  ASSERT_EQ(submaps.size(), 2U);
+  EXPECT_EQ(submaps[0].visual, nullptr);
+  EXPECT_FALSE(submaps[0].keyframes.empty());
+  const auto errors = builder.take_image_errors();
+  ASSERT_FALSE(errors.empty());
+  EXPECT_NE(errors[0].message.find("images of submap 3/0"), std::string::npos) << errors[0].message;
+  EXPECT_TRUE(builder.take_image_errors().empty());
+}
+
+TEST(SubmapBuilder, ImagesElsewhereThanAtAKeyframeAreRefused) {
+  SubmapBuilder builder(RobotId{3}, {});
+  EXPECT_FALSE(builder.add_images(images_at(at(0.0), 0.0)).has_value());
+  ASSERT_TRUE(builder.add_odometry(at(0.0), ahead(0.0), kStepCovariance).has_value());
+  EXPECT_FALSE(builder.add_images(images_at(at(0.1), 0.0)).has_value());
+  EXPECT_TRUE(builder.add_images(images_at(at(0.0), 0.0)).has_value());
+  EXPECT_FALSE(builder.add_images(images_at(at(0.0), 0.0)).has_value());  // again
+  ASSERT_TRUE(builder.add_odometry(at(0.1), ahead(0.05), kStepCovariance).has_value());
+  EXPECT_FALSE(builder.add_images(images_at(at(0.1), 0.05)).has_value());  // no keyframe
+  ASSERT_TRUE(builder.add_odometry(at(2.0), ahead(1.0), kStepCovariance).has_value());
+  TrackedImages bad = images_at(at(2.0), 1.0);
+  bad.images[0].keypoints[1].track = bad.images[0].keypoints[0].track;
+  EXPECT_FALSE(builder.add_images(bad).has_value());
+  bad = images_at(at(2.0), 1.0);
+  bad.cameras = std::make_shared<const std::vector<Camera>>(2, bad.cameras->front());
+  EXPECT_FALSE(builder.add_images(bad).has_value());  // not the robot's cameras
 }
 
 }  // namespace

@@ -94,7 +94,10 @@ std::vector<Matrix6d> spread_odometry(const MapEstimate& map, std::span<const st
     for (; e < map.odometry_edges && map.graph.edges[e].to <= spread[k]; ++e) {
       const PoseGraphEdge& edge = map.graph.edges[e];
       if (edge.from != reached) break;
-      out[k] = compound_covariance(edge.T_from_to, out[k], edge.information.inverse() / weights[e]);
+      const auto refined = map.odometry_of_steps.find(e);
+      out[k] = compound_covariance(
+          edge.T_from_to, out[k],
+          refined == map.odometry_of_steps.end() ? Matrix6d(edge.information.inverse() / weights[e]) : refined->second);
       reached = edge.to;
     }
     if (reached == spread[k]) continue;
@@ -155,7 +158,7 @@ std::vector<double> honest_weights(const MapEstimate& map) {
   std::vector<double> out(map.graph.edges.size(), 1.0);
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
     if (const auto found = map.overstated.find(map.nodes[map.graph.edges[e].from].id.chain);
-        found != map.overstated.end())
+        found != map.overstated.end() && !map.odometry_of_steps.contains(e))
       out[e] = 1.0 / found->second;
   return out;
 }

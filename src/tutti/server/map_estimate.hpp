@@ -74,6 +74,8 @@ struct MapEstimate {
   std::map<ChainId, double> understated;
   /// By which the map shows the variances of each chain's odometry, as in `graph`, to be overstated still, in (0, 1].
   std::map<ChainId, double> overstated;
+  /// Of odometry edges whose place a refined step has taken (map_refiner.hpp), by edge: the covariance of the odometry.
+  std::map<std::size_t, Matrix6d> odometry_of_steps;
   std::uint32_t components = 0;  ///< Connected components that contain a node.
   /// Submaps that contradict earlier ones of their chain: keyframes that are there already, at other moments or out of
   /// order. And all of a chain without which the map can be solved, and with which it cannot.

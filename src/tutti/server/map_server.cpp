@@ -311,9 +311,21 @@ ProxyGraphMessage MapServer::optimise() {
   return rebuild();
 }
 
+void MapServer::refine() {
+  if (refiner_ == nullptr || config_.refine_every == 0) return;
+  if (steps_.empty() || state_.revision % static_cast<std::uint64_t>(config_.refine_every) == 0) {
+    if (auto steps = refiner_->refine({map_, state_.submaps, state_.payload_sizes, state_.verdicts, *payloads_}))
+      steps_ = std::move(*steps);
+    else
+      late_errors_.push_back(std::move(steps.error()));
+  }
+  map_ = with_steps(map_, steps_);
+}
+
 ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
   map_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
+  refine();
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
                             .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};
   message.graph.epoch = state_.epoch;

@@ -17,6 +17,7 @@
 #include "tutti/server/answered_pairs.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/server/map_estimate.hpp"
+#include "tutti/server/map_refiner.hpp"
 #include "tutti/server/payload_store.hpp"
 #include "tutti/server/refusal_counts.hpp"
 
@@ -25,12 +26,16 @@ namespace tutti::server {
 struct ServerConfig {
   MapConfig map;
   consistency::ProxyGraphConfig proxy_graph;
+  int refine_every = 1;
   double update_period_s = 10.0;  ///< Mission time between two optimisations when something new has come.
   std::string broadcast = "own";
   template <class V>
   void describe(V& v) {
     v.field("map", map);
     v.field("proxy_graph", proxy_graph);
+    v.field("refine_every", refine_every, at_least(0),
+            "Every how many updates bundle adjustment goes over the whole map, where cameras saw it; the updates "
+            "between keep what it found of the older part. 0: never.");
     v.field("update_period_s", update_period_s, greater_than(0.0),
             "Mission time between two optimisations when there is something new.");
     v.field("broadcast", broadcast, one_of({"own", "all"}),
@@ -77,6 +82,9 @@ class MapServer {
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
             MapServerState state);
 
+  /// Maps are refined by this from now on (ServerConfig::refine_every); not null.
+  void refine_with(std::shared_ptr<const MapRefiner> refiner) { refiner_ = std::move(refiner); }
+
   /// One more that submaps may come from. Each has the less room for sessions, the more there are.
   void add_robot(RobotId robot) { robots_.insert(robot); }
 
@@ -96,7 +104,8 @@ class MapServer {
   /// error, and nothing changes: its submaps are not there, or there are no closures to accept. Of two words on one
   /// pair the later one holds. A verdict whose closures are accepted stays as it is, whatever newer finders say.
   Status receive(const SubmapPair& pair, const ClosureWord& word);
-  /// Why verdicts that had waited were no good when their submaps came, since the last call.
+  /// Why verdicts that had waited were no good when their submaps came, or a map could not be refined, since the last
+  /// call.
   std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }
   /// Verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
@@ -131,6 +140,8 @@ class MapServer {
   [[nodiscard]] Status check_against_submaps(const ClosureVerdict& verdict) const;
   Status wait_for_submaps(const ClosureVerdict& verdict);
   void judge_waiting();
+  /// The map that is there.
+  void refine();
   /// What is good.
   void take(const ClosureVerdict& verdict);
 
@@ -143,6 +154,8 @@ class MapServer {
   std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are asked when the submaps come
   std::vector<Error> late_errors_;
   MapEstimate map_;
+  std::shared_ptr<const MapRefiner> refiner_;  // null: of none
+  std::vector<RefinedStep> steps_;             // by it
   bool news_ = false;
 };
 

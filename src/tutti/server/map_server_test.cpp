@@ -344,14 +344,14 @@ TEST(MapServer, ASubmapThatComesAgainReplacesItsLostCloud) {
   other.submap = messages[5].submap;
   other.submap.id = id;
   EXPECT_FALSE(server.receive(other).has_value());
-  EXPECT_FALSE(store->get(id).has_value());
+  EXPECT_FALSE(store->cloud(id).has_value());
   store->is_full = true;
   EXPECT_FALSE(server.receive(messages[3]).has_value());
   store->is_full = false;
   EXPECT_TRUE(server.receive(messages[3]).has_value());
   EXPECT_EQ(store->puts, puts + 1);
-  ASSERT_TRUE(store->get(id).has_value());
-  EXPECT_EQ((*store->get(id))->points, messages[3].submap.cloud->points);
+  ASSERT_TRUE(store->cloud(id).has_value());
+  EXPECT_EQ((*store->cloud(id))->points, messages[3].submap.cloud->points);
   EXPECT_EQ(server.state().submaps.size(), messages.size());
 }
 

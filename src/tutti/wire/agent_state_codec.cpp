@@ -145,6 +145,39 @@ void pass(A& a, lidar::PosedCloud& scan) {
   scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
 }
 template <class A>
+void pass(A& a, TrackedKeypoint& keypoint) {
+  for (float& x : keypoint.pixel) a.coordinate(x);
+  a.coordinate(keypoint.sigma_px);
+  pass(a, keypoint.track);
+}
+template <class A>
+void pass(A& a, TrackedImage& image) {
+  pass(a, image.camera);
+  pass(a, image.keypoints);
+  pass(a, image.descriptors.kind);
+  pass(a, image.descriptors.words);
+  pass(a, image.descriptors.bits);
+}
+template <class A>
+void pass(A& a, Camera& camera) {
+  CameraModel& model = camera.model;
+  pass(a, model.kind);
+  pass(a, model.width_px);
+  pass(a, model.height_px);
+  for (double* x : {&model.fx, &model.fy, &model.cx, &model.cy}) a.number(*x);
+  for (double& x : model.distortion) a.number(x);
+  pass(a, camera.T_body_camera);
+}
+template <class A>
+void pass(A& a, TrackedImages& images) {
+  pass(a, images.stamp);
+  std::vector<Camera> cameras;
+  if (images.cameras != nullptr) cameras = *images.cameras;
+  pass(a, cameras);
+  images.cameras = std::make_shared<const std::vector<Camera>>(std::move(cameras));
+  pass(a, images.images);
+}
+template <class A>
 void pass(A& a, robot::FinishedSubmap& finished) {
   pass(a, finished.submap.id.chain.robot.value);
   pass(a, finished.submap.id.chain.session);
@@ -152,6 +185,8 @@ void pass(A& a, robot::FinishedSubmap& finished) {
   pass(a, finished.submap.keyframes);
   pass(a, finished.submap.odometry);
   pass(a, finished.scans);
+  pass(a, finished.images);
+  pass(a, finished.awaits_images);
 }
 template <class A>
 void pass(A& a, robot::SubmapBuilderState& builder) {
@@ -159,6 +194,7 @@ void pass(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.keyframes);
   pass(a, builder.odometry);
   pass(a, builder.scans);
+  pass(a, builder.images);
   pass(a, builder.finished);
   pass(a, builder.since_keyframe);
   pass(a, builder.recent);
@@ -200,6 +236,7 @@ bool is_sound(const RelativePose& measured) {
   return is_sound(measured.T_a_b) && check_covariance(measured.covariance);
 }
 bool is_sound(const lidar::PosedCloud& scan) { return is_sound(scan.T_submap_body); }
+bool is_sound(const TrackedImages& images) { return check_images(images).has_value(); }
 bool is_sound(const robot::Whereabouts& other) { return is_sound(other.T_map_body); }
 template <class T>
 bool all_sound(const std::vector<T>& list) {
@@ -220,10 +257,10 @@ bool is_chain(const std::vector<Keyframe>& keyframes, const std::vector<Relative
 bool is_sound(const robot::SubmapBuilderState& builder) {
   const auto is_whole = [](const robot::FinishedSubmap& finished) {
     return !finished.submap.keyframes.empty() && is_chain(finished.submap.keyframes, finished.submap.odometry) &&
-           all_sound(finished.scans);
+           all_sound(finished.scans) && all_sound(finished.images);
   };
   const auto follows = [](const StampedPose& a, const StampedPose& b) { return a.stamp >= b.stamp; };
-  return is_chain(builder.keyframes, builder.odometry) && all_sound(builder.scans) &&
+  return is_chain(builder.keyframes, builder.odometry) && all_sound(builder.scans) && all_sound(builder.images) &&
          std::ranges::all_of(builder.finished, is_whole) && is_sound(builder.since_keyframe) &&
          std::ranges::all_of(builder.recent, [](const StampedPose& at) { return is_sound(at.pose); }) &&
          std::ranges::adjacent_find(builder.recent, follows) == builder.recent.end() &&
@@ -279,6 +316,24 @@ Result<AgentState> decode_agent_state(std::string_view bytes) {
   if (!reader.is_complete()) return fail(ErrorCode::parse, "agent state: not as many numbers as its lengths say");
   if (const char* wrong = what_is_wrong(state)) return fail(ErrorCode::invalid, "agent state: {}", wrong);
   return state;
+}
+
+std::string encode(const TrackedImages& images) {
+  v1::AgentState out;
+  Writer writer(out);
+  TrackedImages copy = images;
+  pass(writer, copy);
+  return pack_frame(MessageKind::tracked_images, out.SerializeAsString());
+}
+
+Result<TrackedImages> decode_tracked_images(std::string_view bytes) {
+  const auto parsed = parse_frame<v1::AgentState>(MessageKind::tracked_images, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  TrackedImages images;
+  Reader reader(parsed->message);
+  pass(reader, images);
+  if (!reader.is_complete()) return fail(ErrorCode::parse, "tracked images: not as many numbers as their lengths say");
+  return images;
 }
 
 }  // namespace tutti::wire

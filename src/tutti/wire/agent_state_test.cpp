@@ -21,7 +21,18 @@ using robot::test::at;
 
 constexpr RobotId kRobot{1};
 
-/// A robot's mission, sample by sample: scans at keyframes, a proxy graph now and then, submaps taken late.
+/// Of one camera that tracks a few points.
+TrackedImages images_at(Timestamp stamp, Rng& rng) {
+  TrackedImage image;
+  for (std::uint64_t track = 0; track < 5; ++track)
+    image.keypoints.push_back({{100.0F + static_cast<float>(rng.normal()), 50.0F}, 0.8F, track});
+  const std::vector<Camera> cameras{
+      {.model = {CameraKind::pinhole, 752, 480, 458.0, 457.0, 367.0, 248.0, {}}, .T_body_camera = {}}};
+  return {stamp, std::make_shared<const std::vector<Camera>>(cameras), {image}};
+}
+
+/// A robot's mission, sample by sample: images and perhaps scans at keyframes, a proxy graph now and then, submaps
+/// taken late.
 struct Mission {
   robot::AgentConfig config;
   Trajectory odometry = robot::test::drifting_odometry(70);
@@ -42,6 +53,9 @@ struct Mission {
         PointCloud cloud;
         for (int p = 0; p < 20; ++p) cloud.points.push_back(3.0F * Eigen::Vector3d(rng.normal(), 1, 2).cast<float>());
         EXPECT_TRUE(agent.add_scan({odometry[i].stamp, std::make_shared<const PointCloud>(cloud), {}}).has_value());
+      }
+      if (agent.wants_scan()) {
+        EXPECT_TRUE(agent.add_images(images_at(odometry[i].stamp, rng)).has_value());
       }
       if (rng.bernoulli(0.05)) {
         ProxyGraphMessage message = robot::test::broadcast(agent, i, robot::test::kWorld);

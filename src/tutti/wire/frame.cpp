@@ -21,7 +21,7 @@ constexpr std::size_t most_bytes(MessageKind kind) {
   return kind == MessageKind::agent_state ? kMaxStateBytes : kMaxMessageBytes;
 }
 constexpr std::string_view kUnknown = "unknown";
-constexpr auto kLastKind = static_cast<unsigned>(MessageKind::proxy_graph_delta);
+constexpr auto kLastKind = static_cast<unsigned>(MessageKind::tracked_images);
 
 }  // namespace
 
@@ -55,6 +55,8 @@ const char* name(MessageKind kind) {
       return "word";
     case MessageKind::proxy_graph_delta:
       return "proxy graph delta";
+    case MessageKind::tracked_images:
+      return "tracked images";
   }
   return kUnknown.data();
 }
@@ -64,7 +66,8 @@ const char* name(MessageKind kind) {
 // job: from 2 on with evidence. Proxy graph: up to 5 it told what it is unsure of in other terms, which no robot
 // compares any more, up to 6 not where others were last seen, and 7 said more of whole scales than anybody needs;
 // nobody keeps one. Cloud: came with 2, the same since. Receipt: 2 says what is refused, and whose the number is. Agent
-// state: 1 did not say how sure the robot is of where it is.
+// state: 1 did not say how sure the robot is of where it is, 2 knew no
+// images.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
@@ -86,9 +89,10 @@ Versions versions(MessageKind kind) {
     case MessageKind::submap_copy:
     case MessageKind::proxy_graph_delta:
     case MessageKind::mission_status:
+    case MessageKind::tracked_images:
       return {.oldest = 1, .current = 1};
     case MessageKind::agent_state:
-      return {.oldest = 2, .current = 2};
+      return {.oldest = 3, .current = 3};
   }
   return {};
 }

@@ -22,6 +22,7 @@ enum class MessageKind : std::uint8_t {
   submap_copy = 14,        ///< One of them.
   word = 15,               ///< What an operator says of a closure.
   proxy_graph_delta = 17,  ///< A proxy graph in terms of an earlier one.
+  tracked_images = 18,     ///< A robot's own, in its journal.
 };
 
 /// In words: "submap", "proxy graph", ...

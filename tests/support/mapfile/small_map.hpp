@@ -29,7 +29,7 @@ class ExplainingFinder final : public server::ClosureFinder {
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override {
-    auto verdict = finder_.verify(first, second, clouds);
+    auto verdict = finder_.verify(first, second, payloads);
     verdict->evidence = {{RefusalReason::overlap, 0.75, 0.3}};
     return verdict;
   }

@@ -79,6 +79,7 @@ std::span<const Field> fields_of(MessageKind kind) {
     case MessageKind::cloud:
       return kCloud;
     case MessageKind::agent_state:
+    case MessageKind::tracked_images:
       return kAgentState;
     case MessageKind::receipt:
       return kReceipt;

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/bundle_refiner.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace tutti::mission {
+namespace {
+
+using server::JudgedClosure;
+
+/// Pairs of submaps of which the map has accepted a closure.
+std::set<SubmapPair> accepted_pairs(const server::MapToRefine& map) {
+  std::set<std::pair<KeyframeId, KeyframeId>> accepted;
+  for (const JudgedClosure& judged : map.estimate.closures)
+    if (judged.accepted) accepted.insert({judged.closure.from, judged.closure.to});
+  std::set<SubmapPair> out;
+  for (const auto& [pair, verdict] : map.verdicts)
+    if (std::ranges::any_of(verdict.closures, [&](const LoopClosure& c) { return accepted.contains({c.from, c.to}); }))
+      out.insert(pair);
+  return out;
+}
+
+}  // namespace
+
+/// Submaps whose keyframes the map all has, with what their cameras saw.
+Result<std::vector<bundle::PosedSubmap>> BundleRefiner::posed(const server::MapToRefine& map) const {
+  std::vector<bundle::PosedSubmap> out;
+  for (const auto& [id, size] : map.payload_sizes) {
+    if (size.observations == 0) continue;
+    auto payload = map.payloads.visual(id);
+    if (!payload) return tl::unexpected(payload.error());
+    auto submap = std::make_shared<Submap>(*map.submaps.at(id));
+    submap->visual = std::move(*payload);
+    bundle::PosedSubmap at{.submap = nullptr, .T_world_body = {}};
+    for (const Keyframe& keyframe : submap->keyframes) {
+      const KeyframeId node{id.chain, keyframe.index};
+      const auto found = std::ranges::lower_bound(map.estimate.nodes, node, {}, &server::MapNode::id);
+      if (found == map.estimate.nodes.end() || found->id != node) break;  // of a submap that was left out
+      at.T_world_body.push_back(found->T_world_body);
+    }
+    if (at.T_world_body.size() != submap->keyframes.size()) continue;
+    at.submap = std::move(submap);
+    out.push_back(std::move(at));
+  }
+  return out;
+}
+
+/// A function of the two submaps alone, so it is kept.
+const BundleRefiner::Matches& BundleRefiner::matches(const SubmapPair& pair, const Submap& first,
+                                                     const Submap& second) const {
+  const auto [found, fresh] = matches_.try_emplace(pair);
+  if (fresh)
+    found->second = visual::matched_landmarks(visual::extract_features(first, closures_),
+                                              visual::extract_features(second, closures_), closures_);
+  return found->second;
+}
+
+Result<std::vector<server::RefinedStep>> BundleRefiner::refine(const server::MapToRefine& map) const {
+  auto submaps = posed(map);
+  if (!submaps) return tl::unexpected(submaps.error());
+  std::vector<server::RefinedStep> steps;
+  if (submaps->empty()) return steps;
+  bundle::RefinementInput input{.submaps = std::move(*submaps), .matches = {}};
+  const auto seen = [&](SubmapId id) {
+    return std::ranges::find(input.submaps, id, [](const bundle::PosedSubmap& at) { return at.submap->id; });
+  };
+  const std::scoped_lock lock(mutex_);
+  for (const SubmapPair& pair : accepted_pairs(map)) {
+    const auto first = seen(pair.first), second = seen(pair.second);
+    if (first == input.submaps.end() || second == input.submaps.end()) continue;
+    for (const auto& [a, b] : matches(pair, *first->submap, *second->submap))
+      input.matches.push_back({{pair.first, a}, {pair.second, b}});
+  }
+  auto refined = bundle::refine_map(input, config_);
+  if (!refined) return tl::unexpected(refined.error());
+  for (const bundle::RelativeFactor& factor : refined->factors) steps.push_back({factor.from, factor.measurement});
+  last_ = std::move(*refined);
+  return steps;
+}
+
+std::shared_ptr<const BundleRefiner> make_refiner(const MissionConfig& config) {
+  if (config.closures.finder != "visual" && config.closures.finder != "sensors") return nullptr;
+  return std::make_shared<const BundleRefiner>(config.refinement, config.closures.visual);
+}
+
+std::optional<bundle::Refinement> BundleRefiner::last() const {
+  const std::scoped_lock lock(mutex_);
+  return last_;
+}
+
+}  // namespace tutti::mission
