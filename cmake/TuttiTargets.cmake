@@ -94,17 +94,22 @@ function(tutti_add_proto target file)
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON PYTHON_FOLDER "${generated}")
 endfunction()
 
-# tutti_add_tests(<module> TESTS a internal/b.. [NOT_SANITIZED c..] [LIBS libs..] [LABEL label] [TIMEOUT seconds])
+# tutti_add_tests(<module> TESTS a internal/b.. [NO_THREADS c..] [NOT_SANITIZED d..] [LIBS libs..] [LABEL label] [TIMEOUT s])
 # makes one executable test_<module> of a_test.cpp, internal/b_test.cpp.. and one ctest entry "module/a" for each file.
-# NOT_SANITIZED: files that would only repeat under a sanitizer what others have run there. A file that includes
-# RapidCheck is labelled `property`, any other `unit`, unless LABEL says otherwise.
+# NO_THREADS: files that TSan would find nothing in. NOT_SANITIZED: files that would only repeat under a sanitizer what
+# others have run there. A file that includes RapidCheck is labelled `property`, any other `unit`, unless LABEL says otherwise.
 function(tutti_add_tests module)
   if(NOT TUTTI_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "TESTS;NOT_SANITIZED;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "TESTS;NO_THREADS;NOT_SANITIZED;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
+  endif()
+  if(TUTTI_SANITIZE STREQUAL "thread")
+    list(APPEND ARG_NOT_SANITIZED ${ARG_NO_THREADS})
+  else()
+    list(APPEND ARG_TESTS ${ARG_NO_THREADS})
   endif()
   if(TUTTI_SANITIZE AND NOT ARG_TESTS)
     list(TRANSFORM ARG_NOT_SANITIZED PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
@@ -138,7 +143,16 @@ function(tutti_add_tests module)
     add_test(NAME ${module}/${name} COMMAND ${target} --tutti_file=${file})
     set_tests_properties(${module}/${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${label}
                          SKIP_REGULAR_EXPRESSION "TUTTI_ALL_SKIPPED")
+    if(ARG_LABEL STREQUAL "system")
+      tutti_waits_much(${module}/${name})
+    endif()
   endforeach()
+endfunction()
+
+# A test of several processes, which mostly wait: scripts/test.sh runs one of these at a time, from the beginning on,
+# beside one other test on each core.
+function(tutti_waits_much test)
+  set_tests_properties(${test} PROPERTIES RESOURCE_LOCK system COST 1000)
 endfunction()
 
 # Every *_test.cpp is in some list: a forgotten one would never fail.

@@ -4,6 +4,7 @@
 import contextlib
 import json
 import math
+import os
 import pathlib
 import sqlite3
 import subprocess
@@ -132,6 +133,8 @@ class CommandLine(unittest.TestCase):
         graph = json.loads(tutti("compare", out / "graph.g2o", out / "graph.g2o", "--json").stdout)
         self.assertFalse(graph["disagree"])
         self.assertEqual([robot["nodes"] for robot in graph["robots"]], [robot["nodes"] for robot in same["robots"]])
+        if os.environ.get("TUTTI_SANITIZE"):
+            return
         # The effective configuration is a mission file that runs again with the same result.
         self.expect(tutti("run", out / "config.yaml", "--out", self.path / "again", "--seed", 7), 0)
         self.assertEqual((out / "report.json").read_text(), (self.path / "again" / "report.json").read_text())

@@ -71,7 +71,7 @@ std::size_t closures_between_good_robots(const MapEstimate& map) {
 }
 
 TEST(WildOdometry, OfOneRobotHarmsNoOther) {
-  constexpr std::size_t kSeeds = tutti::seeds<std::size_t>(100);
+  const std::size_t kSeeds = tutti::seeds<std::size_t>(100);
   std::size_t informed = 0;
   std::size_t kept = 0;
   std::size_t without_it = 0;
