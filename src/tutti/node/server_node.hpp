@@ -72,6 +72,7 @@ class ServerNode {
   bool admit(RobotId robot);
   void receive_status(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
+  [[nodiscard]] bool waits_too_long(RobotId robot, const NodeStatus& status, Timestamp now);
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// For good: the robot need not send it again.
   void note_refused(SubmapId id, const std::string& why, Step& step);
@@ -109,6 +110,7 @@ class ServerNode {
   server::MapServer server_;
   std::map<RobotId, Receipt> receipts_;
   RobotRegistry registry_;
+  std::map<RobotId, Timestamp> waits_since_;  // robots with a backlog: since then without a receipt that was due
   std::map<std::uint32_t, MissionStatus::Worker> workers_;
   std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
   std::map<std::uint64_t, OpenJob> open_jobs_;  // of this start, by number

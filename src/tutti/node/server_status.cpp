@@ -11,6 +11,7 @@ namespace tutti::node {
 namespace {
 
 constexpr double kWorkerIsGone_s = 300.0;
+constexpr double kReceiptAgain_s = 60.0;
 
 std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
   std::uint64_t all = 0;
@@ -61,9 +62,22 @@ void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status
     if (receipt.conflict && receipt.conflict->session == status.session) receipt.conflict.reset();
     if (before != owner) step.tell(now, RobotJoined{robot, status.name, status.session});
   }
-  if (receipt == old) return;
-  ++changes_;
-  send_receipt(robot, step);
+  const bool is_due = heard.accepted && waits_too_long(robot, status, now);
+  if (receipt != old) ++changes_;
+  if (receipt != old || is_due) send_receipt(robot, step);
+}
+
+/// Then its last receipt may have been lost, with a bus that was killed, and its submap does not come a second time:
+/// the bus takes an id once a day.
+bool ServerNode::waits_too_long(RobotId robot, const NodeStatus& status, Timestamp now) {
+  if (status.backlog_submaps == 0) {
+    waits_since_.erase(robot);
+    return false;
+  }
+  const auto since = waits_since_.try_emplace(robot, now).first;
+  if (now - since->second < kReceiptAgain_s) return false;
+  since->second = now;
+  return true;
 }
 
 MissionStatus ServerNode::mission_status(Timestamp now) const {

@@ -76,6 +76,28 @@ class ServerStatus : public testing::Test {
   Timestamp now_ = Timestamp{} + 3.0;
 };
 
+TEST_F(ServerStatus, ARobotWhoseSubmapsWaitIsToldAgainWhatIsStored) {
+  const auto receipts = [&](std::uint64_t backlog) {
+    const Step step = receive(
+        to_server(Endpoint::of(kAlpha), {.name = "alpha", .session = 7, .start = 2, .backlog_submaps = backlog}));
+    return std::ranges::count(step.messages, MessageKind::receipt, &bus::Envelope::kind);
+  };
+  EXPECT_EQ(receipts(1), 1);  // it is the owner
+  receive(test::envelope(test::submap({kAlpha, 7}, 0)));
+  receipts_.clear();  // with the bus
+  for (now_ = now_ + 58.0; now_ - Timestamp{} < 62.0; now_ = now_ + 2.0) EXPECT_EQ(receipts(1), 0);
+  now_ = now_ + 2.0;
+  EXPECT_EQ(receipts(1), 1);
+  EXPECT_TRUE(receipt(kAlpha).contains({{kAlpha, 7}, 0}));
+  now_ = now_ + 59.0;
+  EXPECT_EQ(receipts(1), 0);
+  now_ = now_ + 2.0;
+  EXPECT_EQ(receipts(1), 1);
+  EXPECT_EQ(receipts(0), 0);
+  now_ = now_ + 100.0;
+  EXPECT_EQ(receipts(1), 0);
+}
+
 TEST_F(ServerStatus, FoldsWhatItKnowsOfEverybody) {
   NodeStatus status{.name = "alpha", .session = 7, .backlog_submaps = 4, .update_age_s = 1.0, .finished = true};
   receive(to_server(Endpoint::of(kAlpha), status));
