@@ -132,6 +132,12 @@ Status NatsConnection::add_stream(jsStreamConfig& stream) const {
   status = found ? js_UpdateStream(&info, streams_, &stream, nullptr, &code)
                  : js_AddStream(&info, streams_, &stream, nullptr, &code);
   const NatsOwned<jsStreamInfo> made(status == NATS_OK ? info : nullptr);
+  if (code == JSStorageResourcesExceededErr)
+    return fail(ErrorCode::io,
+                "{}: the bus has no {} MB for stream {} beside what other missions have set aside: give it more "
+                "(max_file in the jetstream block of nats-server's configuration), or remove what a mission M that is "
+                "over has left (nats stream rm, of SUBMAPS_M, VERDICTS_M, JOBS_M and KV_GRAPH_M)",
+                url_, stream.MaxBytes >> 20, stream.Name);
   if (status != NATS_OK) return failure(status, fmt::format("stream {}", stream.Name), code);
   return {};
 }

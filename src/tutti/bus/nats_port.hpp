@@ -17,7 +17,7 @@ struct NatsPortOptions {
   bool allow_insecure = false;
   std::uint64_t max_waiting_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
-  std::uint64_t max_stream_bytes = std::uint64_t{2} << 30U;
+  std::uint64_t max_stream_bytes = std::uint64_t{512} << 20U;
   double stranded_s = 30.0;
   template <class V>
   void describe(V& v) {
@@ -29,7 +29,8 @@ struct NatsPortOptions {
     v.field("max_held_bytes", max_held_bytes, at_least(0.0),
             "Messages received and not acknowledged; then the rest stays on the bus.");
     v.field("max_stream_bytes", max_stream_bytes, at_least(0.0),
-            "Submaps on the bus; then it takes no more. An eighth each for verdicts, jobs and retained values.");
+            "Submaps on the bus; then it takes no more. An eighth each for verdicts, jobs and retained values. The bus "
+            "sets that room aside for the mission.");
     v.field("stranded_s", stranded_s, greater_than(0.0),
             "Messages that the bus has and gives to nobody for so long, as after a power failure, are dropped with "
             "their stream, which is made anew: who sent them sends them again. A worker's job that has ended five "

@@ -143,6 +143,20 @@ TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
   EXPECT_EQ(receiver.again(), 0);
 }
 
+TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomIsToldWhatToDo) {
+  NatsNetwork network;  // 256 MB, of which mission "test" has set 176 aside
+  NatsPortOptions options = network.options(kServer);
+  options.mission = "other";
+  const Status refused = prepare_nats(options);
+  ASSERT_FALSE(refused.has_value());
+  for (const char* word : {"SUBMAPS_other", "128 MB", "max_file", "nats stream rm"})
+    EXPECT_NE(refused.error().message.find(word), std::string::npos) << word << " in " << refused.error().message;
+  options.max_stream_bytes = 32U << 20U;
+  const Status fits = prepare_nats(options);
+  EXPECT_TRUE(fits.has_value()) << fits.error().message;
+  EXPECT_GE(NatsChildOptions{}.max_store_bytes, 5 * 11 * NatsPortOptions{}.max_stream_bytes / 8);  // five missions
+}
+
 TEST_F(NatsPortTest, HoldsNoMoreThanItMayAndTheRestStaysOnTheBus) {
   NatsNetwork network;
   const auto robot = network.open(kRobot);
