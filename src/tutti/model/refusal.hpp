@@ -39,6 +39,16 @@ enum class RefusalReason : std::uint8_t {
   distant = 20,
   // Of a closure that a finder found, by the joint map.
   inconsistent = 21,
+  // Of a submap's images, whatever they are compared with.
+  no_images = 22,
+  too_few_landmarks = 23,
+  landmark_residual = 24,  ///< Landmarks miss their own pixels: the calibration is wrong.
+  // Of the images of two submaps.
+  descriptor_kinds = 25,
+  too_few_matches = 26,
+  too_few_inliers = 27,
+  position_sigma = 28,
+  image_spread = 29,
 };
 
 /// What is measured for a reason, and the words for people and for report.json.
@@ -50,7 +60,7 @@ struct RefusalKind {
   int digits = 0;  ///< Behind the point, in text.
 };
 
-inline constexpr std::array<RefusalKind, 22> kRefusalKinds = {{
+inline constexpr std::array<RefusalKind, 30> kRefusalKinds = {{
     {"other"},
     {"too small", RefusalKind::Bound::at_least, "points"},
     {"too few keyframes", RefusalKind::Bound::at_least, "keyframes"},
@@ -73,6 +83,14 @@ inline constexpr std::array<RefusalKind, 22> kRefusalKinds = {{
     {"no keyframes near each other"},
     {"distant places"},
     {"inconsistent with the others"},
+    {"no images"},
+    {"too few landmarks", RefusalKind::Bound::at_least, "landmarks"},
+    {"landmarks miss their own pixels: wrong calibration", RefusalKind::Bound::at_most, "px", 1},
+    {"descriptors of different kinds"},
+    {"too few matches", RefusalKind::Bound::at_least, "matches"},
+    {"too few inliers", RefusalKind::Bound::at_least, "inliers"},
+    {"position sigma", RefusalKind::Bound::at_most, "m", 3},
+    {"spread over the image", RefusalKind::Bound::at_least, "", 2},
 }};
 
 constexpr const RefusalKind& kind_of(RefusalReason reason) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <gtest/gtest.h>
-
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -131,6 +131,19 @@ inline Seen fly(const std::vector<RoomPoint>& room, const std::vector<Camera>& c
     out.keyframes.push_back(
         {f.first_keyframe + k, Timestamp{} + (f.start_s + k), f.T_odom_world * out.T_world_submap * T_submap_body});
   }
+  return out;
+}
+
+/// The flight as a submap, its odometry as sure as it says.
+inline Submap make_submap(SubmapId id, const Seen& seen, const std::vector<Camera>& cameras,
+                          const VisualSubmapConfig& config = {}, double sigma_m = 0.01, double sigma_rad = 0.002) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
+  Submap out{.id = id, .keyframes = seen.keyframes};
+  for (std::size_t k = 1; k < seen.keyframes.size(); ++k)
+    out.odometry.push_back(
+        {seen.keyframes[k - 1].T_odom_body.inverse() * seen.keyframes[k].T_odom_body, sigma.cwiseAbs2().asDiagonal()});
+  out.visual = std::make_shared<const VisualPayload>(make_visual_payload(seen.images, cameras, config).value());
   return out;
 }
 

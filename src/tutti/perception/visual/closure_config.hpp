@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+#include "tutti/base/config.hpp"
+#include "tutti/perception/visual/absolute_pose.hpp"
+
+namespace tutti::visual {
+
+/// From two visual payloads to loop closures or a refusal.
+struct VisualClosureConfig {
+  double min_time_apart_s = 0.0;       ///< Between two submaps of any robots: for recordings cut from one.
+  int min_landmarks = 30;              ///< Of a submap, with descriptors.
+  double max_residual_px = 3.0;        ///< Of a submap's landmarks in its own images, RMS: its calibration.
+  double max_hamming = 0.16;           ///< Of a match, as a share of the bits.
+  double max_hamming_ratio = 0.9;      ///< To the nearest descriptor of another landmark.
+  int min_matches = 8;                 ///< And inliers: with fewer nothing is tried, or believed.
+  AbsolutePoseConfig pose;             ///< RANSAC.
+  double max_position_sigma_m = 0.02;  ///< Of the closure, in its most uncertain direction.
+  double min_spread = 0.1;             ///< Area of the box around the inliers, as a share of the image.
+  std::uint64_t ransac_seed = 0;
+  template <class V>
+  void describe(V& v) {
+    v.field("min_time_apart_s", min_time_apart_s, at_least(0.0),
+            "Submaps nearer in time are not compared, whosever they are: for robots cut from one recording.");
+    v.field("min_landmarks", min_landmarks, at_least(4), "Submaps with fewer landmarks with descriptors are not used.");
+    v.field("max_residual_px", max_residual_px, greater_than(0.0),
+            "RMS of a submap's landmarks in its own images above which its calibration is not believed.");
+    v.field("max_hamming", max_hamming, between(0.0, 1.0), "Bits in which a match may differ, as a share of all.");
+    v.field("max_hamming_ratio", max_hamming_ratio, between(0.0, 1.0),
+            "Distance of a match over that of the nearest descriptor of another landmark.");
+    v.field("min_matches", min_matches, at_least(4), "Matches, and inliers among them, of a keyframe.");
+    v.field("pose", pose, any(), "Where a keyframe is among the other submap's landmarks.");
+    v.field("max_position_sigma_m", max_position_sigma_m, greater_than(0.0),
+            "Standard deviation of a closure's position in its most uncertain direction.");
+    v.field("min_spread", min_spread, between(0.0, 1.0), "Box around the inliers as a share of the image.");
+    v.field("ransac_seed", ransac_seed, any(), "Another one draws other samples.");
+  }
+};
+
+}  // namespace tutti::visual
