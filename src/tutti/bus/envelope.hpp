@@ -25,7 +25,7 @@ struct Endpoint {
   static Endpoint server() { return {}; }
   static Endpoint of(RobotId id) { return {Role::robot, id.value}; }
   static Endpoint worker(std::uint32_t number) { return {Role::worker, number}; }
-  /// Whoever of the workers is free: only as a receiver.
+  /// Whoever of the workers is free: only as a receiver, or of a job that none of them has lived to answer.
   static Endpoint any_worker() { return worker(std::numeric_limits<std::uint32_t>::max()); }
 
   static Endpoint viewer(std::uint32_t number) { return {Role::viewer, number}; }

@@ -285,16 +285,19 @@ Result<std::optional<NatsConnection::Look>> NatsConnection::look_at(const std::s
 }
 
 /// One by one: a purge takes what is given for acknowledged (nats-server 2.9.10).
-Result<std::uint64_t> NatsConnection::remove_done(const std::string& stream, const Look& look) const {
-  std::uint64_t removed = 0;
+Status NatsConnection::remove_done(const std::string& stream, const Look& look,
+                                   const std::function<void(natsMsg*)>& take) const {
   const std::uint64_t end = std::min(look.done_up_to, look.first + kMostRemoved);
   for (std::uint64_t sequence = look.first; sequence <= end; ++sequence) {
     jsErrCode code{};
-    const natsStatus status = js_DeleteMsg(streams_, stream.c_str(), sequence, nullptr, &code);
-    if (status == NATS_OK) ++removed;
+    natsMsg* found = nullptr;
+    natsStatus status = js_GetMsg(&found, streams_, stream.c_str(), sequence, nullptr, &code);
+    const NatsOwned<natsMsg> message(status == NATS_OK ? found : nullptr);
+    if (status == NATS_OK) status = js_DeleteMsg(streams_, stream.c_str(), sequence, nullptr, &code);
+    if (status == NATS_OK) take(found);
     if (status == NATS_TIMEOUT || status == NATS_CONNECTION_CLOSED) return failure(status, "emptying " + stream, code);
   }
-  return removed;
+  return {};
 }
 
 Status NatsConnection::remove_stream(const std::string& stream) const {

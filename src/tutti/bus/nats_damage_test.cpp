@@ -89,7 +89,7 @@ TEST_F(NatsDamage, AfterAPowerFailureNothingIsHeldBackForLong) {
   EXPECT_EQ(hub->state().streams_made_anew, 1U) << hub->state().last_error;
 }
 
-TEST_F(NatsDamage, AJobThatEndsEveryWorkerIsRemovedAndTheOthersStay) {
+TEST_F(NatsDamage, AJobThatEndsEveryWorkerComesBackAndTheOthersStay) {
   NatsNetwork network;
   const auto hub = open_hub(network, 0.8);
   send(*hub, Endpoint::any_worker(), MessageKind::job, 0);
@@ -117,6 +117,12 @@ TEST_F(NatsDamage, AJobThatEndsEveryWorkerIsRemovedAndTheOthersStay) {
   worker->acknowledge(ticket);
   EXPECT_EQ(got(*worker, 5.0), "2");
   EXPECT_TRUE(within(5.0, [&] { return hub->state().jobs_removed == 1; })) << hub->state().last_error;
+  const auto returned = hub->receive();
+  ASSERT_EQ(returned.size(), 1U);
+  EXPECT_EQ(returned[0].envelope.from, Endpoint::any_worker());
+  EXPECT_EQ(returned[0].envelope.kind, MessageKind::job);
+  EXPECT_EQ(returned[0].envelope.id, "0");
+  EXPECT_FALSE(returned[0].envelope.bytes->empty());
   worker->acknowledge(ticket);
   send(*hub, Endpoint::any_worker(), MessageKind::job, 3);
   EXPECT_EQ(got(*worker, 5.0), "3");

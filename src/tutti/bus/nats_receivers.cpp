@@ -118,12 +118,14 @@ void JetStreamPort::watch() {
     if (!watched.since) watched.since = Clock::now();
     if (Clock::now() - *watched.since < std::chrono::duration<double>(options_.stranded_s)) return;
     if (stream == jobs && is_left && !watched.removed) {
-      const auto removed = connection.remove_done(stream, **look);
-      if (!removed) return note(removed.error().message);
-      watched.removed = *removed > 0 || (*look)->given == 0;  // or a job before these is being worked on
+      std::uint64_t removed = 0;
+      const Status done = connection.remove_done(stream, **look, [&](natsMsg* message) {
+        ++removed;
+        put_returned(message);
+      });
+      if (!done) return note(done.error().message);
+      watched.removed = removed > 0 || (*look)->given == 0;  // or a job before these is being worked on
       if (watched.removed) watched.since = Clock::now();
-      const std::scoped_lock guard(mutex_);
-      jobs_removed_ += *removed;
       return;
     }
     watched.since.reset();
@@ -141,6 +143,15 @@ void JetStreamPort::watch() {
          }
          return pause(std::chrono::duration<double>(options_.stranded_s / 4));
        });
+}
+
+void JetStreamPort::put_returned(natsMsg* message) {
+  const char* id = nullptr;
+  natsMsgHeader_Get(message, "Nats-Msg-Id", &id);
+  const auto part = part_of(id == nullptr ? "" : id);
+  const std::scoped_lock guard(mutex_);
+  ++jobs_removed_;
+  if (part) inbox_.put_returned(part->id, std::string(bytes_of(message)));
 }
 
 void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) {

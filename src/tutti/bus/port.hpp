@@ -29,7 +29,8 @@ class Port {
   /// to be sent again later.
   [[nodiscard]] virtual Status send(Envelope envelope) = 0;
   /// What has come, without waiting, each once for every time that it is owed. Of jobs one at a time: the next when the
-  /// last one is acknowledged.
+  /// last one is acknowledged. A job that has ended every worker that had it may come back to the server, from
+  /// any_worker(): nobody gets it any more.
   [[nodiscard]] virtual std::vector<Received> receive() = 0;
   /// The receiver has done, and stored, all that the message asks for: it need not come again. Needless, and allowed,
   /// for what is retained or best effort. Of a worker, which stores nothing, it holds when what it has sent before has

@@ -49,6 +49,8 @@ enum class RefusalReason : std::uint8_t {
   too_few_inliers = 27,
   position_sigma = 28,
   image_spread = 29,
+  // Of a pair that every worker failed at, or ended at.
+  unverified = 30,
 };
 
 /// What is measured for a reason, and the words for people and for report.json.
@@ -60,7 +62,7 @@ struct RefusalKind {
   int digits = 0;  ///< Behind the point, in text.
 };
 
-inline constexpr std::array<RefusalKind, 30> kRefusalKinds = {{
+inline constexpr std::array<RefusalKind, 31> kRefusalKinds = {{
     {"other"},
     {"too small", RefusalKind::Bound::at_least, "points"},
     {"too few keyframes", RefusalKind::Bound::at_least, "keyframes"},
@@ -91,6 +93,7 @@ inline constexpr std::array<RefusalKind, 30> kRefusalKinds = {{
     {"too few inliers", RefusalKind::Bound::at_least, "inliers"},
     {"position sigma", RefusalKind::Bound::at_most, "m", 3},
     {"spread over the image", RefusalKind::Bound::at_least, "", 2},
+    {"no worker could verify it"},
 }};
 
 constexpr const RefusalKind& kind_of(RefusalReason reason) {

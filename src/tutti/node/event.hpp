@@ -28,9 +28,10 @@ struct WordTaken {  ///< By the server, from an operator.
   SubmapPair pair;
   Wish wish = Wish::withdraw;
 };
-struct VerificationFailed {  ///< The pair is asked again, with the next submap or after job_timeout_s.
+struct VerificationFailed {  ///< The pair is asked again (ServerNodeConfig::most_tries).
   SubmapPair pair;
   std::string why;
+  bool given_up = false;  ///< No more: it is refused.
 };
 struct MapUpdated {
   std::uint64_t revision = 0;

@@ -16,26 +16,74 @@ namespace tutti::node {
 namespace {
 
 constexpr unsigned kMostDoubled = 10;
+constexpr double kFailedAgain = 0.1;  // of the time for an answer
 
 }  // namespace
 
 void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step) {
   auto answer = wire::decode_verdicts(*envelope.bytes);
   if (!answer) return refuse(envelope, answer.error().message, now, step);
-  note_answer(answer->job, now);
+  close(answer->job, now);
   Verdicts refused{.job = answer->job, .verdicts = {}, .failed = {}, .why = {}};
   for (ClosureVerdict& verdict : answer->verdicts) {
     const bool is_workers = envelope.from.role == bus::Endpoint::Role::worker && !verdict.closures.empty();
+    failed_.erase(verdict.pair);
     verdict.worker = is_workers ? std::optional(envelope.from.number) : std::nullopt;
     if (const Status taken = take(verdict, refused, step); !taken) refuse(envelope, taken.error().message, now, step);
   }
-  if (!refused.verdicts.empty()) step.writes.push_back({"answers", answer->job, wire::encode(refused)});
-  for (const SubmapPair& pair : answer->failed)
-    if (give_back(pair)) {
-      step.tell(now, VerificationFailed{pair, answer->why});
-      if (!given_back_) given_back_ = now;
-    }
+  for (const SubmapPair& pair : answer->failed) note_failed(pair, answer->why, now, refused, step);
+  keep(refused, step);
   step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
+}
+
+void ServerNode::keep(const Verdicts& refused, Step& step) {
+  if (!refused.verdicts.empty()) step.writes.push_back({"answers", refused.job, wire::encode(refused)});
+}
+
+/// It has ended every worker that had it (bus::Port::receive()). Of many pairs one may have done that: each is asked
+/// alone then.
+void ServerNode::receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  const auto job = wire::decode_job(*envelope.bytes);
+  if (!job) return refuse(envelope, job.error().message, now, step);
+  if (!close(job->id, now)) return;
+  Verdicts refused{.job = job->id, .verdicts = {}, .failed = {}, .why = {}};
+  if (job->pairs.size() == 1) {
+    give_up(job->pairs.front(), "every worker that had it has ended", now, refused, step);
+    return keep(refused, step);
+  }
+  for (const SubmapPair& pair : job->pairs) give_back(pair);
+  send_jobs(std::nullopt, now, 0, 1, step);
+  step.tell(now, VerificationFailed{
+                     job->pairs.front(),
+                     fmt::format("one of {} pairs has ended every worker: asked one by one", job->pairs.size())});
+}
+
+void ServerNode::note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused,
+                             Step& step) {
+  const server::SubmapSet& submaps = server_.state().submaps;
+  if (!submaps.contains(pair.first) || !submaps.contains(pair.second)) return;
+  Failed& failed = failed_[pair];
+  if (failed.again) return;  // it is known: the answer has come twice
+  if (++failed.times >= config_.most_tries)
+    return give_up(pair, fmt::format("{} tries have failed: {}", failed.times, why), now, refused, step);
+  step.tell(now, VerificationFailed{pair, why});
+  if (config_.job_timeout_s > 0.0)
+    failed.again = now + kFailedAgain * config_.job_timeout_s * static_cast<double>(1U << (failed.times - 1));
+  else
+    give_back(pair);
+}
+
+/// The map goes on without it, and a newer finder asks again.
+void ServerNode::give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step) {
+  failed_.erase(pair);
+  const ClosureVerdict verdict{.pair = pair,
+                               .closures = {},
+                               .refusal = Refusal{RefusalReason::unverified},
+                               .finder_version = server_.state().finder_version};
+  if (!take(verdict, refused, step)) return;
+  note_refusal(bus::Endpoint::Role::worker, bus::MessageKind::job,
+               fmt::format("submaps {} and {} are given up: {}", to_string(pair.first), to_string(pair.second), why));
+  step.tell(now, VerificationFailed{pair, why, true});
 }
 
 Status ServerNode::take(const ClosureVerdict& verdict, Verdicts& refused, Step& step) {
@@ -60,14 +108,14 @@ Status ServerNode::take(const ClosureVerdict& verdict, Verdicts& refused, Step& 
 
 /// A job is one submap against others: `newest`, if it is in the pair. Its name is no other map's: a bus takes one job
 /// of a name. `asked`: how often before.
-void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, Step& step) {
-  given_back_.reset();
+void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, std::size_t most_pairs,
+                           Step& step) {
   std::map<SubmapId, std::vector<SubmapPair>> pairs;
   for (const server::VerificationJob& job : server_.take_jobs())
     pairs[job.pair.first == newest ? job.pair.first : job.pair.second].push_back(job.pair);
   for (const auto& [submap, of_it] : pairs)
-    for (std::size_t first = 0; first < of_it.size(); first += config_.pairs_per_job) {
-      const std::size_t last = std::min(of_it.size(), first + config_.pairs_per_job);
+    for (std::size_t first = 0; first < of_it.size(); first += most_pairs) {
+      const std::size_t last = std::min(of_it.size(), first + most_pairs);
       const auto at = [&](std::size_t i) { return of_it.begin() + static_cast<std::ptrdiff_t>(i); };
       const Job job{.id = fmt::format("{}/{}/{}", server_.state().epoch, start_, jobs_),
                     .pairs = {at(first), at(last)}};
@@ -79,17 +127,18 @@ void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsign
 
 /// The jobs that were sent later have not had their turn, as long as it goes on: a long queue is no reason to ask
 /// again.
-void ServerNode::note_answer(const std::string& job, Timestamp now) {
+bool ServerNode::close(const std::string& job, Timestamp now) {
   const std::string mine = fmt::format("{}/{}/", server_.state().epoch, start_);
   std::uint64_t number = 0;
-  if (!job.starts_with(mine)) return;  // of an earlier start, or nobody's
+  if (!job.starts_with(mine)) return false;
   const char* end = job.data() + job.size();
   if (const auto read = std::from_chars(job.data() + mine.size(), end, number);
       read.ec != std::errc() || read.ptr != end)
-    return;
-  if (number >= jobs_) return;
-  open_jobs_.erase(number);
+    return false;
+  if (number >= jobs_) return false;
+  const bool was_open = open_jobs_.erase(number) > 0;
   for (auto later = open_jobs_.upper_bound(number); later != open_jobs_.end(); ++later) later->second.since = now;
+  return was_open;
 }
 
 bool ServerNode::give_back(const SubmapPair& pair) {
@@ -110,14 +159,21 @@ std::optional<Timestamp> ServerNode::next_timer() const {
   if (config_.job_timeout_s <= 0.0) return next;
   const auto consider = [&](Timestamp t) { next = next ? std::min(*next, t) : t; };
   for (const auto& [number, job] : open_jobs_) consider(due(job));
-  if (given_back_) consider(*given_back_ + config_.job_timeout_s);
+  for (const auto& [pair, failed] : failed_)
+    if (failed.again) consider(*failed.again);
   return next;
 }
 
 /// The bus gives up a job that has ended five workers, and may lose one. An answer that comes after all does no harm.
 void ServerNode::ask_again(Timestamp now, Step& step) {
   if (config_.job_timeout_s <= 0.0) return;
-  if (given_back_ && *given_back_ + config_.job_timeout_s <= now) send_jobs(std::nullopt, now, 0, step);
+  bool is_due = false;
+  for (auto& [pair, failed] : failed_)
+    if (failed.again && *failed.again <= now) {
+      failed.again.reset();
+      is_due = give_back(pair) || is_due;
+    }
+  if (is_due) send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   std::vector<OpenJob> late;
   for (auto job = open_jobs_.begin(); job != open_jobs_.end();) {
     const auto next = std::next(job);
@@ -127,7 +183,7 @@ void ServerNode::ask_again(Timestamp now, Step& step) {
   for (const OpenJob& job : late) {
     const std::size_t before = step.messages.size();
     for (const SubmapPair& pair : job.pairs) give_back(pair);
-    send_jobs(std::nullopt, now, job.asked + 1, step);
+    send_jobs(std::nullopt, now, job.asked + 1, config_.pairs_per_job, step);
     if (step.messages.size() > before)
       step.tell(now, VerificationFailed{job.pairs.front(), fmt::format("no worker has answered for {:g} s: asked again",
                                                                        now - job.since)});

@@ -182,7 +182,7 @@ Step ServerNode::resume(Timestamp now) {
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
   for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
-  send_jobs(std::nullopt, now, 0, step);
+  send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   return step;
 }
 
@@ -199,6 +199,8 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
     receive_status(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::word)
     receive_word(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::job && envelope.from == bus::Endpoint::any_worker())
+    receive_returned_job(envelope, now, step);
   else
     refuse(envelope, "not for a server", now, step);
   for (const Error& error : server_.take_late_errors())
@@ -263,7 +265,7 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
     step.tell(now, SubmapStored{id});
   }
   send_receipt(id.chain.robot, step);
-  send_jobs(id, now, 0, step);
+  send_jobs(id, now, 0, config_.pairs_per_job, step);
   return {};
 }
 

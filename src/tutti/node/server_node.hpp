@@ -24,8 +24,11 @@ struct ServerNodeConfig {
   /// Mission time without any answer after which the pairs of a job are asked again, as a new job; a job that waits
   /// behind others has its time from the last answer to one of these. Every further time twice as long. 0: never.
   double job_timeout_s = 600.0;
+  /// A pair that a worker says it cannot verify is asked again after a tenth of job_timeout_s, then after twice as long
+  /// (without a timeout: with the next submap), so often in all; then it is refused.
+  unsigned most_tries = 4;
   std::shared_ptr<const server::MapRefiner> refiner;  ///< Null: the map is its pose graph's.
-  bool accepts_others = false;                        ///< Robots that it was not told of, up to ProxyGraph::kMostChains in all.
+  bool accepts_others = false;  ///< Robots that it was not told of, up to ProxyGraph::kMostChains in all.
 };
 
 /// The mapping server round MapServer: submaps, verdicts and operators' words in; receipts, jobs and proxy graphs out.
@@ -78,6 +81,7 @@ class ServerNode {
   void note_refused(SubmapId id, const std::string& why, Step& step);
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
   Status take_word(const bus::Envelope& envelope, Timestamp now, Step& step);
   [[nodiscard]] server::ClosureNames closure_names() const;
@@ -90,8 +94,13 @@ class ServerNode {
     Timestamp since;     // it was sent, or had its turn at the earliest
     unsigned asked = 0;  // before
   };
-  void send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, Step& step);
-  void note_answer(const std::string& job, Timestamp now);
+  void send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, std::size_t most_pairs, Step& step);
+  /// It need not be asked again. False: it is not open, or of an earlier start.
+  bool close(const std::string& job, Timestamp now);
+  /// No worker could verify it this time: it is asked again later, or refused.
+  void note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
+  void give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
+  static void keep(const Verdicts& refused, Step& step);
   [[nodiscard]] Timestamp due(const OpenJob& job) const;
   void ask_again(Timestamp now, Step& step);
   /// False: a submap of it is not there.
@@ -114,7 +123,11 @@ class ServerNode {
   std::map<std::uint32_t, MissionStatus::Worker> workers_;
   std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
   std::map<std::uint64_t, OpenJob> open_jobs_;  // of this start, by number
-  std::optional<Timestamp> given_back_;         // when the first pair was that no worker could verify
+  struct Failed {
+    unsigned times = 0;
+    std::optional<Timestamp> again;  // when it is to be asked; nothing: it is being asked
+  };
+  std::map<SubmapPair, Failed> failed_;  // in this start
   std::uint64_t changes_ = 0;
   std::uint64_t start_ = 0;  // of all on this store; names jobs
   std::uint64_t jobs_ = 0;   // sent in this start

@@ -288,24 +288,6 @@ TEST_F(ServerNodeTest, AJobThatWaitsBehindOthersIsNotAskedAgain) {
   EXPECT_EQ(pairs_of(done(node_->on_timer(now_ + 100.0))), pairs_of(asked[2]));
 }
 
-TEST_F(ServerNodeTest, APairThatCouldNotBeVerifiedComesAgainWithTheNextSubmapOrLater) {
-  receive(test::submap(kAlpha, 0));
-  const SubmapPair pair{{kAlpha, 0}, {kBravo, 0}};
-  const Step asked = receive(test::submap(kBravo, 0));
-  ASSERT_EQ(pairs_of(asked), std::set<SubmapPair>{pair});
-  const std::string job = of_kind(asked, MessageKind::job).at(0).id;
-  const Verdicts failed{.job = job, .verdicts = {}, .failed = {pair}, .why = "no cloud"};
-  const bus::Envelope answer{Endpoint::worker(0), Endpoint::server(), MessageKind::verdicts, job,
-                             std::make_shared<const std::string>(wire::encode(failed))};
-  EXPECT_EQ(told<VerificationFailed>(receive(answer)), 1U);
-  done(node_->on_timer(*node_->next_timer()));
-  ASSERT_EQ(node_->next_timer(), now_ + 600.0);
-  now_ = now_ + 600.0;
-  EXPECT_EQ(pairs_of(done(node_->on_timer(now_))), std::set<SubmapPair>{pair});
-  EXPECT_EQ(told<VerificationFailed>(receive(answer)), 1U);
-  EXPECT_TRUE(pairs_of(receive(test::submap(kAlpha, 1))).contains(pair));
-}
-
 bus::Envelope envelope(const ClosureWord& word) {
   return {Endpoint::viewer(7), Endpoint::server(), MessageKind::word, fmt::format("{}/{}", word.closure, word.given_ns),
           std::make_shared<const std::string>(wire::encode(word))};

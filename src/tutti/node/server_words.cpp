@@ -32,7 +32,7 @@ Status ServerNode::take_word(const bus::Envelope& envelope, Timestamp now, Step&
   if (before == words.at(*pair)) return {};
   step.writes.push_back({"words", key_of(*pair), *envelope.bytes});
   step.tell(now, WordTaken{*pair, word->wish});
-  send_jobs(std::nullopt, now, 0, step);
+  send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   return {};
 }
 

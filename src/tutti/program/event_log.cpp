@@ -63,8 +63,10 @@ Told tell(const node::VerificationFailed& failed) {
   return {{{"event", "verification_failed"},
            {"first", to_string(failed.pair.first)},
            {"second", to_string(failed.pair.second)},
-           {"why", failed.why}},
-          fmt::format("submaps {} could not be verified, and will be asked again: {}", pair, failed.why),
+           {"why", failed.why},
+           {"given_up", failed.given_up}},
+          fmt::format("submaps {} could not be verified, and {}: {}", pair,
+                      failed.given_up ? "are given up" : "will be asked again", failed.why),
           Level::warning};
 }
 Told tell(const node::MapUpdated& map) {

@@ -58,6 +58,7 @@ class JetStreamPort final : public NatsPort {
   /// No more is fetched for now.
   [[nodiscard]] bool is_full() const;
   void take_in(natsMsg* message, const NatsConnection& connection);
+  void put_returned(natsMsg* message);
   void hear_best_effort(const std::string& subject);
   void hear_retained();
   /// Over the streams, whether they give what they have.

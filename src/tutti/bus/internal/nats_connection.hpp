@@ -4,6 +4,7 @@
 #include <nats/nats.h>
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -65,8 +66,9 @@ class NatsConnection {
   };
   /// Nothing: there is no consumer, or the stream does not hold still for long enough.
   [[nodiscard]] Result<std::optional<Look>> look_at(const std::string& stream, const std::string& consumer) const;
-  /// How many messages that are given to nobody any more were removed.
-  [[nodiscard]] Result<std::uint64_t> remove_done(const std::string& stream, const Look& look) const;
+  /// Removes messages that are given to nobody any more, each after `take` has had it.
+  [[nodiscard]] Status remove_done(const std::string& stream, const Look& look,
+                                   const std::function<void(natsMsg*)>& take) const;
   [[nodiscard]] Status remove_stream(const std::string& stream) const;
   // What these return is the connection's, which frees it when it is closed: libnats (issue 637) may be at a message
   // for a subscription that is being destroyed.

@@ -37,6 +37,12 @@ void Inbox::put_retained(Endpoint from, MessageKind kind, std::string bytes) {
   untaken_.push_back({{from, self_, kind, "", std::make_shared<const std::string>(std::move(bytes))}, ++last_ticket_});
 }
 
+void Inbox::put_returned(std::string id, std::string bytes) {
+  untaken_.push_back({{Endpoint::any_worker(), self_, MessageKind::job, std::move(id),
+                       std::make_shared<const std::string>(std::move(bytes))},
+                      ++last_ticket_});
+}
+
 void Inbox::put_best_effort(Endpoint from, MessageKind kind, std::string bytes) {
   const auto alike = [&](const Received& other) { return other.envelope.kind == kind; };
   if (std::ranges::count_if(untaken_, alike) >= kMostBestEffort) untaken_.erase(std::ranges::find_if(untaken_, alike));

@@ -28,6 +28,8 @@ class Inbox {
   bool add_part(Endpoint from, const Part& part, std::string_view bytes, std::string reply);
   /// In the place of one of its kind that is not taken yet.
   void put_retained(Endpoint from, MessageKind kind, std::string bytes);
+  /// A job of ours that no worker gets any more.
+  void put_returned(std::string id, std::string bytes);
   /// Of those not taken the oldest go when there are too many.
   void put_best_effort(Endpoint from, MessageKind kind, std::string bytes);
 

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Pairs that no worker can verify: they are asked again, and in the end refused.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "support/node/submaps.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/worker_node.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::node {
+namespace {
+
+using bus::Endpoint, bus::MessageKind;
+const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
+const SubmapPair kBad{{kAlpha, 0}, {kBravo, 0}};
+
+/// A server on a store, whose steps are committed.
+class ServerJobs : public testing::Test {
+ protected:
+  ServerJobs() { restart(); }
+  Step restart(double job_timeout_s = 600.0) {
+    store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
+                                                    store_ ? store_->tables() : storage::MemoryStore::Tables{});
+    node_ =
+        ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {.job_timeout_s = job_timeout_s}, 1000 + ++starts_, *store_)
+            .value();
+    return done(node_->resume(now_));
+  }
+  Step done(Step step) {
+    EXPECT_TRUE(store_->commit(step.writes).has_value());
+    return step;
+  }
+  Step receive(const bus::Envelope& envelope) { return done(node_->receive(envelope, now_)); }
+  Step receive(const SubmapMessage& message) { return receive(test::envelope(message)); }
+  static std::vector<Job> jobs_of(const Step& step) {
+    std::vector<Job> jobs;
+    for (const bus::Envelope& message : step.messages)
+      if (message.kind == MessageKind::job) jobs.push_back(wire::decode_job(*message.bytes).value());
+    return jobs;
+  }
+  Step fail(const Job& job) {
+    const Verdicts failed{.job = job.id, .verdicts = {}, .failed = job.pairs, .why = "no cloud"};
+    return receive({Endpoint::worker(0), Endpoint::server(), MessageKind::verdicts, job.id,
+                    std::make_shared<const std::string>(wire::encode(failed))});
+  }
+  /// As the bus does it when every worker that had it has ended.
+  Step return_job(const Job& job, Endpoint from = Endpoint::any_worker()) {
+    return receive(
+        {from, Endpoint::server(), MessageKind::job, job.id, std::make_shared<const std::string>(wire::encode(job))});
+  }
+  void answer(const Job& job) {
+    WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(*store_));
+    const bus::Envelope asked{Endpoint::server(), Endpoint::any_worker(), MessageKind::job, job.id,
+                              std::make_shared<const std::string>(wire::encode(job))};
+    for (const bus::Envelope& verdicts : worker.receive(asked, now_).messages) receive(verdicts);
+  }
+  /// What is asked when the map's next update and what is due until `later` have been.
+  std::vector<Job> wait(double later) {
+    std::vector<Job> jobs;
+    const Timestamp end = now_ + later;
+    while (node_->next_timer() && *node_->next_timer() <= end) {
+      now_ = *node_->next_timer();
+      for (Job& job : jobs_of(done(node_->on_timer(now_)))) jobs.push_back(std::move(job));
+    }
+    now_ = end;
+    return jobs;
+  }
+  static std::vector<bool> given_up(const Step& step) {
+    std::vector<bool> out;
+    for (const Event& event : step.events)
+      if (const auto* failed = std::get_if<VerificationFailed>(&event.what)) out.push_back(failed->given_up);
+    return out;
+  }
+  /// The one pair that everything is refused for, and stays refused.
+  void expect_refused(const std::string& why) {
+    const server::RefusalCounts refused = node_->map_server().refusals();
+    ASSERT_TRUE(refused.contains(RefusalReason::unverified));
+    EXPECT_EQ(refused.at(RefusalReason::unverified).inter, 1U);
+    const MissionStatus status = node_->mission_status(now_);
+    EXPECT_EQ(status.pending_jobs, 0U);
+    ASSERT_EQ(status.refusals.size(), 1U);
+    EXPECT_NE(status.refusals[0].last_why.find("0:7/0 and 1:7/0"), std::string::npos) << status.refusals[0].last_why;
+    EXPECT_NE(status.refusals[0].last_why.find(why), std::string::npos) << status.refusals[0].last_why;
+    EXPECT_TRUE(wait(1e6).empty());
+    EXPECT_TRUE(jobs_of(restart()).empty());
+    EXPECT_TRUE(node_->map_server().refusals().contains(RefusalReason::unverified));
+  }
+
+  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
+  std::unique_ptr<storage::MemoryStore> store_;
+  std::unique_ptr<ServerNode> node_;
+  std::uint64_t starts_ = 0;
+  Timestamp now_ = Timestamp{} + 3.0;
+};
+
+TEST_F(ServerJobs, APairThatFailsIsAskedAgainEveryTimeLaterAndThenRefused) {
+  receive(test::submap(kAlpha, 0));
+  std::vector<Job> asked = jobs_of(receive(test::submap(kBravo, 0)));
+  for (const double later : {60.0, 120.0, 240.0}) {
+    ASSERT_EQ(asked.size(), 1U);
+    EXPECT_EQ(asked[0].pairs, std::vector{kBad});
+    EXPECT_EQ(given_up(fail(asked[0])), std::vector{false});
+    EXPECT_TRUE(given_up(fail(asked[0])).empty());  // the same answer
+    EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
+    EXPECT_TRUE(wait(later - 1.0).empty());
+    asked = wait(1.0);
+  }
+  ASSERT_EQ(asked.size(), 1U);
+  EXPECT_EQ(given_up(fail(asked[0])), std::vector{true});
+  expect_refused("4 tries have failed: no cloud");
+}
+
+TEST_F(ServerJobs, APairThatIsVerifiedAfterAllHasNotFailed) {
+  receive(test::submap(kAlpha, 0));
+  fail(jobs_of(receive(test::submap(kBravo, 0))).at(0));
+  answer(wait(60.0).at(0));
+  EXPECT_EQ(node_->map_server().state().verdicts.at(kBad).closures.size(), 1U);
+  EXPECT_TRUE(wait(1e6).empty());
+  EXPECT_TRUE(node_->mission_status(now_).refusals.empty());
+}
+
+TEST_F(ServerJobs, WithoutATimeoutAPairComesAgainWithTheNextSubmap) {
+  restart(0.0);
+  receive(test::submap(kAlpha, 0));
+  Job job = jobs_of(receive(test::submap(kBravo, 0))).at(0);
+  for (std::uint32_t i = 1; i < 4; ++i) {
+    EXPECT_EQ(given_up(fail({job.id, {kBad}})), std::vector{false});
+    const std::vector<Job> asked = jobs_of(receive(test::submap(kAlpha, i)));
+    const auto again = std::ranges::find_if(asked, [](const Job& a) { return std::ranges::count(a.pairs, kBad) > 0; });
+    ASSERT_NE(again, asked.end());
+    job = *again;
+  }
+  EXPECT_EQ(given_up(fail({job.id, {kBad}})), std::vector{true});
+}
+
+TEST_F(ServerJobs, AJobThatEndsEveryWorkerIsTakenApartAndThePairToBlameIsRefused) {
+  receive(test::submap(kAlpha, 0));
+  receive(test::submap(kAlpha, 1));
+  for (const Job& job : jobs_of(receive(test::submap(kAlpha, 2)))) answer(job);
+  wait(20.0);
+  const std::vector<Job> asked = jobs_of(receive(test::submap(kBravo, 0)));
+  ASSERT_EQ(asked.size(), 1U);
+  ASSERT_EQ(asked[0].pairs.size(), 3U);
+  EXPECT_TRUE(jobs_of(return_job(asked[0], Endpoint::worker(3))).empty());  // only the bus returns jobs
+  const std::vector<Job> alone = jobs_of(return_job(asked[0]));
+  ASSERT_EQ(alone.size(), 3U);
+  EXPECT_TRUE(jobs_of(return_job(asked[0])).empty());
+  for (const Job& job : alone) {
+    ASSERT_EQ(job.pairs.size(), 1U);
+    if (job.pairs[0] == kBad)
+      EXPECT_EQ(given_up(return_job(job)), std::vector{true});
+    else
+      answer(job);
+  }
+  EXPECT_TRUE(node_->map_server().state().verdicts.contains({{kAlpha, 2}, {kBravo, 0}}));
+  const std::vector<Job> later = wait(1300.0);  // what the first submaps were asked and nobody has answered
+  for (const Job& job : later) answer(job);
+  EXPECT_EQ(node_->map_server().refusals().at(RefusalReason::unverified).inter, 1U);
+}
+
+TEST_F(ServerJobs, AJobOfAnEarlierStartComesBackForNothing) {
+  receive(test::submap(kAlpha, 0));
+  const Job old = jobs_of(receive(test::submap(kBravo, 0))).at(0);
+  const std::vector<Job> asked = jobs_of(restart());
+  ASSERT_EQ(asked.size(), 1U);
+  EXPECT_TRUE(return_job(old).events.empty());
+  EXPECT_EQ(given_up(return_job(asked[0])), std::vector{true});
+  expect_refused("every worker that had it has ended");
+}
+
+}  // namespace
+}  // namespace tutti::node
