@@ -14,7 +14,7 @@ find_package(PNG REQUIRED)
 find_package(Threads REQUIRED)
 find_package(spectra REQUIRED)
 
-# SuiteSparse 5.12, LAPACKE, zstd, SQLite and NATS ship no CMake configuration that works everywhere: plain imported targets.
+# SuiteSparse 5.12, LAPACKE, zstd, SQLite, NATS and OpenCV ship no CMake configuration that works everywhere: plain imported targets.
 function(tutti_import_library target header)
   cmake_parse_arguments(ARG "" "" "LIBS;SUFFIXES" ${ARGN})
   string(TOUPPER ${target} upper)
@@ -36,6 +36,12 @@ tutti_import_library(tutti::nanoflann nanoflann.hpp)
 tutti_import_library(tutti::sqlite sqlite3.h LIBS sqlite3)
 tutti_import_library(tutti::nats nats/nats.h LIBS nats)
 tutti_import_library(tutti::systemd systemd/sd-daemon.h LIBS systemd)
+tutti_import_library(tutti::turbojpeg turbojpeg.h LIBS turbojpeg)
+if(TUTTI_BUILD_VISUAL)
+  # OpenCV's own CMake configuration is only in libopencv-dev, which wants everything that OpenCV has.
+  tutti_import_library(tutti::opencv opencv2/core.hpp LIBS opencv_features2d opencv_video opencv_imgproc opencv_core
+                       SUFFIXES opencv4)
+endif()
 
 if(TUTTI_BUILD_TESTS)
   find_package(GTest REQUIRED)

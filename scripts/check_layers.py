@@ -19,6 +19,8 @@ CONFINED = [
      "bus/nats_*.cpp and their bus/internal/nats_connection.hpp"),
     (r"(spdlog|systemd)/", r"program/.*\.cpp$", "program/*.cpp"),
     (r"sqlite3", r"storage/sqlite_.*\.cpp$", "storage/sqlite_*.cpp"),
+    (r"opencv2/", r"perception/visual/frontend/.*\.cpp$", "perception/visual/frontend/*.cpp"),
+    (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),
     (r"support/", r"(.*_test\.cpp|tests/.*)$", "tests"),

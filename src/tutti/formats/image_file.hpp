@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "tutti/base/result.hpp"
+#include "tutti/model/image.hpp"
+
+namespace tutti::formats {
+
+/// A PNG or JPEG file as grey, whichever its content is; colour by its luminance (JPEG's Y; for PNG the ITU-R BT.709
+/// weights of libpng). A truncated or damaged image is an error that names it, never half an image.
+Result<Image> read_image(const std::string& path);
+/// The same from bytes; `name` is for the errors.
+Result<Image> decode_image(std::string_view bytes, const std::string& name);
+
+/// As PNG.
+Status write_image(const std::string& path, const Image& image);
+
+}  // namespace tutti::formats

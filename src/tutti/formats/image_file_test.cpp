@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/formats/image_file.hpp"
+
+#include <gtest/gtest.h>
+// RapidCheck after gtest.
+#include <rapidcheck/gtest.h>
+
+#include <numeric>
+
+#include "support/formats/mutations.hpp"
+#include "support/shared_data.hpp"
+#include "tutti/base/file.hpp"
+
+namespace tutti::formats {
+namespace {
+
+const std::string kReal = "data/images/euroc_V1_01_visnav/data/1403715273262142976_0.jpg";
+
+std::string temporary(const std::string& name) { return (std::filesystem::path(testing::TempDir()) / name).string(); }
+
+RC_GTEST_PROP(ImageFile, PngReadsBackBitForBit, ()) {
+  Image image(*rc::gen::inRange(1, 40), *rc::gen::inRange(1, 40));
+  for (auto& grey : image.grey) grey = *rc::gen::arbitrary<std::uint8_t>();
+  const std::string path = temporary("tutti_image.png");
+  RC_ASSERT(write_image(path, image).has_value());
+  RC_ASSERT(read_image(path).value() == image);
+
+  // Cut anywhere but in what follows the last pixel (a checksum and the chunk IEND): an error that names it.
+  const std::string bytes = read_file(path).value();
+  const auto cut =
+      decode_image(std::string_view(bytes).substr(0, *rc::gen::inRange<std::size_t>(0, bytes.size() - 17)), "cut.png");
+  RC_ASSERT(!cut.has_value());
+  RC_ASSERT(cut.error().message.starts_with("cut.png: "));
+}
+
+TEST(ImageFile, ARealJpegAndWhatIsLeftOfIt) {
+  TUTTI_REQUIRE_SHARED(kReal);
+  const std::string bytes = read_file(test::shared_path(kReal).string()).value();
+  const Image image = decode_image(bytes, "real").value();
+  EXPECT_EQ(image.width_px, 752);
+  EXPECT_EQ(image.height_px, 480);
+  const double mean =
+      std::accumulate(image.grey.begin(), image.grey.end(), 0.0) / static_cast<double>(image.grey.size());
+  EXPECT_GT(mean, 30.0);
+  EXPECT_LT(mean, 200.0);
+
+  for (const double share : {0.0, 0.001, 0.1, 0.5, 0.99}) {
+    const auto left = static_cast<std::size_t>(share * static_cast<double>(bytes.size()));
+    const auto cut = decode_image(std::string_view(bytes).substr(0, left), "cut.jpg");
+    ASSERT_FALSE(cut.has_value()) << share;
+    EXPECT_TRUE(cut.error().message.starts_with("cut.jpg: ")) << cut.error().message;
+  }
+}
+
+TEST(ImageFile, WhatIsNoImageIsNamed) {
+  const auto missing = read_image(temporary("not_there.png"));
+  ASSERT_FALSE(missing.has_value());
+  EXPECT_NE(missing.error().message.find("not_there.png"), std::string::npos);
+
+  const auto text = decode_image("hello", "a.png");
+  ASSERT_FALSE(text.has_value());
+  EXPECT_EQ(text.error().message, "a.png: neither a PNG nor a JPEG image (5 bytes)");
+
+  // 2^31 - 1 pixels square, says the header: refused before anything is allocated.
+  std::string huge("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\0\0\0\0", 29);
+  EXPECT_FALSE(decode_image(huge, "huge.png").has_value());
+}
+
+}  // namespace
+}  // namespace tutti::formats

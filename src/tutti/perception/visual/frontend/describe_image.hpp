@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "tutti/base/config.hpp"
+#include "tutti/model/image.hpp"
+#include "tutti/model/visual.hpp"
+
+namespace tutti::visual {
+
+/// How images of keyframes are described, so that a place is recognised.
+struct DescriptorConfig {
+  std::string kind = "brisk";
+  int keypoints = 600;
+  int threshold = 20;
+  int cell_px = 40;
+  int distance_px = 4;
+  template <class V>
+  void describe(V& v) {
+    v.field("kind", kind, one_of({"brisk", "orb"}),
+            "brisk (Leutenegger et al. 2011), or orb (Rublee et al. 2011): faster, finds fewer revisits.");
+    v.field("keypoints", keypoints, between(10, 5000), "Most keypoints of an image that are described.");
+    v.field("threshold", threshold, between(1, 255),
+            "Grey values by which a corner differs from what is round it, over all scales.");
+    v.field("cell_px", cell_px, between(8, 1000), "Keypoints are spread evenly over cells of this size.");
+    v.field("distance_px", distance_px, between(1, 100), "Keypoints are at least this far from each other.");
+  }
+};
+
+/// Keypoints with descriptors, all of them seen in this image alone (track 0). `tracked`, which come first, are
+/// described where they are, at the finest scale; others are detected over all scales, away from them, until there
+/// are `config.keypoints`. An image without texture, or below 64 pixels a side, has none. Keypoints in the outermost
+/// pixels are described from the image as it is mirrored at its edge.
+TrackedImage describe_image(const Image& image, const DescriptorConfig& config = {},
+                            std::span<const TrackedKeypoint> tracked = {});
+
+}  // namespace tutti::visual
