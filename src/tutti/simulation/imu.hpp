@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/base/timestamp.hpp"
+#include "tutti/model/visual.hpp"
+#include "tutti/simulation/flight.hpp"
+
+namespace tutti::simulation {
+
+inline constexpr double kGravity_mps2 = 9.81;  ///< Along world -z.
+
+struct ImuConfig {
+  double rate_hz = 200.0;
+  double gyro_noise_density = ImuNoise{}.gyro_noise_density;
+  double gyro_random_walk = ImuNoise{}.gyro_random_walk;
+  double accelerometer_noise_density = ImuNoise{}.accelerometer_noise_density;
+  double accelerometer_random_walk = ImuNoise{}.accelerometer_random_walk;
+  double gyro_bias_sigma = 0.01;
+  double accelerometer_bias_sigma = 0.05;
+  template <class V>
+  void describe(V& v) {
+    v.field("rate_hz", rate_hz, between(1.0, 10000.0), "Samples per second.");
+    v.field("gyro_noise_density", gyro_noise_density, at_least(0.0), "rad/s/sqrt(Hz)");
+    v.field("gyro_random_walk", gyro_random_walk, at_least(0.0), "rad/s^2/sqrt(Hz)");
+    v.field("accelerometer_noise_density", accelerometer_noise_density, at_least(0.0), "m/s^2/sqrt(Hz)");
+    v.field("accelerometer_random_walk", accelerometer_random_walk, at_least(0.0), "m/s^3/sqrt(Hz)");
+    v.field("gyro_bias_sigma", gyro_bias_sigma, at_least(0.0), "rad/s: bias at the start.");
+    v.field("accelerometer_bias_sigma", accelerometer_bias_sigma, at_least(0.0), "m/s^2: bias at the start.");
+  }
+  [[nodiscard]] ImuNoise noise() const {
+    return {gyro_noise_density, gyro_random_walk, accelerometer_noise_density, accelerometer_random_walk};
+  }
+};
+
+/// What an IMU in the body's origin says: w + b_g + n_g and R^T (a - g) + b_a + n_a (Forster et al. 2017, eqs. 27, 28),
+/// white noise of density / sqrt(dt) and biases that walk at random, from `start` for `duration_s`.
+std::vector<ImuSample> simulate_imu(const std::function<Motion(double time_s)>& motion, Timestamp start,
+                                    double duration_s, const ImuConfig& config, Rng rng);
+
+}  // namespace tutti::simulation
