@@ -4,7 +4,9 @@
 #include <png.h>
 #include <turbojpeg.h>
 
+#include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/check.hpp"
@@ -82,6 +84,21 @@ Status write_image(const std::string& path, const Image& image) {
     return fail(ErrorCode::io, "{}: {}", path, header.message);
   bytes.resize(size);
   return write_file(path, bytes);
+}
+
+ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s) {
+  TUTTI_CHECK(!cameras.empty());
+  ImageStream out;
+  for (const CameraImages& camera : cameras) out.cameras.push_back(camera.camera);
+  for (const ImageFile& file : cameras[0].images) out.stamps.push_back(file.stamp);
+  out.load = [cameras = std::move(cameras), max_difference_s](std::size_t moment, std::size_t camera) -> Result<Image> {
+    const Timestamp stamp = cameras[0].images.at(moment).stamp;
+    const auto& files = cameras.at(camera).images;
+    const auto file = std::ranges::lower_bound(files, stamp - max_difference_s, {}, &ImageFile::stamp);
+    if (file == files.end() || file->stamp - stamp > max_difference_s) return Image();
+    return read_image(file->path);
+  };
+  return out;
 }
 
 }  // namespace tutti::formats

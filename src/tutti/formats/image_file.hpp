@@ -3,9 +3,11 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tutti/base/result.hpp"
-#include "tutti/model/image.hpp"
+#include "tutti/formats/image_folder.hpp"
+#include "tutti/model/image_stream.hpp"
 
 namespace tutti::formats {
 
@@ -17,5 +19,9 @@ Result<Image> decode_image(std::string_view bytes, const std::string& name);
 
 /// As PNG.
 Status write_image(const std::string& path, const Image& image);
+
+/// The images of a recording, read when asked for. Its moments are the stamps of the first camera; images that another
+/// took within `max_difference_s` are of the same moment. At least one camera.
+ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s = 0.005);
 
 }  // namespace tutti::formats

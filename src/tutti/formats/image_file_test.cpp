@@ -66,5 +66,27 @@ TEST(ImageFile, WhatIsNoImageIsNamed) {
   EXPECT_FALSE(decode_image(huge, "huge.png").has_value());
 }
 
+TEST(ImageFile, AStreamReadsTheImagesOfAMoment) {
+  const auto image = [](int side) { return Image(side, side); };
+  std::vector<CameraImages> cameras(2);
+  const auto add = [&](std::size_t camera, double time_s, int side) {
+    const std::string path = temporary(fmt::format("tutti_stream_{}_{}.png", camera, side));
+    ASSERT_TRUE(write_image(path, image(side)).has_value());
+    cameras[camera].images.push_back({Timestamp{0} + time_s, path});
+  };
+  for (int i = 1; i <= 4; ++i) add(0, 0.1 * i, i);
+  add(1, 0.101, 11);  // a millisecond later,
+  add(1, 0.299, 13);  // before; and none at the second and fourth moments
+  add(1, 0.450, 14);
+  const ImageStream stream = stream_images(cameras);
+  ASSERT_EQ(stream.stamps.size(), 4U);
+  EXPECT_EQ(stream.cameras.size(), 2U);
+  const int expected[] = {11, 0, 13, 0};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(stream.load(i, 0).value(), image(static_cast<int>(i) + 1)) << i;
+    EXPECT_EQ(stream.load(i, 1).value(), image(expected[i])) << i;
+  }
+}
+
 }  // namespace
 }  // namespace tutti::formats

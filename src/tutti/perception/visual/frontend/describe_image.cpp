@@ -59,14 +59,14 @@ float centroid_angle_deg(const cv::Mat& grey, const cv::Point2f& at) {
 /// The tracked keypoints, then the detected ones, in the image with its margin.
 std::vector<cv::KeyPoint> find_keypoints(const Method& method, const cv::Mat& grey, const cv::Mat& with_margin,
                                          const DescriptorConfig& config, std::span<const TrackedKeypoint> tracked) {
+  const auto most = static_cast<std::size_t>(config.keypoints);
   std::vector<cv::KeyPoint> detected;
-  method.algorithm->detect(grey, detected);
+  if (tracked.size() < most) method.algorithm->detect(grey, detected);
   std::vector<internal::Candidate> candidates;
   for (const cv::KeyPoint& keypoint : detected)
     candidates.push_back({{keypoint.pt.x, keypoint.pt.y}, keypoint.response});
   std::vector<Eigen::Vector2f> taken;
   for (const TrackedKeypoint& keypoint : tracked) taken.push_back(keypoint.pixel);
-  const auto most = static_cast<std::size_t>(config.keypoints);
   const internal::SpreadRule rule{.width_px = grey.cols,
                                   .height_px = grey.rows,
                                   .cell_px = config.cell_px,

@@ -7,27 +7,13 @@
 #include <bit>
 #include <limits>
 
+#include "support/perception/visual/frontend/blocks.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/formats/image_file.hpp"
 
 namespace tutti::visual {
 namespace {
-
-/// Bright and dark blocks of any size on a wall; `shift_px` is where the image begins on it.
-Image blocks(int width_px, int height_px, int shift_px) {
-  Image image(width_px, height_px);
-  Rng rng(7);
-  for (int block = 0; block < 600; ++block) {
-    const int left = static_cast<int>(rng.index(1000)) - shift_px, top = static_cast<int>(rng.index(600));
-    const int right = left + 5 + static_cast<int>(rng.index(40)), bottom = top + 5 + static_cast<int>(rng.index(40));
-    const auto grey = static_cast<std::uint8_t>(30 + rng.index(200));
-    for (int y = top; y < std::min(bottom, height_px); ++y)
-      for (int x = std::max(left, 0); x < std::min(right, width_px); ++x)
-        image.grey[static_cast<std::size_t>(y * width_px + x)] = grey;
-  }
-  return image;
-}
 
 int distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b) {
   int bits = 0;

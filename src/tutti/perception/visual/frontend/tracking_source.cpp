@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/perception/visual/frontend/tracking_source.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::visual {
+namespace {
+
+/// The stamp nearest to `stamp`, of at least one.
+std::size_t nearest(const std::vector<Timestamp>& stamps, Timestamp stamp) {
+  const auto after = std::ranges::lower_bound(stamps, stamp) - stamps.begin();
+  const auto i = static_cast<std::size_t>(after);
+  if (i == stamps.size()) return i - 1;
+  return i > 0 && stamp - stamps[i - 1] <= stamps[i] - stamp ? i - 1 : i;
+}
+
+/// Are most samples within the stream images' stamps, or most images within the odometry samples'?
+Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odometry, double tolerance_s) {
+  if (stamps.empty() || odometry.empty())
+    return fail(ErrorCode::invalid, "{} images and {} odometry samples, expected some of each", stamps.size(),
+                odometry.size());
+  const Timestamp begin = odometry.front().stamp, end = odometry.back().stamp;
+  std::vector<double> offsets;  // odometry minus image, of the samples while there are images
+  for (const StampedPose& sample : odometry)
+    if (stamps.front() - tolerance_s <= sample.stamp && sample.stamp <= stamps.back() + tolerance_s)
+      offsets.push_back(sample.stamp - stamps[nearest(stamps, sample.stamp)]);
+  if (offsets.empty())
+    return fail(ErrorCode::invalid,
+                "images from {} to {} ns and odometry from {} to {} ns have no moment in common: the odometry begins "
+                "{:.3f} s after the images; is that the offset of their clocks?",
+                stamps.front().ns, stamps.back().ns, begin.ns, end.ns, begin - stamps.front());
+  const auto images = static_cast<std::size_t>(std::ranges::count_if(
+      stamps, [&](Timestamp stamp) { return begin - tolerance_s <= stamp && stamp <= end + tolerance_s; }));
+  const auto matched = static_cast<std::size_t>(
+      std::ranges::count_if(offsets, [&](double offset) { return std::abs(offset) <= tolerance_s; }));
+  const std::size_t possible = std::min(images, offsets.size());
+  if (2 * matched >= possible) return {};
+  const auto quantile = [&](double share) {
+    const auto at = offsets.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(offsets.size() - 1));
+    std::ranges::nth_element(offsets, at);
+    return *at;
+  };
+  return fail(ErrorCode::invalid,
+              "of {} odometry samples that could have an image {} have one within {} s: the odometry is {:.4f} s after "
+              "the nearest image (median; {:.4f} to {:.4f} for the middle half); is that the offset of their clocks?",
+              possible, matched, tolerance_s, quantile(0.5), quantile(0.25), quantile(0.75));
+}
+
+}  // namespace
+
+Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream stream, Trajectory odometry,
+                                                             const TrackingConfig& config) {
+  if (stream.cameras.empty() || stream.cameras.size() > 2)
+    return fail(ErrorCode::unsupported, "{} cameras, expected one or two", stream.cameras.size());
+  for (const Camera& camera : stream.cameras)
+    if (auto ok = check_camera(camera.model); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_stamps(stream.stamps, odometry, config.max_stamp_difference_s); !ok)
+    return tl::unexpected(ok.error());
+  return std::shared_ptr<TrackingSource>(new TrackingSource(std::move(stream), std::move(odometry), config));
+}
+
+TrackingSource::TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config)
+    : stream_(std::move(stream)),
+      cameras_(std::make_shared<const std::vector<Camera>>(stream_.cameras)),
+      odometry_(std::move(odometry)),
+      config_(config),
+      tracker_(stream_.cameras, config.tracker) {}
+
+Result<TrackedImages> TrackingSource::images(std::size_t sample) {
+  TUTTI_CHECK(sample < odometry_.size(), "sample {} of {}", sample, odometry_.size());
+  TrackedImages out{.stamp = odometry_[sample].stamp, .cameras = cameras_, .images = {}};
+  Result<std::vector<TrackedImage>> images;
+  for (; next_sample_ <= sample; ++next_sample_) images = advance(odometry_[next_sample_]);
+  if (!images) return tl::unexpected(images.error());
+  out.images = *std::move(images);
+  return out;
+}
+
+Result<std::vector<TrackedImage>> TrackingSource::advance(const StampedPose& sample) {
+  const bool keyframe = is_keyframe(sample);
+  const std::size_t moment = nearest(stream_.stamps, sample.stamp);
+  if (next_sample_ == 0) next_moment_ = moment;  // Images before the first sample have nothing to tell.
+  // Those on the way here carry the tracks.
+  for (; next_moment_ < moment && stream_.stamps[next_moment_] < sample.stamp; ++next_moment_)
+    static_cast<void>(track(next_moment_, false));
+  const bool is_of_sample = std::abs(stream_.stamps[moment] - sample.stamp) <= config_.max_stamp_difference_s;
+  if (!is_of_sample || moment < next_moment_) return {};
+  next_moment_ = moment + 1;
+  return track(moment, keyframe);
+}
+
+Result<std::vector<TrackedImage>> TrackingSource::track(std::size_t moment, bool keyframe) {
+  std::vector<Image> images;
+  for (std::size_t camera = 0; camera < stream_.cameras.size(); ++camera) {
+    auto image = stream_.load(moment, camera);
+    if (image) {
+      const auto ok = check_sizes({&*image, 1}, {&stream_.cameras[camera], 1});
+      if (!ok) image = in_context(fmt::format("camera {} at {} ns", camera, stream_.stamps[moment].ns), ok.error());
+    }
+    if (!image) unreadable_.push_back(image.error());
+    if (!image && camera == 0) return tl::unexpected(image.error());
+    images.push_back(image ? *std::move(image) : Image());
+  }
+  return tracker_.track(images, keyframe);
+}
+
+bool TrackingSource::is_keyframe(const StampedPose& sample) {
+  if (last_keyframe_) {
+    const Pose3 step = last_keyframe_->pose.inverse() * sample.pose;
+    if (step.translation.norm() < config_.keyframe_distance_m &&
+        rotation_angle(step) < config_.keyframe_angle_deg * kRadPerDeg &&
+        sample.stamp - last_keyframe_->stamp < config_.keyframe_time_s)
+      return false;
+  }
+  last_keyframe_ = sample;
+  return true;
+}
+
+}  // namespace tutti::visual

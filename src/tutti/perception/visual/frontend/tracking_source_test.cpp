@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/perception/visual/frontend/tracking_source.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "support/perception/visual/frontend/blocks.hpp"
+
+namespace tutti::visual {
+namespace {
+
+constexpr int kWidth = 320, kHeight = 240;
+
+Camera camera() {
+  return {.model = {CameraKind::pinhole, kWidth, kHeight, 200.0, 200.0, 159.5, 119.5, {}}, .T_body_camera = {}};
+}
+
+/// Images every 50 ms, past a wall.
+ImageStream wall(std::size_t moments, double offset_s = 0.0) {
+  ImageStream out{.cameras = {camera()}, .stamps = {}, .load = {}};
+  for (std::size_t i = 0; i < moments; ++i)
+    out.stamps.push_back(Timestamp{1'000'000'000} + (0.05 * static_cast<double>(i) + offset_s));
+  out.load = [](std::size_t moment, std::size_t) -> Result<Image> {
+    return blocks(kWidth, kHeight, 4 * static_cast<int>(moment));
+  };
+  return out;
+}
+
+/// 0.1 m in every sample.
+Trajectory straight(std::size_t samples, double step_s) {
+  Trajectory out;
+  for (std::size_t i = 0; i < samples; ++i)
+    out.push_back({Timestamp{1'000'000'000} + step_s * static_cast<double>(i),
+                   {Eigen::Quaterniond::Identity(), {0.1 * static_cast<double>(i), 0.0, 0.0}}});
+  return out;
+}
+
+std::set<std::uint64_t> tracks(const TrackedImage& image) {
+  std::set<std::uint64_t> out;
+  for (const TrackedKeypoint& it : image.keypoints)
+    if (it.track != 0) out.insert(it.track);
+  return out;
+}
+
+TEST(TrackingSource, ServesTheImagesOfSamplesAndFollowsThroughAll) {
+  const auto source = TrackingSource::open(wall(41), straight(11, 0.2), {}).value();
+  std::set<std::uint64_t> last;
+  for (std::size_t sample = 0; sample < 11; ++sample) {
+    const auto images = source->images(sample).value().images;
+    ASSERT_EQ(images.size(), 1U) << sample;
+    EXPECT_TRUE(check_images({Timestamp{0}, std::make_shared<const std::vector<Camera>>(1, camera()), images}));
+    std::size_t kept = 0;
+    const auto now = tracks(images[0]);
+    for (const auto number : now) kept += last.contains(number) ? 1 : 0;
+    // Four images on, 16 px away.
+    if (sample > 0) {
+      EXPECT_GE(kept, 8 * now.size() / 10) << sample;
+    }
+    last = now;
+  }
+  EXPECT_TRUE(source->images(3).value().images.empty());  // asked for again
+  EXPECT_TRUE(source->unreadable().empty());
+}
+
+TEST(TrackingSource, KeyframesAreThoseOfSubmaps) {
+  TrackingConfig config;
+  config.keyframe_distance_m = 0.25;
+  const auto source = TrackingSource::open(wall(41), straight(11, 0.2), config).value();
+  for (std::size_t sample = 0; sample < 11; ++sample) {
+    const auto images = source->images(sample).value().images;
+    EXPECT_EQ(images.at(0).descriptors.size() > 0, sample % 3 == 0) << sample;
+  }
+}
+
+TEST(TrackingSource, ABadImageIsLostAloneAndNamed) {
+  ImageStream stream = wall(41);
+  stream.load = [](std::size_t moment, std::size_t) -> Result<Image> {
+    if (moment == 8) return fail(ErrorCode::parse, "frame_8.png: damaged");
+    if (moment == 9) return fail(ErrorCode::io, "frame_9.png: missing");
+    if (moment == 16) return Image(64, 64);
+    if (moment == 24) return Image();  // none was taken
+    return blocks(kWidth, kHeight, 4 * static_cast<int>(moment));
+  };
+  const auto source = TrackingSource::open(stream, straight(11, 0.2), {}).value();
+  const auto before = tracks(source->images(1).value().images.at(0));
+  const auto damaged = source->images(2);
+  ASSERT_FALSE(damaged.has_value());
+  EXPECT_EQ(damaged.error().message, "frame_8.png: damaged");
+  std::size_t kept = 0;
+  for (const auto number : tracks(source->images(3).value().images.at(0))) kept += before.contains(number) ? 1 : 0;
+  EXPECT_GE(kept, before.size() / 2);  // goes on
+  const auto size = source->images(4);
+  ASSERT_FALSE(size.has_value());
+  EXPECT_EQ(size.error().message, "camera 0 at 1800000000 ns: an image of 64 x 64 pixels, camera 0 has 320 x 240");
+  EXPECT_EQ(source->images(5).value().images.size(), 1U);
+  EXPECT_TRUE(source->images(6).value().images.empty());
+  EXPECT_EQ(source->images(10).value().images.size(), 1U);
+  ASSERT_EQ(source->unreadable().size(), 3U);
+  EXPECT_EQ(source->unreadable()[1].message, "frame_9.png: missing");
+}
+
+TEST(TrackingSource, AStoppedCameraLeavesOdometryAlone) {
+  const auto source = TrackingSource::open(wall(9), straight(11, 0.2), {}).value();
+  for (std::size_t sample = 0; sample < 11; ++sample)
+    EXPECT_EQ(source->images(sample).value().images.size(), sample <= 2 ? 1U : 0U) << sample;
+}
+
+TEST(TrackingSource, StampsOfAnotherClockAreRefusedWithTheOffset) {
+  const auto shifted = TrackingSource::open(wall(41, 0.02), straight(11, 0.2), {});
+  ASSERT_FALSE(shifted.has_value());
+  EXPECT_EQ(
+      shifted.error().message,
+      "of 10 odometry samples that could have an image 0 have one within 0.005 s: the odometry is -0.0200 s after "
+      "the nearest image (median; -0.0200 to -0.0200 for the middle half); is that the offset of their clocks?");
+  const auto elsewhere = TrackingSource::open(wall(41, -3600.0), straight(11, 0.2), {});
+  ASSERT_FALSE(elsewhere.has_value());
+  EXPECT_NE(elsewhere.error().message.find("the odometry begins 3600.000 s after the images"), std::string::npos);
+  EXPECT_FALSE(TrackingSource::open(wall(0), straight(11, 0.2), {}).has_value());
+  EXPECT_FALSE(TrackingSource::open(wall(41), {}, {}).has_value());
+
+  ImageStream broken = wall(41);
+  broken.cameras[0].model.fx = -1.0;
+  EXPECT_FALSE(TrackingSource::open(broken, straight(11, 0.2), {}).has_value());
+}
+
+}  // namespace
+}  // namespace tutti::visual

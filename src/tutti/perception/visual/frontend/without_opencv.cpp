@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Instead of everything else in this folder when it is built with TUTTI_BUILD_VISUAL=OFF: users need not know.
+#include "tutti/base/check.hpp"
+#include "tutti/perception/visual/frontend/tracking_source.hpp"
+
+namespace tutti::visual {
+
+Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream, Trajectory, const TrackingConfig&) {
+  return fail(ErrorCode::unsupported,
+              "images cannot be tracked: this program was built without OpenCV (TUTTI_BUILD_VISUAL=OFF)");
+}
+
+Result<TrackedImages> TrackingSource::images(std::size_t) { TUTTI_CHECK(false, "there is no such source"); }
+
+}  // namespace tutti::visual
