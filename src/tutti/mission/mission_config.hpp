@@ -14,10 +14,12 @@
 #include "tutti/mission/spoiled_closures.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
 #include "tutti/perception/visual/closure_config.hpp"
+#include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/simulation/bounds.hpp"
 #include "tutti/simulation/degrade.hpp"
+#include "tutti/simulation/hall_recordings.hpp"
 #include "tutti/simulation/recordings.hpp"
 #include "tutti/simulation/reference_closures.hpp"
 
@@ -164,9 +166,11 @@ struct MissionConfig {
   std::vector<std::string> notes;             ///< Shown in the report.
   double duration_s = 0.0;                    ///< 0 = until the last sample.
   evaluation::AssociationConfig association;  ///< Of estimates with the reference.
-  std::string source = "recordings";          ///< recordings (`robots`) | simulation
+  std::string source = "recordings";          ///< recordings (`robots`) | simulation | hall
   std::vector<RobotConfig> robots;
   simulation::SimulationConfig simulation;
+  simulation::HallMissionConfig hall;
+  visual::TrackerConfig tracker;
   robot::AgentConfig agent;
   server::ServerConfig server;
   bundle::RefinementConfig refinement;
@@ -182,9 +186,12 @@ struct MissionConfig {
     v.field("notes", notes, any(), "Sentences shown in the report.");
     v.field("duration_s", duration_s, at_least(0.0), "Mission time; 0 = until the last sample.");
     v.field("association", association);
-    v.field("source", source, one_of({"recordings", "simulation"}), "Replay `robots`, or simulate.");
+    v.field("source", source, one_of({"recordings", "simulation", "hall"}),
+            "Replay `robots`, or simulate: walks through a network of corridors, or flights with cameras in a hall.");
     v.field("robots", robots, any(), "The robots whose recordings are replayed.");
     v.field("simulation", simulation);
+    v.field("hall", hall);
+    v.field("tracker", tracker, any(), "How points are followed through images.");
     v.field("agent", agent);
     v.field("server", server);
     v.field("refinement", refinement);

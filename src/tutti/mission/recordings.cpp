@@ -141,8 +141,35 @@ Result<MissionInput> simulate(const MissionConfig& config, std::uint64_t seed) {
   return input;
 }
 
+/// Tracks where the robot makes keyframes.
+visual::TrackingConfig tracking(const MissionConfig& config) {
+  return {.tracker = config.tracker,
+          .keyframe_distance_m = config.agent.submap.keyframe_distance_m,
+          .keyframe_angle_deg = config.agent.submap.keyframe_angle_deg,
+          .keyframe_time_s = config.agent.submap.keyframe_time_s};
+}
+
+Result<MissionInput> fly(const MissionConfig& config, std::uint64_t seed) {
+  auto hall = simulation::simulate_hall(config.hall, Timestamp{0}, seed);
+  if (!hall) return tl::unexpected(hall.error());
+  MissionInput input;
+  for (std::size_t i = 0; i < hall->robots.size(); ++i) {
+    auto& [recording, images] = hall->robots[i];
+    if (!images.stamps.empty()) {
+      auto source = visual::TrackingSource::open(std::move(images), recording.odometry, tracking(config));
+      if (!source) return in_context("robot " + recording.name, source.error());
+      recording.visual = std::move(*source);
+    }
+    input.robots.push_back({.recording = std::move(recording), .start_s = config.hall.robots[i].start_s});
+  }
+  input.survey = std::make_shared<const PointCloud>(
+      simulation::sample_surface(*hall->surface, kSurveySpacing_m, Rng(seed).fork("survey")));
+  return input;
+}
+
 Result<MissionInput> replay_or_simulate(const MissionConfig& config, const fs::path& data, std::uint64_t seed) {
-  if (config.source != "recordings") return simulate(config, seed);
+  if (config.source == "simulation") return simulate(config, seed);
+  if (config.source == "hall") return fly(config, seed);
   auto robots = replay_all(config, data, Rng(seed));
   if (!robots) return tl::unexpected(robots.error());
   return MissionInput{.robots = std::move(*robots), .survey = nullptr};

@@ -30,6 +30,8 @@ std::vector<std::string> robot_names(const mission::MissionConfig& config) {
   std::vector<std::string> names;
   if (config.source == "recordings")
     for (const mission::RobotConfig& robot : config.robots) names.push_back(robot.name);
+  else if (config.source == "hall")
+    for (const auto& robot : config.hall.robots) names.push_back(robot.name);
   else
     for (const auto& robot : simulation::single_robots(config.simulation.robots)) names.push_back(robot.name);
   return names;

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/model/image_stream.hpp"
+#include "tutti/model/recording.hpp"
+#include "tutti/simulation/camera.hpp"
+#include "tutti/simulation/flight.hpp"
+#include "tutti/simulation/hall.hpp"
+#include "tutti/simulation/imu.hpp"
+#include "tutti/simulation/lidar.hpp"
+#include "tutti/simulation/odometry.hpp"
+
+namespace tutti::simulation {
+
+struct FlyingRobotConfig {
+  std::string name;
+  std::string sensors = "visual";
+  double start_s = 0.0;
+  FlightConfig flight;
+  OdometryNoiseConfig odometry;
+  template <class V>
+  void describe(V& v) {
+    v.field("name", name, any(), "Unique name.");
+    v.field("sensors", sensors, one_of({"visual", "lidar", "both"}), "What it carries.");
+    v.field("start_s", start_s, between(0.0, kLongest_s), "Mission time at which it starts to fly.");
+    v.field("flight", flight, any(), "Where it flies.");
+    v.field("odometry", odometry, any(), "Errors of its odometry.");
+  }
+};
+
+/// Robots with cameras, LiDARs or both in one hall.
+struct HallMissionConfig {
+  HallConfig world;
+  ImageConfig images;
+  bool half_resolution = true;
+  bool imu = true;
+  LidarConfig lidar;
+  ImuConfig imu_noise;
+  std::vector<FlyingRobotConfig> robots;
+  template <class V>
+  void describe(V& v) {
+    v.field("world", world, any(), "Where they fly.");
+    v.field("images", images, any(), "Noise and exposure of the cameras.");
+    v.field("half_resolution", half_resolution, any(),
+            "Images of 376 x 240 instead of 752 x 480 pixels: a quarter of the time.");
+    v.field("imu", imu, any(), "Robots with a camera have an IMU, too.");
+    v.field("lidar", lidar, any(), "LiDARs.");
+    v.field("imu_noise", imu_noise, any(), "IMUs.");
+    v.field("robots", robots, any(), "The robots, each with its own start and odom frame.");
+  }
+};
+
+struct FlownRecording {
+  Recording recording;  ///< Without `visual`: somebody is yet to follow points through the images.
+  ImageStream images;   ///< No stamps when there is no camera.
+};
+
+struct SimulatedHall {
+  std::vector<FlownRecording> robots;           ///< Robots 0, 1, ...
+  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would find.
+};
+
+/// The first sample of each robot is at `start` + start_s. An error when two robots have one name, or one has none.
+Result<SimulatedHall> simulate_hall(const HallMissionConfig& config, Timestamp start, std::uint64_t seed);
+
+}  // namespace tutti::simulation
