@@ -13,6 +13,7 @@ find_package(Protobuf REQUIRED)
 find_package(PNG REQUIRED)
 find_package(Threads REQUIRED)
 find_package(spectra REQUIRED)
+find_package(Ceres 2.1 REQUIRED) # bundle adjustment; the reference solver of the tests
 
 # SuiteSparse 5.12, LAPACKE, zstd, SQLite, NATS and OpenCV ship no CMake configuration that works everywhere: plain imported targets.
 function(tutti_import_library target header)
@@ -46,7 +47,6 @@ endif()
 if(TUTTI_BUILD_TESTS)
   find_package(GTest REQUIRED)
   find_package(rapidcheck REQUIRED)
-  find_package(Ceres 2.1 REQUIRED) # the reference solver of the tests
 endif()
 if(TUTTI_BUILD_BENCH)
   find_package(benchmark REQUIRED)

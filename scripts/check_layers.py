@@ -12,7 +12,7 @@ import sys
 CONFINED = [
     (r"yaml-cpp/", r"base/config_io\.cpp$", "base/config_io.cpp"),
     (r"google/protobuf|.*\.pb\.h$", r"(tests/support/)?(wire|bus|program/feed)/", "wire/, bus/ and program/feed/"),
-    (r"ceres/", r"(estimation/.*\.cpp|.*_test\.cpp)$", "estimation/*.cpp and tests"),
+    (r"ceres/", r"(estimation/bundle/.*\.cpp|.*_test\.cpp)$", "estimation/bundle/*.cpp and tests"),
     (r"Spectra/", r"spectral/.*\.cpp$", "spectral/*.cpp"),
     (r"nanoflann", r"(perception|spectral|consistency|evaluation)/.*\.cpp$", "perception/, spectral/, consistency/, evaluation/ *.cpp"),
     (r"nats(/|\.h)", r"bus/(nats_.*\.cpp|internal/nats_connection\.hpp)$",
