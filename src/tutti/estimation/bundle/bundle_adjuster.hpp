@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/estimation/bundle/bundle_problem.hpp"
+
+namespace tutti::bundle {
+
+struct BundleConfig {
+  int max_iterations = 30;
+  double relative_cost_tolerance = 1e-4;
+  std::string loss = "cauchy";
+  double loss_scale = 2.0;
+  double odometry_loss_scale = 5.0;
+  double gyro_random_walk = 1e-4;
+  double accelerometer_random_walk = 4e-3;
+
+  template <class V>
+  void describe(V& v) {
+    v.field("max_iterations", max_iterations, at_least(0), "Steps at most.");
+    v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
+            "Converged when a step lowers the cost by less than this share of it.");
+    v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the views.");
+    v.field("loss_scale", loss_scale, greater_than(0.0), "Its scale, in standard deviations.");
+    v.field("odometry_loss_scale", odometry_loss_scale, greater_than(0.0),
+            "Scale of the Cauchy loss on odometry, in standard deviations.");
+    v.field("gyro_random_walk", gyro_random_walk, greater_than(0.0), "Of the gyro's bias, rad/s^2/sqrt(Hz).");
+    v.field("accelerometer_random_walk", accelerometer_random_walk, greater_than(0.0),
+            "Of the accelerometer's bias, m/s^3/sqrt(Hz).");
+  }
+};
+
+/// Solves a bundle problem. Implementations differ in the library that they use.
+class BundleAdjuster {
+ public:
+  virtual ~BundleAdjuster() = default;
+  /// Refuses what is not finite, by name. Numerical failure is in the summary.
+  [[nodiscard]] virtual Result<BundleSolution> adjust(const BundleProblem& problem) const = 0;
+};
+
+/// Levenberg-Marquardt of Ceres, landmarks eliminated (Schur complement), one thread.
+std::unique_ptr<BundleAdjuster> make_ceres_bundle_adjuster(const BundleConfig& config);
+
+}  // namespace tutti::bundle

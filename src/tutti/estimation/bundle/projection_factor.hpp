@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+
+#include "tutti/estimation/bundle/bundle_problem.hpp"
+
+namespace tutti::bundle {
+
+/// Reprojection error of a landmark, 2x1, in standard deviations of the pixel:
+///   r = (project(T_camera_body T_body_world p_world) - pixel) / sigma
+/// with its derivatives for T_world_body <- retract(T_world_body, xi) and p_world <- p_world + d.
+struct ProjectionLinearisation {
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 6> J_pose;
+  Eigen::Matrix<double, 2, 3> J_landmark;
+};
+/// Nothing when no pixel sees the landmark (geometry/camera.hpp, project()).
+std::optional<ProjectionLinearisation> linearise_projection(const Camera& camera, const Pose3& T_world_body,
+                                                            const Eigen::Vector3d& p_world,
+                                                            const Eigen::Vector2d& pixel, double sigma_px);
+
+/// Pixel minus measured pixel, px; nothing when no pixel sees the landmark.
+std::optional<Eigen::Vector2d> reprojection_error(const Camera& camera, const Pose3& T_world_body,
+                                                  const Eigen::Vector3d& p_world, const Eigen::Vector2d& pixel);
+
+/// Statistics of the problem's reprojection errors by camera.
+std::vector<CameraResiduals> camera_residuals(const BundleProblem& problem);
+
+}  // namespace tutti::bundle

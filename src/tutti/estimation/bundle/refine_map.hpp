@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/estimation/bundle/bundle_adjuster.hpp"
+#include "tutti/estimation/bundle/guided_matches.hpp"
+#include "tutti/estimation/bundle/landmark_merge.hpp"
+
+namespace tutti::bundle {
+
+struct RefinementConfig {
+  GuidedMatchConfig matching;
+  MergeConfig merge;
+  BundleConfig bundle;
+  template <class V>
+  void describe(V& v) {
+    v.field("matching", matching);
+    v.field("merge", merge);
+    v.field("bundle", bundle);
+  }
+};
+
+struct RefinementInput {
+  std::vector<PosedSubmap> submaps;    ///< Of any robots; those without a payload count by their odometry alone.
+  std::vector<SubmapPair> closed;      ///< Tied by accepted closures: guided_matches() says which landmarks are one.
+  std::vector<LandmarkMatch> matches;  ///< Further ones that are known to be one thing.
+};
+
+/// What takes the place of a pose graph's odometry factor.
+struct RelativeFactor {
+  KeyframeId from;
+  KeyframeId to;             ///< The keyframe after it.
+  RelativePose measurement;  ///< T_from_to with the covariance of the joint posterior.
+};
+
+struct Refinement {
+  std::vector<BundleKeyframe> keyframes;          ///< By id.
+  std::vector<RelativeFactor> factors;            ///< By id: from every keyframe to the next one of its submap.
+  std::vector<Eigen::Vector3d> landmarks;         ///< World frame, m.
+  std::vector<CameraResiduals> residuals_before;  ///< MergedMap::residuals: of the submaps as they came.
+  std::vector<CameraResiduals> residuals_after;
+  MergeSummary merge;
+  AdjustmentSummary adjustment;
+};
+
+/// The submaps' keyframes and landmarks in one bundle adjustment, starting from the pose graph's poses. A pure
+/// function; the order of submaps and matches does not matter. Non-finite and contradictory input is refused by name.
+/// Between keyframes that see nothing, and everywhere when the adjustment fails, factors are those of the odometry.
+Result<Refinement> refine_map(const RefinementInput& input, const RefinementConfig& config);
+
+}  // namespace tutti::bundle
