@@ -5,6 +5,7 @@
 #include "fuzz/fuzz_target.hpp"
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
+#include "support/wire/visual.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/wire/agent_state.hpp"
@@ -62,6 +63,9 @@ std::map<std::string, std::vector<std::string>> seeds() {
   Rng rng(5);
   std::map<std::string, std::vector<std::string>> out;
   out["submap"] = both(MessageKind::submap, wire::encode(any_submap(rng, 6, 40)));
+  Rng with_eyes(6);
+  for (std::string& seed : both(MessageKind::submap, wire::encode(any_visual_submap(with_eyes, 6))))
+    out["submap"].push_back(std::move(seed));
   out["proxy_graph"] = both(MessageKind::proxy_graph, wire::encode(any_proxy_graph(rng, 3, 30, false)));
   for (std::string& seed : both(MessageKind::proxy_graph, wire::encode(any_proxy_graph(rng, 2, 30, true))))
     out["proxy_graph"].push_back(std::move(seed));

@@ -38,7 +38,8 @@ struct CloudCodec {
 
 /// Exact: ids, stamps, flags, counts. Poses: 1e-5 m, 1e-6 rad. Odometry covariance: 1 % of the variance in every
 /// direction. Odometry that follows from the keyframe poses is not carried but computed from them. Cloud: see
-/// CloudCodec; an empty one comes back as null.
+/// CloudCodec; an empty one comes back as null. Keypoints: 1/32 px; landmarks: 0.5 mm per axis; their sigmas: 0.6 %, at
+/// least 1e-6; the rest of what the cameras saw, and the IMU's: exact.
 std::string encode(const SubmapMessage& message, const CloudCodec& cloud = {});
 Result<SubmapMessage> decode_submap(std::string_view bytes);
 

@@ -61,17 +61,16 @@ const char* name(MessageKind kind) {
   return kUnknown.data();
 }
 
-// What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions. Verdict: up to 4 it said why a
-// pair was refused in words only, and not by which version of the finder; 6 has sessions, 7 evidence. Verdicts of a
-// job: from 2 on with evidence. Proxy graph: up to 5 it told what it is unsure of in other terms, which no robot
-// compares any more, up to 6 not where others were last seen, and 7 said more of whole scales than anybody needs;
-// nobody keeps one. Cloud: came with 2, the same since. Receipt: 2 says what is refused, and whose the number is. Agent
-// state: 1 did not say how sure the robot is of where it is, 2 knew no
-// images.
+// What changed: submap: only the number, which all kinds shared up to 4; 5 has sessions, 6 what cameras saw. Verdict:
+// up to 4 it said why a pair was refused in words only, and not by which version of the finder; 6 has sessions, 7
+// evidence. Verdicts of a job: from 2 on with evidence. Proxy graph: up to 5 it told what it is unsure of in other
+// terms, which no robot compares any more, up to 6 not where others were last seen, and 7 said more of whole scales
+// than anybody needs; nobody keeps one. Cloud: came with 2, the same since. Receipt: 2 says what is refused, and whose
+// the number is. Agent state: 1 did not say how sure the robot is of where it is, 2 knew no images.
 Versions versions(MessageKind kind) {
   switch (kind) {
     case MessageKind::submap:
-      return {.oldest = 1, .current = 5};
+      return {.oldest = 1, .current = 6};
     case MessageKind::verdict:
       return {.oldest = 5, .current = 7};
     case MessageKind::proxy_graph:

@@ -66,6 +66,18 @@ TEST(Golden, Submap) {
                               {161, {1'577'836'981'199'104'651}, {kQuarterTurn, {2, 2, 3}}, false}};
   message.submap.odometry = {{{kQuarterTurn, {1, 0, 0}}, diagonal(4e-4, 1e-4)}};
   message.submap.cloud = std::make_shared<PointCloud>(PointCloud{{{1, 2, 0.5F}, {-3, 4, 1}, {10, -7, 0}}});
+  auto visual = std::make_shared<VisualPayload>();
+  const CameraModel model{CameraKind::pinhole, 752, 480, 458.5, 457.25, 367.0, 248.0, {-0.25, 0.0625, 0.0, 0.0}};
+  visual->cameras = {{model, {kQuarterTurn, {0.5, 0, 0}}}};
+  visual->landmarks = {{{1.5F, -2.25F, 8.0F}, 0.5F}};
+  visual->descriptors = {DescriptorKind::maplab, 1, {0x0123456789abcdefU}};
+  visual->frames = {{160, 0, {{{10.0F, 20.5F}, 1.0F, 0, kNoIndex}, {{7.0F, 300.0F}, 0.5F, kNoIndex, 0}}},
+                    {161, 0, {{{100.0F, 20.0F}, 1.0F, 0, kNoIndex}}}};
+  visual->imu = {{.from_keyframe = 160, .duration_s = 1.1, .delta_rotation = kQuarterTurn}};
+  visual->imu[0].delta_velocity = {1, 2, 3};
+  visual->imu[0].covariance.diagonal().setConstant(0.25);
+  visual->imu[0].d_bias(8, 5) = -7.0;
+  message.submap.visual = visual;
   for_every_version(
       MessageKind::submap, encode(message), decode_submap, [&](const SubmapMessage& decoded, unsigned version) {
         const Submap& submap = decoded.submap;
@@ -86,6 +98,17 @@ TEST(Golden, Submap) {
         for (const auto& point : submap.cloud->points)
           nearest = std::min(nearest, static_cast<double>((point - Eigen::Vector3f(10, -7, 0)).norm()));
         EXPECT_LT(nearest, 0.0083);
+        ASSERT_EQ(submap.visual != nullptr, version >= 6);
+        if (version < 6) return;
+        EXPECT_EQ(submap.visual->cameras, visual->cameras);
+        EXPECT_EQ(submap.visual->landmarks, visual->landmarks);
+        EXPECT_EQ(submap.visual->descriptors, visual->descriptors);
+        EXPECT_EQ(submap.visual->frames, visual->frames);
+        ASSERT_EQ(submap.visual->imu.size(), 1U);
+        EXPECT_EQ(submap.visual->imu[0].from_keyframe, 160U);
+        EXPECT_EQ(submap.visual->imu[0].delta_velocity, Eigen::Vector3d(1, 2, 3));
+        EXPECT_EQ(submap.visual->imu[0].covariance, visual->imu[0].covariance);
+        EXPECT_EQ(submap.visual->imu[0].d_bias, visual->imu[0].d_bias);
       });
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "support/wire/messages.hpp"
+#include "support/wire/visual.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/integer_coder.hpp"
@@ -37,7 +38,11 @@ const ProxyGraph& base() {
 }
 
 std::string sample(MessageKind kind, Rng rng) {
-  if (kind == MessageKind::submap) return encode(test::any_submap(rng, 6, 30));
+  if (kind == MessageKind::submap) {
+    SubmapMessage message = test::any_submap(rng, 6, 30);
+    message.submap.visual = std::make_shared<VisualPayload>(test::any_visual(rng, message.submap));
+    return encode(message);
+  }
   if (kind == MessageKind::proxy_graph) return encode(test::any_proxy_graph(rng, 2, 30, true));
   if (kind == MessageKind::proxy_graph_delta) {
     ProxyGraphMessage message{{}, base()};

@@ -10,6 +10,13 @@ inline constexpr std::size_t kMaxMessageBytes = 16U << 20U;  ///< Of the protobu
 inline constexpr std::size_t kMaxStateBytes = 256U << 20U;   ///< Of an agent's state, which only its robot reads.
 inline constexpr std::size_t kMaxKeyframes = 10'000;         ///< Per submap.
 inline constexpr std::size_t kMaxCloudPoints = 1'000'000;
+inline constexpr std::size_t kMaxCameras = 8;
+inline constexpr std::size_t kMaxImageSide_px = 65'535;
+inline constexpr std::size_t kMaxImages = 20'000;  ///< These and the next: per submap.
+inline constexpr std::size_t kMaxObservations = 200'000;
+inline constexpr std::size_t kMaxLandmarks = 50'000;
+inline constexpr std::size_t kMaxDescriptorWords = 8;
+inline constexpr std::size_t kMaxDescriptorBytes = 4U << 20U;
 inline constexpr std::size_t kMaxProxyNodes = 200'000;  ///< Also of eliminated ones.
 inline constexpr std::size_t kMaxProxyEdges = 1'000'000;
 inline constexpr std::size_t kMaxClosures = 1'000;  ///< Per verdict.
@@ -23,6 +30,8 @@ inline constexpr std::size_t kMaxRefusalKinds = 1'000;  ///< Per mission status.
 inline constexpr std::size_t kMaxStretches = 100'000;   ///< Per receipt.
 
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.
+inline constexpr double kMaxLandmarkRange_m = 10'000.0;
+inline constexpr double kMaxSigma_px = 1'000.0;
 inline constexpr double kMaxVariance = 1e20;
 
 }  // namespace tutti::wire

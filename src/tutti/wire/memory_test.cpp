@@ -106,6 +106,9 @@ TEST(Memory, NoPayloadOfALegalSizeTakesMuchMoreThanItsBytes) {
       {MessageKind::submap, "flags", field(6, zeros(kMaxMessageBytes - 5))},
       {MessageKind::submap, "clouds", filled(field(9, ""))},
       {MessageKind::submap, "clouds that become one", filled(cloud)},
+      {MessageKind::submap, "visual payloads", filled(field(10, ""))},
+      {MessageKind::submap, "cameras", field(10, filled(field(1, "")).substr(0, 15'000'000))},
+      {MessageKind::submap, "IMU numbers", field(10, field(10, zeros(8 * 2'000'000)))},
       {MessageKind::submap, "headers", filled(field(1, ""))},
       {MessageKind::mission_status, "robots", filled(field(11, field(7, "")))},
       {MessageKind::mission_status, "workers", filled(field(12, ""))},
@@ -138,6 +141,7 @@ TEST(Memory, CountsUpToTheLimitsAreAcceptedAndNoMore) {
     EXPECT_EQ(accepted(MessageKind::submap, field(8, zeros(9) + repeated(covariances - 9 + more, "\xff\x01"))),
               more == 0);
     EXPECT_EQ(accepted(MessageKind::submap, field(9, field(3, zeros(kMaxCloudPoints + more)))), more == 0);
+    EXPECT_EQ(accepted(MessageKind::submap, field(10, repeated(kMaxCameras + more, field(1, "")))), more == 0);
     EXPECT_EQ(accepted(MessageKind::mission_status, repeated(kMaxRobots + more, field(11, ""))), more == 0);
     EXPECT_EQ(accepted(MessageKind::cloud, field(3, zeros(10)) + field(3, zeros(kMaxCloudPoints - 10 + more))),
               more == 0);

@@ -9,6 +9,7 @@
 #include "tutti/wire/internal/columns.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/quantise.hpp"
+#include "tutti/wire/internal/visual_codec.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -96,6 +97,7 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
   write_columns(poses, *out.mutable_pose());
   write_odometry(submap, out);
   if (submap.cloud && !submap.cloud->points.empty()) encode_cloud(*submap.cloud, cloud, *out.mutable_cloud());
+  if (submap.visual) encode_visual(*submap.visual, submap.keyframes.front().index, *out.mutable_visual());
   return pack_frame(MessageKind::submap, out.SerializeAsString());
 }
 
@@ -116,6 +118,11 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
     auto cloud = decode_cloud(in.cloud());
     if (!cloud) return in_context(where, cloud.error());
     message.submap.cloud = std::move(*cloud);
+  }
+  if (in.has_visual()) {
+    auto visual = decode_visual(in.visual(), in.first_keyframe());
+    if (!visual) return in_context(where, visual.error());
+    message.submap.visual = std::move(*visual);
   }
   if (auto ok = validate(message); !ok) return tl::unexpected(ok.error());
   return message;

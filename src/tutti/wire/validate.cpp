@@ -6,6 +6,7 @@
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/internal/visual_codec.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -57,6 +58,8 @@ Status check_submap(const Submap& submap) {
     if (auto ok = check_coded_covariance(odometry.covariance); !ok)
       return in_context("odometry to " + where(), ok.error());
   }
+  if (submap.visual != nullptr)
+    if (auto ok = check_visual(submap); !ok) return in_context("visual", ok.error());
   return submap.cloud == nullptr ? Status() : validate(*submap.cloud);
 }
 

@@ -27,17 +27,19 @@ struct Field {
 };
 
 using v1::AgentState, v1::Cloud, v1::Job, v1::MissionStatus, v1::NumbersOfSession, v1::ProxyGraph, v1::Receipt,
-    v1::SubmapPairs, v1::SubmapRequest, v1::Verdicts, v1::Submap, v1::Verdict;
+    v1::SubmapPairs, v1::SubmapRequest, v1::Verdicts, v1::Submap, v1::Verdict, v1::Visual;
 constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;
 
 constexpr std::array kCloud = {Field{Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
-constexpr std::array kSubmap = {
-    Field{Submap::kStampNsFieldNumber, kMaxKeyframes, "keyframes"},
-    Field{Submap::kPoseFieldNumber, 6 * kMaxKeyframes, "pose numbers"},
-    Field{Submap::kRepresentativeFieldNumber, kMaxKeyframes, "flags"},
-    Field{Submap::kOdometryFieldNumber, 6 * kMaxKeyframes, "odometry numbers"},
-    Field{Submap::kOdometryCovarianceFieldNumber, 21 * kMaxKeyframes, "covariance numbers"},
-    Field{Submap::kCloudFieldNumber, 1, "clouds", true, kCloud}};  // several would be merged
+constexpr std::array kVisual = {Field{Visual::kCameraFieldNumber, kMaxCameras, "cameras", true},
+                                Field{Visual::kImuKeyframeFieldNumber, kMaxKeyframes, "IMU keyframes"}};
+constexpr std::array kSubmap = {Field{Submap::kStampNsFieldNumber, kMaxKeyframes, "keyframes"},
+                                Field{Submap::kPoseFieldNumber, 6 * kMaxKeyframes, "pose numbers"},
+                                Field{Submap::kRepresentativeFieldNumber, kMaxKeyframes, "flags"},
+                                Field{Submap::kOdometryFieldNumber, 6 * kMaxKeyframes, "odometry numbers"},
+                                Field{Submap::kOdometryCovarianceFieldNumber, 21 * kMaxKeyframes, "covariance numbers"},
+                                Field{Submap::kCloudFieldNumber, 1, "clouds", true, kCloud},  // several would be merged
+                                Field{Submap::kVisualFieldNumber, 1, "visual payloads", true, kVisual}};
 constexpr std::array kProxyGraph = {
     Field{ProxyGraph::kRunFieldNumber, kMostChains, "chains", true},
     Field{ProxyGraph::kComponentRobotFieldNumber, kMostChains, "robots of components"},
