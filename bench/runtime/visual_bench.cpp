@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Time of each stage of a visual loop closure in a simulated room, and of a query for a place among 10,000 keyframes,
+// with the error of what came out beside it. bench_visual_v101 does the closures on a real recording.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+
+#include "support/perception/visual/textured_room.hpp"
+#include "tutti/perception/visual/hamming.hpp"
+#include "tutti/perception/visual/p3p.hpp"
+#include "tutti/perception/visual/place_index.hpp"
+#include "tutti/perception/visual/verify.hpp"
+
+namespace {
+
+using namespace tutti;
+using namespace tutti::visual;
+using namespace tutti::visual::test;
+
+const auto kCameras = stereo_cameras();
+const Flight kFlightA;
+const Flight kFlightB{.from = {4.6, 2.6, 1.5}, .to = {2.4, 2.4, 1.4}, .yaw_rad = 1.7};
+
+const std::vector<RoomPoint>& room() {
+  static const auto instance = textured_room(1200, Rng(1));
+  return instance;
+}
+
+void hamming_100000(benchmark::State& state) {
+  Rng rng(1);
+  Descriptors rows{.kind = DescriptorKind::maplab, .words = kWords};
+  for (int i = 0; i < 100000; ++i)
+    for (const std::uint64_t word : random_bits(rng)) rows.bits.push_back(word);
+  const Bits query(rows.row(77777).begin(), rows.row(77777).end());
+  std::vector<std::uint16_t> distances(rows.size());
+  TwoNearest found;
+  for (auto _ : state) {
+    hamming_distances(query, rows, distances);
+    benchmark::DoNotOptimize(found = two_nearest(distances));
+  }
+  state.counters["right"] = found.nearest == 77777 ? 1.0 : 0.0;
+}
+BENCHMARK(hamming_100000)->Unit(benchmark::kMillisecond);
+
+void payload_of_a_submap(benchmark::State& state) {
+  const Seen seen = fly(room(), kCameras, kFlightA, Rng(1));
+  VisualPayload payload;
+  for (auto _ : state) payload = *make_visual_payload(seen.images, kCameras, {});
+  state.counters["landmarks"] = static_cast<double>(payload.landmarks.size());
+}
+BENCHMARK(payload_of_a_submap)->Unit(benchmark::kMillisecond);
+
+void three_points(benchmark::State& state) {
+  std::array<Eigen::Vector3d, 3> points{{{0.3, 0.2, 3.0}, {-0.5, 0.1, 2.0}, {0.1, -0.4, 4.0}}}, directions;
+  for (std::size_t i = 0; i < 3; ++i) directions[i] = points[i].normalized();
+  std::vector<Pose3> solutions;
+  for (auto _ : state) benchmark::DoNotOptimize(solutions = p3p(directions, points));
+  double error = 1e9;
+  for (const Pose3& T : solutions) error = std::min(error, local(Pose3{}, T).norm());
+  state.counters["error"] = error;
+}
+BENCHMARK(three_points);
+
+void verify_a_pair(benchmark::State& state) {
+  const VisualClosureConfig config;
+  const auto a =
+      extract_features(make_submap({RobotId{0}, 0}, fly(room(), kCameras, kFlightA, Rng(1)), kCameras), config);
+  const auto b =
+      extract_features(make_submap({RobotId{1}, 0}, fly(room(), kCameras, kFlightB, Rng(2)), kCameras), config);
+  ClosureVerdict verdict;
+  for (auto _ : state) verdict = verify_pair(a, b, config);
+  double worst = 0.0;
+  for (const LoopClosure& closure : verdict.closures) {
+    const Pose3 T_true = true_pose(kFlightA, closure.from.index).inverse() * true_pose(kFlightB, closure.to.index);
+    worst = std::max(worst, local(T_true, closure.measurement.T_a_b).head<3>().norm());
+  }
+  state.counters["closures"] = static_cast<double>(verdict.closures.size());
+  state.counters["worst_mm"] = 1e3 * worst;
+}
+BENCHMARK(verify_a_pair)->Unit(benchmark::kMillisecond);
+
+// --- a place among 10,000 keyframes of 200 descriptors ---
+
+constexpr std::uint32_t kKeyframes = 10000, kPerKeyframe = 200, kPerSubmap = 10;
+
+/// A descriptor of a submap's place: every keyframe of it sees most of them, each time a little different.
+Bits seen_again(std::uint32_t submap, std::uint32_t point, double flips, Rng& rng) {
+  Rng its = Rng(7).fork((std::uint64_t{submap} << 32U) | point);
+  Bits out = random_bits(its);
+  for (std::uint64_t& word : out)
+    for (int bit = 0; bit < 64; ++bit) word ^= static_cast<std::uint64_t>(rng.bernoulli(flips)) << bit;
+  return out;
+}
+
+/// `share` of the descriptors are of the place, the others of nothing.
+Descriptors look_around(std::uint32_t submap, double share, Rng& rng) {
+  Descriptors out{.kind = DescriptorKind::maplab, .words = kWords};
+  for (std::uint32_t i = 0; i < kPerKeyframe; ++i) {
+    const Bits bits = rng.bernoulli(share) ? seen_again(submap, static_cast<std::uint32_t>(rng.index(300)), 0.06, rng)
+                                           : random_bits(rng);
+    out.bits.insert(out.bits.end(), bits.begin(), bits.end());
+  }
+  return out;
+}
+
+const PlaceIndex& index_of_all() {
+  static const PlaceIndex instance = [] {
+    PlaceIndex index(DescriptorKind::maplab, kWords);
+    Rng rng(1);
+    for (std::uint32_t k = 0; k < kKeyframes; ++k)
+      index.add({RobotId{0}, k / kPerSubmap}, {RobotId{0}, k}, look_around(k / kPerSubmap, 0.7, rng));
+    return index;
+  }();
+  return instance;
+}
+
+void place_among_10000(benchmark::State& state) {
+  const PlaceIndex& index = index_of_all();
+  Rng rng(2);
+  std::vector<std::pair<std::uint32_t, Descriptors>> queries;
+  for (int i = 0; i < 200; ++i) {
+    const auto submap = static_cast<std::uint32_t>(rng.index(kKeyframes / kPerSubmap));
+    queries.emplace_back(submap, look_around(submap, 0.3, rng));
+  }
+  std::size_t asked = 0, right = 0;
+  for (auto _ : state) {
+    const auto& [submap, descriptors] = queries[asked++ % queries.size()];
+    const auto found = index.query(descriptors, 5);
+    right += !found.empty() && found[0].submap.index == submap;
+  }
+  state.counters["right"] = static_cast<double>(right) / static_cast<double>(asked);
+  state.counters["keyframes"] = static_cast<double>(index.size());
+}
+BENCHMARK(place_among_10000)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+
+BENCHMARK_MAIN();
