@@ -85,6 +85,13 @@ std::vector<TrackedImage> VisualTracker::track(std::span<const Image> images, bo
   return out;
 }
 
+void VisualTracker::restart(std::uint64_t first_track) {
+  last_.reset();
+  tracks_.clear();
+  motion_px_.clear();
+  next_track_ = std::max(next_track_, first_track);
+}
+
 std::vector<TrackedKeypoint> VisualTracker::follow_from_last(const internal::Pyramid& now) {
   std::vector<TrackedKeypoint> out;
   std::vector<Eigen::Vector2f> motion;
@@ -105,7 +112,7 @@ std::vector<TrackedKeypoint> VisualTracker::follow_from_last(const internal::Pyr
 
 void VisualTracker::add_corners(const Image& image, std::vector<TrackedKeypoint>& keypoints) {
   const auto wanted = static_cast<std::size_t>(config_.features);
-  if (keypoints.size() >= wanted) return;
+  if (static_cast<double>(keypoints.size()) >= config_.enough_share * config_.features) return;
   const auto corners = internal::find_corners(image, config_.threshold, config_.window_px / 2);
   const internal::SpreadRule rule{.width_px = image.width_px,
                                   .height_px = image.height_px,

@@ -20,6 +20,7 @@ class Pyramid;
 
 struct TrackerConfig {
   int features = 200;
+  double enough_share = 0.9;
   int threshold = 12;
   int cell_px = 40;
   int distance_px = 16;
@@ -32,6 +33,8 @@ struct TrackerConfig {
   template <class V>
   void describe(V& v) {
     v.field("features", features, between(10, 5000), "Points followed at a time, in every image.");
+    v.field("enough_share", enough_share, between(0.0, 1.0),
+            "New ones are looked for when fewer than this share of them is left.");
     v.field("threshold", threshold, between(1, 255),
             "Grey values by which a new corner differs from what is round it.");
     v.field("cell_px", cell_px, between(8, 1000), "New corners are spread evenly over cells of this size.");
@@ -62,7 +65,8 @@ class VisualTracker {
   /// the next one.
   std::vector<TrackedImage> track(std::span<const Image> images, bool keyframe);
 
-  [[nodiscard]] const std::vector<Camera>& cameras() const { return cameras_; }
+  /// Forgets all tracks; new ones have at least this number.
+  void restart(std::uint64_t first_track);
 
  private:
   [[nodiscard]] std::vector<TrackedKeypoint> follow_from_last(const internal::Pyramid& now);

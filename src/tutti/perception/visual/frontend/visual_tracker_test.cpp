@@ -54,7 +54,8 @@ TEST(VisualTracker, FollowsWhatMoves) {
     ASSERT_EQ(out.size(), 1U);
     EXPECT_EQ(out[0].descriptors.size(), 0U);
     const auto now = by_track(out[0]);
-    EXPECT_EQ(now.size(), 200U);
+    EXPECT_GE(now.size(), 180U);
+    EXPECT_LE(now.size(), 200U);
     std::size_t kept = 0;
     int wrong = 0;
     for (const auto& [number, pixel] : now) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/visual/frontend/internal/optical_flow.hpp"
 
+#include <algorithm>
 #include <opencv2/features2d.hpp>
 #include <opencv2/video/tracking.hpp>
 
@@ -24,14 +25,14 @@ struct Flow {
   std::vector<std::uint8_t> found;
 };
 
-/// One way.
+/// One way, from the `levels`th halving on.
 Flow flow(const Pyramid& from, const Pyramid& to, const std::vector<cv::Point2f>& points,
-          std::vector<cv::Point2f> guess, const FlowRule& rule) {
-  constexpr int kIterations = 20;
-  constexpr double kStep_px = 0.02, kLeastEigenvalue = 1e-4;
+          std::vector<cv::Point2f> guess, int window_px, int levels) {
+  constexpr int kIterations = 12;
+  constexpr double kStep_px = 0.03, kLeastEigenvalue = 1e-4;
   Flow out{.points = std::move(guess), .found = {}};
   cv::calcOpticalFlowPyrLK(from.levels().images, to.levels().images, points, out.points, out.found, cv::noArray(),
-                           cv::Size(rule.window_px, rule.window_px), rule.levels,
+                           cv::Size(window_px, window_px), levels,
                            cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kIterations, kStep_px),
                            cv::OPTFLOW_USE_INITIAL_FLOW, kLeastEigenvalue);
   return out;
@@ -62,7 +63,7 @@ std::vector<std::optional<Eigen::Vector2f>> follow(const Pyramid& from, const Py
   std::vector<std::optional<Eigen::Vector2f>> out(points.size());
   if (points.empty()) return out;
   const std::vector<cv::Point2f> begin = to_opencv(points);
-  const Flow there = flow(from, to, begin, to_opencv(guesses), rule);
+  const Flow there = flow(from, to, begin, to_opencv(guesses), rule.window_px, rule.levels);
   // Only what was found is followed back: that is half of the work.
   std::vector<std::size_t> which;
   std::vector<cv::Point2f> end, home;
@@ -76,7 +77,8 @@ std::vector<std::optional<Eigen::Vector2f>> follow(const Pyramid& from, const Py
     home.push_back(begin[i]);
   }
   if (which.empty()) return out;
-  const Flow back = flow(to, from, end, home, rule);
+  // From where it should end, so that the coarse levels have nothing to find.
+  const Flow back = flow(to, from, end, home, rule.window_px, std::min(rule.levels, 1));
   for (std::size_t k = 0; k < which.size(); ++k)
     if (back.found[k] != 0 && cv::norm(back.points[k] - home[k]) <= rule.agreement_px)
       out[which[k]] = Eigen::Vector2f(end[k].x, end[k].y);
