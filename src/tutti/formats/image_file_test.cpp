@@ -10,6 +10,7 @@
 #include "support/formats/mutations.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/base/random.hpp"
 
 namespace tutti::formats {
 namespace {
@@ -50,6 +51,28 @@ TEST(ImageFile, ARealJpegAndWhatIsLeftOfIt) {
     ASSERT_FALSE(cut.has_value()) << share;
     EXPECT_TRUE(cut.error().message.starts_with("cut.jpg: ")) << cut.error().message;
   }
+}
+
+TEST(ImageFile, DamageIsAnErrorOrAnImage) {
+  Rng rng(4);
+  Image noise(24, 16);
+  for (auto& grey : noise.grey) grey = static_cast<std::uint8_t>(rng.index(256));
+  ASSERT_TRUE(write_image(temporary("tutti_damaged.png"), noise).has_value());
+  std::vector<std::string> files = {read_file(temporary("tutti_damaged.png")).value()};
+  if (const auto real = read_file(test::shared_path(kReal).string())) files.push_back(*real);
+  for (const std::string& file : files)
+    for (int run = 0; run < 60; ++run) {
+      std::string bytes = file;
+      for (int k = 0; k < 3; ++k)  // half of them in the header
+        bytes[rng.index(rng.bernoulli(0.5) ? 600 : bytes.size()) % bytes.size()] = static_cast<char>(rng.index(256));
+      const auto image = decode_image(bytes, "damaged");
+      if (image) {
+        EXPECT_EQ(image->grey.size(),
+                  static_cast<std::size_t>(image->width_px) * static_cast<std::size_t>(image->height_px));
+      } else {
+        EXPECT_TRUE(image.error().message.starts_with("damaged: ")) << image.error().message;
+      }
+    }
 }
 
 TEST(ImageFile, WhatIsNoImageIsNamed) {
