@@ -13,7 +13,7 @@ namespace tutti::mission {
 class ListedImages final : public VisualSource {
  public:
   explicit ListedImages(std::vector<TrackedImages> moments) : moments_(std::move(moments)) {}
-  [[nodiscard]] Result<TrackedImages> images(std::size_t sample) override { return moments_.at(sample); }
+  [[nodiscard]] Result<TrackedImages> images(std::size_t sample, bool) override { return moments_.at(sample); }
 
  private:
   std::vector<TrackedImages> moments_;

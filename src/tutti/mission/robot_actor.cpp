@@ -130,9 +130,10 @@ void RobotActor::feed_scan(std::size_t sample, Timestamp now) {
 void RobotActor::feed_images(std::size_t sample, Timestamp now) {
   const Recording& recording = recording_.recording;
   if (!recording.visual) return;
-  const auto images = recording.visual->images(sample);
+  const bool keyframe = node_->agent().wants_scan();
+  const auto images = recording.visual->images(sample, keyframe);
   if (!images) return note(refused_images_, images.error().message);
-  if (images->images.empty() || !node_->agent().wants_scan()) return;
+  if (images->images.empty() || !keyframe) return;
   const CpuScope cpu(cpu_s_);
   const std::size_t refused = refused_images_.count;
   take(node_->add_images(*images, now));

@@ -29,10 +29,11 @@ class ScanSource {
 class VisualSource {
  public:
   virtual ~VisualSource() = default;
-  /// The images taken at this odometry sample, with its stamp; no images when there are none. Tracks that begin after a
+  /// The images taken at this odometry sample, with its stamp; no images when there are none. At a keyframe, what is
+  /// seen will be kept: only there descriptors are needed, which cost most. Tracks that begin after a
   /// restart in the middle have other numbers than those before. An error is of this moment alone (a missing or corrupt
   /// file): the next samples can be asked for.
-  [[nodiscard]] virtual Result<TrackedImages> images(std::size_t sample) = 0;
+  [[nodiscard]] virtual Result<TrackedImages> images(std::size_t sample, bool keyframe) = 0;
 };
 
 /// Where simulated odometry really went wrong. Known to the evaluation only.

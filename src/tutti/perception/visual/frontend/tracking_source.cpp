@@ -6,10 +6,12 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/geometry/so3.hpp"
 
 namespace tutti::visual {
 namespace {
+
+/// An image begins fewer tracks than 2 to this: after a restart their numbers are new.
+constexpr unsigned kNumberBits = 16;
 
 /// The stamp nearest to `stamp`, of at least one.
 std::size_t nearest(const std::vector<Timestamp>& stamps, Timestamp stamp) {
@@ -71,27 +73,27 @@ TrackingSource::TrackingSource(ImageStream stream, Trajectory odometry, const Tr
       config_(config),
       tracker_(stream_.cameras, config.tracker) {}
 
-Result<TrackedImages> TrackingSource::images(std::size_t sample) {
+Result<TrackedImages> TrackingSource::images(std::size_t sample, bool keyframe) {
   TUTTI_CHECK(sample < odometry_.size(), "sample {} of {}", sample, odometry_.size());
-  TrackedImages out{.stamp = odometry_[sample].stamp, .cameras = cameras_, .images = {}};
-  Result<std::vector<TrackedImage>> images;
-  for (; next_sample_ <= sample; ++next_sample_) images = advance(odometry_[next_sample_]);
+  const Timestamp stamp = odometry_[sample].stamp;
+  TrackedImages out{.stamp = stamp, .cameras = cameras_, .images = {}};
+  const std::size_t moment = nearest(stream_.stamps, stamp);
+  // Images on the way from the last sample carry the tracks; those before a first one have nothing to tell.
+  const bool follows = sample > 0 && sample == next_sample_;
+  if (!follows && moment >= next_moment_) {
+    next_moment_ = moment;
+    tracker_.restart((moment << kNumberBits) + 1);
+  }
+  next_sample_ = std::max(next_sample_, sample + 1);
+  for (; next_moment_ < moment && stream_.stamps[next_moment_] < stamp; ++next_moment_)
+    static_cast<void>(track(next_moment_, false));
+  const bool is_of_sample = std::abs(stream_.stamps[moment] - stamp) <= config_.max_stamp_difference_s;
+  if (!is_of_sample || moment < next_moment_) return out;
+  next_moment_ = moment + 1;
+  auto images = track(moment, keyframe);
   if (!images) return tl::unexpected(images.error());
   out.images = *std::move(images);
   return out;
-}
-
-Result<std::vector<TrackedImage>> TrackingSource::advance(const StampedPose& sample) {
-  const bool keyframe = is_keyframe(sample);
-  const std::size_t moment = nearest(stream_.stamps, sample.stamp);
-  if (next_sample_ == 0) next_moment_ = moment;  // Images before the first sample have nothing to tell.
-  // Those on the way here carry the tracks.
-  for (; next_moment_ < moment && stream_.stamps[next_moment_] < sample.stamp; ++next_moment_)
-    static_cast<void>(track(next_moment_, false));
-  const bool is_of_sample = std::abs(stream_.stamps[moment] - sample.stamp) <= config_.max_stamp_difference_s;
-  if (!is_of_sample || moment < next_moment_) return {};
-  next_moment_ = moment + 1;
-  return track(moment, keyframe);
 }
 
 Result<std::vector<TrackedImage>> TrackingSource::track(std::size_t moment, bool keyframe) {
@@ -107,18 +109,6 @@ Result<std::vector<TrackedImage>> TrackingSource::track(std::size_t moment, bool
     images.push_back(image ? *std::move(image) : Image());
   }
   return tracker_.track(images, keyframe);
-}
-
-bool TrackingSource::is_keyframe(const StampedPose& sample) {
-  if (last_keyframe_) {
-    const Pose3 step = last_keyframe_->pose.inverse() * sample.pose;
-    if (step.translation.norm() < config_.keyframe_distance_m &&
-        rotation_angle(step) < config_.keyframe_angle_deg * kRadPerDeg &&
-        sample.stamp - last_keyframe_->stamp < config_.keyframe_time_s)
-      return false;
-  }
-  last_keyframe_ = sample;
-  return true;
 }
 
 }  // namespace tutti::visual

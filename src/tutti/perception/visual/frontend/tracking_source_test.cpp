@@ -27,7 +27,6 @@ ImageStream wall(std::size_t moments, double offset_s = 0.0) {
   return out;
 }
 
-/// 0.1 m in every sample.
 Trajectory straight(std::size_t samples, double step_s) {
   Trajectory out;
   for (std::size_t i = 0; i < samples; ++i)
@@ -47,8 +46,9 @@ TEST(TrackingSource, ServesTheImagesOfSamplesAndFollowsThroughAll) {
   const auto source = TrackingSource::open(wall(41), straight(11, 0.2), {}).value();
   std::set<std::uint64_t> last;
   for (std::size_t sample = 0; sample < 11; ++sample) {
-    const auto images = source->images(sample).value().images;
+    const auto images = source->images(sample, sample % 3 == 0).value().images;
     ASSERT_EQ(images.size(), 1U) << sample;
+    EXPECT_EQ(images[0].descriptors.size() > 0, sample % 3 == 0) << sample;
     EXPECT_TRUE(check_images({Timestamp{0}, std::make_shared<const std::vector<Camera>>(1, camera()), images}));
     std::size_t kept = 0;
     const auto now = tracks(images[0]);
@@ -59,18 +59,25 @@ TEST(TrackingSource, ServesTheImagesOfSamplesAndFollowsThroughAll) {
     }
     last = now;
   }
-  EXPECT_TRUE(source->images(3).value().images.empty());  // asked for again
+  EXPECT_TRUE(source->images(3, false).value().images.empty());  // asked for again
   EXPECT_TRUE(source->unreadable().empty());
 }
 
-TEST(TrackingSource, KeyframesAreThoseOfSubmaps) {
-  TrackingConfig config;
-  config.keyframe_distance_m = 0.25;
-  const auto source = TrackingSource::open(wall(41), straight(11, 0.2), config).value();
-  for (std::size_t sample = 0; sample < 11; ++sample) {
-    const auto images = source->images(sample).value().images;
-    EXPECT_EQ(images.at(0).descriptors.size() > 0, sample % 3 == 0) << sample;
-  }
+TEST(TrackingSource, ARestartBeginsInTheMiddle) {
+  ImageStream stream = wall(41);
+  std::vector<std::size_t> read;
+  stream.load = [&](std::size_t moment, std::size_t) -> Result<Image> {
+    read.push_back(moment);
+    return blocks(kWidth, kHeight, 4 * static_cast<int>(moment));
+  };
+  const auto source = TrackingSource::open(stream, straight(11, 0.2), {}).value();
+  const auto first = tracks(source->images(5, true).value().images.at(0));
+  EXPECT_EQ(read, (std::vector<std::size_t>{20}));
+  const auto whole = TrackingSource::open(wall(41), straight(11, 0.2), {}).value();
+  for (std::size_t sample = 0; sample < 5; ++sample)  // Up to here before the restart: the numbers are not used again.
+    EXPECT_LT(*tracks(whole->images(sample, true).value().images.at(0)).rbegin(), *first.begin());
+  EXPECT_EQ(source->images(6, false).value().images.size(), 1U);
+  EXPECT_EQ(read, (std::vector<std::size_t>{20, 21, 22, 23, 24}));
 }
 
 TEST(TrackingSource, ABadImageIsLostAloneAndNamed) {
@@ -83,19 +90,20 @@ TEST(TrackingSource, ABadImageIsLostAloneAndNamed) {
     return blocks(kWidth, kHeight, 4 * static_cast<int>(moment));
   };
   const auto source = TrackingSource::open(stream, straight(11, 0.2), {}).value();
-  const auto before = tracks(source->images(1).value().images.at(0));
-  const auto damaged = source->images(2);
+  const auto before = tracks(source->images(1, false).value().images.at(0));
+  const auto damaged = source->images(2, false);
   ASSERT_FALSE(damaged.has_value());
   EXPECT_EQ(damaged.error().message, "frame_8.png: damaged");
   std::size_t kept = 0;
-  for (const auto number : tracks(source->images(3).value().images.at(0))) kept += before.contains(number) ? 1 : 0;
+  for (const auto number : tracks(source->images(3, false).value().images.at(0)))
+    kept += before.contains(number) ? 1 : 0;
   EXPECT_GE(kept, before.size() / 2);  // goes on
-  const auto size = source->images(4);
+  const auto size = source->images(4, false);
   ASSERT_FALSE(size.has_value());
   EXPECT_EQ(size.error().message, "camera 0 at 1800000000 ns: an image of 64 x 64 pixels, camera 0 has 320 x 240");
-  EXPECT_EQ(source->images(5).value().images.size(), 1U);
-  EXPECT_TRUE(source->images(6).value().images.empty());
-  EXPECT_EQ(source->images(10).value().images.size(), 1U);
+  EXPECT_EQ(source->images(5, false).value().images.size(), 1U);
+  EXPECT_TRUE(source->images(6, false).value().images.empty());
+  EXPECT_EQ(source->images(10, false).value().images.size(), 1U);
   ASSERT_EQ(source->unreadable().size(), 3U);
   EXPECT_EQ(source->unreadable()[1].message, "frame_9.png: missing");
 }
@@ -103,7 +111,7 @@ TEST(TrackingSource, ABadImageIsLostAloneAndNamed) {
 TEST(TrackingSource, AStoppedCameraLeavesOdometryAlone) {
   const auto source = TrackingSource::open(wall(9), straight(11, 0.2), {}).value();
   for (std::size_t sample = 0; sample < 11; ++sample)
-    EXPECT_EQ(source->images(sample).value().images.size(), sample <= 2 ? 1U : 0U) << sample;
+    EXPECT_EQ(source->images(sample, false).value().images.size(), sample <= 2 ? 1U : 0U) << sample;
 }
 
 TEST(TrackingSource, StampsOfAnotherClockAreRefusedWithTheOffset) {
