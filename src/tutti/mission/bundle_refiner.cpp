@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 namespace tutti::mission {
 namespace {
@@ -10,14 +11,14 @@ namespace {
 using server::JudgedClosure;
 
 /// Pairs of submaps of which the map has accepted a closure.
-std::set<SubmapPair> accepted_pairs(const server::MapToRefine& map) {
+std::vector<SubmapPair> accepted_pairs(const server::MapToRefine& map) {
   std::set<std::pair<KeyframeId, KeyframeId>> accepted;
   for (const JudgedClosure& judged : map.estimate.closures)
     if (judged.accepted) accepted.insert({judged.closure.from, judged.closure.to});
-  std::set<SubmapPair> out;
+  std::vector<SubmapPair> out;
   for (const auto& [pair, verdict] : map.verdicts)
     if (std::ranges::any_of(verdict.closures, [&](const LoopClosure& c) { return accepted.contains({c.from, c.to}); }))
-      out.insert(pair);
+      out.push_back(pair);
   return out;
 }
 
@@ -46,42 +47,25 @@ Result<std::vector<bundle::PosedSubmap>> BundleRefiner::posed(const server::MapT
   return out;
 }
 
-/// A function of the two submaps alone, so it is kept.
-const BundleRefiner::Matches& BundleRefiner::matches(const SubmapPair& pair, const Submap& first,
-                                                     const Submap& second) const {
-  const auto [found, fresh] = matches_.try_emplace(pair);
-  if (fresh)
-    found->second = visual::matched_landmarks(visual::extract_features(first, closures_),
-                                              visual::extract_features(second, closures_), closures_);
-  return found->second;
-}
-
-Result<std::vector<server::RefinedStep>> BundleRefiner::refine(const server::MapToRefine& map) const {
+Result<server::Refinement> BundleRefiner::refine(const server::MapToRefine& map) const {
   auto submaps = posed(map);
   if (!submaps) return tl::unexpected(submaps.error());
-  std::vector<server::RefinedStep> steps;
-  if (submaps->empty()) return steps;
-  bundle::RefinementInput input{.submaps = std::move(*submaps), .matches = {}};
-  const auto seen = [&](SubmapId id) {
-    return std::ranges::find(input.submaps, id, [](const bundle::PosedSubmap& at) { return at.submap->id; });
-  };
-  const std::scoped_lock lock(mutex_);
-  for (const SubmapPair& pair : accepted_pairs(map)) {
-    const auto first = seen(pair.first), second = seen(pair.second);
-    if (first == input.submaps.end() || second == input.submaps.end()) continue;
-    for (const auto& [a, b] : matches(pair, *first->submap, *second->submap))
-      input.matches.push_back({{pair.first, a}, {pair.second, b}});
-  }
-  auto refined = bundle::refine_map(input, config_);
+  server::Refinement out;
+  if (submaps->empty()) return out;
+  const auto refined =
+      bundle::refine_map({.submaps = std::move(*submaps), .closed = accepted_pairs(map), .matches = {}}, config_);
   if (!refined) return tl::unexpected(refined.error());
-  for (const bundle::RelativeFactor& factor : refined->factors) steps.push_back({factor.from, factor.measurement});
-  last_ = std::move(*refined);
-  return steps;
+  for (const bundle::RelativeFactor& factor : refined->factors) out.steps.push_back({factor.from, factor.measurement});
+  for (const bundle::BundleKeyframe& keyframe : refined->keyframes)
+    out.T_world_body.emplace(keyframe.id, keyframe.T_world_body);
+  const std::scoped_lock lock(mutex_);
+  last_ = *refined;
+  return out;
 }
 
 std::shared_ptr<const BundleRefiner> make_refiner(const MissionConfig& config) {
   if (config.closures.finder != "visual" && config.closures.finder != "sensors") return nullptr;
-  return std::make_shared<const BundleRefiner>(config.refinement, config.closures.visual);
+  return std::make_shared<const BundleRefiner>(config.refinement);
 }
 
 std::optional<bundle::Refinement> BundleRefiner::last() const {

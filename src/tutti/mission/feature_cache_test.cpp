@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tutti/mission/parallel.hpp"
+#include "tutti/perception/lidar/submap_features.hpp"
 
 namespace tutti::mission {
 namespace {

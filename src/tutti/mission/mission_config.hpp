@@ -58,11 +58,13 @@ Result<Pose3> to_pose(const LidarPoseConfig& config);
 /// Where a robot's images, or what a tracker made of them, come from: one of these, or none.
 struct ImagesConfig {
   std::vector<std::string> maplab_submaps;  ///< Consecutive folders; the odometry is theirs, too.
+  std::string imu;                          ///< Empty: none.
   template <class V>
   void describe(V& v) {
     v.field("maplab_submaps", maplab_submaps, any(),
             "Folders of consecutive maplab submaps (keyframes, keypoints with tracks and descriptors, calibration); "
             "their keyframe poses are the odometry, without an odometry.file.");
+    v.field("imu", imu, any(), "EuRoC's csv of raw IMU samples.");
   }
 };
 
@@ -170,7 +172,7 @@ struct MissionConfig {
   std::vector<RobotConfig> robots;
   simulation::SimulationConfig simulation;
   simulation::HallMissionConfig hall;
-  visual::TrackerConfig tracker;
+  visual::TrackingConfig tracking;
   robot::AgentConfig agent;
   server::ServerConfig server;
   bundle::RefinementConfig refinement;
@@ -191,7 +193,7 @@ struct MissionConfig {
     v.field("robots", robots, any(), "The robots whose recordings are replayed.");
     v.field("simulation", simulation);
     v.field("hall", hall);
-    v.field("tracker", tracker, any(), "How points are followed through images.");
+    v.field("tracking", tracking, any(), "How points are followed through images.");
     v.field("agent", agent);
     v.field("server", server);
     v.field("refinement", refinement);

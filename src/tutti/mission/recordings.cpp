@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "tutti/base/random.hpp"
+#include "tutti/formats/imu_file.hpp"
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/maplab_submaps.hpp"
 #include "tutti/formats/trajectory_file.hpp"
@@ -108,6 +109,12 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
                     "in the next submap, {} conflicts",
                     robot.name, keyframes, keypoints, landmarks, joined, conflicts));
     out.recording.visual = listed(*maplab, raw, from);
+    out.recording.imu_noise = maplab->imu_noise;
+    if (!robot.images.imu.empty()) {
+      auto imu = formats::read_imu_csv((data / robot.images.imu).string());
+      if (!imu) return tl::unexpected(imu.error());
+      out.recording.imu = std::move(*imu);
+    }
   }
   out.recording.increment_covariance = simulation::increment_covariances(raw, robot.covariance);
   out.recording.odometry = std::move(raw);
@@ -141,14 +148,6 @@ Result<MissionInput> simulate(const MissionConfig& config, std::uint64_t seed) {
   return input;
 }
 
-/// Tracks where the robot makes keyframes.
-visual::TrackingConfig tracking(const MissionConfig& config) {
-  return {.tracker = config.tracker,
-          .keyframe_distance_m = config.agent.submap.keyframe_distance_m,
-          .keyframe_angle_deg = config.agent.submap.keyframe_angle_deg,
-          .keyframe_time_s = config.agent.submap.keyframe_time_s};
-}
-
 Result<MissionInput> fly(const MissionConfig& config, std::uint64_t seed) {
   auto hall = simulation::simulate_hall(config.hall, Timestamp{0}, seed);
   if (!hall) return tl::unexpected(hall.error());
@@ -156,7 +155,7 @@ Result<MissionInput> fly(const MissionConfig& config, std::uint64_t seed) {
   for (std::size_t i = 0; i < hall->robots.size(); ++i) {
     auto& [recording, images] = hall->robots[i];
     if (!images.stamps.empty()) {
-      auto source = visual::TrackingSource::open(std::move(images), recording.odometry, tracking(config));
+      auto source = visual::TrackingSource::open(std::move(images), recording.odometry, config.tracking);
       if (!source) return in_context("robot " + recording.name, source.error());
       recording.visual = std::move(*source);
     }

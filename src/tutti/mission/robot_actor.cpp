@@ -126,15 +126,30 @@ void RobotActor::feed_scan(std::size_t sample, Timestamp now) {
   if (refused == refused_scans_.count) ++taken_scans_;
 }
 
+/// From the last sample before the keyframe before to the first one not before `stamp`, which is the newest keyframe's.
+std::vector<ImuSample> RobotActor::imu_since_keyframe(Timestamp stamp) const {
+  const std::vector<ImuSample>& imu = recording_.recording.imu;
+  const std::vector<Keyframe>& keyframes = node_->agent().keyframes();
+  if (keyframes.size() < 2) return {};
+  const Timestamp before = keyframes[keyframes.size() - 2].stamp;
+  auto first = std::ranges::upper_bound(imu, before, {}, &ImuSample::stamp);
+  auto last = std::ranges::lower_bound(imu, stamp, {}, &ImuSample::stamp);
+  if (first != imu.begin()) --first;
+  if (last != imu.end()) ++last;
+  return first < last ? std::vector<ImuSample>(first, last) : std::vector<ImuSample>();
+}
+
 /// Every image is tracked, those of keyframes are kept.
 void RobotActor::feed_images(std::size_t sample, Timestamp now) {
   const Recording& recording = recording_.recording;
   if (!recording.visual) return;
   const bool keyframe = node_->agent().wants_scan();
-  const auto images = recording.visual->images(sample, keyframe);
+  auto images = recording.visual->images(sample, keyframe);
   if (!images) return note(refused_images_, images.error().message);
   if (images->images.empty() || !keyframe) return;
   const CpuScope cpu(cpu_s_);
+  images->imu = imu_since_keyframe(images->stamp);
+  images->imu_noise = recording.imu_noise;
   const std::size_t refused = refused_images_.count;
   take(node_->add_images(*images, now));
   if (refused == refused_images_.count) ++taken_images_;

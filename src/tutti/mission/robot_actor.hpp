@@ -103,6 +103,7 @@ class RobotActor {
   void score(const Trajectory& map, UpdateRecord& update) const;
   void feed_scan(std::size_t sample, Timestamp now);
   void feed_images(std::size_t sample, Timestamp now);
+  [[nodiscard]] std::vector<ImuSample> imu_since_keyframe(Timestamp stamp) const;
   static void note(Trouble& trouble, const std::string& message);
 
   const MissionRecording& recording_;

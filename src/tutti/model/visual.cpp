@@ -38,6 +38,13 @@ Status check_images(const TrackedImages& images) {
                   images.cameras->size());
     if (auto ok = check_image(image); !ok) return in_context(fmt::format("camera {}", image.camera), ok.error());
   }
+  for (std::size_t i = 0; i < images.imu.size(); ++i) {
+    const ImuSample& sample = images.imu[i];
+    if (!sample.gyro.allFinite() || !sample.accelerometer.allFinite() ||
+        (i > 0 && sample.stamp <= images.imu[i - 1].stamp))
+      return fail(ErrorCode::invalid, "IMU sample at {} ns: expected finite numbers and increasing stamps",
+                  sample.stamp.ns);
+  }
   return {};
 }
 

@@ -61,17 +61,6 @@ struct TrackedImage {
   friend bool operator==(const TrackedImage&, const TrackedImage&) = default;
 };
 
-/// The images of all cameras at one moment.
-struct TrackedImages {
-  Timestamp stamp;
-  std::shared_ptr<const std::vector<Camera>> cameras;  ///< Never null, the same for all images of a robot.
-  std::vector<TrackedImage> images;                    ///< At most one per camera.
-};
-
-/// There are cameras, each sound; each image is of one of them, has finite keypoints with positive sigmas, no track
-/// twice, and as many descriptors as keypoints or none.
-Status check_images(const TrackedImages& images);
-
 /// What the IMU said at a moment, in the body frame.
 struct ImuSample {
   Timestamp stamp;
@@ -88,6 +77,21 @@ struct ImuNoise {
   double accelerometer_random_walk = 3e-3;    ///< m/s^3/sqrt(Hz)
   friend bool operator==(const ImuNoise&, const ImuNoise&) = default;
 };
+
+/// The images of all cameras at one moment.
+struct TrackedImages {
+  Timestamp stamp;
+  std::shared_ptr<const std::vector<Camera>> cameras;  ///< Never null, the same for all images of a robot.
+  std::vector<TrackedImage> images;                    ///< At most one per camera.
+  /// What the IMU said since the images before, from its last sample before them to its first one not before these:
+  /// increasing stamps. None when there is no IMU.
+  std::vector<ImuSample> imu;
+  ImuNoise imu_noise;
+};
+
+/// There are cameras, each sound; each image is of one of them, has finite keypoints with positive sigmas, no track
+/// twice, and as many descriptors as keypoints or none; what the IMU said is finite, with increasing stamps.
+Status check_images(const TrackedImages& images);
 
 /// One image, at the stamp of a keyframe.
 struct VisualFrame {

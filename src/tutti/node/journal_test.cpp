@@ -29,7 +29,11 @@ JournalEntry any_entry(Rng& rng) {
       for (int word = 0; word < 4; ++word) image.descriptors.bits.push_back(~std::uint64_t{0} / (i + 1));
     }
     const std::vector<Camera> cameras{{.model = {CameraKind::equidistant, 752, 480, 1.0, 2.0, 3.0, 4.0, {5.0}}}};
-    return TrackedImages{{7}, std::make_shared<const std::vector<Camera>>(cameras), {image}};
+    return TrackedImages{{7},
+                         std::make_shared<const std::vector<Camera>>(cameras),
+                         {image},
+                         {{{6}, {0.1, 0.2, 0.3}, {0.0, 0.0, 9.8}}},
+                         {}};
   }
   PointCloud cloud;
   for (std::size_t i = rng.index(20); i > 0; --i) cloud.points.emplace_back(rng.normal(), rng.normal(), rng.normal());

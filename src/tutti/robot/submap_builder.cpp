@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/estimation/bundle/imu_preintegration.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/way.hpp"
@@ -23,6 +24,23 @@ Status check_sample(RobotId robot, Timestamp stamp, const Pose3& T_odom_body, co
   return {};
 }
 
+/// What the IMU measured from keyframe to keyframe, where it covers that time, at the gyro bias that the odometry
+/// shows.
+std::vector<ImuPreintegration> imu_steps(const Submap& submap, const std::vector<TrackedImages>& images) {
+  std::vector<ImuSample> samples;
+  for (std::size_t i = 1; i < images.size(); ++i)
+    for (const ImuSample& sample : images[i].imu)
+      if (samples.empty() || samples.back().stamp < sample.stamp) samples.push_back(sample);
+  std::vector<ImuPreintegration> out;
+  const auto gyro_bias = bundle::estimate_gyro_bias(samples, submap.keyframes);
+  if (!gyro_bias) return out;
+  for (std::size_t k = 0; k + 1 < submap.keyframes.size(); ++k)
+    if (auto step = bundle::preintegrate(samples, submap.keyframes[k], submap.keyframes[k + 1], {.gyro = *gyro_bias},
+                                         images.front().imu_noise))
+      out.push_back(std::move(*step));
+  return out;
+}
+
 /// What the cameras saw along the submap.
 Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>& images,
                           const visual::VisualSubmapConfig& config) {
@@ -30,11 +48,12 @@ Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>
   for (const TrackedImages& moment : images) {
     const auto keyframe = std::ranges::find(submap.keyframes, moment.stamp, &Keyframe::stamp);
     TUTTI_CHECK(keyframe != submap.keyframes.end(), "images at {} ns of no keyframe", moment.stamp.ns);
-    seen.push_back({keyframe->index, submap.keyframes.front().T_odom_body.inverse() * keyframe->T_odom_body,
-                    moment.images});
+    seen.push_back(
+        {keyframe->index, submap.keyframes.front().T_odom_body.inverse() * keyframe->T_odom_body, moment.images});
   }
   auto payload = visual::make_visual_payload(seen, *images.front().cameras, config);
   if (!payload) return in_context("images of submap " + to_string(submap.id), payload.error());
+  payload->imu = imu_steps(submap, images);
   return payload;
 }
 

@@ -227,7 +227,10 @@ TrackedImages images_at(Timestamp stamp, double way_m, bool swapped = false) {
     const Eigen::Vector2d seen = swapped ? Eigen::Vector2d(pixel->y(), pixel->x()) : *pixel;
     image.keypoints.push_back({seen.cast<float>(), 0.5F, track});
   }
-  return {stamp, std::make_shared<const std::vector<Camera>>(1, camera), {image}};
+  TrackedImages out{stamp, std::make_shared<const std::vector<Camera>>(1, camera), {image}, {}, {}};
+  for (int i = -201; i <= 0; ++i)  // at constant speed the IMU measures gravity alone
+    out.imu.push_back({stamp + 0.005 * i, {0.0, 0.0, 0.02}, {0.0, 0.0, 9.81}});
+  return out;
 }
 
 /// As drive(), with images at keyframes; submaps are taken as soon as they can be.
@@ -261,6 +264,11 @@ TEST(SubmapBuilder, TheSharedKeyframesImagesAreInBothSubmaps) {
     EXPECT_GT(seen.landmarks.size(), 30U);
     EXPECT_EQ(seen.frames.front().keyframe, submaps[i].keyframes.front().index);
     EXPECT_EQ(seen.frames.back().keyframe, submaps[i].keyframes.back().index);
+    ASSERT_EQ(seen.imu.size(), submaps[i].odometry.size());
+    for (const ImuPreintegration& step : seen.imu) {
+      EXPECT_NEAR(step.gyro_bias.z(), 0.02, 1e-6);  // the odometry does not turn
+      EXPECT_NEAR(step.delta_velocity.z(), 9.81 * step.duration_s, 1e-6);
+    }
     // In the submap's frame, the body of its first keyframe: on the wall.
     for (const Landmark& landmark : seen.landmarks) {
       EXPECT_GT(landmark.position.y(), 2.9F);

@@ -20,7 +20,8 @@ bool has_failed(const MapEstimate& map, const KeyframeId& from) {
 
 }  // namespace
 
-MapEstimate with_steps(const MapEstimate& map, const std::vector<RefinedStep>& steps) {
+MapEstimate refined(const MapEstimate& map, const Refinement& refinement) {
+  const auto& [steps, T_world_body] = refinement;
   if (steps.empty() || !map.converged) return map;
   MapEstimate out = map;
   for (std::size_t e = 0; e < out.odometry_edges; ++e) {
@@ -33,6 +34,11 @@ MapEstimate with_steps(const MapEstimate& map, const std::vector<RefinedStep>& s
         edge.information.inverse() * (overstated == map.overstated.end() ? 1.0 : overstated->second);
     edge.T_from_to = step->measurement.T_a_b;
     edge.information = information_of(bounded_covariance(step->measurement.covariance));
+  }
+  for (std::size_t e = out.odometry_edges; e < out.graph.edges.size(); ++e) {
+    PoseGraphEdge& edge = out.graph.edges[e];
+    const auto from = T_world_body.find(map.nodes[edge.from].id), to = T_world_body.find(map.nodes[edge.to].id);
+    if (from != T_world_body.end() && to != T_world_body.end()) edge.T_from_to = from->second.inverse() * to->second;
   }
   auto solution = estimation::solve_pose_graph(out.graph, {.initialisation = "given"});
   if (!estimation::is_usable(solution.summary.termination)) return map;

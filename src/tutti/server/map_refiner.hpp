@@ -16,6 +16,11 @@ struct RefinedStep {
   RelativePose measurement;  ///< T_from_next, with the covariance of whoever refined it.
 };
 
+struct Refinement {
+  std::vector<RefinedStep> steps;            ///< Sorted by `from`.
+  std::map<KeyframeId, Pose3> T_world_body;  ///< Of the keyframes refined, in the world of the map that was given.
+};
+
 /// A map with all that it was made from.
 struct MapToRefine {
   const MapEstimate& estimate;
@@ -30,12 +35,14 @@ struct MapToRefine {
 class MapRefiner {
  public:
   virtual ~MapRefiner() = default;
-  /// Steps sorted by `from`; none where nothing is known beside the pose graph.
-  [[nodiscard]] virtual Result<std::vector<RefinedStep>> refine(const MapToRefine& map) const = 0;
+  /// Nothing in it where nothing is known beside the pose graph.
+  [[nodiscard]] virtual Result<Refinement> refine(const MapToRefine& map) const = 0;
 };
 
-/// The map with steps in the place of its odometry's, solved again from where it stands, with the closures that it has.
-/// Odometry that failed is no step's place. The map as it was when that cannot be solved.
-MapEstimate with_steps(const MapEstimate& map, const std::vector<RefinedStep>& steps);
+/// The map with the refined steps in the place of its odometry's, solved again from where it stands. Its closures stay
+/// as sure as they were, but say what the refined keyframes say where both their ends are among them: a chain of steps
+/// is looser than all of the refinement, and would be drawn back to where the closures had it before. Odometry that
+/// failed is no step's place. The map as it was when that cannot be solved.
+MapEstimate refined(const MapEstimate& map, const Refinement& refinement);
 
 }  // namespace tutti::server

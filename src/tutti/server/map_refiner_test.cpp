@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <utility>
 
@@ -42,34 +44,53 @@ SubmapSet one_robot() {
 TEST(MapRefiner, StepsTakeThePlaceOfOdometry) {
   const MapEstimate map = estimate_map(one_robot(), {}, {});
   ASSERT_GT(error_at_the_end(map, RobotId{0}), 0.05);
-  const MapEstimate refined = with_steps(map, true_steps(map));
-  EXPECT_LT(error_at_the_end(refined, RobotId{0}), 1e-6);
-  EXPECT_EQ(refined.odometry_of_steps.size(), map.odometry_edges);
-  for (const auto& [edge, covariance] : refined.odometry_of_steps)
-    EXPECT_NEAR(covariance(0, 0), 0.02 * 0.02, 1e-9);  // what the odometry says of itself, for those who ask
-  EXPECT_EQ(local(refined.nodes[0].T_world_body, map.nodes[0].T_world_body).norm(), 0.0);
+  const MapEstimate better = refined(map, {true_steps(map), {}});
+  EXPECT_LT(error_at_the_end(better, RobotId{0}), 1e-6);
+  EXPECT_EQ(better.odometry_of_steps.size(), map.odometry_edges);
+  for (const auto& [edge, covariance] : better.odometry_of_steps)
+    EXPECT_NEAR(covariance(0, 0), 0.02 * 0.02, 1e-7);  // what the odometry says of itself, for those who ask
+  EXPECT_EQ(local(better.nodes[0].T_world_body, map.nodes[0].T_world_body).norm(), 0.0);
 }
 
 TEST(MapRefiner, WithoutStepsOrForOtherKeyframesTheMapIsAsItWas) {
   const MapEstimate map = estimate_map(one_robot(), {}, {});
-  EXPECT_EQ(error_at_the_end(with_steps(map, {}), RobotId{0}), error_at_the_end(map, RobotId{0}));
+  EXPECT_EQ(error_at_the_end(refined(map, {}), RobotId{0}), error_at_the_end(map, RobotId{0}));
   const RefinedStep other{.from = {RobotId{5}, 3}, .measurement = {}};
-  EXPECT_TRUE(with_steps(map, {other}).odometry_of_steps.empty());
+  EXPECT_TRUE(refined(map, {{other}, {}}).odometry_of_steps.empty());
+}
+
+TEST(MapRefiner, ClosuresSayWhatTheRefinedKeyframesSay) {
+  const test::TestFinder finder(1);
+  const SubmapSet submaps = one_robot();
+  VerdictSet verdicts;
+  for (auto a = submaps.begin(); a != submaps.end(); ++a)
+    for (auto b = std::next(a); b != submaps.end(); ++b)
+      if (finder.is_candidate(*a->second, *b->second))
+        verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
+  const MapEstimate map = estimate_map(submaps, verdicts, {});
+  ASSERT_GT(map.graph.edges.size(), map.odometry_edges);
+  Refinement truth{true_steps(map), {}};
+  const double off = error_at_the_end(refined(map, truth), RobotId{0});  // drawn away by the closures
+  const Pose3 T_world_truth = map.nodes[0].T_world_body * test::true_pose(RobotId{0}, 0).inverse();
+  for (const MapNode& node : map.nodes)
+    truth.T_world_body[node.id] = T_world_truth * test::true_pose(node.id.chain.robot, node.id.index);
+  EXPECT_GT(off, 1e-4);
+  EXPECT_LT(error_at_the_end(refined(map, truth), RobotId{0}), 1e-6);
 }
 
 TEST(MapRefiner, OdometryThatFailedIsNoStepsPlace) {
   MapEstimate map = estimate_map(one_robot(), {}, {});
   map.failed_odometry.push_back({RobotId{0}, 20, 23, 1.0, 0.1});
-  EXPECT_EQ(with_steps(map, true_steps(map)).odometry_of_steps.size(), map.odometry_edges - 3);
+  EXPECT_EQ(refined(map, {true_steps(map), {}}).odometry_of_steps.size(), map.odometry_edges - 3);
 }
 
 /// Knows the truth, or fails.
 class Oracle final : public MapRefiner {
  public:
-  [[nodiscard]] Result<std::vector<RefinedStep>> refine(const MapToRefine& map) const override {
+  [[nodiscard]] Result<Refinement> refine(const MapToRefine& map) const override {
     ++calls;
-    if (fails) return fail(ErrorCode::numeric, "no map today");
-    return true_steps(map.estimate);
+    if (fails) return fail(ErrorCode::invalid, "no map today");
+    return Refinement{true_steps(map.estimate), {}};
   }
   mutable int calls = 0;
   bool fails = false;

@@ -313,13 +313,13 @@ ProxyGraphMessage MapServer::optimise() {
 
 void MapServer::refine() {
   if (refiner_ == nullptr || config_.refine_every == 0) return;
-  if (steps_.empty() || state_.revision % static_cast<std::uint64_t>(config_.refine_every) == 0) {
-    if (auto steps = refiner_->refine({map_, state_.submaps, state_.payload_sizes, state_.verdicts, *payloads_}))
-      steps_ = std::move(*steps);
+  if (refinement_.steps.empty() || state_.revision % static_cast<std::uint64_t>(config_.refine_every) == 0) {
+    if (auto made = refiner_->refine({map_, state_.submaps, state_.payload_sizes, state_.verdicts, *payloads_}))
+      refinement_ = std::move(*made);
     else
-      late_errors_.push_back(std::move(steps.error()));
+      late_errors_.push_back(std::move(made.error()));
   }
-  map_ = with_steps(map_, steps_);
+  map_ = refined(map_, refinement_);
 }
 
 ProxyGraphMessage MapServer::rebuild() {

@@ -155,7 +155,7 @@ class MapServer {
   std::vector<Error> late_errors_;
   MapEstimate map_;
   std::shared_ptr<const MapRefiner> refiner_;  // null: of none
-  std::vector<RefinedStep> steps_;             // by it
+  Refinement refinement_;                      // by it
   bool news_ = false;
 };
 

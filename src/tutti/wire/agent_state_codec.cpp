@@ -169,6 +169,12 @@ void pass(A& a, Camera& camera) {
   pass(a, camera.T_body_camera);
 }
 template <class A>
+void pass(A& a, ImuSample& sample) {
+  pass(a, sample.stamp);
+  for (double& x : sample.gyro) a.number(x);
+  for (double& x : sample.accelerometer) a.number(x);
+}
+template <class A>
 void pass(A& a, TrackedImages& images) {
   pass(a, images.stamp);
   std::vector<Camera> cameras;
@@ -176,6 +182,11 @@ void pass(A& a, TrackedImages& images) {
   pass(a, cameras);
   images.cameras = std::make_shared<const std::vector<Camera>>(std::move(cameras));
   pass(a, images.images);
+  pass(a, images.imu);
+  ImuNoise& noise = images.imu_noise;
+  for (double* x : {&noise.gyro_noise_density, &noise.gyro_random_walk, &noise.accelerometer_noise_density,
+                    &noise.accelerometer_random_walk})
+    a.number(*x);
 }
 template <class A>
 void pass(A& a, robot::FinishedSubmap& finished) {

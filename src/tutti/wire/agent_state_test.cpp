@@ -28,7 +28,11 @@ TrackedImages images_at(Timestamp stamp, Rng& rng) {
     image.keypoints.push_back({{100.0F + static_cast<float>(rng.normal()), 50.0F}, 0.8F, track});
   const std::vector<Camera> cameras{
       {.model = {CameraKind::pinhole, 752, 480, 458.0, 457.0, 367.0, 248.0, {}}, .T_body_camera = {}}};
-  return {stamp, std::make_shared<const std::vector<Camera>>(cameras), {image}};
+  return {stamp,
+          std::make_shared<const std::vector<Camera>>(cameras),
+          {image},
+          {{stamp, Eigen::Vector3d::Constant(rng.normal()), Eigen::Vector3d::Constant(9.81)}},
+          {}};
 }
 
 /// A robot's mission, sample by sample: images and perhaps scans at keyframes, a proxy graph now and then, submaps
