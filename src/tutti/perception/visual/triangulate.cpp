@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "tutti/geometry/rays.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::visual {
@@ -18,35 +19,11 @@ constexpr double kLossSigmas = 2.0;     // scale of Cauchy's loss
 constexpr double kUnseenSigmas2 = 1e4;  // squared error of a view that cannot see the point at all
 constexpr double kConverged_m = 1e-6;   // relative to the distance
 
-struct Ray {
-  Eigen::Vector3d origin, direction;  // submap frame; unit direction
-};
-
 std::optional<Ray> ray_of(const View& view) {
   const auto direction = unproject(*view.camera, view.pixel);
   if (!direction) return std::nullopt;
   const Pose3 T_submap_camera = view.T_camera_submap.inverse();
   return Ray{T_submap_camera.translation, T_submap_camera.rotation * *direction};
-}
-
-/// Largest angle between two of the rays, rad.
-double parallax(std::span<const Ray> rays) {
-  double least_cosine = 1.0;
-  for (std::size_t i = 0; i < rays.size(); ++i)
-    for (std::size_t j = i + 1; j < rays.size(); ++j)
-      least_cosine = std::min(least_cosine, rays[i].direction.dot(rays[j].direction));
-  return std::acos(std::max(-1.0, least_cosine));
-}
-
-Eigen::Vector3d midpoint(std::span<const Ray> rays) {
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
-  for (const Ray& ray : rays) {
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray.direction * ray.direction.transpose();
-    A += across;
-    b += across * ray.origin;
-  }
-  return A.ldlt().solve(b);
 }
 
 /// Residual of one view in sigmas, with its Jacobian by the point.
@@ -144,11 +121,13 @@ tl::expected<TriangulatedPoint, TriangulationFault> triangulate(std::span<const 
     if (ray) rays.push_back(*ray);
   }
   if (rays.size() < least) return tl::unexpected(TriangulationFault::misfit);
-  if (parallax(rays) < min_parallax) return tl::unexpected(TriangulationFault::parallax);
+  if (largest_angle(rays) < min_parallax) return tl::unexpected(TriangulationFault::parallax);
+  const auto start = nearest_point(rays);
+  if (!start) return tl::unexpected(TriangulationFault::parallax);
   const auto views = chosen(all, has_ray);
 
   TriangulatedPoint out;
-  out.position = refine(views, midpoint(rays), true);
+  out.position = refine(views, *start, true);
   auto fits = which_fit(views, out.position, config.max_reprojection_px);
   auto fitting = chosen<View>(views, fits);
   if (fitting.size() < least) {
@@ -160,7 +139,7 @@ tl::expected<TriangulatedPoint, TriangulationFault> triangulate(std::span<const 
   fitting = chosen<View>(views, fits);
   if (fitting.size() < least) return tl::unexpected(TriangulationFault::misfit);
   const auto fitting_rays = chosen<Ray>(rays, fits);
-  if (parallax(fitting_rays) < min_parallax) return tl::unexpected(TriangulationFault::parallax);
+  if (largest_angle(fitting_rays) < min_parallax) return tl::unexpected(TriangulationFault::parallax);
   if (!std::ranges::all_of(fitting_rays, [&](const Ray& ray) { return in_front(ray, out.position); }))
     return tl::unexpected(TriangulationFault::behind);
 

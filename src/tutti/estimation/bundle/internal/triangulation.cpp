@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tutti/estimation/bundle/projection_factor.hpp"
+#include "tutti/geometry/rays.hpp"
 
 namespace tutti::bundle::internal {
 namespace {
@@ -27,22 +28,15 @@ double cost(const BundleProblem& problem, std::span<const BundleObservation> vie
   return sum;
 }
 
-/// Least squares of the distances to the rays.
-std::optional<Eigen::Vector3d> midpoint(const BundleProblem& problem, std::span<const BundleObservation> views) {
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+std::optional<Eigen::Vector3d> where_rays_meet(const BundleProblem& problem, std::span<const BundleObservation> views) {
+  std::vector<Ray> rays;
   for (const auto& view : views) {
-    const auto ray = unproject(problem.cameras[view.camera].camera.model, view.pixel);
-    if (!ray) continue;
+    const auto direction = unproject(problem.cameras[view.camera].camera.model, view.pixel);
+    if (!direction) continue;
     const Pose3 T = T_world_camera(problem, view);
-    const Eigen::Vector3d d = T.rotation * *ray;
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
-    A += across;
-    b += across * T.translation;
+    rays.push_back({T.translation, T.rotation * *direction});
   }
-  const Eigen::LLT<Eigen::Matrix3d> llt(A);
-  if (llt.info() != Eigen::Success) return std::nullopt;
-  return llt.solve(b);
+  return nearest_point(rays);
 }
 
 Eigen::Vector3d gauss_newton_step(const BundleProblem& problem, std::span<const BundleObservation> views,
@@ -70,17 +64,17 @@ double error_px(const BundleProblem& problem, const BundleObservation& view, con
 }
 
 double parallax(const BundleProblem& problem, std::span<const BundleObservation> views, const Eigen::Vector3d& point) {
-  std::vector<Eigen::Vector3d> rays;
-  for (const auto& view : views) rays.push_back((point - T_world_camera(problem, view).translation).normalized());
-  double smallest_cosine = 1.0;
-  for (std::size_t i = 0; i < rays.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j) smallest_cosine = std::min(smallest_cosine, rays[i].dot(rays[j]));
-  return std::acos(std::clamp(smallest_cosine, -1.0, 1.0));
+  std::vector<Ray> rays;
+  for (const auto& view : views) {
+    const Eigen::Vector3d origin = T_world_camera(problem, view).translation;
+    rays.push_back({origin, (point - origin).normalized()});
+  }
+  return largest_angle(rays);
 }
 
 std::optional<Eigen::Vector3d> triangulate(const BundleProblem& problem, std::span<const BundleObservation> views,
                                            std::span<const Eigen::Vector3d> starts, double max_px) {
-  std::optional<Eigen::Vector3d> best = midpoint(problem, views);
+  std::optional<Eigen::Vector3d> best = where_rays_meet(problem, views);
   double best_cost = best ? cost(problem, views, *best, max_px) : std::numeric_limits<double>::infinity();
   const auto consider = [&](const Eigen::Vector3d& point) {
     const double of_point = cost(problem, views, point, max_px);
