@@ -58,19 +58,12 @@ Result<server::Refinement> BundleRefiner::refine(const server::MapToRefine& map)
   for (const bundle::RelativeFactor& factor : refined->factors) out.steps.push_back({factor.from, factor.measurement});
   for (const bundle::BundleKeyframe& keyframe : refined->keyframes)
     out.T_world_body.emplace(keyframe.id, keyframe.T_world_body);
-  const std::scoped_lock lock(mutex_);
-  last_ = *refined;
   return out;
 }
 
 std::shared_ptr<const BundleRefiner> make_refiner(const MissionConfig& config) {
   if (config.closures.finder != "visual" && config.closures.finder != "sensors") return nullptr;
   return std::make_shared<const BundleRefiner>(config.refinement);
-}
-
-std::optional<bundle::Refinement> BundleRefiner::last() const {
-  const std::scoped_lock lock(mutex_);
-  return last_;
 }
 
 }  // namespace tutti::mission

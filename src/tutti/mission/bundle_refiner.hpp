@@ -2,8 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <vector>
 
 #include "tutti/estimation/bundle/refine_map.hpp"
@@ -18,15 +16,11 @@ class BundleRefiner final : public server::MapRefiner {
  public:
   explicit BundleRefiner(const bundle::RefinementConfig& config) : config_(config) {}
   [[nodiscard]] Result<server::Refinement> refine(const server::MapToRefine& map) const override;
-  /// Of the last map that had something to refine; nothing before.
-  [[nodiscard]] std::optional<bundle::Refinement> last() const;
 
  private:
   [[nodiscard]] Result<std::vector<bundle::PosedSubmap>> posed(const server::MapToRefine& map) const;
 
   bundle::RefinementConfig config_;
-  mutable std::mutex mutex_;  // guards last_
-  mutable std::optional<bundle::Refinement> last_;
 };
 
 /// Null for a mission whose closures do not come from cameras.
