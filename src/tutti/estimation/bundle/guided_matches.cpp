@@ -2,23 +2,19 @@
 #include "tutti/estimation/bundle/guided_matches.hpp"
 
 #include <algorithm>
-#include <bit>
-#include <limits>
 #include <map>
 #include <optional>
+
+#include "tutti/perception/visual/hamming.hpp"
 
 namespace tutti::bundle {
 namespace {
 
-int hamming(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b) {
-  int bits = 0;
-  for (std::size_t w = 0; w < a.size(); ++w) bits += std::popcount(a[w] ^ b[w]);
-  return bits;
-}
-
 /// Rows of the descriptors of every landmark.
-std::vector<std::vector<std::uint32_t>> descriptors_of(const VisualPayload& visual) {
-  std::vector<std::vector<std::uint32_t>> out(visual.landmarks.size());
+using LandmarkRows = std::vector<std::vector<std::uint32_t>>;
+
+LandmarkRows rows_of(const VisualPayload& visual) {
+  LandmarkRows out(visual.landmarks.size());
   for (const auto& frame : visual.frames)
     for (const auto& view : frame.observations)
       if (view.landmark < out.size() && view.descriptor < visual.descriptors.size())
@@ -34,9 +30,8 @@ struct Image {
   std::vector<Observation> views;
 };
 
-std::vector<Image> images_of(const PosedSubmap& posed) {
+std::vector<Image> images_of(const PosedSubmap& posed, const LandmarkRows& rows) {
   const VisualPayload& visual = *posed.submap->visual;
-  const auto descriptors = descriptors_of(visual);
   std::vector<Image> out;
   for (const auto& frame : visual.frames) {
     const std::uint32_t k = frame.keyframe - posed.submap->keyframes.front().index;
@@ -44,8 +39,8 @@ std::vector<Image> images_of(const PosedSubmap& posed) {
     const Camera& camera = visual.cameras[frame.camera];
     Image image{(posed.T_world_body[k] * camera.T_body_camera).inverse(), &camera.model, {}};
     for (Observation view : frame.observations) {
-      if (view.landmark >= visual.landmarks.size() || descriptors[view.landmark].empty()) continue;
-      if (view.descriptor >= visual.descriptors.size()) view.descriptor = descriptors[view.landmark].front();
+      if (view.landmark >= visual.landmarks.size() || rows[view.landmark].empty()) continue;
+      if (view.descriptor >= visual.descriptors.size()) view.descriptor = rows[view.landmark].front();
       image.views.push_back(view);
     }
     std::sort(image.views.begin(), image.views.end(),
@@ -55,11 +50,21 @@ std::vector<Image> images_of(const PosedSubmap& posed) {
   return out;
 }
 
+/// A submap with a payload, ready to be matched with any other.
+struct Prepared {
+  explicit Prepared(const PosedSubmap& its) : posed(its), visual(*its.submap->visual) {}
+
+  const PosedSubmap& posed;
+  const VisualPayload& visual;
+  LandmarkRows rows = rows_of(visual);
+  std::vector<Image> images = images_of(posed, rows);
+};
+
 class PairMatcher {
  public:
-  PairMatcher(const PosedSubmap& first, const PosedSubmap& second, const GuidedMatchConfig& config)
-      : first_(first), one_(*first.submap->visual), other_(*second.submap->visual), config_(config) {
-    for (const auto& image : images_of(second)) look_in(image);
+  PairMatcher(const Prepared& one, const Prepared& other, const GuidedMatchConfig& config)
+      : one_(one), other_(other), config_(config) {
+    for (const auto& image : other.images) look_in(image);
   }
 
   /// Landmarks that name each other.
@@ -79,12 +84,13 @@ class PairMatcher {
 
  private:
   void look_in(const Image& image) {
-    for (std::uint32_t l = 0; l < one_.landmarks.size(); ++l) {
-      if (descriptors_[l].empty()) continue;
-      const Eigen::Vector3d p_world = first_.T_world_body.front() * one_.landmarks[l].position.cast<double>();
+    for (std::uint32_t l = 0; l < one_.rows.size(); ++l) {
+      if (one_.rows[l].empty()) continue;
+      const Eigen::Vector3d p_world =
+          one_.posed.T_world_body.front() * one_.visual.landmarks[l].position.cast<double>();
       const auto pixel = project(*image.camera, image.T_camera_world * p_world);
       if (!pixel || !in_image(*image.camera, *pixel)) continue;
-      if (const auto match = best_view(image, *pixel, descriptors_[l])) ++votes_[{l, *match}];
+      if (const auto match = best_view(image, *pixel, one_.rows[l])) ++votes_[{l, *match}];
     }
   }
 
@@ -95,13 +101,12 @@ class PairMatcher {
     const auto radius = static_cast<float>(config_.radius_px);
     const auto left = std::partition_point(image.views.begin(), image.views.end(),
                                            [&](const Observation& v) { return v.pixel.x() < at.x() - radius; });
-    int best = std::numeric_limits<int>::max(), second = best;
+    const Descriptors &ours = one_.visual.descriptors, &theirs = other_.visual.descriptors;
+    std::uint32_t best = visual::kNoDistance, second = best;
     std::uint32_t landmark = kNoIndex;
     for (auto view = left; view != image.views.end() && view->pixel.x() <= at.x() + radius; ++view) {
       if ((view->pixel - at).norm() > radius) continue;
-      int distance = std::numeric_limits<int>::max();
-      for (const auto row : rows)
-        distance = std::min(distance, hamming(one_.descriptors.row(row), other_.descriptors.row(view->descriptor)));
+      const auto distance = visual::least_distance(theirs.row(view->descriptor), ours, rows);
       if (distance < best) {
         if (view->landmark != landmark) second = best;
         best = distance;
@@ -110,16 +115,14 @@ class PairMatcher {
         second = std::min(second, distance);
       }
     }
-    const double bits = 64.0 * one_.descriptors.words;
+    const double bits = 64.0 * ours.words;
     if (best > config_.max_hamming * bits || best > config_.max_hamming_ratio * second) return std::nullopt;
     return landmark;
   }
 
-  const PosedSubmap& first_;
-  const VisualPayload& one_;
-  const VisualPayload& other_;
+  const Prepared& one_;
+  const Prepared& other_;
   const GuidedMatchConfig& config_;
-  std::vector<std::vector<std::uint32_t>> descriptors_ = descriptors_of(one_);
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> votes_;
 };
 
@@ -134,13 +137,17 @@ std::vector<LandmarkMatch> guided_matches(std::span<const PosedSubmap> submaps, 
                                           const GuidedMatchConfig& config) {
   std::map<SubmapId, const PosedSubmap*> by_id;
   for (const auto& posed : submaps) by_id[posed.submap->id] = &posed;
+  std::map<SubmapId, Prepared> prepared;
+  const auto prepare = [&](const PosedSubmap& posed) -> const Prepared& {
+    return prepared.try_emplace(posed.submap->id, posed).first->second;
+  };
   std::vector<LandmarkMatch> out;
   for (const auto& pair : pairs) {
     const auto first = by_id.find(pair.first);
     const auto second = by_id.find(pair.second);
     if (first == by_id.end() || second == by_id.end()) continue;
     if (!are_comparable(*first->second->submap, *second->second->submap)) continue;
-    for (const auto& [l, m] : PairMatcher(*first->second, *second->second, config).mutual())
+    for (const auto& [l, m] : PairMatcher(prepare(*first->second), prepare(*second->second), config).mutual())
       out.push_back({{pair.first, l}, {pair.second, m}});
   }
   return out;

@@ -25,6 +25,18 @@ TEST(GuidedMatches, AreTheSameThing) {
   EXPECT_EQ(wrong, 0U);
 }
 
+TEST(GuidedMatches, APairsAreItsOwn) {
+  const Scene scene = make_scene({}, 1);
+  const auto pairs = all_pairs(scene);
+  ASSERT_GT(pairs.size(), 2U);
+  std::vector<LandmarkMatch> one_by_one;
+  for (const auto& pair : pairs) {
+    const auto its = guided_matches(scene.input.submaps, {&pair, 1}, {});
+    one_by_one.insert(one_by_one.end(), its.begin(), its.end());
+  }
+  EXPECT_EQ(guided_matches(scene.input.submaps, pairs, {}), one_by_one);
+}
+
 TEST(GuidedMatches, NothingWhereNothingCanBeCompared) {
   Scene scene = make_scene({}, 2);
   const auto pairs = all_pairs(scene);

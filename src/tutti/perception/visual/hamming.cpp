@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/perception/visual/hamming.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 
@@ -35,7 +36,23 @@ template <std::uint32_t Words>
   }
 }
 
+[[gnu::always_inline]] inline std::uint32_t distance_to_nearest(const std::uint64_t* query, const Descriptors& rows,
+                                                                std::span<const std::uint32_t> which) {
+  std::uint32_t least = kNoDistance;
+  for (const std::uint32_t i : which) {
+    const std::uint64_t* row = rows.bits.data() + std::size_t{i} * rows.words;
+    int bits = 0;
+    for (std::uint32_t w = 0; w < rows.words; ++w) bits += std::popcount(query[w] ^ row[w]);
+    least = std::min(least, static_cast<std::uint32_t>(bits));
+  }
+  return least;
+}
+
 #ifdef __x86_64__
+[[gnu::target("popcnt")]] std::uint32_t with_popcnt(const std::uint64_t* query, const Descriptors& rows,
+                                                    std::span<const std::uint32_t> which) {
+  return distance_to_nearest(query, rows, which);
+}
 [[gnu::target("popcnt")]] void with_popcnt(const std::uint64_t* query, const Descriptors& rows,
                                            std::span<std::uint16_t> out) {
   distances_to_all(query, rows, out);
@@ -53,6 +70,15 @@ std::uint32_t hamming_distance(std::span<const std::uint64_t> a, std::span<const
   int bits = 0;
   for (std::size_t w = 0; w < a.size(); ++w) bits += std::popcount(a[w] ^ b[w]);
   return static_cast<std::uint32_t>(bits);
+}
+
+std::uint32_t least_distance(std::span<const std::uint64_t> query, const Descriptors& rows,
+                             std::span<const std::uint32_t> which) {
+  TUTTI_CHECK(query.size() == rows.words, "{} words against rows of {}", query.size(), rows.words);
+#ifdef __x86_64__
+  if (has_popcnt()) return with_popcnt(query.data(), rows, which);
+#endif
+  return distance_to_nearest(query.data(), rows, which);
 }
 
 void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& rows,

@@ -18,6 +18,10 @@ void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& 
 
 inline constexpr std::uint32_t kNoDistance = 0xFFFF;  ///< More than any descriptor has bits.
 
+/// The least of these over rows by their index, which exist; kNoDistance of none.
+std::uint32_t least_distance(std::span<const std::uint64_t> query, const Descriptors& rows,
+                             std::span<const std::uint32_t> which);
+
 /// The two rows nearest to a descriptor; of equal ones those of smaller index.
 struct TwoNearest {
   std::uint32_t nearest = kNoIndex;

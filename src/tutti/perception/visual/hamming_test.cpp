@@ -33,6 +33,10 @@ RC_GTEST_PROP(Hamming, countsTheBitsThatDiffer, ()) {
     RC_ASSERT(distances[i] == expected);
     RC_ASSERT(hamming_distance(query.row(0), rows.row(i)) == expected);
   }
+  const auto which = *rc::gen::container<std::vector<std::uint32_t>>(rc::gen::inRange(0U, 20U));
+  std::uint32_t least = kNoDistance;
+  for (const std::uint32_t i : which) least = std::min<std::uint32_t>(least, distances[i]);
+  RC_ASSERT(least_distance(query.row(0), rows, which) == least);
 }
 
 RC_GTEST_PROP(TwoNearest, isTheSmallestAndTheSmallestOfAnotherGroup, ()) {
