@@ -22,6 +22,13 @@ template <std::uint32_t Words>
   }
 }
 
+[[gnu::always_inline]] inline std::uint32_t distance(std::span<const std::uint64_t> a,
+                                                     std::span<const std::uint64_t> b) {
+  int bits = 0;
+  for (std::size_t w = 0; w < a.size(); ++w) bits += std::popcount(a[w] ^ b[w]);
+  return static_cast<std::uint32_t>(bits);
+}
+
 [[gnu::always_inline]] inline void distances_to_all(const std::uint64_t* query, const Descriptors& rows,
                                                     std::span<std::uint16_t> out) {
   switch (rows.words) {
@@ -49,6 +56,10 @@ template <std::uint32_t Words>
 }
 
 #ifdef __x86_64__
+[[gnu::target("popcnt")]] std::uint32_t with_popcnt(std::span<const std::uint64_t> a,
+                                                    std::span<const std::uint64_t> b) {
+  return distance(a, b);
+}
 [[gnu::target("popcnt")]] std::uint32_t with_popcnt(const std::uint64_t* query, const Descriptors& rows,
                                                     std::span<const std::uint32_t> which) {
   return distance_to_nearest(query, rows, which);
@@ -67,9 +78,10 @@ bool has_popcnt() {
 
 std::uint32_t hamming_distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b) {
   TUTTI_CHECK(a.size() == b.size(), "descriptors of {} and {} words", a.size(), b.size());
-  int bits = 0;
-  for (std::size_t w = 0; w < a.size(); ++w) bits += std::popcount(a[w] ^ b[w]);
-  return static_cast<std::uint32_t>(bits);
+#ifdef __x86_64__
+  if (has_popcnt()) return with_popcnt(a, b);
+#endif
+  return distance(a, b);
 }
 
 std::uint32_t least_distance(std::span<const std::uint64_t> query, const Descriptors& rows,

@@ -8,11 +8,11 @@
 
 namespace tutti::visual {
 
-/// Bits in which two descriptors of as many words differ.
+/// Bits in which two descriptors of as many words differ. All of these count by the processor's own instruction where
+/// it has one, which is decided when the program runs.
 std::uint32_t hamming_distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b);
 
 /// The same from one descriptor to every row; `distances` has rows.size() elements, the query rows.words (checked).
-/// Counts bits by the processor's own instruction where it has one, which is decided when the program runs.
 void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& rows,
                        std::span<std::uint16_t> distances);
 

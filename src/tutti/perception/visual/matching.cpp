@@ -13,11 +13,29 @@ struct NearestObservation {
   std::uint32_t distance = kNoDistance;
 };
 
+/// As a number of bits.
+std::uint32_t max_distance(const Descriptors& rows, const VisualClosureConfig& config) {
+  return static_cast<std::uint32_t>(config.max_hamming * 64.0 * rows.words);
+}
+
 }  // namespace
+
+int count_near(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
+               const VisualClosureConfig& config, int enough) {
+  const std::uint32_t most = max_distance(map.landmark_descriptors, config);
+  int out = 0;
+  for (const QueryFrame& image : keyframe.frames)
+    for (const Observation& o : image.observations) {
+      if (out >= enough) return out;
+      out += map.tables.has_near(query.descriptors.row(o.descriptor), query.keys[o.descriptor],
+                                 map.landmark_descriptors, most);
+    }
+  return out;
+}
 
 std::vector<Match> match(const QueryFrame& image, const Descriptors& query, const SubmapFeatures& map,
                          const VisualClosureConfig& config) {
-  const double most = config.max_hamming * 64.0 * map.landmark_descriptors.words;
+  const std::uint32_t most = max_distance(map.landmark_descriptors, config);
   std::vector<std::uint16_t> distances(map.landmark_descriptors.size());
   std::vector<NearestObservation> nearest(map.points.size());  // by landmark
   std::vector<Match> candidates;

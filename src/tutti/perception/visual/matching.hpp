@@ -14,6 +14,11 @@ struct Match {
   std::uint32_t landmark = 0;
 };
 
+/// Of a keyframe's observations, how many are near a landmark of the map in their descriptors (max_hamming): counted
+/// up to `enough`, and not all of them, for it costs a twentieth of match(), which hardly ever finds more.
+int count_near(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
+               const VisualClosureConfig& config, int enough);
+
 /// Observations of an image whose descriptor is near one of a landmark of the map (max_hamming), much nearer than to
 /// any other landmark (max_hamming_ratio), and the nearest of the image to that landmark. `query` has the rows that the
 /// image's observations name; both are of one kind.

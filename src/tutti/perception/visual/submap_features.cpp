@@ -136,8 +136,10 @@ SubmapFeatures extract_features(const Submap& submap, const VisualClosureConfig&
   out.odometry = odometry_of(submap);
   out.cameras = payload.cameras;
   out.descriptors = payload.descriptors;
+  out.keys = table_keys(out.descriptors);
   map_points(payload, places, out);
   const auto row_of = describe_landmarks(payload, out);
+  out.tables = DescriptorTables(table_keys(out.landmark_descriptors));
   add_queries(payload, places, row_of, out);
   out.refusal = why_unusable(out, row_of, config);
   return out;
@@ -147,7 +149,8 @@ std::size_t bytes_of(const SubmapFeatures& features) {
   const auto bytes = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
   std::size_t out = sizeof(features) + bytes(features.cameras) + bytes(features.points) +
                     bytes(features.descriptors.bits) + bytes(features.landmark_descriptors.bits) +
-                    bytes(features.landmark_of_row) + bytes(features.keyframes);
+                    bytes(features.keys) + bytes(features.landmark_of_row) + features.tables.bytes() +
+                    bytes(features.keyframes);
   for (const QueryKeyframe& keyframe : features.keyframes) {
     out += bytes(keyframe.frames) + bytes(keyframe.landmarks);
     for (const QueryFrame& frame : keyframe.frames) out += bytes(frame.observations);

@@ -12,6 +12,7 @@
 #include "tutti/model/refusal.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/perception/visual/closure_config.hpp"
+#include "tutti/perception/visual/descriptor_tables.hpp"
 
 namespace tutti::visual {
 
@@ -42,8 +43,10 @@ struct SubmapFeatures {
   std::vector<Camera> cameras;
   std::vector<MappedPoint> points;             ///< By landmark.
   Descriptors descriptors;                     ///< Of the payload.
+  std::vector<TableKeys> keys;                 ///< Of its rows.
   Descriptors landmark_descriptors;            ///< Those of landmarks alone.
   std::vector<std::uint32_t> landmark_of_row;  ///< Of landmark_descriptors.
+  DescriptorTables tables;                     ///< Of landmark_descriptors.
   std::vector<QueryKeyframe> keyframes;
   StretchCovariance odometry;  ///< Between Submap::keyframes.
   double residual_px = 0.0;    ///< RMS of the landmarks in the submap's own images.

@@ -116,6 +116,11 @@ Localised localise(const QueryKeyframe& keyframe, const SubmapFeatures& query, c
     out.gates.push_back({reason, value, limit});
     return misses(out.gates.back());
   };
+  const int enough = (config.min_matches + 1) / 2;  // to look closely: a first look misses some
+  if (const int near = count_near(keyframe, query, map, config, enough); near < enough) {
+    out.gates.push_back({too_few_matches, static_cast<double>(near), static_cast<double>(config.min_matches)});
+    return out;
+  }
   const SeenMap seen = look_up(keyframe, query, map, config);
   if (missed(too_few_matches, static_cast<double>(seen.sightings.size()), config.min_matches)) return out;
   const auto pose = absolute_pose(seen.sightings, query.cameras, config.pose, rng);

@@ -11,14 +11,15 @@ namespace tutti::visual {
 
 /// Of what extract_features, is_candidate and verify_pair make of two submaps. Raised by hand in the commit that
 /// changes it, be it by a gate's default: servers then ask again what older versions answered.
-inline constexpr std::uint32_t kFinderVersion = 1;
+inline constexpr std::uint32_t kFinderVersion = 2;
 
 /// Cheap, without payloads: far enough apart in their chain, if it is one, and in time. first < second.
 bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_submap_gap,
                   const VisualClosureConfig& config);
 
 /// Decides from the two submaps alone which keyframes of one see landmarks of the other, and where from: every keyframe
-/// of either is looked for among the landmarks of the other (matching.hpp, absolute_pose.hpp). A closure is from the
+/// of either that has enough descriptors near the other's is looked for among its landmarks (matching.hpp,
+/// absolute_pose.hpp). A closure is from the
 /// keyframe that saw most of those landmarks, and is believed for what it measures: how sure its position is, and over
 /// how much of an image its inliers are spread; many inliers in one patch prove nothing. In the order of the submap
 /// ids, whatever the order of a and b. Refused for the reason that the keyframe which came farthest met.

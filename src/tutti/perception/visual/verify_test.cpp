@@ -7,6 +7,7 @@
 
 #include "support/perception/visual/textured_room.hpp"
 #include "support/random_pose.hpp"
+#include "tutti/perception/visual/matching.hpp"
 
 namespace tutti::visual {
 namespace {
@@ -102,6 +103,24 @@ TEST(VerifyVisualPair, aRobotWithTwoCamerasJoinsOneWithASingleCamera) {
 RefusalReason reason(const ClosureVerdict& verdict) {
   EXPECT_TRUE(verdict.closures.empty());
   return verdict.refusal ? verdict.refusal->reason : RefusalReason::other;
+}
+
+TEST(VerifyVisualPair, theFirstLookMissesNoKeyframeThatMatches) {
+  const auto features = [](SubmapId id, const Flight& flight, const std::vector<RoomPoint>& room) {
+    return extract_features(see(id, flight, room), kConfig);
+  };
+  const auto map = features(kA, kFlightA, kRoom);
+  const auto count = [&](const SubmapFeatures& query, const QueryKeyframe& keyframe) {
+    return count_near(keyframe, query, map, kConfig, 1000);
+  };
+  const auto here = features(kB, kFlightB, kRoom), elsewhere = features(kB, kFlightB, textured_room(700, Rng(2)));
+  for (const QueryKeyframe& keyframe : here.keyframes) {
+    const auto matches = match(keyframe.frames[0], here.descriptors, map, kConfig).size();
+    EXPECT_GT(matches, 8U);
+    EXPECT_GT(count(here, keyframe), 0.7 * static_cast<double>(matches));
+    EXPECT_EQ(count_near(keyframe, here, map, kConfig, 4), 4);
+  }
+  for (const QueryKeyframe& keyframe : elsewhere.keyframes) EXPECT_EQ(count(elsewhere, keyframe), 0);
 }
 
 TEST(VerifyVisualPair, anotherRoomIsRefused) {
