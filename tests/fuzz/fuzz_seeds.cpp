@@ -6,6 +6,7 @@
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
 #include "support/wire/visual.hpp"
+#include "tutti/formats/image_file.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/wire/agent_state.hpp"
@@ -54,6 +55,33 @@ constexpr std::string_view kPcd =
 std::string fed(const std::string& payload) {
   const char size = static_cast<char>(payload.size());
   return joined({std::string_view(&size, 1), std::string_view("\0\0\0", 3), payload});
+}
+
+constexpr std::string_view kCameras =
+    "cameras:\n  - {model: double_sphere, width_px: 752, height_px: 480, intrinsics: [349.7, 348.7, 365.9, 249.3],\n"
+    "     distortion: [-0.24, 0.57], time_offset_s: 0.01,\n"
+    "     T_body_camera: [0, -1, 0, 0.1, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n";
+constexpr std::string_view kMaplabSensors =
+    "sensors:\n  - {id: 01, sensor_type: IMU, sigmas: {gyro_noise_density: 1e-4, gyro_bias_random_walk_noise_density: "
+    "1e-4, acc_noise_density: 1e-3, acc_bias_random_walk_noise_density: 1e-3}}\n"
+    "  - {id: 03, sensor_type: NCAMERA, cameras: [{camera: {image_height: 480, image_width: 752, type: pinhole, "
+    "intrinsics: {data: [458, 457, 367, 248]}, distortion: {type: radial-tangential, parameters: {data: [-0.3, 0.07, "
+    "0, 0]}}}, T_B_C: {data: [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}}]}\n"
+    "extrinsics:\n  - {sensor_id: 03, T_B_S: {data: [1, 0, 0, 0, 0, 1, 0, 2, 0, 0, 1, 0, 0, 0, 0, 1]}}\n";
+
+void add_images(std::map<std::string, std::vector<std::string>>& out) {
+  out["cameras"] = {std::string(kCameras)};
+  out["image_list"] = {"#stamp,left,right\n1000,l/1.png,r/1.png\n3000,l/3.png,\n5000,,r/5.png\n"};
+  out["imu_csv"] = {
+      "#timestamp, w, a\n1403636579758555392,-0.1,0.15,0.02,8.1,-0.4,-2.4\n1403636579763555392,0,0,0,0,0,9.81\n"};
+  const std::string next(1, kNextFile), descriptor(96, 'a');
+  out["maplab"] = {joined({kMaplabSensors, next, "0.000001 0 0 0 0 0 0 1\n0.000003 1 0 0 0 0 0 1\n", next,
+                           "a,1000,2,1,2,3,2\nc,1000,1,0,0,0,2\n", next, "1000,0,11,20.5,0.80,20.00,7,a,", descriptor,
+                           "\n3000,0,10,20.5,0.80,20.00,7,a,", descriptor, "\n"})};
+  // corpus/image/1 is the same one as JPEG, made with libjpeg-turbo.
+  Image image(8, 4);
+  for (std::size_t i = 0; i < image.grey.size(); ++i) image.grey[i] = static_cast<std::uint8_t>(8 * i);
+  out["image"] = {formats::encode_png(image)};
 }
 
 }  // namespace
@@ -120,6 +148,7 @@ std::map<std::string, std::vector<std::string>> seeds() {
   out["ply"] = {formats::to_ply(std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6}}),
                 "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n4 5 6\n3 0 1 0\n"};
+  add_images(out);
   return out;
 }
 

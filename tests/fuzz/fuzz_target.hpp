@@ -14,6 +14,8 @@ namespace tutti::fuzz {
 
 using Target = void (*)(std::string_view bytes);
 const std::map<std::string, Target>& targets();
+/// Between the files of inputs that are several.
+inline constexpr char kNextFile = '\x1e';
 /// The graph that deltas of these inputs are against.
 const ProxyGraph& delta_base();
 /// Valid inputs to begin with; made from the tests' messages. Those in tests/fuzz/corpus were.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <utility>
 
 #include "fuzz/fuzz_target.hpp"
@@ -6,6 +7,10 @@
 #include "tutti/base/check.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/image_file.hpp"
+#include "tutti/formats/image_folder.hpp"
+#include "tutti/formats/imu_file.hpp"
+#include "tutti/formats/internal/maplab_folder.hpp"
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/pcd.hpp"
 #include "tutti/formats/ply.hpp"
@@ -99,6 +104,22 @@ void kitti_poses(std::string_view bytes) {
   static_cast<void>(formats::parse_kitti_poses(bytes, "fuzz", 10.0, Timestamp{0}));
 }
 
+void cameras(std::string_view bytes) { static_cast<void>(formats::parse_cameras(std::string(bytes), "fuzz")); }
+void image_list(std::string_view bytes) {
+  static_cast<void>(formats::parse_image_list(bytes, "fuzz", "folder", std::vector<formats::CameraCalibration>(2)));
+}
+/// The four files of a submap, one after the other.
+void maplab(std::string_view bytes) {
+  formats::internal::MaplabTexts texts;
+  std::string* const files[] = {&texts.sensors, &texts.keyframes, &texts.landmarks, &texts.keypoints};
+  for (std::string* file : files) {
+    const std::size_t end = std::min(bytes.find(kNextFile), bytes.size());
+    *file = bytes.substr(0, end);
+    bytes.remove_prefix(std::min(end + 1, bytes.size()));
+  }
+  static_cast<void>(formats::internal::parse_maplab_folder(texts, "fuzz"));
+}
+
 }  // namespace
 
 const ProxyGraph& delta_base() {
@@ -112,16 +133,21 @@ const ProxyGraph& delta_base() {
 const std::map<std::string, Target>& targets() {
   static const std::map<std::string, Target> all{
       {"agent_state", agent_state},
+      {"cameras", cameras},
       {"cloud", cloud},
       {"euroc_csv", file<formats::parse_euroc_csv>},
       {"feed", feed},
       {"feed_message", feed_message},
       {"g2o", g2o},
       {"graph_stamps", file<formats::parse_graph_stamps>},
+      {"image", file<formats::decode_image>},
+      {"image_list", image_list},
+      {"imu_csv", file<formats::parse_imu_csv>},
       {"job", job},
       {"journal", journal},
       {"kitti_poses", kitti_poses},
       {"kitti_scan", file<formats::parse_kitti_scan>},
+      {"maplab", maplab},
       {"mission_status", mission_status},
       {"pcd", file<formats::parse_timed_pcd>},
       {"ply", file<formats::parse_ply>},

@@ -71,7 +71,7 @@ Result<Image> read_image(const std::string& path) {
   return decode_image(*bytes, path);
 }
 
-Status write_image(const std::string& path, const Image& image) {
+std::string encode_png(const Image& image) {
   TUTTI_CHECK(!image.empty());
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
@@ -80,11 +80,13 @@ Status write_image(const std::string& path, const Image& image) {
   header.format = PNG_FORMAT_GRAY;
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(header);
   std::string bytes(size, '\0');
-  if (png_image_write_to_memory(&header, bytes.data(), &size, 0, image.grey.data(), 0, nullptr) == 0)
-    return fail(ErrorCode::io, "{}: {}", path, header.message);
+  const int ok = png_image_write_to_memory(&header, bytes.data(), &size, 0, image.grey.data(), 0, nullptr);
+  TUTTI_CHECK(ok != 0, "libpng: {}", header.message);
   bytes.resize(size);
-  return write_file(path, bytes);
+  return bytes;
 }
+
+Status write_image(const std::string& path, const Image& image) { return write_file(path, encode_png(image)); }
 
 ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s) {
   TUTTI_CHECK(!cameras.empty());

@@ -17,7 +17,8 @@ Result<Image> read_image(const std::string& path);
 /// The same from bytes; `name` is for the errors.
 Result<Image> decode_image(std::string_view bytes, const std::string& name);
 
-/// As PNG.
+/// As PNG; not an empty one.
+std::string encode_png(const Image& image);
 Status write_image(const std::string& path, const Image& image);
 
 /// The images of a recording, read when asked for. Its moments are the stamps of the first camera; images that another

@@ -110,28 +110,31 @@ Result<ImuNoise> read_euroc_imu_noise(const std::string& path) {
 
 }  // namespace
 
-Result<std::vector<CameraCalibration>> read_cameras(const std::string& path) {
-  const auto root = load_yaml(path);
+Result<std::vector<CameraCalibration>> parse_cameras(const std::string& text, const std::string& name) {
+  const auto root = parse_yaml(text, name);
   if (!root) return tl::unexpected(root.error());
   CamerasSettings settings;
-  if (auto ok = load_config(*root, settings, path); !ok) return tl::unexpected(ok.error());
-  if (settings.cameras.empty()) return fail(ErrorCode::configuration, "{}: lists no cameras", path);
+  if (auto ok = load_config(*root, settings, name); !ok) return tl::unexpected(ok.error());
+  if (settings.cameras.empty()) return fail(ErrorCode::configuration, "{}: lists no cameras", name);
   std::vector<CameraCalibration> out;
   for (const CameraSettings& camera : settings.cameras) {
     const auto calibration = to_calibration(camera);
-    if (!calibration) return in_context(fmt::format("{}: cameras.{}", path, out.size()), calibration.error());
+    if (!calibration) return in_context(fmt::format("{}: cameras.{}", name, out.size()), calibration.error());
     out.push_back(*calibration);
   }
   return out;
 }
 
-Result<std::vector<CameraImages>> read_image_list(const std::string& list, const std::string& folder,
-                                                  const std::vector<CameraCalibration>& cameras) {
-  const auto text = read_file(list);
-  if (!text) return tl::unexpected(text.error());
+Result<std::vector<CameraCalibration>> read_cameras(const std::string& path) {
+  return read_file(path).and_then([&](const std::string& text) { return parse_cameras(text, path); });
+}
+
+Result<std::vector<CameraImages>> parse_image_list(std::string_view text, const std::string& name,
+                                                   const std::string& folder,
+                                                   const std::vector<CameraCalibration>& cameras) {
   std::vector<CameraImages> out;
   for (const CameraCalibration& camera : cameras) out.push_back({camera.camera, {}});
-  internal::LineReader line(*text, list, internal::Separator::comma);
+  internal::LineReader line(text, name, internal::Separator::comma);
   Timestamp last = kFirstTimestamp;
   while (line.next()) {
     if (auto ok = line.expect_columns(1 + cameras.size(), "stamp[ns],file of each camera"); !ok)
@@ -145,11 +148,21 @@ Result<std::vector<CameraImages>> read_image_list(const std::string& list, const
         out[i].images.push_back({*stamp + cameras[i].time_offset_s, (fs::path(folder) / file).string()});
     }
   }
-  if (last == kFirstTimestamp) return fail(ErrorCode::invalid, "{}: lists no images", list);
+  if (last == kFirstTimestamp) return fail(ErrorCode::invalid, "{}: lists no images", name);
   return out;
 }
 
+Result<std::vector<CameraImages>> read_image_list(const std::string& list, const std::string& folder,
+                                                  const std::vector<CameraCalibration>& cameras) {
+  return read_file(list).and_then(
+      [&](const std::string& text) { return parse_image_list(text, list, folder, cameras); });
+}
+
 Result<EurocFolder> read_euroc_folder(const std::string& folder) {
+  if (!is_folder(folder))
+    return fail(ErrorCode::io,
+                "{}: no such folder, expected a recording in EuRoC's layout (docs/data.md says where they come from)",
+                folder);
   const fs::path mav0 = is_folder(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
   EurocFolder out;
   for (std::size_t i = 0;; ++i) {

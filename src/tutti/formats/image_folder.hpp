@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tutti/base/result.hpp"
@@ -30,10 +31,14 @@ struct CameraCalibration {
 /// Our own calibration file: a list `cameras` of `model` (pinhole, equidistant, double_sphere), `width_px`,
 /// `height_px`, `intrinsics` [fx, fy, cx, cy], `distortion` (four numbers, as geometry/camera.hpp orders them; two for
 /// the double sphere; none for none), `T_body_camera` (4 x 4, row by row) and `time_offset_s`.
+Result<std::vector<CameraCalibration>> parse_cameras(const std::string& text, const std::string& name);
 Result<std::vector<CameraCalibration>> read_cameras(const std::string& path);
 
 /// Images listed in a csv `stamp[ns],file of camera 0,file of camera 1,...`, files relative to `folder`; an empty cell:
 /// this camera took none then.
+Result<std::vector<CameraImages>> parse_image_list(std::string_view text, const std::string& name,
+                                                   const std::string& folder,
+                                                   const std::vector<CameraCalibration>& cameras);
 Result<std::vector<CameraImages>> read_image_list(const std::string& list, const std::string& folder,
                                                   const std::vector<CameraCalibration>& cameras);
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include "tutti/formats/internal/text.hpp"
 #include "tutti/formats/internal/yaml_values.hpp"
@@ -14,6 +15,7 @@
 namespace tutti::formats::internal {
 namespace {
 
+constexpr const char* kSensors = "/vi_map_raw/sensors.yaml";
 constexpr std::size_t kDescriptorBytes = kMaplabDescriptorWords * 8;
 
 /// Landmark id to index among the good ones; kNoIndex for the others.
@@ -37,12 +39,9 @@ std::optional<std::array<std::uint64_t, kMaplabDescriptorWords>> parse_descripto
   return words;
 }
 
-Status read_landmarks(MaplabFolder& out, LandmarkIds& ids) {
+Status read_landmarks(std::string_view text, MaplabFolder& out, LandmarkIds& ids) {
   constexpr std::int64_t kGood = 2;
-  const std::string path = out.path + "/landmarks.csv";
-  const auto text = read_file(path);
-  if (!text) return tl::unexpected(text.error());
-  LineReader line(*text, path, Separator::comma);
+  LineReader line(text, out.path + "/landmarks.csv", Separator::comma);
   while (line.next()) {
     if (auto ok = line.expect_columns(7, "landmark id,keyframe stamp[ns],quality,x,y,z,observations"); !ok) return ok;
     const auto quality = line.integer(2, "quality");
@@ -83,14 +82,11 @@ Result<MaplabKeypoint> read_keypoint(const LineReader& line, const LandmarkIds& 
                         landmark == ids.end() ? kNoIndex : landmark->second, *descriptor};
 }
 
-Status read_keypoints(MaplabFolder& out, const LandmarkIds& ids) {
-  const std::string path = out.path + "/keypoints.csv";
-  const auto text = read_file(path);
-  if (!text) return tl::unexpected(text.error());
+Status read_keypoints(std::string_view text, const LandmarkIds& ids, MaplabFolder& out) {
   std::map<std::int64_t, std::size_t> keyframe_of;
   for (std::size_t k = 0; k < out.keyframes.size(); ++k) keyframe_of[out.keyframes[k].stamp.ns] = k;
   out.keypoints.resize(out.keyframes.size());
-  LineReader line(*text, path, Separator::comma);
+  LineReader line(text, out.path + "/keypoints.csv", Separator::comma);
   while (line.next()) {
     if (auto ok = line.expect_columns(9, "stamp[ns],index,u,v,sigma,scale,track,landmark id,descriptor"); !ok)
       return ok;
@@ -124,9 +120,9 @@ const ConfigNode& only(YamlValues& yaml, const ConfigNode& list, std::string_vie
   return found != nullptr ? *found : list;
 }
 
-Status read_sensors(MaplabFolder& out) {
-  const std::string path = out.path + "/vi_map_raw/sensors.yaml";
-  const auto root = load_yaml(path);
+Status read_sensors(const std::string& text, MaplabFolder& out) {
+  const std::string path = out.path + kSensors;
+  const auto root = parse_yaml(text, path);
   if (!root) return tl::unexpected(root.error());
   YamlValues yaml(path);
   const ConfigNode& sensors = yaml.at(*root, "sensors");
@@ -158,17 +154,29 @@ Status read_sensors(MaplabFolder& out) {
 
 }  // namespace
 
-Result<MaplabFolder> read_maplab_folder(const std::string& path) {
+Result<MaplabFolder> parse_maplab_folder(const MaplabTexts& texts, const std::string& path) {
   MaplabFolder out{.path = path};
-  if (auto ok = read_sensors(out); !ok) return tl::unexpected(ok.error());
-  auto keyframes = read_trajectory(path + "/keyframes.tum", "tum");
+  if (auto ok = read_sensors(texts.sensors, out); !ok) return tl::unexpected(ok.error());
+  auto keyframes = parse_tum(texts.keyframes, path + "/keyframes.tum");
   if (!keyframes) return tl::unexpected(keyframes.error());
   if (keyframes->empty()) return fail(ErrorCode::invalid, "{}/keyframes.tum: holds no keyframe", path);
   out.keyframes = std::move(*keyframes);
   LandmarkIds ids;
-  if (auto ok = read_landmarks(out, ids); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_keypoints(out, ids); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_landmarks(texts.landmarks, out, ids); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_keypoints(texts.keypoints, ids, out); !ok) return tl::unexpected(ok.error());
   return out;
+}
+
+Result<MaplabFolder> read_maplab_folder(const std::string& path) {
+  MaplabTexts texts;
+  for (const auto& [name, text] :
+       {std::pair(kSensors, &texts.sensors), std::pair("/keyframes.tum", &texts.keyframes),
+        std::pair("/landmarks.csv", &texts.landmarks), std::pair("/keypoints.csv", &texts.keypoints)}) {
+    auto read = read_file(path + name);
+    if (!read) return tl::unexpected(read.error());
+    *text = std::move(*read);
+  }
+  return parse_maplab_folder(texts, path);
 }
 
 }  // namespace tutti::formats::internal

@@ -34,6 +34,13 @@ struct MaplabFolder {
   ImuNoise imu_noise;
 };
 
+/// Its files.
+struct MaplabTexts {
+  std::string sensors, keyframes, landmarks, keypoints;
+};
+
+/// `path` is for the errors.
+Result<MaplabFolder> parse_maplab_folder(const MaplabTexts& texts, const std::string& path);
 Result<MaplabFolder> read_maplab_folder(const std::string& path);
 
 }  // namespace tutti::formats::internal
