@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/simulation/hall_view.hpp"
 
 namespace tutti::simulation {
 namespace {
@@ -43,7 +44,6 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<const HallScene> scene, const C
 }
 
 Image SimulatedCamera::image(const Pose3& T_world_camera, double time_s, Rng rng) const {
-  constexpr float kFar_m = 1e4F;
   const Eigen::Vector3f origin = T_world_camera.translation.cast<float>();
   const Eigen::Matrix3f rotation = T_world_camera.rotation.toRotationMatrix().cast<float>();
   const double phase = 2.0 * std::numbers::pi * time_s / config_.exposure_period_s;
@@ -53,14 +53,15 @@ Image SimulatedCamera::image(const Pose3& T_world_camera, double time_s, Rng rng
   const std::uint64_t noise = rng.index(std::uint64_t{1} << 62U);
 
   Image out(model_.width_px, model_.height_px);
+  const std::vector<SeenFace> seen = view_of(scene_->hall, rays_, model_.width_px, T_world_camera);
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     float grey = 0.0F;
-    const Eigen::Vector3f ray = rotation * rays_[i];
-    if (const auto hit = scene_->surface.cast(origin, ray, kFar_m)) {
-      const Face& face = scene_->hall.faces[hit->triangle / 2];
-      const float cosine = std::abs(scene_->surface.normal(hit->triangle).dot(ray));
-      const float footprint_m = hit->distance * pixel_rad / std::max(std::sqrt(cosine), 0.1F);
-      grey = gain * brightness(face, origin + hit->distance * ray, footprint_m);
+    if (const auto [distance_m, number] = seen[i]; number != kNoFace) {
+      const Face& face = scene_->hall.faces[number];
+      const Eigen::Vector3f ray = rotation * rays_[i];
+      const float cosine = std::abs(scene_->surface.normal(2 * number).dot(ray));
+      const float footprint_m = distance_m * pixel_rad / std::max(std::sqrt(cosine), 0.1F);
+      grey = gain * brightness(face, origin + distance_m * ray, footprint_m);
     }
     grey += sigma * normal_from(mixed(noise + i));
     out.grey[i] = static_cast<std::uint8_t>(std::clamp(grey + 0.5F, 0.0F, 255.0F));

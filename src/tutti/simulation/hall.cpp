@@ -12,18 +12,25 @@ namespace {
 using Box = Eigen::AlignedBox3d;
 
 /// One in [-0.5, 0.5] for each patch of each texture.
-float patch(std::uint32_t texture, int x, int y) {
+float patch(std::uint64_t texture, int x, int y) {
   const std::uint64_t place =
       (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32U) ^ static_cast<std::uint32_t>(y);
-  return static_cast<float>(mixed(place ^ mixed(texture)) >> 40U) * 0x1p-24F - 0.5F;
+  return static_cast<float>(mixed(place ^ texture) >> 40U) * 0x1p-24F - 0.5F;
+}
+
+/// std::floor of a number that an int can hold; without SSE 4.1 that is a function of the C library.
+int floor_of(float x) {
+  const int towards_zero = static_cast<int>(x);
+  return towards_zero - (x < static_cast<float>(towards_zero) ? 1 : 0);
 }
 
 /// Patches of size 1 with edges `edge` wide, at most 1.
-float patches(std::uint32_t texture, float x, float y, float edge) {
-  const float cell_x = std::floor(x - 0.5F), cell_y = std::floor(y - 0.5F);
+float patches(std::uint32_t number, float x, float y, float edge) {
+  const std::uint64_t texture = mixed(number);
+  const int ix = floor_of(x - 0.5F), iy = floor_of(y - 0.5F);
+  const float cell_x = static_cast<float>(ix), cell_y = static_cast<float>(iy);
   const auto share = [&](float from_centre) { return std::clamp((from_centre - 0.5F) / edge + 0.5F, 0.0F, 1.0F); };
   const float sx = share(x - 0.5F - cell_x), sy = share(y - 0.5F - cell_y);
-  const int ix = static_cast<int>(cell_x), iy = static_cast<int>(cell_y);
   float sum = 0.0F;
   if (sx < 1.0F && sy < 1.0F) sum += (1.0F - sx) * (1.0F - sy) * patch(texture, ix, iy);
   if (sx > 0.0F && sy < 1.0F) sum += sx * (1.0F - sy) * patch(texture, ix + 1, iy);

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/simulation/hall.hpp"
+
+namespace tutti::simulation {
+
+inline constexpr std::uint32_t kNoFace = std::numeric_limits<std::uint32_t>::max();
+
+struct SeenFace {
+  float distance_m = 0.0F;
+  std::uint32_t face = kNoFace;  ///< Index into Hall::faces.
+};
+
+/// The nearest face along every ray of an image, one per ray: what Bvh::cast finds, many times sooner, because the rays
+/// of a tile of pixels share the few faces whose bounding spheres reach into the cone round them. `rays`: one direction
+/// a pixel, row by row, unit, camera frame; zero where there is none.
+std::vector<SeenFace> view_of(const Hall& hall, std::span<const Eigen::Vector3f> rays, int width_px,
+                              const Pose3& T_world_camera);
+
+}  // namespace tutti::simulation
