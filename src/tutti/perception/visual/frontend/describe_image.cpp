@@ -10,6 +10,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/perception/visual/frontend/internal/optical_flow.hpp"
 #include "tutti/perception/visual/frontend/internal/spread.hpp"
 
 namespace tutti::visual {
@@ -99,7 +100,7 @@ Descriptors packed(const cv::Mat& rows, DescriptorKind kind) {
 TrackedImage describe_image(const Image& image, const DescriptorConfig& config,
                             std::span<const TrackedKeypoint> tracked) {
   if (std::min(image.width_px, image.height_px) < kSmallest_px) return {};
-  cv::setNumThreads(1);
+  internal::keep_opencv_to_one_thread();
   const Method method = config.kind == "orb" ? orb(config) : brisk(config);
   // OpenCV only reads from it.
   const cv::Mat grey(image.height_px, image.width_px, CV_8UC1, const_cast<std::uint8_t*>(image.grey.data()));

@@ -47,9 +47,16 @@ std::vector<cv::Point2f> to_opencv(std::span<const Eigen::Vector2f> points) {
 
 }  // namespace
 
+void keep_opencv_to_one_thread() {
+  [[maybe_unused]] static const bool said = [] {
+    cv::setNumThreads(1);
+    return true;
+  }();
+}
+
 Pyramid::Pyramid(const Image& image, const FlowRule& rule) : width_px_(image.width_px), height_px_(image.height_px) {
   TUTTI_CHECK(!image.empty());
-  cv::setNumThreads(1);
+  keep_opencv_to_one_thread();
   auto levels = std::make_shared<Levels>();
   cv::buildOpticalFlowPyramid(view(image), levels->images, cv::Size(rule.window_px, rule.window_px), rule.levels, true,
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
@@ -86,7 +93,7 @@ std::vector<std::optional<Eigen::Vector2f>> follow(const Pyramid& from, const Py
 }
 
 std::vector<Candidate> find_corners(const Image& image, int threshold, int border_px) {
-  cv::setNumThreads(1);
+  keep_opencv_to_one_thread();
   std::vector<cv::KeyPoint> corners;
   if (image.width_px > 2 * border_px && image.height_px > 2 * border_px)
     cv::FAST(

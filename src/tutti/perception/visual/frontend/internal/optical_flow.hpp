@@ -12,6 +12,10 @@
 
 namespace tutti::visual::internal {
 
+/// OpenCV works in the threads that call it, and starts none. Said once and for all: with TBB below it,
+/// cv::setNumThreads() from two threads at a time crashes.
+void keep_opencv_to_one_thread();
+
 struct FlowRule {
   int window_px = 21;
   int levels = 3;             ///< Halvings of the image.
