@@ -42,7 +42,7 @@ class RobotActor {
 
   /// Mission time of the next sample; infinity when there is none left.
   [[nodiscard]] double next_time() const;
-  [[nodiscard]] bool has_scans() const { return recording_.recording.scans != nullptr; }
+  [[nodiscard]] bool has_sensors() const { return recording_.recording.scans || recording_.recording.visual; }
   /// Replays one odometry sample and its scan; after the last one the node closes its last submap.
   void replay_next(Timestamp now);
   /// Of a robot whose recording is empty, because its samples come from elsewhere; RobotNode's functions of these

@@ -175,8 +175,8 @@ class MissionRun {
     std::vector<Robot*> due;
     for (Robot& robot : robots_)
       if (robot.actor->next_time() <= time_s_) due.push_back(&robot);
-    // A simulated scan is much work, an odometry sample hardly any.
-    const bool heavy = std::ranges::any_of(due, [](const Robot* robot) { return robot->actor->has_scans(); });
+    // A simulated scan or image is much work, an odometry sample hardly any.
+    const bool heavy = std::ranges::any_of(due, [](const Robot* robot) { return robot->actor->has_sensors(); });
     for_each_parallel(due.size(), heavy ? threads_ : 1, [&](std::size_t i) { due[i]->actor->replay_next(now()); });
     for (Robot* robot : due) carry_out(*robot->port, robot->actor->take_step());
   }
