@@ -12,6 +12,8 @@ namespace {
 
 /// Equal voxels: every square metre of a wall counts the same, no matter how often it was seen.
 constexpr double kMapVoxel_m = 0.1;
+/// What is known worse along the viewing ray is no picture of the place.
+constexpr float kMaxLandmarkSigma_m = 0.1F;
 
 void append_moved(const Pose3& T_a_b, const PointCloud& cloud_b, PointCloud& cloud_a) {
   const Eigen::Isometry3d T(T_a_b.matrix());
@@ -52,11 +54,22 @@ std::optional<Pose3> place(const Submap& submap, const Trajectory& estimate) {
   return found->pose * middle.T_odom_body.inverse() * first.T_odom_body;
 }
 
-/// What a submap saw, in its own frame: the only place that knows where clouds lie. Null when it saw nothing.
+std::shared_ptr<const PointCloud> landmarks_of(const VisualPayload& payload) {
+  auto out = std::make_shared<PointCloud>();
+  for (const Landmark& landmark : payload.landmarks)
+    if (landmark.sigma_m <= kMaxLandmarkSigma_m) out->points.push_back(landmark.position);
+  return out;
+}
+
+/// What a submap saw, in its own frame: its cloud, or else the landmarks of its images. The only place that knows where
+/// payloads lie. Null when it saw nothing.
 std::shared_ptr<const PointCloud> cloud_of(const server::MapServer& server, SubmapId id, MissionRecord& record) {
   const auto size = server.state().payload_sizes.find(id);
-  if (size == server.state().payload_sizes.end() || size->second.points == 0) return nullptr;
-  auto cloud = server.payloads().cloud(id);
+  if (size == server.state().payload_sizes.end()) return nullptr;
+  if (size->second.points == 0 && size->second.observations == 0) return nullptr;
+  auto cloud = size->second.points > 0
+                   ? server.payloads().cloud(id)
+                   : server.payloads().visual(id).map([](const auto& seen) { return landmarks_of(*seen); });
   if (cloud) return *cloud;
   record.notes.push_back("Missing in the map: " + cloud.error().message + ".");
   return nullptr;
@@ -107,6 +120,22 @@ void measure_corrected(const ThinnedCloud& map, const evaluation::CloudIndex& su
     robot.map_error.corrected = evaluation::summarise(survey.distances(map.thinned(), *T_reference_map));
 }
 
+/// Walls that bend where a robot turned are not the map's error, but that of the odometry within a submap.
+void note_landmarks(const server::MapServer& server, MissionRecord& record) {
+  std::string names;
+  for (const RobotRecord& robot : record.robots) {
+    PayloadSize seen;
+    for (const auto& [id, size] : server.state().payload_sizes)
+      if (id.chain.robot == robot.id) seen = {seen.points + size.points, seen.observations + size.observations};
+    if (seen.points == 0 && seen.observations > 0) names += (names.empty() ? "" : ", ") + robot.name;
+  }
+  if (!names.empty())
+    record.notes.push_back(names +
+                           ": what it saw is shown by its landmarks, each triangulated within one submap by "
+                           "odometry. The server moves the keyframes that they hang on, not them: distances "
+                           "to the survey are those of the odometry's landmarks.");
+}
+
 /// The joint map of the largest component against the survey, and the other way round.
 void measure_joint_cloud(const evaluation::CloudIndex& survey, MissionRecord& record) {
   ServerRecord& server = record.server;
@@ -141,6 +170,7 @@ void evaluate_map(const server::MapServer& server, const evaluation::Association
     if (!seen.cloud.points.empty()) record.server.clouds.push_back(std::move(seen));
   }
   if (survey) measure_joint_cloud(*survey, record);
+  note_landmarks(server, record);
 }
 
 }  // namespace tutti::mission

@@ -56,12 +56,26 @@ class EvaluateMap : public ::testing::Test {
   void send(Submap& open) {
     const Keyframe& first = open.keyframes.front();
     const Keyframe& middle = open.keyframes[open.keyframes.size() / 2];
-    open.cloud = std::make_shared<const PointCloud>(posts(first.T_odom_body.inverse() * middle.T_odom_body));
+    const PointCloud seen = posts(first.T_odom_body.inverse() * middle.T_odom_body);
+    if (by_camera_)
+      open.visual = landmarks(seen, first.index);
+    else
+      open.cloud = std::make_shared<const PointCloud>(seen);
     seen_.emplace_back(middle.index);
     const SubmapMessage message{.header = {.robot = open.id.chain.robot}, .submap = open};
     const auto taken = server_.receive(message);
     ASSERT_TRUE(taken) << taken.error().message;
     open = {.id = {open.id.chain, open.id.index + 1}, .keyframes = {open.keyframes.back()}};
+  }
+  /// Each point, and another that is known too badly to be shown.
+  static std::shared_ptr<const VisualPayload> landmarks(const PointCloud& points, std::uint32_t keyframe) {
+    VisualPayload out{.cameras = {{}}, .frames = {{keyframe, 0, {}}}};
+    for (const Eigen::Vector3f& p : points.points)
+      for (const float sigma_m : {0.0F, 1.0F}) {
+        out.frames[0].observations.push_back({.landmark = static_cast<std::uint32_t>(out.landmarks.size())});
+        out.landmarks.push_back({(1.0F + sigma_m) * p, sigma_m});
+      }
+    return std::make_shared<const VisualPayload>(std::move(out));
   }
   void evaluate() { evaluate_map(server_, {}, record_); }
 
@@ -73,6 +87,7 @@ class EvaluateMap : public ::testing::Test {
   server::MapServer server_{robots_, std::make_shared<const server::test::TestFinder>(1),
                             std::make_shared<server::MemoryPayloadStore>(), server::ServerConfig{}, 1};
   std::vector<std::uint32_t> seen_;
+  bool by_camera_ = false;
   MissionRecord record_;
 };
 
@@ -97,6 +112,24 @@ TEST_F(EvaluateMap, EveryEstimatePlacesTheCloudsWhereItBelievesTheyWere) {
                 0.03 * robot.map_error.onboard->mean_m);
     EXPECT_FALSE(robot.onboard_cloud.points.empty());
   }
+}
+
+class EvaluateLandmarks : public EvaluateMap {
+ protected:
+  EvaluateLandmarks() { by_camera_ = true; }
+};
+
+TEST_F(EvaluateLandmarks, TheMapOfACameraIsItsGoodLandmarks) {
+  evaluate();
+  ASSERT_EQ(record_.server.clouds.size(), 2U);
+  std::size_t points = 0;
+  for (const CloudRecord& seen : record_.server.clouds) {
+    points += seen.cloud.points.size();
+    for (const float d : seen.distance_m) EXPECT_LT(d, 1e-3F);
+  }
+  EXPECT_EQ(points, 6 * seen_.size());
+  ASSERT_EQ(record_.notes.size(), 1U);
+  EXPECT_TRUE(record_.notes[0].starts_with("robot, robot: what it saw is shown by its landmarks")) << record_.notes[0];
 }
 
 TEST_F(EvaluateMap, SaysHowMuchOfTheSurveyTheMapHolds) {
