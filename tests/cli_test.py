@@ -69,6 +69,8 @@ class CommandLine(unittest.TestCase):
         for seed in ("-1", "1.5", "18446744073709551616"):
             self.expect(tutti("demo", "--seed", seed), 2, "seed", "whole number")
         self.expect(tutti("demo", "--seed", "18446744073709551615", "--print-config"), 0)
+        self.expect(tutti("demo", "--sensors", "sonar"), 2, "sensors", "lidar", "visual", "both")
+        self.expect(tutti("demo", "--sensors", "visual", "--print-config"), 0, "mission: hall\n")
         for points in ("nan", "1e300", "0", "-1"):
             self.expect(tutti("world", "one", "-o", "two", "--points", points), 2, "points", "0.001 to 1000")
         self.expect(tutti("world", "one", "-o", "two", "--seed", "-1"), 2, "seed")

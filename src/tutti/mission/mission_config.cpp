@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/mission_config.hpp"
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <set>
@@ -8,7 +9,7 @@
 #include "tutti/base/config_io.hpp"
 #include "tutti/consistency/policy.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/demo_mission.hpp"
+#include "tutti/mission/demo_missions.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -66,6 +67,8 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
   }
   for (std::size_t i = 0; i < config.simulation.robots.size(); ++i)  // without a name: named by place
     check_name(config.simulation.robots[i].name, fmt::format("simulation.robots.{}", i), problem);
+  for (std::size_t i = 0; i < config.hall.robots.size(); ++i)
+    check_name(config.hall.robots[i].name, fmt::format("hall.robots.{}", i), problem);
 }
 
 /// What a single field cannot know.
@@ -142,10 +145,18 @@ Result<MissionConfig> load_mission(const std::filesystem::path& file, const std:
   return finish(std::move(*root), file.string(), assignments);
 }
 
-Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments) {
-  auto root = parse_yaml(kDemoMission, "missions/demo.yaml");
+Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments, DemoSensors sensors) {
+  struct BuiltIn {
+    const char* text;
+    const char* name;
+  };
+  static constexpr std::array kMissions = {BuiltIn{kDemoMission, "missions/demo.yaml"},
+                                           BuiltIn{kHallMission, "missions/hall.yaml"},
+                                           BuiltIn{kHallMixedMission, "missions/hall_mixed.yaml"}};
+  const auto& [text, name] = kMissions.at(static_cast<std::size_t>(sensors));
+  auto root = parse_yaml(text, name);
   if (!root) return tl::unexpected(root.error());
-  return finish(std::move(*root), "missions/demo.yaml", assignments);
+  return finish(std::move(*root), name, assignments);
 }
 
 }  // namespace tutti::mission

@@ -207,7 +207,11 @@ struct MissionConfig {
 
 /// Loads a mission file, then applies --set assignments; checks what a single field cannot (unique names, files given).
 Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments);
+/// What the robots of `tutti demo` carry: two with LiDAR in a tunnel (missions/demo.yaml), three with cameras in a hall
+/// (hall.yaml), or one with a LiDAR, one with a camera and one with both there (hall_mixed.yaml).
+enum class DemoSensors { lidar, visual, both };
 /// The mission of `tutti demo`: nothing needed but the program.
-Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments);
+Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments,
+                                   DemoSensors sensors = DemoSensors::lidar);
 
 }  // namespace tutti::mission

@@ -23,11 +23,14 @@ std::string problem_with(const std::string& yaml, const std::vector<std::string>
 constexpr const char* kGood =
     "robots: [{name: a, odometry: {file: a.tum}, reference: {file: a.tum}}]\nclosures: {finder: reference}\n";
 
-TEST(MissionConfig, TheDemoIsAMission) {
-  const auto demo = demo_mission({});
-  ASSERT_TRUE(demo.has_value()) << demo.error().message;
-  EXPECT_EQ(demo->mission, "demo");
-  EXPECT_EQ(demo->source, "simulation");
+TEST(MissionConfig, TheDemosAreMissions) {
+  const auto named = [](DemoSensors sensors) {
+    const auto demo = demo_mission({}, sensors);
+    return demo ? demo->mission + " " + demo->source + " " + demo->closures.finder : demo.error().message;
+  };
+  EXPECT_EQ(named(DemoSensors::lidar), "demo simulation lidar");
+  EXPECT_EQ(named(DemoSensors::visual), "hall hall visual");
+  EXPECT_EQ(named(DemoSensors::both), "hall_mixed hall sensors");
 }
 
 TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {
@@ -54,6 +57,9 @@ TEST(MissionConfig, RobotsAreCalledWhatFilesCanBeCalled) {
     EXPECT_NE(problem(name).find("simulation.robots.1.name: is '" + name + "', expected at most 64 letters"),
               std::string::npos)
         << problem(name);
+  const auto flying = demo_mission({"hall.robots.0.name=../b"}, DemoSensors::visual);
+  ASSERT_FALSE(flying.has_value());
+  EXPECT_NE(flying.error().message.find("hall.robots.0.name: is '../b'"), std::string::npos) << flying.error().message;
 }
 
 TEST(MissionConfig, WhereTheLidarSitsIsAPose) {
