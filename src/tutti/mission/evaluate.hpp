@@ -38,10 +38,12 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
 /// Accepted closures against the reference poses of their ends; nothing where none can be checked.
 std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
                                                  const std::vector<const MissionRecording*>& robots,
-                                                 const evaluation::AssociationConfig& association);
+                                                 const evaluation::AssociationConfig& association,
+                                                 const ClosureCheckConfig& config);
 /// Calls evaluate_map() at the end.
 void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
-                     const evaluation::AssociationConfig& association, MissionRecord& record);
+                     const evaluation::AssociationConfig& association, const ClosureCheckConfig& check,
+                     MissionRecord& record);
 /// What the robots saw, put together by every estimate, thinned; and, where record.survey is there, how far it is from
 /// that.
 void evaluate_map(const server::MapServer& server, const evaluation::AssociationConfig& association,

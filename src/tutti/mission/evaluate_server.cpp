@@ -127,7 +127,8 @@ void relate_robots(const std::vector<RobotOutcome>& robots, const server::MapEst
 
 std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
                                                  const std::vector<const MissionRecording*>& robots,
-                                                 const evaluation::AssociationConfig& association) {
+                                                 const evaluation::AssociationConfig& association,
+                                                 const ClosureCheckConfig& config) {
   const std::map<KeyframeId, Pose3> truth = true_ends(map, robots, association);
   std::optional<ClosureCheckRecord> check;
   for (const server::JudgedClosure& judged : map.closures) {
@@ -136,9 +137,10 @@ std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
     const auto to = truth.find(judged.closure.to);
     if (from == truth.end() || to == truth.end()) continue;
     const Vector6d error = local(from->second.inverse() * to->second, judged.closure.measurement.T_a_b);
-    if (!check) check.emplace();
+    if (!check) check = ClosureCheckRecord{.wrong_m = config.wrong_m, .wrong_deg = config.wrong_deg};
     ++check->checked;
-    if (error.head<3>().norm() > 0.5 || error.tail<3>().norm() > 2.0 * kRadPerDeg) ++check->wrong;
+    if (error.head<3>().norm() > config.wrong_m || error.tail<3>().norm() > config.wrong_deg * kRadPerDeg)
+      ++check->wrong;
     check->max_error_m = std::max(check->max_error_m, error.head<3>().norm());
     check->max_error_deg = std::max(check->max_error_deg, error.tail<3>().norm() / kRadPerDeg);
   }
@@ -146,14 +148,15 @@ std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
 }
 
 void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
-                     const evaluation::AssociationConfig& association, MissionRecord& record) {
+                     const evaluation::AssociationConfig& association, const ClosureCheckConfig& check,
+                     MissionRecord& record) {
   const server::MapComponents components = server::choose_components(server.map());
   measure_joint_map(robots, server.map(), components, association, record);
   judge_closures(server, record);
   name_failures(server.map(), record.server);
   std::vector<const MissionRecording*> recordings;
   for (const RobotOutcome& robot : robots) recordings.push_back(robot.recording);
-  record.server.closure_check = check_closures(server.map(), recordings, association);
+  record.server.closure_check = check_closures(server.map(), recordings, association, check);
   record.server.graph = server.map().graph;
   for (const server::MapNode& node : server.map().nodes) record.server.nodes.push_back({node.id, node.stamp});
   relate_robots(robots, server.map(), components.of_robot, record);

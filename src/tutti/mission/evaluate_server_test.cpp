@@ -3,6 +3,7 @@
 
 #include <deque>
 
+#include "tutti/geometry/so3.hpp"
 #include "tutti/mission/evaluate.hpp"
 
 namespace tutti::mission {
@@ -53,7 +54,7 @@ class EvaluateServer : public ::testing::Test {
     server.optimise();
     record_.robots.resize(runs_.size());
     evaluate_robots(outcomes, server.map(), {}, record_);
-    evaluate_server(outcomes, server, {}, record_);
+    evaluate_server(outcomes, server, {}, {}, record_);
     return record_;
   }
 
@@ -67,6 +68,29 @@ class EvaluateServer : public ::testing::Test {
   std::vector<SubmapMessage> messages_;
   MissionRecord record_;
 };
+
+TEST(CheckClosures, CountsAsWrongWhatTheMissionSays) {
+  MissionRecording robot;
+  server::MapEstimate map;
+  const Pose3 T_true_claimed{so3_exp({0.0, 0.0, 3.0 * kRadPerDeg}), {0.3, 0.0, 0.0}};
+  for (std::uint32_t k = 0; k < 20; ++k) {
+    const StampedPose pose{Timestamp{1'000'000'000'000} + 1.0 * k, {Eigen::Quaterniond::Identity(), {1.0 * k, 0, 0}}};
+    robot.recording.reference.push_back(pose);
+    map.nodes.push_back({.id = {RobotId{0}, k}, .stamp = pose.stamp});
+  }
+  const Pose3 T_0_15{Eigen::Quaterniond::Identity(), {15.0, 0.0, 0.0}};
+  map.closures = {{.closure = {{RobotId{0}, 0}, {RobotId{0}, 15}, {T_0_15 * T_true_claimed, {}}}, .accepted = true}};
+  const auto wrong = [&](const ClosureCheckConfig& config) {
+    const auto check = check_closures(map, {&robot}, {}, config);
+    EXPECT_EQ(check->checked, 1U);
+    EXPECT_NEAR(check->max_error_deg, 3.0, 1e-9);
+    EXPECT_EQ(check->wrong_deg, config.wrong_deg);
+    return check->wrong;
+  };
+  EXPECT_EQ(wrong({}), 1U);
+  EXPECT_EQ(wrong({.wrong_deg = 5.0}), 0U);
+  EXPECT_EQ(wrong({.wrong_m = 0.2, .wrong_deg = 5.0}), 1U);
+}
 
 TEST_F(EvaluateServer, AMapOfEverythingIsScoredWhole) {
   add(60);

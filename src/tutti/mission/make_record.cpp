@@ -54,7 +54,7 @@ MissionRecord make_record(const FinishedMission& mission) {
   evaluate_robots(outcomes, server.map(), config.association, record);
   note_undelivered(mission.undelivered, record);
   note_what_the_map_lacks(server.map(), record);
-  evaluate_server(outcomes, server, config.association, record);
+  evaluate_server(outcomes, server, config.association, config.closure_check, record);
   record.server.proxy = broadcast;
   record.server.updates = mission.events.updates();
   for (RobotRecord& robot : record.robots) {

@@ -150,6 +150,17 @@ struct ClosureConfig {
   }
 };
 
+/// From where on an accepted closure counts as wrong in the report: off by more than either of these.
+struct ClosureCheckConfig {
+  double wrong_m = 0.5;
+  double wrong_deg = 2.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("wrong_m", wrong_m, greater_than(0.0), "Off by more than this, a closure counts as wrong.");
+    v.field("wrong_deg", wrong_deg, greater_than(0.0), "The same of its rotation.");
+  }
+};
+
 /// The radio of one robot, instead of the common `link`.
 struct RobotLinkConfig {
   std::string robot;
@@ -168,6 +179,7 @@ struct MissionConfig {
   std::vector<std::string> notes;             ///< Shown in the report.
   double duration_s = 0.0;                    ///< 0 = until the last sample.
   evaluation::AssociationConfig association;  ///< Of estimates with the reference.
+  ClosureCheckConfig closure_check;           ///< Of accepted closures against the reference.
   std::string source = "recordings";          ///< recordings (`robots`) | simulation | hall
   std::vector<RobotConfig> robots;
   simulation::SimulationConfig simulation;
@@ -188,6 +200,7 @@ struct MissionConfig {
     v.field("notes", notes, any(), "Sentences shown in the report.");
     v.field("duration_s", duration_s, at_least(0.0), "Mission time; 0 = until the last sample.");
     v.field("association", association);
+    v.field("closure_check", closure_check, any(), "Accepted closures against the reference.");
     v.field("source", source, one_of({"recordings", "simulation", "hall"}),
             "Replay `robots`, or simulate: walks through a network of corridors, or flights with cameras in a hall.");
     v.field("robots", robots, any(), "The robots whose recordings are replayed.");

@@ -172,7 +172,9 @@ struct NodeRecord {
 /// Accepted closures against the reference, where there is one (also when it does not score trajectories).
 struct ClosureCheckRecord {
   std::size_t checked = 0;
-  std::size_t wrong = 0;  ///< By more than 0.5 m or 2 degrees.
+  std::size_t wrong = 0;  ///< By more than wrong_m or wrong_deg.
+  double wrong_m = 0.0;
+  double wrong_deg = 0.0;
   double max_error_m = 0.0;
   double max_error_deg = 0.0;
 };

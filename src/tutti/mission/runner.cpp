@@ -217,7 +217,8 @@ class MissionRun {
     carry_out(*server_port_, meter_.update(time_s_, [&] { return server_->on_timer(now()); }));
     std::vector<const MissionRecording*> recordings;
     for (const MissionRecording& recording : recordings_) recordings.push_back(&recording);
-    if (const auto check = check_closures(server_->map_server().map(), recordings, config_.association))
+    if (const auto check =
+            check_closures(server_->map_server().map(), recordings, config_.association, config_.closure_check))
       events_.set_wrong(check->wrong);
     server_latency_ms_ = std::max(server_latency_ms_, pace_.late_ms(time_s_));
   }

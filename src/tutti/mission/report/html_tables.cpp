@@ -137,9 +137,10 @@ std::string closures_html(const MissionRecord& record) {
   std::string lead = "What the server took into the map, and why it refused the rest.";
   if (const auto& check = server.closure_check)
     lead += fmt::format(
-        " Against the reference, {} of {} accepted closures are wrong by more than 0.5 m or 2 degrees; the largest "
+        " Against the reference, {} of {} accepted closures are wrong by more than {} m or {} degrees; the largest "
         "errors are {} and {:.2f} degrees.",
-        check->wrong, check->checked, format_metres(check->max_error_m), check->max_error_deg);
+        check->wrong, check->checked, check->wrong_m, check->wrong_deg, format_metres(check->max_error_m),
+        check->max_error_deg);
   if (const std::string surer = format_surer_turns(record.robots); !surer.empty())
     lead += fmt::format(" {}", escape_xml(surer));
   return section("Loop closures", lead, html(table));

@@ -195,6 +195,8 @@ Json server_json(const MissionRecord& record) {
   if (server.closure_check)
     check = {{"checked", server.closure_check->checked},
              {"wrong", server.closure_check->wrong},
+             {"wrong_m", number(server.closure_check->wrong_m)},
+             {"wrong_deg", number(server.closure_check->wrong_deg)},
              {"max_error_m", number(server.closure_check->max_error_m)},
              {"max_error_deg", number(server.closure_check->max_error_deg)}};
   Json failed = Json::array();

@@ -116,9 +116,11 @@ std::string server_lines(const MissionRecord& record) {
                         format_metres(server.joint.rmse_m), format_mapped_robots(record),
                         format_metres(server.joint.max_error_m), format_scored(server.joint.scored_share));
   if (const auto& check = server.closure_check)
-    text += fmt::format(". Of {} closures checked against the reference {} wrong (largest error {}, {:.2f} deg)",
-                        check->checked, check->wrong == 1 ? "1 is" : fmt::format("{} are", check->wrong),
-                        format_metres(check->max_error_m), check->max_error_deg);
+    text += fmt::format(
+        ". Of {} closures checked against the reference {} wrong by more than {} m or {} deg "
+        "(largest error {}, {:.2f} deg)",
+        check->checked, check->wrong == 1 ? "1 is" : fmt::format("{} are", check->wrong), check->wrong_m,
+        check->wrong_deg, format_metres(check->max_error_m), check->max_error_deg);
   std::string out = wrap(text + ".", "  server   ");
   if (const std::string surer = format_surer_turns(record.robots); !surer.empty()) out += wrap(surer, "  odometry ");
   for (const auto& transform : record.transforms) {
