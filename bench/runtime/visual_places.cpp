@@ -106,7 +106,7 @@ Submap describe(std::uint32_t index, const Listed& listed, const std::vector<Cam
     keyframe.images.back().camera = c;
   }
   match_stereo(keyframe.images[0], keyframe.images[1]);
-  const VisualSubmapConfig all{.max_misfit_share = 1.0, .budget_kb = 1e6};
+  const VisualSubmapConfig all{.max_residual_px = 1e9, .budget_kb = 1e6};
   const std::vector<KeyframeImages> keyframes{keyframe};
   return {.id = {RobotId{index}, 0},
           .keyframes = {{0, listed.stamp, {}}},

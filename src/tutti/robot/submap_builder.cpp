@@ -45,11 +45,14 @@ std::vector<ImuPreintegration> imu_steps(const Submap& submap, const std::vector
 Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>& images,
                           const visual::VisualSubmapConfig& config) {
   std::vector<visual::KeyframeImages> seen;
+  std::vector<Vector6d> drift{Vector6d::Zero()};  // variances since the submap's begin
+  for (const RelativePose& step : submap.odometry) drift.push_back(drift.back() + step.covariance.diagonal());
   for (const TrackedImages& moment : images) {
     const auto keyframe = std::ranges::find(submap.keyframes, moment.stamp, &Keyframe::stamp);
     TUTTI_CHECK(keyframe != submap.keyframes.end(), "images at {} ns of no keyframe", moment.stamp.ns);
-    seen.push_back(
-        {keyframe->index, submap.keyframes.front().T_odom_body.inverse() * keyframe->T_odom_body, moment.images});
+    const Vector6d& variance = drift[static_cast<std::size_t>(keyframe - submap.keyframes.begin())];
+    seen.push_back({keyframe->index, submap.keyframes.front().T_odom_body.inverse() * keyframe->T_odom_body,
+                    moment.images, variance.tail<3>().mean(), variance.head<3>().mean()});
   }
   auto payload = visual::make_visual_payload(seen, *images.front().cameras, config);
   if (!payload) return in_context("images of submap " + to_string(submap.id), payload.error());

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <queue>
 #include <utility>
@@ -23,6 +24,7 @@ struct Image {
   const TrackedImage* tracked;
   const Camera* camera;
   Pose3 T_camera_submap;
+  double turn_variance_rad2, shift_variance_m2;
 };
 
 /// A keypoint: of which image, which one.
@@ -60,7 +62,8 @@ Result<std::vector<Image>> flatten(std::span<const KeyframeImages> keyframes, co
       if (auto ok = check_image(image, cameras); !ok)
         return in_context(fmt::format("keyframe {}, image of camera {}", keyframe.keyframe, image.camera), ok.error());
       const Camera& camera = cameras[image.camera];
-      out.push_back({keyframe.keyframe, &image, &camera, (keyframe.T_submap_body * camera.T_body_camera).inverse()});
+      out.push_back({keyframe.keyframe, &image, &camera, (keyframe.T_submap_body * camera.T_body_camera).inverse(),
+                     keyframe.turn_variance_rad2, keyframe.shift_variance_m2});
     }
   }
   const auto key = [](const Image& image) { return std::pair(image.keyframe, image.tracked->camera); };
@@ -105,11 +108,68 @@ Landmark to_landmark(const TriangulatedPoint& point) {
   return {point.position.cast<float>(), static_cast<float>(std::sqrt(variance))};
 }
 
+/// What a track's views miss its point by, and what pixels and odometry explain of it: root mean squares over them.
+struct TrackResidual {
+  std::size_t views;
+  double rms_px, expected_px;
+};
+
+/// Infinite where the views fit no point.
+constexpr double kNoFit_px = std::numeric_limits<double>::infinity();
+
+TrackResidual residual_of(const std::vector<View>& views, const std::vector<Seen>& seen,
+                          const std::vector<Image>& images, const TriangulatedPoint& point) {
+  constexpr double kBehind_px = 1e3;  // where it ought to be seen and cannot be
+  TrackResidual out{views.size(), 0.0, 0.0};
+  const Image& middle = images[seen[seen.size() / 2].image];
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const View& view = views[v];
+    const Eigen::Vector3d in_camera = view.T_camera_submap * point.position;
+    const auto pixel = project(*view.camera, in_camera);
+    out.rms_px += pixel ? (*pixel - view.pixel).squaredNorm() : kBehind_px * kBehind_px;
+    const Image& image = images[seen[v].image];
+    const double turn_rad2 = std::abs(image.turn_variance_rad2 - middle.turn_variance_rad2);
+    const double shift_m2 = std::abs(image.shift_variance_m2 - middle.shift_variance_m2);
+    const double focal_px2 = view.camera->fx * view.camera->fx;
+    out.expected_px +=
+        2.0 * (view.sigma_px * view.sigma_px + focal_px2 * (turn_rad2 + shift_m2 / in_camera.squaredNorm()));
+  }
+  const auto n = static_cast<double>(views.size());
+  out.rms_px = std::sqrt(out.rms_px / n);
+  out.expected_px = std::sqrt(out.expected_px / n);
+  return out;
+}
+
+/// Any two views fit nearly any calibration: tracks of more decide where there are enough.
+Status check_residuals(std::vector<TrackResidual> residuals, const VisualSubmapConfig& config) {
+  constexpr std::size_t kEnough = 20;
+  const auto more = std::ranges::partition(residuals, [](const TrackResidual& it) { return it.views < 3; });
+  if (more.size() >= kEnough) residuals.erase(residuals.begin(), more.begin());
+  if (residuals.empty()) return {};
+  const auto median = [&](auto member) {
+    const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+    std::ranges::nth_element(residuals, middle, {}, member);
+    return (*middle).*member;
+  };
+  constexpr const char* kWhy = "calibration, camera pose on the body, stamps or odometry are wrong";
+  const double rms_px = median(&TrackResidual::rms_px);
+  if (rms_px == kNoFit_px)
+    return fail(ErrorCode::invalid, "half of {} tracks fit no point within {} px: {}", residuals.size(),
+                config.triangulation.max_reprojection_px, kWhy);
+  std::erase_if(residuals, [](const TrackResidual& it) { return it.rms_px == kNoFit_px; });
+  const double expected_px = median(&TrackResidual::expected_px);
+  if (rms_px <= std::max(config.max_residual_px, 2.0 * expected_px)) return {};
+  return fail(ErrorCode::invalid,
+              "landmarks miss their pixels by {:.1f} px (median of {} tracks), expected {:.1f} px by the odometry's "
+              "covariance and at most {:.1f}: {}",
+              rms_px, residuals.size(), expected_px, std::max(config.max_residual_px, 2.0 * expected_px), kWhy);
+}
+
 Result<std::vector<Found>> find_landmarks(const std::vector<Image>& images, const VisualSubmapConfig& config) {
   const auto tracks = tracks_of(images);
   if (!tracks) return tl::unexpected(tracks.error());
   std::vector<Found> out;
-  std::size_t misfits = 0;
+  std::vector<TrackResidual> residuals;
   for (const auto& [track, seen] : *tracks) {
     if (seen.size() < static_cast<std::size_t>(config.triangulation.min_views)) continue;
     std::vector<View> views;
@@ -120,20 +180,16 @@ Result<std::vector<Found>> find_landmarks(const std::vector<Image>& images, cons
     }
     const auto point = triangulate(views, config.triangulation);
     if (!point) {
-      misfits += point.error() == TriangulationFault::misfit;
+      if (point.error() == TriangulationFault::misfit) residuals.push_back({views.size(), kNoFit_px, 0.0});
       continue;
     }
+    residuals.push_back(residual_of(views, seen, images, *point));
     Found found{to_landmark(*point), {}};
     for (std::size_t v = 0; v < seen.size(); ++v)
       if (point->fits[v]) found.seen.push_back(seen[v]);
     out.push_back(std::move(found));
   }
-  const auto tried = static_cast<double>(misfits + out.size());
-  if (static_cast<double>(misfits) > config.max_misfit_share * tried)
-    return fail(ErrorCode::invalid,
-                "{} of {} tracks fit no point within {} px: calibration, camera pose on the body, stamps or odometry "
-                "are wrong",
-                misfits, misfits + out.size(), config.triangulation.max_reprojection_px);
+  if (auto ok = check_residuals(std::move(residuals), config); !ok) return tl::unexpected(ok.error());
   return out;
 }
 

@@ -142,6 +142,24 @@ TEST(VisualPayload, wrongCalibrationIsSaid) {
       std::string::npos);
 }
 
+TEST(VisualPayload, whatTheOdometryExplainsIsNoWrongCalibration) {
+  const VisualSubmapConfig strict{.max_residual_px = 1.0};
+  const auto words = [&](const Seen& seen, double focal) {
+    auto cameras = kCameras;
+    for (Camera& camera : cameras) camera.model.fx *= focal;
+    const auto payload = make_visual_payload(seen.images, cameras, strict);
+    return payload ? std::string() : payload.error().message;
+  };
+  Seen s = seen({.turn_rad = 1.0});
+  EXPECT_EQ(words(s, 1.1).find("landmarks miss their pixels by "), 0U) << words(s, 1.1);
+  EXPECT_NE(words(s, 1.1).find("expected 0.7 px by the odometry's covariance and at most 1.4: calibration"),
+            std::string::npos)
+      << words(s, 1.1);
+  EXPECT_EQ(words(s, 1.001), "");
+  for (KeyframeImages& keyframe : s.images) keyframe.turn_variance_rad2 = keyframe.keyframe * 0.02 * 0.02;
+  EXPECT_EQ(words(s, 1.1), "");
+}
+
 TEST(VisualPayload, inputThatContradictsItselfIsAnError) {
   const Seen good = seen({.keyframes = 3});
   Seen s = good;
