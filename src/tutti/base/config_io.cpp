@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/base/config_io.hpp"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <sstream>
 
 #include "tutti/base/file.hpp"
 
@@ -23,6 +25,30 @@ struct ContentError {
   int line;
   std::string text;
 };
+
+/// Hears of a document's content and keeps nothing.
+class Deaf final : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+/// YAML::LoadAll() finds documents without end, and memory for them, where a token between documents belongs to none
+/// (a ',' at the beginning): it is not asked. Two stand for more.
+int count_documents(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  Deaf nobody;
+  if (!parser.HandleNextDocument(nobody)) return 0;
+  return parser.HandleNextDocument(nobody) ? 2 : 1;
+}
 
 class YamlReader {
  public:
@@ -185,11 +211,11 @@ const ConfigNode* ConfigNode::find(std::string_view key) const {
 
 Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name) {
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1)
-      return fail(ErrorCode::parse, "{}: {} YAML documents, expected one", name, documents.size());
-    if (documents.empty()) return ConfigNode{};
-    return YamlReader{}.read(documents[0], YamlReader::line_of(documents[0], 1));
+    const int documents = count_documents(text);
+    if (documents > 1) return fail(ErrorCode::parse, "{}: several YAML documents, expected one", name);
+    if (documents == 0) return ConfigNode{};
+    const YAML::Node document = YAML::Load(text);
+    return YamlReader{}.read(document, YamlReader::line_of(document, 1));
   } catch (const ContentError& error) {
     return fail(ErrorCode::parse, "{}:{}: {}", name, error.line, error.text);
   } catch (const YAML::Exception& error) {

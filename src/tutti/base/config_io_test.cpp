@@ -140,6 +140,7 @@ TEST(Config, RefusesBrokenYaml) {
   EXPECT_TRUE(parse_error("a: 1\nb: [1, 2\n").starts_with("x.yaml:3: ")) << parse_error("a: 1\nb: [1, 2\n");
   EXPECT_NE(parse_error("a: *nowhere\n"), "");
   EXPECT_NE(parse_error("---\na: 1\n---\na: 2\n"), "");
+  EXPECT_EQ(parse_error(",a: 1"), "x.yaml: several YAML documents, expected one");  // yaml-cpp would find ever more
   EXPECT_NE(parse_error("? [a, b]\n: 1\n"), "");
   EXPECT_NE(parse_error("\ta: 1\n"), "");
 }
