@@ -159,10 +159,6 @@ Result<std::vector<CameraImages>> read_image_list(const std::string& list, const
 }
 
 Result<EurocFolder> read_euroc_folder(const std::string& folder) {
-  if (!is_folder(folder))
-    return fail(ErrorCode::io,
-                "{}: no such folder, expected a recording in EuRoC's layout (docs/data.md says where they come from)",
-                folder);
   const fs::path mav0 = is_folder(fs::path(folder) / "mav0") ? fs::path(folder) / "mav0" : fs::path(folder);
   EurocFolder out;
   for (std::size_t i = 0;; ++i) {
@@ -175,7 +171,10 @@ Result<EurocFolder> read_euroc_folder(const std::string& folder) {
     out.cameras.push_back(std::move(images->front()));
   }
   if (out.cameras.empty())
-    return fail(ErrorCode::io, "{}: there is no folder cam0, expected EuRoC's mav0/cam0", mav0.string());
+    return fail(
+        ErrorCode::io,
+        "{}: there is no folder cam0, expected EuRoC's mav0/cam0 (docs/data.md says where recordings come from)",
+        mav0.string());
   const fs::path of_imu = mav0 / "imu0";
   if (!is_folder(of_imu)) return out;
   const auto noise = read_euroc_imu_noise((of_imu / "sensor.yaml").string());

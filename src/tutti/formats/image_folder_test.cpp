@@ -133,7 +133,8 @@ TEST_F(ImageFolder, ErrorsInEurocsFilesSayWhereAndWhat) {
   EXPECT_EQ(error_with("mav0/imu0/sensor.yaml", replaced(kImu, "1.0, 0.0, 0.0, 0.0", "1.0, 0.0, 0.0, 0.1")),
             "mav0/imu0/sensor.yaml:1: T_BS of the IMU is not the identity, expected the body to be the IMU");
   fs::remove_all(folder_ / "mav0/cam0");
-  EXPECT_EQ(error_with("mav0/x", ""), "mav0: there is no folder cam0, expected EuRoC's mav0/cam0");
+  EXPECT_EQ(error_with("mav0/x", ""),
+            "mav0: there is no folder cam0, expected EuRoC's mav0/cam0 (docs/data.md says where recordings come from)");
 }
 
 constexpr const char* kTwoCameras = R"(cameras:
