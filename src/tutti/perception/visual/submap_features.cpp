@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <map>
 
+#include "tutti/perception/visual/reprojection.hpp"
 #include "tutti/perception/visual/triangulate.hpp"
 
 namespace tutti::visual {
@@ -51,7 +52,7 @@ MappedPoint map_point(const Landmark& landmark, const std::vector<View>& views) 
   return out;
 }
 
-/// Fills points and residual_px.
+/// Fills points.
 void map_points(const VisualPayload& payload, const Places& places, SubmapFeatures& out) {
   std::vector<std::vector<View>> views(payload.landmarks.size());
   for (const VisualFrame& frame : payload.frames) {
@@ -61,17 +62,7 @@ void map_points(const VisualPayload& payload, const Places& places, SubmapFeatur
       if (o.landmark != kNoIndex)
         views[o.landmark].push_back({&camera.model, T_camera_submap, o.pixel.cast<double>(), o.sigma_px});
   }
-  double sum = 0.0;
-  std::size_t n = 0;
-  for (std::size_t l = 0; l < views.size(); ++l) {
-    out.points.push_back(map_point(payload.landmarks[l], views[l]));
-    for (const View& view : views[l])
-      if (const auto pixel = project(*view.camera, view.T_camera_submap * out.points[l].position)) {
-        sum += (*pixel - view.pixel).squaredNorm();
-        ++n;
-      }
-  }
-  out.residual_px = n > 0 ? std::sqrt(sum / static_cast<double>(n)) : 0.0;
+  for (std::size_t l = 0; l < views.size(); ++l) out.points.push_back(map_point(payload.landmarks[l], views[l]));
 }
 
 /// Fills the landmarks' descriptors; returns of each landmark a row of the payload's, or kNoIndex.
@@ -138,6 +129,7 @@ SubmapFeatures extract_features(const Submap& submap, const VisualClosureConfig&
   out.descriptors = payload.descriptors;
   out.keys = table_keys(out.descriptors);
   map_points(payload, places, out);
+  out.residual_px = reprojection_error(submap).rms_px();
   const auto row_of = describe_landmarks(payload, out);
   out.tables = DescriptorTables(table_keys(out.landmark_descriptors));
   add_queries(payload, places, row_of, out);
