@@ -19,6 +19,7 @@ namespace tutti::bundle {
 struct BundleKeyframe {
   KeyframeId id;
   Pose3 T_world_body;
+  bool is_constant = false;  ///< Keeps its pose.
 };
 
 /// A camera of a robot.
@@ -80,14 +81,16 @@ struct MotionState {
 struct AdjustmentSummary {
   estimation::Termination termination = estimation::Termination::not_run;
   int iterations = 0;
-  int components = 0;          ///< Sets of keyframes that nothing ties to each other; each has a gauge of its own.
+  int components = 0;          ///< Sets of keyframes that nothing ties to each other; without constant ones each
+                               ///< has a gauge of its own.
   double initial_cost = -1.0;  ///< Sum of rho(r^T Omega r) / 2.
   double final_cost = -1.0;
   std::string message;  ///< The solver's own words.
 };
 
 struct BundleSolution {
-  std::vector<Pose3> T_world_body;         ///< Per keyframe. The first one of every component has not moved.
+  std::vector<Pose3> T_world_body;  ///< Per keyframe. Constant ones have not moved, nor the first one of a component
+                                    ///< without any.
   std::vector<Eigen::Vector3d> landmarks;  ///< World frame, m.
   std::vector<MotionState> motion;         ///< Per keyframe; meaningful where an IMU factor ends.
   std::vector<Eigen::Vector3d> gravity;    ///< Per component, m/s^2, world frame; zero where there is no IMU factor.

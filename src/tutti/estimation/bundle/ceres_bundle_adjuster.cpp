@@ -190,7 +190,7 @@ class CeresProblem {
     for (const auto& p : start.landmarks) landmarks_.push_back({p.x(), p.y(), p.z()});
     for (const auto& g : start.gravity) gravity_.push_back({g.x(), g.y(), g.z()});
     for (auto& pose : poses_) ceres_.AddParameterBlock(pose.data(), 7, &manifold_);
-    for (const std::size_t k : structure.anchor) ceres_.SetParameterBlockConstant(poses_[k].data());
+    for (const std::size_t k : structure.anchors) ceres_.SetParameterBlockConstant(poses_[k].data());
     add_views(problem, config);
     for (const auto& odometry : problem.odometry)
       ceres_.AddResidualBlock(new OdometryCost(odometry.measurement), &odometry_loss_, poses_[odometry.from].data(),

@@ -81,6 +81,8 @@ class Merger {
   }
 
   void add(const Group& group) {
+    if (std::ranges::all_of(group.views, [&](const auto& view) { return out_.keyframes[view.keyframe].is_constant; }))
+      return;
     const auto point = triangulate(group);
     if (!point) {
       ++summary_.landmarks_uncertain;

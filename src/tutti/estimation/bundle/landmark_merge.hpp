@@ -19,6 +19,7 @@ namespace tutti::bundle {
 struct PosedSubmap {
   std::shared_ptr<const Submap> submap;
   std::vector<Pose3> T_world_body;  ///< Per keyframe of the submap.
+  bool is_constant = false;         ///< Its keyframes keep these poses, also those that it shares.
 };
 
 /// A landmark, by the submap that carries it.
@@ -89,10 +90,10 @@ struct MergedMap {
 
 /// One bundle problem from several submaps. Landmarks of neighbouring submaps of one chain become one when they have a
 /// keypoint of the shared keyframe in common (same camera, same pixel: one ray), those of other submaps when a match
-/// says so. What was joined is triangulated again along all its rays from `T_world_body`, never averaged: two submaps
-/// put a landmark apart along the viewing ray. Views that contradict are dropped; where most do, the join is undone.
-/// A pure function; the order of submaps and matches does not matter. Refuses what does not fit together (a pose for
-/// every keyframe, indices in range, finite numbers), by name.
+/// says so; what constant keyframes alone see is left out. What was joined is triangulated again along all its rays
+/// from `T_world_body`, never averaged: two submaps put a landmark apart along the viewing ray. Views that contradict
+/// are dropped; where most do, the join is undone. A pure function; the order of submaps and matches does not matter.
+/// Refuses what does not fit together (a pose for every keyframe, indices in range, finite numbers), by name.
 Result<MergedMap> merge_landmarks(std::span<const PosedSubmap> submaps, std::span<const LandmarkMatch> matches,
                                   const MergeConfig& config);
 

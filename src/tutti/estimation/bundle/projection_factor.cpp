@@ -46,14 +46,32 @@ std::optional<Eigen::Vector2d> reprojection_error(const Camera& camera, const Po
   return *seen - pixel;
 }
 
+namespace {
+
+std::optional<Eigen::Vector2d> error_of(const BundleProblem& problem, const BundleObservation& view) {
+  return reprojection_error(problem.cameras[view.camera].camera, problem.keyframes[view.keyframe].T_world_body,
+                            problem.landmarks[view.landmark], view.pixel);
+}
+
+}  // namespace
+
+double reprojection_rms_px(const BundleProblem& problem) {
+  double sum = 0.0;
+  std::size_t seen = 0;
+  for (const auto& view : problem.observations)
+    if (const auto error = error_of(problem, view)) {
+      sum += error->squaredNorm();
+      ++seen;
+    }
+  return seen > 0 ? std::sqrt(sum / static_cast<double>(seen)) : 0.0;
+}
+
 std::vector<CameraResiduals> camera_residuals(const BundleProblem& problem) {
   std::vector<CameraResiduals> out;
   std::vector<std::vector<double>> lengths(problem.cameras.size());
   for (const auto& camera : problem.cameras) out.push_back({.robot = camera.robot, .camera = camera.index});
   for (const auto& view : problem.observations) {
-    const auto error =
-        reprojection_error(problem.cameras[view.camera].camera, problem.keyframes[view.keyframe].T_world_body,
-                           problem.landmarks[view.landmark], view.pixel);
+    const auto error = error_of(problem, view);
     ++out[view.camera].observations;
     if (error)
       lengths[view.camera].push_back(error->norm());

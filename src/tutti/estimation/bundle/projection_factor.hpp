@@ -27,4 +27,7 @@ std::optional<Eigen::Vector2d> reprojection_error(const Camera& camera, const Po
 /// Statistics of the problem's reprojection errors by camera.
 std::vector<CameraResiduals> camera_residuals(const BundleProblem& problem);
 
+/// Root mean square of their lengths, px; of those that a pixel sees. 0 without any.
+double reprojection_rms_px(const BundleProblem& problem);
+
 }  // namespace tutti::bundle

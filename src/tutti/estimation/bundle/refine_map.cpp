@@ -22,6 +22,7 @@ std::vector<RelativeFactor> factors_of(const MergedMap& merged, const BundleSolu
   std::vector<RelativeFactor> out;
   for (std::size_t e = 0; e < problem.odometry.size(); ++e) {
     const auto& [from, to, measurement] = problem.odometry[e];
+    if (problem.keyframes[from].is_constant && problem.keyframes[to].is_constant) continue;
     RelativePose refined = merged.odometry[e];
     if (covariances && (sees[from] || sees[to]))
       refined = {solution.T_world_body[from].inverse() * solution.T_world_body[to], (*covariances)[e]};
@@ -41,11 +42,13 @@ Result<Refinement> refine_map(const RefinementInput& input, const RefinementConf
   if (!solution) return tl::unexpected(solution.error());
 
   Refinement out;
+  out.rms_before_px = reprojection_rms_px(merged->problem);
   out.factors = factors_of(*merged, *solution, config.bundle);
   for (std::size_t k = 0; k < merged->problem.keyframes.size(); ++k)
     merged->problem.keyframes[k].T_world_body = solution->T_world_body[k];
   merged->problem.landmarks = std::move(solution->landmarks);
   out.residuals_before = std::move(merged->residuals);
+  out.rms_after_px = reprojection_rms_px(merged->problem);
   out.residuals_after = camera_residuals(merged->problem);
   out.keyframes = std::move(merged->problem.keyframes);
   out.landmarks = std::move(merged->problem.landmarks);

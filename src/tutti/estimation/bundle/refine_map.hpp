@@ -38,15 +38,19 @@ struct RelativeFactor {
 
 struct Refinement {
   std::vector<BundleKeyframe> keyframes;          ///< By id.
-  std::vector<RelativeFactor> factors;            ///< By id: from every keyframe to the next one of its submap.
+  std::vector<RelativeFactor> factors;            ///< By id: from every keyframe to the next one of its submap, where
+                                                  ///< not both are constant.
   std::vector<Eigen::Vector3d> landmarks;         ///< World frame, m.
   std::vector<CameraResiduals> residuals_before;  ///< MergedMap::residuals: of the submaps as they came.
   std::vector<CameraResiduals> residuals_after;
+  double rms_before_px = 0.0;  ///< Of the adjusted problem's views, without those that no pixel sees.
+  double rms_after_px = 0.0;
   MergeSummary merge;
   AdjustmentSummary adjustment;
 };
 
-/// The submaps' keyframes and landmarks in one bundle adjustment, starting from the pose graph's poses. A pure
+/// The submaps' keyframes and landmarks in one bundle adjustment, starting from the poses given. Constant submaps hold
+/// the others: with such a neighbour a component has no other gauge, and covariances are those given its poses. A pure
 /// function; the order of submaps and matches does not matter. Non-finite and contradictory input is refused by name.
 /// Between keyframes that see nothing, and everywhere when the adjustment fails, factors are those of the odometry.
 Result<Refinement> refine_map(const RefinementInput& input, const RefinementConfig& config);

@@ -163,5 +163,61 @@ TEST(RefineMap, UnconnectedMapsKeepTheirPlaces) {
     }
 }
 
+/// The scene with its true poses where they are held.
+Scene partly_held(const SceneOptions& options, std::uint64_t seed) {
+  Scene scene = make_scene(options, seed);
+  for (auto& posed : scene.input.submaps) {
+    posed.is_constant = posed.submap->id.index != 1;
+    for (std::size_t k = 0; posed.is_constant && k < posed.T_world_body.size(); ++k)
+      posed.T_world_body[k] = scene.truth[posed.submap->keyframes[k].index];
+  }
+  return scene;
+}
+
+TEST(RefineMap, WhatIsConstantStaysAndHoldsTheOthers) {
+  const Scene scene = partly_held({}, 2);
+  const auto refined = refine_map(scene.input, {}).value();
+  const auto& submaps = scene.input.submaps;
+  ASSERT_EQ(refined.keyframes.size(), scene.truth.size());
+  double moved = 0.0, off = 0.0;
+  for (const auto& keyframe : refined.keyframes) {
+    const Pose3& truth = scene.truth[keyframe.id.index];
+    const bool is_free = keyframe.id.index > submaps[1].submap->keyframes.front().index &&
+                         keyframe.id.index < submaps[1].submap->keyframes.back().index;
+    EXPECT_EQ(keyframe.is_constant, !is_free);  // shared ones too
+    if (!is_free) {
+      EXPECT_EQ(keyframe.T_world_body, truth);
+      continue;
+    }
+    const Pose3& start = submaps[1].T_world_body[keyframe.id.index - submaps[1].submap->keyframes.front().index];
+    moved = std::max(moved, local(start, keyframe.T_world_body).norm());
+    off = std::max(off, local(truth, keyframe.T_world_body).head<3>().norm());
+  }
+  EXPECT_GT(moved, 0.02);
+  EXPECT_LT(off, 0.02);  // odometry: 0.02 a step
+  ASSERT_EQ(refined.factors.size(), submaps[1].submap->odometry.size());
+  EXPECT_EQ(refined.factors.front().from.index, submaps[1].submap->keyframes.front().index);
+  EXPECT_GT(refined.rms_before_px, refined.rms_after_px);
+}
+
+TEST(RefineMap, CovarianceOfWhatIsFreeIsConsistent) {
+  TUTTI_STATISTIC();
+  double sum = 0.0;
+  const int runs = 30;
+  for (int run = 0; run < runs; ++run) {
+    const Scene scene = partly_held({.points = 120}, 300 + static_cast<std::uint64_t>(run));
+    sum += mean_nees(scene, refine_map(scene.input, exact_config()).value());
+  }
+  EXPECT_NEAR(sum / runs, 6.0, 0.9);
+}
+
+TEST(RefineMap, WithEverythingConstantNothingHappens) {
+  Scene scene = make_scene({.keyframes = 15}, 2);
+  for (auto& posed : scene.input.submaps) posed.is_constant = true;
+  const auto refined = refine_map(scene.input, {}).value();
+  EXPECT_TRUE(refined.factors.empty());
+  EXPECT_TRUE(refined.landmarks.empty());
+}
+
 }  // namespace
 }  // namespace tutti::bundle

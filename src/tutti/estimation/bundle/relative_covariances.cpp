@@ -190,7 +190,7 @@ std::optional<std::vector<Matrix6d>> odometry_posterior(const BundleProblem& pro
   add_imu(problem, solution, config, structure, nodes, blocks);
 
   const SingleThread single_thread;
-  const BlockStructure slots = structure_of(blocks, nodes.count, structure.anchor);
+  const BlockStructure slots = structure_of(blocks, nodes.count, structure.anchors);
   BlockCholesky hessian(slots, 6);
   hessian.set_zero();
   std::size_t e = 0;

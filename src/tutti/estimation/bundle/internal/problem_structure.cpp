@@ -59,12 +59,18 @@ ProblemStructure analyse(const BundleProblem& problem) {
   }
   for (const auto& imu : problem.imu) out.begins_motion[imu.to] = false;
   std::tie(out.component, out.components) = sets.labels();
-  out.anchor.assign(static_cast<std::size_t>(out.components), n);
-  out.has_gravity.assign(static_cast<std::size_t>(out.components), false);
-  for (std::size_t k = n; k-- > 0;) {
+  std::vector<bool> is_held(static_cast<std::size_t>(out.components), false);
+  out.has_gravity = is_held;
+  for (std::size_t k = 0; k < n; ++k) {
     const auto c = static_cast<std::size_t>(out.component[k]);
-    out.anchor[c] = k;
+    if (problem.keyframes[k].is_constant) is_held[c] = true;
     if (out.has_motion[k]) out.has_gravity[c] = true;
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto c = static_cast<std::size_t>(out.component[k]);
+    if (is_held[c] && !problem.keyframes[k].is_constant) continue;
+    out.anchors.push_back(k);
+    is_held[c] = true;
   }
   return out;
 }

@@ -12,10 +12,10 @@ namespace tutti::bundle::internal {
 struct ProblemStructure {
   std::vector<int> component;  ///< Per keyframe.
   int components = 0;
-  std::vector<std::size_t> anchor;  ///< Per component: its first keyframe, which keeps its pose.
-  std::vector<bool> has_motion;     ///< Per keyframe: an IMU factor ends here.
-  std::vector<bool> begins_motion;  ///< Per keyframe: an IMU factor starts here, and none ends.
-  std::vector<bool> has_gravity;    ///< Per component.
+  std::vector<std::size_t> anchors;  ///< Keyframes that keep their poses: constant ones, or a component's first.
+  std::vector<bool> has_motion;      ///< Per keyframe: an IMU factor ends here.
+  std::vector<bool> begins_motion;   ///< Per keyframe: an IMU factor starts here, and none ends.
+  std::vector<bool> has_gravity;     ///< Per component.
 };
 ProblemStructure analyse(const BundleProblem& problem);
 
