@@ -12,6 +12,7 @@
 #include "tutti/wire/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::fuzz {
@@ -114,6 +115,9 @@ std::map<std::string, std::vector<std::string>> seeds() {
       out["agent_state"].push_back(std::move(seed));
   out["submap_request"] = both(MessageKind::submap_request, wire::encode(any_submap_request(rng)));
   out["submap_copy"] = both(MessageKind::submap_copy, wire::encode(any_submap_copy(rng)));
+
+  out["refinement_job"] = both(MessageKind::refinement_job, wire::encode(any_refinement_job(rng)));
+  out["refinement"] = both(MessageKind::refinement, wire::encode(any_refinement(rng)));
 
   const Scan scan{{5},
                   std::make_shared<const PointCloud>(PointCloud{{{1, 2, 3}, {4, 5, 6}}}),

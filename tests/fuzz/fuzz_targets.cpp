@@ -21,6 +21,7 @@
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/limits.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::fuzz {
@@ -57,6 +58,8 @@ void status(std::string_view bytes) { frame(MessageKind::status, bytes, wire::de
 void mission_status(std::string_view bytes) { frame(MessageKind::mission_status, bytes, wire::decode_mission_status); }
 void cloud(std::string_view bytes) { frame(MessageKind::cloud, bytes, wire::decode_cloud); }
 void submap_request(std::string_view bytes) { frame(MessageKind::submap_request, bytes, wire::decode_submap_request); }
+void refinement_job(std::string_view bytes) { frame(MessageKind::refinement_job, bytes, wire::decode_refinement_job); }
+void refinement(std::string_view bytes) { frame(MessageKind::refinement, bytes, wire::decode_refinement); }
 void submap_copy(std::string_view bytes) { frame(MessageKind::submap_copy, bytes, wire::decode_submap_copy); }
 void agent_state(std::string_view bytes) { frame(MessageKind::agent_state, bytes, wire::decode_agent_state); }
 
@@ -154,6 +157,8 @@ const std::map<std::string, Target>& targets() {
       {"proxy_graph", proxy_graph},
       {"proxy_graph_delta", proxy_graph_delta},
       {"receipt", receipt},
+      {"refinement", refinement},
+      {"refinement_job", refinement_job},
       {"status", status},
       {"submap", submap},
       {"submap_copy", submap_copy},

@@ -20,16 +20,18 @@ constexpr Delivery delivery_of(wire::MessageKind kind) {
     case wire::MessageKind::receipt:         // server -> one robot
     case wire::MessageKind::mission_status:  // server -> all viewers
       return Delivery::retained;
-    case wire::MessageKind::job:  // server -> any worker
+    case wire::MessageKind::job:             // server -> any worker
+    case wire::MessageKind::refinement_job:  // server -> any worker
       return Delivery::work_queue;
     case wire::MessageKind::status:          // robot, worker -> server
     case wire::MessageKind::submap_request:  // worker -> server
     case wire::MessageKind::submap_copy:     // server -> one worker
       return Delivery::best_effort;
-    case wire::MessageKind::submap:    // robot -> server
-    case wire::MessageKind::verdicts:  // worker -> server
-    case wire::MessageKind::word:      // viewer -> server
-    case wire::MessageKind::verdict:   // these four are stored, not sent
+    case wire::MessageKind::submap:      // robot -> server
+    case wire::MessageKind::verdicts:    // worker -> server
+    case wire::MessageKind::refinement:  // worker -> server
+    case wire::MessageKind::word:        // viewer -> server
+    case wire::MessageKind::verdict:     // these four are stored, not sent
     case wire::MessageKind::cloud:
     case wire::MessageKind::agent_state:
     case wire::MessageKind::tracked_images:

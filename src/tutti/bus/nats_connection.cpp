@@ -147,7 +147,8 @@ Status NatsConnection::prepare(const NatsPortOptions& options) const {
   const auto most = static_cast<std::int64_t>(options.max_stream_bytes);
   const std::array<std::vector<std::string>, 3> subjects{
       {{fmt::format("mission.{}.robot.*.submap", mission)},
-       {fmt::format("mission.{}.worker.*.verdicts", mission), fmt::format("mission.{}.viewer.*.word", mission)},
+       {fmt::format("mission.{}.worker.*.verdicts", mission), fmt::format("mission.{}.worker.*.refinement", mission),
+        fmt::format("mission.{}.viewer.*.word", mission)},
        {fmt::format("mission.{}.jobs.loop", mission)}}};
   const std::array names{submap_stream(mission), verdict_stream(mission), job_stream(mission)};
   for (std::size_t i = 0; i < names.size(); ++i) {

@@ -215,7 +215,8 @@ void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
   if (done) {
     const std::scoped_lock guard(mutex_);
     if (stream == submap_stream(options_.mission)) inbox_.forget_stream(MessageKind::submap);
-    if (stream == verdict_stream(options_.mission)) inbox_.forget_stream(MessageKind::verdicts);
+    if (stream == verdict_stream(options_.mission))
+      for (const MessageKind kind : {MessageKind::verdicts, MessageKind::refinement}) inbox_.forget_stream(kind);
   }
   if (done) done = connection.prepare(options_);
   if (!done) return note(done.error().message);  // and again

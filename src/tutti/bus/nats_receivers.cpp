@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/jetstream_port.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
 
@@ -151,7 +152,7 @@ void JetStreamPort::put_returned(natsMsg* message) {
   const auto part = part_of(id == nullptr ? "" : id);
   const std::scoped_lock guard(mutex_);
   ++jobs_removed_;
-  if (part) inbox_.put_returned(part->id, std::string(bytes_of(message)));
+  if (part) inbox_.put_returned(part->kind, part->id, std::string(bytes_of(message)));
 }
 
 void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) {
@@ -161,7 +162,7 @@ void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) 
   const auto address = address_of(natsMsg_GetSubject(message));
   const bool job = self_.role == Endpoint::Role::worker;
   const std::string reply = natsMsg_GetReply(message);
-  bool ours = part && (job ? part->kind == MessageKind::job : address && address->kind == part->kind);
+  bool ours = part && (job ? delivery_of(part->kind) == Delivery::work_queue : address && address->kind == part->kind);
   std::unique_lock guard(mutex_);
   if (ours) ours = inbox_.add_part(job ? Endpoint::server() : address->end, *part, bytes_of(message), reply);
   if (ours) return;

@@ -117,7 +117,8 @@ class PortConformance : public ::testing::TestWithParam<Implementation> {
     send(robot, alpha, server, MessageKind::submap, id, "submap " + id);
   }
   void send_job(Port& port, const std::string& id) {
-    send(port, server, Endpoint::any_worker(), MessageKind::job, id, "job " + id);
+    const MessageKind kind = id == "b" ? MessageKind::refinement_job : MessageKind::job;  // of one queue
+    send(port, server, Endpoint::any_worker(), kind, id, "job " + id);
   }
   std::vector<Received> receive(Port& port) {
     network->settle();

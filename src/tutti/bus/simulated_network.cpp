@@ -9,11 +9,9 @@
 namespace tutti::bus {
 namespace {
 
+bool is_job(MessageKind kind) { return delivery_of(kind) == Delivery::work_queue; }
 /// Comes again until it is acknowledged.
-bool is_owed(MessageKind kind) {
-  const Delivery delivery = delivery_of(kind);
-  return delivery == Delivery::durable || delivery == Delivery::work_queue;
-}
+bool is_owed(MessageKind kind) { return is_job(kind) || delivery_of(kind) == Delivery::durable; }
 
 }  // namespace
 
@@ -89,10 +87,10 @@ void SimulatedNetwork::arrive(Envelope envelope) {
 
 std::vector<Received> SimulatedNetwork::receive(Endpoint endpoint) {
   std::vector<Received> received;
-  bool takes_job = endpoint.role == Endpoint::Role::worker && std::ranges::none_of(messages_, [&](const auto& entry) {
-                     return entry.second.given && entry.second.envelope.to == endpoint &&
-                            entry.second.envelope.kind == MessageKind::job;
-                   });
+  bool takes_job =
+      endpoint.role == Endpoint::Role::worker && std::ranges::none_of(messages_, [&](const auto& entry) {
+        return entry.second.given && entry.second.envelope.to == endpoint && is_job(entry.second.envelope.kind);
+      });
   for (auto entry = messages_.begin(); entry != messages_.end();) {
     auto& [ticket, message] = *entry;
     const bool is_own = message.envelope.to == endpoint;
@@ -121,7 +119,7 @@ void SimulatedNetwork::disconnect(Endpoint endpoint) {
   for (auto& [ticket, message] : messages_) {
     if (message.envelope.to != endpoint) continue;
     message.given = false;
-    if (message.envelope.kind == MessageKind::job) message.envelope.to = Endpoint::any_worker();
+    if (is_job(message.envelope.kind)) message.envelope.to = Endpoint::any_worker();
   }
 }
 

@@ -71,6 +71,9 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   auto settings = node::read_settings(map);
   if (!settings) return tl::unexpected(settings.error());
   content.settings = std::move(*settings);
+  auto refinements = node::read_refinements(map);
+  if (!refinements) return tl::unexpected(refinements.error());
+  content.refinements = std::move(*refinements);
   auto names = node::read_robot_names(map);
   if (!names) return tl::unexpected(names.error());
   content.names = std::move(*names);
@@ -98,7 +101,8 @@ Result<Content> read(const storage::TableStore& map) {
 }
 
 server::MapEstimate estimate(const Content& content) {
-  return server::estimate_map(content.submaps, content.verdicts, content.settings.map, content.words);
+  return server::refined(server::estimate_map(content.submaps, content.verdicts, content.settings.map, content.words),
+                         content.refinements);
 }
 
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {

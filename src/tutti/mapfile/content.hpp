@@ -23,6 +23,7 @@ struct Content {
   std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of submaps that carry any.
   server::VerdictSet verdicts;                    ///< With their evidence.
   WordSet words;
+  server::Refinements refinements;
   std::map<RobotId, std::string> names;
   std::map<std::uint32_t, std::size_t> refused;  ///< Pairs that were refused, by the version of their finder.
   struct Table {
@@ -37,7 +38,7 @@ struct Content {
 
 Result<Content> read(const storage::TableStore& map);
 
-/// The joint map, judged as the server judges it.
+/// The joint map, judged as the server judges it, and refined as it has it.
 server::MapEstimate estimate(const Content& content);
 
 /// A map's file, which must be there. An error: it is open in another program, or no map.

@@ -1,63 +1,56 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/bundle_refiner.hpp"
 
-#include <algorithm>
-#include <set>
 #include <utility>
+#include <vector>
 
 namespace tutti::mission {
 namespace {
 
-using server::JudgedClosure;
-
-/// Pairs of submaps of which the map has accepted a closure.
-std::vector<SubmapPair> accepted_pairs(const server::MapToRefine& map) {
-  std::set<std::pair<KeyframeId, KeyframeId>> accepted;
-  for (const JudgedClosure& judged : map.estimate.closures)
-    if (judged.accepted) accepted.insert({judged.closure.from, judged.closure.to});
-  std::vector<SubmapPair> out;
-  for (const auto& [pair, verdict] : map.verdicts)
-    if (std::ranges::any_of(verdict.closures, [&](const LoopClosure& c) { return accepted.contains({c.from, c.to}); }))
-      out.push_back(pair);
-  return out;
-}
-
-}  // namespace
-
-/// Submaps whose keyframes the map all has, with what their cameras saw.
-Result<std::vector<bundle::PosedSubmap>> BundleRefiner::posed(const server::MapToRefine& map) const {
+/// The job's submaps where it has them, with what their cameras saw.
+Result<std::vector<bundle::PosedSubmap>> posed(const RefinementJob& job, const server::SubmapSet& submaps,
+                                               const server::PayloadStore& payloads) {
   std::vector<bundle::PosedSubmap> out;
-  for (const auto& [id, size] : map.payload_sizes) {
-    if (size.observations == 0) continue;
-    auto payload = map.payloads.visual(id);
+  for (const auto& [id, is_free, T_world_body] : job.parts) {
+    const auto there = submaps.find(id);
+    if (there == submaps.end()) return fail(ErrorCode::io, "submap {} is not there", to_string(id));
+    auto payload = payloads.visual(id);
     if (!payload) return tl::unexpected(payload.error());
-    auto submap = std::make_shared<Submap>(*map.submaps.at(id));
+    auto submap = std::make_shared<Submap>(*there->second);
     submap->visual = std::move(*payload);
-    bundle::PosedSubmap at{.submap = nullptr, .T_world_body = {}};
-    for (const Keyframe& keyframe : submap->keyframes) {
-      const KeyframeId node{id.chain, keyframe.index};
-      const auto found = std::ranges::lower_bound(map.estimate.nodes, node, {}, &server::MapNode::id);
-      if (found == map.estimate.nodes.end() || found->id != node) break;  // of a submap that was left out
-      at.T_world_body.push_back(found->T_world_body);
-    }
-    if (at.T_world_body.size() != submap->keyframes.size()) continue;
-    at.submap = std::move(submap);
-    out.push_back(std::move(at));
+    out.push_back({std::move(submap), T_world_body, !is_free});
   }
   return out;
 }
 
-Result<server::Refinement> BundleRefiner::refine(const server::MapToRefine& map) const {
-  auto submaps = posed(map);
-  if (!submaps) return tl::unexpected(submaps.error());
-  server::Refinement out;
-  if (submaps->empty()) return out;
-  const auto refined =
-      bundle::refine_map({.submaps = std::move(*submaps), .closed = accepted_pairs(map), .matches = {}}, config_);
+RefinementCounts counts_of(const bundle::Refinement& refined) {
+  const bundle::MergeSummary& merge = refined.merge;
+  return {.keyframes = refined.keyframes.size(),
+          .landmarks = merge.landmarks_out,
+          .observations = merge.views_out,
+          .joined_by_keyframe = merge.neighbour_joins,
+          .joined_by_closure = merge.closure_joins,
+          .two_positions = merge.two_positions,
+          .two_things = merge.two_things,
+          .views_contradicting = merge.views_contradicting,
+          .landmarks_uncertain = merge.landmarks_uncertain,
+          .rms_before_px = refined.rms_before_px,
+          .rms_after_px = refined.rms_after_px};
+}
+
+}  // namespace
+
+Result<Refinement> BundleRefiner::refine(const RefinementJob& job, const server::SubmapSet& submaps,
+                                         const server::PayloadStore& payloads) const {
+  auto parts = posed(job, submaps, payloads);
+  if (!parts) return tl::unexpected(parts.error());
+  const auto refined = bundle::refine_map({.submaps = std::move(*parts), .closed = job.closed, .matches = {}}, config_);
   if (!refined) return tl::unexpected(refined.error());
+  Refinement out = answer_to(job);
   for (const bundle::RelativeFactor& factor : refined->factors) out.steps.push_back({factor.from, factor.measurement});
   for (const bundle::BundleKeyframe& keyframe : refined->keyframes)
     out.T_world_body.emplace(keyframe.id, keyframe.T_world_body);
+  out.counts = counts_of(*refined);
   return out;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/mission/mission_config.hpp"
@@ -10,16 +9,16 @@
 
 namespace tutti::mission {
 
-/// Bundle adjustment over all that cameras saw of a map: the landmarks of its submaps, joined where neighbours share a
+/// Bundle adjustment over all that cameras saw of a job's submaps: their landmarks, joined where neighbours share a
 /// keyframe and where an accepted visual closure found them to be the same.
 class BundleRefiner final : public server::MapRefiner {
  public:
   explicit BundleRefiner(const bundle::RefinementConfig& config) : config_(config) {}
-  [[nodiscard]] Result<server::Refinement> refine(const server::MapToRefine& map) const override;
+  [[nodiscard]] bool can_refine(const PayloadSize& size) const override { return size.observations > 0; }
+  [[nodiscard]] Result<Refinement> refine(const RefinementJob& job, const server::SubmapSet& submaps,
+                                          const server::PayloadStore& payloads) const override;
 
  private:
-  [[nodiscard]] Result<std::vector<bundle::PosedSubmap>> posed(const server::MapToRefine& map) const;
-
   bundle::RefinementConfig config_;
 };
 

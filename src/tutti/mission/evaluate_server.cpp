@@ -157,6 +157,8 @@ void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapS
   std::vector<const MissionRecording*> recordings;
   for (const RobotOutcome& robot : robots) recordings.push_back(robot.recording);
   record.server.closure_check = check_closures(server.map(), recordings, association, check);
+  for (const auto& [revision, refinement] : server.state().refinements.all())
+    if (refinement->whole) record.server.refinement = refinement->counts;
   record.server.graph = server.map().graph;
   for (const server::MapNode& node : server.map().nodes) record.server.nodes.push_back({node.id, node.stamp});
   relate_robots(robots, server.map(), components.of_robot, record);

@@ -12,6 +12,7 @@ void MissionEvents::take(const node::Event& event) {
   if (const auto* failed = std::get_if<node::VerificationFailed>(&event.what);
       failed != nullptr && failed_.insert(failed->pair).second)
     refusals_.push_back(failed->why);
+  if (const auto* failed = std::get_if<node::RefinementFailed>(&event.what)) refusals_.push_back(failed->why);
   if (const auto* update = std::get_if<node::MapUpdated>(&event.what))
     updates_.push_back({static_cast<double>(event.time.ns) / 1e9, update->accepted, std::nullopt});
 }

@@ -19,6 +19,7 @@
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/recording.hpp"
+#include "tutti/model/refinement.hpp"
 #include "tutti/model/refusal.hpp"
 #include "tutti/model/trajectory.hpp"
 
@@ -214,6 +215,8 @@ struct ServerRecord {
   std::optional<evaluation::CloudDistance> map_error;  ///< The joint map against the survey, same robots and alignment.
   std::optional<double> survey_covered;  ///< Share of the survey's points with a point of the joint map within 0.3 m.
   std::vector<FailedOdometryRecord> failed_odometry;
+  /// What bundle adjustment of the final map made of what the cameras saw; nothing without any.
+  std::optional<RefinementCounts> refinement;
   std::vector<NodeRecord> nodes;    ///< One per pose of `graph`, sorted by (robot, index).
   PoseGraph graph;                  ///< T_world_body.
   ProxyGraph proxy;                 ///< The last broadcast.
@@ -254,7 +257,16 @@ struct ServerLoadRecord {
   /// One per submap: from its arrival to the first broadcast that contains it; mission time spent waiting for the next
   /// update (or for one core to verify its pairs, if that takes longer), plus the computing of that update.
   std::vector<double> update_latency_ms;
-  double peak_memory_mb = 0.0;  ///< Of the whole process: server, robots and simulator.
+  double peak_memory_mb = 0.0;    ///< Of the whole process: server, robots and simulator.
+  double refinement_cpu_s = 0.0;  ///< Bundle adjustment.
+};
+
+/// One refinement of the map.
+struct RefinementTiming {
+  bool whole = false;
+  std::size_t free_submaps = 0;
+  std::size_t submaps = 0;  ///< With those that are held.
+  double cpu_s = 0.0;
 };
 
 /// Everything that depends on the clock of this machine: never mixed with the rest.
@@ -265,6 +277,7 @@ struct TimingRecord {
   std::vector<PolicyTiming> policies;
   std::vector<double> server_verification_ms;  ///< One per candidate pair.
   std::vector<double> server_optimisation_ms;
+  std::vector<RefinementTiming> server_refinements;
   ServerLoadRecord server_load;
   std::vector<LoadRecord> load;
 };

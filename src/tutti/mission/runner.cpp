@@ -63,14 +63,14 @@ class MissionRun {
         survey_(std::move(input.survey)),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                      : std::max(1U, std::thread::hardware_concurrency())),
-        meter_(make_closure_finder(config.closures, recordings_, options.seed)),
+        meter_(make_closure_finder(config.closures, recordings_, options.seed), make_refiner(config)),
         network_(radio(), kMissionStart),
         store_(storage::map_schema()),
         server_(node::ServerNode::open(robot_ids(recordings_), meter_.finder(),
                                        {.server = config.server,
                                         .pairs_per_job = wire::kMaxPairs,
                                         .job_timeout_s = 0.0,
-                                        .refiner = make_refiner(config)},
+                                        .refiner = meter_.refiner()},
                                        kEpoch, store_)
                     .value()),
         worker_(kWorker, meter_.finder(), node::SubmapFrames::of(store_),
@@ -78,6 +78,7 @@ class MissionRun {
         server_port_(network_.connect(bus::Endpoint::server())),
         worker_port_(network_.connect(kWorker)),
         pace_(options.rate) {
+    worker_.refine_with(meter_.refiner());
     std::vector<std::string> policies = config.compare_policies;
     if (std::find(policies.begin(), policies.end(), config.agent.policy.name) == policies.end())
       policies.insert(policies.begin(), config.agent.policy.name);
@@ -103,7 +104,10 @@ class MissionRun {
           carry_out(*robot.port, robot.actor->take_step());
         }
       const double delivery_s = next_delivery(), timer_s = next_timer();
-      if (sample_s == kNever && delivery_s > duration_s_ + kPatience_s && timer_s == kNever) break;
+      if (sample_s == kNever && delivery_s > duration_s_ + kPatience_s && timer_s == kNever) {
+        if (!deliver()) break;  // or a worker was asked last
+        continue;
+      }
       time_s_ = std::min({sample_s, delivery_s, timer_s});
       pace_.wait_until(time_s_);
       deliver();
@@ -182,8 +186,10 @@ class MissionRun {
   }
 
   /// All that is there at this moment, and what that makes others send: between server and worker it takes no time.
-  void deliver() {
-    for (bool moved = true; moved;) {
+  /// False: there was nothing.
+  bool deliver() {
+    bool any = false;
+    for (bool moved = true; moved; any = any || moved) {
       network_.advance(now());
       moved = hear(*server_port_, [&](const bus::Envelope& message) {
         return meter_.serve(time_s_, [&] { return server_->receive(message, now()); });
@@ -202,6 +208,7 @@ class MissionRun {
                      }) ||
                 moved;
     }
+    return any;
   }
   template <class Node>
   bool hear(bus::Port& port, Node&& node) {

@@ -21,6 +21,27 @@ Result<ClosureVerdict> MeasuredFinder::verify(const Submap& first, const Submap&
   return verdict;
 }
 
+Result<Refinement> MeasuredRefiner::refine(const RefinementJob& job, const server::SubmapSet& submaps,
+                                           const server::PayloadStore& payloads) const {
+  RefinementTiming timing{.whole = job.whole};
+  const auto is_free = [](const RefinementJob::Part& part) { return part.is_free; };
+  timing.free_submaps = static_cast<std::size_t>(std::ranges::count_if(job.parts, is_free));
+  timing.submaps = job.parts.size();
+  auto refinement = [&] {
+    const CpuScope cpu(timing.cpu_s);
+    return refiner_->refine(job, submaps, payloads);
+  }();
+  took_.push_back(timing);
+  return refinement;
+}
+
+double ServerMeter::refinement_cpu_s() const {
+  double sum = 0.0;
+  if (refiner_)
+    for (const RefinementTiming& timing : refiner_->took()) sum += timing.cpu_s;
+  return sum;
+}
+
 void ServerMeter::note_submap(double time_s, const node::Step& step) {
   if (std::ranges::none_of(
           step.events, [](const node::Event& event) { return std::holds_alternative<node::SubmapStored>(event.what); }))
@@ -47,11 +68,13 @@ void ServerMeter::note_update(double time_s, double took_ms) {
 void ServerMeter::record(double mission_s, TimingRecord& timing) const {
   timing.server_verification_ms = finder_->took_ms();
   timing.server_optimisation_ms = optimisation_ms_;
+  if (refiner_) timing.server_refinements = refiner_->took();
   timing.server_load = {.mission_s = mission_s,
                         .map_cpu_s = map_cpu_s_,
                         .verification_cpu_s = finder_->cpu_s(),
                         .update_latency_ms = update_latency_ms_,
-                        .peak_memory_mb = peak_memory_mb()};
+                        .peak_memory_mb = peak_memory_mb(),
+                        .refinement_cpu_s = refinement_cpu_s()};
 }
 
 }  // namespace tutti::mission

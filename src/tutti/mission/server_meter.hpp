@@ -12,6 +12,7 @@
 #include "tutti/mission/record.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/server/closure_finder.hpp"
+#include "tutti/server/map_refiner.hpp"
 
 namespace tutti::mission {
 
@@ -39,13 +40,32 @@ class MeasuredFinder final : public server::ClosureFinder {
   mutable double cpu_s_ = 0.0;
 };
 
+/// Another refiner, and how long it takes for each job.
+class MeasuredRefiner final : public server::MapRefiner {
+ public:
+  explicit MeasuredRefiner(std::shared_ptr<const server::MapRefiner> refiner) : refiner_(std::move(refiner)) {}
+  [[nodiscard]] bool can_refine(const PayloadSize& size) const override { return refiner_->can_refine(size); }
+  [[nodiscard]] Result<Refinement> refine(const RefinementJob& job, const server::SubmapSet& submaps,
+                                          const server::PayloadStore& payloads) const override;
+
+  [[nodiscard]] const std::vector<RefinementTiming>& took() const { return took_; }  ///< Not while it refines.
+
+ private:
+  std::shared_ptr<const server::MapRefiner> refiner_;
+  mutable std::vector<RefinementTiming> took_;  // one job at a time
+};
+
 /// What server and workers take of the machine they run on: beside the nodes, which know no clock.
 class ServerMeter {
  public:
-  explicit ServerMeter(std::shared_ptr<const server::ClosureFinder> finder)
-      : finder_(std::make_shared<MeasuredFinder>(std::move(finder))) {}
+  /// No refiner: null.
+  explicit ServerMeter(std::shared_ptr<const server::ClosureFinder> finder,
+                       std::shared_ptr<const server::MapRefiner> refiner = nullptr)
+      : finder_(std::make_shared<MeasuredFinder>(std::move(finder))),
+        refiner_(refiner ? std::make_shared<MeasuredRefiner>(std::move(refiner)) : nullptr) {}
   /// To be used by server and workers.
   [[nodiscard]] std::shared_ptr<const server::ClosureFinder> finder() const { return finder_; }
+  [[nodiscard]] std::shared_ptr<const server::MapRefiner> refiner() const { return refiner_; }
 
   /// Calls `step` of the server, which may store a submap, and returns what it makes.
   template <class F>
@@ -73,7 +93,7 @@ class ServerMeter {
     return made;
   }
 
-  [[nodiscard]] double cpu_s() const { return map_cpu_s_ + finder_->cpu_s(); }
+  [[nodiscard]] double cpu_s() const { return map_cpu_s_ + finder_->cpu_s() + refinement_cpu_s(); }
   void record(double mission_s, TimingRecord& timing) const;
 
  private:
@@ -81,11 +101,13 @@ class ServerMeter {
     double arrived_s = 0.0;
     double verification_cpu_s = 0.0;
   };
+  [[nodiscard]] double refinement_cpu_s() const;
   void note_submap(double time_s, const node::Step& step);
   void note_job(const std::string& job, double cpu_s);
   void note_update(double time_s, double took_ms);
 
   std::shared_ptr<MeasuredFinder> finder_;
+  std::shared_ptr<MeasuredRefiner> refiner_;
   double map_cpu_s_ = 0.0;
   std::vector<Unanswered> unanswered_;         // submaps that no broadcast contains yet
   std::map<std::string, std::size_t> of_job_;  // which of them it verifies

@@ -33,6 +33,17 @@ struct VerificationFailed {  ///< The pair is asked again (ServerNodeConfig::mos
   std::string why;
   bool given_up = false;  ///< No more: it is refused.
 };
+struct RefinementTaken {  ///< By the server.
+  std::string job;
+  std::uint64_t revision = 0;  ///< Of the map that was refined.
+  bool whole = false;
+  std::size_t steps = 0;
+};
+struct RefinementFailed {  ///< It is asked for again (ServerNodeConfig::most_tries).
+  std::uint64_t revision = 0;
+  std::string why;
+  bool given_up = false;  ///< No more, until something new has come; the map stands.
+};
 struct MapUpdated {
   std::uint64_t revision = 0;
   std::size_t submaps = 0;
@@ -72,8 +83,9 @@ struct ImagesRefused {
 
 struct Event {
   Timestamp time;
-  std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, MapUpdated, RobotUpdated, MessageRefused,
-               RobotJoined, RobotRefused, SampleRefused, ScanRefused, ImagesRefused>
+  std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
+               MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, SampleRefused, ScanRefused,
+               ImagesRefused>
       what;
 };
 

@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/map_meta.hpp"
 
+#include <utility>
+
 #include "tutti/base/config_io.hpp"
 #include "tutti/node/robot_registry.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::node {
 namespace {
 
-constexpr const char* kMeta = "meta";
 constexpr const char* kMap = "map";
 constexpr const char* kSettings = "settings";
+constexpr std::string_view kRefinement = "refinement/";
 
 }  // namespace
 
 storage::Write to_row(const MapMeta& meta) {
-  return {kMeta, kMap, storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
+  return {kMetaTable, kMap, storage::key_of({meta.epoch, meta.revision, meta.news ? 1U : 0U, meta.start})};
 }
 
 Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
-  const auto row = map.read(kMeta, kMap);
+  const auto row = map.read(kMetaTable, kMap);
   if (!row) return tl::unexpected(row.error());
   if (!*row) return std::nullopt;
   const auto numbers = storage::numbers_of(**row, 4);
@@ -27,18 +30,31 @@ Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
 }
 
 storage::Write to_row(const server::ServerConfig& settings) {
-  return {kMeta, kSettings, to_yaml(dump_config(settings))};
+  return {kMetaTable, kSettings, to_yaml(dump_config(settings))};
 }
 
 Result<server::ServerConfig> read_settings(const storage::TableStore& map) {
   server::ServerConfig settings;
-  const auto row = map.read(kMeta, kSettings);
+  const auto row = map.read(kMetaTable, kSettings);
   if (!row) return tl::unexpected(row.error());
   if (!*row) return settings;
   const auto node = parse_yaml(**row, "the map's settings");
   if (!node) return tl::unexpected(node.error());
   if (auto ok = load_config(*node, settings, "the map's settings"); !ok) return tl::unexpected(ok.error());
   return settings;
+}
+
+std::string refinement_key(std::uint64_t revision) { return fmt::format("{}{:020}", kRefinement, revision); }
+
+Result<server::Refinements> read_refinements(const storage::TableStore& map) {
+  server::Refinements refinements;
+  const auto scanned = map.scan(kMetaTable, kRefinement, [&](std::string_view key, std::string_view bytes) {
+    if (!key.starts_with(kRefinement)) return false;
+    if (auto refinement = wire::decode_refinement(bytes)) refinements.add(std::move(*refinement));
+    return true;
+  });
+  if (!scanned) return tl::unexpected(scanned.error());
+  return refinements;
 }
 
 std::string encode(const RobotRow& row) {
@@ -66,7 +82,7 @@ std::optional<RobotRow> decode_robot(std::string_view bytes) {
 
 Result<std::map<RobotId, std::string>> read_robot_names(const storage::TableStore& map) {
   std::map<RobotId, std::string> names;
-  const auto scanned = map.scan(kMeta, {}, [&](std::string_view key, std::string_view bytes) {
+  const auto scanned = map.scan(kMetaTable, {}, [&](std::string_view key, std::string_view bytes) {
     const auto robot = RobotRegistry::robot_of(key);
     const auto row = robot ? decode_robot(bytes) : std::nullopt;
     if (row) names[*robot] = row->name;

@@ -14,6 +14,8 @@
 /// The rows of a map's table `meta`.
 namespace tutti::node {
 
+inline constexpr const char* kMetaTable = "meta";
+
 /// The row `map`: what the server itself was about.
 struct MapMeta {
   std::uint64_t epoch = 0;
@@ -29,6 +31,11 @@ Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map);
 storage::Write to_row(const server::ServerConfig& settings);
 /// The defaults where there is none. An error: it is of another program's version, or damaged.
 Result<server::ServerConfig> read_settings(const storage::TableStore& map);
+
+/// Rows `refinement/REVISION`: the refinements that hold, as they came. One that cannot be read is none: it is made
+/// again.
+std::string refinement_key(std::uint64_t revision);
+Result<server::Refinements> read_refinements(const storage::TableStore& map);
 
 /// A row `robot/NUMBER` (RobotRegistry::key()): a robot's name, and the sessions that go by it. 8 bytes each: its
 /// session, how many it had before, how many others were refused, these; then the name.

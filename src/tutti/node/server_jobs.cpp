@@ -68,9 +68,13 @@ void ServerNode::note_failed(const SubmapPair& pair, const std::string& why, Tim
     return give_up(pair, fmt::format("{} tries have failed: {}", failed.times, why), now, refused, step);
   step.tell(now, VerificationFailed{pair, why});
   if (config_.job_timeout_s > 0.0)
-    failed.again = now + kFailedAgain * config_.job_timeout_s * static_cast<double>(1U << (failed.times - 1));
+    failed.again = now + failed_again_after(failed.times);
   else
     give_back(pair);
+}
+
+double ServerNode::failed_again_after(unsigned times) const {
+  return kFailedAgain * config_.job_timeout_s * static_cast<double>(1U << (times - 1));
 }
 
 /// The map goes on without it, and a newer finder asks again.
@@ -117,28 +121,31 @@ void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsign
     for (std::size_t first = 0; first < of_it.size(); first += most_pairs) {
       const std::size_t last = std::min(of_it.size(), first + most_pairs);
       const auto at = [&](std::size_t i) { return of_it.begin() + static_cast<std::ptrdiff_t>(i); };
-      const Job job{.id = fmt::format("{}/{}/{}", server_.state().epoch, start_, jobs_),
-                    .pairs = {at(first), at(last)}};
-      open_jobs_.emplace(jobs_++, OpenJob{job.pairs, now, asked});
+      const Job job{.id = job_name(jobs_), .pairs = {at(first), at(last)}};
+      open_jobs_.emplace(jobs_++, OpenJob{job.pairs, nullptr, now, asked});
       step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::job, job.id,
                                std::make_shared<const std::string>(wire::encode(job))});
     }
 }
 
+std::string ServerNode::job_name(std::uint64_t number) const {
+  return fmt::format("{}/{}/{}", server_.state().epoch, start_, number);
+}
+
 /// The jobs that were sent later have not had their turn, as long as it goes on: a long queue is no reason to ask
 /// again.
-bool ServerNode::close(const std::string& job, Timestamp now) {
+std::optional<ServerNode::OpenJob> ServerNode::close(const std::string& job, Timestamp now) {
   const std::string mine = fmt::format("{}/{}/", server_.state().epoch, start_);
   std::uint64_t number = 0;
-  if (!job.starts_with(mine)) return false;
+  if (!job.starts_with(mine)) return std::nullopt;
   const char* end = job.data() + job.size();
   if (const auto read = std::from_chars(job.data() + mine.size(), end, number);
       read.ec != std::errc() || read.ptr != end)
-    return false;
-  if (number >= jobs_) return false;
-  const bool was_open = open_jobs_.erase(number) > 0;
+    return std::nullopt;
+  if (number >= jobs_) return std::nullopt;
+  auto open = open_jobs_.extract(number);
   for (auto later = open_jobs_.upper_bound(number); later != open_jobs_.end(); ++later) later->second.since = now;
-  return was_open;
+  return open ? std::optional(std::move(open.mapped())) : std::nullopt;
 }
 
 bool ServerNode::give_back(const SubmapPair& pair) {
@@ -161,6 +168,7 @@ std::optional<Timestamp> ServerNode::next_timer() const {
   for (const auto& [number, job] : open_jobs_) consider(due(job));
   for (const auto& [pair, failed] : failed_)
     if (failed.again) consider(*failed.again);
+  if (refine_again_) consider(refine_again_->due);
   return next;
 }
 
@@ -174,6 +182,7 @@ void ServerNode::ask_again(Timestamp now, Step& step) {
       is_due = give_back(pair) || is_due;
     }
   if (is_due) send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
+  refine_again(now, step);
   std::vector<OpenJob> late;
   for (auto job = open_jobs_.begin(); job != open_jobs_.end();) {
     const auto next = std::next(job);
@@ -181,12 +190,16 @@ void ServerNode::ask_again(Timestamp now, Step& step) {
     job = next;
   }
   for (const OpenJob& job : late) {
+    const std::string why = fmt::format("no worker has answered for {:g} s: asked again", now - job.since);
+    if (job.refinement) {
+      ask_for_refinement(*job.refinement, now, job.asked + 1, step);
+      step.tell(now, RefinementFailed{job.refinement->revision, why});
+      continue;
+    }
     const std::size_t before = step.messages.size();
     for (const SubmapPair& pair : job.pairs) give_back(pair);
     send_jobs(std::nullopt, now, job.asked + 1, config_.pairs_per_job, step);
-    if (step.messages.size() > before)
-      step.tell(now, VerificationFailed{job.pairs.front(), fmt::format("no worker has answered for {:g} s: asked again",
-                                                                       now - job.since)});
+    if (step.messages.size() > before) step.tell(now, VerificationFailed{job.pairs.front(), why});
   }
 }
 

@@ -16,7 +16,6 @@
 namespace tutti::node {
 namespace {
 
-constexpr const char* kMeta = "meta";        // with the rows of map_meta.hpp
 constexpr const char* kRefused = "refused";  // and receipts of what is refused for good
 constexpr std::size_t kMostRefusedSessions = 100;
 constexpr std::size_t kMostRefusedStretches = 500;  // in each of these
@@ -89,7 +88,7 @@ Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
     }
     return ok.has_value();
   };
-  if (auto scanned = store.scan(kMeta, {}, visit); !scanned) return scanned;
+  if (auto scanned = store.scan(kMetaTable, {}, visit); !scanned) return scanned;
   return ok;
 }
 
@@ -128,6 +127,9 @@ Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& s
   auto words = read_words(store);
   if (!words) return tl::unexpected(words.error());
   opened.state.words = std::move(*words);
+  auto refinements = read_refinements(store);
+  if (!refinements) return tl::unexpected(refinements.error());
+  opened.state.refinements = std::move(*refinements);
   if (auto ok = read_rows(store, "submaps", wire::decode_submap, add); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_refusals); !ok)
@@ -183,6 +185,7 @@ Step ServerNode::resume(Timestamp now) {
   step.writes.push_back(to_row(config_.server));
   for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
+  send_refinement_job(now, step);
   return step;
 }
 
@@ -193,6 +196,8 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
     receive_submap(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::verdicts)
     receive_verdicts(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::refinement)
+    receive_refinement(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::submap_request)
     send_copies(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::status)
@@ -201,6 +206,8 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
     receive_word(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::job && envelope.from == bus::Endpoint::any_worker())
     receive_returned_job(envelope, now, step);
+  else if (envelope.kind == bus::MessageKind::refinement_job && envelope.from == bus::Endpoint::any_worker())
+    receive_returned_refinement(envelope, now, step);
   else
     refuse(envelope, "not for a server", now, step);
   for (const Error& error : server_.take_late_errors())
@@ -279,7 +286,7 @@ void ServerNode::note_refused(SubmapId id, const std::string& why, Step& step) {
     receipt.refused[id.chain.session].insert(id.index);
     receipt.why_refused = wire::plain_text(why);
     const Receipt kept{.robot = receipt.robot, .refused = receipt.refused, .why_refused = receipt.why_refused};
-    step.writes.push_back({kMeta, fmt::format("{}/{}", kRefused, id.chain.robot.value), wire::encode(kept)});
+    step.writes.push_back({kMetaTable, fmt::format("{}/{}", kRefused, id.chain.robot.value), wire::encode(kept)});
   }
   send_receipt(id.chain.robot, step);
 }
@@ -347,6 +354,7 @@ Step ServerNode::on_timer(Timestamp now) {
   const auto accepted = std::ranges::count_if(server_.map().closures, &server::JudgedClosure::accepted);
   step.tell(now,
             MapUpdated{server_.state().revision, server_.state().submaps.size(), static_cast<std::size_t>(accepted)});
+  send_refinement_job(now, step);
   return step;
 }
 

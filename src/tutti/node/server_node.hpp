@@ -82,21 +82,34 @@ class ServerNode {
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
   Status take_word(const bus::Envelope& envelope, Timestamp now, Step& step);
   [[nodiscard]] server::ClosureNames closure_names() const;
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Takes one verdict of these; a refusal that now holds is kept in `refused`.
   Status take(const ClosureVerdict& verdict, Verdicts& refused, Step& step);
-  /// Pairs that were asked for and have no answer yet.
+  /// What was asked for and has no answer yet: pairs, or a refinement.
   struct OpenJob {
     std::vector<SubmapPair> pairs;
+    std::shared_ptr<const RefinementJob> refinement;
     Timestamp since;     // it was sent, or had its turn at the earliest
     unsigned asked = 0;  // before
   };
   void send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, std::size_t most_pairs, Step& step);
-  /// It need not be asked again. False: it is not open, or of an earlier start.
-  bool close(const std::string& job, Timestamp now);
+  [[nodiscard]] std::string job_name(std::uint64_t number) const;
+  /// It need not be asked again. Nothing: it is not open, or of an earlier start.
+  std::optional<OpenJob> close(const std::string& job, Timestamp now);
+  /// What the last map wants, if anything.
+  void send_refinement_job(Timestamp now, Step& step);
+  void ask_for_refinement(RefinementJob job, Timestamp now, unsigned asked, Step& step);
+  /// It is asked again later, or given up.
+  void note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step);
+  void give_up_refinement(std::uint64_t revision, const std::string& why, Timestamp now, Step& step);
+  void refine_again(Timestamp now, Step& step);
+  /// How long after the so-manieth failure, s.
+  [[nodiscard]] double failed_again_after(unsigned times) const;
   /// No worker could verify it this time: it is asked again later, or refused.
   void note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
   void give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
@@ -128,6 +141,12 @@ class ServerNode {
     std::optional<Timestamp> again;  // when it is to be asked; nothing: it is being asked
   };
   std::map<SubmapPair, Failed> failed_;  // in this start
+  unsigned failed_refinements_ = 0;      // since the last that was taken or given up
+  struct RefineAgain {
+    RefinementJob job;
+    Timestamp due;
+  };
+  std::optional<RefineAgain> refine_again_;
   std::uint64_t changes_ = 0;
   std::uint64_t start_ = 0;  // of all on this store; names jobs
   std::uint64_t jobs_ = 0;   // sent in this start

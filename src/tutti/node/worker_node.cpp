@@ -7,6 +7,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/limits.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
@@ -16,6 +17,16 @@ std::set<SubmapId> submaps_of(const Job& job) {
   std::set<SubmapId> ids;
   for (const auto& [first, second] : job.pairs) ids.insert({first, second});
   return ids;
+}
+
+std::set<SubmapId> submaps_of(const RefinementJob& job) {
+  std::set<SubmapId> ids;
+  for (const RefinementJob::Part& part : job.parts) ids.insert(part.submap);
+  return ids;
+}
+
+std::set<SubmapId> submaps_of(const std::variant<Job, RefinementJob>& job) {
+  return std::visit([](const auto& one) { return submaps_of(one); }, job);
 }
 
 }  // namespace
@@ -49,7 +60,7 @@ Result<ClosureVerdict> WorkerNode::verify(const SubmapPair& pair) const {
 
 Step WorkerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   Step step;
-  if (envelope.kind == bus::MessageKind::job)
+  if (envelope.kind == bus::MessageKind::job || envelope.kind == bus::MessageKind::refinement_job)
     receive_job(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::submap_copy)
     receive_copy(envelope, now, step);
@@ -58,9 +69,14 @@ Step WorkerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   return step;
 }
 
+Result<WorkerNode::AnyJob> WorkerNode::decode(const bus::Envelope& envelope) {
+  if (envelope.kind == bus::MessageKind::job) return wire::decode_job(*envelope.bytes);
+  return wire::decode_refinement_job(*envelope.bytes);
+}
+
 void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
   TUTTI_CHECK(!held_, "a second job");
-  auto job = wire::decode_job(*envelope.bytes);
+  auto job = decode(envelope);
   if (!job) {
     step.tell(now, MessageRefused{envelope.from, envelope.kind, job.error().message});
     return;
@@ -129,6 +145,33 @@ Step WorkerNode::on_timer(Timestamp now) {
   const Held held = *std::exchange(held_, std::nullopt);
   answer(held.job, step);  // without them: those pairs have failed
   return step;
+}
+
+Result<Refinement> WorkerNode::refine(const RefinementJob& job) const {
+  if (!refiner_) return fail(ErrorCode::unsupported, "this worker refines no maps: its mission has no cameras");
+  server::SubmapSet submaps;
+  for (const RefinementJob::Part& part : job.parts) {
+    auto submap = submaps_->submap(part.submap);
+    if (!submap) return tl::unexpected(submap.error());
+    submaps[part.submap] = std::move(*submap);
+  }
+  auto refinement = refiner_->refine(job, submaps, *submaps_);
+  if (!refinement) return refinement;
+  if (auto ok = wire::validate(*refinement); !ok) return tl::unexpected(ok.error());
+  return refinement;
+}
+
+void WorkerNode::answer(const RefinementJob& job, Step& step) const {
+  Result<Refinement> result = answer_to(job);
+  for_each_(1, [&](std::size_t) { result = refine(job); });
+  Refinement answer = result ? std::move(*result) : answer_to(job);
+  if (!result) answer.why = result.error().message.substr(0, wire::kMaxReasonBytes);
+  step.messages.push_back({self_, bus::Endpoint::server(), bus::MessageKind::refinement, job.id,
+                           std::make_shared<const std::string>(wire::encode(answer))});
+}
+
+void WorkerNode::answer(const AnyJob& job, Step& step) const {
+  std::visit([&](const auto& one) { answer(one, step); }, job);
 }
 
 void WorkerNode::answer(const Job& job, Step& step) const {

@@ -69,6 +69,24 @@ Told tell(const node::VerificationFailed& failed) {
                       failed.given_up ? "are given up" : "will be asked again", failed.why),
           Level::warning};
 }
+Told tell(const node::RefinementTaken& taken) {
+  return {{{"event", "refinement_taken"},
+           {"job", taken.job},
+           {"revision", taken.revision},
+           {"whole", taken.whole},
+           {"steps", taken.steps}},
+          fmt::format("{} of map revision {} was refined: {} steps", taken.whole ? "all" : "a part", taken.revision,
+                      taken.steps)};
+}
+Told tell(const node::RefinementFailed& failed) {
+  return {{{"event", "refinement_failed"},
+           {"revision", failed.revision},
+           {"why", failed.why},
+           {"given_up", failed.given_up}},
+          fmt::format("map revision {} could not be refined, which {}: {}", failed.revision,
+                      failed.given_up ? "is given up" : "will be tried again", failed.why),
+          Level::warning};
+}
 Told tell(const node::MapUpdated& map) {
   return {{{"event", "map_updated"}, {"revision", map.revision}, {"submaps", map.submaps}, {"accepted", map.accepted}},
           fmt::format("map revision {}: {} submaps, {} closures", map.revision, map.submaps, map.accepted)};

@@ -77,14 +77,17 @@ Json HostedServer::status(Timestamp now) const {
 class OwnWorker {
  public:
   OwnWorker(const bus::NatsPortOptions& where, std::shared_ptr<const server::ClosureFinder> finder,
-            const storage::TableStore& map, const std::string& version, std::size_t threads, const Clock& clock,
-            EventLog& log)
+            std::shared_ptr<const server::MapRefiner> refiner, const storage::TableStore& map,
+            const std::string& version, std::size_t threads, const Clock& clock, EventLog& log)
       : host_(
             {.store = nullptr,
              .open_port = [where]() -> Result<std::unique_ptr<bus::Port>> { return bus::open_nats_port(kSelf, where); },
-             .open_node = [this, finder, version, threads, &map](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
+             .open_node = [this, finder, refiner, version, threads,
+                           &map](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
                const auto make = [&](node::WorkerNode::ForEach for_each) {
-                 return node::WorkerNode(kSelf, finder, node::SubmapFrames::of(map), std::move(for_each));
+                 node::WorkerNode node(kSelf, finder, node::SubmapFrames::of(map), std::move(for_each));
+                 node.refine_with(refiner);
+                 return node;
                };
                return std::make_unique<HostedWorker>(kSelf, version, make, threads, port, stop_);
              },
@@ -234,7 +237,8 @@ Status ServerProgram::start() {
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
   if (options_.threads == 0) return {};
-  worker_.emplace(bus_, finder_, *store_, options_.version, static_cast<std::size_t>(options_.threads), *clock_, *log_);
+  worker_.emplace(bus_, finder_, mission::make_refiner(config_), *store_, options_.version,
+                  static_cast<std::size_t>(options_.threads), *clock_, *log_);
   return worker_->start();
 }
 

@@ -12,7 +12,9 @@
 #include <utility>
 
 #include "tutti/base/random.hpp"
+#include "tutti/bus/delivery.hpp"
 #include "tutti/bus/nats_port.hpp"
+#include "tutti/mission/bundle_refiner.hpp"
 #include "tutti/mission/parallel.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/stop.hpp"
@@ -72,7 +74,7 @@ Answer HostedWorker::carry_on(F&& step) {
 }
 
 Answer HostedWorker::receive(const bus::Received& message, Timestamp now) {
-  if (message.envelope.kind == bus::MessageKind::job) job_ = message.ticket;
+  if (bus::delivery_of(message.envelope.kind) == bus::Delivery::work_queue) job_ = message.ticket;
   return carry_on([&] { return node_.receive(message.envelope, now); });
 }
 
@@ -103,7 +105,9 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
                                                   : std::max(1U, std::thread::hardware_concurrency());
   const auto cache = std::make_shared<node::FrameCache>(kCacheBytes);
   const auto make = [&](node::WorkerNode::ForEach for_each) {
-    return node::WorkerNode(self, *finder, cache, std::move(for_each));
+    node::WorkerNode node(self, *finder, cache, std::move(for_each));
+    node.refine_with(mission::make_refiner(*config));
+    return node;
   };
   const Clock clock;
   Host host({.store = nullptr,

@@ -154,7 +154,7 @@ Status MapServer::receive(const SubmapMessage& message) {
   judge_waiting();
   for (const auto& [other, there] : state_.submaps)
     if (other != id) plan_verification(ordered(id, other));
-  news_ = true;
+  note_news();
   return {};
 }
 
@@ -267,7 +267,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
   const bool is_kept = kept != state_.verdicts.end();
   if (known > verdict.finder_version) return;
   if (known == verdict.finder_version && !(is_kept && holds_over(verdict, kept->second))) return;
-  if (!verdict.closures.empty() || (is_kept && !kept->second.closures.empty())) news_ = true;
+  if (!verdict.closures.empty() || (is_kept && !kept->second.closures.empty())) note_news();
   if (verdict.finder_version >= finder_->version()) state_.answered.insert(pair);
   if (verdict.refusal && verdict.finder_version == state_.finder_version) {
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state_.refused);
@@ -295,7 +295,7 @@ Status MapServer::receive(const SubmapPair& pair, const ClosureWord& word) {
   const bool changes = known == state_.words.end() ? word.wish != Wish::withdraw : known->second.wish != word.wish;
   state_.words.insert_or_assign(pair, word);
   if (was_accepted && word.wish != Wish::accept) plan_verification(pair);  // newer finders were not asked
-  if (changes && has_closures) news_ = true;
+  if (changes && has_closures) note_news();
   return {};
 }
 
@@ -311,21 +311,45 @@ ProxyGraphMessage MapServer::optimise() {
   return rebuild();
 }
 
-void MapServer::refine() {
-  if (refiner_ == nullptr || config_.refine_every == 0) return;
-  if (refinement_.steps.empty() || state_.revision % static_cast<std::uint64_t>(config_.refine_every) == 0) {
-    if (auto made = refiner_->refine({map_, state_.submaps, state_.payload_sizes, state_.verdicts, *payloads_}))
-      refinement_ = std::move(*made);
-    else
-      late_errors_.push_back(std::move(made.error()));
+void MapServer::note_news() {
+  news_ = true;
+  estimate_.reset();
+}
+
+Status MapServer::receive(const Refinement& refinement) {
+  const auto where = [&] { return fmt::format("refinement of revision {}", refinement.revision); };
+  if (refinement.revision > state_.revision)
+    return fail(ErrorCode::invalid, "{}: expected one of at most {}", where(), state_.revision);
+  if (!refinement.why.empty()) return fail(ErrorCode::invalid, "{}: {}", where(), refinement.why);
+  for (const auto& [from, step] : refinement.steps) {
+    if (!is_valid(step.T_a_b)) return fail(ErrorCode::invalid, "{}: a step is no pose", where());
+    if (auto ok = check_covariance(step.covariance); !ok) return in_context(where(), ok.error());
   }
-  map_ = refined(map_, refinement_);
+  for (const auto& [id, T_world_body] : refinement.T_world_body)
+    if (!is_valid(T_world_body))
+      return fail(ErrorCode::invalid, "{}: keyframe {} has no valid pose", where(), id.index);
+  if (refining_ == refinement.revision) refining_.reset();
+  if (state_.refinements.add(refinement)) news_ = true;
+  return {};
+}
+
+void MapServer::plan_refinement() {
+  if (refiner_ == nullptr || config_.refine_every == 0 || refining_) return;
+  RefinementScope scope = refinable(*estimate_, state_.submaps, state_.payload_sizes, state_.verdicts, *refiner_);
+  if (asked_ && asked_->whole && asked_->scope == scope) return;
+  refinement_job_ = server::plan_refinement(scope, state_.refinements, *estimate_, map_, state_.submaps,
+                                            static_cast<std::size_t>(config_.refine_every), state_.revision);
+  if (!refinement_job_) return;
+  refining_ = state_.revision;
+  asked_ = Asked{std::move(scope), refinement_job_->whole};
 }
 
 ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
-  map_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
-  refine();
+  if (!estimate_) estimate_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
+  map_ = refined(*estimate_, state_.refinements);
+  plan_refinement();
+  if (refiner_ == nullptr) estimate_.reset();  // nobody asks for it
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
                             .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};
   message.graph.epoch = state_.epoch;

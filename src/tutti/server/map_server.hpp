@@ -17,8 +17,8 @@
 #include "tutti/server/answered_pairs.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/server/map_estimate.hpp"
-#include "tutti/server/map_refiner.hpp"
 #include "tutti/server/payload_store.hpp"
+#include "tutti/server/refinements.hpp"
 #include "tutti/server/refusal_counts.hpp"
 
 namespace tutti::server {
@@ -33,9 +33,10 @@ struct ServerConfig {
   void describe(V& v) {
     v.field("map", map);
     v.field("proxy_graph", proxy_graph);
-    v.field("refine_every", refine_every, at_least(0),
-            "Every how many updates bundle adjustment goes over the whole map, where cameras saw it; the updates "
-            "between keep what it found of the older part. 0: never.");
+    v.field(
+        "refine_every", refine_every, at_least(0),
+        "Every which bundle adjustment goes over the whole map, where cameras saw it; those between over what is new, "
+        "and the whole follows when nothing more comes. 0: none at all.");
     v.field("update_period_s", update_period_s, greater_than(0.0),
             "Mission time between two optimisations when there is something new.");
     v.field("broadcast", broadcast, one_of({"own", "all"}),
@@ -61,9 +62,10 @@ struct MapServerState {
   /// `finder_version`. Refusals by other versions, which are few, stand here too.
   VerdictSet verdicts;
   std::uint32_t finder_version = 0;
-  WordSet words;            ///< Of operators.
-  AnsweredPairs answered;   ///< By a finder at least as new as the server's, or not to be asked.
-  RefusalCounts refused;    ///< By `finder_version`.
+  WordSet words;           ///< Of operators.
+  AnsweredPairs answered;  ///< By a finder at least as new as the server's, or not to be asked.
+  RefusalCounts refused;   ///< By `finder_version`.
+  Refinements refinements;
   std::uint64_t epoch = 0;  ///< Of the server that this is the state of.
   std::uint64_t revision = 0;
 };
@@ -82,7 +84,7 @@ class MapServer {
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
             MapServerState state);
 
-  /// Maps are refined by this from now on (ServerConfig::refine_every); not null.
+  /// Asks for refinements that this can make, from now on (ServerConfig::refine_every); not null.
   void refine_with(std::shared_ptr<const MapRefiner> refiner) { refiner_ = std::move(refiner); }
 
   /// One more that submaps may come from. Each has the less room for sessions, the more there are.
@@ -104,13 +106,21 @@ class MapServer {
   /// error, and nothing changes: its submaps are not there, or there are no closures to accept. Of two words on one
   /// pair the later one holds. A verdict whose closures are accepted stays as it is, whatever newer finders say.
   Status receive(const SubmapPair& pair, const ClosureWord& word);
-  /// Why verdicts that had waited were no good when their submaps came, or a map could not be refined, since the last
-  /// call.
+  /// The answer to a refinement job, in any order, any number of times, however late; the map follows at the next
+  /// optimise(). Of two on one step the newer map's holds (Refinements). One that failed, and what is no refinement of
+  /// this map, is an error; the map stays as good as it was.
+  Status receive(const Refinement& refinement);
+  /// Why verdicts that had waited were no good when their submaps came, since the last call.
   std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }
   /// Verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
   /// A job that had an error instead of an answer: the next take_jobs() hands it out again.
   void give_back(VerificationJob job);
+  /// The refinement that the last map wants, without a name; handed out once. There is no other before this one is
+  /// answered or given up, and none again for a map with nothing new.
+  std::optional<RefinementJob> take_refinement_job() { return std::exchange(refinement_job_, std::nullopt); }
+  /// There will be no answer to it.
+  void give_up_refinement() { refining_.reset(); }
 
   /// True when something came since the last optimise().
   [[nodiscard]] bool has_news() const { return news_; }
@@ -140,8 +150,10 @@ class MapServer {
   [[nodiscard]] Status check_against_submaps(const ClosureVerdict& verdict) const;
   Status wait_for_submaps(const ClosureVerdict& verdict);
   void judge_waiting();
-  /// The map that is there.
-  void refine();
+  /// Something has come that changes the pose graph.
+  void note_news();
+  /// Makes the job for the map that is there, if there is to be one.
+  void plan_refinement();
   /// What is good.
   void take(const ClosureVerdict& verdict);
 
@@ -153,9 +165,16 @@ class MapServer {
   std::vector<VerificationJob> jobs_;
   std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are asked when the submaps come
   std::vector<Error> late_errors_;
-  MapEstimate map_;
+  std::optional<MapEstimate> estimate_;        // the pose graph's map; nothing: to be made
+  MapEstimate map_;                            // refined
   std::shared_ptr<const MapRefiner> refiner_;  // null: of none
-  Refinement refinement_;                      // by it
+  std::optional<RefinementJob> refinement_job_;
+  std::optional<std::uint64_t> refining_;  // the revision of the job that is out
+  struct Asked {
+    RefinementScope scope;
+    bool whole = false;
+  };
+  std::optional<Asked> asked_;  // last
   bool news_ = false;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/server/map_refiner.hpp"
+#include "tutti/server/refinements.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,9 @@
 #include <iterator>
 #include <memory>
 #include <utility>
+#include <vector>
 
-#include "support/server/world.hpp"
+#include "support/server/refiners.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::server {
@@ -34,6 +35,13 @@ double error_at_the_end(const MapEstimate& map, RobotId robot) {
   return local(truth, first->T_world_body.inverse() * last->T_world_body).norm();
 }
 
+Refinements only(Refinement refinement) {
+  Refinements out;
+  out.add(std::move(refinement));
+  return out;
+}
+Refinements only(std::vector<RefinedStep> steps) { return only(Refinement{.steps = std::move(steps)}); }
+
 SubmapSet one_robot() {
   SubmapSet out;
   for (Submap& submap : test::make_submaps(RobotId{0}, {}, Rng(1)))
@@ -41,10 +49,10 @@ SubmapSet one_robot() {
   return out;
 }
 
-TEST(MapRefiner, StepsTakeThePlaceOfOdometry) {
+TEST(Refinements, StepsTakeThePlaceOfOdometry) {
   const MapEstimate map = estimate_map(one_robot(), {}, {});
   ASSERT_GT(error_at_the_end(map, RobotId{0}), 0.05);
-  const MapEstimate better = refined(map, {true_steps(map), {}});
+  const MapEstimate better = refined(map, only(true_steps(map)));
   EXPECT_LT(error_at_the_end(better, RobotId{0}), 1e-6);
   EXPECT_EQ(better.odometry_of_steps.size(), map.odometry_edges);
   for (const auto& [edge, covariance] : better.odometry_of_steps)
@@ -52,14 +60,14 @@ TEST(MapRefiner, StepsTakeThePlaceOfOdometry) {
   EXPECT_EQ(local(better.nodes[0].T_world_body, map.nodes[0].T_world_body).norm(), 0.0);
 }
 
-TEST(MapRefiner, WithoutStepsOrForOtherKeyframesTheMapIsAsItWas) {
+TEST(Refinements, WithoutStepsOrForOtherKeyframesTheMapIsAsItWas) {
   const MapEstimate map = estimate_map(one_robot(), {}, {});
   EXPECT_EQ(error_at_the_end(refined(map, {}), RobotId{0}), error_at_the_end(map, RobotId{0}));
   const RefinedStep other{.from = {RobotId{5}, 3}, .measurement = {}};
-  EXPECT_TRUE(refined(map, {{other}, {}}).odometry_of_steps.empty());
+  EXPECT_TRUE(refined(map, only({other})).odometry_of_steps.empty());
 }
 
-TEST(MapRefiner, ClosuresSayWhatTheRefinedKeyframesSay) {
+TEST(Refinements, ClosuresSayWhatTheRefinedKeyframesSay) {
   const test::TestFinder finder(1);
   const SubmapSet submaps = one_robot();
   VerdictSet verdicts;
@@ -69,51 +77,212 @@ TEST(MapRefiner, ClosuresSayWhatTheRefinedKeyframesSay) {
         verdicts[{a->first, b->first}] = *finder.verify(*a->second, *b->second, MemoryPayloadStore());
   const MapEstimate map = estimate_map(submaps, verdicts, {});
   ASSERT_GT(map.graph.edges.size(), map.odometry_edges);
-  Refinement truth{true_steps(map), {}};
-  const double off = error_at_the_end(refined(map, truth), RobotId{0});  // drawn away by the closures
+  Refinement truth{.steps = true_steps(map)};
+  const double off = error_at_the_end(refined(map, only(truth)), RobotId{0});  // drawn away by the closures
   const Pose3 T_world_truth = map.nodes[0].T_world_body * test::true_pose(RobotId{0}, 0).inverse();
   for (const MapNode& node : map.nodes)
     truth.T_world_body[node.id] = T_world_truth * test::true_pose(node.id.chain.robot, node.id.index);
   EXPECT_GT(off, 1e-4);
-  EXPECT_LT(error_at_the_end(refined(map, truth), RobotId{0}), 1e-6);
+  EXPECT_LT(error_at_the_end(refined(map, only(truth)), RobotId{0}), 1e-6);
 }
 
-TEST(MapRefiner, OdometryThatFailedIsNoStepsPlace) {
+TEST(Refinements, OdometryThatFailedIsNoStepsPlace) {
   MapEstimate map = estimate_map(one_robot(), {}, {});
   map.failed_odometry.push_back({RobotId{0}, 20, 23, 1.0, 0.1});
-  EXPECT_EQ(refined(map, {true_steps(map), {}}).odometry_of_steps.size(), map.odometry_edges - 3);
+  EXPECT_EQ(refined(map, only(true_steps(map))).odometry_of_steps.size(), map.odometry_edges - 3);
 }
 
-/// Knows the truth, or fails.
-class Oracle final : public MapRefiner {
+/// A server that is fed one submap after the other of two robots; every job is answered by an oracle.
+class RefinedServer {
  public:
-  [[nodiscard]] Result<Refinement> refine(const MapToRefine& map) const override {
-    ++calls;
-    if (fails) return fail(ErrorCode::invalid, "no map today");
-    return Refinement{true_steps(map.estimate), {}};
+  explicit RefinedServer(int refine_every, MapServerState state = {})
+      : server_({RobotId{0}, RobotId{1}}, finder_, payloads_, {.refine_every = refine_every}, 1, std::move(state)) {
+    server_.refine_with(oracle_);
   }
-  mutable int calls = 0;
-  bool fails = false;
+  static std::vector<SubmapMessage> messages() {
+    std::vector<SubmapMessage> out;
+    for (const std::uint32_t robot : {0U, 1U})
+      for (Submap& submap : test::make_submaps(RobotId{robot}, {.keyframes = 61}, Rng(robot))) {
+        submap.cloud = std::make_shared<const PointCloud>(PointCloud{{{1.0F, 2.0F, 3.0F}}});
+        out.push_back({{RobotId{robot}, 0, submap.id.index}, std::move(submap)});
+      }
+    std::ranges::stable_sort(out, {}, [](const SubmapMessage& m) { return m.submap.id.index; });
+    return out;
+  }
+  void take(const SubmapMessage& message) {
+    ASSERT_TRUE(server_.receive(message).has_value());
+    for (const VerificationJob& job : server_.take_jobs())
+      ASSERT_TRUE(server_.receive(*finder_->verify(*job.first, *job.second, *payloads_)).has_value());
+  }
+  std::optional<RefinementJob> update() {
+    server_.optimise();
+    return server_.take_refinement_job();
+  }
+  [[nodiscard]] Refinement answer(const RefinementJob& job) const {
+    return oracle_->refine(job, server_.state().submaps, *payloads_).value();
+  }
+  /// Answers all until there is nothing new.
+  std::vector<RefinementJob> settle() {
+    std::vector<RefinementJob> jobs;
+    for (int updates = 0; server_.has_news(); ++updates) {
+      EXPECT_LT(updates, 5);
+      if (auto job = update()) {
+        EXPECT_TRUE(server_.receive(answer(*job)).has_value());
+        jobs.push_back(std::move(*job));
+      }
+    }
+    return jobs;
+  }
+  MapServer& operator*() { return server_; }
+  MapServer* operator->() { return &server_; }
+
+ private:
+  std::shared_ptr<const test::TestFinder> finder_ = std::make_shared<const test::TestFinder>(1);
+  std::shared_ptr<MemoryPayloadStore> payloads_ = std::make_shared<MemoryPayloadStore>();
+  std::shared_ptr<const test::Oracle> oracle_ = std::make_shared<const test::Oracle>();
+  MapServer server_;
 };
 
-TEST(MapRefiner, TheServerAsksEverySoOftenAndKeepsWhatItWasTold) {
-  const auto oracle = std::make_shared<Oracle>();
-  MapServer server({RobotId{0}}, std::make_shared<const test::TestFinder>(1), std::make_shared<MemoryPayloadStore>(),
-                   {.refine_every = 3}, 1);
-  server.refine_with(oracle);
-  const auto submaps = test::make_submaps(RobotId{0}, {}, Rng(1));
-  std::uint64_t sequence = 0;
-  for (const Submap& submap : submaps) {
-    ASSERT_TRUE(server.receive({.header = {RobotId{0}, 0, sequence++}, .submap = submap}).has_value());
-    server.optimise();
+std::vector<bool> whole(const std::vector<RefinementJob>& jobs) {
+  std::vector<bool> out;
+  for (const RefinementJob& job : jobs) out.push_back(job.whole);
+  return out;
+}
+
+TEST(Refinements, AnAnswerIsNewsAndThenThereIsNoneLeft) {
+  RefinedServer server(1);
+  for (const SubmapMessage& message : RefinedServer::messages()) {
+    server.take(message);
+    EXPECT_EQ(whole(server.settle()), std::vector{true});
   }
-  EXPECT_EQ(oracle->calls, 1 + static_cast<int>(submaps.size()) / 3);
-  EXPECT_LT(error_at_the_end(server.map(), RobotId{0}), 0.1);
-  const std::size_t known = server.map().odometry_of_steps.size();
-  oracle->fails = true;
-  for (int i = 0; i < 3; ++i) server.optimise();
-  EXPECT_EQ(server.map().odometry_of_steps.size(), known);
-  ASSERT_EQ(server.take_late_errors().size(), 1U);
+  EXPECT_LT(error_at_the_end(server->map(), RobotId{0}), 1e-6);
+  EXPECT_LT(error_at_the_end(server->map(), RobotId{1}), 1e-6);
+  const std::uint64_t revision = server->state().revision;
+  EXPECT_FALSE(server.update().has_value());  // nothing new
+  EXPECT_EQ(server->state().revision, revision + 1);
+  EXPECT_EQ(server->state().refinements.all().size(), 1U);
+}
+
+TEST(Refinements, BetweenThoseOfTheWholeOnesOfWhatIsNew) {
+  RefinedServer server(4);
+  std::vector<RefinementJob> jobs;
+  for (const SubmapMessage& message : RefinedServer::messages()) {
+    server.take(message);
+    auto job = server.update();
+    ASSERT_TRUE(job.has_value());
+    EXPECT_TRUE(server->receive(server.answer(*job)).has_value());
+    EXPECT_LE(server->state().refinements.all().size(), 4U);
+    jobs.push_back(std::move(*job));
+  }
+  std::vector<bool> expected;
+  for (std::size_t i = 0; i < jobs.size(); ++i) expected.push_back(i % 4 == 0);
+  EXPECT_EQ(whole(jobs), expected);
+  const RefinementJob& part = jobs[jobs.size() - 1 - (jobs.size() - 1) % 4 - 1];
+  EXPECT_TRUE(std::ranges::any_of(part.parts, [](const auto& p) { return !p.is_free; }));
+  EXPECT_LT(std::ranges::count_if(part.parts, [](const auto& p) { return p.is_free; }), 8);
+  EXPECT_EQ(whole(server.settle()), std::vector{true});  // when no more comes
+  EXPECT_LT(error_at_the_end(server->map(), RobotId{0}), 1e-6);
+  EXPECT_LT(error_at_the_end(server->map(), RobotId{1}), 1e-6);
+}
+
+TEST(Refinements, WhatAJobHoldsIsWhereTheMapHasIt) {
+  RefinedServer server(100);
+  const auto messages = RefinedServer::messages();
+  for (std::size_t i = 0; i + 1 < messages.size(); ++i) server.take(messages[i]);
+  server.settle();
+  server.take(messages.back());
+  const auto job = server.update();
+  ASSERT_TRUE(job && !job->whole);
+  for (const RefinementJob::Part& part : job->parts)
+    for (std::size_t k = 0; k < part.T_world_body.size(); ++k) {
+      const KeyframeId id{part.submap.chain, server->state().submaps.at(part.submap)->keyframes[k].index};
+      const auto node = std::ranges::lower_bound(server->map().nodes, id, {}, &MapNode::id);
+      EXPECT_EQ(part.T_world_body[k], node->T_world_body);
+    }
+}
+
+/// Answers come late, twice, out of order, or never, and submaps without an update between them.
+TEST(Refinements, InAnyOrderTheyEndInOneMap) {
+  const auto messages = RefinedServer::messages();
+  RefinedServer undisturbed(3);
+  for (const SubmapMessage& message : messages) undisturbed.take(message);
+  undisturbed.settle();
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Rng rng(seed);
+    RefinedServer server(3);
+    std::vector<Refinement> late;
+    const auto hand_in = [&](double share) {
+      for (std::size_t i = late.size(); i > 1; --i) std::swap(late[i - 1], late[rng.index(i)]);
+      for (const Refinement& refinement : late) {
+        if (rng.bernoulli(share)) {
+          EXPECT_TRUE(server->receive(refinement).has_value());
+        }
+      }
+    };
+    for (std::size_t i = 0; i < messages.size(); ++i) {
+      server.take(messages[i]);
+      if (rng.bernoulli(0.3)) continue;
+      if (const auto job = server.update()) {
+        const bool is_lost = rng.bernoulli(0.3) && i + 1 < messages.size();
+        if (!is_lost || rng.bernoulli(0.5)) late.push_back(server.answer(*job));
+        if (is_lost) server->give_up_refinement();
+      }
+      hand_in(0.5);
+    }
+    hand_in(1.0);
+    server.settle();
+    const MapEstimate &map = server->map(), &expected = undisturbed->map();
+    ASSERT_EQ(map.nodes.size(), expected.nodes.size());
+    for (std::size_t k = 0; k < map.nodes.size(); ++k)
+      ASSERT_EQ(map.nodes[k].T_world_body, expected.nodes[k].T_world_body) << "seed " << seed;
+  }
+}
+
+TEST(Refinements, WhatIsGivenUpIsAskedForWhenSomethingNewHasCome) {
+  const auto messages = RefinedServer::messages();
+  RefinedServer server(1);
+  server.take(messages[0]);
+  ASSERT_TRUE(server.update().has_value());
+  EXPECT_FALSE(server.update().has_value());  // one at a time
+  server->give_up_refinement();
+  EXPECT_FALSE(server.update().has_value());
+  EXPECT_TRUE(server->map().odometry_of_steps.empty());
+  server.take(messages[2]);
+  EXPECT_TRUE(server.update().has_value());
+}
+
+TEST(Refinements, ARestoredServerHasThemAndAsksForWhatIsMissing) {
+  const auto messages = RefinedServer::messages();
+  RefinedServer server(3);
+  for (std::size_t i = 0; i + 2 < messages.size(); ++i) server.take(messages[i]);
+  server.settle();
+  RefinedServer restored(3, server->state());
+  restored->rebuild();
+  EXPECT_FALSE(restored->take_refinement_job().has_value());
+  for (std::size_t k = 0; k < server->map().nodes.size(); ++k)
+    ASSERT_EQ(restored->map().nodes[k].T_world_body, server->map().nodes[k].T_world_body);
+  server.take(messages.back());
+  ASSERT_TRUE(server.update().has_value());
+  RefinedServer again(3, server->state());
+  again->rebuild();
+  EXPECT_TRUE(again->take_refinement_job().has_value());  // that of the first is lost
+}
+
+TEST(Refinements, WhatIsNoneOfThisMapIsRefused) {
+  RefinedServer server(1);
+  server.take(RefinedServer::messages().front());
+  Refinement refinement = server.answer(server.update().value());
+  const auto refused = [&](const Refinement& r) { return !server->receive(r).has_value() && !server->has_news(); };
+  Refinement bad = refinement;
+  bad.revision = 2;
+  EXPECT_TRUE(refused(bad));
+  bad = refinement;
+  bad.why = "no cloud";
+  EXPECT_TRUE(refused(bad));
+  bad = refinement;
+  bad.steps.front().measurement.covariance(0, 0) = -1.0;
+  EXPECT_TRUE(refused(bad));
+  EXPECT_FALSE(refused(refinement));
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/wire/internal/logarithm.hpp"
 #include "tutti/wire/limits.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::wire {
@@ -278,6 +279,38 @@ TEST(Logarithm, AtItsLimits) {
     EXPECT_FALSE(dequantise_log(-1, steps).has_value());
     EXPECT_FALSE(dequantise_log(last + 1, steps).has_value());
   }
+}
+
+RC_GTEST_PROP(RefinementCodec, JobsAndAnswersComeBackExactly, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
+  const RefinementJob job = test::any_refinement_job(rng);
+  RC_ASSERT(decode_refinement_job(encode(job)).value() == job);
+  const Refinement refinement = test::any_refinement(rng);
+  RC_ASSERT(decode_refinement(encode(refinement)).value() == refinement);
+}
+
+TEST(RefinementCodec, WhatIsNoneIsRefused) {
+  Rng rng(1);
+  RefinementJob job = test::any_refinement_job(rng);
+  while (job.parts.size() < 2 || job.parts[0].T_world_body.empty()) job = test::any_refinement_job(rng);
+  const auto changed = [](auto value, auto&& change) {
+    change(value);
+    return value;
+  };
+  for (const RefinementJob& bad :
+       {changed(job, [](auto& j) { std::swap(j.parts[0].submap, j.parts[1].submap); }),
+        changed(job, [](auto& j) { j.id = "a b"; }),
+        changed(job, [](auto& j) { j.parts[0].T_world_body[0].translation.x() = std::nan(""); }),
+        changed(job, [](auto& j) { j.parts[0].T_world_body.resize(kMaxRefinedKeyframes + 1); })})
+    EXPECT_FALSE(validate(bad).has_value());
+  Refinement refinement = test::any_refinement(rng);
+  while (refinement.steps.size() < 2) refinement = test::any_refinement(rng);
+  for (const Refinement& bad : {changed(refinement, [](auto& r) { std::swap(r.steps[0], r.steps[1]); }),
+                                changed(refinement, [](auto& r) { r.T_world_body.erase(r.steps[0].from); }),
+                                changed(refinement, [](auto& r) { r.steps[0].measurement.covariance(1, 1) = -1.0; }),
+                                changed(refinement, [](auto& r) { r.counts.rms_after_px = std::nan(""); }),
+                                changed(refinement, [](auto& r) { r.why.assign(kMaxReasonBytes + 1, 'a'); })})
+    EXPECT_FALSE(validate(bad).has_value());
 }
 
 RC_GTEST_PROP(JobCodec, ReceiptsJobsAndVerdictsComeBackExactly, ()) {

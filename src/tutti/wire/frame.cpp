@@ -21,7 +21,7 @@ constexpr std::size_t most_bytes(MessageKind kind) {
   return kind == MessageKind::agent_state ? kMaxStateBytes : kMaxMessageBytes;
 }
 constexpr std::string_view kUnknown = "unknown";
-constexpr auto kLastKind = static_cast<unsigned>(MessageKind::tracked_images);
+constexpr auto kLastKind = static_cast<unsigned>(MessageKind::refinement);
 
 }  // namespace
 
@@ -57,6 +57,10 @@ const char* name(MessageKind kind) {
       return "proxy graph delta";
     case MessageKind::tracked_images:
       return "tracked images";
+    case MessageKind::refinement_job:
+      return "refinement job";
+    case MessageKind::refinement:
+      return "refinement";
   }
   return kUnknown.data();
 }
@@ -89,6 +93,8 @@ Versions versions(MessageKind kind) {
     case MessageKind::proxy_graph_delta:
     case MessageKind::mission_status:
     case MessageKind::tracked_images:
+    case MessageKind::refinement_job:
+    case MessageKind::refinement:
       return {.oldest = 1, .current = 1};
     case MessageKind::agent_state:
       return {.oldest = 3, .current = 3};

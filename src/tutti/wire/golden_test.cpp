@@ -14,6 +14,7 @@
 #include "support/paths.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::wire {
@@ -226,6 +227,24 @@ TEST(Golden, SubmapRequestAndCopy) {
   const SubmapCopy copy{.id = {{RobotId{1}, 1'700'000'123}, 4}, .frame = "TU, and so on"};
   for_every_version(MessageKind::submap_copy, encode(copy), decode_submap_copy,
                     [&](const SubmapCopy& decoded, unsigned) { EXPECT_EQ(decoded, copy); });
+}
+
+TEST(Golden, RefinementJobAndAnswer) {
+  const SubmapId one{RobotId{2}, 3}, two{{RobotId{2}, 1'700'000'123}, 4};
+  const Pose3 here{kQuarterTurn, {1, 2, 3}}, there{kQuarterTurn, {-9, 100, 0.1}};
+  const RefinementJob job{.id = "9/1/17",
+                          .revision = 42,
+                          .whole = false,
+                          .parts = {{one, false, {here}}, {two, true, {here, there}}},
+                          .closed = {{one, two}}};
+  for_every_version(MessageKind::refinement_job, encode(job), decode_refinement_job,
+                    [&](const RefinementJob& decoded, unsigned) { EXPECT_EQ(decoded, job); });
+  Refinement refinement = answer_to(job);
+  refinement.T_world_body = {{{two.chain, 5}, here}, {{two.chain, 6}, there}};
+  refinement.steps = {{{two.chain, 5}, {there, diagonal(1e-4, 1e-6)}}};
+  refinement.counts = {152, 7417, 26486, 811, 1204, 93, 12, 377, 41, 2.5, 1.125};
+  for_every_version(MessageKind::refinement, encode(refinement), decode_refinement,
+                    [&](const Refinement& decoded, unsigned) { EXPECT_EQ(decoded, refinement); });
 }
 
 TEST(Golden, Receipt) {

@@ -15,18 +15,20 @@
 #include "tutti/wire/internal/integer_coder.hpp"
 #include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/limits.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::wire {
 namespace {
 
-constexpr std::array kKinds = {MessageKind::submap,     MessageKind::proxy_graph,
-                               MessageKind::verdict,    MessageKind::cloud,
-                               MessageKind::receipt,    MessageKind::job,
-                               MessageKind::verdicts,   MessageKind::proxy_graph_delta,
-                               MessageKind::status,     MessageKind::mission_status,
-                               MessageKind::word,       MessageKind::submap_request,
-                               MessageKind::submap_copy};
+constexpr std::array kKinds = {MessageKind::submap,      MessageKind::proxy_graph,
+                               MessageKind::verdict,     MessageKind::cloud,
+                               MessageKind::receipt,     MessageKind::job,
+                               MessageKind::verdicts,    MessageKind::proxy_graph_delta,
+                               MessageKind::status,      MessageKind::mission_status,
+                               MessageKind::word,        MessageKind::submap_request,
+                               MessageKind::submap_copy, MessageKind::refinement_job,
+                               MessageKind::refinement};
 
 /// What deltas are against.
 const ProxyGraph& base() {
@@ -55,6 +57,8 @@ std::string sample(MessageKind kind, Rng rng) {
   if (kind == MessageKind::job) return encode(Job{"1/7", test::any_pairs(rng, 5)});
   if (kind == MessageKind::verdicts) return encode(test::any_verdicts(rng));
   if (kind == MessageKind::submap_request) return encode(test::any_submap_request(rng));
+  if (kind == MessageKind::refinement_job) return encode(test::any_refinement_job(rng));
+  if (kind == MessageKind::refinement) return encode(test::any_refinement(rng));
   if (kind == MessageKind::submap_copy) return encode(test::any_submap_copy(rng));
   if (kind == MessageKind::status) return encode(test::any_status(rng));
   if (kind == MessageKind::mission_status) return encode(test::any_mission_status(rng));
@@ -87,6 +91,8 @@ std::optional<Error> decode(MessageKind kind, std::string_view bytes) {
   if (kind == MessageKind::job) return outcome(decode_job(bytes));
   if (kind == MessageKind::verdicts) return outcome(decode_verdicts(bytes));
   if (kind == MessageKind::submap_request) return outcome(decode_submap_request(bytes));
+  if (kind == MessageKind::refinement_job) return outcome(decode_refinement_job(bytes));
+  if (kind == MessageKind::refinement) return outcome(decode_refinement(bytes));
   if (kind == MessageKind::submap_copy) return outcome(decode_submap_copy(bytes));
   if (kind == MessageKind::status) return outcome(decode_status(bytes));
   if (kind == MessageKind::mission_status) return outcome(decode_mission_status(bytes));

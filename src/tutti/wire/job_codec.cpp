@@ -3,13 +3,12 @@
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/job_message.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/verdict_message.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
-namespace {
-
 void write(const std::vector<SubmapPair>& pairs, v1::SubmapPairs& out) {
   for (const auto& [first, second] : pairs) {
     out.add_first_robot(first.chain.robot.value);
@@ -49,6 +48,8 @@ Status check_job_id(const std::string& id) {
   return fail(ErrorCode::invalid, "the name of a job has {} letters, expected 1 to {} plain ones", id.size(),
               kMaxIdBytes);
 }
+
+namespace {
 
 Status check_numbers(const std::map<std::uint64_t, NumberSet>& sessions) {
   std::size_t stretches = 0;

@@ -23,6 +23,8 @@ enum class MessageKind : std::uint8_t {
   word = 15,               ///< What an operator says of a closure.
   proxy_graph_delta = 17,  ///< A proxy graph in terms of an earlier one.
   tracked_images = 18,     ///< A robot's own, in its journal.
+  refinement_job = 19,     ///< Submaps to be refined together.
+  refinement = 20,         ///< The answer to that.
 };
 
 /// In words: "submap", "proxy graph", ...

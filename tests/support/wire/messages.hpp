@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/messages.hpp"
+#include "tutti/model/refinement.hpp"
 #include "tutti/model/status.hpp"
 #include "tutti/model/submap_copy.hpp"
 
@@ -258,6 +260,34 @@ inline ClosureWord any_word(Rng& rng) {
 inline Verdicts any_verdicts(Rng& rng) {
   Verdicts out{.job = "12/0.3:4-5_6", .verdicts = {}, .failed = any_pairs(rng, rng.index(3)), .why = "\xff no cloud"};
   for (std::size_t i = rng.index(5); i > 0; --i) out.verdicts.push_back(any_verdict(rng, rng.index(3)));
+  return out;
+}
+
+inline RefinementJob any_refinement_job(Rng& rng) {
+  RefinementJob job{.id = "12/0/7", .revision = rng.index(1000), .whole = rng.bernoulli(0.5)};
+  for (std::uint64_t i = rng.index(5); i > 0; --i) {
+    RefinementJob::Part part{any_submap_request(rng).submaps.front(), rng.bernoulli(0.5), {}};
+    for (std::uint64_t k = rng.index(4); k > 0; --k) part.T_world_body.push_back(any_pose(rng, 100.0));
+    job.parts.push_back(std::move(part));
+  }
+  std::ranges::sort(job.parts, {}, &RefinementJob::Part::submap);
+  const auto twice = std::ranges::unique(job.parts, {}, &RefinementJob::Part::submap);
+  job.parts.erase(twice.begin(), twice.end());
+  job.closed = any_pairs(rng, rng.index(4));
+  std::ranges::sort(job.closed);
+  return job;
+}
+
+inline Refinement any_refinement(Rng& rng) {
+  Refinement out = answer_to(any_refinement_job(rng));
+  for (std::uint64_t i = rng.index(8); i > 0; --i) {
+    const ChainId chain{RobotId{static_cast<std::uint32_t>(rng.index(3))}, any_session(rng)};
+    out.T_world_body[{chain, static_cast<std::uint32_t>(rng.index(1000))}] = any_pose(rng, 100.0);
+  }
+  for (const auto& [id, T] : out.T_world_body)
+    if (rng.bernoulli(0.7)) out.steps.push_back({id, {any_pose(rng, 5.0), any_covariance(rng)}});
+  out.counts = {.keyframes = rng.index(1000), .two_things = rng.index(1000), .rms_before_px = 1.5, .rms_after_px = 0.5};
+  if (rng.bernoulli(0.3)) out.why = "no images";
   return out;
 }
 

@@ -37,10 +37,10 @@ void Inbox::put_retained(Endpoint from, MessageKind kind, std::string bytes) {
   untaken_.push_back({{from, self_, kind, "", std::make_shared<const std::string>(std::move(bytes))}, ++last_ticket_});
 }
 
-void Inbox::put_returned(std::string id, std::string bytes) {
-  untaken_.push_back({{Endpoint::any_worker(), self_, MessageKind::job, std::move(id),
-                       std::make_shared<const std::string>(std::move(bytes))},
-                      ++last_ticket_});
+void Inbox::put_returned(MessageKind kind, std::string id, std::string bytes) {
+  untaken_.push_back(
+      {{Endpoint::any_worker(), self_, kind, std::move(id), std::make_shared<const std::string>(std::move(bytes))},
+       ++last_ticket_});
 }
 
 void Inbox::put_best_effort(Endpoint from, MessageKind kind, std::string bytes) {

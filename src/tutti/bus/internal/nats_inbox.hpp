@@ -29,7 +29,7 @@ class Inbox {
   /// In the place of one of its kind that is not taken yet.
   void put_retained(Endpoint from, MessageKind kind, std::string bytes);
   /// A job of ours that no worker gets any more.
-  void put_returned(std::string id, std::string bytes);
+  void put_returned(MessageKind kind, std::string id, std::string bytes);
   /// Of those not taken the oldest go when there are too many.
   void put_best_effort(Endpoint from, MessageKind kind, std::string bytes);
 

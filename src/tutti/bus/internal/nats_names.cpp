@@ -24,7 +24,8 @@ constexpr std::array kSent{MessageKind::submap,
                            MessageKind::status,
                            MessageKind::mission_status,
                            MessageKind::word,
-
+                           MessageKind::refinement_job,
+                           MessageKind::refinement,
                            MessageKind::submap_request,
                            MessageKind::submap_copy};
 

@@ -22,8 +22,10 @@ TEST(NatsNames, SubjectsSayWhoseMessageItIs) {
   };
   EXPECT_EQ(subject(kRobot, kServer, MessageKind::submap), "mission.m1.robot.3.submap");
   EXPECT_EQ(subject(kWorker, kServer, MessageKind::verdicts), "mission.m1.worker.7.verdicts");
+  EXPECT_EQ(subject(kWorker, kServer, MessageKind::refinement), "mission.m1.worker.7.refinement");
   EXPECT_EQ(subject(kWorker, kServer, MessageKind::status), "mission.m1.worker.7.status");
-  EXPECT_EQ(subject(kServer, Endpoint::any_worker(), MessageKind::job), "mission.m1.jobs.loop");
+  for (const MessageKind kind : {MessageKind::job, MessageKind::refinement_job})
+    EXPECT_EQ(subject(kServer, Endpoint::any_worker(), kind), "mission.m1.jobs.loop");
   EXPECT_EQ(subject(kServer, kRobot, MessageKind::proxy_graph), "$KV.GRAPH_m1.robot.3.proxy_graph");
   EXPECT_EQ(subject(kServer, kRobot, MessageKind::receipt), "$KV.GRAPH_m1.robot.3.receipt");
   EXPECT_EQ(subject(kWorker, kServer, MessageKind::submap_request), "mission.m1.worker.7.submap_request");

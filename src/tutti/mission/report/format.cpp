@@ -151,4 +151,17 @@ std::string format_surer_turns(std::span<const RobotRecord> robots) {
   return "Closures show that odometry turns better than it says (at least: " + names + "); the server counts it so.";
 }
 
+std::string format_refinement(const RefinementCounts& counts) {
+  return fmt::format(
+      "Bundle adjustment: {} views of {} landmarks at {} keyframes, {:.2f} px off before and {:.2f} px after (root "
+      "mean "
+      "square). Landmarks merged by a shared keyframe: {}, by closures: {}. Conflicts: {} of these had two positions "
+      "and "
+      "were triangulated again, {} were two things and taken apart; {} views that contradict and {} landmarks too "
+      "uncertain were dropped.",
+      counts.observations, counts.landmarks, counts.keyframes, counts.rms_before_px, counts.rms_after_px,
+      counts.joined_by_keyframe, counts.joined_by_closure, counts.two_positions, counts.two_things,
+      counts.views_contradicting, counts.landmarks_uncertain);
+}
+
 }  // namespace tutti::mission

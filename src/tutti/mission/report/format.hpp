@@ -67,5 +67,7 @@ ClosureCounts count_closures(const ServerRecord& server);
 std::string format_mapped_robots(const MissionRecord& record);
 /// Whose odometry turns better than it says, in standard deviations, as a sentence; empty when nobody's does.
 std::string format_surer_turns(std::span<const RobotRecord> robots);
+/// What bundle adjustment made of the map, as sentences.
+std::string format_refinement(const RefinementCounts& counts);
 
 }  // namespace tutti::mission

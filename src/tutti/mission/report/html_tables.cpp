@@ -76,7 +76,9 @@ std::string server_load_html(const ServerLoadRecord& load) {
   const auto share = [&](double cpu_s) { return fmt::format("{:.2f} %", 100.0 * cpu_s / load.mission_s); };
   table.rows.push_back({"of one core: receiving, optimising, proxy graphs", share(load.map_cpu_s)});
   table.rows.push_back({"of one core: verifying closures", share(load.verification_cpu_s)});
-  if (const double busy_s = load.map_cpu_s + load.verification_cpu_s; busy_s > 0.0)
+  if (load.refinement_cpu_s > 0.0)
+    table.rows.push_back({"of one core: bundle adjustment", share(load.refinement_cpu_s)});
+  if (const double busy_s = load.map_cpu_s + load.verification_cpu_s + load.refinement_cpu_s; busy_s > 0.0)
     table.rows.push_back({"one core would keep up with", fmt::format("{:.0f} x", load.mission_s / busy_s)});
   if (const auto latency = spread(load.update_latency_ms))
     table.rows.push_back(
@@ -143,6 +145,7 @@ std::string closures_html(const MissionRecord& record) {
         check->max_error_deg);
   if (const std::string surer = format_surer_turns(record.robots); !surer.empty())
     lead += fmt::format(" {}", escape_xml(surer));
+  if (server.refinement) lead += fmt::format(" {}", format_refinement(*server.refinement));
   return section("Loop closures", lead, html(table));
 }
 

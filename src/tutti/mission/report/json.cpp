@@ -178,6 +178,21 @@ Json robot_json(const RobotRecord& robot, bool tied) {
   return out;
 }
 
+Json refinement_json(const std::optional<RefinementCounts>& counts) {
+  if (!counts) return nullptr;
+  return {{"keyframes", counts->keyframes},
+          {"landmarks", counts->landmarks},
+          {"observations", counts->observations},
+          {"joined_by_keyframe", counts->joined_by_keyframe},
+          {"joined_by_closure", counts->joined_by_closure},
+          {"two_positions", counts->two_positions},
+          {"two_things", counts->two_things},
+          {"views_contradicting", counts->views_contradicting},
+          {"landmarks_uncertain", counts->landmarks_uncertain},
+          {"rms_before_px", number(counts->rms_before_px)},
+          {"rms_after_px", number(counts->rms_after_px)}};
+}
+
 Json server_json(const MissionRecord& record) {
   const ServerRecord& server = record.server;
   const ClosureCounts counts = count_closures(server);
@@ -225,6 +240,7 @@ Json server_json(const MissionRecord& record) {
            {"map_error", map_error_json(server.map_error)},
            {"survey_covered", number(server.survey_covered)},
            {"failed_odometry", std::move(failed)},
+           {"refinement", refinement_json(server.refinement)},
            {"course", std::move(course)}};
   add_scored(out, "", server.joint.scored_share);
   return out;
@@ -247,10 +263,11 @@ Json spread_json(const std::vector<double>& samples) {
 }
 
 Json load_json(const ServerLoadRecord& load) {
-  const double busy_s = load.map_cpu_s + load.verification_cpu_s;
+  const double busy_s = load.map_cpu_s + load.verification_cpu_s + load.refinement_cpu_s;
   return {{"mission_s", number(load.mission_s)},
           {"map_cpu_s", number(load.map_cpu_s)},
           {"verification_cpu_s", number(load.verification_cpu_s)},
+          {"refinement_cpu_s", number(load.refinement_cpu_s)},
           {"share_of_one_core", load.mission_s > 0.0 ? number(busy_s / load.mission_s) : Json(nullptr)},
           {"update_latency", spread_json(load.update_latency_ms)},
           {"peak_memory_mb", load.peak_memory_mb > 0.0 ? number(load.peak_memory_mb) : Json(nullptr)}};
@@ -303,6 +320,12 @@ std::string timing_json(const MissionRecord& record) {
     load.push_back({{"name", entry.name},
                     {"cpu_share", number(entry.cpu_share)},
                     {"worst_latency_ms", number(entry.worst_latency_ms)}});
+  Json refinements = Json::array();
+  for (const RefinementTiming& refinement : timing.server_refinements)
+    refinements.push_back({{"whole", refinement.whole},
+                           {"free_submaps", refinement.free_submaps},
+                           {"submaps", refinement.submaps},
+                           {"cpu_s", number(refinement.cpu_s)}});
   return dump(Json{{"format", kFormat},
                    {"mission", record.mission},
                    {"seed", record.seed},
@@ -314,6 +337,7 @@ std::string timing_json(const MissionRecord& record) {
                    {"server",
                     {{"verification", spread_json(timing.server_verification_ms)},
                      {"optimisation", spread_json(timing.server_optimisation_ms)},
+                     {"refinements", std::move(refinements)},
                      {"load", load_json(timing.server_load)}}},
                    {"load", std::move(load)}});
 }

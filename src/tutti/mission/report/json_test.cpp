@@ -50,6 +50,18 @@ TEST(ReportJson, HasTheDocumentedKeys) {
     expect_keys(transform, {"from", "to", "translation_m", "quaternion_xyzw"});
 }
 
+TEST(ReportJson, SaysWhatTheAdjustmentMadeOfTheMap) {
+  MissionRecord record = test::example_record();
+  EXPECT_TRUE(json::parse(report_json(record))["server"]["refinement"].is_null());
+  record.server.refinement = RefinementCounts{152, 7417, 26486, 811, 1204, 93, 12, 377, 41, 2.5, 1.125};
+  record.timing.server_refinements = {{false, 2, 5, 0.25}};
+  const json refinement = json::parse(report_json(record))["server"]["refinement"];
+  EXPECT_EQ(refinement["joined_by_keyframe"], 811);
+  EXPECT_EQ(refinement["two_positions"], 93);
+  EXPECT_EQ(refinement["rms_after_px"], 1.125);
+  EXPECT_EQ(json::parse(timing_json(record))["server"]["refinements"][0]["submaps"], 5);
+}
+
 TEST(ReportJson, CarriesTheRecordsFigures) {
   MissionRecord record = test::example_record();
   record.robots[0].onboard.rmse_m = 0.1234567891;

@@ -27,7 +27,8 @@ struct Field {
 };
 
 using v1::AgentState, v1::Cloud, v1::Job, v1::MissionStatus, v1::NumbersOfSession, v1::ProxyGraph, v1::Receipt,
-    v1::SubmapPairs, v1::SubmapRequest, v1::Verdicts, v1::Submap, v1::Verdict, v1::Visual;
+    v1::Refinement, v1::RefinementJob, v1::SubmapIds, v1::SubmapPairs, v1::SubmapRequest, v1::Verdicts, v1::Submap,
+    v1::Verdict, v1::Visual;
 constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;
 
 constexpr std::array kCloud = {Field{Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
@@ -65,6 +66,20 @@ constexpr std::array kAgentState = {Field{AgentState::kIntegerFieldNumber, kMaxS
 constexpr std::array kRequest = {Field{SubmapRequest::kRobotFieldNumber, kMaxRequested, "submaps"},
                                  Field{SubmapRequest::kSessionFieldNumber, kMaxRequested, "submaps"},
                                  Field{SubmapRequest::kIndexFieldNumber, kMaxRequested, "submaps"}};
+constexpr std::array kIds = {Field{SubmapIds::kRobotFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                             Field{SubmapIds::kSessionFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                             Field{SubmapIds::kIndexFieldNumber, kMaxRefinedSubmaps, "submaps"}};
+constexpr std::array kRefinementJob = {Field{RefinementJob::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
+                                       Field{RefinementJob::kIsFreeFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                                       Field{RefinementJob::kKeyframesFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                                       Field{RefinementJob::kClosedFieldNumber, 1, "lists of pairs", true, kPairs}};
+constexpr std::array kRefinement = {Field{Refinement::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
+                                    Field{Refinement::kClosedFieldNumber, 1, "lists of pairs", true, kPairs},
+                                    Field{Refinement::kRobotFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{Refinement::kSessionFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{Refinement::kKeyframeFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{Refinement::kHasStepFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{Refinement::kCountFieldNumber, 100, "counts"}};
 constexpr std::array kMissionStatus = {Field{MissionStatus::kRobotFieldNumber, kMaxRobots, "robots", true},
                                        Field{MissionStatus::kWorkerFieldNumber, kMaxRobots, "workers", true},
                                        Field{MissionStatus::kRefusalsFieldNumber, kMaxRefusalKinds, "refusals", true}};
@@ -89,6 +104,10 @@ std::span<const Field> fields_of(MessageKind kind) {
       return kJob;
     case MessageKind::verdicts:
       return kVerdicts;
+    case MessageKind::refinement_job:
+      return kRefinementJob;
+    case MessageKind::refinement:
+      return kRefinement;
     case MessageKind::submap_request:
       return kRequest;
     case MessageKind::mission_status:

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a ServerNode has its map refined.
+#include <fmt/format.h>
+
+#include <set>
+#include <utility>
+
+#include "tutti/node/map_meta.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/wire/codec.hpp"
+#include "tutti/wire/refinement_codec.hpp"
+
+namespace tutti::node {
+namespace {
+
+std::set<std::uint64_t> revisions(const server::Refinements& refinements) {
+  std::set<std::uint64_t> out;
+  for (const auto& [revision, refinement] : refinements.all()) out.insert(revision);
+  return out;
+}
+
+}  // namespace
+
+void ServerNode::send_refinement_job(Timestamp now, Step& step) {
+  if (auto job = server_.take_refinement_job()) ask_for_refinement(std::move(*job), now, 0, step);
+}
+
+void ServerNode::ask_for_refinement(RefinementJob job, Timestamp now, unsigned asked, Step& step) {
+  job.id = job_name(jobs_);
+  if (const Status valid = wire::validate(job); !valid)
+    return give_up_refinement(job.revision, valid.error().message, now, step);
+  step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::refinement_job,
+                           job.id, std::make_shared<const std::string>(wire::encode(job))});
+  open_jobs_.emplace(jobs_++, OpenJob{{}, std::make_shared<const RefinementJob>(std::move(job)), now, asked});
+}
+
+void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  const auto refinement = wire::decode_refinement(*envelope.bytes);
+  if (!refinement) return refuse(envelope, refinement.error().message, now, step);
+  const auto closed = close(refinement->job, now);
+  const auto failed = [&](const std::string& why) {
+    if (closed && closed->refinement) note_failed_refinement(*closed->refinement, why, now, step);
+  };
+  if (!refinement->why.empty()) return failed(refinement->why);
+  const std::set<std::uint64_t> before = revisions(server_.state().refinements);
+  if (const Status taken = server_.receive(*refinement); !taken) {
+    refuse(envelope, taken.error().message, now, step);
+    return failed(taken.error().message);
+  }
+  failed_refinements_ = 0;
+  const std::set<std::uint64_t> after = revisions(server_.state().refinements);
+  for (const std::uint64_t revision : before)
+    if (!after.contains(revision)) step.writes.push_back({kMetaTable, refinement_key(revision), std::nullopt});
+  for (const std::uint64_t revision : after)
+    if (!before.contains(revision)) step.writes.push_back({kMetaTable, refinement_key(revision), *envelope.bytes});
+  step.tell(now, RefinementTaken{refinement->job, refinement->revision, refinement->whole, refinement->steps.size()});
+}
+
+/// It has ended every worker that had it (bus::Port::receive()).
+void ServerNode::receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step) {
+  const auto job = wire::decode_refinement_job(*envelope.bytes);
+  if (!job) return refuse(envelope, job.error().message, now, step);
+  if (close(job->id, now)) give_up_refinement(job->revision, "every worker that had it has ended", now, step);
+}
+
+void ServerNode::note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step) {
+  const bool again = ++failed_refinements_ < config_.most_tries && config_.job_timeout_s > 0.0;
+  if (!again) return give_up_refinement(job.revision, why, now, step);
+  refine_again_ = RefineAgain{job, now + failed_again_after(failed_refinements_)};
+  step.tell(now, RefinementFailed{job.revision, why});
+}
+
+/// The map goes on without it, and asks for another when something new has come.
+void ServerNode::give_up_refinement(std::uint64_t revision, const std::string& why, Timestamp now, Step& step) {
+  failed_refinements_ = 0;
+  server_.give_up_refinement();
+  note_refusal(bus::Endpoint::Role::worker, bus::MessageKind::refinement_job,
+               fmt::format("the refinement of revision {} is given up: {}", revision, why));
+  step.tell(now, RefinementFailed{revision, why, true});
+}
+
+void ServerNode::refine_again(Timestamp now, Step& step) {
+  if (!refine_again_ || refine_again_->due > now) return;
+  ask_for_refinement(std::exchange(refine_again_, std::nullopt)->job, now, 0, step);
+}
+
+}  // namespace tutti::node

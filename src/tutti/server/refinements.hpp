@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "tutti/model/refinement.hpp"
+#include "tutti/server/map_estimate.hpp"
+#include "tutti/server/map_refiner.hpp"
+
+namespace tutti::server {
+
+/// What a refinement can go by, and what it has gone by.
+struct RefinementScope {
+  std::set<SubmapId> submaps;
+  std::set<SubmapPair> closed;  ///< Of these; tied by accepted closures.
+  friend bool operator==(const RefinementScope&, const RefinementScope&) = default;
+};
+
+/// The refinements that hold: the newest one of the whole map, and those of parts of newer maps. The same set whatever
+/// order they come in, and however often.
+class Refinements {
+ public:
+  using ByRevision = std::map<std::uint64_t, std::shared_ptr<const Refinement>>;
+  /// False: nothing has changed; it is there, or one of a whole map as new.
+  bool add(Refinement refinement);
+  [[nodiscard]] const ByRevision& all() const { return all_; }
+  /// What they have taken into account.
+  [[nodiscard]] RefinementScope scope() const;
+  /// How many are there of parts, since the last of a whole map.
+  [[nodiscard]] std::size_t parts() const;
+  [[nodiscard]] bool has_whole() const { return !all_.empty() && all_.begin()->second->whole; }
+
+ private:
+  ByRevision all_;
+};
+
+/// The map with the refined steps, of each the newest, in the place of its odometry's, solved again from where it
+/// stands. Its closures stay as sure as they were, but say what the newest refinement with both their ends says: a
+/// chain of steps is looser than all of the refinement, and would be drawn back to where the closures had it before.
+/// Odometry that failed is no step's place. The map as it was when that cannot be solved.
+MapEstimate refined(const MapEstimate& map, const Refinements& refinements);
+
+/// The submaps that the refiner can use and that are in the map, and the pairs of them with accepted closures.
+RefinementScope refinable(const MapEstimate& map, const SubmapSet& submaps,
+                          const std::map<SubmapId, PayloadSize>& sizes, const VerdictSet& verdicts,
+                          const MapRefiner& refiner);
+
+/// The job that makes a map of this scope refined; nothing where the refinements have taken all of it into account. Of
+/// the whole map: when `every` jobs were not, or there is nothing new but parts were refined last, so that a map to
+/// which nothing is added ends as a function of its submaps and closures. Its poses are then those of `estimate`, the
+/// pose graph's. Otherwise free are what is new, which means submaps and the ends of pairs, and their neighbours in the
+/// chain; what is tied to these is held where it is in `map`, the refined one.
+std::optional<RefinementJob> plan_refinement(const RefinementScope& scope, const Refinements& refinements,
+                                             const MapEstimate& estimate, const MapEstimate& map,
+                                             const SubmapSet& submaps, std::size_t every, std::uint64_t revision);
+
+}  // namespace tutti::server
