@@ -44,6 +44,8 @@ std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
 void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapServer& server,
                      const evaluation::AssociationConfig& association, const ClosureCheckConfig& check,
                      MissionRecord& record);
+/// What came of the robots' images, and a note of each.
+void evaluate_images(const server::MapServer& server, MissionRecord& record);
 /// What the robots saw, put together by every estimate, thinned; and, where record.survey is there, how far it is from
 /// that.
 void evaluate_map(const server::MapServer& server, const evaluation::AssociationConfig& association,

@@ -55,6 +55,7 @@ MissionRecord make_record(const FinishedMission& mission) {
   note_undelivered(mission.undelivered, record);
   note_what_the_map_lacks(server.map(), record);
   evaluate_server(outcomes, server, config.association, config.closure_check, record);
+  evaluate_images(server, record);
   record.server.proxy = broadcast;
   record.server.updates = mission.events.updates();
   for (RobotRecord& robot : record.robots) {

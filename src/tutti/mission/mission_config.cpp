@@ -40,6 +40,23 @@ void check_name(const std::string& name, const std::string& path, const Problem&
         fmt::format("{}.name: is '{}', expected at most {} letters, digits, '_' and '-'", path, name, kLongestName));
 }
 
+void check_images(const RobotConfig& robot, const std::string& path, const Problem& problem) {
+  const ImagesConfig& images = robot.images;
+  const bool from_maplab = !images.maplab_submaps.empty();
+  if (robot.odometry.file.empty() && !from_maplab) problem(path + ".odometry.file: missing");
+  if (!robot.odometry.file.empty() && from_maplab)
+    problem(path + ".odometry.file: given, but images.maplab_submaps have the odometry");
+  if ((images.euroc_folder.empty() ? 0 : 1) + (images.list.empty() ? 0 : 1) + (from_maplab ? 1 : 0) > 1)
+    problem(path + ".images: several of euroc_folder, list and maplab_submaps are given, expected one");
+  if (images.list.empty() != images.cameras.empty())
+    problem(fmt::format("{}.images.{}: missing, but images.{} is given", path, images.list.empty() ? "list" : "cameras",
+                        images.list.empty() ? "cameras" : "list"));
+  if (images.time_offset_s != 0.0 && !images.has_files())
+    problem(path + ".images.time_offset_s: given, but there is no images.euroc_folder or images.list");
+  if (!images.imu.empty() && !images.euroc_folder.empty())
+    problem(path + ".images.imu: given, but images.euroc_folder has its own in imu0");
+}
+
 void check_robots(const MissionConfig& config, const Problem& problem) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
@@ -48,10 +65,7 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
     if (robot.name.empty()) problem(path + ".name: missing");
     check_name(robot.name, path, problem);
     if (!names.insert(robot.name).second) problem(fmt::format("{}.name: '{}' is there twice", path, robot.name));
-    const bool sees = !robot.images.maplab_submaps.empty();
-    if (robot.odometry.file.empty() && !sees) problem(path + ".odometry.file: missing");
-    if (!robot.odometry.file.empty() && sees)
-      problem(path + ".odometry.file: given, but images.maplab_submaps have the odometry");
+    check_images(robot, path, problem);
     if (!robot.reference_offset_m.empty() && robot.reference_offset_m.size() != 3)
       problem(fmt::format("{}.reference_offset_m: {} numbers, expected 3", path, robot.reference_offset_m.size()));
     if (const auto T_body_lidar = to_pose(robot.T_body_lidar); !T_body_lidar)
@@ -62,7 +76,7 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
       problem(path + ".reference.file: missing, but closures.finder is 'reference'");
     if (config.closures.finder == "lidar" && robot.scans.empty())
       problem(path + ".scans: missing, but closures.finder is 'lidar'");
-    if (config.closures.finder == "visual" && !sees)
+    if (config.closures.finder == "visual" && !robot.images.is_given())
       problem(path + ".images: missing, but closures.finder is 'visual'");
   }
   for (std::size_t i = 0; i < config.simulation.robots.size(); ++i)  // without a name: named by place

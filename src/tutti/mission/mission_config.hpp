@@ -55,17 +55,38 @@ struct LidarPoseConfig {
 /// The pose, or what is wrong with it.
 Result<Pose3> to_pose(const LidarPoseConfig& config);
 
-/// Where a robot's images, or what a tracker made of them, come from: one of these, or none.
+/// Where a robot's images, or what a tracker made of them, come from: a folder, a list or submaps, or nothing. Paths
+/// are below the --data folder.
 struct ImagesConfig {
+  std::string euroc_folder;                 ///< mav0, or what holds it.
+  std::string list;                         ///< With `cameras`.
+  std::string cameras;                      ///< formats::read_cameras()
   std::vector<std::string> maplab_submaps;  ///< Consecutive folders; the odometry is theirs, too.
-  std::string imu;                          ///< Empty: none.
+  int most_cameras = 2;
+  double time_offset_s = 0.0;
+  std::string imu;  ///< Empty: none, or that of `euroc_folder`.
   template <class V>
   void describe(V& v) {
+    constexpr double kMostOffset_s = 1e10;  // clocks that count from 1970, and clocks that count from their start
+    v.field("euroc_folder", euroc_folder, any(),
+            "A recording in EuRoC's (ASL's) layout: mav0/cam0 and, where they are there, cam1 and imu0, each with "
+            "sensor.yaml and data.csv. Names mav0 or the folder that holds it.");
+    v.field("list", list, any(),
+            "Instead: a csv `stamp[ns],file of camera 0,file of camera 1`; files relative to its folder, PNG or JPEG.");
+    v.field("cameras", cameras, any(),
+            "With list: yaml with a list `cameras` of model (pinhole, equidistant, double_sphere), width_px, "
+            "height_px, intrinsics [fx, fy, cx, cy], distortion, T_body_camera (16 numbers) and time_offset_s.");
     v.field("maplab_submaps", maplab_submaps, any(),
-            "Folders of consecutive maplab submaps (keyframes, keypoints with tracks and descriptors, calibration); "
-            "their keyframe poses are the odometry, without an odometry.file.");
-    v.field("imu", imu, any(), "EuRoC's csv of raw IMU samples.");
+            "Instead: folders of consecutive maplab submaps (keyframes, keypoints with tracks and descriptors, "
+            "calibration); their keyframe poses are the odometry, without an odometry.file.");
+    v.field("most_cameras", most_cameras, between(1, 2), "1: of two cameras only the first is used.");
+    v.field("time_offset_s", time_offset_s, between(-kMostOffset_s, kMostOffset_s),
+            "Added to the images' stamps gives the odometry's time.");
+    v.field("imu", imu, any(), "EuRoC's csv of raw IMU samples, with list or maplab_submaps.");
   }
+  /// Are there images to follow points through?
+  [[nodiscard]] bool has_files() const { return !euroc_folder.empty() || !list.empty(); }
+  [[nodiscard]] bool is_given() const { return has_files() || !maplab_submaps.empty(); }
 };
 
 /// One robot whose recording is replayed.

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "support/paths.hpp"
+
 namespace tutti::mission {
 namespace {
 
@@ -43,6 +45,34 @@ TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {
       "robots: [{name: a, odometry: {file: a}, scans: s}, {name: a, odometry: {file: b}, scans: s}]";
   EXPECT_NE(problem_with(twins).find("'a' is there twice"), std::string::npos);
   EXPECT_NE(problem_with("robots: [{name: 'a/b', odometry: {file: a}, scans: s}]").find("a/b"), std::string::npos);
+}
+
+TEST(MissionConfig, ImagesComeFromOnePlace) {
+  const auto problem = [](const std::string& images, const std::string& odometry = "{file: a}") {
+    return problem_with("robots: [{name: a, odometry: " + odometry + ", images: {" + images +
+                        "}}]\nclosures: {finder: visual}\n");
+  };
+  EXPECT_EQ(problem("euroc_folder: f, most_cameras: 1, time_offset_s: -0.01"), "");
+  EXPECT_EQ(problem("list: l, cameras: c, imu: i"), "");
+  EXPECT_EQ(problem("maplab_submaps: [s]", "{}"), "");
+  const auto expect = [&](const std::string& images, const std::string& words) {
+    EXPECT_NE(problem(images).find("robots.0." + words), std::string::npos) << problem(images);
+  };
+  expect("", "images: missing, but closures.finder is 'visual'");
+  expect("euroc_folder: f, list: l, cameras: c", "images: several of euroc_folder, list and maplab_submaps are given");
+  expect("list: l", "images.cameras: missing, but images.list is given");
+  expect("cameras: c", "images.list: missing, but images.cameras is given");
+  expect("time_offset_s: 1", "images.time_offset_s: given, but there is no images.euroc_folder or images.list");
+  expect("euroc_folder: f, imu: i", "images.imu: given, but images.euroc_folder has its own in imu0");
+  expect("euroc_folder: f, most_cameras: 3", "images.most_cameras: ");
+  EXPECT_NE(problem("euroc_folder: f", "{}").find("robots.0.odometry.file: missing"), std::string::npos);
+}
+
+TEST(MissionConfig, EurocsImagesAreAMission) {
+  const auto mission = load_mission(test::source_path("missions/euroc_mh_images.yaml"), {});
+  ASSERT_TRUE(mission.has_value()) << mission.error().message;
+  ASSERT_EQ(mission->robots.size(), 3U);
+  for (const RobotConfig& robot : mission->robots) EXPECT_EQ(robot.images.euroc_folder.find("euroc/MH_0"), 0U);
 }
 
 TEST(MissionConfig, RobotsAreCalledWhatFilesCanBeCalled) {

@@ -115,6 +115,16 @@ struct TrafficRecord {
   std::uint64_t largest_message = 0;    ///< Bytes.
 };
 
+/// What came of a robot's images, by the submaps that the server has of it.
+struct ImagesRecord {
+  std::size_t keyframes = 0;  ///< With an image.
+  std::size_t landmarks = 0;  ///< Of all submaps.
+  double landmarks_per_keyframe = 0.0;
+  /// Root mean square over the images that saw a landmark, against where the robot's odometry has it; nothing without
+  /// landmarks.
+  std::optional<double> reprojection_rms_px;
+};
+
 struct RobotRecord {
   RobotId id;
   std::string name;
@@ -144,6 +154,7 @@ struct RobotRecord {
   std::optional<consistency::Explanation> explanation;  ///< Raw odometry against the map, at the last update.
   std::vector<WhereaboutsRecord> whereabouts;
   std::vector<DriftOrigin> drift_origins;  ///< Where its odometry really went wrong; empty when unknown.
+  std::optional<ImagesRecord> images;      ///< Nothing when no submap has any.
   /// What it saw, put together by raw odometry and laid rigidly on the reference (without one: on the server's
   /// estimate); thinned. Empty without a range sensor.
   PointCloud onboard_cloud;

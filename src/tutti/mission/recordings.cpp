@@ -10,11 +10,9 @@
 #include <utility>
 
 #include "tutti/base/random.hpp"
-#include "tutti/formats/imu_file.hpp"
 #include "tutti/formats/kitti.hpp"
-#include "tutti/formats/maplab_submaps.hpp"
 #include "tutti/formats/trajectory_file.hpp"
-#include "tutti/mission/listed_images.hpp"
+#include "tutti/mission/robot_images.hpp"
 #include "tutti/mission/scan_folder.hpp"
 #include "tutti/simulation/surface.hpp"
 
@@ -44,26 +42,27 @@ bool is_degraded(const simulation::DegradeConfig& degrade) {
   return degrade.yaw_deg_per_m != 0.0 || degrade.scale_percent != 0.0;
 }
 
-Result<formats::MaplabRecording> read_maplab(const RobotConfig& robot, const fs::path& data) {
-  std::vector<std::string> folders;
-  for (const std::string& folder : robot.images.maplab_submaps) folders.push_back((data / folder).string());
-  return formats::read_maplab_submaps(folders);
+/// The reference in the common frame, and where its own frame lies in that.
+Result<std::pair<Trajectory, Pose3>> read_reference(const RobotConfig& robot, const fs::path& data) {
+  auto reference = read_trajectory(robot.reference, data);
+  if (!reference) return tl::unexpected(reference.error());
+  Pose3 T_common_reference;
+  if (!robot.reference_transform.empty()) {
+    const auto transform = formats::read_transform((data / robot.reference_transform).string());
+    if (!transform) return tl::unexpected(transform.error());
+    T_common_reference = *transform;
+  }
+  if (robot.reference_offset_m.size() == 3)
+    T_common_reference.translation += Eigen::Vector3d(robot.reference_offset_m.data());
+  for (StampedPose& sample : *reference) sample.pose = T_common_reference * sample.pose;
+  return std::pair(std::move(*reference), T_common_reference);
 }
 
-/// The images of the samples to replay.
-std::shared_ptr<VisualSource> listed(const formats::MaplabRecording& from, const Trajectory& samples,
-                                     std::size_t first) {
-  const auto cameras = std::make_shared<const std::vector<Camera>>(from.cameras);
-  std::vector<TrackedImages> moments;
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    moments.push_back({samples[i].stamp, cameras, {from.images[first + i]}});
-  return std::make_shared<ListedImages>(std::move(moments));
-}
-
-Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, Rng rng) {
+Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, const visual::TrackingConfig& tracking,
+                                Rng rng) {
   std::optional<formats::MaplabRecording> maplab;
   if (!robot.images.maplab_submaps.empty()) {
-    auto read = read_maplab(robot, data);
+    auto read = read_maplab(robot.images, data);
     if (!read) return tl::unexpected(read.error());
     maplab = std::move(*read);
   }
@@ -71,19 +70,10 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
   if (!robot.reference.file.empty()) {
-    auto reference = read_trajectory(robot.reference, data);
+    auto reference = read_reference(robot, data);
     if (!reference) return tl::unexpected(reference.error());
-    Pose3 T_common_reference;
-    if (!robot.reference_transform.empty()) {
-      const auto transform = formats::read_transform((data / robot.reference_transform).string());
-      if (!transform) return tl::unexpected(transform.error());
-      T_common_reference = *transform;
-    }
-    if (robot.reference_offset_m.size() == 3)
-      T_common_reference.translation += Eigen::Vector3d(robot.reference_offset_m.data());
-    for (StampedPose& sample : *reference) sample.pose = T_common_reference * sample.pose;
-    out.recording.reference = std::move(*reference);
-    if (robot.reference.file == robot.odometry.file) out.T_common_odom = T_common_reference;
+    out.recording.reference = std::move(reference->first);
+    if (robot.reference.file == robot.odometry.file) out.T_common_odom = reference->second;
   }
   const auto [from, until] = part_of(odometry->size(), robot);
   Trajectory raw(odometry->begin() + static_cast<std::ptrdiff_t>(from),
@@ -102,19 +92,14 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     out.notes.push_back(fmt::format("{}: {}", robot.name, (*scans)->note()));
     out.recording.scans = *scans;
   }
-  if (maplab) {
-    const auto& [keyframes, keypoints, landmarks, joined, conflicts] = maplab->summary;
-    out.notes.push_back(
-        fmt::format("{}: maplab submaps with {} keyframes, {} keypoints, {} good landmarks; {} continued "
-                    "in the next submap, {} conflicts",
-                    robot.name, keyframes, keypoints, landmarks, joined, conflicts));
-    out.recording.visual = listed(*maplab, raw, from);
-    out.recording.imu_noise = maplab->imu_noise;
-    if (!robot.images.imu.empty()) {
-      auto imu = formats::read_imu_csv((data / robot.images.imu).string());
-      if (!imu) return tl::unexpected(imu.error());
-      out.recording.imu = std::move(*imu);
-    }
+  if (robot.images.is_given()) {
+    auto images =
+        maplab ? listed_images(*maplab, robot.images, data, raw, from) : open_images(robot.images, data, raw, tracking);
+    if (!images) return tl::unexpected(images.error());
+    out.notes.push_back(fmt::format("{}: {}", robot.name, images->note));
+    out.recording.visual = std::move(images->visual);
+    out.recording.imu = std::move(images->imu);
+    out.recording.imu_noise = images->imu_noise;
   }
   out.recording.increment_covariance = simulation::increment_covariances(raw, robot.covariance);
   out.recording.odometry = std::move(raw);
@@ -124,7 +109,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
 Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, const fs::path& data, const Rng& rng) {
   std::vector<MissionRecording> out;
   for (const RobotConfig& robot : config.robots) {
-    auto loaded = replay(robot, data, rng.fork("robot/" + robot.name));
+    auto loaded = replay(robot, data, config.tracking, rng.fork("robot/" + robot.name));
     if (!loaded) return in_context("robot " + robot.name, loaded.error());
     loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
     loaded->recording.name = robot.name;

@@ -144,15 +144,31 @@ void RobotActor::feed_images(std::size_t sample, Timestamp now) {
   const Recording& recording = recording_.recording;
   if (!recording.visual) return;
   const bool keyframe = node_->agent().wants_scan();
-  auto images = recording.visual->images(sample, keyframe);
-  if (!images) return note(refused_images_, images.error().message);
-  if (images->images.empty() || !keyframe) return;
+  TrackedImages images = recording.visual->images(sample, keyframe);
+  refuse_images(recording.visual->take_errors(), now);
+  if (!keyframe) return;
+  if (const auto stopped = sight_.add(recording.odometry[sample].stamp, images.images)) tell_refused(*stopped, now);
+  if (images.images.empty()) return;
   const CpuScope cpu(cpu_s_);
-  images->imu = imu_since_keyframe(images->stamp);
-  images->imu_noise = recording.imu_noise;
-  const std::size_t refused = refused_images_.count;
-  take(node_->add_images(*images, now));
-  if (refused == refused_images_.count) ++taken_images_;
+  images.imu = imu_since_keyframe(images.stamp);
+  images.imu_noise = recording.imu_noise;
+  take(node_->add_images(images, now));
+}
+
+void RobotActor::tell_refused(const std::string& why, Timestamp now) {
+  node::Step step;
+  step.tell(now, node::ImagesRefused{id(), why});
+  take(std::move(step));
+}
+
+/// All are counted; of a row of samples with errors the first is told.
+void RobotActor::refuse_images(const std::vector<Error>& errors, Timestamp now) {
+  for (const Error& error : errors)
+    if (std::exchange(images_fail_, true))
+      note(refused_images_, error.message);
+    else
+      tell_refused(error.message, now);
+  images_fail_ = !errors.empty();
 }
 
 void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
@@ -256,18 +272,15 @@ std::vector<std::string> RobotActor::troubles() const {
   add(refused_odometry_, "odometry samples refused");
   add(refused_scans_, "keyframes without a scan");
   add(refused_images_, "times images refused");
+  for (const std::string& line : sight_.notes()) out.push_back(fmt::format("{}: {}", recording_.recording.name, line));
   add(failed_updates_, "updates without a correction");
   return out;
 }
 
-Status RobotActor::check_sensors() const {
-  const auto check = [&](const char* what, std::size_t taken, const Trouble& refused) -> Status {
-    if (taken > 0 || refused.count == 0) return {};
-    return fail(ErrorCode::invalid, "robot {}: not one {} could be read: {} of {} failed, the first because: {}",
-                recording_.recording.name, what, refused.count, refused.count, refused.first);
-  };
-  if (auto ok = check("scan", taken_scans_, refused_scans_); !ok) return ok;
-  return check("image", taken_images_, refused_images_);
+Status RobotActor::check_scans() const {
+  if (taken_scans_ > 0 || refused_scans_.count == 0) return {};
+  return fail(ErrorCode::invalid, "robot {}: not one scan could be read: {} of {} failed, the first because: {}",
+              recording_.recording.name, refused_scans_.count, refused_scans_.count, refused_scans_.first);
 }
 
 }  // namespace tutti::mission

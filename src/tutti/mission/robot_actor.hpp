@@ -11,6 +11,7 @@
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/mission/evaluate.hpp"
+#include "tutti/mission/image_tally.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/node/robot_node.hpp"
@@ -42,6 +43,7 @@ class RobotActor {
 
   /// Mission time of the next sample; infinity when there is none left.
   [[nodiscard]] double next_time() const;
+  /// Is its next sample more work than a pose is?
   [[nodiscard]] bool has_sensors() const { return recording_.recording.scans || recording_.recording.visual; }
   /// Replays one odometry sample and its scan; after the last one the node closes its last submap.
   void replay_next(Timestamp now);
@@ -73,8 +75,8 @@ class RobotActor {
   /// What went wrong (bad samples or scans refused, updates without a correction): one line per kind with a count and
   /// the first case.
   [[nodiscard]] std::vector<std::string> troubles() const;
-  /// Fails when scans or images were asked for and all of them failed.
-  [[nodiscard]] Status check_sensors() const;
+  /// Fails when scans were asked for and all of them failed.
+  [[nodiscard]] Status check_scans() const;
 
  private:
   struct Member {
@@ -103,6 +105,8 @@ class RobotActor {
   void score(const Trajectory& map, UpdateRecord& update) const;
   void feed_scan(std::size_t sample, Timestamp now);
   void feed_images(std::size_t sample, Timestamp now);
+  void refuse_images(const std::vector<Error>& errors, Timestamp now);
+  void tell_refused(const std::string& why, Timestamp now);
   [[nodiscard]] std::vector<ImuSample> imu_since_keyframe(Timestamp stamp) const;
   static void note(Trouble& trouble, const std::string& message);
 
@@ -122,7 +126,8 @@ class RobotActor {
   Trouble refused_scans_;
   std::size_t taken_scans_ = 0;
   Trouble refused_images_;
-  std::size_t taken_images_ = 0;
+  bool images_fail_ = false;  // at the last sample
+  ImageTally sight_;
   Trouble failed_updates_;
 };
 

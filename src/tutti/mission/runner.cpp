@@ -119,10 +119,10 @@ class MissionRun {
     }
   }
 
-  /// Fails when a robot was to have scans or images and not one could be taken.
-  [[nodiscard]] Status check_sensors() const {
+  /// Fails when a robot was to have scans and not one could be taken.
+  [[nodiscard]] Status check_scans() const {
     for (const Robot& robot : robots_)
-      if (auto ok = robot.actor->check_sensors(); !ok) return ok;
+      if (auto ok = robot.actor->check_scans(); !ok) return ok;
     return {};
   }
   MissionRecord record() const;
@@ -329,7 +329,7 @@ Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions&
   if (const auto ok = check_links(config, input->robots); !ok) return tl::unexpected(ok.error());
   MissionRun mission(config, options, std::move(*input));
   mission.run();
-  if (const auto ok = mission.check_sensors(); !ok) return tl::unexpected(ok.error());
+  if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());
   return mission.record();
 }
 

@@ -31,9 +31,11 @@ class VisualSource {
   virtual ~VisualSource() = default;
   /// The images taken at this odometry sample, with its stamp; no images when there are none. At a keyframe, what is
   /// seen will be kept: only there descriptors are needed, which cost most. Tracks that begin after a
-  /// restart in the middle have other numbers than those before. An error is of this moment alone (a missing or corrupt
-  /// file): the next samples can be asked for.
-  [[nodiscard]] virtual Result<TrackedImages> images(std::size_t sample, bool keyframe) = 0;
+  /// restart in the middle have other numbers than those before.
+  [[nodiscard]] virtual TrackedImages images(std::size_t sample, bool keyframe) = 0;
+  /// What went wrong since the last call: images that are missing or corrupt, one error each, of samples and between
+  /// them. They are lost alone.
+  virtual std::vector<Error> take_errors() { return {}; }
 };
 
 /// Where simulated odometry really went wrong. Known to the evaluation only.

@@ -7,8 +7,9 @@
 namespace tutti::simulation {
 namespace {
 
-/// As EuRoC's left camera, looking ahead.
-Camera make_camera(bool half_resolution) {
+/// As EuRoC's, looking ahead.
+std::vector<Camera> make_cameras(int count, bool half_resolution) {
+  constexpr double kBaseline_m = 0.11;
   const CameraModel model{.kind = CameraKind::pinhole,
                           .width_px = 752,
                           .height_px = 480,
@@ -19,7 +20,11 @@ Camera make_camera(bool half_resolution) {
                           .distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}};
   Eigen::Matrix3d R_body_camera;  // z ahead, x to the right, y down
   R_body_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {half_resolution ? halved(model) : model, {Eigen::Quaterniond(R_body_camera), {0.1, 0.0, 0.0}}};
+  std::vector<Camera> out;
+  for (int i = 0; i < count; ++i)
+    out.push_back(
+        {half_resolution ? halved(model) : model, {Eigen::Quaterniond(R_body_camera), {0.1, -kBaseline_m * i, 0.0}}});
+  return out;
 }
 
 Status check_names(const std::vector<FlyingRobotConfig>& robots) {
@@ -53,8 +58,8 @@ Result<SimulatedHall> simulate_hall(const HallMissionConfig& config, Timestamp s
     if (robot.sensors != "visual")
       recording.scans = std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar, own.fork("lidar"));
     if (robot.sensors != "lidar") {
-      flown.images = simulate_images(scene, {make_camera(config.half_resolution)}, recording.reference, config.images,
-                                     own.fork("images"));
+      flown.images = simulate_images(scene, make_cameras(config.cameras, config.half_resolution), recording.reference,
+                                     config.images, own.fork("images"));
       if (config.imu) {
         recording.imu = simulate_imu([&](double time_s) { return flight_motion(robot.flight, time_s); },
                                      start + robot.start_s, robot.flight.duration_s, config.imu_noise, own.fork("imu"));

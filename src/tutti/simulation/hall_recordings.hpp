@@ -39,6 +39,7 @@ struct FlyingRobotConfig {
 struct HallMissionConfig {
   HallConfig world;
   ImageConfig images;
+  int cameras = 1;
   bool half_resolution = true;
   bool imu = true;
   LidarConfig lidar;
@@ -48,6 +49,7 @@ struct HallMissionConfig {
   void describe(V& v) {
     v.field("world", world, any(), "Where they fly.");
     v.field("images", images, any(), "Noise and exposure of the cameras.");
+    v.field("cameras", cameras, between(1, 2), "Of a robot with any; the second is 11 cm to the right of the first.");
     v.field("half_resolution", half_resolution, any(),
             "Images of 376 x 240 instead of 752 x 480 pixels: a quarter of the time.");
     v.field("imu", imu, any(), "Robots with a camera have an IMU, too.");

@@ -144,6 +144,14 @@ Json traffic_json(const std::vector<TrafficRecord>& traffic) {
   return rows;
 }
 
+Json images_json(const std::optional<ImagesRecord>& images) {
+  if (!images) return nullptr;
+  return {{"keyframes", images->keyframes},
+          {"landmarks", images->landmarks},
+          {"landmarks_per_keyframe", number(images->landmarks_per_keyframe)},
+          {"reprojection_rms_px", number(images->reprojection_rms_px)}};
+}
+
 Json robot_json(const RobotRecord& robot, bool tied) {
   Json policies = Json::object();
   for (const auto& policy : robot.policies) policies[policy.name] = policy_json(robot, policy);
@@ -173,6 +181,7 @@ Json robot_json(const RobotRecord& robot, bool tied) {
               {"messages_down", robot.messages_down},
               {"traffic", traffic_json(robot.traffic)},
               {"proxy_nodes", robot.proxy_nodes},
+              {"images", images_json(robot.images)},
               {"updates", robot.updates.size()},
               {"course", course_json(robot)}});
   return out;

@@ -32,7 +32,7 @@ TEST(ReportJson, HasTheDocumentedKeys) {
   ASSERT_EQ(report["robots"].size(), 2U);
   for (const auto& robot : report["robots"]) {
     expect_keys(robot, {"name", "distance_m", "odometry_factors", "rotation_variance_factor", "onboard_rmse_m",
-                        "server_rmse_m", "policies", "bytes_up", "bytes_down", "traffic", "proxy_nodes"});
+                        "server_rmse_m", "policies", "bytes_up", "bytes_down", "traffic", "proxy_nodes", "images"});
     ASSERT_EQ(robot["traffic"].size(), 2U);
     for (const auto& row : robot["traffic"])
       expect_keys(row,

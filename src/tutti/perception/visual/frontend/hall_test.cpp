@@ -2,6 +2,7 @@
 // From simulated images to landmarks and revisits, without any recording.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 
 #include "tutti/geometry/so3.hpp"
@@ -26,14 +27,20 @@ class Hall : public testing::Test {
 
   /// The keyframes of a few seconds of flight that begins `start_deg` round the hall, with true poses.
   std::vector<KeyframeImages> fly(const std::vector<Camera>& cameras, double start_deg, double duration_s) const {
-    const Trajectory truth = simulation::simulate_flight(
-        {.duration_s = duration_s, .rate_hz = kRate_hz, .start_deg = start_deg}, Timestamp{0});
+    return see(cameras,
+               simulation::simulate_flight({.duration_s = duration_s, .rate_hz = kRate_hz, .start_deg = start_deg},
+                                           Timestamp{0}),
+               3);  // about every 0.3 m
+  }
+  /// Every so many poses a keyframe.
+  std::vector<KeyframeImages> see(const std::vector<Camera>& cameras, const Trajectory& truth,
+                                  std::size_t every) const {
     const auto source =
         TrackingSource::open(simulation::simulate_images(scene_, cameras, truth, {}, Rng(3)), truth, {}).value();
     std::vector<KeyframeImages> out;
     for (std::size_t i = 0; i < truth.size(); ++i) {
-      const bool keyframe = i % 3 == 0;  // about every 0.3 m
-      auto images = source->images(i, keyframe).value().images;
+      const bool keyframe = i % every == 0;
+      auto images = source->images(i, keyframe).images;
       if (keyframe) out.push_back({static_cast<std::uint32_t>(out.size()), truth[i].pose, std::move(images)});
     }
     return out;
@@ -76,6 +83,30 @@ TEST_F(Hall, LandmarksReprojectWithinAPixelAndLieOnTheWalls) {
     EXPECT_GE(within, 0.95 * views) << within << " of " << views << ", cameras " << count;
     EXPECT_GE(near, 0.85 * views) << near << " of " << views << ", cameras " << count;
   }
+}
+
+TEST_F(Hall, StereoHasDepthWhereNothingTranslates) {
+  const Pose3 place = simulation::simulate_flight({.duration_s = 0.1}, Timestamp{0}).front().pose;
+  Trajectory turning;
+  for (int i = 0; i < 3; ++i)
+    turning.push_back({Timestamp{0} + 0.1 * i, place * Pose3{so3_exp({0.0, 0.0, 0.02 * i}), Eigen::Vector3d::Zero()}});
+  const std::vector<Camera> cameras = stereo();
+  const auto stereo_images = see(cameras, turning, 1), mono = see({cameras[0]}, turning, 1);
+  EXPECT_TRUE(make_visual_payload(mono, {cameras[0]}, {}).value().landmarks.empty());
+  const VisualPayload payload = make_visual_payload(stereo_images, cameras, {}).value();
+  EXPECT_GE(payload.landmarks.size(), 100U);
+  std::size_t right = 0;
+  std::vector<double> relative;
+  const Pose3 T_world_camera = place * cameras[0].T_body_camera;
+  for (const Landmark& landmark : payload.landmarks) {
+    const Eigen::Vector3d point = landmark.position.cast<double>();
+    const double error_m = depth_error(T_world_camera, point);
+    right += error_m < 4.0 * landmark.sigma_m + 0.02 ? 1 : 0;
+    relative.push_back(error_m / (point - T_world_camera.translation).norm());
+  }
+  EXPECT_GE(10 * right, 9 * payload.landmarks.size()) << right << " of " << payload.landmarks.size();
+  std::ranges::nth_element(relative, relative.begin() + relative.size() / 2);
+  EXPECT_LT(relative[relative.size() / 2], 0.05);
 }
 
 TEST_F(Hall, RevisitsAreKnownByTheirDescriptors) {

@@ -33,9 +33,10 @@ Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odom
       offsets.push_back(sample.stamp - stamps[nearest(stamps, sample.stamp)]);
   if (offsets.empty())
     return fail(ErrorCode::invalid,
-                "images from {} to {} ns and odometry from {} to {} ns have no moment in common: the odometry begins "
-                "{:.3f} s after the images; is that the offset of their clocks?",
-                stamps.front().ns, stamps.back().ns, begin.ns, end.ns, begin - stamps.front());
+                "images from {} to {} ns and odometry from {} to {} ns have no moment in common: the images begin "
+                "{:.3f} s {} the odometry; is that the offset of their clocks?",
+                stamps.front().ns, stamps.back().ns, begin.ns, end.ns, std::abs(begin - stamps.front()),
+                begin < stamps.front() ? "after" : "before");
   const auto images = static_cast<std::size_t>(std::ranges::count_if(
       stamps, [&](Timestamp stamp) { return begin - tolerance_s <= stamp && stamp <= end + tolerance_s; }));
   const auto matched = static_cast<std::size_t>(
@@ -48,8 +49,9 @@ Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odom
     return *at;
   };
   return fail(ErrorCode::invalid,
-              "of {} odometry samples that could have an image {} have one within {} s: the odometry is {:.4f} s after "
-              "the nearest image (median; {:.4f} to {:.4f} for the middle half); is that the offset of their clocks?",
+              "of {} odometry samples that could have an image {} have one within {} s: to come to the nearest sample, "
+              "add {:.4f} s to the images' stamps (median; {:.4f} to {:.4f} for the middle half); is that the offset "
+              "of their clocks?",
               possible, matched, tolerance_s, quantile(0.5), quantile(0.25), quantile(0.75));
 }
 
@@ -71,9 +73,10 @@ TrackingSource::TrackingSource(ImageStream stream, Trajectory odometry, const Tr
       cameras_(std::make_shared<const std::vector<Camera>>(stream_.cameras)),
       odometry_(std::move(odometry)),
       config_(config),
-      tracker_(stream_.cameras, config.tracker) {}
+      tracker_(stream_.cameras, config.tracker),
+      clock_(stream_.cameras.front()) {}
 
-Result<TrackedImages> TrackingSource::images(std::size_t sample, bool keyframe) {
+TrackedImages TrackingSource::images(std::size_t sample, bool keyframe) {
   TUTTI_CHECK(sample < odometry_.size(), "sample {} of {}", sample, odometry_.size());
   const Timestamp stamp = odometry_[sample].stamp;
   TrackedImages out{.stamp = stamp, .cameras = cameras_, .images = {}};
@@ -90,13 +93,22 @@ Result<TrackedImages> TrackingSource::images(std::size_t sample, bool keyframe) 
   const bool is_of_sample = std::abs(stream_.stamps[moment] - stamp) <= config_.max_stamp_difference_s;
   if (!is_of_sample || moment < next_moment_) return out;
   next_moment_ = moment + 1;
-  auto images = track(moment, keyframe);
-  if (!images) return tl::unexpected(images.error());
-  out.images = *std::move(images);
+  out.images = track(moment, keyframe);
+  if (sample + 1 == odometry_.size() || clock_.pairs() == ClockCheck::kPairs) check_clock();
   return out;
 }
 
-Result<std::vector<TrackedImage>> TrackingSource::track(std::size_t moment, bool keyframe) {
+void TrackingSource::check_clock() {
+  if (std::exchange(clock_checked_, true)) return;
+  if (const auto offset_s = clock_.offset_s(odometry_))
+    errors_.push_back(
+        {ErrorCode::invalid, fmt::format("points move through the images as if these were taken "
+                                         "{:.2f} s {} their stamps: to come to the odometry's clock, "
+                                         "add {:.2f} s to them?",
+                                         std::abs(*offset_s), *offset_s > 0.0 ? "after" : "before", *offset_s)});
+}
+
+std::vector<TrackedImage> TrackingSource::track(std::size_t moment, bool keyframe) {
   std::vector<Image> images;
   for (std::size_t camera = 0; camera < stream_.cameras.size(); ++camera) {
     auto image = stream_.load(moment, camera);
@@ -104,11 +116,13 @@ Result<std::vector<TrackedImage>> TrackingSource::track(std::size_t moment, bool
       const auto ok = check_sizes({&*image, 1}, {&stream_.cameras[camera], 1});
       if (!ok) image = in_context(fmt::format("camera {} at {} ns", camera, stream_.stamps[moment].ns), ok.error());
     }
-    if (!image) unreadable_.push_back(image.error());
-    if (!image && camera == 0) return tl::unexpected(image.error());
+    if (!image) errors_.push_back(image.error());
+    if (!image && camera == 0) return {};
     images.push_back(image ? *std::move(image) : Image());
   }
-  return tracker_.track(images, keyframe);
+  auto tracked = tracker_.track(images, keyframe);
+  if (!tracked.empty()) clock_.add(stream_.stamps[moment], tracked.front());
+  return tracked;
 }
 
 }  // namespace tutti::visual

@@ -3,12 +3,14 @@
 
 #include <cstddef>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/recording.hpp"
+#include "tutti/perception/visual/clock_check.hpp"
 #include "tutti/perception/visual/frontend/visual_tracker.hpp"
 
 namespace tutti::visual {
@@ -25,29 +27,31 @@ struct TrackingConfig {
 };
 
 /// Follows points through all images of a stream and serves those of the odometry's samples. Samples are asked for one
-/// after the other; after a jump forward (a restart) tracks begin anew, a sample asked for again has no images.
+/// after the other; after a jump forward (a restart) tracks begin anew, a sample asked for again has no images. Among
+/// the errors is, once, a clock of the images that is not the odometry's.
 class TrackingSource : public VisualSource {
  public:
   /// Fails when the stream's stamps are not those of the odometry, saying by how much they differ.
   static Result<std::shared_ptr<TrackingSource>> open(ImageStream stream, Trajectory odometry,
                                                       const TrackingConfig& config);
 
-  [[nodiscard]] Result<TrackedImages> images(std::size_t sample, bool keyframe) override;
-
-  /// Every image that could not be read so far; those between samples, and of a second camera, too.
-  [[nodiscard]] const std::vector<Error>& unreadable() const { return unreadable_; }
+  [[nodiscard]] TrackedImages images(std::size_t sample, bool keyframe) override;
+  std::vector<Error> take_errors() override { return std::exchange(errors_, {}); }
 
  private:
   TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config);
-  [[nodiscard]] Result<std::vector<TrackedImage>> track(std::size_t moment, bool keyframe);
+  void check_clock();
+  [[nodiscard]] std::vector<TrackedImage> track(std::size_t moment, bool keyframe);
 
   ImageStream stream_;
   std::shared_ptr<const std::vector<Camera>> cameras_;
   Trajectory odometry_;
   TrackingConfig config_;
   VisualTracker tracker_;
+  ClockCheck clock_;
+  bool clock_checked_ = false;
   std::size_t next_moment_ = 0, next_sample_ = 0;
-  std::vector<Error> unreadable_;
+  std::vector<Error> errors_;
 };
 
 }  // namespace tutti::visual

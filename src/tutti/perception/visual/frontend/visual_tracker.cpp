@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/perception/visual/clock_check.hpp"
 #include "tutti/perception/visual/frontend/internal/optical_flow.hpp"
 #include "tutti/perception/visual/frontend/internal/spread.hpp"
 
@@ -21,17 +22,6 @@ std::vector<Eigen::Vector2f> pixels_of(std::span<const TrackedKeypoint> keypoint
 
 internal::FlowRule flow_rule(const TrackerConfig& config) {
   return {.window_px = config.window_px, .levels = config.levels, .agreement_px = config.agreement_px};
-}
-
-/// How far two unit rays to a point are from lying in one plane with the two cameras, rad: the smaller of the angles
-/// between a ray and the plane of the other one and the baseline. Without a baseline there is no such plane: 0.
-double epipolar_error_rad(const Pose3& T_first_second, const Eigen::Vector3d& ray_first,
-                          const Eigen::Vector3d& ray_second) {
-  const Eigen::Vector3d turned = T_first_second.rotation * ray_second;  // in the first camera
-  const Eigen::Vector3d volume = T_first_second.translation.cross(turned);
-  const Eigen::Vector3d normal_first = T_first_second.translation.cross(ray_first);
-  const double area = std::max(volume.norm(), normal_first.norm());
-  return area > 0.0 ? std::abs(ray_first.dot(volume)) / area : 0.0;
 }
 
 }  // namespace

@@ -10,6 +10,6 @@ Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream, Trajec
               "images cannot be tracked: this program was built without OpenCV (TUTTI_BUILD_VISUAL=OFF)");
 }
 
-Result<TrackedImages> TrackingSource::images(std::size_t, bool) { TUTTI_CHECK(false, "there is no such source"); }
+TrackedImages TrackingSource::images(std::size_t, bool) { TUTTI_CHECK(false, "there is no such source"); }
 
 }  // namespace tutti::visual

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/robot_images.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "tutti/formats/image_file.hpp"
+#include "tutti/formats/image_folder.hpp"
+#include "tutti/formats/imu_file.hpp"
+#include "tutti/perception/visual/frontend/tracking_source.hpp"
+
+namespace tutti::mission {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Images that were tracked before, one moment per odometry sample.
+class ListedImages final : public VisualSource {
+ public:
+  explicit ListedImages(std::vector<TrackedImages> moments) : moments_(std::move(moments)) {}
+  [[nodiscard]] TrackedImages images(std::size_t sample, bool) override { return moments_.at(sample); }
+
+ private:
+  std::vector<TrackedImages> moments_;
+};
+
+/// Of a robot whose images are not used: says why, once.
+class NoImages final : public VisualSource {
+ public:
+  explicit NoImages(Error why) : why_{std::move(why)} {}
+  [[nodiscard]] TrackedImages images(std::size_t, bool) override { return {}; }
+  std::vector<Error> take_errors() override { return std::exchange(why_, {}); }
+
+ private:
+  std::vector<Error> why_;
+};
+
+Result<std::vector<ImuSample>> read_imu(const ImagesConfig& config, const fs::path& data) {
+  if (config.imu.empty()) return std::vector<ImuSample>();
+  auto imu = formats::read_imu_csv((data / config.imu).string());
+  return imu ? imu : in_context("images.imu", imu.error());
+}
+
+Result<formats::EurocFolder> read_folder(const ImagesConfig& config, const fs::path& data) {
+  if (!config.euroc_folder.empty()) {
+    auto folder = formats::read_euroc_folder((data / config.euroc_folder).string());
+    if (!folder) return in_context("images.euroc_folder", folder.error());
+    return folder;
+  }
+  const auto cameras = formats::read_cameras((data / config.cameras).string());
+  if (!cameras) return in_context("images.cameras", cameras.error());
+  const fs::path list = data / config.list;
+  auto images = formats::read_image_list(list.string(), list.parent_path().string(), *cameras);
+  if (!images) return in_context("images.list", images.error());
+  formats::EurocFolder out{.cameras = std::move(*images), .imu = {}, .imu_noise = {}};
+  auto imu = read_imu(config, data);
+  if (!imu) return tl::unexpected(imu.error());
+  out.imu = std::move(*imu);
+  return out;
+}
+
+}  // namespace
+
+Result<formats::MaplabRecording> read_maplab(const ImagesConfig& config, const fs::path& data) {
+  std::vector<std::string> folders;
+  for (const std::string& folder : config.maplab_submaps) folders.push_back((data / folder).string());
+  return formats::read_maplab_submaps(folders);
+}
+
+Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const ImagesConfig& config,
+                                  const fs::path& data, const Trajectory& samples, std::size_t first) {
+  auto imu = read_imu(config, data);
+  if (!imu) return tl::unexpected(imu.error());
+  const auto cameras = std::make_shared<const std::vector<Camera>>(maplab.cameras);
+  std::vector<TrackedImages> moments;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    moments.push_back({samples[i].stamp, cameras, {maplab.images[first + i]}, {}, {}});
+  const auto& [keyframes, keypoints, landmarks, joined, conflicts] = maplab.summary;
+  return RobotImages{.visual = std::make_shared<ListedImages>(std::move(moments)),
+                     .imu = std::move(*imu),
+                     .imu_noise = maplab.imu_noise,
+                     .note = fmt::format("maplab submaps with {} keyframes, {} keypoints, {} good landmarks; {} "
+                                         "continued in the next submap, {} conflicts",
+                                         keyframes, keypoints, landmarks, joined, conflicts)};
+}
+
+Result<RobotImages> open_images(const ImagesConfig& config, const fs::path& data, const Trajectory& odometry,
+                                const visual::TrackingConfig& tracking) {
+  auto folder = read_folder(config, data);
+  if (!folder) return tl::unexpected(folder.error());
+  if (folder->cameras.size() > static_cast<std::size_t>(config.most_cameras))
+    folder->cameras.erase(folder->cameras.begin() + config.most_cameras, folder->cameras.end());
+  for (formats::CameraImages& camera : folder->cameras)
+    for (formats::ImageFile& image : camera.images) image.stamp = image.stamp + config.time_offset_s;
+  ImageStream stream = formats::stream_images(std::move(folder->cameras), tracking.max_stamp_difference_s);
+  RobotImages out{.visual = nullptr, .imu = std::move(folder->imu), .imu_noise = folder->imu_noise, .note = {}};
+  out.note = fmt::format("{} images of {}, {}", stream.stamps.size(),
+                         stream.cameras.size() == 1 ? "one camera" : "each of two cameras",
+                         out.imu.empty() ? "no IMU" : "and an IMU");
+  auto source = visual::TrackingSource::open(std::move(stream), odometry, tracking);
+  if (!source && source.error().code == ErrorCode::unsupported) return tl::unexpected(source.error());
+  if (source)
+    out.visual = std::move(*source);
+  else
+    out.visual = std::make_shared<NoImages>(Error{
+        source.error().code,
+        fmt::format("{}; none are used (images.time_offset_s is {})", source.error().message, config.time_offset_s)});
+  return out;
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/formats/maplab_submaps.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/model/recording.hpp"
+
+namespace tutti::mission {
+
+/// What a robot's cameras and its IMU recorded.
+struct RobotImages {
+  std::shared_ptr<VisualSource> visual;
+  std::vector<ImuSample> imu;  ///< Empty when there is none.
+  ImuNoise imu_noise;
+  std::string note;  ///< What was found, for the report.
+};
+
+/// Of config.maplab_submaps.
+Result<formats::MaplabRecording> read_maplab(const ImagesConfig& config, const std::filesystem::path& data);
+/// What was tracked at its keyframes, of which `samples` are those from `first` on.
+Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const ImagesConfig& config,
+                                  const std::filesystem::path& data, const Trajectory& samples, std::size_t first);
+
+/// Images of config.euroc_folder or .list, which points are followed through; those of the odometry's samples are
+/// served. Files that are not there or say nothing sensible are an error that names them; images whose stamps are not
+/// the odometry's are not: then the source has none and says why, and the robot goes on with odometry alone.
+Result<RobotImages> open_images(const ImagesConfig& config, const std::filesystem::path& data,
+                                const Trajectory& odometry, const visual::TrackingConfig& tracking);
+
+}  // namespace tutti::mission

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/robot_images.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "support/mission/asl_folder.hpp"
+#include "tutti/formats/trajectory_file.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/mission/runner.hpp"
+#include "tutti/simulation/camera.hpp"
+#include "tutti/simulation/flight.hpp"
+#include "tutti/simulation/imu.hpp"
+
+namespace tutti::mission {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Timestamp kStart{1'403'636'579'763'555'584};
+constexpr double kRate_hz = 8.0;
+
+std::vector<Camera> small_stereo() {
+  const CameraModel model = simulation::halved(
+      simulation::halved({CameraKind::pinhole, 752, 480, 458.7, 457.3, 367.2, 248.4, {-0.283, 0.074, 2e-4, 1.8e-5}}));
+  const Eigen::Quaterniond ahead((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished());
+  return {{model, {ahead, {0.0, 0.055, 0.0}}}, {model, {ahead, {0.0, -0.055, 0.0}}}};
+}
+
+/// The simulated hall, written as an ASL folder `hall` and as a list, and the true way as odometry.
+class RobotImages : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    const simulation::FlightConfig flight{.duration_s = 4.0, .rate_hz = kRate_hz};
+    const Trajectory truth = simulation::simulate_flight(flight, kStart);
+    const auto scene = std::make_shared<const simulation::HallScene>(simulation::make_hall({}, Rng(1)));
+    const ImageStream stream = simulation::simulate_images(scene, small_stereo(), truth, {}, Rng(3));
+    const auto imu = simulation::simulate_imu([&](double time_s) { return simulation::flight_motion(flight, time_s); },
+                                              kStart, flight.duration_s, {}, Rng(4));
+    test::write_asl_folder(folder() / "hall", stream, imu);
+    ASSERT_TRUE(formats::write_tum((folder() / "odometry.tum").string(), truth));
+    std::ofstream list(folder() / "list.csv");
+    for (const Timestamp stamp : stream.stamps) list << fmt::format("{0},hall/mav0/cam0/data/{0}.png\n", stamp.ns);
+    const auto& [m, T_body_camera] = stream.cameras[0];
+    std::ofstream(folder() / "cameras.yaml") << fmt::format(
+        "cameras:\n  - {{width_px: {}, height_px: {}, intrinsics: [{}, {}, {}, {}], distortion: [{}, {}, {}, {}], "
+        "T_body_camera: {}}}\n",
+        m.width_px, m.height_px, m.fx, m.fy, m.cx, m.cy, m.distortion[0], m.distortion[1], m.distortion[2],
+        m.distortion[3], test::matrix_of(T_body_camera));
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder()); }
+  static fs::path folder() { return fs::path(testing::TempDir()) / "tutti_robot_images"; }
+
+  RobotImages() {
+    config_.robots = {{.name = "a", .odometry = {.file = "odometry.tum"}, .images = {.euroc_folder = "hall"}}};
+    config_.agent.submap.duration_s = 2.0;
+    config_.closures.finder = "visual";
+    config_.tracking.tracker.descriptors.kind = "orb";
+  }
+  [[nodiscard]] MissionRecord run() const {
+    auto record = run_mission(config_, {.data = folder()});
+    EXPECT_TRUE(record.has_value()) << record.error().message;
+    return record ? std::move(*record) : MissionRecord{};
+  }
+  /// Of the first sample's images.
+  [[nodiscard]] std::string first_error() const {
+    auto input = load_input(config_, folder(), 1);
+    if (!input) return input.error().message;
+    VisualSource& source = *input->robots[0].recording.visual;
+    static_cast<void>(source.images(0, true));
+    const auto errors = source.take_errors();
+    return errors.empty() ? "" : errors[0].message;
+  }
+
+  MissionConfig config_;
+};
+
+bool has_note(const MissionRecord& record, const std::string& words) {
+  return std::ranges::any_of(record.notes,
+                             [&](const std::string& note) { return note.find(words) != std::string::npos; });
+}
+std::string all_notes(const MissionRecord& record) { return fmt::format("{}", fmt::join(record.notes, "\n")); }
+
+TEST_F(RobotImages, AnEurocFolderBecomesSubmapsWithLandmarks) {
+  for (const int cameras : {1, 2}) {
+    config_.robots[0].images.most_cameras = cameras;
+    const MissionRecord record = run();
+    ASSERT_EQ(record.robots.size(), 1U);
+    EXPECT_TRUE(has_note(record, cameras == 1 ? "33 images of one camera" : "33 images of each of two cameras"))
+        << all_notes(record);
+    EXPECT_FALSE(has_note(record, "refused")) << all_notes(record);
+    const auto& images = record.robots[0].images;
+    ASSERT_TRUE(images.has_value());
+    EXPECT_EQ(images->keyframes, record.robots[0].keyframes);
+    EXPECT_GT(images->landmarks_per_keyframe, 20.0 * cameras);
+    EXPECT_GT(images->reprojection_rms_px, 0.05);
+    EXPECT_LT(images->reprojection_rms_px, 0.6);
+  }
+}
+
+TEST_F(RobotImages, AListWithACamerasFileIsTheSame) {
+  config_.robots[0].images.most_cameras = 1;
+  const auto folder = load_input(config_, RobotImages::folder(), 1);
+  config_.robots[0].images = {.list = "list.csv", .cameras = "cameras.yaml", .imu = "hall/mav0/imu0/data.csv"};
+  const auto list = load_input(config_, RobotImages::folder(), 1);
+  ASSERT_TRUE(folder && list) << list.error().message;
+  const auto images = [](const Result<MissionInput>& input) {
+    return input->robots[0].recording.visual->images(0, true).images.at(0);
+  };
+  EXPECT_EQ(images(folder), images(list));
+  EXPECT_EQ(folder->robots[0].recording.imu, list->robots[0].recording.imu);
+  EXPECT_FALSE(list->robots[0].recording.imu.empty());
+}
+
+TEST_F(RobotImages, StampsOfAnotherClockAreSaidAndTheOffsetIsASetting) {
+  config_.robots[0].images.time_offset_s = 0.03;
+  EXPECT_NE(first_error().find("add -0.0300 s"), std::string::npos) << first_error();
+  EXPECT_NE(first_error().find("images.time_offset_s is 0.03"), std::string::npos) << first_error();
+  config_.robots[0].images.time_offset_s = -1'403'636'000.0;
+  EXPECT_NE(first_error().find("begin 1403636000.000 s before"), std::string::npos) << first_error();
+  const MissionRecord record = run();  // goes on
+  EXPECT_TRUE(has_note(record, "a: 1 times images refused, the first because: images from")) << all_notes(record);
+  EXPECT_EQ(record.robots[0].submaps, 2U);
+  EXPECT_FALSE(record.robots[0].images.has_value());
+  // Images of a camera that counts from another second.
+  auto& images = config_.robots[0].images;
+  images = {.list = "late.csv", .cameras = "cameras.yaml", .time_offset_s = -0.03};
+  std::ofstream late(folder() / "late.csv");
+  for (int i = 0; i <= 4 * kRate_hz; ++i)
+    late << fmt::format("{},hall/mav0/cam0/data/{}.png\n", (kStart + (i / kRate_hz + 0.03)).ns,
+                        (kStart + i / kRate_hz).ns);
+  late.close();
+  EXPECT_EQ(first_error(), "");
+}
+
+TEST_F(RobotImages, LostImagesAreLostAloneAndNamed) {
+  auto& images = config_.robots[0].images;
+  images = {.list = "lost.csv", .cameras = "cameras.yaml"};
+  std::ofstream lost(folder() / "lost.csv");
+  for (int i = 0; i <= 3 * kRate_hz; ++i)  // and stops a second before the end
+    lost << fmt::format("{},hall/mav0/cam0/data/{}.png\n", (kStart + i / kRate_hz).ns,
+                        i % 8 == 7 ? 0 : (kStart + i / kRate_hz).ns);
+  lost.close();
+  const MissionRecord record = run();
+  EXPECT_TRUE(has_note(record, "a: 3 times images refused, the first because: ")) << all_notes(record);
+  EXPECT_TRUE(has_note(record, "a: no image at ")) << all_notes(record);
+  EXPECT_TRUE(has_note(record, "hall/mav0/cam0/data/0.png")) << all_notes(record);
+  ASSERT_TRUE(record.robots[0].images.has_value());
+  EXPECT_GT(record.robots[0].images->landmarks_per_keyframe, 20.0);
+}
+
+TEST_F(RobotImages, AWrongCalibrationIsSaidBeforeAnythingIsMerged) {
+  std::ifstream good(folder() / "cameras.yaml");
+  std::string text((std::istreambuf_iterator<char>(good)), {});
+  const std::size_t at = text.find("T_body_camera");
+  text = text.substr(0, at) + "T_body_camera: " + test::matrix_of({}) + "}\n";  // looks up
+  std::ofstream(folder() / "wrong.yaml") << text;
+  config_.robots[0].images = {.list = "list.csv", .cameras = "wrong.yaml"};
+  const MissionRecord record = run();
+  EXPECT_TRUE(has_note(record, "a: 2 times images refused, the first because: images of submap")) << all_notes(record);
+  EXPECT_TRUE(has_note(record, "calibration, camera pose on the body, stamps or odometry are wrong"))
+      << all_notes(record);
+  EXPECT_EQ(record.robots[0].submaps, 2U);
+  EXPECT_FALSE(record.robots[0].images.has_value());
+}
+
+TEST_F(RobotImages, WhatIsNotThereIsNamedBeforeTheMission) {
+  config_.robots[0].images = {.euroc_folder = "euroc/MH_01"};
+  EXPECT_EQ(first_error(),
+            fmt::format("robot a: images.euroc_folder: {}/euroc/MH_01: there is no folder cam0, expected EuRoC's "
+                        "mav0/cam0 (docs/data.md says where recordings come from)",
+                        folder().string()));
+  config_.robots[0].images = {.list = "list.csv", .cameras = "nothing.yaml"};
+  EXPECT_NE(first_error().find("robot a: images.cameras: "), std::string::npos) << first_error();
+  EXPECT_NE(first_error().find("nothing.yaml"), std::string::npos) << first_error();
+}
+
+}  // namespace
+}  // namespace tutti::mission
