@@ -186,6 +186,7 @@ Step ServerNode::resume(Timestamp now) {
   for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   send_refinement_job(now, step);
+  note_settling(now);
   return step;
 }
 
@@ -346,6 +347,7 @@ bus::Envelope ServerNode::own_graph(RobotId robot, const ProxyGraphMessage& mess
 Step ServerNode::on_timer(Timestamp now) {
   Step step;
   ask_again(now, step);
+  settle(now, step);
   if (!timer_ || now < *timer_) return step;
   timer_.reset();
   ++changes_;
@@ -355,6 +357,7 @@ Step ServerNode::on_timer(Timestamp now) {
   step.tell(now,
             MapUpdated{server_.state().revision, server_.state().submaps.size(), static_cast<std::size_t>(accepted)});
   send_refinement_job(now, step);
+  note_settling(now);
   return step;
 }
 

@@ -108,6 +108,9 @@ class ServerNode {
   void note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step);
   void give_up_refinement(std::uint64_t revision, const std::string& why, Timestamp now, Step& step);
   void refine_again(Timestamp now, Step& step);
+  /// The map has been updated: when all of it is to be refined, if nothing more comes.
+  void note_settling(Timestamp now);
+  void settle(Timestamp now, Step& step);
   /// How long after the so-manieth failure, s.
   [[nodiscard]] double failed_again_after(unsigned times) const;
   /// No worker could verify it this time: it is asked again later, or refused.
@@ -147,6 +150,7 @@ class ServerNode {
     Timestamp due;
   };
   std::optional<RefineAgain> refine_again_;
+  std::optional<Timestamp> settle_at_;
   std::uint64_t changes_ = 0;
   std::uint64_t start_ = 0;  // of all on this store; names jobs
   std::uint64_t jobs_ = 0;   // sent in this start

@@ -79,6 +79,19 @@ void ServerNode::give_up_refinement(std::uint64_t revision, const std::string& w
   step.tell(now, RefinementFailed{revision, why, true});
 }
 
+void ServerNode::note_settling(Timestamp now) {
+  settle_at_.reset();
+  if (server_.is_unsettled())
+    settle_at_ = now + static_cast<double>(config_.server.refine_every) * config_.server.update_period_s;
+}
+
+void ServerNode::settle(Timestamp now, Step& step) {
+  if (!settle_at_ || *settle_at_ > now) return;
+  settle_at_.reset();
+  server_.settle();
+  send_refinement_job(now, step);
+}
+
 void ServerNode::refine_again(Timestamp now, Step& step) {
   if (!refine_again_ || refine_again_->due > now) return;
   ask_for_refinement(std::exchange(refine_again_, std::nullopt)->job, now, 0, step);

@@ -114,6 +114,26 @@ TEST_F(ServerRefinement, LeavesAsAJobAndTheNextUpdateHasIt) {
   EXPECT_EQ(node_->mission_status(now_).pending_jobs, 0U);
 }
 
+TEST_F(ServerRefinement, OfAPartIsFollowedByOneOfTheWholeWhenNothingMoreComes) {
+  for (std::uint32_t i = 0; i < 6; ++i) take(i);
+  answer(wait(10.0).at(0));
+  EXPECT_TRUE(wait(100.0).empty());
+  take(6);
+  const auto part = wait(10.0);
+  ASSERT_EQ(part.size(), 1U);
+  EXPECT_FALSE(wire::decode_refinement_job(*part[0].bytes)->whole);
+  answer(part[0]);
+  EXPECT_TRUE(wait(50.0).empty());
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
+  const auto whole = wait(10.0);
+  ASSERT_EQ(whole.size(), 1U);
+  EXPECT_TRUE(wire::decode_refinement_job(*whole[0].bytes)->whole);
+  answer(whole[0]);
+  EXPECT_TRUE(wait(1e4).empty());
+  EXPECT_EQ(rows(), 1U);
+  EXPECT_NEAR(length(), 0.99 * 21.0, 1e-6);
+}
+
 TEST_F(ServerRefinement, IsThereAfterARestart) {
   take(0);
   take(1);

@@ -90,7 +90,8 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
                     .submaps = state.submaps.size(),
                     .closures = static_cast<std::uint64_t>(accepted),
                     .components = server_.map().components,
-                    .pending_jobs = open_jobs_.size() + static_cast<std::uint64_t>(later) + (refine_again_ ? 1 : 0),
+                    .pending_jobs = open_jobs_.size() + static_cast<std::uint64_t>(later) + (refine_again_ ? 1 : 0) +
+                                    (settle_at_ ? 1 : 0),
                     .has_news = server_.has_news()};
   for (const RobotId robot : robots_) {
     if (out.robots.size() == wire::kMaxRobots) break;

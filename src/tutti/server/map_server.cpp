@@ -333,12 +333,16 @@ Status MapServer::receive(const Refinement& refinement) {
   return {};
 }
 
-void MapServer::plan_refinement() {
+void MapServer::settle() {
+  if (estimate_) plan_refinement(true);
+}
+
+void MapServer::plan_refinement(bool settle) {
   if (refiner_ == nullptr || config_.refine_every == 0 || refining_) return;
   RefinementScope scope = refinable(*estimate_, state_.submaps, state_.payload_sizes, state_.verdicts, *refiner_);
   if (asked_ && asked_->whole && asked_->scope == scope) return;
   refinement_job_ = server::plan_refinement(scope, state_.refinements, *estimate_, map_, state_.submaps,
-                                            static_cast<std::size_t>(config_.refine_every), state_.revision);
+                                            {static_cast<std::size_t>(config_.refine_every), settle}, state_.revision);
   if (!refinement_job_) return;
   refining_ = state_.revision;
   asked_ = Asked{std::move(scope), refinement_job_->whole};
@@ -348,7 +352,7 @@ ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
   if (!estimate_) estimate_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
   map_ = refined(*estimate_, state_.refinements);
-  plan_refinement();
+  plan_refinement(false);
   if (refiner_ == nullptr) estimate_.reset();  // nobody asks for it
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
                             .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};

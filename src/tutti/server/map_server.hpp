@@ -26,7 +26,7 @@ namespace tutti::server {
 struct ServerConfig {
   MapConfig map;
   consistency::ProxyGraphConfig proxy_graph;
-  int refine_every = 1;
+  int refine_every = 5;
   double update_period_s = 10.0;  ///< Mission time between two optimisations when something new has come.
   std::string broadcast = "own";
   template <class V>
@@ -35,8 +35,8 @@ struct ServerConfig {
     v.field("proxy_graph", proxy_graph);
     v.field(
         "refine_every", refine_every, at_least(0),
-        "Every which bundle adjustment goes over the whole map, where cameras saw it; those between over what is new, "
-        "and the whole follows when nothing more comes. 0: none at all.");
+        "Every which bundle adjustment goes over the whole map, where cameras saw it; those between over what is new. "
+        "When nothing has come for so many update periods, one of the whole follows. 0: none at all.");
     v.field("update_period_s", update_period_s, greater_than(0.0),
             "Mission time between two optimisations when there is something new.");
     v.field("broadcast", broadcast, one_of({"own", "all"}),
@@ -119,6 +119,10 @@ class MapServer {
   /// The refinement that the last map wants, without a name; handed out once. There is no other before this one is
   /// answered or given up, and none again for a map with nothing new.
   std::optional<RefinementJob> take_refinement_job() { return std::exchange(refinement_job_, std::nullopt); }
+  /// True while parts were refined since all was: settle() is to be called when nothing new has come for some time.
+  [[nodiscard]] bool is_unsettled() const { return refiner_ != nullptr && state_.refinements.parts() > 0; }
+  /// Makes the job of the whole map that is there, unless one is out.
+  void settle();
   /// There will be no answer to it.
   void give_up_refinement() { refining_.reset(); }
 
@@ -153,7 +157,7 @@ class MapServer {
   /// Something has come that changes the pose graph.
   void note_news();
   /// Makes the job for the map that is there, if there is to be one.
-  void plan_refinement();
+  void plan_refinement(bool settle);
   /// What is good.
   void take(const ClosureVerdict& verdict);
 

@@ -73,15 +73,17 @@ std::vector<Pose3> poses_of(const Submap& submap, const MapEstimate& map) {
   return out;
 }
 
-/// Submaps of the scope that are not in the other, and those of pairs that are in one of the two only.
+/// Submaps of the scope that are not in the other, and those of pairs that are in one of the two only and that none of
+/// these is of: a new submap fits itself to what it closes with, which waits for the whole.
 std::set<SubmapId> difference(const RefinementScope& scope, const RefinementScope& before) {
   std::set<SubmapId> out;
   std::ranges::set_difference(scope.submaps, before.submaps, std::inserter(out, out.end()));
   std::vector<SubmapPair> pairs;
   std::ranges::set_symmetric_difference(scope.closed, before.closed, std::back_inserter(pairs));
+  const std::set<SubmapId> added = out;
   for (const auto& [first, second] : pairs)
     for (const SubmapId& id : {first, second})
-      if (scope.submaps.contains(id)) out.insert(id);
+      if (scope.submaps.contains(id) && !added.contains(first) && !added.contains(second)) out.insert(id);
   return out;
 }
 
@@ -166,16 +168,20 @@ RefinementScope refinable(const MapEstimate& map, const SubmapSet& submaps,
 
 std::optional<RefinementJob> plan_refinement(const RefinementScope& scope, const Refinements& refinements,
                                              const MapEstimate& estimate, const MapEstimate& map,
-                                             const SubmapSet& submaps, std::size_t every, std::uint64_t revision) {
+                                             const SubmapSet& submaps, const RefinementCadence& cadence,
+                                             std::uint64_t revision) {
   std::set<SubmapId> free = difference(scope, refinements.scope());
-  if (scope.submaps.empty() || (free.empty() && refinements.parts() == 0)) return std::nullopt;
+  const bool settles = cadence.settle && refinements.parts() > 0;
+  if (scope.submaps.empty() || (free.empty() && !settles)) return std::nullopt;
   RefinementJob job{.revision = revision};
-  job.whole = free.empty() || !refinements.has_whole() || refinements.parts() + 1 >= every;
+  job.whole = free.empty() || !refinements.has_whole() || refinements.parts() + 1 >= cadence.every;
   if (job.whole) {
     free = scope.submaps;
   } else {
     for (const SubmapId& id : std::set(free))
       for (const SubmapId& next : neighbours(id, scope.submaps)) free.insert(next);
+    job.whole = 2 * free.size() > scope.submaps.size();
+    if (job.whole) free = scope.submaps;
   }
   std::set<SubmapId> all = held(scope, free);
   all.insert(free.begin(), free.end());

@@ -49,13 +49,20 @@ RefinementScope refinable(const MapEstimate& map, const SubmapSet& submaps,
                           const std::map<SubmapId, PayloadSize>& sizes, const VerdictSet& verdicts,
                           const MapRefiner& refiner);
 
+struct RefinementCadence {
+  std::size_t every = 1;  ///< Job is of the whole map.
+  /// Also where nothing is new, but parts were refined last: then a map to which nothing is added ends as a function of
+  /// its submaps and closures.
+  bool settle = false;
+};
+
 /// The job that makes a map of this scope refined; nothing where the refinements have taken all of it into account. Of
-/// the whole map: when `every` jobs were not, or there is nothing new but parts were refined last, so that a map to
-/// which nothing is added ends as a function of its submaps and closures. Its poses are then those of `estimate`, the
-/// pose graph's. Otherwise free are what is new, which means submaps and the ends of pairs, and their neighbours in the
-/// chain; what is tied to these is held where it is in `map`, the refined one.
+/// the whole map by the cadence, or where half of it is to be free anyway: its poses are then those of `estimate`, the
+/// pose graph's. Otherwise free are new submaps, older ones with pairs that are new or gone, and their neighbours in
+/// the chain; what is tied to these is held where it is in `map`, the refined one.
 std::optional<RefinementJob> plan_refinement(const RefinementScope& scope, const Refinements& refinements,
                                              const MapEstimate& estimate, const MapEstimate& map,
-                                             const SubmapSet& submaps, std::size_t every, std::uint64_t revision);
+                                             const SubmapSet& submaps, const RefinementCadence& cadence,
+                                             std::uint64_t revision);
 
 }  // namespace tutti::server

@@ -47,7 +47,7 @@ class Assembler {
     const KeyframeId id{posed.submap->id.chain, posed.submap->keyframes[k].index};
     const auto [it, is_new] = nodes_.try_emplace(id, out_.problem.keyframes.size());
     if (is_new) out_.problem.keyframes.push_back({id, posed.T_world_body[k]});
-    if (posed.is_constant) out_.problem.keyframes[it->second].is_constant = true;
+    if (posed.is_constant) out_.problem.keyframes[it->second] = {id, posed.T_world_body[k], true};
     return it->second;
   }
 
