@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a mapping server holds in memory after a mission of so many robots and minutes, per robot-hour, and where it
-// goes: trajectories only, the map in an SQLite file, closures from the reference (missions/fleet.yaml). Usage:
+// goes: trajectories and, where the mission has them, images; the map in an SQLite file. Usage:
 //   bench_server_memory MISSION.yaml ROBOTS MINUTES [SECONDS BETWEEN UPDATES [POINTS PER SUBMAP [MAP: it stays there]]]
+//   bench_server_memory MISSION.yaml DATA-FOLDER [SETTING=VALUE ...]      as the mission has it: robots, way and
+//   closures
 #include <fmt/format.h>
 #include <malloc.h>
 #include <sys/resource.h>
@@ -20,6 +22,7 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/mission/bundle_refiner.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
@@ -83,6 +86,11 @@ std::multimap<Timestamp, bus::Envelope> submaps_of(const mission::MissionInput& 
       const StampedPose& sample = recording.odometry[i];
       static_cast<void>(builder.add_odometry(sample.stamp, sample.pose,
                                              i == 0 ? Matrix6d::Zero().eval() : recording.increment_covariance[i - 1]));
+      if (recording.visual) {
+        const bool keyframe = builder.wants_scan();
+        const TrackedImages images = recording.visual->images(i, keyframe);  // every one is tracked
+        if (keyframe && !images.images.empty()) static_cast<void>(builder.add_images(images));
+      }
       take();
     }
     builder.finish();
@@ -129,14 +137,22 @@ std::vector<Part> parts_of(const server::MapServer& server, const ProxyGraph& gr
           {"proxy graph: uncertainty", graph.uncertainties.size(), uncertainties}};
 }
 
-void run(const std::string& file, int robots, double minutes, double update_s, int points, const std::string& keep) {
-  const auto config =
-      mission::load_mission(file, {fmt::format("simulation.robots.0.copies={}", robots),
-                                   fmt::format("simulation.robots.0.walk.duration_s={}", 60.0 * minutes),
-                                   fmt::format("server.update_period_s={}", update_s)});
+struct Arguments {
+  std::string file, data;
+  std::vector<std::string> settings;
+  int points = 0;
+  std::string keep;
+};
+
+void run(const Arguments& arguments) {
+  const auto& [file, data, settings, points, keep] = arguments;
+  const auto config = mission::load_mission(file, settings);
   if (!config) throw std::runtime_error(config.error().message);
-  const auto input = mission::load_input(*config, {}, 1);
+  const auto input = mission::load_input(*config, data, 1);
   if (!input) throw std::runtime_error(input.error().message);
+  double hours = 0.0;
+  for (const auto& robot : input->robots)
+    hours += (robot.recording.odometry.back().stamp - robot.recording.odometry.front().stamp) / 3600.0;
   const auto finder = mission::make_closure_finder(config->closures, input->robots, 1);
   auto arrivals = submaps_of(*input, config->agent.submap, points);
   std::set<RobotId> ids;
@@ -147,15 +163,18 @@ void run(const std::string& file, int robots, double minutes, double update_s, i
   auto store = storage::open_sqlite_store(path, storage::map_schema(), {.min_free_bytes = 0}).value();
   malloc_trim(0);
   const double heap_before = heap_mb(), resident_before = resident_mb("VmRSS:");
-  auto node = node::ServerNode::open(ids, finder, {.server = config->server}, 1, *store).value();
+  const auto refiner = mission::make_refiner(*config);
+  auto node = node::ServerNode::open(ids, finder, {.server = config->server, .refiner = refiner}, 1, *store).value();
   const auto frames = node::SubmapFrames::of(*store);
-  const node::WorkerNode worker(bus::Endpoint::worker(0), finder, frames);
+  node::WorkerNode worker(bus::Endpoint::worker(0), finder, frames);
+  worker.refine_with(refiner);
   std::size_t pairs = 0;
   const std::function<void(node::Step)> carry_out = [&](node::Step step) {
     if (auto ok = store->commit(step.writes); !ok) throw std::runtime_error(ok.error().message);
     for (const bus::Envelope& message : step.messages) {
-      if (message.kind != bus::MessageKind::job) continue;
-      pairs += wire::decode_job(*message.bytes)->pairs.size();
+      const bool verifies = message.kind == bus::MessageKind::job;
+      if (!verifies && message.kind != bus::MessageKind::refinement_job) continue;
+      if (verifies) pairs += wire::decode_job(*message.bytes)->pairs.size();
       node::WorkerNode here = worker;
       for (const bus::Envelope& answer : here.receive(message, {}).messages) carry_out(node->receive(answer, {}));
     }
@@ -177,9 +196,8 @@ void run(const std::string& file, int robots, double minutes, double update_s, i
   }
   if (node->next_timer()) update();
   malloc_trim(0);
-  const double hours = robots * minutes / 60.0;
   const double heap = heap_mb() - heap_before;
-  fmt::print("{} robots, {} min: {:.1f} robot-hours, {} submaps, {} pairs verified\n", robots, minutes, hours,
+  fmt::print("{} robots: {:.3f} robot-hours, {} submaps, {} pairs verified\n", input->robots.size(), hours,
              node->map_server().state().submaps.size(), pairs);
   fmt::print("{:<28} {:>9} {:>9} {:>16}\n", "", "count", "MB", "MB/robot-hour");
   double known = 0.0;
@@ -188,7 +206,7 @@ void run(const std::string& file, int robots, double minutes, double update_s, i
     fmt::print("{:<28} {:>9} {:>9.2f} {:>16.2f}\n", part.what, part.count, 1e-6 * part.bytes,
                1e-6 * part.bytes / hours);
   }
-  fmt::print("{:<28} {:>9} {:>9.2f} {:>16.2f}\n", "other heap (worker's submaps)", "", heap - known,
+  fmt::print("{:<28} {:>9} {:>9.2f} {:>16.2f}\n", "other heap (worker's features)", "", heap - known,
              (heap - known) / hours);
   fmt::print("{:<28} {:>9} {:>9.2f} {:>16.2f}\n", "heap in all", "", heap, heap / hours);
   fmt::print("{:<28} {:>9} {:>9.2f} {:>16.2f}\n", "resident", "", resident_mb("VmRSS:") - resident_before,
@@ -209,14 +227,26 @@ void run(const std::string& file, int robots, double minutes, double update_s, i
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 4) {
+  if (argc < 3) {
     fmt::print(
-        "usage: bench_server_memory MISSION.yaml ROBOTS MINUTES [SECONDS BETWEEN UPDATES [POINTS PER SUBMAP [MAP]]]\n");
+        "usage: bench_server_memory MISSION.yaml ROBOTS MINUTES [SECONDS BETWEEN UPDATES [POINTS PER SUBMAP [MAP]]]\n"
+        "       bench_server_memory MISSION.yaml DATA-FOLDER [SETTING=VALUE ...]\n");
     return 2;
   }
+  Arguments arguments{.file = argv[1]};
+  if (std::filesystem::is_directory(argv[2])) {
+    arguments.data = argv[2];
+    arguments.settings.assign(argv + 3, argv + argc);
+  } else {
+    const double minutes = argc > 3 ? std::atof(argv[3]) : 30.0;
+    arguments.settings = {fmt::format("simulation.robots.0.copies={}", std::atoi(argv[2])),
+                          fmt::format("simulation.robots.0.walk.duration_s={}", 60.0 * minutes),
+                          fmt::format("server.update_period_s={}", argc > 4 ? std::atof(argv[4]) : 20.0)};
+    arguments.points = argc > 5 ? std::atoi(argv[5]) : 0;
+    arguments.keep = argc > 6 ? argv[6] : "";
+  }
   try {
-    run(argv[1], std::atoi(argv[2]), std::atof(argv[3]), argc > 4 ? std::atof(argv[4]) : 20.0,
-        argc > 5 ? std::atoi(argv[5]) : 0, argc > 6 ? argv[6] : "");
+    run(arguments);
   } catch (const std::exception& error) {
     fmt::print(stderr, "bench_server_memory: {}\n", error.what());
     return 1;
