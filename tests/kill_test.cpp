@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "support/sanitized.hpp"
-#include "support/server/refiners.hpp"
 #include "tutti/bus/simulated_network.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/node/robot_node.hpp"
@@ -154,7 +153,6 @@ class Mission {
     program.store = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(program.saved));
     node::ServerNodeConfig config{.pairs_per_job = 3, .job_timeout_s = 30.0};
     config.server.update_period_s = kUpdatePeriod_s;
-    config.refiner = refiner_;
     return std::move(node::ServerNode::open(world_.robots, world_.finder, config, kEpoch, *program.store).value());
   }
   std::unique_ptr<node::RobotNode> open(Program<node::RobotNode>& program) {
@@ -166,9 +164,7 @@ class Mission {
   std::unique_ptr<node::WorkerNode> open(Program<node::WorkerNode>& program) {
     const auto submaps = std::make_shared<node::SubmapFrames>(
         [this](SubmapId id) { return Result<std::string>(**server_.store->read("submaps", node::key_of(id))); });
-    auto worker = std::make_unique<node::WorkerNode>(program.self, world_.finder, submaps);
-    worker->refine_with(refiner_);
-    return worker;
+    return std::make_unique<node::WorkerNode>(program.self, world_.finder, submaps);
   }
 
   /// From the bytes of its store; also when it is dropped in its very first step.
@@ -283,7 +279,6 @@ class Mission {
   }
 
   const World& world_;
-  std::shared_ptr<const server::MapRefiner> refiner_ = std::make_shared<const server::test::Shrinker>();
   bus::SimulatedNetwork network_;
   Killer& killer_;
   Timestamp now_;
@@ -346,7 +341,6 @@ TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
   ASSERT_GT(undisturbed.server().state().revision, 5U);
   ASSERT_GT(undisturbed.agent(0).ledger().size() + undisturbed.agent(1).ledger().size(), 0U);
   ASSERT_GT(undisturbed.server().state().verdicts.size(), 5U);
-  ASSERT_FALSE(undisturbed.server().map().odometry_of_steps.empty());
   ASSERT_GE(nobody.seen.size(), 11 * (kParts - 1));  // kinds of inputs, of all nodes
 
   std::map<Moment, std::size_t> killed;
