@@ -16,6 +16,11 @@
 namespace tutti::program {
 
 namespace fs = std::filesystem;
+namespace {
+
+fs::path beside_of(const fs::path& file) { return file.string() + ".new"; }
+
+}  // namespace
 
 double StateFolder::age_s() const {
   const std::uint64_t now_ns = wall_clock_ns();
@@ -23,7 +28,7 @@ double StateFolder::age_s() const {
 }
 
 Status replace_file(const fs::path& file, const std::string& text, bool durable) {
-  const fs::path beside = file.string() + ".new";
+  const fs::path beside = beside_of(file);
   if (Status written = write_file(beside.string(), text); !written) return written;
   if (const int written = durable ? ::open(beside.c_str(), O_RDONLY | O_CLOEXEC) : -1; written >= 0) {
     fsync(written);
@@ -74,8 +79,9 @@ Status StateFolder::read_or_make(const std::string& owner) {
     if (made_ns_ > 0) return {};
     return fail(ErrorCode::parse, "{}: does not say when the folder was made", file.string());
   }
+  // A program that was killed here before has left the beginnings of lock and owner.
   for (const auto& entry : fs::directory_iterator(path_, error))
-    if (entry.path().filename() != "lock")
+    if (entry.path() != path_ / "lock" && entry.path() != beside_of(file))
       return fail(ErrorCode::io, "state folder {}: holds '{}' and is none of tutti's; a new or an empty one is needed",
                   path_.string(), entry.path().filename().string());
   is_new_ = true;

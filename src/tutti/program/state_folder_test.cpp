@@ -50,6 +50,16 @@ TEST_F(StateFolderTest, IsOneOwnersAndOneProgramsAtATime) {
   EXPECT_EQ(refused("robot alpha"), "");
 }
 
+TEST_F(StateFolderTest, AKillWhileItIsMadeLeavesWhatTheNextStartTakes) {
+  fs::create_directories(folder_);
+  std::ofstream(folder_ / "lock");
+  std::ofstream(folder_ / "owner.new") << "tutti ro";
+  const auto folder = StateFolder::open(folder_, "robot alpha");
+  ASSERT_TRUE(folder.has_value()) << folder.error().message;
+  EXPECT_TRUE(folder->is_new());
+  EXPECT_FALSE(fs::exists(folder_ / "owner.new"));
+}
+
 TEST_F(StateFolderTest, AFolderWithOtherThingsIsNotTaken) {
   fs::create_directories(folder_);
   std::ofstream(folder_ / "thesis.tex") << "important";
