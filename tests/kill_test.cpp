@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "support/sanitized.hpp"
+#include "support/server/refiners.hpp"
 #include "tutti/bus/simulated_network.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/node/robot_node.hpp"
@@ -88,8 +89,13 @@ struct Program {
 
 class Mission {
  public:
-  Mission(const World& world, const bus::LinkConfig& link, Killer& killer)
-      : world_(world), network_(bus::SimulatedRadio(Timestamp{}, link, 1), Timestamp{}), killer_(killer) {
+  /// `refiner`: null for a map that is its pose graph's.
+  Mission(const World& world, const bus::LinkConfig& link, Killer& killer,
+          std::shared_ptr<const server::MapRefiner> refiner = nullptr)
+      : world_(world),
+        refiner_(std::move(refiner)),
+        network_(bus::SimulatedRadio(Timestamp{}, link, 1), Timestamp{}),
+        killer_(killer) {
     server_.self = Endpoint::server();
     start(server_);
     for (const auto& recording : world.recordings) {
@@ -153,6 +159,7 @@ class Mission {
     program.store = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(program.saved));
     node::ServerNodeConfig config{.pairs_per_job = 3, .job_timeout_s = 30.0};
     config.server.update_period_s = kUpdatePeriod_s;
+    config.refiner = refiner_;
     return std::move(node::ServerNode::open(world_.robots, world_.finder, config, kEpoch, *program.store).value());
   }
   std::unique_ptr<node::RobotNode> open(Program<node::RobotNode>& program) {
@@ -164,7 +171,9 @@ class Mission {
   std::unique_ptr<node::WorkerNode> open(Program<node::WorkerNode>& program) {
     const auto submaps = std::make_shared<node::SubmapFrames>(
         [this](SubmapId id) { return Result<std::string>(**server_.store->read("submaps", node::key_of(id))); });
-    return std::make_unique<node::WorkerNode>(program.self, world_.finder, submaps);
+    auto node = std::make_unique<node::WorkerNode>(program.self, world_.finder, submaps);
+    node->refine_with(refiner_);
+    return node;
   }
 
   /// From the bytes of its store; also when it is dropped in its very first step.
@@ -279,6 +288,7 @@ class Mission {
   }
 
   const World& world_;
+  const std::shared_ptr<const server::MapRefiner> refiner_;
   bus::SimulatedNetwork network_;
   Killer& killer_;
   Timestamp now_;
@@ -334,20 +344,22 @@ class Kill : public testing::Test {
 
 TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
   const bus::LinkConfig at_once{.latency_s = 0.0};
+  const auto refiner = std::make_shared<const server::test::Shrinker>();
   Killer nobody;
-  Mission undisturbed(world_, at_once, nobody);
+  Mission undisturbed(world_, at_once, nobody, refiner);
   undisturbed.run();
   undisturbed.expect_settled();
   ASSERT_GT(undisturbed.server().state().revision, 5U);
   ASSERT_GT(undisturbed.agent(0).ledger().size() + undisturbed.agent(1).ledger().size(), 0U);
   ASSERT_GT(undisturbed.server().state().verdicts.size(), 5U);
+  ASSERT_FALSE(undisturbed.server().state().refinements.all().empty());
   ASSERT_GE(nobody.seen.size(), 11 * (kParts - 1));  // kinds of inputs, of all nodes
 
   std::map<Moment, std::size_t> killed;
   std::size_t kills = 0;
   for (std::uint64_t seed = 0; seed < tutti::seeds(4U); ++seed) {
     Killer killer = planned(nobody, Rng(seed), 1);
-    Mission mission(world_, at_once, killer);
+    Mission mission(world_, at_once, killer, refiner);
     mission.run();
     mission.expect_settled();
     EXPECT_TRUE(mission.refusals().empty()) << mission.refusals().front();
