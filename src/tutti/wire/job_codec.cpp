@@ -32,6 +32,21 @@ Result<std::vector<SubmapPair>> read(const v1::SubmapPairs& in) {
   return pairs;
 }
 
+void write(const SubmapId& id, v1::SubmapIds& out) {
+  out.add_robot(id.chain.robot.value);
+  out.add_session(id.chain.session);
+  out.add_index(id.index);
+}
+
+Result<std::vector<SubmapId>> read(const v1::SubmapIds& in) {
+  if (in.session_size() != in.robot_size() || in.index_size() != in.robot_size())
+    return fail(ErrorCode::parse, "submaps in columns of {}, {} and {}", in.robot_size(), in.session_size(),
+                in.index_size());
+  std::vector<SubmapId> out;
+  for (int i = 0; i < in.robot_size(); ++i) out.push_back({{RobotId{in.robot(i)}, in.session(i)}, in.index(i)});
+  return out;
+}
+
 Status check_pairs(const std::vector<SubmapPair>& pairs) {
   if (pairs.size() > kMaxPairs)
     return fail(ErrorCode::invalid, "{} pairs of submaps, at most {} are accepted", pairs.size(), kMaxPairs);

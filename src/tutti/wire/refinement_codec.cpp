@@ -12,58 +12,22 @@
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/job_message.hpp"
 #include "tutti/wire/internal/payload.hpp"
+#include "tutti/wire/internal/pose_numbers.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
 namespace {
 
-using Numbers = google::protobuf::RepeatedField<double>;
-constexpr int kPose = 7, kStep = 7 + 21;
+constexpr int kStep = kPoseNumbers + kCovarianceNumbers;
 constexpr std::array kCounts = {&RefinementCounts::keyframes,          &RefinementCounts::landmarks,
                                 &RefinementCounts::observations,       &RefinementCounts::joined_by_keyframe,
                                 &RefinementCounts::joined_by_closure,  &RefinementCounts::two_positions,
                                 &RefinementCounts::two_things,         &RefinementCounts::views_contradicting,
                                 &RefinementCounts::landmarks_uncertain};
 
-void write(const SubmapId& id, v1::SubmapIds& out) {
-  out.add_robot(id.chain.robot.value);
-  out.add_session(id.chain.session);
-  out.add_index(id.index);
-}
-
-Result<std::vector<SubmapId>> read(const v1::SubmapIds& in) {
-  if (in.session_size() != in.robot_size() || in.index_size() != in.robot_size())
-    return fail(ErrorCode::parse, "submaps in columns of {}, {} and {}", in.robot_size(), in.session_size(),
-                in.index_size());
-  std::vector<SubmapId> out;
-  for (int i = 0; i < in.robot_size(); ++i) out.push_back({{RobotId{in.robot(i)}, in.session(i)}, in.index(i)});
-  return out;
-}
-
-void write(const Pose3& T, Numbers& out) {
-  for (const double x : T.translation) out.Add(x);
-  for (const double q : T.rotation.coeffs()) out.Add(q);
-}
-
-Pose3 read_pose(const Numbers& in, int at) {
-  Pose3 T;
-  for (int i = 0; i < 3; ++i) T.translation(i) = in.Get(at + i);
-  for (int i = 0; i < 4; ++i) T.rotation.coeffs()(i) = in.Get(at + 3 + i);
-  return T;
-}
-
 void write(const RelativePose& step, Numbers& out) {
   write(step.T_a_b, out);
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) out.Add(step.covariance(i, j));
-}
-
-RelativePose read_step(const Numbers& in, int at) {
-  RelativePose step{read_pose(in, at), Matrix6d::Zero()};
-  at += kPose;
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j, ++at) step.covariance(i, j) = step.covariance(j, i) = in.Get(at);
-  return step;
+  write(step.covariance, out);
 }
 
 Status check_pose(const Pose3& T) {
@@ -103,7 +67,7 @@ Status read_keyframes(const v1::Refinement& in, Refinement& out) {
   const int count = in.robot_size();
   const auto steps = std::ranges::count(in.has_step(), true);
   if (in.session_size() != count || in.keyframe_size() != count || in.has_step_size() != count ||
-      in.pose_size() != kPose * count || in.step_size() != kStep * steps)
+      in.pose_size() != kPoseNumbers * count || in.step_size() != kStep * steps)
     return fail(ErrorCode::parse, "keyframes in columns of {}, {}, {} and {}, with {} and {} numbers", count,
                 in.session_size(), in.keyframe_size(), in.has_step_size(), in.pose_size(), in.step_size());
   int step = 0;
@@ -111,8 +75,10 @@ Status read_keyframes(const v1::Refinement& in, Refinement& out) {
     const KeyframeId id{{RobotId{in.robot(i)}, in.session(i)}, in.keyframe(i)};
     if (!out.T_world_body.empty() && !(out.T_world_body.rbegin()->first < id))
       return fail(ErrorCode::invalid, "keyframes out of order");
-    out.T_world_body.emplace_hint(out.T_world_body.end(), id, read_pose(in.pose(), kPose * i));
-    if (in.has_step(i)) out.steps.push_back({id, read_step(in.step(), kStep * step++)});
+    out.T_world_body.emplace_hint(out.T_world_body.end(), id, read_pose(in.pose(), kPoseNumbers * i));
+    if (!in.has_step(i)) continue;
+    const int at = kStep * step++;
+    out.steps.push_back({id, {read_pose(in.step(), at), read_covariance(in.step(), at + kPoseNumbers)}});
   }
   return {};
 }
@@ -183,7 +149,7 @@ Result<RefinementJob> decode_refinement_job(std::string_view bytes) {
   std::uint64_t keyframes = 0;
   for (const std::uint32_t count : in.keyframes()) keyframes += count;
   if (in.is_free_size() != static_cast<int>(submaps->size()) || in.keyframes_size() != in.is_free_size() ||
-      keyframes * kPose != static_cast<std::uint64_t>(in.pose_size()))
+      keyframes * kPoseNumbers != static_cast<std::uint64_t>(in.pose_size()))
     return fail(ErrorCode::parse, "refinement job: {} submaps in columns of {} and {}, {} keyframes with {} numbers",
                 submaps->size(), in.is_free_size(), in.keyframes_size(), keyframes, in.pose_size());
   RefinementJob job{.id = in.id(), .revision = in.revision(), .whole = in.whole(), .closed = std::move(*closed)};
@@ -192,7 +158,7 @@ Result<RefinementJob> decode_refinement_job(std::string_view bytes) {
     RefinementJob::Part& part = job.parts.emplace_back();
     part.submap = (*submaps)[static_cast<std::size_t>(i)];
     part.is_free = in.is_free(i);
-    for (std::uint32_t k = 0; k < in.keyframes(i); ++k, at += kPose)
+    for (std::uint32_t k = 0; k < in.keyframes(i); ++k, at += kPoseNumbers)
       part.T_world_body.push_back(read_pose(in.pose(), at));
   }
   if (auto ok = validate(job); !ok) return tl::unexpected(ok.error());

@@ -7,6 +7,7 @@
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/payload.hpp"
+#include "tutti/wire/internal/pose_numbers.hpp"
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
@@ -41,11 +42,7 @@ void write(const NodeStatus& status, v1::Status& out) {
   out.set_heard_revision(status.heard_revision);
   if (status.update_age_s) out.set_update_age_s(*status.update_age_s);
   out.set_keyframes(status.keyframes);
-  const Pose3& T = status.T_odom_body;
-  if (!(T == Pose3{})) {
-    out.mutable_pose()->Add(T.translation.data(), T.translation.data() + 3);
-    out.mutable_pose()->Add(T.rotation.coeffs().data(), T.rotation.coeffs().data() + 4);
-  }
+  if (!(status.T_odom_body == Pose3{})) write(status.T_odom_body, *out.mutable_pose());
   out.set_alerts(status.alerts);
   out.set_finished(status.finished);
   out.set_jobs_done(status.jobs_done);
@@ -69,12 +66,10 @@ Result<NodeStatus> read(const v1::Status& in) {
                     .jobs_done = in.jobs_done(),
                     .trouble = in.trouble()};
   if (in.has_update_age_s()) status.update_age_s = in.update_age_s();
-  if (in.pose_size() == 7) {
-    std::copy_n(in.pose().begin(), 3, status.T_odom_body.translation.data());
-    std::copy_n(in.pose().begin() + 3, 4, status.T_odom_body.rotation.coeffs().data());
-  } else if (in.pose_size() != 0) {
-    return fail(ErrorCode::parse, "a pose of {} numbers, expected 7", in.pose_size());
-  }
+  if (in.pose_size() == kPoseNumbers)
+    status.T_odom_body = read_pose(in.pose(), 0);
+  else if (in.pose_size() != 0)
+    return fail(ErrorCode::parse, "a pose of {} numbers, expected {}", in.pose_size(), kPoseNumbers);
   return status;
 }
 

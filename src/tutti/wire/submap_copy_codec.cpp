@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/wire/submap_copy_codec.hpp"
 
+#include <utility>
+
 #include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/job_message.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/limits.hpp"
 
@@ -29,25 +32,17 @@ Status validate(const SubmapCopy& copy) {
 std::string encode(const SubmapRequest& request) {
   const Status valid = validate(request);
   TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
-  v1::SubmapRequest out;
-  for (const SubmapId& id : request.submaps) {
-    out.add_robot(id.chain.robot.value);
-    out.add_session(id.chain.session);
-    out.add_index(id.index);
-  }
+  v1::SubmapIds out;
+  for (const SubmapId& id : request.submaps) write(id, out);
   return pack_frame(MessageKind::submap_request, out.SerializeAsString());
 }
 
 Result<SubmapRequest> decode_submap_request(std::string_view bytes) {
-  const auto parsed = parse_frame<v1::SubmapRequest>(MessageKind::submap_request, bytes);
+  const auto parsed = parse_frame<v1::SubmapIds>(MessageKind::submap_request, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  const v1::SubmapRequest& in = parsed->message;
-  if (in.session_size() != in.robot_size() || in.index_size() != in.robot_size())
-    return fail(ErrorCode::parse, "submap request: columns of {}, {} and {}", in.robot_size(), in.session_size(),
-                in.index_size());
-  SubmapRequest request;
-  for (int i = 0; i < in.robot_size(); ++i)
-    request.submaps.push_back({{RobotId{in.robot(i)}, in.session(i)}, in.index(i)});
+  auto submaps = read(parsed->message);
+  if (!submaps) return in_context("submap request", submaps.error());
+  SubmapRequest request{std::move(*submaps)};
   if (auto ok = validate(request); !ok) return tl::unexpected(ok.error());
   return request;
 }

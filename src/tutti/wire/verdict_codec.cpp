@@ -8,6 +8,7 @@
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/payload.hpp"
+#include "tutti/wire/internal/pose_numbers.hpp"
 #include "tutti/wire/internal/verdict_message.hpp"
 
 namespace tutti::wire {
@@ -18,26 +19,18 @@ void write(const LoopClosure& closure, v1::LoopClosure& out) {
   out.set_from_index(closure.from.index);
   out.set_to_robot(closure.to.chain.robot.value);
   out.set_to_index(closure.to.index);
-  for (const double x : closure.measurement.T_a_b.translation) out.add_pose(x);
-  for (const double q : closure.measurement.T_a_b.rotation.coeffs()) out.add_pose(q);
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j) out.add_covariance(closure.measurement.covariance(i, j));
+  write(closure.measurement.T_a_b, *out.mutable_pose());
+  write(closure.measurement.covariance, *out.mutable_covariance());
 }
 
 /// `in` is of a verdict on this pair.
 Result<LoopClosure> read(const v1::LoopClosure& in, const SubmapPair& pair) {
-  if (in.pose_size() != 7 || in.covariance_size() != 21)
-    return fail(ErrorCode::parse, "closure with {} pose numbers and {} covariance numbers, expected 7 and 21",
-                in.pose_size(), in.covariance_size());
-  LoopClosure closure{.from = {{RobotId{in.from_robot()}, pair.first.chain.session}, in.from_index()},
-                      .to = {{RobotId{in.to_robot()}, pair.second.chain.session}, in.to_index()}};
-  for (int i = 0; i < 3; ++i) closure.measurement.T_a_b.translation(i) = in.pose(i);
-  for (int i = 0; i < 4; ++i) closure.measurement.T_a_b.rotation.coeffs()(i) = in.pose(3 + i);
-  int at = 0;
-  for (int i = 0; i < 6; ++i)
-    for (int j = i; j < 6; ++j, ++at)
-      closure.measurement.covariance(i, j) = closure.measurement.covariance(j, i) = in.covariance(at);
-  return closure;
+  if (in.pose_size() != kPoseNumbers || in.covariance_size() != kCovarianceNumbers)
+    return fail(ErrorCode::parse, "closure with {} pose numbers and {} covariance numbers, expected {} and {}",
+                in.pose_size(), in.covariance_size(), kPoseNumbers, kCovarianceNumbers);
+  return LoopClosure{.from = {{RobotId{in.from_robot()}, pair.first.chain.session}, in.from_index()},
+                     .to = {{RobotId{in.to_robot()}, pair.second.chain.session}, in.to_index()},
+                     .measurement = {read_pose(in.pose(), 0), read_covariance(in.covariance(), 0)}};
 }
 
 Result<Refusal> read_measured(std::uint32_t reason, double value, double limit) {
