@@ -13,11 +13,7 @@ namespace {
 using Ends = std::pair<KeyframeId, KeyframeId>;
 
 std::optional<ClosureFit::Misfit> misfit(const server::MapEstimate& map, const LoopClosure& closure) {
-  const auto node = [&](const KeyframeId& id) {
-    const auto found = std::ranges::lower_bound(map.nodes, id, {}, &server::MapNode::id);
-    return found != map.nodes.end() && found->id == id ? &*found : nullptr;
-  };
-  const server::MapNode *from = node(closure.from), *to = node(closure.to);
+  const server::MapNode *from = find_node(map, closure.from), *to = find_node(map, closure.to);
   if (from == nullptr || to == nullptr || from->component != to->component) return std::nullopt;
   const Vector6d error = local(closure.measurement.T_a_b, from->T_world_body.inverse() * to->T_world_body);
   const Matrix6d covariance = bounded_covariance(closure.measurement.covariance);

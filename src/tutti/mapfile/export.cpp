@@ -27,9 +27,8 @@ constexpr std::size_t kThinAt = 1'000'000;  // points, so that a long map's clou
 std::optional<Pose3> place(const Submap& submap, const server::MapEstimate& map, std::uint32_t component) {
   const Keyframe& first = submap.keyframes.front();
   const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
-  const KeyframeId id{submap.id.chain, middle.index};
-  const auto node = std::ranges::lower_bound(map.nodes, id, {}, &server::MapNode::id);
-  if (node == map.nodes.end() || node->id != id || node->component != component) return std::nullopt;
+  const server::MapNode* node = find_node(map, {submap.id.chain, middle.index});
+  if (node == nullptr || node->component != component) return std::nullopt;
   return node->T_world_body * middle.T_odom_body.inverse() * first.T_odom_body;
 }
 

@@ -72,7 +72,7 @@ std::map<KeyframeId, Pose3> true_ends(const server::MapEstimate& map,
   for (const server::JudgedClosure& judged : map.closures)
     if (judged.accepted)
       for (const KeyframeId& id : {judged.closure.from, judged.closure.to})
-        ends[id.chain.robot][std::ranges::lower_bound(map.nodes, id, {}, &server::MapNode::id)->stamp] = id;
+        ends[id.chain.robot][find_node(map, id)->stamp] = id;
   std::map<KeyframeId, Pose3> out;
   for (const MissionRecording* robot : robots) {
     Trajectory moments;

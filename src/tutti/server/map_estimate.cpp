@@ -249,6 +249,11 @@ const char* to_string(Objection objection) {
   return "";
 }
 
+const MapNode* find_node(const MapEstimate& map, const KeyframeId& id) {
+  const auto node = std::ranges::lower_bound(map.nodes, id, {}, &MapNode::id);
+  return node != map.nodes.end() && node->id == id ? &*node : nullptr;
+}
+
 MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdicts, const MapConfig& config,
                          const WordSet& words) {
   std::vector<SubmapId> left_out;

@@ -106,6 +106,9 @@ struct MapConfig {
 std::vector<OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
                                            const std::vector<std::optional<Matrix6d>>& step_to);
 
+/// Null when the map does not have it.
+const MapNode* find_node(const MapEstimate& map, const KeyframeId& id);
+
 /// The map of a set of submaps, verdicts and words: attaches submaps by their shared keyframes, judges closures and
 /// odometry, optimises. Pure: the same sets give the same map, whatever the order they came in.
 MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,

@@ -59,17 +59,15 @@ void put_closures(const Refinements& refinements, MapEstimate& map) {
 
 bool has_all(const MapEstimate& map, const Submap& submap) {
   return std::ranges::all_of(submap.keyframes, [&](const Keyframe& keyframe) {
-    const KeyframeId id{submap.id.chain, keyframe.index};
-    const auto node = std::ranges::lower_bound(map.nodes, id, {}, &MapNode::id);
-    return node != map.nodes.end() && node->id == id;
+    return find_node(map, {submap.id.chain, keyframe.index}) != nullptr;
   });
 }
 
+/// Of one that the map has all of.
 std::vector<Pose3> poses_of(const Submap& submap, const MapEstimate& map) {
   std::vector<Pose3> out;
   for (const Keyframe& keyframe : submap.keyframes)
-    out.push_back(std::ranges::lower_bound(map.nodes, KeyframeId{submap.id.chain, keyframe.index}, {}, &MapNode::id)
-                      ->T_world_body);
+    out.push_back(find_node(map, {submap.id.chain, keyframe.index})->T_world_body);
   return out;
 }
 
