@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "support/node/submaps.hpp"
+#include "support/node/stored_server.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
@@ -20,30 +20,18 @@ using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
 const SubmapPair kBad{{kAlpha, 0}, {kBravo, 0}};
 
-/// A server on a store, whose steps are committed.
-class ServerJobs : public testing::Test {
+class ServerJobs : public test::StoredServer {
  protected:
   ServerJobs() { restart(); }
   Step restart(double job_timeout_s = 600.0) {
-    store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
-                                                    store_ ? store_->tables() : storage::MemoryStore::Tables{});
-    node_ =
-        ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {.job_timeout_s = job_timeout_s}, 1000 + ++starts_, *store_)
-            .value();
-    return done(node_->resume(now_));
+    return start({RobotId{0}, RobotId{1}}, {.job_timeout_s = job_timeout_s});
   }
-  Step done(Step step) {
-    EXPECT_TRUE(store_->commit(step.writes).has_value());
-    return step;
-  }
-  Step receive(const bus::Envelope& envelope) { return done(node_->receive(envelope, now_)); }
-  Step receive(const SubmapMessage& message) { return receive(test::envelope(message)); }
-  static std::vector<Job> jobs_of(const Step& step) {
+  static std::vector<Job> decoded(const std::vector<bus::Envelope>& sent) {
     std::vector<Job> jobs;
-    for (const bus::Envelope& message : step.messages)
-      if (message.kind == MessageKind::job) jobs.push_back(wire::decode_job(*message.bytes).value());
+    for (const bus::Envelope& message : sent) jobs.push_back(wire::decode_job(*message.bytes).value());
     return jobs;
   }
+  static std::vector<Job> jobs_of(const Step& step) { return decoded(of_kind(step, MessageKind::job)); }
   Step fail(const Job& job) {
     const Verdicts failed{.job = job.id, .verdicts = {}, .failed = job.pairs, .why = "no cloud"};
     return receive({Endpoint::worker(0), Endpoint::server(), MessageKind::verdicts, job.id,
@@ -61,16 +49,7 @@ class ServerJobs : public testing::Test {
     for (const bus::Envelope& verdicts : worker.receive(asked, now_).messages) receive(verdicts);
   }
   /// What is asked when the map's next update and what is due until `later` have been.
-  std::vector<Job> wait(double later) {
-    std::vector<Job> jobs;
-    const Timestamp end = now_ + later;
-    while (node_->next_timer() && *node_->next_timer() <= end) {
-      now_ = *node_->next_timer();
-      for (Job& job : jobs_of(done(node_->on_timer(now_)))) jobs.push_back(std::move(job));
-    }
-    now_ = end;
-    return jobs;
-  }
+  std::vector<Job> wait(double later) { return decoded(wait_for(MessageKind::job, later)); }
   static std::vector<bool> given_up(const Step& step) {
     std::vector<bool> out;
     for (const Event& event : step.events)
@@ -91,12 +70,6 @@ class ServerJobs : public testing::Test {
     EXPECT_TRUE(jobs_of(restart()).empty());
     EXPECT_TRUE(node_->map_server().refusals().contains(RefusalReason::unverified));
   }
-
-  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
-  std::unique_ptr<storage::MemoryStore> store_;
-  std::unique_ptr<ServerNode> node_;
-  std::uint64_t starts_ = 0;
-  Timestamp now_ = Timestamp{} + 3.0;
 };
 
 TEST_F(ServerJobs, APairThatFailsIsAskedAgainEveryTimeLaterAndThenRefused) {

@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "support/node/submaps.hpp"
+#include "support/node/stored_server.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
@@ -19,29 +19,11 @@ namespace {
 using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
 
-/// A server on a store, whose steps are committed, and a worker beside it.
-class ServerNodeTest : public testing::Test {
+/// And a worker beside it.
+class ServerNodeTest : public test::StoredServer {
  protected:
   ServerNodeTest() { restart(); }
-  /// From the bytes of its store.
-  void restart() {
-    store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
-                                                    store_ ? store_->tables() : storage::MemoryStore::Tables{});
-    node_ =
-        ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {.pairs_per_job = 2}, 1000 + ++starts_, *store_).value();
-    resumed_ = done(node_->resume(now_));
-  }
-  Step done(Step step) {
-    EXPECT_TRUE(store_->commit(step.writes).has_value());
-    return step;
-  }
-  Step receive(const bus::Envelope& envelope) { return done(node_->receive(envelope, now_)); }
-  Step receive(const SubmapMessage& message) { return receive(test::envelope(message)); }
-  static std::vector<bus::Envelope> of_kind(const Step& step, MessageKind kind) {
-    std::vector<bus::Envelope> out;
-    std::ranges::copy_if(step.messages, std::back_inserter(out), [&](const auto& m) { return m.kind == kind; });
-    return out;
-  }
+  void restart() { resumed_ = start({RobotId{0}, RobotId{1}}, {.pairs_per_job = 2}); }
   static std::set<SubmapPair> pairs_of(const Step& step) {
     std::set<SubmapPair> pairs;
     for (const auto& job : of_kind(step, MessageKind::job)) {
@@ -69,12 +51,7 @@ class ServerNodeTest : public testing::Test {
       for (const ChainId& chain : {kAlpha, kBravo}) answer(receive(test::submap(chain, i)));
   }
 
-  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
-  std::unique_ptr<storage::MemoryStore> store_;
-  std::unique_ptr<ServerNode> node_;
   Step resumed_;
-  std::uint64_t starts_ = 0;
-  Timestamp now_ = Timestamp{} + 3.0;
 };
 
 TEST_F(ServerNodeTest, GivesWorkersCopiesOfWhatItHasStored) {

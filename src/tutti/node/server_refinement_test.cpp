@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "support/node/submaps.hpp"
+#include "support/node/stored_server.hpp"
 #include "support/server/refiners.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
@@ -22,45 +22,20 @@ namespace {
 using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7};
 
-class ServerRefinement : public testing::Test {
+class ServerRefinement : public test::StoredServer {
  protected:
   ServerRefinement() { restart(); }
   Step restart(double job_timeout_s = 600.0) {
-    store_ = std::make_unique<storage::MemoryStore>(storage::map_schema(),
-                                                    store_ ? store_->tables() : storage::MemoryStore::Tables{});
-    node_ = ServerNode::open({RobotId{0}}, finder_, {.job_timeout_s = job_timeout_s, .refiner = refiner_},
-                             1000 + ++starts_, *store_)
-                .value();
-    return done(node_->resume(now_));
+    return start({RobotId{0}}, {.job_timeout_s = job_timeout_s, .refiner = refiner_});
   }
-  Step done(Step step) {
-    EXPECT_TRUE(store_->commit(step.writes).has_value());
-    return step;
-  }
-  Step receive(const bus::Envelope& envelope) { return done(node_->receive(envelope, now_)); }
   /// Whose pairs are answered at once.
   void take(std::uint32_t index) {
-    for (const bus::Envelope& message : receive(test::envelope(test::submap(kAlpha, index))).messages)
-      if (message.kind == MessageKind::job)
-        for (const bus::Envelope& verdicts : worker_->receive(message, now_).messages) receive(verdicts);
+    for (const bus::Envelope& job : of_kind(receive(test::submap(kAlpha, index)), MessageKind::job))
+      for (const bus::Envelope& verdicts : worker_->receive(job, now_).messages) receive(verdicts);
   }
-  static std::vector<bus::Envelope> asked(const Step& step) {
-    std::vector<bus::Envelope> out;
-    std::ranges::copy_if(step.messages, std::back_inserter(out),
-                         [](const bus::Envelope& m) { return m.kind == MessageKind::refinement_job; });
-    return out;
-  }
+  static std::vector<bus::Envelope> asked(const Step& step) { return of_kind(step, MessageKind::refinement_job); }
   /// What is to be refined when all that is due until `later` has been.
-  std::vector<bus::Envelope> wait(double later) {
-    std::vector<bus::Envelope> out;
-    const Timestamp end = now_ + later;
-    while (node_->next_timer() && *node_->next_timer() <= end) {
-      now_ = *node_->next_timer();
-      for (bus::Envelope& job : asked(done(node_->on_timer(now_)))) out.push_back(std::move(job));
-    }
-    now_ = end;
-    return out;
-  }
+  std::vector<bus::Envelope> wait(double later) { return wait_for(MessageKind::refinement_job, later); }
   static Step answer_of(WorkerNode& worker, const bus::Envelope& job) { return worker.receive(job, Timestamp{}); }
   Step answer(const bus::Envelope& job) { return receive(answer_of(*worker_, job).messages.at(0)); }
   Step fail(const bus::Envelope& job) {
@@ -81,10 +56,7 @@ class ServerRefinement : public testing::Test {
         store_->tables().at("meta"), [](const auto& row) { return row.first.starts_with("refinement/"); }));
   }
 
-  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
   std::shared_ptr<const server::MapRefiner> refiner_ = std::make_shared<const server::test::Shrinker>();
-  std::unique_ptr<storage::MemoryStore> store_;
-  std::unique_ptr<ServerNode> node_;
   std::unique_ptr<WorkerNode> worker_ = [this] {
     auto worker =
         std::make_unique<WorkerNode>(Endpoint::worker(0), finder_, std::make_shared<SubmapFrames>([this](SubmapId id) {
@@ -93,8 +65,6 @@ class ServerRefinement : public testing::Test {
     worker->refine_with(refiner_);
     return worker;
   }();
-  std::uint64_t starts_ = 0;
-  Timestamp now_ = Timestamp{} + 3.0;
 };
 
 TEST_F(ServerRefinement, LeavesAsAJobAndTheNextUpdateHasIt) {
