@@ -3,17 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include "support/perception/visual/descriptors.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/perception/visual/hamming.hpp"
 
 namespace tutti::visual {
 namespace {
 
-Descriptors random_rows(std::uint32_t words, std::size_t n, Rng& rng) {
-  Descriptors rows{.kind = DescriptorKind::orb, .words = words};
-  for (std::size_t i = 0; i < n * words; ++i) rows.bits.push_back(rng.index(~std::uint64_t{0}));
-  return rows;
-}
+using test::random_rows;
 
 /// The rows again, each with this share of its bits turned.
 Descriptors turned(Descriptors rows, double share, Rng& rng) {

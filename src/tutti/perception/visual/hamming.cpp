@@ -43,15 +43,11 @@ template <std::uint32_t Words>
   }
 }
 
-[[gnu::always_inline]] inline std::uint32_t distance_to_nearest(const std::uint64_t* query, const Descriptors& rows,
+[[gnu::always_inline]] inline std::uint32_t distance_to_nearest(std::span<const std::uint64_t> query,
+                                                                const Descriptors& rows,
                                                                 std::span<const std::uint32_t> which) {
   std::uint32_t least = kNoDistance;
-  for (const std::uint32_t i : which) {
-    const std::uint64_t* row = rows.bits.data() + std::size_t{i} * rows.words;
-    int bits = 0;
-    for (std::uint32_t w = 0; w < rows.words; ++w) bits += std::popcount(query[w] ^ row[w]);
-    least = std::min(least, static_cast<std::uint32_t>(bits));
-  }
+  for (const std::uint32_t i : which) least = std::min(least, distance(query, rows.row(i)));
   return least;
 }
 
@@ -60,7 +56,7 @@ template <std::uint32_t Words>
                                                     std::span<const std::uint64_t> b) {
   return distance(a, b);
 }
-[[gnu::target("popcnt")]] std::uint32_t with_popcnt(const std::uint64_t* query, const Descriptors& rows,
+[[gnu::target("popcnt")]] std::uint32_t with_popcnt(std::span<const std::uint64_t> query, const Descriptors& rows,
                                                     std::span<const std::uint32_t> which) {
   return distance_to_nearest(query, rows, which);
 }
@@ -88,9 +84,9 @@ std::uint32_t least_distance(std::span<const std::uint64_t> query, const Descrip
                              std::span<const std::uint32_t> which) {
   TUTTI_CHECK(query.size() == rows.words, "{} words against rows of {}", query.size(), rows.words);
 #ifdef __x86_64__
-  if (has_popcnt()) return with_popcnt(query.data(), rows, which);
+  if (has_popcnt()) return with_popcnt(query, rows, which);
 #endif
-  return distance_to_nearest(query.data(), rows, which);
+  return distance_to_nearest(query, rows, which);
 }
 
 void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& rows,

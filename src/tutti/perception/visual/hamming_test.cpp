@@ -7,16 +7,13 @@
 #include <algorithm>
 #include <bitset>
 
+#include "support/perception/visual/descriptors.hpp"
 #include "tutti/base/random.hpp"
 
 namespace tutti::visual {
 namespace {
 
-Descriptors random_rows(std::uint32_t words, std::size_t n, Rng& rng) {
-  Descriptors rows{.kind = DescriptorKind::orb, .words = words};
-  for (std::size_t i = 0; i < n * words; ++i) rows.bits.push_back(rng.index(~std::uint64_t{0}));
-  return rows;
-}
+using test::random_rows;
 
 RC_GTEST_PROP(Hamming, countsTheBitsThatDiffer, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint64_t>());
