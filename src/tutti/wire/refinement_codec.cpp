@@ -26,8 +26,8 @@ constexpr std::array kCounts = {&RefinementCounts::keyframes,          &Refineme
                                 &RefinementCounts::landmarks_uncertain};
 
 void write(const RelativePose& step, Numbers& out) {
-  write(step.T_a_b, out);
-  write(step.covariance, out);
+  wire::write(step.T_a_b, out);
+  wire::write(step.covariance, out);
 }
 
 Status check_pose(const Pose3& T) {

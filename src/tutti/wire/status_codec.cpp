@@ -42,7 +42,7 @@ void write(const NodeStatus& status, v1::Status& out) {
   out.set_heard_revision(status.heard_revision);
   if (status.update_age_s) out.set_update_age_s(*status.update_age_s);
   out.set_keyframes(status.keyframes);
-  if (!(status.T_odom_body == Pose3{})) write(status.T_odom_body, *out.mutable_pose());
+  if (!(status.T_odom_body == Pose3{})) wire::write(status.T_odom_body, *out.mutable_pose());
   out.set_alerts(status.alerts);
   out.set_finished(status.finished);
   out.set_jobs_done(status.jobs_done);

@@ -19,8 +19,8 @@ void write(const LoopClosure& closure, v1::LoopClosure& out) {
   out.set_from_index(closure.from.index);
   out.set_to_robot(closure.to.chain.robot.value);
   out.set_to_index(closure.to.index);
-  write(closure.measurement.T_a_b, *out.mutable_pose());
-  write(closure.measurement.covariance, *out.mutable_covariance());
+  wire::write(closure.measurement.T_a_b, *out.mutable_pose());
+  wire::write(closure.measurement.covariance, *out.mutable_covariance());
 }
 
 /// `in` is of a verdict on this pair.

@@ -27,8 +27,8 @@ struct Field {
 };
 
 using v1::AgentState, v1::Cloud, v1::Job, v1::MissionStatus, v1::NumbersOfSession, v1::ProxyGraph, v1::Receipt,
-    v1::Refinement, v1::RefinementJob, v1::SubmapIds, v1::SubmapPairs, v1::SubmapRequest, v1::Verdicts, v1::Submap,
-    v1::Verdict, v1::Visual;
+    v1::Refinement, v1::RefinementJob, v1::SubmapIds, v1::SubmapPairs, v1::Verdicts, v1::Submap, v1::Verdict,
+    v1::Visual;
 constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;
 
 constexpr std::array kCloud = {Field{Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
@@ -63,9 +63,9 @@ constexpr std::array kVerdicts = {Field{Verdicts::kVerdictFieldNumber, kMaxPairs
                                   Field{Verdicts::kFailedFieldNumber, 1, "lists of pairs", true, kPairs}};
 constexpr std::array kAgentState = {Field{AgentState::kIntegerFieldNumber, kMaxStateBytes / 32, "integers"}};
 
-constexpr std::array kRequest = {Field{SubmapRequest::kRobotFieldNumber, kMaxRequested, "submaps"},
-                                 Field{SubmapRequest::kSessionFieldNumber, kMaxRequested, "submaps"},
-                                 Field{SubmapRequest::kIndexFieldNumber, kMaxRequested, "submaps"}};
+constexpr std::array kRequest = {Field{SubmapIds::kRobotFieldNumber, kMaxRequested, "submaps"},
+                                 Field{SubmapIds::kSessionFieldNumber, kMaxRequested, "submaps"},
+                                 Field{SubmapIds::kIndexFieldNumber, kMaxRequested, "submaps"}};
 constexpr std::array kIds = {Field{SubmapIds::kRobotFieldNumber, kMaxRefinedSubmaps, "submaps"},
                              Field{SubmapIds::kSessionFieldNumber, kMaxRefinedSubmaps, "submaps"},
                              Field{SubmapIds::kIndexFieldNumber, kMaxRefinedSubmaps, "submaps"}};
