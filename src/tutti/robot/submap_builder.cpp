@@ -19,6 +19,9 @@ Status check_sample(RobotId robot, Timestamp stamp, const Pose3& T_odom_body, co
   if (!is_valid(T_odom_body))
     return fail(ErrorCode::invalid, "robot {}: odometry at {} ns is not a pose (|q| = {}, expected finite and 1)",
                 robot.value, stamp.ns, T_odom_body.rotation.norm());
+  if (const double largest = T_odom_body.translation.cwiseAbs().maxCoeff(); largest > kMaxCoordinate_m)
+    return fail(ErrorCode::invalid, "robot {}: odometry at {} ns has a coordinate of {} m, at most {:.0f} m",
+                robot.value, stamp.ns, largest, kMaxCoordinate_m);
   if (auto ok = check_covariance(covariance); !ok)
     return in_context(fmt::format("robot {}: odometry at {} ns", robot.value, stamp.ns), ok.error());
   return {};

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <bit>
+#include <cmath>
 #include <type_traits>
 
-#include "tutti/geometry/covariance.hpp"
+#include "tutti/geometry/pose3.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/agent_state.hpp"
 #include "tutti/wire/frame.hpp"
@@ -242,10 +242,11 @@ void pass(A& a, AgentState& state) {
   state.component = has_component ? std::optional(component) : std::nullopt;
 }
 
-bool is_sound(const Pose3& T) { return is_valid(T) && T.translation.cwiseAbs().maxCoeff() <= kMaxCoordinate_m; }
-bool is_sound(const RelativePose& measured) {
-  return is_sound(measured.T_a_b) && check_covariance(measured.covariance);
-}
+// What is checked here is what an agent had to have checked: samples were within kMaxCoordinate_m when it took them,
+// but what it computes of them need not be, nor need a covariance compounded over such ways be a covariance to
+// rounding.
+bool is_sound(const Pose3& T) { return is_valid(T); }
+bool is_sound(const RelativePose& measured) { return is_sound(measured.T_a_b) && measured.covariance.allFinite(); }
 bool is_sound(const lidar::PosedCloud& scan) { return is_sound(scan.T_submap_body); }
 bool is_sound(const TrackedImages& images) { return check_images(images).has_value(); }
 bool is_sound(const robot::Whereabouts& other) { return is_sound(other.T_map_body); }
