@@ -32,6 +32,9 @@ class DiaryStore final : public storage::TableStore {
   [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override {
     return rows_.scan(table, from, visit);
   }
+  [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override {
+    return rows_.sizes(table, visit);
+  }
   bool full = false;
 
  private:

@@ -137,6 +137,13 @@ TEST_P(Conformance, KeysSortAsUnsignedBytesAndAScanBeginsAtAnyKey) {
   EXPECT_TRUE(rows("pears", "\xff\x01").empty());
 }
 
+TEST_P(Conformance, SizesAreThoseOfTheRows) {
+  put({{"apples", "b", std::string(70'000, '\0')}, {"apples", "", "1"}, {"apples", "a", ""}, {"pears", "c", "12"}});
+  std::vector<std::pair<std::string, std::size_t>> sizes;
+  EXPECT_TRUE(store_->sizes("apples", [&](std::string_view key, std::size_t size) { sizes.emplace_back(key, size); }));
+  EXPECT_EQ(sizes, (decltype(sizes){{"", 1}, {"a", 0}, {"b", 70'000}}));
+}
+
 TEST_P(Conformance, AScanEndsWhereTheVisitorSaysSo) {
   put({{"apples", "a", "1"}, {"apples", "b", "2"}, {"apples", "c", "3"}});
   std::string seen;

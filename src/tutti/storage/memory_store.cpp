@@ -50,6 +50,14 @@ Status MemoryStore::scan(std::string_view table, std::string_view from, const Vi
   return {};
 }
 
+Status MemoryStore::sizes(std::string_view table, const VisitSize& visit) const {
+  const std::scoped_lock lock(mutex_);
+  const Rows& rows = rows_of(table);
+  const Scanning scanning(scanning_);
+  for (const auto& [key, bytes] : rows) visit(key, bytes.size());
+  return {};
+}
+
 MemoryStore::Tables MemoryStore::tables() const {
   const std::scoped_lock lock(mutex_);
   return tables_;

@@ -22,6 +22,7 @@ class MemoryStore final : public TableStore {
   Status commit(std::span<const Write> writes) override;
   [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override;
   [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override;
+  [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override;
 
   /// All there is; tables without rows are in it.
   [[nodiscard]] Tables tables() const;

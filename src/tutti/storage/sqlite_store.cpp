@@ -59,6 +59,7 @@ struct TableStatements {
   Statement remove;
   Statement read;
   Statement scan;
+  Statement sizes;
 };
 
 /// FNV-1a over the key, then over the bytes. Any change within eight neighbouring bits changes it.
@@ -91,6 +92,7 @@ class SqliteStore final : public TableStore {
   Status commit(std::span<const Write> writes) override;
   [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override;
   [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override;
+  [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override;
 
  private:
   [[nodiscard]] tl::unexpected<Error> failure(int code, std::string_view doing) const;
@@ -100,6 +102,8 @@ class SqliteStore final : public TableStore {
   [[nodiscard]] Result<std::int64_t> number_of(const std::string& sql) const;
   Status configure();
   Status create(const Schema& schema);
+  Status check_kind(const Schema& schema) const;
+  Status add_tables(const Schema& schema) const;
   Status check(const Schema& schema) const;
   [[nodiscard]] Status room_for(std::span<const Write> writes) const;
   [[nodiscard]] Status write_all(std::span<const Write> writes) const;
@@ -189,7 +193,7 @@ Status SqliteStore::create(const Schema& schema) {
   return run(sql);
 }
 
-Status SqliteStore::check(const Schema& schema) const {
+Status SqliteStore::check_kind(const Schema& schema) const {
   const std::string file = file_.string();
   const Result<std::int64_t> application = number_of("PRAGMA application_id");
   if (!application) return tl::unexpected(application.error());
@@ -201,9 +205,30 @@ Status SqliteStore::check(const Schema& schema) const {
   if (*kind != schema.kind) return fail(ErrorCode::invalid, "{}: holds a {}, expected a {}", file, *kind, schema.kind);
   const Result<std::int64_t> version = number_of("PRAGMA user_version");
   if (!version) return tl::unexpected(version.error());
-  if (*version != schema.version)
-    return fail(ErrorCode::unsupported, "{}: a {} of version {}, this program reads version {}{}", file, schema.kind,
-                *version, schema.version, *version > schema.version ? "; it was written by a newer one" : "");
+  if (*version < 1 || *version > schema.version)
+    return fail(ErrorCode::unsupported, "{}: a {} of version {}, this program reads versions 1 to {}{}", file,
+                schema.kind, *version, schema.version,
+                *version > schema.version ? "; it was written by a newer one" : "");
+  return {};
+}
+
+/// Those that an older version did not have.
+Status SqliteStore::add_tables(const Schema& schema) const {
+  const Result<std::int64_t> version = number_of("PRAGMA user_version");
+  if (!version) return tl::unexpected(version.error());
+  if (*version == schema.version) return {};
+  std::string sql = "BEGIN;";
+  for (const std::string& table : schema.tables) {
+    const Result<std::int64_t> known =
+        number_of("SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = '" + table + "'");
+    if (!known) return tl::unexpected(known.error());
+    if (*known == 0) sql += sql_of_table(table) + ";";
+  }
+  return run(sql + fmt::format("PRAGMA user_version={};COMMIT", schema.version));
+}
+
+Status SqliteStore::check(const Schema& schema) const {
+  const std::string file = file_.string();
   std::vector<std::string> expected{sql_of_kind()};
   for (const std::string& table : schema.tables) expected.push_back(sql_of_table(table));
   std::ranges::sort(expected);
@@ -224,6 +249,8 @@ Status SqliteStore::open(const Schema& schema) {
   if (!tables) return tl::unexpected(tables.error());
   if (*tables == 0)
     if (const Status done = create(schema); !done) return done;
+  if (const Status done = check_kind(schema); !done) return done;
+  if (const Status done = add_tables(schema); !done) return done;
   if (const Status done = check(schema); !done) return done;
   if (const Result<std::string> mode = value_of("PRAGMA journal_mode = WAL"); !mode)
     return tl::unexpected(mode.error());
@@ -241,9 +268,10 @@ Status SqliteStore::open(const Schema& schema) {
     auto remove = prepare("DELETE FROM " + table + " WHERE key = ?1");
     auto read = prepare("SELECT hash, bytes FROM " + table + " WHERE key = ?1");
     auto scan = prepare("SELECT key, hash, bytes FROM " + table + " WHERE key >= ?1 ORDER BY key");
-    for (const auto* made : {&put, &remove, &read, &scan})
+    auto sizes = prepare("SELECT key, length(bytes) FROM " + table + " ORDER BY key");
+    for (const auto* made : {&put, &remove, &read, &scan, &sizes})
       if (!*made) return tl::unexpected(made->error());
-    tables_[table] = {std::move(*put), std::move(*remove), std::move(*read), std::move(*scan)};
+    tables_[table] = {std::move(*put), std::move(*remove), std::move(*read), std::move(*scan), std::move(*sizes)};
   }
   return {};
 }
@@ -338,6 +366,16 @@ Status SqliteStore::scan(std::string_view table, std::string_view from, const Vi
     last = key;
   }
   if (code != SQLITE_DONE) return failure(code, fmt::format("{}, from key x'{}' on", table, hex(last)));
+  return {};
+}
+
+Status SqliteStore::sizes(std::string_view table, const VisitSize& visit) const {
+  const std::scoped_lock lock(mutex_);
+  Use use(statements(table).sizes);
+  const Scanning scanning(scanning_);
+  int code = use.step();
+  for (; code == SQLITE_ROW; code = use.step()) visit(use.bytes(0), static_cast<std::size_t>(use.number(1)));
+  if (code != SQLITE_DONE) return failure(code, fmt::format("{}, its rows' sizes", table));
   return {};
 }
 

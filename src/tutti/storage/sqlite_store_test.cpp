@@ -113,15 +113,26 @@ TEST_F(SqliteStoreTest, OtherKindsAndVersionsAreRefused) {
   expect_says(refusal(map_schema()), {"some.tutti", "holds a test, expected a map"});
   Schema old = kSchema;
   old.version = 1;
-  expect_says(refusal(old), {"a test of version 2, this program reads version 1", "newer"});
-  Schema next = kSchema;
-  next.version = 3;
-  expect_says(refusal(next), {"a test of version 2, this program reads version 3"});
+  expect_says(refusal(old), {"a test of version 2, this program reads versions 1 to 1", "newer"});
   Schema more = kSchema;
   more.tables.emplace_back("plums");
   expect_says(refusal(more), {"other tables"});
   run_sql("CREATE TRIGGER evil AFTER INSERT ON apples BEGIN DELETE FROM pears; END");
   expect_says(refusal(), {"other tables", "evil"});
+}
+
+TEST_F(SqliteStoreTest, AnOlderVersionGetsTheTablesThatItLacks) {
+  EXPECT_TRUE(open()->commit(one("a", "1")));
+  Schema next = kSchema;
+  next.version = 3;
+  next.tables.emplace_back("plums");
+  for (int start = 0; start < 2; ++start) {
+    const auto store = open_sqlite_store(file(), next, {.min_free_bytes = 0}).value();
+    EXPECT_EQ(store->read("apples", "a").value(), "1");
+    EXPECT_EQ(store->read("plums", "a").value().has_value(), start == 1);
+    EXPECT_TRUE(store->commit(std::vector<Write>{{"plums", "a", "2"}}));
+  }
+  expect_says(refusal(), {"a test of version 3", "newer"});
 }
 
 TEST_F(SqliteStoreTest, IsOpenOnce) {

@@ -14,7 +14,8 @@
 
 namespace tutti::storage {
 
-/// What a store is for. A store of one kind is never opened as another, nor one of a newer version.
+/// What a store is for. A store of one kind is never opened as another, nor one of a newer version. A newer version has
+/// the tables of those before, and more: an older store gets those when it is opened, empty.
 struct Schema {
   std::string kind;                 ///< In messages and in the file: "map", "robot".
   std::uint32_t version = 1;        ///< Raised when tables or the meaning of their bytes change.
@@ -54,6 +55,9 @@ class TableStore {
   [[nodiscard]] virtual Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const = 0;
   /// Rows with keys from `from` on, in the order of their keys, byte by byte as unsigned numbers.
   [[nodiscard]] virtual Status scan(std::string_view table, std::string_view from, const Visit& visit) const = 0;
+  using VisitSize = std::function<void(std::string_view key, std::size_t size)>;
+  /// All keys in their order, with how many bytes each row has, which are not read. As for scan().
+  [[nodiscard]] virtual Status sizes(std::string_view table, const VisitSize& visit) const = 0;
 };
 
 /// A key that sorts as the tuple of numbers does: 8 bytes each, most significant first.
