@@ -2,9 +2,11 @@
 #include "tutti/bus/internal/nats_connection.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <utility>
 
 #include "tutti/bus/internal/nats_names.hpp"
@@ -84,7 +86,7 @@ Status check(const NatsPortOptions& options) {
 }
 
 Result<std::shared_ptr<NatsConnection>> NatsConnection::open(const NatsPortOptions& options, const std::string& name) {
-  std::shared_ptr<NatsConnection> made(new NatsConnection(options.url));
+  std::shared_ptr<NatsConnection> made(new NatsConnection(options.url, name));
   const auto settings = make_options(options.url, name);
   if (!settings) return fail(ErrorCode::configuration, "{}: not an address that NATS understands", options.url);
   natsStatus status = natsConnection_Connect(&made->connection_, settings.get());
@@ -189,7 +191,7 @@ Status NatsConnection::renew_consumer(const std::string& stream, const std::stri
   return {};
 }
 
-Result<natsSubscription*> NatsConnection::pull(const std::string& stream, const std::string& consumer) {
+Status NatsConnection::add_consumer(const std::string& stream, const std::string& consumer) const {
   jsConsumerConfig config;
   jsConsumerConfig_Init(&config);
   config.Durable = consumer.c_str();
@@ -200,18 +202,16 @@ Result<natsSubscription*> NatsConnection::pull(const std::string& stream, const 
   config.MaxDeliver = stream.starts_with("JOBS_") ? kDeliveries : -1;
   jsConsumerInfo* info = nullptr;
   jsErrCode code{};
-  natsStatus status = js_AddConsumer(&info, streams_, stream.c_str(), &config, nullptr, &code);
+  const natsStatus status = js_AddConsumer(&info, streams_, stream.c_str(), &config, nullptr, &code);
   const NatsOwned<jsConsumerInfo> made(info);
-  if (status != NATS_OK) return failure(status, "consumer of " + stream, code);
-  jsSubOptions options;
-  jsSubOptions_Init(&options);
-  options.Stream = stream.c_str();
-  options.Consumer = consumer.c_str();
-  natsSubscription* subscription = nullptr;
-  status = js_PullSubscribe(&subscription, streams_, nullptr, consumer.c_str(), nullptr, &options, &code);
-  if (status != NATS_OK) return failure(status, "consumer of " + stream, code);
-  const std::scoped_lock guard(mutex_);
-  return subscriptions_.emplace_back(subscription).get();
+  return status == NATS_OK ? Status() : failure(status, "consumer of " + stream, code);
+}
+
+/// Below the prefix that the connection has in make_options().
+std::string NatsConnection::make_inbox() const {
+  static std::atomic<std::uint64_t> number = 0;
+  return fmt::format("_INBOX_{}.{}_{}_{}", name_, getpid(), std::chrono::steady_clock::now().time_since_epoch().count(),
+                     ++number);
 }
 
 Result<natsSubscription*> NatsConnection::subscribe(const std::string& subject) {

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <csignal>
 #include <map>
+#include <set>
 #include <string>
 
 #include "support/bus/nats_network.hpp"
@@ -126,6 +127,26 @@ TEST_F(NatsPortTest, OverALinkThatBreaksAgainAndAgainNothingIsLost) {
   EXPECT_GE(network.relay().cuts(), 3U);
 }
 
+/// Debian's libnats 3.4.1 writes past its list when messages of an earlier fetch come late (nats.c #749): the process
+/// ends with "double free" or "invalid next size".
+TEST_F(NatsPortTest, AServerWhoseLinkStallsTakesEverything) {
+  constexpr std::size_t kMessages = 700;
+  NatsNetwork network({.delay_s = 0.12});
+  NatsPortOptions far = network.options(kRobot), near = network.options(kServer);  // the server is behind the relay
+  const auto hub = std::move(open_nats_port(kServer, far).value());
+  const auto robot = std::move(open_nats_port(kRobot, near).value());
+  ASSERT_TRUE(within(10.0, [&] { return hub->state().connected; }));
+  for (std::size_t i = 0; i < kMessages; ++i)
+    ASSERT_TRUE(send_submap(*robot, std::to_string(i), std::string(1000, 'x')));
+  std::set<std::string> came;
+  EXPECT_TRUE(within(30.0,
+                     [&] {
+                       for (const Received& received : hub->receive()) came.insert(received.envelope.id);
+                       return came.size() == kMessages;
+                     }))
+      << came.size() << " of " << kMessages << " came; " << hub->state().last_error;
+}
+
 TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
   NatsNetwork network;
   NatsPortOptions options = network.options(kServer);
@@ -172,7 +193,7 @@ TEST_F(NatsPortTest, HoldsNoMoreThanItMayAndTheRestStaysOnTheBus) {
     return false;
   });
   EXPECT_GE(held.size(), 10U);
-  EXPECT_LE(held.size(), 10U + 16U);
+  EXPECT_LE(held.size(), 10U + 32U);
   std::size_t heard = 0;
   EXPECT_TRUE(within(10.0, [&] {
     for (const Received& received : held) (*hub)->acknowledge(received.ticket);

@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/jetstream_port.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
+#include "tutti/bus/internal/nats_pull.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -18,7 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kListen_ms = 200;
-constexpr int kBatch = 16;
+constexpr int kBatch = 32;
 constexpr std::uint64_t kMostGiven = 1000;  // of 1024; then the bus waits for acknowledgements
 
 void drop_all(natsSubscription* subscription) {
@@ -78,20 +80,24 @@ bool JetStreamPort::is_full() const {
 }
 
 void JetStreamPort::pull(const std::string& stream, const std::string& consumer) {
+  std::uint64_t asked = 0;  // after so many cuts
   keep(
-      [&](Session& present) -> Result<natsSubscription*> {
+      [&](Session& present) -> Result<std::unique_ptr<NatsPull>> {
         if (is_stranded(stream)) return fail(ErrorCode::io, "{}: being made anew", stream);
-        return present.connection->pull(stream, consumer);
+        if (Status made = present.connection->add_consumer(stream, consumer); !made)
+          return tl::unexpected(made.error());
+        const std::string inbox = present.connection->make_inbox();
+        const auto subscription = present.connection->subscribe(inbox + ".*");
+        if (!subscription) return tl::unexpected(subscription.error());
+        return std::make_unique<NatsPull>(present.connection, stream, consumer, *subscription, inbox);
       },
-      [&](natsSubscription* subscription, Session& present) {
+      [&](const std::unique_ptr<NatsPull>& from, Session& present) {
         if (is_stranded(stream)) return false;
         if (!present.connection->connected() || is_full()) return pause(kTick / 10);  // no requests pile up in a cut
-        natsMsgList list{};
-        const int batch = self_.role == Endpoint::Role::worker ? 1 : kBatch;
-        const natsStatus status = natsSubscription_Fetch(&list, subscription, batch, kListen_ms, nullptr);
-        for (int i = 0; i < list.Count; ++i) take_in(list.Msgs[i], *present.connection);
-        natsMsgList_Destroy(&list);
-        return status == NATS_OK || status == NATS_TIMEOUT;
+        if (const std::uint64_t cuts = cuts_; std::exchange(asked, cuts) != cuts) from->ask_again();
+        const NatsPull::Next next = from->next(self_.role == Endpoint::Role::worker ? 1 : kBatch);
+        if (next.message) take_in(next.message.get(), *present.connection);
+        return next.state != NatsPull::State::lost;
       });
 }
 

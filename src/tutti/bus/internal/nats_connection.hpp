@@ -72,8 +72,10 @@ class NatsConnection {
   [[nodiscard]] Status remove_stream(const std::string& stream) const;
   // What these return is the connection's, which frees it when it is closed: libnats (issue 637) may be at a message
   // for a subscription that is being destroyed.
-  /// Of a stream with a consumer, which is made if it is missing.
-  [[nodiscard]] Result<natsSubscription*> pull(const std::string& stream, const std::string& consumer);
+  /// The consumer of a stream, if it is missing.
+  [[nodiscard]] Status add_consumer(const std::string& stream, const std::string& consumer) const;
+  /// A subject to be answered at, of nobody else.
+  [[nodiscard]] std::string make_inbox() const;
   [[nodiscard]] Result<natsSubscription*> subscribe(const std::string& subject);
 
   /// The value retained at this subject; nothing if there is none.
@@ -87,11 +89,12 @@ class NatsConnection {
   void flush() const { natsConnection_FlushTimeout(connection_, kNatsAnswer.count()); }
 
  private:
-  explicit NatsConnection(std::string url) : url_(std::move(url)) {}
+  NatsConnection(std::string url, std::string name) : url_(std::move(url)), name_(std::move(name)) {}
   [[nodiscard]] Status add_stream(jsStreamConfig& stream) const;
   [[nodiscard]] tl::unexpected<Error> failure(natsStatus status, std::string_view doing, int code = 0) const;
 
   std::string url_;
+  std::string name_;
   natsConnection* connection_ = nullptr;
   jsCtx* streams_ = nullptr;
   std::mutex mutex_;  ///< For what follows.
