@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <functional>
 #include <future>
 #include <map>
@@ -26,7 +27,7 @@ class FeatureCache {
   explicit FeatureCache(std::size_t budget_bytes) : budget_bytes_(budget_bytes) {}
 
   /// What is kept, or else what `compute` makes of it, once for all threads that ask meanwhile. A submap is as old as
-  /// the first call that names it.
+  /// the first call that names it. What `compute` throws, this throws.
   Result<Features> get(SubmapId id, const std::function<Result<Features>()>& compute);
   [[nodiscard]] std::size_t held_bytes() const;  ///< Never more than the budget.
 
@@ -61,7 +62,15 @@ auto FeatureCache<F>::get(SubmapId id, const std::function<Result<Features>()>& 
     }
     under_way_.emplace(age, promise.get_future().share());
   }
-  Result<Features> made = compute();
+  Result<Features> made;
+  try {
+    made = compute();
+  } catch (...) {  // for all who ask meanwhile; the next who asks computes again
+    promise.set_exception(std::current_exception());
+    const std::lock_guard lock(mutex_);
+    under_way_.erase(age);
+    throw;
+  }
   promise.set_value(made);
   const std::lock_guard lock(mutex_);
   under_way_.erase(age);

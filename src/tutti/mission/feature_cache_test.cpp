@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -44,6 +45,18 @@ struct Counted {
 };
 
 const std::size_t kOne = lidar::bytes_of(*features_of({}));
+
+TEST(FeatureCache, WhatThrowsOnceIsComputedTheNextTime) {
+  FeatureCache<lidar::SubmapFeatures> cache(10 * kOne);
+  const auto throws = []() -> Result<FeatureCache<lidar::SubmapFeatures>::Features> {
+    throw std::out_of_range("a defect");
+  };
+  EXPECT_THROW(static_cast<void>(cache.get(id_of(1), throws)), std::out_of_range);
+  const auto made = cache.get(
+      id_of(1), []() -> Result<FeatureCache<lidar::SubmapFeatures>::Features> { return features_of(id_of(1)); });
+  ASSERT_TRUE(made.has_value());
+  EXPECT_EQ((*made)->id, id_of(1));
+}
 
 // Those used last would all be gone when they are wanted again: 44,850 pairs, all of them but a few computed.
 TEST(FeatureCache, EachNewOneAgainstAllBeforeItComputesNoMoreThanDoesNotFit) {

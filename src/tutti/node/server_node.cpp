@@ -217,6 +217,12 @@ Step ServerNode::receive(const bus::Envelope& envelope, Timestamp now) {
   return step;
 }
 
+Step ServerNode::put_aside(const bus::Envelope& envelope, const std::string& why, Timestamp now) {
+  Step step;
+  refuse(envelope, why, now, step);
+  return step;
+}
+
 void ServerNode::note_news(Timestamp now, bool before, Step& step) {
   if (before == server_.has_news()) return;
   timer_ = next_update(now, config_.server.update_period_s);

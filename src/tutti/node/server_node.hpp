@@ -50,6 +50,8 @@ class ServerNode {
   /// with a name or number that is in use (RobotRegistry) is told so by the receipt, and its submaps are taken, but
   /// what is sent to that number is the owner's.
   Step receive(const bus::Envelope& envelope, Timestamp now);
+  /// In place of receive(), for what the host does not hand in (program/host.hpp): told, and counted as refused.
+  Step put_aside(const bus::Envelope& envelope, const std::string& why, Timestamp now);
   /// When on_timer() is to be called next; nothing while there is no news and every job is answered.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
   /// Optimises the map and asks again when it is time; otherwise does nothing.

@@ -2,6 +2,7 @@
 #include "tutti/node/worker_node.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -29,6 +30,17 @@ std::set<SubmapId> submaps_of(const std::variant<Job, RefinementJob>& job) {
   return std::visit([](const auto& one) { return submaps_of(one); }, job);
 }
 
+/// What a finder or refiner throws is a defect of ours, which costs the pair, or the refinement, and nothing else.
+template <class T, class Call>
+Result<T> caught(Call&& call) {
+  try {
+    return call();
+  } catch (const std::exception& error) {
+    return fail(ErrorCode::invalid, "the worker has thrown, which is a defect of it: {}",
+                wire::plain_text(error.what()));
+  }
+}
+
 }  // namespace
 
 void WorkerNode::one_by_one(std::size_t count, const std::function<void(std::size_t)>& call) {
@@ -48,6 +60,10 @@ WorkerNode::WorkerNode(bus::Endpoint self, std::shared_ptr<const server::Closure
       for_each_(std::move(for_each)) {}
 
 Result<ClosureVerdict> WorkerNode::verify(const SubmapPair& pair) const {
+  return caught<ClosureVerdict>([&] { return verify_or_throw(pair); });
+}
+
+Result<ClosureVerdict> WorkerNode::verify_or_throw(const SubmapPair& pair) const {
   const auto first = submaps_->submap(pair.first);
   if (!first) return tl::unexpected(first.error());
   const auto second = submaps_->submap(pair.second);
@@ -148,6 +164,10 @@ Step WorkerNode::on_timer(Timestamp now) {
 }
 
 Result<Refinement> WorkerNode::refine(const RefinementJob& job) const {
+  return caught<Refinement>([&] { return refine_or_throw(job); });
+}
+
+Result<Refinement> WorkerNode::refine_or_throw(const RefinementJob& job) const {
   if (!refiner_) return fail(ErrorCode::unsupported, "this worker refines no maps: its mission has no cameras");
   server::SubmapSet submaps;
   for (const RefinementJob::Part& part : job.parts) {

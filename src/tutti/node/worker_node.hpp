@@ -66,7 +66,9 @@ class WorkerNode {
   void answer(const RefinementJob& job, Step& step) const;
   void answer(const AnyJob& job, Step& step) const;
   [[nodiscard]] Result<ClosureVerdict> verify(const SubmapPair& pair) const;
+  [[nodiscard]] Result<ClosureVerdict> verify_or_throw(const SubmapPair& pair) const;
   [[nodiscard]] Result<Refinement> refine(const RefinementJob& job) const;
+  [[nodiscard]] Result<Refinement> refine_or_throw(const RefinementJob& job) const;
 
   bus::Endpoint self_;
   std::shared_ptr<const server::ClosureFinder> finder_;

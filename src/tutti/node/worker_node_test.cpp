@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -56,6 +57,34 @@ TEST_F(WorkerNodeTest, AnswersEveryPairOfAJobTheSameOnAnyNumberOfThreads) {
   });
   EXPECT_EQ(answer(many.receive(envelope(job), Timestamp{})), verdicts);
   EXPECT_EQ(answer(many.receive(envelope(job), Timestamp{})), verdicts);  // again
+}
+
+TEST_F(WorkerNodeTest, AFinderThatThrowsCostsThePairAndNothingElse) {
+  class Throwing final : public server::ClosureFinder {
+   public:
+    [[nodiscard]] std::uint32_t version() const override { return there_.version(); }
+    [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+      return there_.is_candidate(first, second);
+    }
+    [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+      return there_.can_compare(first, second);
+    }
+    [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                                const server::PayloadStore& payloads) const override {
+      if (first.id.index == 1) throw std::out_of_range("vector::_M_range_check");
+      return there_.verify(first, second, payloads);
+    }
+
+   private:
+    test::EvenFinder there_;
+  };
+  WorkerNode worker(kWorker, std::make_shared<Throwing>(), frames());
+  Job job{.id = "1/0", .pairs = {}};
+  for (std::uint32_t i = 0; i < 3; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
+  const Verdicts verdicts = answer(worker.receive(envelope(job), Timestamp{}));
+  EXPECT_EQ(verdicts.verdicts.size(), 2U);
+  EXPECT_EQ(verdicts.failed, (std::vector<SubmapPair>{job.pairs[1]}));
+  EXPECT_NE(verdicts.why.find("_M_range_check"), std::string::npos) << verdicts.why;
 }
 
 /// What a worker asks the server for, and the server's answers.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <iterator>
 #include <thread>
 
@@ -14,6 +15,23 @@
 
 namespace tutti::program {
 
+namespace {
+
+/// What a call throws; nothing: it returns.
+template <class Call>
+std::optional<std::string> thrown_by(Call&& call) {
+  try {
+    call();
+    return std::nullopt;
+  } catch (const std::exception& error) {
+    return error.what();
+  } catch (...) {
+    return "something that is no exception of the standard library's";
+  }
+}
+
+}  // namespace
+
 void Hosted::wait(double wall_s) {
   if (wall_s > 0.0) std::this_thread::sleep_for(std::chrono::duration<double>(wall_s));
 }
@@ -21,6 +39,17 @@ void Hosted::wait(double wall_s) {
 Host::~Host() { close(); }
 
 Status Host::open() {
+  Status opened;
+  if (const auto thrown = thrown_by([&] { opened = open_parts(); })) {
+    note_thrown("its start", *thrown);
+    return fail(ErrorCode::invalid, "it cannot start, which is a defect of the program: {}", *thrown);
+  }
+  return opened;
+}
+
+Status Host::open_parts() {
+  if (parts_.store != nullptr && !parts_.table_aside.empty())
+    if (Status read = aside_.read(*parts_.store, parts_.table_aside); !read) return read;
   auto port = parts_.open_port();
   if (!port) return tl::unexpected(port.error());
   auto node = parts_.open_node(**port);
@@ -47,7 +76,80 @@ void Host::reopen() {
     return close();
   }
   log_.say(Level::info, "works again, from what is stored");
-  trouble_.clear();
+  if (pause_s_ == 0.0) trouble_.clear();
+}
+
+/// Told, and counted.
+void Host::note_thrown(const std::string& by, const std::string& what) {
+  ++thrown_;
+  last_thrown_ = fmt::format("{}: {}", by, what);
+  log_.write(Json{{"time_s", clock_.now() - Timestamp{}}, {"event", "thrown"}, {"by", by}, {"what", what}});
+  log_.say(Level::error,
+           fmt::format("{} has made the program throw, which is a defect of it; it goes on from what is stored: {}", by,
+                       what));
+}
+
+bool Host::hand_in(const bus::Received& message) {
+  const bus::Envelope& envelope = message.envelope;
+  const std::string hash = PutAside::hash_of(envelope);
+  const bool is_aside = aside_.contains(hash);
+  const auto thrown = thrown_by([&] {
+    add(is_aside ? node_->put_aside(message, fmt::format("put aside: it makes this program throw (hash {})", hash),
+                                    clock_.now())
+                 : node_->receive(message, clock_.now()));
+  });
+  if (!thrown) return true;
+  note_thrown(
+      fmt::format("a {} from {} {} with the id '{}', {} bytes, hash {}", wire::name(envelope.kind),
+                  bus::name(envelope.from.role), envelope.from.number, envelope.id, envelope.bytes->size(), hash),
+      *thrown);
+  if (bus::delivery_of(envelope.kind) != bus::Delivery::work_queue && aside_.note(hash)) {
+    if (!parts_.table_aside.empty()) said_.step.writes.push_back(aside_.to_row(parts_.table_aside, hash));
+    log_.write(Json{{"time_s", clock_.now() - Timestamp{}},
+                    {"event", "put_aside"},
+                    {"from", fmt::format("{} {}", bus::name(envelope.from.role), envelope.from.number)},
+                    {"kind", wire::name(envelope.kind)},
+                    {"id", envelope.id},
+                    {"bytes", envelope.bytes->size()},
+                    {"hash", hash},
+                    {"why", *thrown}});
+    log_.say(Level::error,
+             fmt::format("the message of hash {} is put aside after {} deliveries; another version of the "
+                         "program will try it again",
+                         hash, PutAside::kMostThrows));
+  }
+  if (carry_out()) close();  // what was said before it holds
+  return false;
+}
+
+/// Messages are taken while it waits for its next try.
+bool Host::work() {
+  const auto thrown = thrown_by([&] {
+    const auto next = node_->next_work();
+    if (!next || *next > clock_.now() || clock_.wall_s() < work_again_s_) return;
+    add(node_->work(clock_.now()));
+    if (std::exchange(pause_s_, 0.0) > 0.0) trouble_.clear();
+  });
+  if (!thrown) return true;
+  pause_s_ = std::clamp(2.0 * pause_s_, 2.0 * kReopen_s, kLongestPause_s);
+  work_again_s_ = clock_.wall_s() + pause_s_;
+  note_thrown("its own work", *thrown);
+  if (carry_out()) close();
+  trouble_ = fmt::format("its own work fails, which is a defect of the program, and is tried again every {:.0f} s: {}",
+                         pause_s_, *thrown);
+  return false;
+}
+
+bool Host::report() {
+  const double wall_s = clock_.wall_s();
+  if (wall_s < report_s_) return true;
+  report_s_ = wall_s + kReport_s;
+  const auto thrown = thrown_by([&] { add(node_->report(clock_.now())); });
+  if (!thrown) return true;
+  report_s_ = wall_s + kLongestPause_s;
+  note_thrown("its report", *thrown);
+  if (carry_out()) close();
+  return false;
 }
 
 double Host::turn() {
@@ -64,33 +166,35 @@ double Host::turn() {
   send_waiting();
   for (const bus::Received& message : port_->receive()) {
     count(false, message.envelope);
-    add(node_->receive(message, clock_.now()));
+    if (!hand_in(message)) return kLongestSleep_s;
     if (said_bytes_ > kMostUncommitted && !carry_out()) return kLongestSleep_s;
   }
   if (!carry_out()) return kLongestSleep_s;  // receipts do not wait for long work
-  if (const auto next = node_->next_work(); next && *next <= clock_.now()) add(node_->work(clock_.now()));
-  if (wall_s >= report_s_) {
-    report_s_ = wall_s + kReport_s;
-    add(node_->report(clock_.now()));
-  }
-  if (!carry_out()) return kLongestSleep_s;
+  if (!work() || !report() || !carry_out()) return kLongestSleep_s;
   tell_status();
-  const auto next = node_->next_work();
+  const auto next = clock_.wall_s() < work_again_s_ ? std::nullopt : node_->next_work();
   return next ? std::min(kLongestSleep_s, clock_.wall_s_until(*next)) : kLongestSleep_s;
 }
 
 void Host::run(const std::atomic<bool>& stop) {
   while (!stop && !(node_ && node_->finished())) {
     const double wait_s = turn();
-    if (node_)
-      node_->wait(wait_s);
-    else
+    if (node_) {
+      if (const auto thrown = thrown_by([&] { node_->wait(wait_s); })) {
+        note_thrown("what it was fed", *thrown);
+        lost_ = true;
+      }
+    } else {
       std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
+    }
     if (std::exchange(lost_, false)) close();
   }
   if (node_) {
-    add(node_->end());
-    add(node_->report(clock_.now()));  // how it stays; lost when the port goes sooner
+    const auto thrown = thrown_by([&] {
+      add(node_->end());
+      add(node_->report(clock_.now()));  // how it stays; lost when the port goes sooner
+    });
+    if (thrown) note_thrown("its end", *thrown);
     static_cast<void>(carry_out());
   }
   status_s_ = 0.0;
@@ -123,8 +227,16 @@ bool Host::carry_out() {
 }
 
 Status Host::carry_out_said() {
-  Answer said = std::exchange(said_, {});
   said_bytes_ = 0;
+  Status carried_out;
+  const auto thrown = thrown_by([&] { carried_out = store_and_send(std::exchange(said_, {})); });
+  if (!thrown) return carried_out;
+  note_thrown("what it has said", *thrown);
+  trouble_ = fmt::format("cannot carry out what it says, tries again every {} s: {}", kReopen_s, *thrown);
+  return fail(ErrorCode::invalid, "{}", trouble_);
+}
+
+Status Host::store_and_send(Answer said) {
   TUTTI_CHECK(parts_.store != nullptr || said.step.writes.empty(), "writes without a store");
   if (!said.step.writes.empty())
     if (const Status committed = parts_.store->commit(said.step.writes); !committed) {
@@ -174,8 +286,12 @@ void Host::tell_status() {
   const double wall_s = clock_.wall_s();
   if (wall_s < status_s_) return;
   status_s_ = wall_s + kStatus_s;
-  Json status = node_ ? node_->status(clock_.now()) : Json{{"line", trouble_}};
+  Json status{{"line", trouble_}};
+  if (node_)
+    if (const auto thrown = thrown_by([&] { status = node_->status(clock_.now()); }))
+      status["line"] = "how it stands cannot be told: " + *thrown;
   if (!trouble_.empty()) status["trouble"] = trouble_;
+  if (thrown_ > 0) status["thrown"] = {{"times", thrown_}, {"last", last_thrown_}, {"put_aside", aside_.count()}};
   if (status.contains("line")) log_.show(status.value("line", ""));
   if (!parts_.status_file.empty()) static_cast<void>(replace_file(parts_.status_file, status.dump() + "\n", false));
 }

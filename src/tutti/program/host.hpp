@@ -16,6 +16,7 @@
 #include "tutti/node/step.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/event_log.hpp"
+#include "tutti/program/put_aside.hpp"
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::program {
@@ -33,6 +34,10 @@ class Hosted {
   /// The first step.
   virtual Answer start(Timestamp now) = 0;
   virtual Answer receive(const bus::Received& message, Timestamp now) = 0;
+  /// In place of receive(), for a message that has made the node throw too often: it is done with, and counted.
+  virtual Answer put_aside(const bus::Received& message, const std::string& /*why*/, Timestamp /*now*/) {
+    return {{}, {message.ticket}};
+  }
   /// When there is something to do without a message; nothing: never.
   [[nodiscard]] virtual std::optional<Timestamp> next_work() const { return std::nullopt; }
   virtual Answer work(Timestamp /*now*/) { return {}; }
@@ -58,11 +63,16 @@ struct Traffic {
 /// Carries out what a node says, as node/step.hpp asks for: all steps of one turn in one transaction. When that cannot
 /// be committed the node goes and is made again from its store, every few seconds until it works; what had come to it
 /// comes again, since nothing was acknowledged. One thread.
+///
+/// What a node throws, which is a defect of ours, ends no program: the node is made again in the same way, since nobody
+/// knows how it stands. A message that has made it throw PutAside::kMostThrows times is put aside; a job is left to the
+/// bus, which gives it to others. Work that throws waits, longer every time, while messages are taken.
 class Host {
  public:
   static constexpr double kReport_s = 2.0;
   static constexpr double kStatus_s = 0.5;
   static constexpr double kReopen_s = 3.0;
+  static constexpr double kLongestPause_s = 600.0;  ///< Between two tries of work that throws.
   static constexpr double kLongestSleep_s = 0.05;
   static constexpr std::size_t kMostUncommitted = 8U << 20U;  ///< Bytes.
 
@@ -72,8 +82,11 @@ class Host {
     std::function<Result<std::unique_ptr<Hosted>>(bus::Port& port)> open_node;
     std::function<void()> each_second;  ///< May be empty.
     std::filesystem::path status_file;  ///< Empty: none.
+    std::string table_aside = {};  ///< Of the store: where messages that are put aside are remembered. Empty: nowhere.
+    std::string version = {};      ///< Of the program: what is put aside by one, another tries again.
   };
-  Host(Parts parts, const Clock& clock, EventLog& log) : parts_(std::move(parts)), clock_(clock), log_(log) {}
+  Host(Parts parts, const Clock& clock, EventLog& log)
+      : parts_(std::move(parts)), clock_(clock), log_(log), aside_(parts_.version) {}
   ~Host();
   Host(const Host&) = delete;
   Host& operator=(const Host&) = delete;
@@ -92,11 +105,20 @@ class Host {
   /// By direction (true: sent) and kind.
   using TrafficTable = std::map<std::pair<bool, bus::MessageKind>, Traffic>;
   [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }
+  /// Why the node does not do all that it should; empty when it does.
+  [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
  private:
+  Status open_parts();
   void add(Answer answer);
+  /// False: the node is gone.
+  bool hand_in(const bus::Received& message);
+  bool work();
+  bool report();
+  void note_thrown(const std::string& by, const std::string& what);
   [[nodiscard]] bool carry_out();
   Status carry_out_said();
+  Status store_and_send(Answer said);
   void send_waiting();
   void close();
   void reopen();
@@ -115,6 +137,10 @@ class Host {
   double report_s_ = 0.0, status_s_ = 0.0, second_s_ = 0.0;
   std::string trouble_;
   bool lost_ = false;  // a step from within Hosted::wait()
+  PutAside aside_;
+  std::uint64_t thrown_ = 0;  // so often
+  std::string last_thrown_;
+  double pause_s_ = 0.0, work_again_s_ = 0.0;  // of work that throws
   TrafficTable traffic_;
 };
 

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "support/node/submaps.hpp"
+#include "tutti/node/server_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 
 namespace tutti::program {
@@ -20,7 +23,7 @@ using Diary = std::vector<std::string>;
 
 class DiaryStore final : public storage::TableStore {
  public:
-  explicit DiaryStore(Diary& diary) : diary_(diary), rows_({"test", 1, {"rows"}}) {}
+  explicit DiaryStore(Diary& diary) : diary_(diary), rows_({"test", 1, {"rows", "meta"}}) {}
   Status commit(std::span<const storage::Write> writes) override {
     if (full) return fail(ErrorCode::io, "disk full");
     diary_.push_back("commit " + std::to_string(writes.size()));
@@ -86,17 +89,27 @@ class Postman final : public Hosted {
   Answer end() override { return {{.writes = {{"rows", "end", "goodbye"}}}, {}}; }
   Answer start(Timestamp) override { return {{.messages = {letter(MessageKind::job, "hello")}}, {}}; }
   Answer receive(const bus::Received& message, Timestamp) override {
+    if (*message.envelope.bytes == "poison") throw std::out_of_range("poisoned");
     return {{.writes = {{"rows", std::to_string(message.ticket), *message.envelope.bytes}},
              .messages = {letter(MessageKind::job, *message.envelope.bytes)}},
             {message.ticket}};
   }
+  Answer put_aside(const bus::Received& message, const std::string& why, Timestamp) override {
+    EXPECT_NE(why.find(PutAside::hash_of(message.envelope)), std::string::npos) << why;
+    return {{.messages = {letter(MessageKind::job, "refused")}}, {message.ticket}};
+  }
   [[nodiscard]] std::optional<Timestamp> next_work() const override { return Timestamp{} + next_s_; }
   Answer work(Timestamp) override {
+    if (work_throws) throw std::logic_error("cannot work");
     next_s_ += 1.0;
     return {{.messages = {letter(MessageKind::job, "work")}}, {}};
   }
-  Answer report(Timestamp) override { return {{.messages = {letter(MessageKind::status, "report")}}, {}}; }
+  Answer report(Timestamp) override {
+    if (report_throws) throw 42;
+    return {{.messages = {letter(MessageKind::status, "report")}}, {}};
+  }
   [[nodiscard]] Json status(Timestamp) const override { return {{"line", "fine"}}; }
+  static inline bool work_throws = false, report_throws = false;
 
  private:
   const std::function<void()>& waits_;
@@ -106,7 +119,13 @@ class Postman final : public Hosted {
 class HostTest : public testing::Test {
  protected:
   HostTest() {
+    Postman::work_throws = Postman::report_throws = false;
+    host_ = host("1");
+  }
+  std::unique_ptr<Host> host(const std::string& version) {
     Host::Parts parts;
+    parts.table_aside = "meta";
+    parts.version = version;
     parts.store = &store_;
     parts.open_port = [this]() -> Result<std::unique_ptr<bus::Port>> {
       return std::make_unique<DiaryPort>(diary_, mail_);
@@ -114,7 +133,17 @@ class HostTest : public testing::Test {
     parts.open_node = [this](bus::Port&) -> Result<std::unique_ptr<Hosted>> {
       return std::make_unique<Postman>(waits_);
     };
-    host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
+    return std::make_unique<Host>(std::move(parts), clock_, *log_);
+  }
+  /// Turns, with time to be made again in between.
+  Diary turns(int count) {
+    for (int i = 0; i < count; ++i, wall_s_ += 1.01 * Host::kReopen_s) host_->turn();
+    return said();
+  }
+  [[nodiscard]] std::size_t rows_aside() const {
+    std::size_t rows = 0;
+    EXPECT_TRUE(store_.scan("meta", "aside/", [&](auto, auto) { return ++rows > 0; }).has_value());
+    return rows;
   }
   Diary said() { return std::exchange(diary_, {}); }
 
@@ -196,6 +225,166 @@ TEST_F(HostTest, WhatCanNeverBeSentDoesNotWait) {
   said();
   host_->turn();
   EXPECT_EQ(said(), Diary{});
+}
+
+TEST_F(HostTest, AMessageThatMakesTheNodeThrowIsPutAsideAndAllElseGoesOn) {
+  mail_.owed = {{1, letter(MessageKind::submap, "a")},
+                {2, letter(MessageKind::submap, "poison")},
+                {3, letter(MessageKind::submap, "b")}};
+  ASSERT_TRUE(host_->open().has_value());
+  EXPECT_EQ(turns(1), (Diary{"send hello", "commit 1", "send a", "acknowledge 1"}));  // what came before it holds
+  EXPECT_EQ(host_->hosted(), nullptr);                                                // nobody knows how it stands
+  EXPECT_EQ(rows_aside(), 0U);
+  for (unsigned throws = 1; throws < PutAside::kMostThrows; ++throws) turns(2);  // is made again; throws again
+  EXPECT_EQ(rows_aside(), 1U);
+  const Diary after = turns(2);
+  EXPECT_EQ((Diary{after.begin(), after.begin() + 6}),
+            (Diary{"send hello", "commit 1", "send refused", "send b", "acknowledge 2", "acknowledge 3"}));
+  EXPECT_TRUE(mail_.owed.empty());
+
+  mail_.owed = {{4, letter(MessageKind::submap, "poison")}};  // it is known, also after a restart,
+  host_ = host("1");
+  ASSERT_TRUE(host_->open().has_value());
+  turns(1);
+  EXPECT_NE(host_->hosted(), nullptr);
+  EXPECT_TRUE(mail_.owed.empty());
+  mail_.owed = {{5, letter(MessageKind::submap, "poison")}};  // and another version tries again
+  host_ = host("2");
+  ASSERT_TRUE(host_->open().has_value());
+  turns(1);
+  EXPECT_EQ(host_->hosted(), nullptr);
+  EXPECT_FALSE(mail_.owed.empty());
+}
+
+TEST_F(HostTest, AJobThatMakesTheNodeThrowIsLeftToTheBus) {
+  mail_.owed = {{1, letter(MessageKind::job, "poison")}};
+  ASSERT_TRUE(host_->open().has_value());
+  turns(4 * static_cast<int>(PutAside::kMostThrows));
+  EXPECT_EQ(mail_.owed.size(), 1U);
+  EXPECT_EQ(rows_aside(), 0U);
+}
+
+TEST_F(HostTest, AStatusIsPutAsideByItsSender) {
+  bus::Envelope status = letter(MessageKind::status, "poison");
+  bus::Envelope next = letter(MessageKind::status, "fine");
+  EXPECT_EQ(PutAside::hash_of(status), PutAside::hash_of(next));
+  next.from = Endpoint::of(RobotId{2});
+  EXPECT_NE(PutAside::hash_of(status), PutAside::hash_of(next));
+  bus::Envelope submap = letter(MessageKind::submap, "a");
+  EXPECT_NE(PutAside::hash_of(submap), PutAside::hash_of(letter(MessageKind::submap, "b")));
+  submap.id = "1";
+  EXPECT_NE(PutAside::hash_of(submap), PutAside::hash_of(letter(MessageKind::submap, "a")));
+}
+
+TEST_F(HostTest, WorkThatThrowsWaitsLongerEveryTimeWhileMessagesAreTaken) {
+  Postman::work_throws = true;
+  ASSERT_TRUE(host_->open().has_value());
+  wall_s_ = 5.0;
+  std::size_t tries = 0;
+  for (int i = 0; i < 200; ++i, wall_s_ += 1.0) {
+    const bool was_there = host_->hosted() != nullptr;
+    mail_.owed = {{1, letter(MessageKind::submap, "a")}};
+    EXPECT_GT(host_->turn(), 0.0);
+    if (was_there && host_->hosted() == nullptr) ++tries;
+  }
+  EXPECT_GE(tries, 4U);
+  EXPECT_LE(tries, 6U);                                                              // after 6, 12, 24, 48, 96 s
+  EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(said(), "send a")), tries);  // whenever it is made again
+  EXPECT_NE(host_->trouble().find("cannot work"), std::string::npos) << host_->trouble();
+  Postman::work_throws = false;
+  for (int i = 0; i < 200; ++i, wall_s_ += 1.0) host_->turn();
+  EXPECT_GT(std::ranges::count(said(), "send work"), 0);
+  EXPECT_EQ(host_->trouble(), "");
+}
+
+TEST_F(HostTest, AReportThatThrowsEndsNothing) {
+  Postman::report_throws = true;
+  ASSERT_TRUE(host_->open().has_value());
+  turns(1);
+  mail_.owed = {{1, letter(MessageKind::submap, "a")}};
+  turns(3);
+  EXPECT_TRUE(mail_.owed.empty());
+}
+
+TEST_F(HostTest, WhatIsThrownWhileItWaitsOrEndsEndsNothing) {
+  std::atomic<bool> stop = false;
+  waits_ = [&] {
+    stop = true;
+    throw std::runtime_error("fed something strange");
+  };
+  ASSERT_TRUE(host_->open().has_value());
+  host_->run(stop);
+  EXPECT_EQ(host_->hosted(), nullptr);
+  wall_s_ += Host::kReopen_s;
+  host_->turn();
+  EXPECT_NE(host_->hosted(), nullptr);
+  Postman::report_throws = true;
+  host_->run(stop);
+}
+
+/// A mapping server whose finder throws when it is asked for submap 0/7/1.
+class Mapper final : public Hosted {
+ public:
+  class Finder final : public server::ClosureFinder {
+   public:
+    [[nodiscard]] std::uint32_t version() const override { return there_.version(); }
+    [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+      return there_.can_compare(first, second);
+    }
+    [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+      for (const Submap* submap : {&first, &second})
+        if (submap->id == SubmapId{{RobotId{0}, 7}, 1}) throw std::out_of_range("map::at");
+      return there_.is_candidate(first, second);
+    }
+    [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                                const server::PayloadStore& payloads) const override {
+      return there_.verify(first, second, payloads);
+    }
+
+   private:
+    node::test::EvenFinder there_;
+  };
+  explicit Mapper(const storage::TableStore& store)
+      : node_(std::move(
+            node::ServerNode::open({RobotId{0}}, std::make_shared<Finder>(), node::ServerNodeConfig{}, 1, store)
+                .value())) {}
+  Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
+  Answer receive(const bus::Received& message, Timestamp now) override {
+    return {node_->receive(message.envelope, now), {message.ticket}};
+  }
+  Answer put_aside(const bus::Received& message, const std::string& why, Timestamp now) override {
+    return {node_->put_aside(message.envelope, why, now), {message.ticket}};
+  }
+  [[nodiscard]] Json status(Timestamp now) const override {
+    const MissionStatus status = node_->mission_status(now);
+    return {{"submaps", status.submaps}, {"refused", status.refusals.size()}};
+  }
+
+ private:
+  std::unique_ptr<node::ServerNode> node_;
+};
+
+TEST_F(HostTest, AServerWhoseFinderThrowsOnOneSubmapMapsTheOthers) {
+  storage::MemoryStore store(storage::map_schema());
+  Host host(
+      {.store = &store,
+       .open_port = [this]() -> Result<std::unique_ptr<bus::Port>> {
+         return std::make_unique<DiaryPort>(diary_, mail_);
+       },
+       .open_node = [&](bus::Port&) -> Result<std::unique_ptr<Hosted>> { return std::make_unique<Mapper>(store); },
+       .each_second = {},
+       .status_file = {},
+       .table_aside = "meta",
+       .version = "1"},
+      clock_, *log_);
+  for (std::uint32_t i = 0; i < 4; ++i)
+    mail_.owed.emplace(i, node::test::envelope(node::test::submap({RobotId{0}, 7}, i)));
+  ASSERT_TRUE(host.open().has_value());
+  for (int i = 0; i < 10; ++i, wall_s_ += 1.01 * Host::kReopen_s) host.turn();
+  EXPECT_TRUE(mail_.owed.empty());
+  ASSERT_NE(host.hosted(), nullptr);
+  EXPECT_EQ(host.hosted()->status(clock_.now()), (Json{{"submaps", 3}, {"refused", 1}}));
+  EXPECT_EQ(store.tables().at("submaps").size(), 3U);
 }
 
 TEST_F(HostTest, ItsLastWordsAreStored) {

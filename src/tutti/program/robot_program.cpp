@@ -301,7 +301,9 @@ Status RobotProgram::start() {
                             },
                             .open_node = [this](bus::Port& port) { return open_node(port); },
                             .each_second = {},
-                            .status_file = folder_->path() / kStatusFile},
+                            .status_file = folder_->path() / kStatusFile,
+                            .table_aside = "meta",
+                            .version = options_.version},
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
   log_->say(Level::info, fmt::format("robot {} runs in {}, bus {}, {}, {}", robot_.value, folder_->path().string(),

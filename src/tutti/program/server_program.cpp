@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -15,6 +16,7 @@
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mission/bundle_refiner.hpp"
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/host.hpp"
@@ -28,11 +30,14 @@ namespace {
 
 class HostedServer final : public Hosted {
  public:
-  HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, const std::string& trouble)
-      : node_(std::move(node)), version_(std::move(version)), trouble_(trouble) {}
+  HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, std::function<std::string()> trouble)
+      : node_(std::move(node)), version_(std::move(version)), trouble_(std::move(trouble)) {}
   Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
   Answer receive(const bus::Received& message, Timestamp now) override {
     return {node_->receive(message.envelope, now), {message.ticket}};
+  }
+  Answer put_aside(const bus::Received& message, const std::string& why, Timestamp now) override {
+    return {node_->put_aside(message.envelope, why, now), {message.ticket}};
   }
   [[nodiscard]] std::optional<Timestamp> next_work() const override { return node_->next_timer(); }
   Answer work(Timestamp now) override {
@@ -49,13 +54,13 @@ class HostedServer final : public Hosted {
     MissionStatus status = node_->mission_status(now);
     status.version = version_;
     status.wall_ns = static_cast<std::int64_t>(wall_clock_ns());
-    status.trouble = trouble_;
+    status.trouble = trouble_();
     return node::to_viewers(std::move(status));
   }
 
   std::unique_ptr<node::ServerNode> node_;
   std::string version_;
-  const std::string& trouble_;
+  std::function<std::string()> trouble_;
   std::uint64_t told_changes_ = 0;
 };
 
@@ -182,7 +187,8 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   for (std::uint32_t i = 0; i < names_.size(); ++i) robots.insert(RobotId{i});
   auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
-  return std::make_unique<HostedServer>(std::move(*node), options_.version, trouble_);
+  return std::make_unique<HostedServer>(std::move(*node), options_.version,
+                                        [this] { return trouble_.empty() ? host_->trouble() : trouble_; });
 }
 
 /// Once a second: the bus may have ended, or its disk may be full.
@@ -233,7 +239,9 @@ Status ServerProgram::start() {
                             },
                             .open_node = [this](bus::Port&) { return open_node(); },
                             .each_second = [this] { tend_bus(); },
-                            .status_file = folder_->path() / kStatusFile},
+                            .status_file = folder_->path() / kStatusFile,
+                            .table_aside = node::kMetaTable,
+                            .version = options_.version},
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
   if (options_.threads == 0) return {};
