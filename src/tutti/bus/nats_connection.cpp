@@ -22,9 +22,10 @@ constexpr std::int64_t kConnect_ms = 2000;
 constexpr std::int64_t kPing_ms = 10'000;
 constexpr int kPingsOut = 2;
 constexpr std::int64_t kWrite_ms = 15'000;  // without it a cut blocks for minutes; a part takes 1 s at 1 Mbit/s
-constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+/// So long the bus takes one message of an id: robots send again every minute what the server has no time for, and once
+/// in so long that may take room on the bus. Shorter than the server waits for the rest of a message.
+constexpr std::int64_t kSameId_ns = 3'600'000'000'000;
 constexpr std::int64_t kAcknowledge_ns = 30'000'000'000;  // then a message comes again
-constexpr std::int64_t kUnacknowledged = 1024;            // parts; more than the robots have under way at a time
 constexpr std::uint64_t kMostRemoved = 1000;              // sequences looked at in one go
 constexpr std::int64_t kDeliveries = 5;                   // of a job: what ends five workers is not given to a sixth
 
@@ -129,7 +130,7 @@ Status NatsConnection::add_stream(jsStreamConfig& stream) const {
   natsStatus status = js_GetStreamInfo(&info, streams_, stream.Name, nullptr, &code);
   NatsOwned<jsStreamInfo> found(info);
   if (status == NATS_OK && found->Config->MaxBytes == stream.MaxBytes &&
-      found->Config->SubjectsLen == stream.SubjectsLen)
+      found->Config->SubjectsLen == stream.SubjectsLen && found->Config->Duplicates == stream.Duplicates)
     return {};
   status = found ? js_UpdateStream(&info, streams_, &stream, nullptr, &code)
                  : js_AddStream(&info, streams_, &stream, nullptr, &code);
@@ -166,7 +167,7 @@ Status NatsConnection::prepare(const NatsPortOptions& options) const {
     stream.Discard = js_DiscardNew;
     stream.MaxBytes = i == 0 ? most : most / 8;
     stream.MaxMsgSize = 8U << 20U;
-    stream.Duplicates = kDay_ns;
+    stream.Duplicates = kSameId_ns;
     if (const Status done = add_stream(stream); !done) return done;
   }
   const std::string bucket = retained_bucket(mission);
@@ -198,7 +199,7 @@ Status NatsConnection::add_consumer(const std::string& stream, const std::string
   config.AckPolicy = js_AckExplicit;
   config.DeliverPolicy = js_DeliverAll;
   config.AckWait = kAcknowledge_ns;
-  config.MaxAckPending = kUnacknowledged;
+  config.MaxAckPending = kMostUnacknowledged;
   config.MaxDeliver = stream.starts_with("JOBS_") ? kDeliveries : -1;
   jsConsumerInfo* info = nullptr;
   jsErrCode code{};

@@ -94,7 +94,7 @@ NatsState JetStreamPort::state() const {
                   .waiting_messages = outbox_.messages(),
                   .waiting_bytes = outbox_.bytes(),
                   .waiting_acknowledgements = inbox_.acknowledgements(),
-                  .refused = refused_,
+                  .refused = refused_ + inbox_.given_up(),
                   .streams_made_anew = streams_made_anew_,
                   .jobs_removed = jobs_removed_,
                   .last_error = last_error_};

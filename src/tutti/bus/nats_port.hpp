@@ -49,7 +49,7 @@ struct NatsState {
   std::size_t waiting_messages = 0;  ///< Their parts: not sent, or not confirmed by the bus.
   std::uint64_t waiting_bytes = 0;
   std::size_t waiting_acknowledgements = 0;
-  std::uint64_t refused = 0;            ///< Arrived, and were none of ours.
+  std::uint64_t refused = 0;            ///< Arrived, and were none of ours, or never whole.
   std::uint64_t streams_made_anew = 0;  ///< Of the server's port: since the bus would not give what was in them.
   std::uint64_t jobs_removed = 0;       ///< Of the server's port: those that no worker gets any more.
   std::string last_error;

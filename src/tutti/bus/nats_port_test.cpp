@@ -268,6 +268,70 @@ TEST_F(NatsPortTest, GarbageIsCountedAndInNobodysWay) {
   EXPECT_NE(hub->state().last_error.find("none of ours"), std::string::npos) << hub->state().last_error;
 }
 
+/// A few hundred bytes of somebody's.
+class Stranger {
+ public:
+  explicit Stranger(const std::string& url) {
+    EXPECT_EQ(natsConnection_ConnectTo(&connection_, url.c_str()), NATS_OK);
+    EXPECT_EQ(natsConnection_JetStream(&streams_, connection_, nullptr), NATS_OK);
+  }
+  ~Stranger() {
+    jsCtx_Destroy(streams_);
+    natsConnection_Destroy(connection_);
+  }
+  Stranger(const Stranger&) = delete;
+  Stranger& operator=(const Stranger&) = delete;
+  void store(const std::string& subject, const std::string& id, const std::string& bytes) const {
+    jsPubOptions options;
+    jsPubOptions_Init(&options);
+    options.MsgId = id.c_str();
+    EXPECT_EQ(
+        js_Publish(nullptr, streams_, subject.c_str(), bytes.data(), static_cast<int>(bytes.size()), &options, nullptr),
+        NATS_OK)
+        << id;
+  }
+
+ private:
+  natsConnection* connection_ = nullptr;
+  jsCtx* streams_ = nullptr;
+};
+
+TEST_F(NatsPortTest, OrphanPartsStopNobody) {
+  NatsNetwork network;
+  const auto hub = network.open(kServer);
+  const auto robot = network.open(kRobot);
+  const Stranger stranger(network.child().url());
+  for (int i = 0; i < 1100; ++i) {
+    const std::string from = i % 2 == 0 ? "3" : "5";  // the robot's own number, too
+    stranger.store("mission.test.robot." + from + ".submap", "submap/orphan " + std::to_string(i) + "/0.2", "o");
+  }
+  ASSERT_TRUE(send_submap(*robot, "7", bytes_of(7, 300'000)));
+  Receiver receiver(300'000);
+  EXPECT_TRUE(within(10.0, [&] { return receiver.take(*hub), receiver.heard() == 1; })) << hub->state().last_error;
+}
+
+TEST_F(NatsPortTest, WhoUsesARobotsIdsBeforeItDoesIsNotInItsWay) {
+  NatsNetwork network;
+  const auto hub = network.open(kServer);
+  const auto robot = network.open(kRobot);
+  const Stranger stranger(network.child().url());
+  for (int i = 0; i < 3; ++i)
+    stranger.store("mission.test.robot.3.submap", "submap/" + std::to_string(i) + "/0.1", "junk");
+  std::map<std::string, std::set<std::string>> came;
+  const auto take = [&] {
+    for (const Received& received : hub->receive()) {
+      came[received.envelope.id].insert(*received.envelope.bytes);
+      hub->acknowledge(received.ticket);
+    }
+  };
+  EXPECT_TRUE(within(10.0, [&] { return take(), came.size() == 3; }));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), "real"));
+  EXPECT_TRUE(within(10.0, [&] {
+    take();
+    return std::ranges::all_of(came, [](const auto& of_id) { return of_id.second.contains("real"); });
+  }));
+}
+
 TEST(NatsPortOptionsTest, OtherMachinesNeedTlsAndMissionsAName) {
   const auto refusal = [](const NatsPortOptions& options) {
     const auto port = open_nats_port(kRobot, options);

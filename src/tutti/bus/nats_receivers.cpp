@@ -21,7 +21,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kListen_ms = 200;
 constexpr int kBatch = 32;
-constexpr std::uint64_t kMostGiven = 1000;  // of 1024; then the bus waits for acknowledgements
 
 void drop_all(natsSubscription* subscription) {
   natsMsg* heard = nullptr;
@@ -118,7 +117,7 @@ void JetStreamPort::watch() {
     if (!*look) return;
     const bool is_left = (*look)->messages > (*look)->pending + (*look)->given;
     const bool is_held_back = (*look)->pending > 0 && (*look)->asked && (*look)->deliveries == watched.deliveries &&
-                              (*look)->given < kMostGiven && !(stream != jobs && is_full());
+                              (*look)->given < kMostUnacknowledged && !(stream != jobs && is_full());
     watched.deliveries = (*look)->deliveries;
     if (!is_left && !is_held_back) watched = {.since = {}, .deliveries = watched.deliveries, .removed = false};
     if (!is_left && !is_held_back) return;
@@ -170,7 +169,8 @@ void JetStreamPort::take_in(natsMsg* message, const NatsConnection& connection) 
   const std::string reply = natsMsg_GetReply(message);
   bool ours = part && (job ? delivery_of(part->kind) == Delivery::work_queue : address && address->kind == part->kind);
   std::unique_lock guard(mutex_);
-  if (ours) ours = inbox_.add_part(job ? Endpoint::server() : address->end, *part, bytes_of(message), reply);
+  if (ours)
+    ours = inbox_.add_part(job ? Endpoint::server() : address->end, *part, bytes_of(message), reply, Clock::now());
   if (ours) return;
   ++refused_;
   last_error_ = fmt::format("{}: id '{}' is none of ours", natsMsg_GetSubject(message), id == nullptr ? "" : id);

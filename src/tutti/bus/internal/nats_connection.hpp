@@ -34,6 +34,9 @@ using NatsOwned = std::unique_ptr<T, NatsFree>;
 /// How long the bus is waited for when it is asked something.
 inline constexpr std::chrono::milliseconds kNatsAnswer{5000};
 
+/// Parts that a consumer has been given and has not acknowledged; then the bus waits. More than an inbox can hold.
+inline constexpr std::uint64_t kMostUnacknowledged = 65'536;
+
 Status check(const NatsPortOptions& options);
 
 class NatsConnection {

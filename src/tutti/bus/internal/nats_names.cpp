@@ -40,6 +40,15 @@ std::optional<std::uint32_t> number_of(std::string_view text) {
   return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
 }
 
+/// "h00c0ffee00c0ffee"
+std::optional<std::uint64_t> content_of(std::string_view word) {
+  constexpr std::size_t kDigits = 16;
+  if (word.size() != 1 + kDigits || word.front() != 'h') return std::nullopt;
+  std::uint64_t content = 0;
+  const auto [end, error] = std::from_chars(word.data() + 1, word.data() + word.size(), content, 16);
+  return error == std::errc() && end == word.data() + word.size() ? std::optional(content) : std::nullopt;
+}
+
 std::string path_of(Endpoint end) {
   TUTTI_CHECK(end.role != Endpoint::Role::server, "the server has no subject of its own");
   return fmt::format("{}.{}", name(end.role), end.role == Endpoint::Role::viewer ? 0 : end.number);
@@ -97,7 +106,8 @@ std::optional<Address> address_of(std::string_view subject) {
 }
 
 std::string to_string(const Part& part) {
-  return fmt::format("{}/{}/{}.{}", word_of(part.kind), part.id, part.index, part.count);
+  const std::string content = part.content ? fmt::format("/h{:016x}", *part.content) : "";
+  return fmt::format("{}/{}{}/{}.{}", word_of(part.kind), part.id, content, part.index, part.count);
 }
 
 std::optional<Part> part_of(std::string_view text) {
@@ -110,13 +120,17 @@ std::optional<Part> part_of(std::string_view text) {
   const auto index = number_of(numbers[0]);
   const auto count = number_of(numbers[1]);
   if (!index || !count || *count > kMostParts || *index >= *count) return std::nullopt;
-  return Part{*kind, std::string(text.substr(first + 1, last - first - 1)), *index, *count};
+  std::string_view id = text.substr(first + 1, last - first - 1);
+  const std::size_t before = id.rfind('/');
+  const auto content = content_of(before == std::string_view::npos ? "" : id.substr(before + 1));
+  if (content) id = id.substr(0, before);
+  return Part{*kind, std::string(id), *index, *count, content};
 }
 
 bool Assembly::add(const Part& part, std::string_view bytes, std::string reply) {
   if (count_ == 0) count_ = part.count;
   if (part.count != count_) return false;
-  if (!taken_) bytes_.try_emplace(part.index, bytes);
+  if (!taken_ && bytes_.try_emplace(part.index, bytes).second) size_ += bytes.size();
   replies_.insert_or_assign(part.index, std::move(reply));
   return true;
 }

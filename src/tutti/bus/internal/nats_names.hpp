@@ -35,12 +35,14 @@ struct Address {
 };
 std::optional<Address> address_of(std::string_view subject);
 
-/// Which part of which message. NATS stores one message of an id only: "submap/3/1700000000/4/0.2" is the first of two.
+/// Which part of which message. NATS stores one message of an id only: "submap/3/1700000000/4/h00c0ffee00c0ffee/0.2" is
+/// the first of two. The content is in it, so that another message with this id is not in the way of the right one.
 struct Part {
   MessageKind kind = MessageKind::submap;
   std::string id;
   std::uint32_t index = 0;
   std::uint32_t count = 1;
+  std::optional<std::uint64_t> content;  ///< content_hash() of the whole; older programs do not say it.
   friend bool operator==(const Part&, const Part&) = default;
 };
 std::string to_string(const Part& part);
@@ -52,6 +54,7 @@ class Assembly {
   /// False: the message has another number of parts, and this one is not taken.
   bool add(const Part& part, std::string_view bytes, std::string reply);
   [[nodiscard]] bool complete() const { return replies_.size() == count_; }
+  [[nodiscard]] std::size_t size() const { return size_; }  ///< Bytes of the parts that are here.
   /// Once, when it is complete: the parts' bytes are kept no longer.
   [[nodiscard]] std::string take_bytes();
   /// Where each part is acknowledged: that of its newest delivery.
@@ -62,6 +65,7 @@ class Assembly {
  private:
   std::uint32_t count_ = 0;
   bool taken_ = false;
+  std::size_t size_ = 0;
   std::map<std::uint32_t, std::string> bytes_;
   std::map<std::uint32_t, std::string> replies_;
 };

@@ -54,9 +54,18 @@ TEST(NatsNames, WhatIsNotOursIsNothing) {
   EXPECT_TRUE(is_mission_name("Tunnel-2_b"));
 }
 
+TEST(NatsNames, TheContentStandsInFrontOfThePart) {
+  const Part part{MessageKind::submap, "3/1700000000/4", 0, 2, 0xc0ffee00c0ffeeU};
+  EXPECT_EQ(to_string(part), "submap/3/1700000000/4/h00c0ffee00c0ffee/0.2");
+  EXPECT_EQ(part_of(to_string(part)), part);
+  EXPECT_EQ(part_of("submap/3/1700000000/4/0.2"), (Part{MessageKind::submap, "3/1700000000/4", 0, 2, {}}));  // older
+  EXPECT_EQ(part_of("submap/3/h00c0ffee/0.2"), (Part{MessageKind::submap, "3/h00c0ffee", 0, 2, {}}));
+}
+
 RC_GTEST_PROP(NatsNames, AMessageIsPutTogetherFromItsPartsInAnyOrderAnyOfThemAgain, ()) {
   const auto count = *rc::gen::inRange<std::uint32_t>(1, 10);
   const auto id = *rc::gen::element<std::string>("a", "3/17/4", "x/0.1/y:_-.", "");
+  const auto content = *rc::gen::element<std::optional<std::uint64_t>>(std::nullopt, 0U, ~0ULL, 0xc0ffeeU);
   std::vector<std::string> bytes(count);
   std::vector<std::uint32_t> order;
   std::string all;
@@ -69,7 +78,7 @@ RC_GTEST_PROP(NatsNames, AMessageIsPutTogetherFromItsPartsInAnyOrderAnyOfThemAga
   std::vector<bool> seen(count, false);
   std::string put_together;
   for (std::size_t step = 0; step < order.size(); ++step) {
-    const Part part{MessageKind::verdicts, id, order[step], count};
+    const Part part{MessageKind::verdicts, id, order[step], count, content};
     RC_ASSERT(part_of(to_string(part)) == part);
     const bool before = assembly.complete() && step > 0;
     RC_ASSERT(assembly.add(part, bytes[order[step]], std::to_string(step)));
@@ -77,7 +86,7 @@ RC_GTEST_PROP(NatsNames, AMessageIsPutTogetherFromItsPartsInAnyOrderAnyOfThemAga
     RC_ASSERT(assembly.complete() == (std::ranges::find(seen, false) == seen.end()));
     if (assembly.complete() && !before) put_together = assembly.take_bytes();
     RC_ASSERT(assembly.replies().at(order[step]) == std::to_string(step));
-    RC_ASSERT(!assembly.add({MessageKind::verdicts, id, 0, count + 1}, "wrong", "wrong"));
+    RC_ASSERT(!assembly.add({MessageKind::verdicts, id, 0, count + 1, {}}, "wrong", "wrong"));
   }
   RC_ASSERT(put_together == all);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "tutti/base/content_hash.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
 
 namespace tutti::bus {
@@ -30,7 +31,8 @@ Status Outbox::add(const Envelope& envelope) {
     return fail(ErrorCode::invalid, "{} {}: {} bytes, at most {} can be sent", word_of(envelope.kind), envelope.id,
                 size, most);
   const bool bounded = cut || delivery == Delivery::work_queue;
-  if (bounded && waits(envelope)) return {};
+  const std::uint64_t content = bounded ? content_hash(*envelope.bytes) : 0;
+  if (bounded && waits(envelope, content)) return {};
   if (bounded && bytes_ + size > max_waiting_bytes_)
     return fail(ErrorCode::io, "{} {}: {} bytes wait to be sent already, {} may", word_of(envelope.kind), envelope.id,
                 bytes_, max_waiting_bytes_);
@@ -42,7 +44,7 @@ Status Outbox::add(const Envelope& envelope) {
     piece.number = next_number_++;
     piece.begin = i * kPartBytes;
     piece.size = cut ? std::min(kPartBytes, size - piece.begin) : size;
-    if (bounded) piece.id = to_string(Part{envelope.kind, envelope.id, i, parts});
+    if (bounded) piece.id = to_string(Part{envelope.kind, envelope.id, i, parts, content});
     bytes_ += piece.size;
     waiting_.emplace(order_of(piece), piece);
   }
@@ -50,11 +52,10 @@ Status Outbox::add(const Envelope& envelope) {
 }
 
 /// Its last part goes last.
-bool Outbox::waits(const Envelope& envelope) const {
-  const std::string id = word_of(envelope.kind) + "/" + envelope.id + "/";
-  const auto is_part = [&](const Piece& piece) {
-    return piece.id.starts_with(id) && piece.id.find('/', id.size()) == std::string::npos;
-  };
+bool Outbox::waits(const Envelope& envelope, std::uint64_t content) const {
+  std::string id = to_string(Part{envelope.kind, envelope.id, 0, 1, content});
+  id.resize(id.rfind('/') + 1);
+  const auto is_part = [&](const Piece& piece) { return piece.id.starts_with(id); };
   return std::ranges::any_of(waiting_, [&](const auto& other) { return is_part(other.second); }) ||
          std::ranges::any_of(under_way_, [&](const auto& other) { return is_part(other.second.piece); });
 }

@@ -64,7 +64,7 @@ class Outbox {
   static Order order_of(const Piece& piece);
   void put_back(Piece piece);
   void drop_waiting(Delivery delivery, const std::string* subject);
-  [[nodiscard]] bool waits(const Envelope& envelope) const;
+  [[nodiscard]] bool waits(const Envelope& envelope, std::uint64_t content) const;
   [[nodiscard]] bool is_under_way(const std::string& subject) const;
 
   std::string mission_;

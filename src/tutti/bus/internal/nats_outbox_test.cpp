@@ -8,6 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "tutti/base/content_hash.hpp"
+#include "tutti/bus/internal/nats_names.hpp"
+
 namespace tutti::bus {
 namespace {
 
@@ -25,6 +28,11 @@ Envelope envelope(MessageKind kind, const std::string& id, std::size_t size, cha
           .bytes = std::make_shared<const std::string>(size, content)};
 }
 
+/// Of envelope(MessageKind::submap, id, size).
+std::string part_id(const std::string& id, std::size_t size, std::uint32_t index = 0, std::uint32_t count = 1) {
+  return to_string(Part{MessageKind::submap, id, index, count, content_hash(std::string(size, 'x'))});
+}
+
 TEST(NatsOutbox, StatusGoesFirstThenRetainedThenTheRestInTheirOrder) {
   Outbox outbox("m", 1000);
   for (const char* id : {"a", "b"}) ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, id, 10)));
@@ -35,7 +43,8 @@ TEST(NatsOutbox, StatusGoesFirstThenRetainedThenTheRestInTheirOrder) {
   while (const auto piece = outbox.next(kStart)) order += piece->subject + " " + piece->id + ";";
   EXPECT_EQ(order,
             "mission.m.robot.3.status ;$KV.GRAPH_m.robot.3.proxy_graph ;"
-            "mission.m.robot.3.submap submap/a/0.1;mission.m.robot.3.submap submap/b/0.1;");
+            "mission.m.robot.3.submap " +
+                part_id("a", 10) + ";mission.m.robot.3.submap " + part_id("b", 10) + ";");
   EXPECT_EQ(outbox.messages(), 3U);
   EXPECT_EQ(outbox.bytes(), 30U);
 }
@@ -52,7 +61,7 @@ TEST(NatsOutbox, ALargeMessageIsCutAndOnlySoMuchIsUnderWay) {
   }
   EXPECT_LE(under_way, 512U << 10U);
   outbox.confirm(numbers[0]);
-  EXPECT_EQ(outbox.next(kStart)->id, "submap/a/4.8");
+  EXPECT_EQ(outbox.next(kStart)->id, part_id("a", 1'000'000, 4, 8));
   EXPECT_FALSE(outbox.next(kStart));
 }
 
@@ -68,6 +77,8 @@ TEST(NatsOutbox, WhatIsHereAlreadyDoesNotWaitTwice) {
   EXPECT_EQ(outbox.messages(), 0U);
   ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, "a", 1'000'000)));
   EXPECT_EQ(outbox.messages(), 8U);
+  ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, "a", 1'000'000, 'y')));  // another content is another message
+  EXPECT_EQ(outbox.messages(), 16U);
 }
 
 TEST(NatsOutbox, BoundsAreKept) {
@@ -101,7 +112,7 @@ TEST(NatsOutbox, WhatIsRefusedOrNotConfirmedGoesAgain) {
   outbox.resend_all();
   piece = outbox.next(kStart + 21s);
   ASSERT_TRUE(piece.has_value());
-  EXPECT_EQ(piece->id, "submap/a/0.1");
+  EXPECT_EQ(piece->id, part_id("a", 10));
   outbox.confirm(piece->number);
   outbox.confirm(piece->number);  // heard twice
   EXPECT_EQ(outbox.messages(), 0U);
@@ -130,7 +141,7 @@ RC_GTEST_PROP(NatsOutbox, EverythingArrivesAndTheNewestRetainedValueLast, ()) {
       RC_ASSERT(
           outbox.add(graph ? envelope(MessageKind::proxy_graph, "", 1, newest) : envelope(MessageKind::submap, id, 1))
               .has_value());
-      if (!graph) sent.insert("submap/" + id + "/0.1");
+      if (!graph) sent.insert(part_id(id, 1));
     }
     now += 1s;
     outbox.expire(now);
