@@ -15,14 +15,14 @@ namespace {
 
 constexpr int kStack = 256;  ///< Ranges are halved, so that this is enough.
 constexpr float kFar = std::numeric_limits<float>::infinity();
-constexpr float kSlack = 1.000002F;  ///< A few ulp: rounding may shrink a flat box's slab to less than nothing.
-constexpr float kEdge = 1e-5F;       ///< Of a triangle's size.
+constexpr float kSlack = 1.000002F;     ///< A few ulp: rounding may shrink a flat box's slab to less than nothing.
+constexpr float kTriangleEdge = 1e-5F;  ///< Of a triangle's size.
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
-struct Box {
+struct Bounds {
   Eigen::Array3f low = Eigen::Array3f::Constant(kFar);
   Eigen::Array3f high = Eigen::Array3f::Constant(-kFar);
-  void add(const Box& other) {
+  void add(const Bounds& other) {
     low = low.min(other.low);
     high = high.max(other.high);
   }
@@ -33,7 +33,7 @@ struct Box {
 };
 
 struct Item {
-  Box box;
+  Bounds box;
   std::uint32_t triangle = 0;
   [[nodiscard]] Eigen::Array3f centre() const { return 0.5F * (box.low + box.high); }
 };
@@ -47,7 +47,7 @@ struct Bvh::Builder {
 
   struct Range {
     std::uint32_t begin = 0, end = 0;
-    Box box;
+    Bounds box;
     [[nodiscard]] std::uint32_t size() const { return end - begin; }
     /// How much there is to gain from splitting it.
     [[nodiscard]] float weight() const { return size() <= kWidth ? -1.0F : box.half_area(); }
@@ -62,7 +62,7 @@ struct Bvh::Builder {
   /// Reorders the items of a range and says where its second half begins: half of the packets' triangles, by where
   /// their centres lie along the axis on which these spread most.
   std::uint32_t halve(const Range& range) {
-    Box centres;
+    Bounds centres;
     for (std::uint32_t i = range.begin; i < range.end; ++i) centres.add({items[i].centre(), items[i].centre()});
     int axis = 0;
     (centres.high - centres.low).maxCoeff(&axis);
@@ -177,7 +177,8 @@ struct Bvh::Ray {
     const Lanes u = (sx * px + sy * py + sz * pz) * scale;
     const Lanes v = (dx * qx + dy * qy + dz * qz) * scale;
     const Lanes t = (cx * qx + cy * qy + cz * qz) * scale;
-    const auto inside = (u >= -kEdge) & (v >= -kEdge) & (u + v <= 1.0F + kEdge) & (t > 0.0F) & (t <= hit.distance);
+    const auto inside = (u >= -kTriangleEdge) & (v >= -kTriangleEdge) & (u + v <= 1.0F + kTriangleEdge) & (t > 0.0F) &
+                        (t <= hit.distance);
     const Lanes distance = inside ? t : all(kFar);
     for (int i = 0; i < kWidth; ++i) {
       const bool nearer = distance[i] < hit.distance;

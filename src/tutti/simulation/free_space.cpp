@@ -82,27 +82,27 @@ double FreeSpace::bumps(const Eigen::Vector3d& p) const {
          0.4 * noise(p.x() * fine, p.y() * fine, p.z() * fine, seed_ + 1U);
 }
 
-double FreeSpace::hall(const Hall& hall, const Eigen::Vector3d& p) const {
-  const Eigen::Vector2d along = (hall.b - hall.a).head<2>();
-  const Eigen::Vector2d from_a = (p - hall.a).head<2>();
+double FreeSpace::passage(const Passage& passage, const Eigen::Vector3d& p) const {
+  const Eigen::Vector2d along = (passage.b - passage.a).head<2>();
+  const Eigen::Vector2d from_a = (p - passage.a).head<2>();
   const double squared = along.squaredNorm();
   const double share = squared > 0.0 ? std::clamp(from_a.dot(along) / squared, 0.0, 1.0) : 0.0;
   const double across = (from_a - share * along).norm();
-  const double above = p.z() - std::lerp(hall.a.z(), hall.b.z(), share);
-  double half_width = hall.half_width, height = hall.height;
-  if (hall.variation > 0.0) {
+  const double above = p.z() - std::lerp(passage.a.z(), passage.b.z(), share);
+  double half_width = passage.half_width, height = passage.height;
+  if (passage.variation > 0.0) {
     // Both walls and the roof on their own; the two walls meet where the sign of `side` changes, inside the corridor.
     const bool left = along.x() * from_a.y() - along.y() * from_a.x() > 0.0;
-    const Eigen::Vector2d at = (hall.a.head<2>() + share * along) / kVariationLength_m;
-    half_width *= 1.0 + 1.3 * hall.variation * noise(at.x(), at.y(), left ? 0.3 : 7.3, seed_ + 2U);
-    height *= 1.0 + 0.8 * hall.variation * noise(at.x(), at.y(), 13.3, seed_ + 2U);
+    const Eigen::Vector2d at = (passage.a.head<2>() + share * along) / kVariationLength_m;
+    half_width *= 1.0 + 1.3 * passage.variation * noise(at.x(), at.y(), left ? 0.3 : 7.3, seed_ + 2U);
+    height *= 1.0 + 0.8 * passage.variation * noise(at.x(), at.y(), 13.3, seed_ + 2U);
   }
-  const double radius = above > 0.5 * height ? hall.top_radius : hall.bottom_radius;
+  const double radius = above > 0.5 * height ? passage.top_radius : passage.bottom_radius;
   const double smooth = rounded_rectangle(across, above - 0.5 * height, half_width, 0.5 * height,
                                           std::min({radius, half_width, 0.5 * height}));
-  if (hall.roughness <= 0.0 || std::abs(smooth) > 3.0 * hall.roughness) return smooth;
+  if (passage.roughness <= 0.0 || std::abs(smooth) > 3.0 * passage.roughness) return smooth;
   const double floor = std::clamp((above - 0.1) / 0.5, 0.0, 1.0);  // What walks on it has made it smoother.
-  return smooth + hall.roughness * (0.3 + 0.7 * floor) * bumps(p);
+  return smooth + passage.roughness * (0.3 + 0.7 * floor) * bumps(p);
 }
 
 double FreeSpace::box(const Box& box, const Eigen::Vector3d& p) const {
@@ -125,7 +125,7 @@ double FreeSpace::roof(const Eigen::Vector3d& p) const {
 
 double FreeSpace::enclosed(const Nearby& nearby, const Eigen::Vector3d& p) const {
   double value = kSolid;
-  for (const std::uint32_t i : nearby.halls) value = std::min(value, hall(parts_.halls[i], p));
+  for (const std::uint32_t i : nearby.passages) value = std::min(value, passage(parts_.passages[i], p));
   for (const std::uint32_t i : nearby.openings) value = std::min(value, box(parts_.openings[i], p));
   for (const std::uint32_t i : nearby.solids) value = std::max(value, -box(parts_.solids[i], p));
   return value;
@@ -157,18 +157,18 @@ void FreeSpace::index_parts() {
         for (int z = first.z(); z <= last.z(); ++z)
           visit(BlockIndex{x, y, z}, Eigen::Vector3d(block_m_ * (x + 0.5), block_m_ * (y + 0.5), block_m_ * (z + 0.5)));
   };
-  for (std::uint32_t i = 0; i < parts_.halls.size(); ++i) {
-    const Hall& hall = parts_.halls[i];
-    const double grown = 1.0 + 2.0 * hall.variation;
-    const double side = grown * hall.half_width;
-    const Eigen::Vector3d low = hall.a.cwiseMin(hall.b) - Eigen::Vector3d(side, side, 0.0);
-    const Eigen::Vector3d high = hall.a.cwiseMax(hall.b) + Eigen::Vector3d(side, side, grown * hall.height);
-    const Eigen::Vector2d along = (hall.b - hall.a).head<2>();
+  for (std::uint32_t i = 0; i < parts_.passages.size(); ++i) {
+    const Passage& passage = parts_.passages[i];
+    const double grown = 1.0 + 2.0 * passage.variation;
+    const double side = grown * passage.half_width;
+    const Eigen::Vector3d low = passage.a.cwiseMin(passage.b) - Eigen::Vector3d(side, side, 0.0);
+    const Eigen::Vector3d high = passage.a.cwiseMax(passage.b) + Eigen::Vector3d(side, side, grown * passage.height);
+    const Eigen::Vector2d along = (passage.b - passage.a).head<2>();
     for_blocks(low, high, [&](const BlockIndex& at, const Eigen::Vector3d& centre) {
-      const Eigen::Vector2d from_a = (centre - hall.a).head<2>();
+      const Eigen::Vector2d from_a = (centre - passage.a).head<2>();
       const double squared = along.squaredNorm();
       const double share = squared > 0.0 ? std::clamp(from_a.dot(along) / squared, 0.0, 1.0) : 0.0;
-      if ((from_a - share * along).norm() < side + kReach + half_diagonal) blocks_[at].halls.push_back(i);
+      if ((from_a - share * along).norm() < side + kReach + half_diagonal) blocks_[at].passages.push_back(i);
     });
   }
   const auto for_box = [&](const Box& box, const auto& visit) {

@@ -15,7 +15,7 @@
 namespace tutti::simulation {
 
 /// A corridor, or with a == b the chamber at a junction: the same cross-section all along, round ends.
-struct Hall {
+struct Passage {
   Eigen::Vector3d a, b;  ///< Of the floor's middle.
   double half_width = 0.0;
   double height = 0.0;
@@ -40,9 +40,9 @@ struct Roof {
   std::vector<Box> solids;
 };
 
-/// What a world's free space is made of: halls, openings and roof joined, less the solids.
+/// What a world's free space is made of: passages, openings and roof joined, less the solids.
 struct SpaceParts {
-  std::vector<Hall> halls;
+  std::vector<Passage> passages;
   std::vector<Box> openings;  ///< Alcoves, doors, rooms.
   std::vector<Box> solids;    ///< Obstacles, furniture; not on the roof.
   std::optional<Roof> roof;
@@ -63,7 +63,7 @@ class FreeSpace {
   /// Cubes of block_m() that together hold all of the surface; what may matter within each.
   using BlockIndex = std::array<int, 3>;
   struct Nearby {
-    std::vector<std::uint32_t> halls, openings, solids;  ///< Of parts().
+    std::vector<std::uint32_t> passages, openings, solids;  ///< Of parts().
     bool roof = false;
   };
   [[nodiscard]] double block_m() const { return block_m_; }
@@ -77,7 +77,7 @@ class FreeSpace {
 
  private:
   [[nodiscard]] double enclosed(const Nearby& nearby, const Eigen::Vector3d& position) const;
-  [[nodiscard]] double hall(const Hall& hall, const Eigen::Vector3d& position) const;
+  [[nodiscard]] double passage(const Passage& passage, const Eigen::Vector3d& position) const;
   [[nodiscard]] double box(const Box& box, const Eigen::Vector3d& position) const;
   [[nodiscard]] double roof(const Eigen::Vector3d& position) const;
   [[nodiscard]] double bumps(const Eigen::Vector3d& position) const;

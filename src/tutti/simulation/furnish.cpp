@@ -107,19 +107,19 @@ void furnish_office(const CorridorWorld& world, std::size_t corridor, const Aisl
   }
 }
 
-Hall hall_of(CorridorKind kind, const SurfaceConfig& config, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+Passage passage_of(CorridorKind kind, const SurfaceConfig& config, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   if (kind == CorridorKind::office) return {a, b, 0.5 * config.office_width_m, kOfficeHeight_m, 0.0, 0.0, 0.0, 0.0};
-  Hall hall{a, b, 0.5 * config.width_m, kHeight_m, 1.2, 0.8, 0.0, 0.0};
+  Passage passage{a, b, 0.5 * config.width_m, kHeight_m, 1.2, 0.8, 0.0, 0.0};
   if (kind == CorridorKind::rough) {
-    hall.bottom_radius = 0.4;
-    hall.roughness = kRoughness_m;
-    hall.variation = kWidthVariation;
+    passage.bottom_radius = 0.4;
+    passage.roughness = kRoughness_m;
+    passage.variation = kWidthVariation;
   }
-  return hall;
+  return passage;
 }
 
 /// The house around the door through which `corridor` comes out onto the roof.
-Box stairhouse(const Hall& corridor, const Roof& roof, bool comes_out_at_b) {
+Box stairhouse(const Passage& corridor, const Roof& roof, bool comes_out_at_b) {
   const Eigen::Vector2d end = (comes_out_at_b ? corridor.b : corridor.a).head<2>();
   const Eigen::Vector2d in = (end - (comes_out_at_b ? corridor.a : corridor.b).head<2>()).normalized();
   double to_edge = std::numeric_limits<double>::infinity();  // From `end` back along the corridor.
@@ -185,37 +185,37 @@ SpaceParts furnish(const CorridorWorld& world, const SurfaceConfig& config, Rng 
   const Eigen::Vector3d down(0.0, 0.0, -config.body_height_m);
   SpaceParts parts;
   parts.roof = roof_of(world, config);
-  std::vector<std::optional<Hall>> chambers(world.junctions.size());
+  std::vector<std::optional<Passage>> chambers(world.junctions.size());
   std::vector<bool> is_open(world.junctions.size(), false);
   for (const Corridor& corridor : world.corridors)
     if (corridor.kind == CorridorKind::open) is_open[corridor.a] = is_open[corridor.b] = true;
   for (std::size_t i = 0; i < world.corridors.size(); ++i) {
     const Corridor& corridor = world.corridors[i];
     if (corridor.kind == CorridorKind::open) continue;
-    const Hall hall =
-        hall_of(corridor.kind, config, world.junctions[corridor.a] + down, world.junctions[corridor.b] + down);
-    parts.halls.push_back(hall);
-    const Eigen::Vector3d ab = hall.b - hall.a;
+    const Passage passage =
+        passage_of(corridor.kind, config, world.junctions[corridor.a] + down, world.junctions[corridor.b] + down);
+    parts.passages.push_back(passage);
+    const Eigen::Vector3d ab = passage.b - passage.a;
     const double length = ab.head<2>().norm();
-    const Aisle aisle{hall.a, ab.head<2>() / length, length, ab.z() / length, hall.half_width};
+    const Aisle aisle{passage.a, ab.head<2>() / length, length, ab.z() / length, passage.half_width};
     if (corridor.kind == CorridorKind::rough) furnish_tunnel(aisle, parts, rng.fork(i));
     if (corridor.kind == CorridorKind::office) furnish_office(world, i, aisle, config, parts, rng.fork(i));
     for (const std::size_t end : {corridor.a, corridor.b}) {
       const Eigen::Vector3d at = world.junctions[end] + down;
       if (is_open[end]) {
-        parts.roof->solids.push_back(stairhouse(hall, *parts.roof, end == corridor.b));
+        parts.roof->solids.push_back(stairhouse(passage, *parts.roof, end == corridor.b));
       } else if (corridor.kind != CorridorKind::office) {
-        chambers[end] = hall_of(CorridorKind::rough, config, at, at);
+        chambers[end] = passage_of(CorridorKind::rough, config, at, at);
       } else if (world.corridors_at[end].size() == 2) {  // Corners of an office are not round.
-        const Eigen::Vector3d up(0.0, 0.0, 0.5 * hall.height);
-        parts.openings.push_back({at + up, aisle.along, {hall.half_width, hall.half_width, up.z()}, 0.0});
+        const Eigen::Vector3d up(0.0, 0.0, 0.5 * passage.height);
+        parts.openings.push_back({at + up, aisle.along, {passage.half_width, passage.half_width, up.z()}, 0.0});
       }
     }
   }
   for (std::size_t i = 0; i < chambers.size(); ++i) {
     if (!chambers[i]) continue;
     chambers[i]->half_width *= rng.fork("chamber").fork(i).uniform(1.2, 1.5);
-    parts.halls.push_back(*chambers[i]);
+    parts.passages.push_back(*chambers[i]);
   }
   if (parts.roof) add_chimneys(world, config, *parts.roof, rng.fork("chimneys"));
   return parts;

@@ -9,7 +9,7 @@
 namespace tutti::simulation {
 namespace {
 
-using Box = Eigen::AlignedBox3d;
+using AlignedBox = Eigen::AlignedBox3d;
 
 /// One in [-0.5, 0.5] for each patch of each texture.
 float patch(std::uint64_t texture, int x, int y) {
@@ -40,7 +40,7 @@ float patches(std::uint32_t number, float x, float y, float edge) {
 }
 
 /// The six sides of a box, seen from outside, or from inside.
-void add_box(Hall& hall, const Box& box, bool from_inside, double plain_share, Rng& rng) {
+void add_box(Hall& hall, const AlignedBox& box, bool from_inside, double plain_share, Rng& rng) {
   for (int axis = 0; axis < 3; ++axis)
     for (const bool high : {false, true}) {
       const int u = (axis + 1) % 3, w = (axis + 2) % 3;
@@ -75,7 +75,7 @@ Hall make_hall(const HallConfig& config, Rng rng) {
   constexpr double kMiddle = 0.2;        // and this share of it away from its middle
   const Eigen::Vector3d half(config.length_m / 2.0, config.width_m / 2.0, 0.0);
   Hall hall;
-  add_box(hall, Box(-half, half + Eigen::Vector3d(0.0, 0.0, config.height_m)), true, 0.0, rng);
+  add_box(hall, AlignedBox(-half, half + Eigen::Vector3d(0.0, 0.0, config.height_m)), true, 0.0, rng);
   for (int i = 0; i < config.boxes; ++i) {
     const Eigen::Vector3d size(rng.uniform(0.3, kAlongWalls_m), rng.uniform(0.3, kAlongWalls_m), rng.uniform(0.3, 3.0));
     Eigen::Vector3d low(rng.uniform(-half.x(), half.x() - size.x()), rng.uniform(-half.y(), half.y() - size.y()), 0.0);
@@ -85,7 +85,7 @@ Hall make_hall(const HallConfig& config, Rng rng) {
       const int across = i % 2;  // to which walls
       low[across] = rng.bernoulli(0.5) ? -half[across] : half[across] - size[across];
     }
-    add_box(hall, Box(low, low + size), false, config.plain_share, rng);
+    add_box(hall, AlignedBox(low, low + size), false, config.plain_share, rng);
   }
   return hall;
 }

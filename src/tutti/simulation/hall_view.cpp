@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kWidth_px = 16, kHeight_px = 8;  // of a tile
 constexpr std::size_t kRays = kWidth_px * kHeight_px;
-constexpr float kFar = std::numeric_limits<float>::infinity();
+constexpr float kNothing = std::numeric_limits<float>::infinity();
 constexpr float kEdge = 1e-5F;      // of a face's size, as in bvh.cpp
 constexpr float kRounding = 1e-6F;  // of a cosine
 
@@ -86,7 +86,7 @@ struct Nearest {
   std::array<float, kRays> distance;
   std::array<std::uint32_t, kRays> face;
   Nearest() {
-    distance.fill(kFar);
+    distance.fill(kNothing);
     face.fill(kNoFace);
   }
 
