@@ -108,8 +108,6 @@ Result<std::map<std::uint64_t, NumberSet>> read(const Sessions& in) {
   return sessions;
 }
 
-void expect_valid(const Status& valid) { TUTTI_CHECK(valid.has_value(), "{}", valid.error().message); }
-
 }  // namespace
 
 Status validate(const Receipt& receipt) {

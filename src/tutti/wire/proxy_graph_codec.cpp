@@ -82,7 +82,7 @@ Result<std::vector<Run>> read_runs(const v1::ProxyGraph& in) {
 }
 
 void write_body(const ProxyGraph& graph, const ProxyGraph& base, const std::vector<Run>& runs, v1::ProxyGraph& out) {
-  Writer writer;
+  ColumnWriter writer;
   NodeColumns nodes;
   StampColumn eliminated;
   UncertaintyColumns uncertainties;
@@ -110,7 +110,7 @@ void write_body(const ProxyGraph& graph, const ProxyGraph& base, const std::vect
 Status read_body(const v1::ProxyGraph& in, const ProxyGraph& base, const std::vector<Run>& runs, ProxyGraph& graph) {
   if (in.edges() > kMaxProxyEdges)
     return fail(ErrorCode::invalid, "{} edges, at most {} are accepted", in.edges(), kMaxProxyEdges);
-  Reader reader{RangeDecoder(in.body())};
+  ColumnReader reader{RangeDecoder(in.body())};
   NodeColumns nodes;
   StampColumn eliminated;
   UncertaintyColumns uncertainties;
@@ -159,8 +159,7 @@ Status read_components(const v1::ProxyGraph& in, ProxyGraph& graph) {
 
 /// `base`: an empty graph for a message that needs none.
 std::string encode(const ProxyGraphMessage& message, MessageKind kind, const ProxyGraph& base) {
-  const Status valid = validate(message);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(message));
   const ProxyGraph& graph = message.graph;
   v1::ProxyGraph out;
   out.mutable_header()->set_robot(message.header.robot.value);

@@ -30,7 +30,7 @@ void write(const RelativePose& step, Numbers& out) {
   wire::write(step.covariance, out);
 }
 
-Status check_pose(const Pose3& T) {
+Status check_refined_pose(const Pose3& T) {
   if (is_valid(T) && T.translation.cwiseAbs().maxCoeff() <= kMaxCoordinate_m) return {};
   return fail(ErrorCode::invalid, "a pose that is none, or a coordinate above {} m", kMaxCoordinate_m);
 }
@@ -53,15 +53,13 @@ Status check_steps(const Refinement& refinement) {
   for (const auto& [from, step] : refinement.steps) {
     if (!refinement.T_world_body.contains(from))
       return fail(ErrorCode::invalid, "a step from keyframe {}, which has no pose", from.index);
-    if (auto ok = check_pose(step.T_a_b); !ok) return ok;
+    if (auto ok = check_refined_pose(step.T_a_b); !ok) return ok;
     if (auto ok = check_covariance(step.covariance); !ok) return ok;
     if (step.covariance.cwiseAbs().maxCoeff() > kMaxVariance)
       return fail(ErrorCode::invalid, "a covariance above {}", kMaxVariance);
   }
   return {};
 }
-
-void expect_valid(const Status& valid) { TUTTI_CHECK(valid.has_value(), "{}", valid.error().message); }
 
 Status read_keyframes(const v1::Refinement& in, Refinement& out) {
   const int count = in.robot_size();
@@ -96,7 +94,7 @@ Status validate(const RefinementJob& job) {
     if (auto ok = check_order(job.closed, "pairs"); !ok) return ok;
     for (const RefinementJob::Part& part : job.parts)
       for (const Pose3& T : part.T_world_body)
-        if (auto ok = check_pose(T); !ok) return ok;
+        if (auto ok = check_refined_pose(T); !ok) return ok;
     return {};
   };
   if (auto ok = check(); !ok) return in_context("refinement job", ok.error());
@@ -111,7 +109,7 @@ Status validate(const Refinement& refinement) {
     if (auto ok = check_pairs(refinement.closed); !ok) return ok;
     if (auto ok = check_order(refinement.closed, "pairs"); !ok) return ok;
     for (const auto& [id, T] : refinement.T_world_body)
-      if (auto ok = check_pose(T); !ok) return ok;
+      if (auto ok = check_refined_pose(T); !ok) return ok;
     for (const double rms : {refinement.counts.rms_before_px, refinement.counts.rms_after_px})
       if (!std::isfinite(rms)) return fail(ErrorCode::invalid, "an error of {} px", rms);
     if (refinement.why.size() > kMaxReasonBytes)

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -150,8 +149,7 @@ Status validate(const MissionStatus& status) {
 }
 
 std::string encode(const NodeStatus& status) {
-  const Status valid = validate(status);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(status));
   v1::Status out;
   write(status, out);
   return pack_frame(MessageKind::status, out.SerializeAsString());
@@ -167,8 +165,7 @@ Result<NodeStatus> decode_status(std::string_view bytes) {
 }
 
 std::string encode(const MissionStatus& status) {
-  const Status valid = validate(status);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(status));
   v1::MissionStatus out;
   out.set_time_ns(status.time.ns);
   out.set_wall_ns(status.wall_ns);

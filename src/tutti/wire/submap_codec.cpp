@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <vector>
 
-#include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -77,8 +76,7 @@ Status read_odometry(const v1::Submap& in, Submap& submap) {
 }  // namespace
 
 std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
-  const Status valid = validate(message);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(message));
   const Submap& submap = message.submap;
   v1::Submap out;
   out.mutable_header()->set_robot(message.header.robot.value);

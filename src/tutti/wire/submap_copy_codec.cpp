@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/job_message.hpp"
@@ -30,8 +29,7 @@ Status validate(const SubmapCopy& copy) {
 }
 
 std::string encode(const SubmapRequest& request) {
-  const Status valid = validate(request);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(request));
   v1::SubmapIds out;
   for (const SubmapId& id : request.submaps) write(id, out);
   return pack_frame(MessageKind::submap_request, out.SerializeAsString());
@@ -48,8 +46,7 @@ Result<SubmapRequest> decode_submap_request(std::string_view bytes) {
 }
 
 std::string encode(const SubmapCopy& copy) {
-  const Status valid = validate(copy);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(copy));
   v1::SubmapCopy out;
   out.set_robot(copy.id.chain.robot.value);
   out.set_session(copy.id.chain.session);

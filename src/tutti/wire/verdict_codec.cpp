@@ -3,7 +3,6 @@
 #include <string_view>
 #include <utility>
 
-#include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -100,8 +99,7 @@ Result<ClosureVerdict> read_verdict(const v1::Verdict& in) {
 }
 
 std::string encode(const ClosureVerdict& verdict) {
-  const Status valid = validate(verdict);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(verdict));
   v1::Verdict out;
   write(verdict, out);
   return pack_frame(MessageKind::verdict, out.SerializeAsString());

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/base/check.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -18,8 +17,7 @@ Status validate(const ClosureWord& word) {
 }
 
 std::string encode(const ClosureWord& word) {
-  const Status valid = validate(word);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(word));
   v1::Word out;
   out.set_closure(word.closure);
   out.set_wish(static_cast<std::uint32_t>(word.wish));

@@ -139,8 +139,7 @@ Result<std::shared_ptr<const PointCloud>> decode_cloud(const v1::Cloud& in) {
 }
 
 std::string encode(const PointCloud& cloud, const CloudCodec& codec) {
-  const Status valid = validate(cloud);
-  TUTTI_CHECK(valid.has_value(), "{}", valid.error().message);
+  expect_valid(validate(cloud));
   v1::Cloud out;
   encode_cloud(cloud, codec, out);
   return pack_frame(MessageKind::cloud, out.SerializeAsString());

@@ -26,63 +26,62 @@ struct Field {
   std::span<const Field> inside = {};  ///< Of a message.
 };
 
-using v1::AgentState, v1::Cloud, v1::Job, v1::MissionStatus, v1::NumbersOfSession, v1::ProxyGraph, v1::Receipt,
-    v1::Refinement, v1::RefinementJob, v1::SubmapIds, v1::SubmapPairs, v1::Verdicts, v1::Submap, v1::Verdict,
-    v1::Visual;
 constexpr std::size_t kMostChains = tutti::ProxyGraph::kMostChains;
 
-constexpr std::array kCloud = {Field{Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
-constexpr std::array kVisual = {Field{Visual::kCameraFieldNumber, kMaxCameras, "cameras", true},
-                                Field{Visual::kImuKeyframeFieldNumber, kMaxKeyframes, "IMU keyframes"}};
-constexpr std::array kSubmap = {Field{Submap::kStampNsFieldNumber, kMaxKeyframes, "keyframes"},
-                                Field{Submap::kPoseFieldNumber, 6 * kMaxKeyframes, "pose numbers"},
-                                Field{Submap::kRepresentativeFieldNumber, kMaxKeyframes, "flags"},
-                                Field{Submap::kOdometryFieldNumber, 6 * kMaxKeyframes, "odometry numbers"},
-                                Field{Submap::kOdometryCovarianceFieldNumber, 21 * kMaxKeyframes, "covariance numbers"},
-                                Field{Submap::kCloudFieldNumber, 1, "clouds", true, kCloud},  // several would be merged
-                                Field{Submap::kVisualFieldNumber, 1, "visual payloads", true, kVisual}};
+constexpr std::array kCloud = {Field{v1::Cloud::kVoxelFieldNumber, kMaxCloudPoints, "points"}};
+constexpr std::array kVisual = {Field{v1::Visual::kCameraFieldNumber, kMaxCameras, "cameras", true},
+                                Field{v1::Visual::kImuKeyframeFieldNumber, kMaxKeyframes, "IMU keyframes"}};
+constexpr std::array kSubmap = {
+    Field{v1::Submap::kStampNsFieldNumber, kMaxKeyframes, "keyframes"},
+    Field{v1::Submap::kPoseFieldNumber, 6 * kMaxKeyframes, "pose numbers"},
+    Field{v1::Submap::kRepresentativeFieldNumber, kMaxKeyframes, "flags"},
+    Field{v1::Submap::kOdometryFieldNumber, 6 * kMaxKeyframes, "odometry numbers"},
+    Field{v1::Submap::kOdometryCovarianceFieldNumber, 21 * kMaxKeyframes, "covariance numbers"},
+    Field{v1::Submap::kCloudFieldNumber, 1, "clouds", true, kCloud},  // several would be merged
+    Field{v1::Submap::kVisualFieldNumber, 1, "visual payloads", true, kVisual}};
 constexpr std::array kProxyGraph = {
-    Field{ProxyGraph::kRunFieldNumber, kMostChains, "chains", true},
-    Field{ProxyGraph::kComponentRobotFieldNumber, kMostChains, "robots of components"},
-    Field{ProxyGraph::kComponentSessionFieldNumber, kMostChains, "sessions of components"},
-    Field{ProxyGraph::kComponentFieldNumber, kMostChains, "components"}};
-constexpr std::array kVerdict = {Field{Verdict::kClosureFieldNumber, kMaxClosures, "closures", true},
-                                 Field{Verdict::kGateFieldNumber, kMaxClosures, "values as evidence"}};
+    Field{v1::ProxyGraph::kRunFieldNumber, kMostChains, "chains", true},
+    Field{v1::ProxyGraph::kComponentRobotFieldNumber, kMostChains, "robots of components"},
+    Field{v1::ProxyGraph::kComponentSessionFieldNumber, kMostChains, "sessions of components"},
+    Field{v1::ProxyGraph::kComponentFieldNumber, kMostChains, "components"}};
+constexpr std::array kVerdict = {Field{v1::Verdict::kClosureFieldNumber, kMaxClosures, "closures", true},
+                                 Field{v1::Verdict::kGateFieldNumber, kMaxClosures, "values as evidence"}};
 
-constexpr std::array kNumbers = {Field{NumbersOfSession::kBoundFieldNumber, 2 * kMaxStretches, "bounds"}};
-constexpr std::array kReceipt = {Field{Receipt::kStoredFieldNumber, kMostChains, "sessions", true, kNumbers},
-                                 Field{Receipt::kRefusedFieldNumber, kMostChains, "sessions", true, kNumbers}};
-constexpr std::array kPairs = {Field{SubmapPairs::kFirstRobotFieldNumber, kMaxPairs, "pairs"},
-                               Field{SubmapPairs::kFirstSessionFieldNumber, kMaxPairs, "pairs"},
-                               Field{SubmapPairs::kFirstIndexFieldNumber, kMaxPairs, "pairs"},
-                               Field{SubmapPairs::kSecondRobotFieldNumber, kMaxPairs, "pairs"},
-                               Field{SubmapPairs::kSecondSessionFieldNumber, kMaxPairs, "pairs"},
-                               Field{SubmapPairs::kSecondIndexFieldNumber, kMaxPairs, "pairs"}};
-constexpr std::array kJob = {Field{Job::kPairsFieldNumber, 1, "lists of pairs", true, kPairs}};
-constexpr std::array kVerdicts = {Field{Verdicts::kVerdictFieldNumber, kMaxPairs, "verdicts", true, kVerdict},
-                                  Field{Verdicts::kFailedFieldNumber, 1, "lists of pairs", true, kPairs}};
-constexpr std::array kAgentState = {Field{AgentState::kIntegerFieldNumber, kMaxStateBytes / 32, "integers"}};
+constexpr std::array kNumbers = {Field{v1::NumbersOfSession::kBoundFieldNumber, 2 * kMaxStretches, "bounds"}};
+constexpr std::array kReceipt = {Field{v1::Receipt::kStoredFieldNumber, kMostChains, "sessions", true, kNumbers},
+                                 Field{v1::Receipt::kRefusedFieldNumber, kMostChains, "sessions", true, kNumbers}};
+constexpr std::array kPairs = {Field{v1::SubmapPairs::kFirstRobotFieldNumber, kMaxPairs, "pairs"},
+                               Field{v1::SubmapPairs::kFirstSessionFieldNumber, kMaxPairs, "pairs"},
+                               Field{v1::SubmapPairs::kFirstIndexFieldNumber, kMaxPairs, "pairs"},
+                               Field{v1::SubmapPairs::kSecondRobotFieldNumber, kMaxPairs, "pairs"},
+                               Field{v1::SubmapPairs::kSecondSessionFieldNumber, kMaxPairs, "pairs"},
+                               Field{v1::SubmapPairs::kSecondIndexFieldNumber, kMaxPairs, "pairs"}};
+constexpr std::array kJob = {Field{v1::Job::kPairsFieldNumber, 1, "lists of pairs", true, kPairs}};
+constexpr std::array kVerdicts = {Field{v1::Verdicts::kVerdictFieldNumber, kMaxPairs, "verdicts", true, kVerdict},
+                                  Field{v1::Verdicts::kFailedFieldNumber, 1, "lists of pairs", true, kPairs}};
+constexpr std::array kAgentState = {Field{v1::AgentState::kIntegerFieldNumber, kMaxStateBytes / 32, "integers"}};
 
-constexpr std::array kRequest = {Field{SubmapIds::kRobotFieldNumber, kMaxRequested, "submaps"},
-                                 Field{SubmapIds::kSessionFieldNumber, kMaxRequested, "submaps"},
-                                 Field{SubmapIds::kIndexFieldNumber, kMaxRequested, "submaps"}};
-constexpr std::array kIds = {Field{SubmapIds::kRobotFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                             Field{SubmapIds::kSessionFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                             Field{SubmapIds::kIndexFieldNumber, kMaxRefinedSubmaps, "submaps"}};
-constexpr std::array kRefinementJob = {Field{RefinementJob::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
-                                       Field{RefinementJob::kIsFreeFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                                       Field{RefinementJob::kKeyframesFieldNumber, kMaxRefinedSubmaps, "submaps"},
-                                       Field{RefinementJob::kClosedFieldNumber, 1, "lists of pairs", true, kPairs}};
-constexpr std::array kRefinement = {Field{Refinement::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
-                                    Field{Refinement::kClosedFieldNumber, 1, "lists of pairs", true, kPairs},
-                                    Field{Refinement::kRobotFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{Refinement::kSessionFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{Refinement::kKeyframeFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{Refinement::kHasStepFieldNumber, kMaxRefinedKeyframes, "keyframes"},
-                                    Field{Refinement::kCountFieldNumber, 100, "counts"}};
-constexpr std::array kMissionStatus = {Field{MissionStatus::kRobotFieldNumber, kMaxRobots, "robots", true},
-                                       Field{MissionStatus::kWorkerFieldNumber, kMaxRobots, "workers", true},
-                                       Field{MissionStatus::kRefusalsFieldNumber, kMaxRefusalKinds, "refusals", true}};
+constexpr std::array kRequest = {Field{v1::SubmapIds::kRobotFieldNumber, kMaxRequested, "submaps"},
+                                 Field{v1::SubmapIds::kSessionFieldNumber, kMaxRequested, "submaps"},
+                                 Field{v1::SubmapIds::kIndexFieldNumber, kMaxRequested, "submaps"}};
+constexpr std::array kIds = {Field{v1::SubmapIds::kRobotFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                             Field{v1::SubmapIds::kSessionFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                             Field{v1::SubmapIds::kIndexFieldNumber, kMaxRefinedSubmaps, "submaps"}};
+constexpr std::array kRefinementJob = {Field{v1::RefinementJob::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
+                                       Field{v1::RefinementJob::kIsFreeFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                                       Field{v1::RefinementJob::kKeyframesFieldNumber, kMaxRefinedSubmaps, "submaps"},
+                                       Field{v1::RefinementJob::kClosedFieldNumber, 1, "lists of pairs", true, kPairs}};
+constexpr std::array kRefinement = {Field{v1::Refinement::kSubmapsFieldNumber, 1, "lists of submaps", true, kIds},
+                                    Field{v1::Refinement::kClosedFieldNumber, 1, "lists of pairs", true, kPairs},
+                                    Field{v1::Refinement::kRobotFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{v1::Refinement::kSessionFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{v1::Refinement::kKeyframeFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{v1::Refinement::kHasStepFieldNumber, kMaxRefinedKeyframes, "keyframes"},
+                                    Field{v1::Refinement::kCountFieldNumber, 100, "counts"}};
+constexpr std::array kMissionStatus = {
+    Field{v1::MissionStatus::kRobotFieldNumber, kMaxRobots, "robots", true},
+    Field{v1::MissionStatus::kWorkerFieldNumber, kMaxRobots, "workers", true},
+    Field{v1::MissionStatus::kRefusalsFieldNumber, kMaxRefusalKinds, "refusals", true}};
 
 std::span<const Field> fields_of(MessageKind kind) {
   switch (kind) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "tutti/base/check.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/message_kind.hpp"
@@ -13,6 +14,9 @@ namespace tutti::wire {
 /// An error when the payload has more elements than limits.hpp accepts, of those that take more memory parsed than
 /// they have bytes. Looks at tags and lengths and takes no memory.
 Status check_counts(MessageKind kind, std::string_view payload);
+
+/// What is encoded is ours, and whole.
+inline void expect_valid(const Status& valid) { TUTTI_CHECK(valid.has_value(), "{}", valid.error().message); }
 
 template <class Message>
 struct Parsed {

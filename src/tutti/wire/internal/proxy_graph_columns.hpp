@@ -34,14 +34,14 @@ struct Run {
   bool has_uncertainty = false;
 };
 
-struct Writer {
+struct ColumnWriter {
   RangeEncoder out;
   std::int64_t code(IntegerModel& model, std::int64_t value) {
     model.put(out, value);
     return value;
   }
 };
-struct Reader {
+struct ColumnReader {
   RangeDecoder in;
   std::int64_t code(IntegerModel& model, std::int64_t) { return model.get(in); }
 };
