@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kArm_m = 5.0;  // a rotation counts by how far it moves a point this far away
 
-struct Options {
+struct CompareOptions {
   std::string a, b;
   std::string a_estimate = "server";
   std::string b_estimate = "onboard";
@@ -31,7 +31,7 @@ struct Options {
   bool json = false;
 };
 
-Result<mission::CompareReport> compare(const Options& options) {
+Result<mission::CompareReport> compare(const CompareOptions& options) {
   const auto sides = load_sides({options.a, options.a_estimate}, {options.b, options.b_estimate});
   if (!sides) return tl::unexpected(sides.error());
   const auto& [a, b] = *sides;
@@ -64,7 +64,7 @@ Status write_files(const mission::CompareReport& report, const std::filesystem::
   return write_file((folder / "compare.json").string(), mission::compare_json(report));
 }
 
-int run(const Options& options) {
+int run(const CompareOptions& options) {
   const auto report = compare(options);
   const Status written = !report               ? tl::unexpected(report.error())
                          : options.out.empty() ? Status()
@@ -76,7 +76,7 @@ int run(const Options& options) {
 }
 
 /// What is known of either side's errors.
-void add_noise_options(CLI::App& command, Options& options) {
+void add_noise_options(CLI::App& command, CompareOptions& options) {
   add_number(command, "--tolerance", options.config.tolerance_m,
              "How sure A is of its positions, over stretches of any length: standard deviation", "METRES");
   add_number(command, "--tolerance-deg", options.tolerance_deg,
@@ -95,7 +95,7 @@ void add_noise_options(CLI::App& command, Options& options) {
 }  // namespace
 
 void add_compare_command(CLI::App& app, int& exit_code) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand("compare", "Where, at which scale and since when two trajectories disagree");
   command->footer(
       "A judges, B is judged, as a robot judges its odometry by the server's map. Both are cut into nodes along A;\n"

@@ -18,7 +18,7 @@
 namespace tutti::app {
 namespace {
 
-struct Options {
+struct EvalOptions {
   std::string estimate_path;
   std::string reference_path;
   std::string format = "auto";
@@ -43,14 +43,14 @@ struct Report {
 double duration_s(const Trajectory& trajectory) { return trajectory.back().stamp - trajectory.front().stamp; }
 double seconds(Timestamp stamp) { return static_cast<double>(stamp.ns) * 1e-9; }
 
-Result<Trajectory> load(const std::string& path, const Options& options) {
+Result<Trajectory> load(const std::string& path, const EvalOptions& options) {
   auto trajectory = formats::read_trajectory(path, options.format, options.kitti_rate_hz);
   if (trajectory && trajectory->empty())
     return fail(ErrorCode::invalid, "{}: holds no pose, expected at least one", path);
   return trajectory;
 }
 
-Result<Report> evaluate(const Options& options) {
+Result<Report> evaluate(const EvalOptions& options) {
   auto estimate = load(options.estimate_path, options);
   if (!estimate) return tl::unexpected(estimate.error());
   auto reference = load(options.reference_path, options);
@@ -78,7 +78,7 @@ std::string rpe_line(const std::optional<evaluation::RpeResult>& rpe) {
   return fmt::format("{:.4f} m   {:.4f} deg   rmse of {} intervals", rpe->rmse_m, rpe->rmse_deg, rpe->count);
 }
 
-void print_table(const Options& options, const Report& report) {
+void print_table(const EvalOptions& options, const Report& report) {
   const auto& ate = report.ate;
   const auto file_line = [](const char* what, const std::string& path, const Trajectory& trajectory) {
     fmt::print("{:<12} {}: {} poses in {:.1f} s\n", what, path, trajectory.size(), duration_s(trajectory));
@@ -104,7 +104,7 @@ nlohmann::ordered_json rpe_json(const char* interval_key, double interval,
   return {{interval_key, interval}, {"count", rpe->count}, {"rmse_m", rpe->rmse_m}, {"rmse_deg", rpe->rmse_deg}};
 }
 
-void print_json(const Options& options, const Report& report) {
+void print_json(const EvalOptions& options, const Report& report) {
   using Json = nlohmann::ordered_json;
   const auto& ate = report.ate;
   const auto& t = ate.T_reference_estimate.translation;
@@ -133,7 +133,7 @@ void print_json(const Options& options, const Report& report) {
   fmt::print("{}\n", out.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
-int run(Options options) {
+int run(EvalOptions options) {
   if (options.map) {
     options.map_options.map_path = options.estimate_path;
     options.map_options.survey_path = options.reference_path;
@@ -180,7 +180,7 @@ void add_map_options(CLI::App& command, EvalMapOptions& options, CLI::Option* ma
 }  // namespace
 
 void add_eval_command(CLI::App& app, int& exit_code) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvalOptions>();
   CLI::App* command =
       app.add_subcommand("eval", "Error of a trajectory against a reference, or of a map against a survey");
   command->footer(

@@ -27,7 +27,7 @@ constexpr const char* kCommand = "map closure";
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr auto kHandOver = std::chrono::seconds(10);
 
-struct Options {
+struct ClosureOptions {
   std::string map, closure, by, bus;
   bool insecure = false, rejected = false;
 };
@@ -44,7 +44,7 @@ Result<std::vector<mapfile::ClosureInfo>> closures_of(const std::string& file) {
   return mapfile::closures(*content, mapfile::estimate(*content));
 }
 
-int list(const Options& options) {
+int list(const ClosureOptions& options) {
   const auto closures = closures_of(options.map);
   if (!closures) return complain(kCommand, closures.error().message);
   fmt::print("{:<32} {:<10} {}\n", "closure", "state", "why");
@@ -90,7 +90,7 @@ void print_origin(const mapfile::ClosureInfo& info) {
   }
 }
 
-int show(const Options& options) {
+int show(const ClosureOptions& options) {
   const auto map = mapfile::open(options.map);
   if (!map) return complain(kCommand, map.error().message);
   const auto content = mapfile::read(**map);
@@ -108,7 +108,7 @@ int show(const Options& options) {
 }
 
 /// To the server that has the map open.
-Status send(const Options& options, const ClosureWord& word) {
+Status send(const ClosureOptions& options, const ClosureWord& word) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
   auto port = bus::open_nats_port(self, {.url = options.bus, .allow_insecure = options.insecure});
   if (!port) return tl::unexpected(port.error());
@@ -126,7 +126,7 @@ Status send(const Options& options, const ClosureWord& word) {
   return {};
 }
 
-int say(const Options& options, Wish wish) {
+int say(const ClosureOptions& options, Wish wish) {
   if (options.map.empty() == options.bus.empty())
     return complain(kCommand, "expected a map's file, or --bus URL of the server that has it open", 2);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -147,7 +147,7 @@ int say(const Options& options, Wish wish) {
 }
 
 void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_code) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ClosureOptions>();
   const char* user = std::getenv("USER");
   if (user != nullptr) options->by = user;
   CLI::App* word = command.add_subcommand(to_string(wish), help);
@@ -172,7 +172,7 @@ void add_map_closure_command(CLI::App& map, int& exit_code) {
   closure->footer(
       "A closure's name is that of its two submaps: alpha/12-bravo/7; alpha.2/3 is of alpha's second session.\n"
       "Your word stands above the server's judgement, survives restarts, and the map follows at its next update.\n");
-  const auto listing = std::make_shared<Options>(), showing = std::make_shared<Options>();
+  const auto listing = std::make_shared<ClosureOptions>(), showing = std::make_shared<ClosureOptions>();
   CLI::App* all = closure->add_subcommand("list", "Every pair of submaps with closures, accepted or not, and why.");
   all->add_option("map", listing->map, "The map's file.")->type_name("MAP")->required();
   all->add_flag("--rejected", listing->rejected, "Only those that are not in the map.");

@@ -3,12 +3,11 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/evaluation/association.hpp"
+#include "tutti/evaluation/rpe.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::evaluation {
 namespace {
-
-constexpr double kMaxOvershoot = 0.5;  // of the interval, as in rpe.cpp
 
 void include(const PosePair& i, const PosePair& j, Kink& largest) {
   const Pose3 raw = i.reference.inverse() * j.reference;

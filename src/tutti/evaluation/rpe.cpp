@@ -12,8 +12,6 @@
 namespace tutti::evaluation {
 namespace {
 
-constexpr double kMaxOvershoot = 0.5;  // of the interval
-
 /// E over all i, where `abscissa` says how far along pair i is (ns or m), without decreasing; j is the first pair at
 /// least `least` after i, and none when that is more than `most`.
 template <class T>

@@ -9,11 +9,14 @@
 
 namespace tutti::evaluation {
 
+/// By how much of an interval its end may be late: beyond it there is a gap.
+inline constexpr double kMaxOvershoot = 0.5;
+
 /// Relative pose error (Sturm et al., IROS 2012, eqs. 1, 2): with Q the reference and P the estimate,
 ///   E_i = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j),
 /// rmse over all i of |translation of E_i| and of its rotation angle. Needs no alignment. From every pair i, j is the
 /// first pair at least the asked interval later (times to the nanosecond, ways to 1e-9 of it); where that overshoots by
-/// more than half the interval (a gap), i is left out. An error per interval, not divided by it.
+/// more than kMaxOvershoot, i is left out. An error per interval, not divided by it.
 struct RpeResult {
   std::size_t count = 0;
   double rmse_m = 0.0;

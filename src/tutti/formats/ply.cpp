@@ -17,7 +17,7 @@ struct Element {
   internal::RecordLayout layout;
 };
 
-struct Header {
+struct PlyHeader {
   std::string_view format;
   std::vector<Element> elements;
 };
@@ -56,8 +56,8 @@ Status add_property(const LineReader& line, Element& element) {
 }
 
 /// Reads up to and including "end_header".
-Result<Header> read_header(LineReader& line) {
-  Header header;
+Result<PlyHeader> read_ply_header(LineReader& line) {
+  PlyHeader header;
   if (!line.next() || line.columns()[0] != "ply")
     return fail(ErrorCode::parse, "{}: does not begin with \"ply\", expected a PLY file", line.name());
   while (line.next()) {
@@ -104,7 +104,7 @@ Status skip(LineReader& line, std::string_view& data, bool ascii, const Element&
 
 Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name) {
   LineReader line(bytes, name);
-  const auto header = read_header(line);
+  const auto header = read_ply_header(line);
   if (!header) return tl::unexpected(header.error());
   const bool ascii = header->format == "ascii";
   if (!ascii && header->format != "binary_little_endian")

@@ -139,12 +139,12 @@ Status check_covariances(const NamedTrajectory& b) {
   return {};
 }
 
-double seconds(Timestamp stamp) { return static_cast<double>(stamp.ns) * 1e-9; }
+double epoch_s(Timestamp stamp) { return static_cast<double>(stamp.ns) * 1e-9; }
 
 std::string span(const Trajectory& trajectory) {
   return trajectory.empty() ? std::string("no pose")
                             : fmt::format("{} poses, {:.3f} to {:.3f} s", trajectory.size(),
-                                          seconds(trajectory.front().stamp), seconds(trajectory.back().stamp));
+                                          epoch_s(trajectory.front().stamp), epoch_s(trajectory.back().stamp));
 }
 
 }  // namespace

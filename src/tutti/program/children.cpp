@@ -18,7 +18,7 @@ namespace tutti::program {
 namespace {
 
 constexpr auto kPolitely = std::chrono::seconds(30);
-constexpr auto kLookAgain = std::chrono::milliseconds(20);
+constexpr auto kLookForEnd = std::chrono::milliseconds(20);
 
 std::string end_of(const std::filesystem::path& output) {
   constexpr std::size_t kTail = 1000;
@@ -72,7 +72,7 @@ void Children::stop(const std::vector<std::string>& names) {
     if (child == running_.end()) continue;
     while (waitpid(child->second.pid, nullptr, WNOHANG) == 0) {
       if (std::chrono::steady_clock::now() > end) kill(child->second.pid, SIGKILL);
-      std::this_thread::sleep_for(kLookAgain);
+      std::this_thread::sleep_for(kLookForEnd);
     }
     running_.erase(child);
   }

@@ -21,7 +21,7 @@ namespace tutti::program {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 constexpr auto kLookAgain = std::chrono::milliseconds(200);
 constexpr auto kServerStarts = std::chrono::seconds(120);
@@ -57,7 +57,7 @@ class MissionUp {
   fs::path state_;
   Children children_;
   std::string bus_;
-  Clock::time_point begin_ = Clock::now();
+  SteadyClock::time_point begin_ = SteadyClock::now();
   double wall_s_ = 0.0;
 };
 
@@ -87,11 +87,11 @@ Status MissionUp::start_server(const std::atomic<bool>& stop) {
   server.insert(server.end(), {"--threads", std::to_string(options_.workers > 0 ? 0 : options_.threads)});
   const fs::path output = state_ / "server.out";
   if (Status started = children_.start("server", server, output); !started) return started;
-  const auto until = Clock::now() + kServerStarts;
+  const auto until = SteadyClock::now() + kServerStarts;
   while (bus_.empty()) {
     if (Status runs = children_.check(); !runs) return runs;
     if (stop) return fail(ErrorCode::io, "stopped");
-    if (Clock::now() > until) return fail(ErrorCode::io, "the server does not start: {}", output.string());
+    if (SteadyClock::now() > until) return fail(ErrorCode::io, "the server does not start: {}", output.string());
     const std::string text = read_file(output.string()).value_or("");
     const std::size_t begin = text.find("--bus ");
     const std::size_t end = text.find(' ', begin == std::string::npos ? begin : begin + 6);
@@ -148,7 +148,7 @@ void MissionUp::tell(const MissionStatus& status) const {
 
 /// The server last: it still takes what the others say.
 void MissionUp::end() {
-  wall_s_ = std::chrono::duration<double>(Clock::now() - begin_).count();
+  wall_s_ = std::chrono::duration<double>(SteadyClock::now() - begin_).count();
   std::vector<std::string> others;
   for (const std::string& name : names_) others.push_back("robot " + name);
   for (int i = 0; i < options_.workers; ++i) others.push_back(fmt::format("worker{}", i + 1));

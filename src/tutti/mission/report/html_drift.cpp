@@ -13,8 +13,8 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kLeft_px = 78.0;
-constexpr double kRight_px = 14.0;
+constexpr double kDriftLeft_px = 78.0;
+constexpr double kDriftRight_px = 14.0;
 constexpr std::string_view kTimeAxis = "mission time [s]";
 
 /// Logarithmic when a linear axis would press the smaller curves onto the floor.
@@ -42,10 +42,10 @@ struct Common {
 /// Bands from the top to the bottom of the plot.
 void draw_bands(Svg& svg, const MissionRecord& record, const RobotRecord& robot, const Axis& x, double top,
                 double bottom) {
-  constexpr double kThinnest_px = 1.5;
+  constexpr double kThinnestMark_px = 1.5;
   const auto band = [&](Timestamp from, Timestamp until, const std::string& css_class, const std::string& title) {
     const double left = x(mission_clock(robot)(from));
-    svg.rect({left, top}, {std::max(kThinnest_px, x(mission_clock(robot)(until)) - left), bottom - top}, css_class,
+    svg.rect({left, top}, {std::max(kThinnestMark_px, x(mission_clock(robot)(until)) - left), bottom - top}, css_class,
              title);
   };
   for (const DriftOrigin& origin : robot.drift_origins)
@@ -110,21 +110,21 @@ std::string timeline(const MissionRecord& record, const RobotRecord& robot, cons
   constexpr double kErrorsBottom_px = 230.0;
   constexpr double kBornTop_px = 246.0;
   constexpr double kBornBottom_px = 306.0;
-  const double right = kWide_px - kRight_px;
+  const double right = kWide_px - kDriftRight_px;
   const bool born = !common.born_m.empty;
   const double bottom = born ? kBornBottom_px : kErrorsBottom_px;
-  const Axis x = Axis::linear(common.time_s, kLeft_px, right, 14, false);
+  const Axis x = Axis::linear(common.time_s, kDriftLeft_px, right, 14, false);
   const Axis y = common.logarithmic ? Axis::logarithmic(common.error_m, kErrorsBottom_px, kErrorsTop_px)
                                     : Axis::linear(common.error_m, kErrorsBottom_px, kErrorsTop_px, 5, true);
   Svg svg(kWide_px, bottom + 40.0, fmt::format("Error of {} over mission time", robot.name));
   draw_bands(svg, record, robot, x, kMarksTop_px, bottom);
-  svg.text({kLeft_px - 8.0, kMarksBottom_px - 3.0}, "constraints", "tick", "end");
+  svg.text({kDriftLeft_px - 8.0, kMarksBottom_px - 3.0}, "constraints", "tick", "end");
   draw_constraints(svg, record, robot, x, kMarksTop_px, kMarksBottom_px);
-  draw_axes(svg, x, y, {kLeft_px, kErrorsTop_px}, {right, kErrorsBottom_px}, born ? "" : kTimeAxis, true);
+  draw_axes(svg, x, y, {kDriftLeft_px, kErrorsTop_px}, {right, kErrorsBottom_px}, born ? "" : kTimeAxis, true);
   svg.vertical_text({13.0, 0.5 * (kErrorsTop_px + kErrorsBottom_px)}, "error", "axis");
   if (born) {
     const Axis rate = Axis::linear(common.born_m, kBornBottom_px, kBornTop_px, 2, true);
-    draw_axes(svg, x, rate, {kLeft_px, kBornTop_px}, {right, kBornBottom_px}, kTimeAxis, true);
+    draw_axes(svg, x, rate, {kDriftLeft_px, kBornTop_px}, {right, kBornBottom_px}, kTimeAxis, true);
     svg.vertical_text({13.0, 0.5 * (kBornTop_px + kBornBottom_px)}, "new drift", "axis");
     draw_born(svg, g, x, rate);
   }

@@ -16,7 +16,7 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kHalf_px = 560.0;
+constexpr double kMapHalf_px = 560.0;
 
 /// What the robots saw, as a picture under the routes.
 void draw_clouds(Svg& svg, const PlanView& view, const GroundPlane& ground, std::vector<CloudLayer> clouds) {
@@ -149,7 +149,7 @@ std::string robot_maps_html(const MissionRecord& record, const std::vector<Robot
     const GroundPlane ground = ground_plane({g.onboard, g.server, g.reference});
     const PlanView view(
         {ground(g.onboard), ground(g.corrected), ground(g.server), ground(g.reference), ground(g.whereabouts)},
-        kHalf_px, 0.85 * kHalf_px);
+        kMapHalf_px, 0.85 * kMapHalf_px);
     Svg svg(view.width(), view.height(), fmt::format("Estimates of {} from above", robot.name));
     svg.polyline(view(ground(g.server)), "server", "server");
     draw_drift(svg, robot, robot.odometry, view(ground(g.onboard)));

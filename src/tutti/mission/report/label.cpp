@@ -9,7 +9,7 @@
 namespace tutti::mission {
 namespace {
 
-constexpr int kColumns = 5;
+constexpr int kLetterColumns = 5;
 constexpr int kRows = 7;
 
 struct Letter {
@@ -61,10 +61,10 @@ void draw_label(Image& image, int left, int top, std::string_view text, int squa
     const auto* letter = std::find_if(std::begin(kLetters), std::end(kLetters),
                                       [&](const Letter& l) { return l.character == character; });
     for (int row = 0; letter != std::end(kLetters) && row < kRows; ++row)
-      for (int column = 0; column < kColumns; ++column)
-        if ((letter->rows[static_cast<std::size_t>(row)] >> (kColumns - 1 - column) & 1) != 0)
+      for (int column = 0; column < kLetterColumns; ++column)
+        if ((letter->rows[static_cast<std::size_t>(row)] >> (kLetterColumns - 1 - column) & 1) != 0)
           fill(image, left + column * square, top + row * square, square, square, colour);
-    left += (kColumns + 1) * square;
+    left += (kLetterColumns + 1) * square;
   }
 }
 

@@ -9,7 +9,7 @@
 namespace tutti::mission {
 namespace {
 
-constexpr std::size_t kColumns = 100;
+constexpr std::size_t kLineColumns = 100;
 constexpr std::size_t kGap = 2;
 
 }  // namespace
@@ -42,7 +42,7 @@ std::string wrap(const std::string& text, const std::string& prefix) {
   std::size_t column = prefix.size();
   std::istringstream words(text);
   for (std::string word; words >> word;) {
-    if (column > prefix.size() && column + 1 + word.size() > kColumns) {
+    if (column > prefix.size() && column + 1 + word.size() > kLineColumns) {
       out.append("\n").append(prefix.size(), ' ');
       column = prefix.size();
     }

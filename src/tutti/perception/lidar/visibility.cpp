@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kColumns = 128;
 constexpr int kRows = 64;
-constexpr float kBinsPerRad = kColumns / (2.0F * std::numbers::pi_v<float>);
+constexpr float kPixelsPerRad = kColumns / (2.0F * std::numbers::pi_v<float>);
 constexpr float kMinDepth = 0.3F;
 
 struct Direction {
@@ -20,8 +20,8 @@ struct Direction {
 Direction direction_of(const Eigen::Vector3f& ray) {
   const float azimuth = std::atan2(ray.y(), ray.x());
   const float elevation = std::atan2(ray.z(), std::hypot(ray.x(), ray.y()));
-  return {(azimuth + std::numbers::pi_v<float>)*kBinsPerRad,
-          (elevation + 0.5F * std::numbers::pi_v<float>)*kBinsPerRad};
+  return {(azimuth + std::numbers::pi_v<float>)*kPixelsPerRad,
+          (elevation + 0.5F * std::numbers::pi_v<float>)*kPixelsPerRad};
 }
 
 }  // namespace
@@ -34,7 +34,7 @@ DepthPanorama::DepthPanorama(const OrientedCloud& cloud, const Eigen::Vector3f& 
     if (depth < kMinDepth) continue;
     const auto depth_cm = static_cast<std::uint16_t>(std::min(100.0F * depth, 65535.0F));
     const Direction d = direction_of(ray);
-    const float reach = 0.5F + 0.7F * spacing_m / depth * kBinsPerRad;
+    const float reach = 0.5F + 0.7F * spacing_m / depth * kPixelsPerRad;
     const float flat = std::max(0.1F, std::hypot(ray.x(), ray.y()) / depth);  // a column is narrower near the poles
     const int row_begin = std::max(0, static_cast<int>(d.row - reach)),
               row_end = std::min(kRows - 1, static_cast<int>(d.row + reach));

@@ -15,8 +15,8 @@ namespace tutti::visual {
 namespace {
 
 constexpr std::size_t kLeastInliers = 4;
-constexpr int kRounds = 5;       // of refining and finding the inliers again
-constexpr int kIterations = 10;  // of Gauss-Newton
+constexpr int kRounds = 5;        // of refining and finding the inliers again
+constexpr int kRefinements = 10;  // of Gauss-Newton
 constexpr double kLossSigmas2 = 4.0;
 constexpr double kConverged = 1e-9;  // m and rad
 
@@ -110,7 +110,7 @@ class Problem {
 };
 
 Pose3 refine(const Problem& problem, const std::vector<std::uint32_t>& chosen, Pose3 T_map_body) {
-  for (int i = 0; i < kIterations; ++i) {
+  for (int i = 0; i < kRefinements; ++i) {
     const auto normal = problem.normal_equations(chosen, T_map_body, true);
     const Vector6d step = -normal.H.ldlt().solve(normal.g);
     if (!step.allFinite()) break;
