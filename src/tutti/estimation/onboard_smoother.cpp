@@ -37,9 +37,50 @@ OnboardSmoother::OnboardSmoother(const OnboardSmootherConfig& config, SmootherSt
   state_.poses.reserve(state.odometry.size() + 1);
   for (const RelativePose& step : state.odometry) append(step);
   set_constraints(std::move(state.constraints));
-  if (state.poses.empty()) return;
-  TUTTI_CHECK(state.poses.size() == size(), "{} poses of {} nodes", state.poses.size(), size());
-  state_.poses = std::move(state.poses);
+  TUTTI_CHECK(state.poses.size() <= size() && state.held <= size(), "{} poses, {} held, of {} nodes",
+              state.poses.size(), state.held, size());
+  state_.solution.clear();
+  state_.held = state.held;
+  if (state.poses.empty()) {
+    restore_solution(std::move(state.solution));
+    return;
+  }
+  state_.solution = std::move(state.solution);
+  std::ranges::copy(state.poses, state_.poses.begin());
+  compose_from(state.poses.size() - 1);
+}
+
+/// As solve() did after it had found it.
+void OnboardSmoother::restore_solution(std::vector<Pose3> solution) {
+  if (solution.empty()) return;
+  const auto nodes = internal::reduced_nodes(state_.constraints);
+  TUTTI_CHECK(solution.size() == nodes.size(), "a solution of {} poses, {} nodes", solution.size(), nodes.size());
+  internal::update_runs(nodes, state_.odometry, runs_);
+  PoseGraph graph = internal::reduced_graph(nodes, runs_, state_.constraints, state_.first);
+  state_.solution = std::move(solution);
+  if (!internal::is_finite(graph)) return;
+  const auto structure = internal::analyse_blocks(graph);
+  internal::GraphEquations equations(graph, structure);
+  spread(nodes, graph, equations);
+}
+
+std::size_t OnboardSmoother::solution_size(const std::vector<ChainConstraint>& constraints) {
+  return internal::reduced_nodes(constraints).size();
+}
+
+int OnboardSmoother::spread(const std::vector<std::size_t>& nodes, PoseGraph& graph,
+                            internal::GraphEquations& equations) {
+  internal::place(runs_, state_.solution, state_.odometry, state_.poses);
+  int steps = 0;
+  while (steps < config_.polishing_steps && internal::polish(nodes, state_.odometry, graph, equations, state_.poses))
+    ++steps;
+  compose_from(nodes.back());
+  return steps;
+}
+
+void OnboardSmoother::compose_from(std::size_t node) {
+  for (std::size_t k = node; k < state_.odometry.size(); ++k)
+    state_.poses[k + 1] = state_.poses[k] * state_.odometry[k].T_a_b;
 }
 
 std::size_t OnboardSmoother::append(const RelativePose& odometry) {
@@ -52,11 +93,19 @@ void OnboardSmoother::set_constraints(std::vector<ChainConstraint> constraints) 
   for (const auto& constraint : constraints)
     TUTTI_CHECK(constraint.from < size() && constraint.to < size(), "constraint {} -> {}, {} nodes", constraint.from,
                 constraint.to, size());
+  if (constraints != state_.constraints) hold();
   state_.constraints = std::move(constraints);
+}
+
+/// The poses are no longer those of a solution.
+void OnboardSmoother::hold() {
+  state_.solution.clear();
+  state_.held = size();
 }
 
 void OnboardSmoother::set_first_pose(const Pose3& T_map_first) {
   const Pose3 motion = T_map_first * state_.first.inverse();
+  if (size() > 1) hold();
   for (Pose3& pose : state_.poses) pose = motion * pose;
   state_.poses.front() = state_.first = T_map_first;
 }
@@ -94,13 +143,9 @@ SmootherSummary OnboardSmoother::solve() {
   summary.initial_cost = result.initial_cost;
   summary.final_cost = result.final_cost;
   if (!is_usable(summary.termination)) return summary;
-
-  internal::place(runs_, reduced, state_.odometry, state_.poses);
-  while (summary.polishing_steps < config_.polishing_steps &&
-         internal::polish(nodes, state_.odometry, graph, equations, state_.poses))
-    ++summary.polishing_steps;
-  for (std::size_t k = nodes.back(); k < state_.odometry.size(); ++k)
-    state_.poses[k + 1] = state_.poses[k] * state_.odometry[k].T_a_b;
+  state_.solution = std::move(reduced);
+  state_.held = 0;
+  summary.polishing_steps = spread(nodes, graph, equations);
   return summary;
 }
 

@@ -9,6 +9,9 @@
 #include "tutti/model/relative_pose.hpp"
 
 namespace tutti::estimation {
+namespace internal {
+class GraphEquations;
+}
 
 struct OnboardSmootherConfig {
   int max_iterations = 20;
@@ -44,14 +47,19 @@ struct SmootherSummary {
   std::size_t compounded_steps = 0;  ///< Of odometry: those between nodes that the last solve did not have.
 };
 
-/// All that a smoother knows but what it can compound again.
+/// All that a smoother knows but what it can compound again. Poses grow with the chain and all change at every solve,
+/// but follow from the rest: to restore them to the bit the first `held` of them, or `solution`, are enough.
 struct SmootherState {
   Pose3 first;
   std::vector<RelativePose> odometry;
   std::vector<ChainConstraint> constraints;
-  /// T_map_body per node, one more than odometry steps, as the last solve left them: the next one starts there. Empty,
-  /// to restore a smoother from the rest: composed from odometry until solve().
+  /// T_map_body per node, one more than odometry steps, as the last solve left them: the next one starts there. To
+  /// restore a smoother fewer will do: the others follow from the last one by odometry; none: from `solution`.
   std::vector<Pose3> poses;
+  /// Of the reduced graph of `constraints`, before polishing, if the last solve was usable. Empty: no such solve; then
+  /// poses but for the held ones are composed from odometry.
+  std::vector<Pose3> solution;
+  std::size_t held = 0;  ///< So many of the first poses do not follow from the rest.
   friend bool operator==(const SmootherState&, const SmootherState&) = default;
 };
 
@@ -87,7 +95,16 @@ class OnboardSmoother {
   [[nodiscard]] const std::vector<Pose3>& poses() const { return state_.poses; }  ///< T_map_body per node.
   [[nodiscard]] const SmootherState& state() const { return state_; }
 
+  /// Poses that a solution of these constraints has.
+  static std::size_t solution_size(const std::vector<ChainConstraint>& constraints);
+
  private:
+  void hold();
+  /// All poses from the solution; returns polishing steps.
+  int spread(const std::vector<std::size_t>& nodes, PoseGraph& graph, internal::GraphEquations& equations);
+  void compose_from(std::size_t node);
+  void restore_solution(std::vector<Pose3> solution);
+
   OnboardSmootherConfig config_;
   SmootherState state_;
   std::vector<PoseGraphEdge> runs_;  ///< Compounded odometry between the reduced nodes of the last solve.

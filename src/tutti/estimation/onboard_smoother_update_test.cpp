@@ -43,6 +43,8 @@ OnboardSmoother live(Rng rng, const Mission& m, const OnboardSmootherConfig& con
 /// Without the poses that the last solve left.
 SmootherState bare(SmootherState state) {
   state.poses.clear();
+  state.solution.clear();
+  state.held = 0;
   return state;
 }
 
@@ -87,6 +89,23 @@ RC_GTEST_PROP(OnboardSmootherUpdate, ARestoredOneGoesOnToTheBit, ()) {
     one->set_constraints(m.constraints);
     one->solve();
   }
+  RC_ASSERT(restored.state() == smoother.state());
+}
+
+/// What is stored of one: poses only where they do not follow from the rest.
+RC_GTEST_PROP(OnboardSmootherUpdate, ItsPosesFollowToTheBitFromTheSolution, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint32_t>());
+  const auto m = mission(rng, 300, 12);
+  const OnboardSmootherConfig config{.polishing_steps = rng.bernoulli(0.8) ? 1 : 0};
+  auto smoother = live(rng.fork("updates"), m, config, 8);
+  RC_ASSERT(smoother.state().held == 0U);
+  if (rng.bernoulli(0.5)) smoother.append(m.odometry.front());
+  if (rng.bernoulli(0.3)) smoother.set_first_pose(random_pose(rng, 20.0, 2.0));
+  if (rng.bernoulli(0.3)) smoother.set_constraints(m.constraints);
+  if (rng.bernoulli(0.5)) smoother.append(m.odometry.front());
+  SmootherState stored = smoother.state();
+  stored.poses.resize(stored.held);
+  const OnboardSmoother restored(config, stored);
   RC_ASSERT(restored.state() == smoother.state());
 }
 

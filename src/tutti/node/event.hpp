@@ -68,6 +68,11 @@ struct RobotRefused {  ///< Another program with a name or number that is in use
   std::uint64_t session = 0;
   std::string why;
 };
+struct StateLost {  ///< What was stored of the robot cannot be read: a new session; submaps that wait are kept.
+  RobotId robot;
+  std::uint64_t session = 0;  ///< The new one.
+  std::string why;
+};
 struct SampleRefused {
   RobotId robot;
   std::string why;
@@ -84,8 +89,8 @@ struct ImagesRefused {
 struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
-               MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, SampleRefused, ScanRefused,
-               ImagesRefused>
+               MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost, SampleRefused,
+               ScanRefused, ImagesRefused>
       what;
 };
 

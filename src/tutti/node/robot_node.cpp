@@ -13,12 +13,13 @@ namespace tutti::node {
 namespace {
 
 constexpr const char* kCheckpoint = "checkpoint";
-constexpr const char* kAgent = "agent";  // its one row
+constexpr const char* kWhole = "agent";  // the one row that was the checkpoint once
 constexpr const char* kJournal = "journal";
 constexpr const char* kOutbox = "outbox";
 constexpr const char* kMeta = "meta";
-constexpr const char* kRobot = "robot";    // whose store it is
-constexpr const char* kStarts = "starts";  // on it
+constexpr const char* kRobot = "robot";      // whose store it is
+constexpr const char* kStarts = "starts";    // on it
+constexpr const char* kSession = "session";  // the newest on it
 
 }  // namespace
 
@@ -28,29 +29,68 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
   if (!whose) return tl::unexpected(whose.error());
   if (*whose && **whose != storage::key_of({robot.value}))
     return fail(ErrorCode::invalid, "what is stored is another robot's than {}", robot.value);
-  robot::AgentState state{.session = session};
   const auto starts = store.read(kMeta, kStarts);
   if (!starts) return tl::unexpected(starts.error());
-  const auto checkpoint = store.read(kCheckpoint, kAgent);
-  if (!checkpoint) return tl::unexpected(checkpoint.error());
-  if (*checkpoint) {
-    auto decoded = wire::decode_agent_state(**checkpoint);
-    if (!decoded) return in_context(fmt::format("robot {}: checkpoint", robot.value), decoded.error());
-    state = std::move(*decoded);
-  }
-  std::unique_ptr<RobotNode> node(new RobotNode(robot, config, std::move(rng), std::move(state), store));
-  node->is_new_ = !*checkpoint;
-  if (const auto before = storage::numbers_of(starts->value_or(""), 1)) node->start_ = before->front() + 1;
-  Status ok = node->read_outbox();
-  const auto hear = [&](std::string_view, std::string_view bytes) {
-    const auto entry = decode_entry(bytes);
-    ok = entry ? node->hear_again(*entry) : Status(tl::unexpected(entry.error()));
-    return ok.has_value();
+  wire::StateRows rows;
+  const auto keep = [&](std::string_view key, std::string_view bytes) {
+    rows.emplace(key, bytes);
+    return true;
   };
-  if (ok)
-    if (auto scanned = store.scan(kJournal, {}, hear); !scanned) ok = scanned;
-  if (!ok) return in_context(fmt::format("robot {}: what is stored", robot.value), ok.error());
+  if (auto scanned = store.scan(kCheckpoint, {}, keep); !scanned) return tl::unexpected(scanned.error());
+
+  const auto make = [&](robot::AgentState state) {
+    return std::unique_ptr<RobotNode>(new RobotNode(robot, config, rng, std::move(state), store));
+  };
+  std::unique_ptr<RobotNode> node;
+  Status readable;
+  const bool is_whole = rows.contains(kWhole);
+  if (rows.empty()) {
+    node = make({{.session = session}});
+  } else if (auto state = is_whole ? wire::decode_agent_state(rows.at(kWhole)) : wire::decode_state_rows(rows)) {
+    wire::StoredState stored = is_whole ? wire::StoredState{} : wire::stored_state(*state);
+    node = make(std::move(*state));
+    node->stored_ = std::move(stored);
+    if (is_whole) node->obsolete_ = {kWhole};
+  } else {
+    readable = in_context("checkpoint", state.error());
+  }
+  std::uint64_t entries = 0;
+  const auto hear = [&](std::string_view, std::string_view bytes) {
+    ++entries;
+    if (!readable) return true;
+    const auto entry = decode_entry(bytes);
+    readable = entry ? node->hear_again(*entry) : Status(tl::unexpected(entry.error()));
+    if (!readable) readable = in_context("journal", readable.error());
+    return true;
+  };
+  if (auto scanned = store.scan(kJournal, {}, hear); !scanned) return tl::unexpected(scanned.error());
+  if (!readable) {
+    const auto before = newest_session(store);
+    if (!before) return tl::unexpected(before.error());
+    node = make({{.session = std::max(session, *before) + 1}});
+    for (const auto& [key, bytes] : rows) node->obsolete_.push_back(key);
+    node->why_lost_ = readable.error().message;
+  }
+  node->journal_ = entries;
+  node->is_new_ = rows.empty() || !readable;
+  if (const auto before = storage::numbers_of(starts->value_or(""), 1)) node->start_ = before->front() + 1;
+  if (Status ok = node->read_outbox(); !ok)
+    return in_context(fmt::format("robot {}: what is stored", robot.value), ok.error());
   return node;
+}
+
+/// Of those that the store says itself, and of submaps that wait; 0: none.
+Result<std::uint64_t> RobotNode::newest_session(const storage::TableStore& store) {
+  const auto row = store.read(kMeta, kSession);
+  if (!row) return tl::unexpected(row.error());
+  std::uint64_t newest = 0;
+  if (const auto session = storage::numbers_of(row->value_or(""), 1)) newest = session->front();
+  const auto look = [&](std::string_view key, std::string_view) {
+    if (const auto numbers = storage::numbers_of(key, 3)) newest = std::max(newest, (*numbers)[1]);
+    return true;
+  };
+  if (auto scanned = store.scan(kOutbox, {}, look); !scanned) return tl::unexpected(scanned.error());
+  return newest;
 }
 
 Status RobotNode::read_outbox() {
@@ -71,7 +111,6 @@ Status RobotNode::read_outbox() {
 
 /// No submap ends here: when one does, the journal goes in the same transaction.
 Status RobotNode::hear_again(const JournalEntry& entry) {
-  ++journal_;
   if (const auto* sample = std::get_if<OdometrySample>(&entry))
     return agent_.add_odometry(sample->stamp, sample->T_odom_body, sample->increment_covariance);
   if (const auto* scan = std::get_if<Scan>(&entry)) {
@@ -95,7 +134,11 @@ Step RobotNode::resume(Timestamp now) {
     step.writes.push_back({kMeta, kRobot, storage::key_of({agent_.robot().value})});
     save_checkpoint(step);
   }
-  if (config_.keeps_state) step.writes.push_back({kMeta, kStarts, storage::key_of({start_})});
+  if (config_.keeps_state) {
+    step.writes.push_back({kMeta, kStarts, storage::key_of({start_})});
+    step.writes.push_back({kMeta, kSession, storage::key_of({agent_.chain().session})});
+  }
+  if (why_lost_) step.tell(now, StateLost{agent_.robot(), agent_.chain().session, *std::exchange(why_lost_, {})});
   send_submaps(now, {}, step);
   return step;
 }
@@ -181,7 +224,11 @@ Step RobotNode::on_timer(Timestamp now) {
 
 void RobotNode::save_checkpoint(Step& step) {
   if (!config_.keeps_state) return;
-  step.writes.push_back({kCheckpoint, kAgent, wire::encode(agent_.state())});
+  for (std::string& key : std::exchange(obsolete_, {}))
+    step.writes.push_back({kCheckpoint, std::move(key), std::nullopt});
+  wire::StateChange change = wire::changed_rows(agent_, stored_);
+  for (std::string& key : change.removed) step.writes.push_back({kCheckpoint, std::move(key), std::nullopt});
+  for (auto& [key, bytes] : change.put) step.writes.push_back({kCheckpoint, key, std::move(bytes)});
   unwritten_.clear();
   for (; journal_ > 0; --journal_) step.writes.push_back({kJournal, storage::key_of({journal_ - 1}), std::nullopt});
 }

@@ -13,6 +13,7 @@
 #include "tutti/node/step.hpp"
 #include "tutti/node/uplink.hpp"
 #include "tutti/robot/agent.hpp"
+#include "tutti/wire/agent_state.hpp"
 
 namespace tutti::node {
 
@@ -34,8 +35,9 @@ struct RobotNodeConfig {
 class RobotNode {
  public:
   /// On an empty store a new chain of this session, which is larger than any before (ChainId); otherwise the robot goes
-  /// on as if nothing had happened, with the same configuration and randomness as then. An error: what is stored is no
-  /// state, or another robot's. The store must outlive the node.
+  /// on as if nothing had happened, with the same configuration and randomness as then. A state that cannot be read, of
+  /// another version for one, is deleted: the robot begins a session after all before, keeps its outbox, and says so
+  /// (StateLost). An error: the store cannot be read, or is another robot's. The store must outlive the node.
   static Result<std::unique_ptr<RobotNode>> open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
                                                  Rng rng, const storage::TableStore& store);
 
@@ -78,6 +80,7 @@ class RobotNode {
             const storage::TableStore& store)
       : config_(config), store_(store), agent_(robot, config.agent, std::move(rng), std::move(state)) {}
 
+  static Result<std::uint64_t> newest_session(const storage::TableStore& store);
   Status hear_again(const JournalEntry& entry);
   Status read_outbox();
   void remember(const JournalEntry& entry, Timestamp now, Step& step);
@@ -106,6 +109,9 @@ class RobotNode {
   std::uint64_t journal_ = 0;                 // entries since the checkpoint that are written
   std::vector<std::string> unwritten_;        // and those that are not
   Timestamp unwritten_since_;
+  wire::StoredState stored_;           // of the agent, in the checkpoint
+  std::vector<std::string> obsolete_;  // rows of the checkpoint, until the next one
+  std::optional<std::string> why_lost_;
   bool is_new_ = false;      // there is no checkpoint yet
   std::uint64_t start_ = 1;  // of all on this store
   bool finished_ = false;

@@ -122,6 +122,13 @@ Told tell(const node::RobotRefused& refused) {
       "a second robot was refused: " + refused.why,
       Level::warning};
 }
+Told tell(const node::StateLost& lost) {
+  return {
+      {{"event", "state_lost"}, {"robot", lost.robot.value}, {"session", lost.session}, {"why", lost.why}},
+      fmt::format("what was stored of this robot cannot be read; it begins session {}, submaps that wait are kept: {}",
+                  lost.session, lost.why),
+      Level::warning};
+}
 Told tell(const node::SampleRefused& refused) {
   return {{{"event", "sample_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "an odometry sample was refused: " + refused.why,

@@ -31,7 +31,7 @@ constexpr double kRoundedQuaternion = 1e-3;
 }  // namespace
 
 RobotAgent::RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng)
-    : RobotAgent(robot, config, std::move(rng), AgentState{.session = session}) {}
+    : RobotAgent(robot, config, std::move(rng), AgentState{{.session = session}}) {}
 RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentState state)
     : chain_(robot, state.session),
       config_(config),
@@ -195,6 +195,12 @@ void RobotAgent::locate_others(const ProxyGraph& graph, std::span<const consiste
   for (const LastSeen& seen : graph.last_seen)
     if (seen.chain.robot != chain_.robot && component_of(graph, seen.chain) == component_of(graph, chain_))
       state_.whereabouts.push_back({seen.chain.robot, seen.stamp, T_map_world * seen.T_world_body});
+}
+
+AgentHead RobotAgent::head() const {
+  AgentHead out = state_;
+  out.submaps = submaps_.state();
+  return out;
 }
 
 AgentState RobotAgent::state() const {

@@ -67,19 +67,14 @@ struct UpdateSummary {
 enum class UpdateStage { compare, choose, optimise };
 using StageObserver = std::function<void(UpdateStage)>;
 
-/// An agent's whole state, by value: restart it from this and it goes on as if nothing had happened.
-struct AgentState {
+/// What of an agent's state changes as it goes on; it does not grow with the way.
+struct AgentHead {
   std::uint64_t session = 0;   ///< ChainId::session; goes on with the state.
   std::uint64_t sequence = 0;  ///< Of the next message.
   std::uint64_t epoch = 0;     ///< Of the newest proxy graph seen: ProxyGraph::age().
   std::uint64_t revision = 0;
   std::uint64_t comparisons = 0;  ///< Proxy graphs compared.
   SubmapBuilderState submaps;
-  estimation::SmootherState smoother;
-  consistency::Ledger ledger;
-  std::vector<Keyframe> keyframes;          ///< Nodes of the smoother's chain.
-  std::vector<std::uint32_t> submap_of;     ///< Of each keyframe: the submap it was first in.
-  std::vector<RelativePose> node_odometry;  ///< Raw, between representative keyframes; [k] ends at the k-th.
   RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   Pose3 T_odom_body;  ///< Newest sample.
   Pose3 T_map_odom;
@@ -87,6 +82,16 @@ struct AgentState {
   std::vector<Whereabouts> whereabouts;
   /// Of the map, by the newest proxy graph; nothing: it does not know this chain.
   std::optional<std::uint32_t> component;
+};
+
+/// An agent's whole state, by value: restart it from this and it goes on as if nothing had happened.
+struct AgentState : AgentHead {
+  estimation::SmootherState smoother;  ///< Its odometry is only added to; the rest changes when a graph is received.
+  consistency::Ledger ledger;          ///< The same.
+  // These are only added to.
+  std::vector<Keyframe> keyframes;          ///< Nodes of the smoother's chain.
+  std::vector<std::uint32_t> submap_of;     ///< Of each keyframe: the submap it was first in.
+  std::vector<RelativePose> node_odometry;  ///< Raw, between representative keyframes; [k] ends at the k-th.
 };
 
 /// One robot: odometry and scans in, submaps out; proxy graphs in, corrected trajectory out. No threads, sockets or
@@ -134,6 +139,11 @@ class RobotAgent {
   [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> newest_heard() const { return {state_.epoch, state_.revision}; }
 
   [[nodiscard]] AgentState state() const;
+  // The parts of state(), which takes the longer the longer the way is.
+  [[nodiscard]] AgentHead head() const;
+  [[nodiscard]] const estimation::SmootherState& smoother() const { return smoother_.state(); }
+  [[nodiscard]] const std::vector<std::uint32_t>& submap_of() const { return state_.submap_of; }
+  [[nodiscard]] const std::vector<RelativePose>& node_odometry() const { return state_.node_odometry; }
   [[nodiscard]] RobotId robot() const { return chain_.robot; }
   [[nodiscard]] const ChainId& chain() const { return chain_; }
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return state_.keyframes; }

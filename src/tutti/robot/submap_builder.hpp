@@ -77,9 +77,9 @@ class SubmapBuilder {
   SubmapBuilder(const ChainId& chain, const SubmapConfig& config, SubmapBuilderState state = {});
 
   /// Raw pose with the covariance of the increment since the previous one (ignored for the first). Stamps must
-  /// increase; poses must be within kMaxCoordinate_m with unit quaternions, covariances what check_covariance() says (geometry/
-  /// covariance.hpp): otherwise an error, and nothing changes. Returns the
-  /// keyframe this sample became, if it did.
+  /// increase; poses must be within kMaxCoordinate_m with unit quaternions, covariances what check_covariance() says
+  /// (geometry/ covariance.hpp): otherwise an error, and nothing changes. Returns the keyframe this sample became, if
+  /// it did.
   Result<std::optional<KeyframeStep>> add_odometry(Timestamp stamp, const Pose3& T_odom_body,
                                                    const Matrix6d& increment_covariance);
   /// A scan that ends at the latest odometry sample's stamp; points in the body frame. A sweep with ages is undistorted

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a robot's store is written, and what becomes of one that another version has written.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "support/paths.hpp"
+#include "support/robot/drifting_robot.hpp"
+#include "tutti/node/robot_node.hpp"
+#include "tutti/storage/memory_store.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::node {
+namespace {
+
+constexpr RobotId kRobot{1};
+
+std::size_t bytes_of(const Step& step) {
+  std::size_t bytes = 0;
+  for (const storage::Write& write : step.writes) bytes += write.key.size() + (write.bytes ? write.bytes->size() : 0);
+  return bytes;
+}
+
+struct Robot {
+  explicit Robot(const storage::TableStore& of, std::uint64_t session = 101)
+      : node(RobotNode::open(kRobot, session, {}, Rng(1), of).value()) {}
+  /// A sample of a robot that walks on and on, half a metre and half a second each.
+  Step walk(int i) {
+    const Timestamp stamp = robot::test::at(i);
+    if (i > 0) T_odom_body = T_odom_body * (robot::test::true_pose(i - 1).inverse() * robot::test::true_pose(i)) * bend;
+    return node->add_odometry({stamp, T_odom_body, robot::test::kStepCovariance}, Timestamp{} + 0.5 * i);
+  }
+  Step hear(const ProxyGraphMessage& message, Timestamp now) const {
+    return node->receive({bus::Endpoint::server(),
+                          bus::Endpoint::of(kRobot),
+                          bus::MessageKind::proxy_graph,
+                          {},
+                          std::make_shared<const std::string>(wire::encode(message))},
+                         now);
+  }
+  std::unique_ptr<RobotNode> node;
+  Pose3 T_odom_body;
+  const Pose3 bend = (robot::test::true_pose(0).inverse() * robot::test::true_pose(1)).inverse() *
+                     robot::test::drifting_odometry(2)[1].pose;
+};
+
+// A checkpoint used to be the whole way so far.
+TEST(RobotState, WhatASubmapWritesDoesNotGrowWithTheWay) {
+  storage::MemoryStore store(storage::robot_schema());
+  Robot robot(store);
+  ASSERT_TRUE(store.commit(robot.node->resume({}).writes).has_value());
+  std::vector<std::size_t> of_submaps{0};
+  constexpr int kSamples = 3000;
+  for (int i = 0; i < kSamples; ++i) {
+    const Step step = robot.walk(i);
+    of_submaps.back() += bytes_of(step);
+    ASSERT_TRUE(store.commit(step.writes).has_value());
+    if (!step.messages.empty()) of_submaps.push_back(0);
+  }
+  of_submaps.pop_back();
+  ASSERT_GT(of_submaps.size(), 100U);
+  const auto mean = [&](std::size_t from, std::size_t to) {
+    double sum = 0.0;
+    for (std::size_t i = from; i < to; ++i) sum += static_cast<double>(of_submaps[i]) / static_cast<double>(to - from);
+    return sum;
+  };
+  const std::size_t n = of_submaps.size();
+  RecordProperty("bytes_per_submap", static_cast<int>(mean(n / 2, n)));
+  EXPECT_LT(mean(n - n / 10, n), 1.1 * mean(n / 10, n / 5));
+  EXPECT_LT(static_cast<double>(*std::ranges::max_element(of_submaps)), 2.0 * mean(0, n));
+}
+
+TEST(RobotState, OfTheLinksToTheMapOnlyThoseThatChangedAreWritten) {
+  storage::MemoryStore store(storage::robot_schema());
+  Robot robot(store);
+  const auto done = [&](const Step& step) { ASSERT_TRUE(store.commit(step.writes).has_value()); };
+  done(robot.node->resume({}));
+  const auto links_in = [](const Step& step) {
+    return std::ranges::count_if(step.writes, [](const storage::Write& w) { return w.key.starts_with("link/"); });
+  };
+  int i = 0;
+  const auto to_the_next_submap = [&] {
+    while (true) {
+      Step step = robot.walk(i++);
+      done(step);
+      if (!step.messages.empty()) return step;
+    }
+  };
+  while (i < 130) to_the_next_submap();
+  const ProxyGraphMessage graph = robot::test::broadcast(robot.node->agent(), 1, robot::test::kWorld);
+  done(robot.hear(graph, Timestamp{} + 0.5 * i));
+  const std::size_t links = robot.node->agent().ledger().size();
+  ASSERT_GT(links, 1U);
+  EXPECT_EQ(links_in(to_the_next_submap()), static_cast<std::ptrdiff_t>(links));
+  EXPECT_EQ(links_in(to_the_next_submap()), 0);
+  ProxyGraphMessage other = graph;  // the end of what the links hold to is no longer known: some links go
+  other.graph.revision = 2;
+  other.graph.nodes.erase(other.graph.nodes.begin() + 40, other.graph.nodes.end() - 1);
+  other.graph.uncertainties.clear();
+  done(robot.hear(other, Timestamp{} + 0.5 * i));
+  const consistency::Ledger ledger = robot.node->agent().ledger();
+  ASSERT_LT(ledger.size(), links);
+  to_the_next_submap();
+  EXPECT_EQ(std::ranges::count_if(store.tables().at("checkpoint"),
+                                  [](const auto& row) { return row.first.starts_with("link/"); }),
+            static_cast<std::ptrdiff_t>(ledger.size()));
+  EXPECT_EQ(Robot(store).node->agent().ledger(), ledger);
+}
+
+/// tests/stored/robot_1.tutti: written on 22 November 2026 by the program before states were rows (agent state 3),
+/// after 90 s, two graphs, and half a second of journal; robot_1.txt: what its corrected trajectory was, to the bit.
+class StoredRobot : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto from = test::source_path("tests/stored/robot_1.tutti");
+    const auto file = std::filesystem::path(testing::TempDir()) / "robot_1.tutti";
+    std::filesystem::copy_file(from, file, std::filesystem::copy_options::overwrite_existing);
+    const auto read = storage::open_sqlite_store(file, storage::robot_schema(), {.min_free_bytes = 0});
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    storage::MemoryStore::Tables tables;
+    for (const std::string& table : storage::robot_schema().tables)
+      ASSERT_TRUE((*read)->scan(table, {}, [&](std::string_view key, std::string_view bytes) {
+        tables[table].emplace(key, bytes);
+        return true;
+      }));
+    store_ = std::make_unique<storage::MemoryStore>(storage::robot_schema(), tables);
+    std::filesystem::remove(file);
+  }
+  std::unique_ptr<storage::MemoryStore> store_;
+};
+
+TEST_F(StoredRobot, OfTheVersionBeforeRowsIsReadToTheBitAndGoesOnAsRows) {
+  Robot robot(*store_, 7);
+  std::ifstream expected(test::source_path("tests/stored/robot_1.txt"));
+  for (const StampedPose& at : robot.node->agent().corrected()) {
+    std::int64_t ns = 0;
+    expected >> ns;
+    ASSERT_EQ(at.stamp.ns, ns);
+    std::string x, y, z;
+    expected >> x >> y >> z;
+    const Eigen::Vector3d t(std::strtod(x.c_str(), nullptr), std::strtod(y.c_str(), nullptr),
+                            std::strtod(z.c_str(), nullptr));
+    ASSERT_LT((at.pose.translation - t).norm(), 1e-9) << ns;  // what the journal adds may be another machine's bits
+    for (int k = 0; k < 4; ++k) expected >> x;
+  }
+  EXPECT_EQ(robot.node->agent().keyframes().size(), 181U);
+  EXPECT_EQ(robot.node->agent().ledger().size(), 7U);
+  EXPECT_EQ(robot.node->agent().chain().session, 101U);
+  EXPECT_EQ(robot.node->backlog().size(), 4U);
+  const Step resumed = robot.node->resume({});
+  EXPECT_TRUE(resumed.events.empty());
+  EXPECT_EQ(resumed.messages.size(), 4U);
+  ASSERT_TRUE(store_->commit(resumed.writes).has_value());
+  const Trajectory odometry = robot::test::drifting_odometry(210);
+  for (std::size_t i = 181; i < odometry.size(); ++i) {
+    const auto& [stamp, pose] = odometry[i];
+    ASSERT_TRUE(store_->commit(robot.node->add_odometry({stamp, pose, robot::test::kStepCovariance}, {}).writes));
+  }
+  ASSERT_TRUE(store_->commit(robot.node->finish({}).writes));
+  EXPECT_FALSE(store_->tables().at("checkpoint").contains("agent"));
+  EXPECT_TRUE(store_->tables().at("journal").empty());
+  const Robot again(*store_, 7);
+  EXPECT_EQ(wire::encode(again.node->agent().state()), wire::encode(robot.node->agent().state()));
+}
+
+TEST_F(StoredRobot, WhoseStateCannotBeReadBeginsASessionAndKeepsItsOutbox) {
+  const auto whole = store_->tables();
+  for (const bool newer : {true, false})
+    for (const char* table : {"checkpoint", "journal"}) {
+      auto tables = whole;
+      std::string& row = tables.at(table).begin()->second;
+      row[table == std::string("checkpoint") ? 2 : 0] = newer ? '\x7f' : '\0';  // version; kind of entry
+      storage::MemoryStore store(storage::robot_schema(), tables);
+      Robot robot(store, 7);
+      EXPECT_EQ(robot.node->agent().chain().session, 102U);  // after that of the submaps that wait
+      EXPECT_EQ(robot.node->backlog().size(), 4U);
+      const Step resumed = robot.node->resume({});
+      ASSERT_EQ(resumed.events.size(), 1U);
+      const auto& lost = std::get<StateLost>(resumed.events[0].what);
+      EXPECT_EQ(lost.session, 102U);
+      EXPECT_NE(lost.why.find(table), std::string::npos) << lost.why;
+      EXPECT_EQ(resumed.messages.size(), 4U);
+      ASSERT_TRUE(store.commit(resumed.writes).has_value());
+      EXPECT_TRUE(store.tables().at("journal").empty());
+      Robot again(store, 7);
+      EXPECT_TRUE(again.node->resume({}).events.empty());
+      EXPECT_EQ(again.node->agent().chain().session, 102U);
+    }
+}
+
+}  // namespace
+}  // namespace tutti::node
