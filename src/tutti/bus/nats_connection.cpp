@@ -70,6 +70,7 @@ std::string submap_stream(const std::string& mission) { return "SUBMAPS_" + miss
 std::string verdict_stream(const std::string& mission) { return "VERDICTS_" + mission; }
 std::string job_stream(const std::string& mission) { return "JOBS_" + mission; }
 std::string retained_bucket(const std::string& mission) { return "GRAPH_" + mission; }
+std::string retained_stream(const std::string& mission) { return "KV_" + retained_bucket(mission); }
 
 tl::unexpected<Error> NatsConnection::failure(natsStatus status, std::string_view doing, int code) const {
   return fail(ErrorCode::io, "{}: {}: {}{}", url_, doing, natsStatus_GetText(status),
@@ -253,6 +254,16 @@ Status NatsConnection::publish(const std::string& subject, const std::string& an
   if (status == NATS_OK && !id.empty()) status = natsMsgHeader_Set(made, "Nats-Msg-Id", id.c_str());
   if (status == NATS_OK) status = natsConnection_PublishMsg(connection_, made);
   return status == NATS_OK ? Status() : failure(status, "sending to " + subject);
+}
+
+Result<bool> NatsConnection::has_stream(const std::string& stream) const {
+  jsErrCode code{};
+  jsStreamInfo* info = nullptr;
+  const natsStatus status = js_GetStreamInfo(&info, streams_, stream.c_str(), nullptr, &code);
+  const NatsOwned<jsStreamInfo> owned(status == NATS_OK ? info : nullptr);
+  if (status == NATS_NOT_FOUND) return false;
+  if (status != NATS_OK) return failure(status, "stream " + stream, code);
+  return true;
 }
 
 /// Between two equal looks at the stream the consumer's numbers are of the same moment.

@@ -2,6 +2,7 @@
 // A bus that has lost part of its disk, or keeps what nobody gets: the server's port notices and mends it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -87,6 +88,44 @@ TEST_F(NatsDamage, AfterAPowerFailureNothingIsHeldBackForLong) {
   for (const auto& [number, times] : came) EXPECT_EQ(times, 1) << number;
   within(2.0 * kStranded_s, [&] { return take(-1), false; });
   EXPECT_EQ(hub->state().streams_made_anew, 1U) << hub->state().last_error;
+}
+
+/// Its disk is a new one: nobody starts again, and what was on it is sent again by those who keep it.
+TEST_F(NatsDamage, ABusThatHasLostItsStoreIsSetUpAgain) {
+  NatsNetwork network;
+  const auto robot = network.open(kRobot);
+  const auto hub = open_hub(network, 4.0);
+  const auto bytes = std::make_shared<const std::string>("graph");
+  ASSERT_TRUE(hub->send({kServer, kRobot, MessageKind::proxy_graph, "", bytes}));
+  ASSERT_TRUE(within(10.0, [&] { return robot->state().connected && hub->state().waiting_messages == 0; }));
+  send(*robot, kServer, MessageKind::submap, 0);
+  std::set<std::string> came;
+  const auto take = [&] {
+    for (const Received& received : hub->receive()) {
+      came.insert(received.envelope.id);
+      if (received.envelope.id != "0") hub->acknowledge(received.ticket);  // that one only after the loss
+    }
+    return came.size();
+  };
+  ASSERT_TRUE(within(10.0, [&] { return take() == 1; }));
+  kill(network.child().pid(), SIGKILL);
+  ASSERT_TRUE(within(5.0, [&] { return !network.child().running(); }));
+  std::filesystem::remove_all(network.folder() / "js");
+  ASSERT_TRUE(network.child().tend().has_value());
+  for (int i = 1; i < 5; ++i) send(*robot, kServer, MessageKind::submap, i);
+  EXPECT_TRUE(within(20.0, [&] { return take() == 5; }))
+      << came.size() << ", " << robot->state().waiting_messages << " wait; " << hub->state().last_error << "; "
+      << robot->state().last_error;
+  EXPECT_GE(hub->state().streams_made_anew, 1U);
+  EXPECT_TRUE(within(10.0, [&] { return robot->state().waiting_messages == 0; }));
+  const auto later = network.open(kRobot);  // another start: what is retained is there again
+  EXPECT_TRUE(within(10.0, [&] {
+    const auto heard = later->receive();
+    return std::ranges::any_of(heard, [](const auto& one) { return *one.envelope.bytes == "graph"; });
+  }));
+  const auto worker = network.open(Endpoint::worker(1));
+  send(*hub, Endpoint::any_worker(), MessageKind::job, 7);
+  EXPECT_TRUE(within(10.0, [&] { return !worker->receive().empty(); }));
 }
 
 TEST_F(NatsDamage, AJobThatEndsEveryWorkerComesBackAndTheOthersStay) {

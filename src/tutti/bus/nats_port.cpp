@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/jetstream_port.hpp"
 
 namespace tutti::bus {
@@ -65,6 +67,8 @@ Status JetStreamPort::send(Envelope envelope) {
   TUTTI_CHECK(envelope.from == self_ && envelope.bytes != nullptr, "not from {}", name_of(self_));
   const std::scoped_lock guard(mutex_);
   Status added = outbox_.add(envelope);
+  if (added && delivery_of(envelope.kind) == Delivery::retained)
+    retained_sent_.insert_or_assign({envelope.to, envelope.kind}, envelope);
   changed_.notify_all();
   return added;
 }
@@ -89,7 +93,8 @@ void JetStreamPort::still_busy(std::uint64_t ticket) {
 NatsState JetStreamPort::state() const {
   const std::scoped_lock guard(mutex_);
   const bool listening = listening_ + 1 == threads_.size();  // all but the sender's thread
-  NatsState state{.connected = listening && session_ && session_->connection->connected(),
+  NatsState state{.url = options_.url,
+                  .connected = listening && session_ && session_->connection->connected(),
                   .reconnects = cuts_ == 0 ? 0 : cuts_ - 1,
                   .waiting_messages = outbox_.messages(),
                   .waiting_bytes = outbox_.bytes(),
@@ -97,7 +102,10 @@ NatsState JetStreamPort::state() const {
                   .refused = refused_ + inbox_.given_up(),
                   .streams_made_anew = streams_made_anew_,
                   .jobs_removed = jobs_removed_,
+                  .unconfirmed_s = 0.0,
                   .last_error = last_error_};
+  if (const auto since = outbox_.unconfirmed_since(); since && state.connected)
+    state.unconfirmed_s = std::chrono::duration<double>(Clock::now() - *since).count();
   return state;
 }
 
@@ -188,6 +196,7 @@ void JetStreamPort::send_all() {
     const std::uint64_t reconnects = connection.reconnects();
     if (reconnects != reconnects_ || !connected) {
       const std::scoped_lock guard(mutex_);
+      outbox_.note_cut();
       if (reconnects != reconnects_) outbox_.resend_all();
       cuts_ += reconnects - reconnects_;
       if (!connected) outbox_.forget_best_effort();
@@ -203,29 +212,43 @@ void JetStreamPort::send_all() {
 }
 
 /// Its sequence begins again: what was to be acknowledged in the old one must not be in the new one. With it goes the
-/// memory of its ids, so that what is sent again is taken.
+/// memory of its ids, so that what is sent again is taken. A bus that has lost one may have lost all.
 void JetStreamPort::make_stream_anew(const NatsConnection& connection) {
-  std::string stream;
+  std::string stranded;
   {
     const std::scoped_lock guard(mutex_);
-    stream = stranded_;
+    stranded = stranded_;
   }
-  if (stream.empty()) return;
-  Status done = connection.remove_stream(stream);
+  if (stranded.empty()) return;
+  const std::string& mission = options_.mission;
+  Status done;
+  std::vector<std::string> lost;
+  for (const std::string& stream :
+       {submap_stream(mission), verdict_stream(mission), job_stream(mission), retained_stream(mission)}) {
+    const auto there = stream == stranded ? Result<bool>(false) : connection.has_stream(stream);
+    if (!there) done = tl::unexpected(there.error());
+    if (there && !*there) lost.push_back(stream);
+  }
+  if (done) done = connection.remove_stream(stranded);
   if (done) {
     const std::scoped_lock guard(mutex_);
-    if (stream == submap_stream(options_.mission)) inbox_.forget_stream(MessageKind::submap);
-    if (stream == verdict_stream(options_.mission))
-      for (const MessageKind kind : {MessageKind::verdicts, MessageKind::refinement}) inbox_.forget_stream(kind);
+    for (const std::string& stream : lost) {
+      if (stream == submap_stream(mission)) inbox_.forget_stream(MessageKind::submap);
+      if (stream == verdict_stream(mission))
+        for (const MessageKind kind : {MessageKind::verdicts, MessageKind::refinement, MessageKind::word})
+          inbox_.forget_stream(kind);
+    }
   }
   if (done) done = connection.prepare(options_);
   if (!done) return note(done.error().message);  // and again
   const std::scoped_lock guard(mutex_);
-  ++streams_made_anew_;
+  streams_made_anew_ += lost.size();
   last_error_ = fmt::format(
-      "the bus did not give what was in its stream {}, as after a power failure: made anew, and "
-      "what was in it is to be sent again",
-      stream);
+      "the bus had lost {}, or did not give what was in it, as after a power failure: made anew, and what was in it is "
+      "to be sent again",
+      fmt::join(lost, ", "));
+  if (std::ranges::find(lost, retained_stream(mission)) != lost.end())
+    for (const auto& [to, envelope] : retained_sent_) static_cast<void>(outbox_.add(envelope));
   stranded_.clear();
   changed_.notify_all();
 }

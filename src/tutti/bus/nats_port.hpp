@@ -44,14 +44,17 @@ Status prepare_nats(const NatsPortOptions& options);
 
 /// How a port stands with its bus.
 struct NatsState {
+  std::string url;
   bool connected = false;  ///< And listening.
   std::uint64_t reconnects = 0;
   std::size_t waiting_messages = 0;  ///< Their parts: not sent, or not confirmed by the bus.
   std::uint64_t waiting_bytes = 0;
   std::size_t waiting_acknowledgements = 0;
   std::uint64_t refused = 0;            ///< Arrived, and were none of ours, or never whole.
-  std::uint64_t streams_made_anew = 0;  ///< Of the server's port: since the bus would not give what was in them.
+  std::uint64_t streams_made_anew = 0;  ///< Of the server's port: the bus had lost them, or gave nothing of them.
   std::uint64_t jobs_removed = 0;       ///< Of the server's port: those that no worker gets any more.
+  /// So long the bus, which is there, has stored nothing of what was sent.
+  double unconfirmed_s = 0.0;
   std::string last_error;
 };
 

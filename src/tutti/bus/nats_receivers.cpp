@@ -58,15 +58,20 @@ void JetStreamPort::hear_confirmations() {
          natsMsg* heard = nullptr;
          const natsStatus status = natsSubscription_NextMsg(&heard, confirmations, kListen_ms);
          const NatsOwned<natsMsg> message(heard);
-         if (status != NATS_OK) return status == NATS_TIMEOUT;
+         if (status == NATS_NO_RESPONDERS) {  // of libnats, which does not say to what
+           const std::scoped_lock guard(mutex_);
+           outbox_.refuse_all(Clock::now());
+           last_error_ = "the bus has no stream for this mission: has its server been there?";
+         }
+         if (status != NATS_OK) return status == NATS_TIMEOUT || status == NATS_NO_RESPONDERS;
          const std::string_view subject = natsMsg_GetSubject(heard);
          const auto number = std::strtoull(subject.substr(subject.rfind('.') + 1).data(), nullptr, 10);
          const std::string_view answer = bytes_of(heard);
-         const bool stored = !natsMsg_IsNoResponders(heard) && answer.find("\"error\":{") == std::string_view::npos;
+         const bool stored = answer.find("\"error\":{") == std::string_view::npos;
          const std::scoped_lock guard(mutex_);
          if (stored) outbox_.confirm(number);
          if (!stored) outbox_.refuse(number, Clock::now());
-         if (!stored) last_error_ = answer.empty() ? "the bus has no stream for this mission" : std::string(answer);
+         if (!stored) last_error_ = std::string(answer);
          changed_.notify_all();
          return true;
        });
@@ -100,8 +105,9 @@ void JetStreamPort::pull(const std::string& stream, const std::string& consumer)
       });
 }
 
-/// nats-server 2.9 takes a damaged end of a stream for none, and may go on with sequences that its consumer has behind
-/// it: what is stored then is neither pending nor given. Of jobs it keeps those that were given for the last time.
+/// A bus may have lost its streams, with its disk. And nats-server 2.9 takes a damaged end of a stream for none, and
+/// may go on with sequences that its consumer has behind it: what is stored then is neither pending nor given. Of jobs
+/// it keeps those that were given for the last time.
 void JetStreamPort::watch() {
   struct Watched {
     std::optional<Clock::time_point> since;  // they have been in this state
@@ -110,7 +116,19 @@ void JetStreamPort::watch() {
   };
   const std::string jobs = job_stream(options_.mission);
   std::map<std::string, Watched> all;
+  const auto strand = [&](const std::string& stream) {
+    const std::scoped_lock guard(mutex_);
+    if (stranded_.empty()) stranded_ = stream;
+    changed_.notify_all();
+  };
+  const auto is_there = [&](const std::string& stream, const NatsConnection& connection) {
+    const auto there = connection.has_stream(stream);
+    if (!there) note(there.error().message);
+    if (there && !*there) strand(stream);
+    return there && *there;
+  };
   const auto look_at = [&](const std::string& stream, const std::string& consumer, const NatsConnection& connection) {
+    if (!is_there(stream, connection)) return;
     const auto look = connection.look_at(stream, consumer);
     if (!look) return note(look.error().message);
     Watched& watched = all[stream];
@@ -136,9 +154,7 @@ void JetStreamPort::watch() {
     }
     watched.since.reset();
     watched.removed = false;
-    const std::scoped_lock guard(mutex_);
-    if (stranded_.empty()) stranded_ = stream;
-    changed_.notify_all();
+    strand(stream);
   };
   keep([](Session& /*present*/) { return Result<bool>(true); },
        [&](bool /*made*/, Session& present) {
@@ -146,6 +162,7 @@ void JetStreamPort::watch() {
            look_at(submap_stream(options_.mission), "server", *present.connection);
            look_at(verdict_stream(options_.mission), "server", *present.connection);
            look_at(jobs, "workers", *present.connection);
+           is_there(retained_stream(options_.mission), *present.connection);
          }
          return pause(std::chrono::duration<double>(options_.stranded_s / 4));
        });

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "tutti/bus/internal/nats_connection.hpp"
@@ -101,7 +102,9 @@ class JetStreamPort final : public NatsPort {
   Inbox inbox_;
   std::vector<std::string> busy_;                ///< Where work is said to go on.
   std::map<MessageKind, std::string> retained_;  ///< What was last given.
-  std::string stranded_;                         ///< The stream to be made anew; "": none.
+  /// What was last sent, of the server's: a bus that has lost it is told again.
+  std::map<std::pair<Endpoint, MessageKind>, Envelope> retained_sent_;
+  std::string stranded_;  ///< The stream to be made anew; "": none.
   std::uint64_t streams_made_anew_ = 0;
   std::uint64_t jobs_removed_ = 0;
   std::uint64_t refused_ = 0;

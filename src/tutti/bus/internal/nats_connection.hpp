@@ -67,6 +67,8 @@ class NatsConnection {
     std::uint64_t done_up_to = 0;  ///< What is in the stream up to this sequence is given to nobody any more.
     bool asked = false;            ///< Somebody waits for messages.
   };
+  /// False: a bus that has lost its store. An error: it does not answer.
+  [[nodiscard]] Result<bool> has_stream(const std::string& stream) const;
   /// Nothing: there is no consumer, or the stream does not hold still for long enough.
   [[nodiscard]] Result<std::optional<Look>> look_at(const std::string& stream, const std::string& consumer) const;
   /// Removes messages that are given to nobody any more, each after `take` has had it.
@@ -110,5 +112,6 @@ std::string submap_stream(const std::string& mission);
 std::string verdict_stream(const std::string& mission);
 std::string job_stream(const std::string& mission);
 std::string retained_bucket(const std::string& mission);
+std::string retained_stream(const std::string& mission);  ///< In which the bucket is kept.
 
 }  // namespace tutti::bus

@@ -75,12 +75,14 @@ std::optional<Outbox::Piece> Outbox::next(Time now) {
       bytes_ -= piece.size;
     else
       under_way_.insert_or_assign(piece.number, UnderWay{piece, now + kConfirmation});
+    if (delivery != Delivery::best_effort && !unconfirmed_since_) unconfirmed_since_ = now;
     return piece;
   }
   return std::nullopt;
 }
 
 void Outbox::confirm(std::uint64_t number) {
+  unconfirmed_since_.reset();
   const auto found = under_way_.find(number);
   if (found == under_way_.end()) return;
   bytes_ -= found->second.piece.size;
@@ -103,6 +105,11 @@ void Outbox::refuse(std::uint64_t number, Time now) {
   Piece piece = std::move(found->second.piece);
   under_way_.erase(found);
   put_back(std::move(piece));
+}
+
+void Outbox::refuse_all(Time now) {
+  not_before_ = now + kAgain;
+  resend_all();
 }
 
 void Outbox::expire(Time now) {

@@ -44,10 +44,16 @@ class Outbox {
   void confirm(std::uint64_t number);
   /// The bus does not take it: again, after a while.
   void refuse(std::uint64_t number, Time now);
+  /// Of what is under way.
+  void refuse_all(Time now);
   /// What was under way for too long waits again.
   void expire(Time now);
   /// All that was under way waits again: the connection was gone, and with it maybe the messages.
   void resend_all();
+  /// Since when the bus has stored nothing of what was sent; nothing: it has, or nothing was.
+  [[nodiscard]] std::optional<Time> unconfirmed_since() const { return unconfirmed_since_; }
+  /// It could not.
+  void note_cut() { unconfirmed_since_.reset(); }
   /// What is best effort is not heard without a connection.
   void forget_best_effort();
 
@@ -72,6 +78,7 @@ class Outbox {
   std::uint64_t bytes_ = 0;  ///< Of all pieces.
   std::uint64_t next_number_ = 0;
   Time not_before_{};
+  std::optional<Time> unconfirmed_since_;
   std::map<Order, Piece> waiting_;
   std::map<std::uint64_t, UnderWay> under_way_;
 };

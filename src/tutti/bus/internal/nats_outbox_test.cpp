@@ -112,11 +112,34 @@ TEST(NatsOutbox, WhatIsRefusedOrNotConfirmedGoesAgain) {
   outbox.resend_all();
   piece = outbox.next(kStart + 21s);
   ASSERT_TRUE(piece.has_value());
+  outbox.refuse_all(kStart + 21s);
+  EXPECT_FALSE(outbox.next(kStart + 21s));
+  piece = outbox.next(kStart + 22s);
+  ASSERT_TRUE(piece.has_value());
   EXPECT_EQ(piece->id, part_id("a", 10));
   outbox.confirm(piece->number);
   outbox.confirm(piece->number);  // heard twice
   EXPECT_EQ(outbox.messages(), 0U);
   EXPECT_EQ(outbox.bytes(), 0U);
+}
+
+TEST(NatsOutbox, TellsSinceWhenTheBusStoresNothing) {
+  Outbox outbox("m", 1000);
+  EXPECT_FALSE(outbox.unconfirmed_since());
+  for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, id, 10)));
+  auto piece = outbox.next(kStart + 1s);
+  static_cast<void>(outbox.next(kStart + 2s));
+  outbox.expire(kStart + 30s);
+  static_cast<void>(outbox.next(kStart + 30s));
+  EXPECT_EQ(outbox.unconfirmed_since(), kStart + 1s);
+  outbox.confirm(piece->number);
+  EXPECT_FALSE(outbox.unconfirmed_since());
+  piece = outbox.next(kStart + 31s);
+  EXPECT_EQ(outbox.unconfirmed_since(), kStart + 31s);
+  outbox.refuse(piece->number, kStart + 32s);
+  EXPECT_EQ(outbox.unconfirmed_since(), kStart + 31s);
+  outbox.note_cut();
+  EXPECT_FALSE(outbox.unconfirmed_since());
 }
 
 /// A bus that stores, refuses and forgets to confirm at random ends with everything, and with the newest retained

@@ -12,6 +12,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kListen(200);   // then the bus gives nothing for a request any more
+constexpr int kMostUnanswered = 3;                  // a bus that does not know the consumer says nothing
 constexpr std::chrono::milliseconds kIsLost(1000);  // and so much later it will not say so any more, either
 
 }  // namespace
@@ -43,13 +44,17 @@ bool NatsPull::ask(int batch) {
 }
 
 NatsPull::Next NatsPull::next(int batch) {
-  if (left_ > 0 && Clock::now() > until_) left_ = 0;
+  if (left_ > 0 && Clock::now() > until_) {
+    left_ = 0;
+    if (++unanswered_ >= kMostUnanswered) return {State::lost, {}};
+  }
   if (left_ == 0 && batch > 0 && !ask(batch)) return {State::lost, {}};
   natsMsg* heard = nullptr;
   const natsStatus status = natsSubscription_NextMsg(&heard, subscription_, kListen.count());
   NatsOwned<natsMsg> message(heard);
   if (status == NATS_TIMEOUT) return {};
   if (status != NATS_OK) return {State::lost, {}};
+  unanswered_ = 0;
   if (std::string_view(natsMsg_GetSubject(heard)).starts_with(inbox_)) return {told(heard), {}};
   if (left_ > 0) --left_;
   return {State::message, std::move(message)};

@@ -42,7 +42,8 @@ class NatsPull {
   natsSubscription* subscription_;
   std::string inbox_;  ///< Of all requests; each has a number behind it.
   std::uint64_t requests_ = 0;
-  int left_ = 0;  ///< Of the last request.
+  int left_ = 0;        ///< Of the last request.
+  int unanswered_ = 0;  ///< Requests, the last ones.
   std::chrono::steady_clock::time_point until_;
 };
 
