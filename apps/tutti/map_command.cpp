@@ -139,38 +139,48 @@ void print_robots(const mapfile::Content& content, const server::MapEstimate& ma
   }
 }
 
+void print_finders(const mapfile::Content& content) {
+  std::map<std::uint32_t, std::size_t> found;
+  for (const auto& [pair, verdict] : content.verdicts)
+    if (!verdict.closures.empty()) ++found[verdict.finder_version];
+  for (const auto& [version, pairs] : content.refused) found.try_emplace(version, 0);
+  for (const auto& [version, pairs] : found)
+    fmt::print("finder       version {}: closures between {} pairs, {} refused\n", version, pairs,
+               content.refused.contains(version) ? content.refused.at(version) : 0);
+}
+
 int show_map(const fs::path& file) {
   const std::string changed = last_change(file);
   const auto map = mapfile::open(file);
   if (!map) return complain("map info", map.error().message);
   const auto content = mapfile::read(**map);
   if (!content) return complain("map info", content.error().message);
-  const server::MapEstimate estimate = mapfile::estimate(*content);
   std::error_code failure;
-  std::map<std::string, std::size_t> states;
-  std::map<std::uint32_t, std::size_t> finders;
-  std::size_t by_operator = 0;
-  for (const mapfile::ClosureInfo& info : mapfile::closures(*content, estimate)) {
-    ++states[to_string(info.state)];
-    if (info.word && info.word->wish != Wish::withdraw) ++by_operator;
-    if (info.verdict) ++finders[info.verdict->finder_version];
-  }
   fmt::print(
       "map          {}\nsize         {}\nlast change  {} UTC\nserver       epoch {}, revision {}, opened {} times{}\n",
       file.string(), size_of(fs::file_size(file, failure)), changed, content->meta.epoch, content->meta.revision,
       content->meta.start, content->meta.news ? ", with news since" : "");
-  fmt::print("submaps      {}\nclosures     {} accepted, {} rejected, {} candidates; {} by an operator's word\n",
-             content->submaps.size(), states["accepted"], states["rejected"], states["candidate"], by_operator);
-  for (const auto& [version, pairs] : finders) {
-    fmt::print("finder       version {}: closures between {} pairs, {} refused\n", version, pairs,
-               content->refused.contains(version) ? content->refused.at(version) : 0);
+  const Counts counts = count(*content);
+  fmt::print("submaps      {} of {} robots, {} sessions\nfound        closures between {} pairs\n",
+             content->submaps.size(), counts.robots, counts.sessions, counts.pairs);
+  if (const auto& last = content->counts)
+    fmt::print("last update  revision {}: {} keyframes, {} closures accepted, {} components\n", last->revision,
+               last->keyframes, last->closures, last->components);
+  print_finders(*content);
+  print_tables(*content);
+  std::fflush(stdout);  // what follows takes as long as an update of the map
+
+  const server::MapEstimate estimate = mapfile::estimate(*content);
+  std::map<std::string, std::size_t> states;
+  std::size_t by_operator = 0;
+  for (const mapfile::ClosureInfo& info : mapfile::closures(*content, estimate)) {
+    ++states[to_string(info.state)];
+    if (info.word && info.word->wish != Wish::withdraw) ++by_operator;
   }
-  for (const auto& [version, pairs] : content->refused)
-    if (!finders.contains(version))
-      fmt::print("finder       version {}: closures between 0 pairs, {} refused\n", version, pairs);
+  fmt::print("\nclosures     {} accepted, {} rejected, {} candidates; {} by an operator's word\n", states["accepted"],
+             states["rejected"], states["candidate"], by_operator);
   fmt::print("joint map    {} keyframes, {} components\n", estimate.nodes.size(), estimate.components);
   print_robots(*content, estimate);
-  print_tables(*content);
   return 0;
 }
 
@@ -200,9 +210,10 @@ int export_map(const ExportOptions& options) {
   if (!options.ply.empty()) {
     const auto cloud = mapfile::export_ply(**map, *content, estimate, options.ply);
     if (!cloud) return complain("map export", cloud.error().message);
-    if (cloud->points == 0) return complain("map export", options.map + ": no submap of the joint map has a cloud");
-    fmt::print("{}: {} points of {} submaps{}\n", options.ply, cloud->points, cloud->submaps,
-               cloud->left_out > 0 ? fmt::format("; {} are not tied to the joint map", cloud->left_out) : "");
+    if (cloud->points == 0) return complain("map export", options.map + ": no submap has a cloud");
+    fmt::print("{}: {} points of {} submaps{}{}\n", options.ply, cloud->points, cloud->submaps,
+               cloud->left_out > 0 ? fmt::format("; {} are not tied to these", cloud->left_out) : "",
+               cloud->of_the_largest ? "" : "; the largest part of the map has no clouds, this is of another");
   }
   return 0;
 }

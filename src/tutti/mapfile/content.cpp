@@ -10,6 +10,7 @@
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/submap_outline.hpp"
 
 namespace tutti::mapfile {
 namespace {
@@ -36,12 +37,12 @@ Status read_table(const storage::TableStore& map, const std::string& name, Decod
 }
 
 Status read_submaps(const storage::TableStore& map, Content& content) {
-  const auto take = [&](std::string_view, SubmapMessage message) {
-    const SubmapId id = message.submap.id;
-    if (const PayloadSize size = payload_size(message.submap); size != PayloadSize()) content.payload_sizes[id] = size;
-    content.submaps[id] = std::make_shared<const Submap>(without_payloads(std::move(message.submap)));
+  const auto take = [&](std::string_view, wire::SubmapOutline outline) {
+    const SubmapId id = outline.submap.id;
+    if (outline.size != PayloadSize()) content.payload_sizes[id] = outline.size;
+    content.submaps[id] = std::make_shared<const Submap>(std::move(outline.submap));
   };
-  return read_table(map, "submaps", wire::decode_submap, take, content);
+  return read_table(map, "submaps", wire::decode_outline, take, content);
 }
 
 Status read_verdicts(const storage::TableStore& map, Content& content) {
@@ -68,6 +69,9 @@ Status read_meta(const storage::TableStore& map, Content& content) {
   const auto meta = node::read_map_meta(map);
   if (!meta) return tl::unexpected(meta.error());
   content.meta = meta->value_or(node::MapMeta{});
+  const auto counts = node::read_map_counts(map);
+  if (!counts) return tl::unexpected(counts.error());
+  content.counts = *counts;
   auto settings = node::read_settings(map);
   if (!settings) return tl::unexpected(settings.error());
   content.settings = std::move(*settings);

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "tutti/node/map_meta.hpp"
@@ -18,6 +19,7 @@ namespace tutti::mapfile {
 /// What a map's store holds. Clouds stay there.
 struct Content {
   node::MapMeta meta;
+  std::optional<node::MapCounts> counts;  ///< Of the last update.
   server::ServerConfig settings;
   server::SubmapSet submaps;
   std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of submaps that carry any.

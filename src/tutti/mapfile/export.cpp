@@ -23,13 +23,28 @@ namespace {
 constexpr double kVoxel_m = 0.1;
 constexpr std::size_t kThinAt = 1'000'000;  // points, so that a long map's cloud stays small in memory
 
-/// T_world_submap of a submap in this component.
-std::optional<Pose3> place(const Submap& submap, const server::MapEstimate& map, std::uint32_t component) {
+/// Where a submap lies: T_world_submap, in the world of a component. Nothing: the map does not have it.
+struct Place {
+  std::uint32_t component = 0;
+  Pose3 T_world_submap;
+};
+std::optional<Place> place(const Submap& submap, const server::MapEstimate& map) {
   const Keyframe& first = submap.keyframes.front();
   const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
   const server::MapNode* node = find_node(map, {submap.id.chain, middle.index});
-  if (node == nullptr || node->component != component) return std::nullopt;
-  return node->T_world_body * middle.T_odom_body.inverse() * first.T_odom_body;
+  if (node == nullptr) return std::nullopt;
+  return Place{node->component, node->T_world_body * middle.T_odom_body.inverse() * first.T_odom_body};
+}
+
+/// The largest, or, where nobody there has a cloud, the one with most points.
+std::uint32_t component_to_show(const Content& content, const server::MapEstimate& map) {
+  const std::uint32_t largest = server::choose_components(map).largest;
+  std::map<std::uint32_t, std::size_t> points;
+  for (const auto& [id, size] : content.payload_sizes)
+    if (const auto at = place(*content.submaps.at(id), map); at && size.points > 0)
+      points[at->component] += size.points;
+  if (points.empty() || points.contains(largest)) return largest;
+  return std::ranges::max_element(points, {}, [](const auto& entry) { return entry.second; })->first;
 }
 
 }  // namespace
@@ -62,22 +77,22 @@ Result<std::vector<std::string>> export_tum(const Content& content, const server
 
 Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
                                  const server::MapEstimate& map, const std::filesystem::path& file) {
-  const std::uint32_t component = server::choose_components(map).largest;
+  const std::uint32_t component = component_to_show(content, map);
   const auto clouds = node::SubmapFrames::of(store);
-  ExportedCloud out;
+  ExportedCloud out{.of_the_largest = component == server::choose_components(map).largest};
   PointCloud joint;
   std::size_t thin_at = kThinAt;
   for (const auto& [id, size] : content.payload_sizes) {
     if (size.points == 0) continue;
-    const auto T_world_submap = place(*content.submaps.at(id), map, component);
-    if (!T_world_submap) {
+    const auto at = place(*content.submaps.at(id), map);
+    if (!at || at->component != component) {
       ++out.left_out;
       continue;
     }
     const auto cloud = clouds->cloud(id);
     if (!cloud) return tl::unexpected(cloud.error());
     ++out.submaps;
-    const Eigen::Isometry3d T(T_world_submap->matrix());
+    const Eigen::Isometry3d T(at->T_world_submap.matrix());
     for (const Eigen::Vector3f& p : (*cloud)->points) joint.points.push_back((T * p.cast<double>()).cast<float>());
     if (joint.points.size() < thin_at) continue;
     joint = lidar::voxel_downsample(joint, kVoxel_m);

@@ -22,10 +22,12 @@ Result<std::vector<std::string>> export_tum(const Content& content, const server
 struct ExportedCloud {
   std::size_t points = 0;
   std::size_t submaps = 0;
-  std::size_t left_out = 0;  ///< Submaps with a cloud that are not in the largest component.
+  std::size_t left_out = 0;    ///< Submaps with a cloud that are not in this component.
+  bool of_the_largest = true;  ///< Component; otherwise that has no clouds, and this is the one with most points.
 };
-/// What all robots of the largest component saw, in its frame, thinned to voxels of 0.1 m. Where none saw anything, no
-/// file. A submap hangs on the keyframe in its middle.
+/// What all robots of the largest component saw, in its frame, thinned to voxels of 0.1 m; where they saw nothing, of
+/// the component that has most points. Where nobody saw anything, no file. A submap hangs on the keyframe in its
+/// middle.
 Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
                                  const server::MapEstimate& map, const std::filesystem::path& file);
 

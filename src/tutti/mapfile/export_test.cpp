@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "support/mapfile/small_map.hpp"
+#include "support/node/submaps.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/ply.hpp"
@@ -74,6 +75,38 @@ TEST_F(Export, GraphTrajectoriesAndCloudAreThoseOfTheServersMap) {
   for (const Eigen::Vector3f& point : points->points)
     nearest = std::min(nearest, (point.cast<double>() - expected).norm());
   EXPECT_LT(nearest, 0.15);  // a voxel, and the wire's rounding
+}
+
+/// Of a small part with a camera on foot, and a large one without: there is something to see.
+TEST_F(Export, WhereTheLargestPartHasNoCloudsTheCloudIsOfAnother) {
+  Content content;
+  server::MapEstimate map;
+  map.components = 2;
+  storage::MemoryStore store(storage::map_schema());
+  const ChainId bare{RobotId{0}, 5}, seen{RobotId{1}, 5};
+  for (const auto& [chain, submaps] : {std::pair{bare, 5U}, std::pair{seen, 2U}})
+    for (std::uint32_t i = 0; i < submaps; ++i) {
+      SubmapMessage message = node::test::submap(chain, i);
+      if (chain == bare) message.submap.cloud.reset();
+      const SubmapId id = message.submap.id;
+      ASSERT_TRUE(store.commit(std::vector<storage::Write>{{"submaps", node::key_of(id), wire::encode(message)}}));
+      if (chain == seen) content.payload_sizes[id] = payload_size(message.submap);
+      for (const Keyframe& keyframe : message.submap.keyframes)
+        if (i == 0 || &keyframe != &message.submap.keyframes.front())
+          map.nodes.push_back({{chain, keyframe.index},
+                               keyframe.stamp,
+                               true,
+                               keyframe.T_odom_body,
+                               keyframe.T_odom_body,
+                               chain.robot.value});
+      content.submaps[id] = std::make_shared<const Submap>(without_payloads(std::move(message.submap)));
+    }
+  const auto cloud = export_ply(store, content, map, folder_ / "map.ply");
+  ASSERT_TRUE(cloud.has_value()) << cloud.error().message;
+  EXPECT_EQ(cloud->submaps, 2U);
+  EXPECT_EQ(cloud->points, 2U);
+  EXPECT_EQ(cloud->left_out, 0U);
+  EXPECT_FALSE(cloud->of_the_largest);
 }
 
 TEST_F(Export, AFolderThatCannotBeMadeIsAnError) {

@@ -67,7 +67,8 @@ void expect_days_to_join(Reopen&& reopen) {
   }
   auto store = reopen();
   Mapper mapper({kAlpha, kBravo, kCharlie}, *store, 5000);
-  EXPECT_EQ(day_of(mapper).poses, yesterday.poses);  // at once, before anybody has come
+  mapper.update();
+  EXPECT_EQ(day_of(mapper).poses, yesterday.poses);  // the map of before, before anybody has come
   for (const ChainId& chain : kToday) mapper.walk(chain);
   const Day today = day_of(mapper);
   EXPECT_EQ(today.verdicts, yesterday.verdicts);

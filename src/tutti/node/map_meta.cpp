@@ -11,6 +11,7 @@ namespace tutti::node {
 namespace {
 
 constexpr const char* kMap = "map";
+constexpr const char* kCounts = "counts";
 constexpr const char* kSettings = "settings";
 constexpr std::string_view kRefinement = "refinement/";
 
@@ -27,6 +28,19 @@ Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
   const auto numbers = storage::numbers_of(**row, 4);
   if (!numbers) return fail(ErrorCode::parse, "the map's own row has {} bytes, expected 32", (*row)->size());
   return MapMeta{(*numbers)[0], (*numbers)[1], (*numbers)[2] != 0, (*numbers)[3]};
+}
+
+storage::Write to_row(const MapCounts& counts) {
+  return {kMetaTable, kCounts,
+          storage::key_of({counts.revision, counts.keyframes, counts.closures, counts.components})};
+}
+
+Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map) {
+  const auto row = map.read(kMetaTable, kCounts);
+  if (!row) return tl::unexpected(row.error());
+  const auto numbers = storage::numbers_of(row->value_or(""), 4);
+  if (!numbers) return std::nullopt;
+  return MapCounts{(*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]};
 }
 
 storage::Write to_row(const server::ServerConfig& settings) {

@@ -27,6 +27,19 @@ storage::Write to_row(const MapMeta& meta);
 /// Nothing: no server has had this map yet.
 Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map);
 
+/// The row `counts`: what the last update made of the map, so that it can be told before it is computed again.
+struct MapCounts {
+  std::uint64_t revision = 0;
+  std::uint64_t keyframes = 0;
+  std::uint64_t closures = 0;  ///< Accepted.
+  std::uint64_t components = 0;
+  friend bool operator==(const MapCounts&, const MapCounts&) = default;
+};
+storage::Write to_row(const MapCounts& counts);
+/// Nothing: no update has been made of this map, or none by a program that wrote them. A row that cannot be read is
+/// none.
+Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map);
+
 /// The row `settings`: what the server judges closures by, so that whoever reads the map sees it as the server does.
 storage::Write to_row(const server::ServerConfig& settings);
 /// The defaults where there is none. An error: it is of another program's version, or damaged.

@@ -164,6 +164,7 @@ Timestamp ServerNode::due(const OpenJob& job) const {
 std::optional<Timestamp> ServerNode::next_timer() const {
   std::optional<Timestamp> next = timer_;
   const auto consider = [&](Timestamp t) { next = next ? std::min(*next, t) : t; };
+  if (compute_at_) consider(*compute_at_);
   if (settle_at_) consider(*settle_at_);
   if (config_.job_timeout_s <= 0.0) return next;
   for (const auto& [number, job] : open_jobs_) consider(due(job));

@@ -12,6 +12,7 @@
 #include "tutti/node/worker_node.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
+#include "tutti/wire/submap_outline.hpp"
 
 namespace tutti::node {
 namespace {
@@ -54,19 +55,20 @@ struct ServerNode::Opened {
   std::uint64_t epoch = 0;
   std::uint64_t start = 0;
   bool news = false;
+  std::optional<MapCounts> counts;
 
   static Result<Opened> from(const storage::TableStore& store, std::uint32_t finder_version);
 
  private:
   Status read_meta(const storage::TableStore& store);
-  void add(SubmapMessage message);
+  void add(wire::SubmapOutline outline);
   void add(ClosureVerdict verdict);
 };
 
-void ServerNode::Opened::add(SubmapMessage message) {
-  const SubmapId id = message.submap.id;
-  if (const PayloadSize size = payload_size(message.submap); size != PayloadSize()) state.payload_sizes[id] = size;
-  state.submaps[id] = std::make_shared<const Submap>(without_payloads(std::move(message.submap)));
+void ServerNode::Opened::add(wire::SubmapOutline outline) {
+  const SubmapId id = outline.submap.id;
+  if (outline.size != PayloadSize()) state.payload_sizes[id] = outline.size;
+  state.submaps[id] = std::make_shared<const Submap>(std::move(outline.submap));
   state.answered.add_submap(id);
   Receipt& receipt = receipts[id.chain.robot];
   receipt.robot = id.chain.robot;
@@ -96,14 +98,13 @@ Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
 /// need not be known.
 void ServerNode::Opened::add(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
-  const bool counts = verdict.refusal && verdict.finder_version == state.finder_version;
+  const bool is_counted = verdict.refusal && verdict.finder_version == state.finder_version;
   if (verdict.finder_version < state.finder_version) {
     if (!verdict.refusal) state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
     return;
   }
-  if (state.answered.contains(pair) && verdict.refusal) return;
-  state.answered.insert(pair);
-  if (counts)
+  if (!state.answered.insert(pair) && verdict.refusal) return;
+  if (is_counted)
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state.refused);
   else
     state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
@@ -127,10 +128,13 @@ Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& s
   auto words = read_words(store);
   if (!words) return tl::unexpected(words.error());
   opened.state.words = std::move(*words);
+  auto counts = read_map_counts(store);
+  if (!counts) return tl::unexpected(counts.error());
+  opened.counts = *counts;
   auto refinements = read_refinements(store);
   if (!refinements) return tl::unexpected(refinements.error());
   opened.state.refinements = std::move(*refinements);
-  if (auto ok = read_rows(store, "submaps", wire::decode_submap, add); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_rows(store, "submaps", wire::decode_outline, add); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_refusals); !ok)
     return tl::unexpected(ok.error());
@@ -164,7 +168,8 @@ ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::C
       receipts_(std::move(opened.receipts)),
       registry_(std::move(opened.registry)),
       start_(opened.start + 1),
-      had_news_(opened.news) {
+      had_news_(opened.news),
+      stored_counts_(opened.counts) {
   if (config.refiner != nullptr) server_.refine_with(config.refiner);
 }
 
@@ -179,13 +184,15 @@ Step ServerNode::resume(Timestamp now) {
   for (auto& [robot, receipt] : receipts_)
     if (const auto owner = registry_.owner(robot)) receipt.owner_session = owner->session;
   const bool is_whole = server_.state().revision > 0 && !had_news_;
-  if (is_whole) send_graph(server_.rebuild(), step);
+  if (is_whole) {
+    server_.nothing_is_new();
+    compute_at_ = now;
+  }
   if (server_.has_news()) timer_ = next_update(now, config_.server.update_period_s);
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
   for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
-  send_refinement_job(now, step);
   note_settling(now);
   return step;
 }
@@ -225,6 +232,7 @@ Step ServerNode::put_aside(const bus::Envelope& envelope, const std::string& why
 
 void ServerNode::note_news(Timestamp now, bool before, Step& step) {
   if (before == server_.has_news()) return;
+  compute_at_.reset();  // the map with the news takes its place
   timer_ = next_update(now, config_.server.update_period_s);
   step.writes.push_back(meta());
 }
@@ -350,20 +358,39 @@ bus::Envelope ServerNode::own_graph(RobotId robot, const ProxyGraphMessage& mess
   return to_robot(robot, bus::MessageKind::proxy_graph, std::move(full));
 }
 
+MapCounts ServerNode::counts() const {
+  if (!has_map_ && stored_counts_) return *stored_counts_;
+  const server::MapEstimate& map = server_.map();
+  const auto accepted = std::ranges::count_if(map.closures, &server::JudgedClosure::accepted);
+  return {server_.state().revision, map.nodes.size(), static_cast<std::uint64_t>(accepted), map.components};
+}
+
+void ServerNode::send_map(ProxyGraphMessage message, Timestamp now, Step& step) {
+  has_map_ = true;
+  compute_at_.reset();
+  ++changes_;
+  send_graph(std::move(message), step);
+  if (const MapCounts now_there = counts(); stored_counts_ != now_there) {
+    stored_counts_ = now_there;
+    step.writes.push_back(to_row(now_there));
+  }
+  send_refinement_job(now, step);
+  note_settling(now);
+}
+
 Step ServerNode::on_timer(Timestamp now) {
   Step step;
   ask_again(now, step);
   settle(now, step);
-  if (!timer_ || now < *timer_) return step;
-  timer_.reset();
-  ++changes_;
-  send_graph(server_.optimise(), step);
-  step.writes.push_back(meta());
-  const auto accepted = std::ranges::count_if(server_.map().closures, &server::JudgedClosure::accepted);
-  step.tell(now,
-            MapUpdated{server_.state().revision, server_.state().submaps.size(), static_cast<std::size_t>(accepted)});
-  send_refinement_job(now, step);
-  note_settling(now);
+  if (timer_ && *timer_ <= now) {
+    timer_.reset();
+    send_map(server_.optimise(), now, step);
+    step.writes.push_back(meta());
+    step.tell(now, MapUpdated{server_.state().revision, server_.state().submaps.size(),
+                              static_cast<std::size_t>(counts().closures)});
+  } else if (compute_at_ && *compute_at_ <= now) {
+    send_map(server_.rebuild(), now, step);
+  }
   return step;
 }
 

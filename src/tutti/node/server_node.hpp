@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/submap_frames.hpp"
@@ -44,7 +45,8 @@ class ServerNode {
                                                   const ServerNodeConfig& config, std::uint64_t epoch,
                                                   const storage::TableStore& store);
 
-  /// The first step after every start.
+  /// The first step after every start: receipts, and what is to be verified. The map is not computed yet; next_timer()
+  /// says when on_timer() does, which may be at once, and what comes before is taken.
   Step resume(Timestamp now);
   /// What has come to the server. A submap that it will never take is in the robot's receipt as refused. A second robot
   /// with a name or number that is in use (RobotRegistry) is told so by the receipt, and its submaps are taken, but
@@ -63,6 +65,8 @@ class ServerNode {
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
 
   [[nodiscard]] const server::MapServer& map_server() const { return server_; }
+  /// False after a start, until the first update: mission_status() says what the last one before it made.
+  [[nodiscard]] bool has_map() const { return has_map_; }
   [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_; }  ///< The last one; empty before.
 
  private:
@@ -124,6 +128,9 @@ class ServerNode {
   /// False: a submap of it is not there.
   bool give_back(const SubmapPair& pair);
   void send_receipt(RobotId robot, Step& step) const;
+  [[nodiscard]] MapCounts counts() const;
+  /// The map has been computed.
+  void send_map(ProxyGraphMessage message, Timestamp now, Step& step);
   void send_graph(ProxyGraphMessage message, Step& step);
   /// In full, or in terms of the last one that was, whichever makes fewer bytes in the long run.
   [[nodiscard]] bus::Envelope own_graph(RobotId robot, const ProxyGraphMessage& message);
@@ -158,6 +165,9 @@ class ServerNode {
   std::uint64_t jobs_ = 0;   // sent in this start
   bool had_news_ = false;    // when the store was opened
   std::optional<Timestamp> timer_;
+  std::optional<Timestamp> compute_at_;  // the map that was there when the store was opened
+  std::optional<MapCounts> stored_counts_;
+  bool has_map_ = false;
   ProxyGraph broadcast_;
   /// What a robot was sent in full, as it knows it, and what has come in terms of it since.
   struct Base {

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "support/node/stored_server.hpp"
@@ -339,6 +341,76 @@ TEST_F(ServerNodeTest, TheMapSaysWhoVerifiedAClosureAndWhenButTheServerDoesNotCa
   EXPECT_EQ(verdicts.at(pair).worker, std::nullopt);
   restart();
   EXPECT_EQ(node_->map_server().state().verdicts, verdicts);
+}
+
+/// Counts what is read of another.
+class CountingStore final : public storage::TableStore {
+ public:
+  explicit CountingStore(const storage::TableStore& rows) : rows_(rows) {}
+  Status commit(std::span<const storage::Write>) override { return fail(ErrorCode::io, "nothing is written here"); }
+  [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override {
+    ++read_[std::string(table)];
+    return rows_.read(table, key);
+  }
+  [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override {
+    return rows_.scan(table, from, [&](std::string_view key, std::string_view bytes) {
+      ++scanned_[std::string(table)];
+      return visit(key, bytes);
+    });
+  }
+  [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override {
+    return rows_.sizes(table, visit);
+  }
+  mutable std::map<std::string, std::size_t> read_, scanned_;
+
+ private:
+  const storage::TableStore& rows_;
+};
+
+TEST_F(ServerNodeTest, ItIsReadyBeforeTheMapIsComputedAndSaysWhatTheStoreKnows) {
+  fill();
+  now_ = Timestamp{} + 20.0;
+  done(node_->on_timer(now_));
+  const auto before = node_->mission_status(now_);
+  ASSERT_GT(before.closures, 0U);
+  const CountingStore store(*store_);
+  const auto again = std::move(ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {}, 1, store).value());
+  const Step first = again->resume(now_);
+  EXPECT_EQ(of_kind(first, MessageKind::receipt).size(), 2U);
+  EXPECT_TRUE(of_kind(first, MessageKind::proxy_graph).empty());
+  EXPECT_EQ(store.read_["submaps"], 0U);
+  EXPECT_EQ(store.scanned_["submaps"], 8U);  // each once, and no cloud is decoded (wire::decode_outline)
+  EXPECT_FALSE(again->has_map());
+  EXPECT_TRUE(again->map_server().map().nodes.empty());
+  EXPECT_EQ(again->mission_status(now_).closures, before.closures);
+  EXPECT_EQ(again->mission_status(now_).components, before.components);
+  EXPECT_EQ(again->mission_status(now_).submaps, before.submaps);
+  EXPECT_FALSE(again->mission_status(now_).has_news);
+
+  ASSERT_EQ(again->next_timer(), now_);
+  const Step second = again->on_timer(now_);
+  EXPECT_EQ(of_kind(second, MessageKind::proxy_graph).size(), 2U);
+  EXPECT_TRUE(again->has_map());
+  EXPECT_EQ(again->map_server().state().revision, node_->map_server().state().revision);
+  EXPECT_EQ(again->map_server().map().nodes.size(), node_->map_server().map().nodes.size());
+  EXPECT_EQ(again->next_timer(), std::nullopt);
+}
+
+TEST_F(ServerNodeTest, WhatComesBeforeTheMapIsComputedIsInTheFirstOne) {
+  fill();
+  now_ = Timestamp{} + 20.0;
+  done(node_->on_timer(now_));
+  const auto again = std::move(ServerNode::open({RobotId{0}, RobotId{1}}, finder_, {}, 1, *store_).value());
+  now_ = now_ + 1.0;
+  done(again->resume(now_));
+  const Step step = done(again->receive(test::envelope(test::submap(kAlpha, 9)), now_));
+  EXPECT_EQ(of_kind(step, MessageKind::receipt).size(), 1U);
+  EXPECT_EQ(again->next_timer(), Timestamp{} + 30.0);  // an update as any other
+  const Step update = done(again->on_timer(*again->next_timer()));
+  EXPECT_EQ(told<MapUpdated>(update), 1U);
+  EXPECT_EQ(of_kind(update, MessageKind::proxy_graph).size(), 2U);
+  EXPECT_EQ(again->map_server().state().revision, node_->map_server().state().revision + 1);
+  EXPECT_NE(find_node(again->map_server().map(), {kAlpha, 27}), nullptr);
 }
 
 TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {

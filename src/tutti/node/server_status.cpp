@@ -82,14 +82,14 @@ bool ServerNode::waits_too_long(RobotId robot, const NodeStatus& status, Timesta
 
 MissionStatus ServerNode::mission_status(Timestamp now) const {
   const server::MapServerState& state = server_.state();
-  const auto accepted = std::ranges::count_if(server_.map().closures, &server::JudgedClosure::accepted);
+  const MapCounts made = counts();
   const auto later = std::ranges::count_if(failed_, [](const auto& failed) { return failed.second.again.has_value(); });
   MissionStatus out{.time = now,
                     .epoch = state.epoch,
                     .revision = state.revision,
                     .submaps = state.submaps.size(),
-                    .closures = static_cast<std::uint64_t>(accepted),
-                    .components = server_.map().components,
+                    .closures = made.closures,
+                    .components = made.components,
                     .pending_jobs = open_jobs_.size() + static_cast<std::uint64_t>(later) + (refine_again_ ? 1 : 0) +
                                     (settle_at_ ? 1 : 0),
                     .has_news = server_.has_news()};

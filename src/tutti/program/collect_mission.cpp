@@ -137,7 +137,8 @@ Result<mission::MissionRecord> collect_mission(const mission::MissionConfig& con
   if (!store) return tl::unexpected(store.error());
   const auto server = node::ServerNode::open(ids, *finder, {.server = config.server}, 1, **store);
   if (!server) return in_context(map.string(), server.error());
-  static_cast<void>((*server)->resume(Timestamp{}));  // computes the map
+  static_cast<void>((*server)->resume(Timestamp{}));
+  if (const auto due = (*server)->next_timer()) static_cast<void>((*server)->on_timer(*due));  // computes the map
   const auto course = read_course(state / "server");
   if (!course) return tl::unexpected(course.error());
   mission::FinishedMission finished{.config = config,

@@ -73,9 +73,12 @@ Json HostedServer::status(Timestamp now) const {
           {"closures", status.closures},
           {"pending_jobs", status.pending_jobs},
           {"has_news", status.has_news},
+          {"has_map", node_->has_map()},
           {"line", fmt::format("map revision {}: {} submaps of {} robots, {} closures, {} maps{}", status.revision,
                                status.submaps, status.robots.size(), status.closures, status.components,
-                               status.has_news ? ", news" : "")}};
+                               status.has_news                            ? ", news"
+                               : node_->has_map() || status.revision == 0 ? ""
+                                                                          : ", being computed")}};
 }
 
 /// The server's own worker: on a thread of its own, over a port of its own, with the map's file at hand.

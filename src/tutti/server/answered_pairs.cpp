@@ -18,15 +18,39 @@ AnsweredPairs::Place AnsweredPairs::place_of(const SubmapPair& pair) const {
   return {later, earlier};
 }
 
-void AnsweredPairs::insert(const SubmapPair& pair) {
+bool AnsweredPairs::insert(const SubmapPair& pair) {
   const auto [later, earlier] = place_of(pair);
+  if (answered_[later].contains(earlier)) return false;
   answered_[later].insert(earlier);
+  return true;
 }
 
 bool AnsweredPairs::contains(const SubmapPair& pair) const {
   if (!number_.contains(pair.first) || !number_.contains(pair.second)) return false;
   const auto [later, earlier] = place_of(pair);
   return answered_[later].contains(earlier);
+}
+
+std::vector<SubmapPair> AnsweredPairs::open() const {
+  std::vector<SubmapId> ids(number_.size());
+  for (const auto& [id, number] : number_) ids[number] = id;
+  std::vector<SubmapPair> open;
+  for (std::size_t later = 0; later < ids.size(); ++later) {
+    std::uint64_t next = 0;
+    const auto take_until = [&](std::uint64_t end) {
+      for (; next < end; ++next) {
+        const auto [first, second] = std::minmax(ids[next], ids[later]);
+        open.push_back({first, second});
+      }
+    };
+    for (const auto& [begin, end] : answered_[later].stretches()) {
+      take_until(begin);
+      next = end;
+    }
+    take_until(later);
+  }
+  std::ranges::sort(open);
+  return open;
 }
 
 void AnsweredPairs::forget_answers() {

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
+#include <unordered_map>
 #include <vector>
 
 #include "tutti/base/number_set.hpp"
@@ -19,9 +19,12 @@ class AnsweredPairs {
  public:
   /// Submaps that are there already stay where they are.
   void add_submap(SubmapId id);
-  /// Both submaps have been added; again changes nothing.
-  void insert(const SubmapPair& pair);
+  /// Both submaps have been added. False: it was there.
+  bool insert(const SubmapPair& pair);
   [[nodiscard]] bool contains(const SubmapPair& pair) const;
+  /// Those that are not in it, the smaller submap first, in the order of their ids. Takes time for these and for the
+  /// submaps, not for all pairs.
+  [[nodiscard]] std::vector<SubmapPair> open() const;
   /// No pair is answered any more; the submaps stay.
   void forget_answers();
 
@@ -38,7 +41,7 @@ class AnsweredPairs {
   };
   [[nodiscard]] Place place_of(const SubmapPair& pair) const;
 
-  std::map<SubmapId, std::uint32_t> number_;
+  std::unordered_map<SubmapId, std::uint32_t> number_;
   std::vector<NumberSet> answered_;  ///< By number.
 };
 

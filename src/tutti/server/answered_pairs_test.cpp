@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <vector>
 
@@ -45,11 +46,17 @@ TEST(AnsweredPairs, KnowsExactlyWhatWasAnsweredWhateverTheOrder) {
     shuffle(order, rng);
     std::set<SubmapPair> truth;
     for (const SubmapPair& next : order) {
-      answered.insert(next);
-      if (rng.bernoulli(0.2)) answered.insert(next);
+      ASSERT_TRUE(answered.insert(next));
+      if (rng.bernoulli(0.2)) {
+        ASSERT_FALSE(answered.insert(next));
+      }
       truth.insert(next);
       if (truth.size() % 20 > 0 && truth.size() + 5 < order.size()) continue;
       for (const SubmapPair& pair : order) ASSERT_EQ(answered.contains(pair), truth.contains(pair));
+      std::vector<SubmapPair> open;
+      std::ranges::copy_if(order, std::back_inserter(open), [&](const auto& pair) { return !truth.contains(pair); });
+      std::ranges::sort(open);
+      ASSERT_EQ(answered.open(), open);
       for (std::size_t b = 0; b < ids.size(); ++b) {
         std::size_t a = 0;
         while (a < b && truth.contains(ordered(ids[a], ids[b]))) ++a;

@@ -125,9 +125,7 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
     state_.refused.clear();
   }
   for (const auto& [id, submap] : state_.submaps) state_.answered.add_submap(id);
-  for (auto first = state_.submaps.begin(); first != state_.submaps.end(); ++first)
-    for (auto second = std::next(first); second != state_.submaps.end(); ++second)
-      plan_verification({first->first, second->first});
+  for (const SubmapPair& pair : state_.answered.open()) plan_verification(pair);
   news_ = !state_.submaps.empty();
 }
 

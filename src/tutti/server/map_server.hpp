@@ -130,8 +130,10 @@ class MapServer {
   [[nodiscard]] bool has_news() const { return news_; }
   /// Optimises the joint map and returns its whole proxy graph.
   ProxyGraphMessage optimise();
-  /// The last revision's again: for a server that goes on from a state in which nothing has come since.
+  /// The last revision's again: for a server that goes on from a state in which nothing has come since, as it is told
+  /// by nothing_is_new().
   ProxyGraphMessage rebuild();
+  void nothing_is_new() { news_ = false; }
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
   [[nodiscard]] const MapServerState& state() const { return state_; }

@@ -11,10 +11,13 @@
 
 #include "support/wire/messages.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/v1/messages.pb.h"
+#include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/logarithm.hpp"
 #include "tutti/wire/limits.hpp"
 #include "tutti/wire/refinement_codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
+#include "tutti/wire/submap_outline.hpp"
 
 namespace tutti::wire {
 namespace {
@@ -61,6 +64,44 @@ RC_GTEST_PROP(SubmapCodec, RoundTrip, ()) {
   const auto again = decode_submap(encode(*decoded));
   RC_ASSERT(again.has_value());
   RC_ASSERT(same_submap(*again, *decoded));
+}
+
+RC_GTEST_PROP(SubmapCodec, AnOutlineIsTheSubmapWithoutItsPayloads, ()) {
+  Rng rng = any_rng();
+  SubmapMessage message =
+      test::any_submap(rng, *rc::gen::inRange<std::size_t>(1, 20), *rc::gen::inRange<std::size_t>(0, 200));
+  if (*rc::gen::arbitrary<bool>())
+    for (RelativePose& odometry : message.submap.odometry) odometry.T_a_b = test::any_pose(rng, 1.0, 0.5);
+  const std::string frame = encode(message);
+  const auto whole = decode_submap(frame);
+  const auto outline = decode_outline(frame);
+  RC_ASSERT(whole.has_value() && outline.has_value());
+  RC_ASSERT(outline->size == payload_size(whole->submap));
+  RC_ASSERT(outline->submap.cloud == nullptr);
+  RC_ASSERT(same_submap({whole->header, outline->submap}, {whole->header, without_payloads(whole->submap)}));
+}
+
+TEST(SubmapCodec, AnOutlineTellsNothingOfWhatIsInThePayloads) {
+  v1::Submap submap;
+  submap.add_stamp_ns(1);
+  submap.add_representative(true);
+  for (int i = 0; i < 6; ++i) submap.add_pose(0);
+  submap.mutable_cloud()->set_voxel_m(0.3);
+  submap.mutable_cloud()->set_offset_bits(77);
+  submap.mutable_cloud()->add_voxel(1);
+  for (auto* offset : {submap.mutable_cloud()->mutable_offset_x(), submap.mutable_cloud()->mutable_offset_y(),
+                       submap.mutable_cloud()->mutable_offset_z()})
+    offset->push_back('\x01');
+  submap.mutable_visual()->set_observations(5);
+  submap.mutable_visual()->set_body("none");
+  const std::string frame = pack_frame(MessageKind::submap, submap.SerializeAsString());
+  EXPECT_FALSE(decode_submap(frame).has_value());
+  const auto outline = decode_outline(frame);
+  ASSERT_TRUE(outline.has_value()) << outline.error().message;
+  EXPECT_EQ(outline->size, (PayloadSize{1, 5}));
+
+  submap.clear_pose();  // what is in the outline is checked
+  EXPECT_FALSE(decode_outline(pack_frame(MessageKind::submap, submap.SerializeAsString())).has_value());
 }
 
 RC_GTEST_PROP(SubmapCodec, CloudKeepsEveryPointWithinItsError, ()) {

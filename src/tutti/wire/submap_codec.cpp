@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/v1/messages.pb.h"
+#include "tutti/v1/outline.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/cloud_codec.hpp"
@@ -10,6 +13,7 @@
 #include "tutti/wire/internal/quantise.hpp"
 #include "tutti/wire/internal/visual_codec.hpp"
 #include "tutti/wire/limits.hpp"
+#include "tutti/wire/submap_outline.hpp"
 
 namespace tutti::wire {
 namespace {
@@ -37,7 +41,9 @@ void write_odometry(const Submap& submap, v1::Submap& out) {
   if (!odometry_follows_from_poses(submap)) write_columns(poses, *out.mutable_odometry());
 }
 
-Status read_keyframes(const v1::Submap& in, Submap& submap) {
+/// Of v1::Submap or its outline, as what follows.
+template <class In>
+Status read_keyframes(const In& in, Submap& submap) {
   const auto count = static_cast<std::size_t>(in.stamp_ns_size());
   if (count == 0) return fail(ErrorCode::invalid, "no keyframes, expected at least one");
   const auto stamps = read_columns<1>(in.stamp_ns(), count);
@@ -54,7 +60,8 @@ Status read_keyframes(const v1::Submap& in, Submap& submap) {
   return {};
 }
 
-Status read_odometry(const v1::Submap& in, Submap& submap) {
+template <class In>
+Status read_odometry(const In& in, Submap& submap) {
   const std::size_t count = submap.keyframes.size() - 1;
   const auto covariances = read_columns<21>(in.odometry_covariance(), count);
   if (!covariances)
@@ -71,6 +78,20 @@ Status read_odometry(const v1::Submap& in, Submap& submap) {
     submap.odometry.push_back({*T, *covariance});
   }
   return {};
+}
+
+/// All but the payloads.
+template <class In>
+Result<SubmapMessage> read_way(const In& in, std::uint16_t version) {
+  SubmapMessage message;
+  // Up to version 4 the session said nothing of the chain: each robot had one.
+  const ChainId chain{RobotId{in.header().robot()}, version < 5 ? 0 : in.header().session()};
+  message.header = {chain.robot, chain.session, in.header().sequence()};
+  message.submap.id = {chain, in.index()};
+  const std::string where = "submap " + to_string(message.submap.id);
+  if (auto ok = read_keyframes(in, message.submap); !ok) return in_context(where, ok.error());
+  if (auto ok = read_odometry(in, message.submap); !ok) return in_context(where, ok.error());
+  return message;
 }
 
 }  // namespace
@@ -103,15 +124,10 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
   const auto parsed = parse_frame<v1::Submap>(MessageKind::submap, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
   const v1::Submap& in = parsed->message;
-
-  SubmapMessage message;
-  // Up to version 4 the session said nothing of the chain: each robot had one.
-  const ChainId chain{RobotId{in.header().robot()}, parsed->version < 5 ? 0 : in.header().session()};
-  message.header = {chain.robot, chain.session, in.header().sequence()};
-  message.submap.id = {chain, in.index()};
+  auto way = read_way(in, parsed->version);
+  if (!way) return way;
+  SubmapMessage message = std::move(*way);
   const std::string where = "submap " + to_string(message.submap.id);
-  if (auto ok = read_keyframes(in, message.submap); !ok) return in_context(where, ok.error());
-  if (auto ok = read_odometry(in, message.submap); !ok) return in_context(where, ok.error());
   if (in.has_cloud() && in.cloud().voxel_size() > 0) {
     auto cloud = decode_cloud(in.cloud());
     if (!cloud) return in_context(where, cloud.error());
@@ -124,6 +140,23 @@ Result<SubmapMessage> decode_submap(std::string_view bytes) {
   }
   if (auto ok = validate(message); !ok) return tl::unexpected(ok.error());
   return message;
+}
+
+Result<SubmapOutline> decode_outline(std::string_view bytes) {
+  const auto parsed = parse_frame<v1::SubmapOutline>(MessageKind::submap, bytes);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const v1::SubmapOutline& in = parsed->message;
+  auto way = read_way(in, parsed->version);
+  if (!way) return tl::unexpected(way.error());
+  if (auto ok = validate(*way); !ok) return tl::unexpected(ok.error());
+  SubmapOutline outline{std::move(way->submap), {}};
+  v1::CloudOutline cloud;
+  v1::VisualOutline visual;
+  if (!cloud.ParseFromString(in.cloud()) || !visual.ParseFromString(in.visual()))
+    return fail(ErrorCode::parse, "submap {}: its payloads are not the messages expected",
+                to_string(outline.submap.id));
+  outline.size = {cloud.offset_x().size(), visual.observations()};
+  return outline;
 }
 
 }  // namespace tutti::wire
