@@ -223,29 +223,30 @@ Status validate(const ProxyGraphMessage& message) {
 
 Status validate(const ClosureVerdict& verdict) {
   const auto& [first, second] = verdict.pair;
-  const std::string where = fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second));
-  if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where);
-  if (auto ok = at_most(verdict.closures.size(), kMaxClosures, "closures"); !ok) return in_context(where, ok.error());
+  // Only of what is no good: of millions of verdicts in a large map all are.
+  const auto where = [&] { return fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second)); };
+  if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where());
+  if (auto ok = at_most(verdict.closures.size(), kMaxClosures, "closures"); !ok) return in_context(where(), ok.error());
   if (verdict.closures.empty() != verdict.refusal.has_value())
-    return fail(ErrorCode::invalid, "{}: {} closures {} a refusal, expected one of the two", where,
+    return fail(ErrorCode::invalid, "{}: {} closures {} a refusal, expected one of the two", where(),
                 verdict.closures.size(), verdict.refusal ? "and" : "without");
   if (verdict.refusal && !(std::isfinite(verdict.refusal->value) && std::isfinite(verdict.refusal->limit)))
-    return fail(ErrorCode::invalid, "{}: refused for a value of {} at a limit of {}, expected finite ones", where,
+    return fail(ErrorCode::invalid, "{}: refused for a value of {} at a limit of {}, expected finite ones", where(),
                 verdict.refusal->value, verdict.refusal->limit);
   if (auto ok = at_most(verdict.evidence.size(), kRefusalKinds.size(), "values as evidence"); !ok)
-    return in_context(where, ok.error());
+    return in_context(where(), ok.error());
   if (verdict.refusal && (!verdict.evidence.empty() || verdict.worker || verdict.verified_ns != 0))
-    return fail(ErrorCode::invalid, "{}: a refusal with evidence, expected it with closures", where);
+    return fail(ErrorCode::invalid, "{}: a refusal with evidence, expected it with closures", where());
   for (const Refusal& measured : verdict.evidence)
     if (!std::isfinite(measured.value) || !std::isfinite(measured.limit))
-      return fail(ErrorCode::invalid, "{}: evidence of {} at a limit of {}, expected finite ones", where,
+      return fail(ErrorCode::invalid, "{}: evidence of {} at a limit of {}, expected finite ones", where(),
                   measured.value, measured.limit);
   for (const LoopClosure& closure : verdict.closures) {
     if (closure.from.chain != first.chain || closure.to.chain != second.chain)
-      return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where, to_string(closure.from.chain),
+      return fail(ErrorCode::invalid, "{}: closure from robot {} to robot {}", where(), to_string(closure.from.chain),
                   to_string(closure.to.chain));
-    if (auto ok = check_pose(closure.measurement.T_a_b); !ok) return in_context(where, ok.error());
-    if (auto ok = check_coded_covariance(closure.measurement.covariance); !ok) return in_context(where, ok.error());
+    if (auto ok = check_pose(closure.measurement.T_a_b); !ok) return in_context(where(), ok.error());
+    if (auto ok = check_coded_covariance(closure.measurement.covariance); !ok) return in_context(where(), ok.error());
   }
   return {};
 }
