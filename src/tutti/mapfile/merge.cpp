@@ -12,10 +12,12 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::mapfile {
 namespace {
@@ -49,6 +51,11 @@ class Writer {
 /// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
 
+/// Rows that say something of one map alone: what became of it, and refinements, which join_refinements() puts.
+bool is_of_one_map(const std::string& table, std::string_view key) {
+  return table == node::kMetaTable && (key == node::kCountsKey || key.starts_with(node::kRefinementPrefix));
+}
+
 /// Rows of `a`, and those of `b`, into the table; counts the keys that are in both.
 Result<std::size_t> join(const TableStore& a, const TableStore& b, const std::string& table, const Choose& choose,
                          Writer& out) {
@@ -56,6 +63,7 @@ Result<std::size_t> join(const TableStore& a, const TableStore& b, const std::st
   Status ok;
   const auto copy = [&](const TableStore& from, const TableStore* other, bool first) {
     const auto scanned = from.scan(table, {}, [&](std::string_view key, std::string_view bytes) {
+      if (is_of_one_map(table, key)) return true;
       const auto there = other->read(table, key);
       if (!there) {
         ok = tl::unexpected(there.error());
@@ -114,8 +122,36 @@ Result<std::string> later_word(std::string_view, std::string a, std::string b) {
   return holds_over(*other, *one) ? b : a;
 }
 
-/// Of what both know of a robot: its newest session, and that it had the others before. Of the rest the first map's.
+NumberSet both(const NumberSet& a, const NumberSet& b) {
+  std::vector<NumberSet::Stretch> stretches = a.stretches();
+  stretches.insert(stretches.end(), b.stretches().begin(), b.stretches().end());
+  std::ranges::sort(stretches, {}, &NumberSet::Stretch::begin);
+  NumberSet out;
+  for (std::size_t i = 0; i < stretches.size();) {
+    NumberSet::Stretch joined = stretches[i];
+    for (++i; i < stretches.size() && stretches[i].begin <= joined.end; ++i)
+      joined.end = std::max(joined.end, stretches[i].end);
+    out.append(joined);
+  }
+  return out;
+}
+
+/// What either never takes; the reason of the first.
+Result<std::string> joined_refusals(std::string_view key, const std::string& a, const std::string& b) {
+  auto one = wire::decode_receipt(a);
+  const auto other = wire::decode_receipt(b);
+  if (!one || !other)
+    return in_context(fmt::format("the row '{}' of table 'meta'", key), one ? other.error() : one.error());
+  for (const auto& [session, refused] : other->refused) one->refused[session] = both(one->refused[session], refused);
+  if (one->why_refused.empty()) one->why_refused = other->why_refused;
+  if (auto ok = wire::validate(*one); !ok) return tl::unexpected(ok.error());
+  return wire::encode(*one);
+}
+
+/// Of what both know of a robot: its newest session, and that it had the others before; which submaps either refuses.
+/// Of the rest the first map's.
 Result<std::string> joined_meta(std::string_view key, std::string a, std::string b) {
+  if (key.starts_with(node::kRefusedPrefix)) return joined_refusals(key, a, b);
   if (!node::RobotRegistry::robot_of(key)) return a;
   const auto one = node::decode_robot(a), other = node::decode_robot(b);
   if (!one || !other) return fail(ErrorCode::parse, "the row '{}' of table 'meta' is damaged", key);
@@ -130,6 +166,20 @@ Result<std::string> joined_meta(std::string_view key, std::string a, std::string
   for (auto* sessions : {&row.former, &row.rivals})  // as many as a server keeps, the newest
     while (sessions->size() > node::RobotRow::kMostSessions) sessions->erase(sessions->begin());
   return encode(row);
+}
+
+/// Each is of a part of the joint map, in the order that it had in its own map, the first map's before the second's; no
+/// refinement of the whole is there yet. Returns the revision of the last.
+Result<std::uint64_t> join_refinements(const Content& a, const Content& b, std::uint64_t revision, Writer& out) {
+  for (const Content* map : {&a, &b})
+    for (const auto& [before, refinement] : map->refinements.all()) {
+      Refinement part = *refinement;
+      part.revision = ++revision;
+      part.whole = false;
+      if (auto ok = out.put({node::kMetaTable, node::refinement_key(revision), wire::encode(part)}); !ok)
+        return tl::unexpected(ok.error());
+    }
+  return revision;
 }
 
 /// Answers are named after jobs, which servers count: one name, two jobs.
@@ -175,8 +225,10 @@ Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) 
        {std::pair<const char*, Choose>{"verdicts", newer_verdict}, {"words", later_word}, {"meta", joined_meta}})
     if (const auto done = join(a, b, table, choose, writer); !done) return tl::unexpected(done.error());
   if (auto done = join_answers(a, b, writer); !done) return tl::unexpected(done.error());
+  const auto revision = join_refinements(*one, *other, std::max(one->meta.revision, other->meta.revision), writer);
+  if (!revision) return tl::unexpected(revision.error());
   const node::MapMeta meta{.epoch = std::max(one->meta.epoch, other->meta.epoch) + 1,
-                           .revision = std::max(one->meta.revision, other->meta.revision),
+                           .revision = *revision,
                            .news = true,
                            .start = std::max(one->meta.start, other->meta.start)};
   if (auto done = writer.put(node::to_row(meta)); !done) return tl::unexpected(done.error());

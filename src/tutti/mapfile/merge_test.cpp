@@ -8,8 +8,10 @@
 #include "support/mapfile/small_map.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/mapfile/closures.hpp"
+#include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/storage/sqlite_store.hpp"
+#include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::mapfile {
 namespace {
@@ -135,6 +137,59 @@ TEST(Merge, TheLaterWordHoldsWhicheverMapItIsIn) {
     ASSERT_EQ(words.size(), 1U);
     EXPECT_EQ(words.begin()->second.by, "bob");
   }
+}
+
+Refinement refinement_of(const ChainId& chain, std::uint64_t revision, bool whole, std::uint32_t from) {
+  Refinement out{.job = "1/1/1", .revision = revision, .whole = whole, .submaps = {{chain, 0}}};
+  out.steps.push_back({{chain, from}, {Pose3{}, 1e-4 * Matrix6d::Identity()}});
+  for (std::uint32_t k : {from, from + 1}) out.T_world_body[{chain, k}] = Pose3{};
+  return out;
+}
+void put(MemoryStore& store, const Refinement& refinement) {
+  ASSERT_TRUE(
+      store.commit(std::vector<Write>{{"meta", node::refinement_key(refinement.revision), wire::encode(refinement)}})
+          .has_value());
+}
+
+TEST(Merge, TheRefinementsOfBothAreKeptAsThoseOfParts) {
+  const auto a = map_of({{kAlpha, 5}}), b = map_of({{kBravo, 6}});
+  put(*a, refinement_of({kAlpha, 5}, 1, true, 0));
+  put(*a, refinement_of({kAlpha, 5}, 2, false, 1));
+  put(*b, refinement_of({kBravo, 6}, 1, true, 0));  // of the same revision as one of the first map
+  ASSERT_TRUE(a->commit(std::vector<Write>{node::to_row(node::MapCounts{.revision = 1, .closures = 77})}).has_value());
+  MemoryStore both(storage::map_schema());
+  ASSERT_TRUE(merge(*a, *b, both).has_value());
+  const Content content = read(both).value();
+  ASSERT_EQ(content.refinements.all().size(), 3U);
+  EXPECT_FALSE(content.refinements.has_whole());  // of the two together there is none yet
+  std::vector<std::pair<ChainId, std::uint32_t>> steps;
+  for (const auto& [revision, refinement] : content.refinements.all())
+    steps.emplace_back(refinement->steps.front().from.chain, refinement->steps.front().from.index);
+  EXPECT_EQ(steps,
+            (std::vector<std::pair<ChainId, std::uint32_t>>{{{kAlpha, 5}, 0}, {{kAlpha, 5}, 1}, {{kBravo, 6}, 0}}));
+  EXPECT_GE(content.meta.revision, content.refinements.all().rbegin()->first);
+  EXPECT_EQ(content.counts, std::nullopt);  // no update has been made of the two
+}
+
+TEST(Merge, WhatEitherNeverTakesIsNotTaken) {
+  const auto a = map_of({{kAlpha, 5}}), b = map_of({{kBravo, 6}});
+  const auto refuse = [](MemoryStore& store, std::uint64_t session, std::vector<std::uint64_t> numbers) {
+    Receipt receipt{.robot = kAlpha};
+    for (const std::uint64_t number : numbers) receipt.refused[session].insert(number);
+    receipt.why_refused = "garbage";
+    ASSERT_TRUE(
+        store.commit(std::vector<Write>{{"meta", std::string(node::kRefusedPrefix) + "0", wire::encode(receipt)}})
+            .has_value());
+  };
+  refuse(*a, 5, {90, 91});
+  refuse(*b, 5, {91, 92, 95});
+  MemoryStore both(storage::map_schema());
+  ASSERT_TRUE(merge(*a, *b, both).has_value());
+  const auto row = both.read("meta", std::string(node::kRefusedPrefix) + "0").value();
+  ASSERT_TRUE(row.has_value());
+  const Receipt receipt = wire::decode_receipt(*row).value();
+  for (std::uint32_t i = 88; i < 98; ++i)
+    EXPECT_EQ(receipt.refuses({{kAlpha, 5}, i}), i == 90 || i == 91 || i == 92 || i == 95) << i;
 }
 
 class MergedFiles : public testing::Test {

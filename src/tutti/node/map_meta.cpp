@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "tutti/base/config_io.hpp"
+#include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/wire/refinement_codec.hpp"
 
@@ -11,9 +12,7 @@ namespace tutti::node {
 namespace {
 
 constexpr const char* kMap = "map";
-constexpr const char* kCounts = "counts";
 constexpr const char* kSettings = "settings";
-constexpr std::string_view kRefinement = "refinement/";
 
 }  // namespace
 
@@ -31,12 +30,12 @@ Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map) {
 }
 
 storage::Write to_row(const MapCounts& counts) {
-  return {kMetaTable, kCounts,
+  return {kMetaTable, std::string(kCountsKey),
           storage::key_of({counts.revision, counts.keyframes, counts.closures, counts.components})};
 }
 
 Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map) {
-  const auto row = map.read(kMetaTable, kCounts);
+  const auto row = map.read(kMetaTable, kCountsKey);
   if (!row) return tl::unexpected(row.error());
   const auto numbers = storage::numbers_of(row->value_or(""), 4);
   if (!numbers) return std::nullopt;
@@ -58,12 +57,12 @@ Result<server::ServerConfig> read_settings(const storage::TableStore& map) {
   return settings;
 }
 
-std::string refinement_key(std::uint64_t revision) { return fmt::format("{}{:020}", kRefinement, revision); }
+std::string refinement_key(std::uint64_t revision) { return fmt::format("{}{:020}", kRefinementPrefix, revision); }
 
 Result<server::Refinements> read_refinements(const storage::TableStore& map) {
   server::Refinements refinements;
-  const auto scanned = map.scan(kMetaTable, kRefinement, [&](std::string_view key, std::string_view bytes) {
-    if (!key.starts_with(kRefinement)) return false;
+  const auto scanned = map.scan(kMetaTable, kRefinementPrefix, [&](std::string_view key, std::string_view bytes) {
+    if (!key.starts_with(kRefinementPrefix)) return false;
     if (auto refinement = wire::decode_refinement(bytes)) refinements.add(std::move(*refinement));
     return true;
   });

@@ -8,6 +8,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/node/map_meta.hpp"
+#include "tutti/node/meta_keys.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/wire/codec.hpp"
@@ -17,7 +18,6 @@
 namespace tutti::node {
 namespace {
 
-constexpr const char* kRefused = "refused";  // and receipts of what is refused for good
 constexpr std::size_t kMostRefusedSessions = 100;
 constexpr std::size_t kMostRefusedStretches = 500;  // in each of these
 
@@ -81,7 +81,7 @@ Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
   const auto visit = [&](std::string_view key, std::string_view bytes) {
     if (const auto robot = RobotRegistry::robot_of(key)) {
       if (!registry.restore(*robot, bytes)) ok = fail(ErrorCode::parse, "the map's row '{}' is damaged", key);
-    } else if (key.starts_with(kRefused)) {
+    } else if (key.starts_with(kRefusedPrefix)) {
       auto receipt = wire::decode_receipt(bytes);
       if (receipt)
         receipts[receipt->robot] = std::move(*receipt);
@@ -301,7 +301,7 @@ void ServerNode::note_refused(SubmapId id, const std::string& why, Step& step) {
     receipt.refused[id.chain.session].insert(id.index);
     receipt.why_refused = wire::plain_text(why);
     const Receipt kept{.robot = receipt.robot, .refused = receipt.refused, .why_refused = receipt.why_refused};
-    step.writes.push_back({kMetaTable, fmt::format("{}/{}", kRefused, id.chain.robot.value), wire::encode(kept)});
+    step.writes.push_back({kMetaTable, fmt::format("{}{}", kRefusedPrefix, id.chain.robot.value), wire::encode(kept)});
   }
   send_receipt(id.chain.robot, step);
 }
