@@ -9,35 +9,35 @@ namespace tutti::node {
 
 void FrameCache::put(SubmapId id, std::string frame) {
   const std::scoped_lock lock(mutex_);
-  Entry& entry = entries_[id];
-  bytes_ += frame.size() - entry.frame.size();
-  entry = {std::move(frame), ++uses_};
+  ages_.try_emplace(id, ages_.size());
+  std::string& kept = frames_[id];
+  bytes_ += frame.size() - kept.size();
+  kept = std::move(frame);
 }
 
 bool FrameCache::contains(SubmapId id) const {
   const std::scoped_lock lock(mutex_);
-  return entries_.contains(id);
+  return frames_.contains(id);
 }
 
 Result<std::string> FrameCache::get(SubmapId id) const {
   const std::scoped_lock lock(mutex_);
-  const auto found = entries_.find(id);
-  if (found == entries_.end()) return fail(ErrorCode::io, "submap {} has not come from the server", to_string(id));
-  found->second.used = ++uses_;
-  return found->second.frame;
+  const auto found = frames_.find(id);
+  if (found == frames_.end()) return fail(ErrorCode::io, "submap {} has not come from the server", to_string(id));
+  return found->second;
 }
 
 void FrameCache::trim(const std::set<SubmapId>& needed) {
   const std::scoped_lock lock(mutex_);
   if (bytes_ <= max_bytes_) return;
   std::vector<std::pair<std::uint64_t, SubmapId>> oldest;
-  for (const auto& [id, entry] : entries_)
-    if (!needed.contains(id)) oldest.emplace_back(entry.used, id);
+  for (const auto& [id, frame] : frames_)
+    if (!needed.contains(id)) oldest.emplace_back(ages_.at(id), id);
   std::ranges::sort(oldest);
-  for (const auto& [used, id] : oldest) {
+  for (const auto& [age, id] : oldest) {
     if (bytes_ <= max_bytes_) return;
-    bytes_ -= entries_.at(id).frame.size();
-    entries_.erase(id);
+    bytes_ -= frames_.at(id).size();
+    frames_.erase(id);
   }
 }
 

@@ -13,7 +13,9 @@
 
 namespace tutti::node {
 
-/// Frames of submaps, of which those used last are kept. May be called from several threads.
+/// Frames of submaps, of which the newest are kept: every new submap meets all others in turn, and of those used last
+/// hardly any would be there when they are wanted again. A submap is as old as the first put() of it. May be called
+/// from several threads.
 class FrameCache {
  public:
   explicit FrameCache(std::size_t max_bytes) : max_bytes_(max_bytes) {}
@@ -21,20 +23,16 @@ class FrameCache {
   void put(SubmapId id, std::string frame);
   [[nodiscard]] bool contains(SubmapId id) const;
   [[nodiscard]] Result<std::string> get(SubmapId id) const;
-  /// Drops those used longest ago until the rest fits; but none of `needed`, whatever they take.
+  /// Drops the oldest until the rest fits; but none of `needed`, whatever they take.
   void trim(const std::set<SubmapId>& needed);
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  struct Entry {
-    std::string frame;
-    mutable std::uint64_t used = 0;  // larger: later
-  };
   std::size_t max_bytes_;
-  mutable std::mutex mutex_;  // guards what follows
-  mutable std::uint64_t uses_ = 0;
+  mutable std::mutex mutex_;                // guards what follows
+  std::map<SubmapId, std::uint64_t> ages_;  // of all that have ever come; larger: newer
   std::size_t bytes_ = 0;
-  std::map<SubmapId, Entry> entries_;
+  std::map<SubmapId, std::string> frames_;
 };
 
 }  // namespace tutti::node

@@ -55,7 +55,8 @@ Result<std::shared_ptr<const Submap>> SubmapFrames::submap(SubmapId id) const {
   if (!decoded) return tl::unexpected(decoded.error());
   const auto submap = std::make_shared<const Submap>(without_payloads(std::move(*decoded)));
   const std::scoped_lock lock(mutex_);
-  if (kept_.size() >= kMostKept) kept_.clear();
+  // Jobs go through all submaps in the order of their ids, again and again: most of them are there every time.
+  if (kept_.size() >= kMostKept) kept_.erase(kept_.begin());
   kept_.insert_or_assign(id, submap);
   return submap;
 }

@@ -177,16 +177,46 @@ TEST_F(DistantWorkerTest, AnotherSubmapThanWasAskedForIsNotTaken) {
   EXPECT_TRUE(worker_.holds_job());
 }
 
-TEST(FrameCache, KeepsWhatWasUsedLastAndWhatIsNeeded) {
+TEST(FrameCache, KeepsTheNewestAndWhatIsNeeded) {
   FrameCache cache(10);
   for (std::uint32_t i = 0; i < 4; ++i) cache.put({kAlpha, i}, "12345");
   EXPECT_TRUE(cache.get({kAlpha, 1}).has_value());
   cache.trim({{kAlpha, 0}});
   EXPECT_EQ(cache.bytes(), 10U);
-  EXPECT_TRUE(cache.contains({kAlpha, 0}) && cache.contains({kAlpha, 1}));
-  EXPECT_FALSE(cache.get({kAlpha, 3}).has_value());
+  EXPECT_TRUE(cache.contains({kAlpha, 0}) && cache.contains({kAlpha, 3}));
+  EXPECT_FALSE(cache.get({kAlpha, 1}).has_value());
   cache.put({kAlpha, 0}, "1");
   EXPECT_EQ(cache.bytes(), 6U);
+}
+
+// Of those used last not one would be there.
+TEST(FrameCache, ScannedAgainAndAgainItHasWhatFits) {
+  constexpr std::uint32_t kSubmaps = 100, kRoom = 60;
+  FrameCache cache(kRoom);
+  std::size_t fetched = 0;
+  for (int scan = 0; scan < 5; ++scan)
+    for (std::uint32_t i = 0; i < kSubmaps; ++i) {
+      if (cache.contains({kAlpha, i})) continue;
+      ++fetched;
+      cache.put({kAlpha, i}, "1");
+      cache.trim({});
+    }
+  EXPECT_EQ(fetched, kSubmaps + 4 * (kSubmaps - kRoom));
+}
+
+TEST(SubmapFrames, ScannedAgainAndAgainTheyDecodeWhatDoesNotFit) {
+  constexpr auto kSubmaps = static_cast<std::uint32_t>(SubmapFrames::kMostKept + 200);
+  std::size_t fetched = 0;
+  const SubmapFrames frames([&](SubmapId id) -> Result<std::string> {
+    ++fetched;
+    SubmapMessage message = test::submap(id.chain, 0);
+    message.submap.id.index = id.index;
+    message.submap.cloud.reset();
+    return wire::encode(message);
+  });
+  for (int scan = 0; scan < 2; ++scan)
+    for (std::uint32_t i = 0; i < kSubmaps; ++i) ASSERT_TRUE(frames.submap({kAlpha, i}).has_value());
+  EXPECT_LE(fetched, kSubmaps + 201);
 }
 
 TEST_F(WorkerNodeTest, WhatIsNoJobIsRefused) {
