@@ -237,6 +237,25 @@ Result<std::optional<std::string>> NatsConnection::retained(const std::string& b
   return std::string(bytes_of(found));
 }
 
+Result<NatsOwned<kvStore>> NatsConnection::bucket(const std::string& name, std::optional<double> lasts_s) const {
+  kvStore* store = nullptr;
+  natsStatus status = js_KeyValue(&store, streams_, name.c_str());
+  if (status == NATS_NOT_FOUND && !lasts_s) return NatsOwned<kvStore>();
+  if (status == NATS_NOT_FOUND) {
+    kvConfig values;
+    kvConfig_Init(&values);
+    values.Bucket = name.c_str();
+    values.History = 1;
+    values.MaxValueSize = 1 << 13;
+    values.MaxBytes = 1 << 23;
+    values.TTL = static_cast<std::int64_t>(*lasts_s * 1e9);
+    values.StorageType = js_FileStorage;
+    status = js_CreateKeyValue(&store, streams_, &values);
+  }
+  if (status != NATS_OK) return failure(status, "bucket " + name);
+  return NatsOwned<kvStore>(store);
+}
+
 Status NatsConnection::acknowledge(const std::string& reply) const {
   natsMsg* answer = nullptr;
   const natsStatus status =

@@ -111,6 +111,10 @@ NatsState JetStreamPort::state() const {
 
 /// True: there is a new session.
 bool JetStreamPort::connect() {
+  if (options_.may_connect && !options_.may_connect()) {
+    note("may not connect yet: the lease of the mission is not this program's");
+    return false;
+  }
   auto connection = NatsConnection::open(options_, name_of(self_));
   Status done = connection ? Status() : Status(tl::unexpected(connection.error()));
   if (done && self_.role == Endpoint::Role::server) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -19,6 +20,7 @@ struct NatsPortOptions {
   std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_stream_bytes = std::uint64_t{512} << 20U;
   double stranded_s = 30.0;
+  std::function<bool()> may_connect = {};  ///< Asked before each connection; none: always. See MissionLease.
   template <class V>
   void describe(V& v) {
     v.field("url", url, any(), "\"nats://HOST:PORT\"");

@@ -83,6 +83,9 @@ class NatsConnection {
   [[nodiscard]] std::string make_inbox() const;
   [[nodiscard]] Result<natsSubscription*> subscribe(const std::string& subject);
 
+  /// A bucket of values that are gone so many seconds after they were put, made if it is missing; without a number:
+  /// null then.
+  [[nodiscard]] Result<NatsOwned<kvStore>> bucket(const std::string& name, std::optional<double> lasts_s) const;
   /// The value retained at this subject; nothing if there is none.
   [[nodiscard]] Result<std::optional<std::string>> retained(const std::string& bucket,
                                                             const std::string& subject) const;
