@@ -16,6 +16,7 @@
 #include "commands.hpp"
 #include "map_command.hpp"
 #include "options.hpp"
+#include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/wire/codec.hpp"
@@ -26,9 +27,10 @@ namespace {
 constexpr const char* kCommand = "map closure";
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr auto kHandOver = std::chrono::seconds(10);
+constexpr double kLook_s = 2.0;  // for leases
 
 struct ClosureOptions {
-  std::string map, closure, by, bus;
+  std::string map, closure, by, bus, mission;
   bool insecure = false, rejected = false;
 };
 
@@ -79,9 +81,9 @@ void print_origin(const mapfile::ClosureInfo& info) {
                info.word->by.empty() ? "" : " by " + info.word->by, time_of(info.word->given_ns));
   if (info.verdict) {
     const ClosureVerdict& verdict = *info.verdict;
-    fmt::print("verified     by {}{}, finder version {}\n",
+    fmt::print("verified     by {}{}, finder {}\n",
                verdict.worker ? fmt::format("worker {}", *verdict.worker) : "an unknown worker",
-               verdict.verified_ns != 0 ? " at " + time_of(verdict.verified_ns) : "", verdict.finder_version);
+               verdict.verified_ns != 0 ? " at " + time_of(verdict.verified_ns) : "", to_string(verdict.finder));
     for (const Refusal& measured : verdict.evidence) {
       const RefusalKind& kind = kind_of(measured.reason);
       fmt::print("  {:<40} {:>8.3f} {:<4} {} {:.3f}\n", kind.words, measured.value, kind.unit,
@@ -110,7 +112,11 @@ int show(const ClosureOptions& options) {
 /// To the server that has the map open.
 Status send(const ClosureOptions& options, const ClosureWord& word) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
-  auto port = bus::open_nats_port(self, {.url = options.bus, .allow_insecure = options.insecure});
+  bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
+  auto mission = options.mission.empty() ? bus::served_mission(where, kLook_s) : options.mission;
+  if (!mission) return tl::unexpected(mission.error());
+  where.mission = std::move(*mission);
+  auto port = bus::open_nats_port(self, where);
   if (!port) return tl::unexpected(port.error());
   const bus::Envelope envelope{self, bus::Endpoint::server(), bus::MessageKind::word,
                                fmt::format("{}/{}/{}", to_string(word.wish), word.given_ns, getpid()),
@@ -158,6 +164,8 @@ void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_c
       ->type_name("MAP");
   word->add_option("--bus", options->bus, "The bus of the server that has the map open, instead of a file.")
       ->type_name("nats://HOST:PORT");
+  word->add_option("--mission", options->mission, "Of several on that bus; default: the one that has a server.")
+      ->type_name("NAME");
   word->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet.");
   word->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
   word->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });

@@ -140,13 +140,15 @@ void print_robots(const mapfile::Content& content, const server::MapEstimate& ma
 }
 
 void print_finders(const mapfile::Content& content) {
-  std::map<std::uint32_t, std::size_t> found;
+  std::map<MethodId, std::size_t> found;
   for (const auto& [pair, verdict] : content.verdicts)
-    if (!verdict.closures.empty()) ++found[verdict.finder_version];
-  for (const auto& [version, pairs] : content.refused) found.try_emplace(version, 0);
-  for (const auto& [version, pairs] : found)
-    fmt::print("finder       version {}: closures between {} pairs, {} refused\n", version, pairs,
-               content.refused.contains(version) ? content.refused.at(version) : 0);
+    if (!verdict.closures.empty()) ++found[verdict.finder];
+  for (const auto& [finder, pairs] : content.refused) found.try_emplace(finder, 0);
+  for (const auto& [finder, pairs] : found)
+    fmt::print("finder       {}: closures between {} pairs, {} refused\n", to_string(finder), pairs,
+               content.refused.contains(finder) ? content.refused.at(finder) : 0);
+  for (const auto& [finder, pairs] : content.aside)
+    fmt::print("finder       {}: closures between {} pairs that are not believed\n", to_string(finder), pairs);
 }
 
 int show_map(const fs::path& file) {

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -13,6 +14,7 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/node/status_text.hpp"
 #include "tutti/wire/codec.hpp"
@@ -23,10 +25,12 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kFresh_s = 6.0;  // three of the server's periods: it is there
+constexpr double kLookForLeases_s = 2.0;  // for leases
+constexpr double kFresh_s = 6.0;          // three of the server's periods: it is there
 
 struct StatusOptions {
   std::string bus;
+  std::string mission;
   bool insecure = false;
   bool json = false;
   bool watch = false;
@@ -110,6 +114,10 @@ Json json_of(const MissionStatus& status, double silent_s) {
            {"pending_jobs", status.pending_jobs},
            {"has_news", status.has_news},
            {"trouble", status.trouble},
+           {"finder", status.finder},
+           {"former_pairs", status.former_pairs},
+           {"waiting", status.waiting},
+           {"why_waiting", status.why_waiting},
            {"robots", Json::array()},
            {"workers", Json::array()},
            {"refusals", Json::array()}};
@@ -160,7 +168,8 @@ int look_once(bus::NatsPort& port, View& view, const StatusOptions& options) {
   }
   const std::string error = view.problem().empty() ? port.state().last_error : view.problem();
   if (!connected) return complain("status", fmt::format("no bus at {} ({})", options.bus, error));
-  return complain("status", fmt::format("there is a bus at {}, but no server has said anything on it{}", options.bus,
+  return complain("status", fmt::format("there is a bus at {}, but no server{} has said anything on it{}", options.bus,
+                                        options.mission.empty() ? "" : " of mission '" + options.mission + "'",
                                         error.empty() ? "" : " (" + error + ")"));
 }
 
@@ -174,8 +183,12 @@ int watch(bus::NatsPort& port, View& view, const StatusOptions& options) {
 }
 
 int run(const StatusOptions& options) {
-  auto port = bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())),
-                                  {.url = options.bus, .allow_insecure = options.insecure});
+  bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
+  const auto mission = options.mission.empty() ? bus::served_mission(where, std::min(kLookForLeases_s, options.wait_s))
+                                               : options.mission;
+  if (!mission) return complain("status", mission.error().message, 2);
+  where.mission = *mission;
+  auto port = bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), where);
   if (!port) return complain("status", port.error().message, 2);
   View view;
   return options.watch ? watch(**port, view, options) : look_once(**port, view, options);
@@ -196,6 +209,8 @@ void add_status_command(CLI::App& app, int& exit_code) {
   command->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet");
   command->add_flag("--json", options->json, "One JSON object on a line instead of a table");
   command->add_flag("--watch", options->watch, "Go on, and show it again whenever something is new");
+  command->add_option("--mission", options->mission, "Of several missions on one bus; default: the one with a server")
+      ->type_name("NAME");
   add_number(*command, "--wait", options->wait_s, "How long to listen for a server at most", "S");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

@@ -45,17 +45,14 @@ constexpr std::size_t kRowsPerCommit = 2000;
 /// As one that compares scans: every pair is worth a look.
 class EveryPair final : public server::ClosureFinder {
  public:
-  explicit EveryPair(std::uint32_t version) : version_(version) {}
-  [[nodiscard]] std::uint32_t version() const override { return version_; }
+  static MethodId who() { return {"large_map", 1, 1}; }
+  [[nodiscard]] MethodId id() const override { return who(); }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap&, const Submap&,
                                               const server::PayloadStore&) const override {
     return fail(ErrorCode::unsupported, "nothing is verified here");
   }
-
- private:
-  std::uint32_t version_;
 };
 
 /// Commits rows in batches.
@@ -135,12 +132,11 @@ void make_map(const mission::MissionConfig& config, const std::filesystem::path&
   };
   for (std::size_t b = 0; b < all.size(); ++b) {
     for (std::size_t a = 0; a < b; ++a) {
-      ClosureVerdict verdict{.pair = {all[a].id, all[b].id},
-                             .closures = {},
-                             .refusal = Refusal{RefusalReason::unlike_from_above},
-                             .finder_version = finder->version()};
+      ClosureVerdict verdict{
+          .pair = {all[a].id, all[b].id}, .closures = {}, .refusal = Refusal{RefusalReason::unlike_from_above}};
       if ((begin[a] - begin[b]).norm() < kFar_m && finder->is_candidate(all[a], all[b]))
         verdict = finder->verify(all[a], all[b], *nothing).value();
+      verdict.finder = EveryPair::who();
       if (!verdict.refusal) {
         ++closed;
         writer.put({"verdicts", node::key_of(verdict.pair), wire::encode(verdict)});
@@ -171,14 +167,14 @@ auto timed(const char* what, Call&& call) {
   return result;
 }
 
-void measure(const mission::MissionConfig& config, const std::filesystem::path& file, std::uint32_t version) {
+void measure(const mission::MissionConfig& config, const std::filesystem::path& file) {
   fmt::print("{}: {:.1f} MB\n", file.string(), 1e-6 * static_cast<double>(std::filesystem::file_size(file)));
   auto store = timed("the file is open", [&] {
     return storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0}).value();
   });
   auto node = timed("what is stored is read", [&] {
-    return node::ServerNode::open({}, std::make_shared<EveryPair>(version),
-                                  {.server = config.server, .accepts_others = true}, 1, *store)
+    return node::ServerNode::open({}, std::make_shared<EveryPair>(), {.server = config.server, .accepts_others = true},
+                                  1, *store)
         .value();
   });
   const auto resumed = timed("its first step: it is ready", [&] { return node->resume({}); });
@@ -211,7 +207,7 @@ int main(int argc, char** argv) {
         make_map(*config, file, submaps, argc > 4 ? std::atoi(argv[4]) : 0);
         return 0;
       });
-    measure(*config, file, simulation::ReferenceClosures::kVersion);
+    measure(*config, file);
   } catch (const std::exception& error) {
     fmt::print(stderr, "bench_large_map: {}\n", error.what());
     return 1;

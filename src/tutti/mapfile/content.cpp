@@ -47,11 +47,12 @@ Status read_submaps(const storage::TableStore& map, Content& content) {
 
 Status read_verdicts(const storage::TableStore& map, Content& content) {
   const auto take = [&](std::string_view, ClosureVerdict verdict) {
-    if (verdict.refusal) ++content.refused[verdict.finder_version];
+    if (verdict.refusal) ++content.refused[verdict.finder];
     content.verdicts.insert_or_assign(verdict.pair, std::move(verdict));
   };
   const auto count = [&](std::string_view, const Verdicts& answer) {
-    for (const ClosureVerdict& verdict : answer.verdicts) ++content.refused[verdict.finder_version];
+    for (const ClosureVerdict& verdict : answer.verdicts)
+      ++(verdict.refusal ? content.refused : content.aside)[verdict.finder];
   };
   if (auto ok = read_table(map, "verdicts", wire::decode_verdict, take, content); !ok) return ok;
   return read_table(map, "answers", wire::decode_verdicts, count, content);

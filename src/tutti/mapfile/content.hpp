@@ -27,7 +27,8 @@ struct Content {
   WordSet words;
   server::Refinements refinements;
   std::map<RobotId, std::string> names;
-  std::map<std::uint32_t, std::size_t> refused;  ///< Pairs that were refused, by the version of their finder.
+  std::map<MethodId, std::size_t> refused;  ///< Pairs, by who refused them.
+  std::map<MethodId, std::size_t> aside;    ///< Pairs with closures of finders that the server's was not: not believed.
   struct Table {
     std::size_t rows = 0;
     std::uint64_t bytes = 0;                          ///< Of keys and rows.

@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/mission/finder_maker.hpp"
+
 namespace tutti::mission {
 namespace {
 
@@ -39,6 +41,9 @@ RefinementCounts counts_of(const bundle::Refinement& refined) {
 }
 
 }  // namespace
+
+BundleRefiner::BundleRefiner(const bundle::RefinementConfig& config)
+    : config_(config), settings_(settings_of(config)) {}
 
 Result<Refinement> BundleRefiner::refine(const RefinementJob& job, const server::SubmapSet& submaps,
                                          const server::PayloadStore& payloads) const {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <string>
 
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/mission/mission_config.hpp"
@@ -13,13 +15,18 @@ namespace tutti::mission {
 /// keyframe and where an accepted visual closure found them to be the same.
 class BundleRefiner final : public server::MapRefiner {
  public:
-  explicit BundleRefiner(const bundle::RefinementConfig& config) : config_(config) {}
+  static constexpr const char* kName = "bundle";
+  static constexpr std::uint32_t kVersion = 1;  ///< Raised by hand in the commit that changes what refine() makes.
+  explicit BundleRefiner(const bundle::RefinementConfig& config);
+  [[nodiscard]] MethodId id() const override { return {kName, kVersion, settings_hash(settings_)}; }
+  [[nodiscard]] std::string settings() const override { return settings_; }
   [[nodiscard]] bool can_refine(const PayloadSize& size) const override { return size.observations > 0; }
   [[nodiscard]] Result<Refinement> refine(const RefinementJob& job, const server::SubmapSet& submaps,
                                           const server::PayloadStore& payloads) const override;
 
  private:
   bundle::RefinementConfig config_;
+  std::string settings_;
 };
 
 /// Null for a mission whose closures do not come from cameras.

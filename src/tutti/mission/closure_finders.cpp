@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/closure_finders.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -8,6 +10,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/mission/finder_maker.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/verify.hpp"
 #include "tutti/perception/visual/verify.hpp"
@@ -17,8 +20,6 @@ namespace tutti::mission {
 LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap,
                                        std::size_t cache_bytes)
     : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
-
-std::uint32_t LidarClosureFinder::version() const { return lidar::kFinderVersion; }
 
 bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
   return first.id.chain != second.id.chain || second.id.index - first.id.index >= min_submap_gap_;  // first < second
@@ -33,11 +34,13 @@ Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Sub
   const auto& a = *features_a;
   const auto& b = *features_b;
   const auto refuse = [&](const std::optional<Refusal>& refusal) {
-    return ClosureVerdict{{first.id, second.id}, {}, refusal, version()};
+    return ClosureVerdict{{first.id, second.id}, {}, refusal, id()};
   };
   if (!a->usable || !b->usable) return refuse(a->usable ? b->refusal : a->refusal);
   if (!lidar::plausible_pair(*a, *b)) return refuse(Refusal{RefusalReason::unlike_from_above});
-  return lidar::to_verdict(first, second, lidar::verify_pair(*a, *b, config_));
+  ClosureVerdict verdict = lidar::to_verdict(first, second, lidar::verify_pair(*a, *b, config_));
+  verdict.finder = id();
+  return verdict;
 }
 
 Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
@@ -121,13 +124,23 @@ std::shared_ptr<const server::ClosureFinder> make_reference_finder(const Closure
                                                   planted_closures(config.planted, recordings));
 }
 
+/// Of the recordings that the finder's answers depend on, in short.
+std::string extent_of(const ClosureConfig& config, const std::vector<MissionRecording>& recordings) {
+  std::string out;
+  if (config.finder != "reference") return out;
+  for (const MissionRecording& robot : recordings) {
+    const Trajectory& reference = robot.recording.reference;
+    out += fmt::format("{} {}\n", robot.recording.robot.value, reference.size());
+    if (!reference.empty()) out += fmt::format("{} {}\n", reference.front().stamp.ns, reference.back().stamp.ns);
+  }
+  return out;
+}
+
 }  // namespace
 
 VisualClosureFinder::VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap,
                                          std::size_t cache_bytes)
     : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
-
-std::uint32_t VisualClosureFinder::version() const { return visual::kFinderVersion; }
 
 bool VisualClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
   return visual::is_candidate(first, second, min_submap_gap_, config_);
@@ -139,7 +152,9 @@ Result<ClosureVerdict> VisualClosureFinder::verify(const Submap& first, const Su
   if (!a) return tl::unexpected(a.error());
   const auto b = features_of(second, payloads);
   if (!b) return tl::unexpected(b.error());
-  return visual::verify_pair(**a, **b, config_);
+  ClosureVerdict verdict = visual::verify_pair(**a, **b, config_);
+  verdict.finder = id();
+  return verdict;
 }
 
 Result<VisualClosureFinder::Features> VisualClosureFinder::features_of(const Submap& submap,
@@ -156,12 +171,6 @@ Result<VisualClosureFinder::Features> VisualClosureFinder::features_of(const Sub
 JointClosureFinder::JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders)
     : finders_(std::move(finders)) {}
 
-std::uint32_t JointClosureFinder::version() const {
-  std::uint32_t sum = 0;
-  for (const auto& finder : finders_) sum += finder->version();
-  return sum;
-}
-
 bool JointClosureFinder::can_compare(const PayloadSize& first, const PayloadSize& second) const {
   return std::ranges::any_of(finders_, [&](const auto& finder) { return finder->can_compare(first, second); });
 }
@@ -172,7 +181,7 @@ bool JointClosureFinder::is_candidate(const Submap& first, const Submap& second)
 
 Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Submap& second,
                                                   const server::PayloadStore& payloads) const {
-  ClosureVerdict out{.pair = {first.id, second.id}, .finder_version = version()};
+  ClosureVerdict out{.pair = {first.id, second.id}, .finder = id()};
   for (const auto& finder : finders_) {
     if (!finder->is_candidate(first, second)) continue;
     auto verdict = finder->verify(first, second, payloads);
@@ -206,8 +215,13 @@ std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureCo
         std::vector<std::shared_ptr<const server::ClosureFinder>>{lidar(), visual()});
   else
     finder = make_reference_finder(config, recordings, seed);
-  if (config.wrong_share == 0.0) return finder;
-  return std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
+  MethodId id = finder->id();
+  if (config.wrong_share > 0.0)
+    finder = std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
+  std::string settings = settings_of(config, seed);
+  id.settings = settings_hash(settings + extent_of(config, recordings));
+  if (config.finder == "reference") settings.clear();
+  return std::make_shared<NamedFinder>(std::move(finder), std::move(id), std::move(settings));
 }
 
 }  // namespace tutti::mission

@@ -6,13 +6,17 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tutti/mission/feature_cache.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/perception/lidar/submap_features.hpp"
+#include "tutti/perception/lidar/verify.hpp"
 #include "tutti/perception/visual/submap_features.hpp"
+#include "tutti/perception/visual/verify.hpp"
 #include "tutti/server/closure_finder.hpp"
 
 namespace tutti::mission {
@@ -22,7 +26,7 @@ namespace tutti::mission {
 class LidarClosureFinder final : public server::ClosureFinder {
  public:
   LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
-  [[nodiscard]] std::uint32_t version() const override;
+  [[nodiscard]] MethodId id() const override { return {"lidar", lidar::kFinderVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.points > 0 && second.points > 0;
   }
@@ -44,7 +48,7 @@ class LidarClosureFinder final : public server::ClosureFinder {
 class VisualClosureFinder final : public server::ClosureFinder {
  public:
   VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
-  [[nodiscard]] std::uint32_t version() const override;
+  [[nodiscard]] MethodId id() const override { return {"visual", visual::kFinderVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.observations > 0 && second.observations > 0;
   }
@@ -66,7 +70,8 @@ class VisualClosureFinder final : public server::ClosureFinder {
 class JointClosureFinder final : public server::ClosureFinder {
  public:
   explicit JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders);
-  [[nodiscard]] std::uint32_t version() const override;  ///< The sum: larger when any of them changes.
+  static constexpr std::uint32_t kVersion = 1000 * lidar::kFinderVersion + visual::kFinderVersion;
+  [[nodiscard]] MethodId id() const override { return {"sensors", kVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override;
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
@@ -92,16 +97,20 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
  public:
   ReferenceClosureFinder(std::map<RobotId, Trajectory> reference, const simulation::ReferenceClosureConfig& config,
                          std::uint64_t seed, std::vector<PlantedClosure> planted = {});
-  [[nodiscard]] std::uint32_t version() const override { return simulation::ReferenceClosures::kVersion; }
+  [[nodiscard]] MethodId id() const override { return {"reference", simulation::ReferenceClosures::kVersion, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return planted_in(first, second) || closures_.is_candidate(first, second);
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore&) const override {
+    ClosureVerdict verdict{.pair = {first.id, second.id}};
     if (const auto planted = planted_in(first, second))
-      return ClosureVerdict{{first.id, second.id}, {*planted}, std::nullopt, version()};
-    return closures_.verify(first, second);
+      verdict.closures.push_back(*planted);
+    else
+      verdict = closures_.verify(first, second);
+    verdict.finder = id();
+    return verdict;
   }
 
  private:
@@ -110,6 +119,33 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
   simulation::ReferenceClosures closures_;
   std::vector<PlantedClosure> planted_;
   Matrix6d covariance_;  // of those
+};
+
+/// Another finder, under a name that says what its settings are; so do its verdicts.
+class NamedFinder final : public server::ClosureFinder {
+ public:
+  /// `settings`: ClosureFinder::settings().
+  NamedFinder(std::shared_ptr<const server::ClosureFinder> finder, MethodId id, std::string settings)
+      : finder_(std::move(finder)), id_(std::move(id)), settings_(std::move(settings)) {}
+  [[nodiscard]] MethodId id() const override { return id_; }
+  [[nodiscard]] std::string settings() const override { return settings_; }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return finder_->can_compare(first, second);
+  }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return finder_->is_candidate(first, second);
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::PayloadStore& payloads) const override {
+    auto verdict = finder_->verify(first, second, payloads);
+    if (verdict) verdict->finder = id_;
+    return verdict;
+  }
+
+ private:
+  std::shared_ptr<const server::ClosureFinder> finder_;
+  MethodId id_;
+  std::string settings_;
 };
 
 /// What load_input() accepts is complete: planted closures name robots of the mission.

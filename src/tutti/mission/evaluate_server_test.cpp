@@ -12,7 +12,7 @@ namespace {
 /// No submap is compared with any other.
 class NoClosures final : public server::ClosureFinder {
  public:
-  [[nodiscard]] std::uint32_t version() const override { return 1; }
+  [[nodiscard]] MethodId id() const override { return {"none", 1, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return false; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap&, const Submap&,

@@ -20,7 +20,8 @@ namespace tutti::mission {
 class MeasuredFinder final : public server::ClosureFinder {
  public:
   explicit MeasuredFinder(std::shared_ptr<const server::ClosureFinder> finder) : finder_(std::move(finder)) {}
-  [[nodiscard]] std::uint32_t version() const override { return finder_->version(); }
+  [[nodiscard]] MethodId id() const override { return finder_->id(); }
+  [[nodiscard]] std::string settings() const override { return finder_->settings(); }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return finder_->can_compare(first, second);
   }
@@ -44,6 +45,8 @@ class MeasuredFinder final : public server::ClosureFinder {
 class MeasuredRefiner final : public server::MapRefiner {
  public:
   explicit MeasuredRefiner(std::shared_ptr<const server::MapRefiner> refiner) : refiner_(std::move(refiner)) {}
+  [[nodiscard]] MethodId id() const override { return refiner_->id(); }
+  [[nodiscard]] std::string settings() const override { return refiner_->settings(); }
   [[nodiscard]] bool can_refine(const PayloadSize& size) const override { return refiner_->can_refine(size); }
   [[nodiscard]] Result<Refinement> refine(const RefinementJob& job, const server::SubmapSet& submaps,
                                           const server::PayloadStore& payloads) const override;

@@ -29,7 +29,8 @@ class SpoiledClosureFinder final : public server::ClosureFinder {
  public:
   SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                        const SpoiledClosureConfig& config, std::uint64_t seed);
-  [[nodiscard]] std::uint32_t version() const override { return inner_->version(); }
+  /// The other's: whoever makes it gives it a name of its own (NamedFinder).
+  [[nodiscard]] MethodId id() const override { return inner_->id(); }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return inner_->can_compare(first, second);
   }

@@ -26,7 +26,7 @@ Submap submap(std::uint32_t robot, std::uint32_t index) {
 /// Finds every pair, between the middle keyframes, exactly.
 class Perfect final : public server::ClosureFinder {
  public:
-  [[nodiscard]] std::uint32_t version() const override { return 7; }
+  [[nodiscard]] MethodId id() const override { return {"perfect", 7, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
@@ -38,7 +38,7 @@ class Perfect final : public server::ClosureFinder {
                             {second.id.chain, b.index},
                             {a.T_odom_body.inverse() * b.T_odom_body, Matrix6d::Identity()}}},
                           std::nullopt,
-                          version()};
+                          id()};
   }
 };
 
@@ -116,7 +116,7 @@ TEST_F(Planted, OnePairOfSubmapsHasTheWrongClosure) {
       const auto verdict = finder_->verify(submap(0, i), submap(1, j), payloads_);
       EXPECT_EQ(finder_->is_candidate(submap(0, i), submap(1, j)), !verdict->closures.empty());
       EXPECT_EQ(verdict->refusal.has_value(), verdict->closures.empty());
-      EXPECT_EQ(verdict->finder_version, simulation::ReferenceClosures::kVersion);
+      EXPECT_EQ(verdict->finder, finder_->id());
       if (verdict->closures.empty()) continue;
       ++found;
       const LoopClosure& closure = verdict->closures.front();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tutti/base/ids.hpp"
+#include "tutti/model/method_id.hpp"
 #include "tutti/model/refusal.hpp"
 #include "tutti/model/relative_pose.hpp"
 
@@ -27,12 +28,12 @@ struct SubmapPair {
 };
 
 /// Outcome of verifying one pair: closures or a refusal, never both. A verdict depends on the two submaps and the
-/// finder's version alone, never on the map's state, so that the map is a function of the set of submaps and verdicts.
+/// finder alone, never on the map's state, so that the map is a function of the set of submaps and verdicts.
 struct ClosureVerdict {
   SubmapPair pair;
   std::vector<LoopClosure> closures;  ///< From keyframes of pair.first to keyframes of pair.second.
   std::optional<Refusal> refusal;     ///< When there are none.
-  std::uint32_t finder_version = 0;   ///< server::ClosureFinder::version; 0: of a program that did not say.
+  MethodId finder;                    ///< server::ClosureFinder::id(), of who says so.
   // For people, and of closures only; the map does not depend on these.
   std::vector<Refusal> evidence;        ///< What the finder measured, with the limit that each value kept.
   std::optional<std::uint32_t> worker;  ///< Who verified the pair; nothing: it was not said.

@@ -65,6 +65,8 @@ struct Receipt {
 struct Job {
   std::string id;
   std::vector<SubmapPair> pairs;
+  MethodId finder{};       ///< By this one and no other; without a name: of an older server, by any.
+  std::string settings{};  ///< Which make one (server::ClosureFinder::settings()); empty: only who has it can.
   friend bool operator==(const Job&, const Job&) = default;
 };
 
@@ -74,6 +76,7 @@ struct Verdicts {
   std::vector<ClosureVerdict> verdicts;
   std::vector<SubmapPair> failed;  ///< Without a verdict, as when a cloud could not be read.
   std::string why;                 ///< The first of them failed.
+  bool cannot = false;             ///< All of them failed since this worker has not got the job's finder: another may.
   friend bool operator==(const Verdicts&, const Verdicts&) = default;
 };
 

@@ -8,6 +8,7 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/model/loop_closure.hpp"
+#include "tutti/model/method_id.hpp"
 #include "tutti/model/relative_pose.hpp"
 
 /// Refining a map by what its sensors saw, as bundle adjustment does: work that leaves the server, and what comes back.
@@ -26,6 +27,8 @@ struct RefinementJob {
   bool whole = true;               ///< All that can be refined of the map is here, and free.
   std::vector<Part> parts;         ///< Sorted by submap. Neighbours of one chain may share a keyframe.
   std::vector<SubmapPair> closed;  ///< Sorted; with accepted closures, and one of the two free.
+  MethodId refiner{};              ///< By this one and no other; without a name: by any.
+  std::string settings{};          ///< Which make one (server::MapRefiner::settings()).
   friend bool operator==(const RefinementJob&, const RefinementJob&) = default;
 };
 
@@ -60,7 +63,8 @@ struct Refinement {
   std::vector<RefinedStep> steps;            ///< Sorted by `from`; none between keyframes that kept their poses.
   std::map<KeyframeId, Pose3> T_world_body;  ///< Of all keyframes of the job, in the world that it gave.
   RefinementCounts counts;
-  std::string why;  ///< It could not be refined; there are no steps and poses then.
+  std::string why;      ///< It could not be refined; there are no steps and poses then.
+  bool cannot = false;  ///< ... since this worker has not got the job's refiner: another may.
   friend bool operator==(const Refinement&, const Refinement&) = default;
 };
 

@@ -9,6 +9,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/model/method_id.hpp"
 
 /// What nodes know about each other. Every time is mission time of the sender, whose clock others do not share.
 namespace tutti {
@@ -30,6 +31,7 @@ struct NodeStatus {
   bool finished = false;        ///< Its recording has ended.
   std::uint64_t jobs_done = 0;  ///< Of a worker, since it started.
   std::string trouble;          ///< For people; empty: none.
+  std::vector<MethodId> can;    ///< Of a worker: its finders and refiners; without settings: with any.
   friend bool operator==(const NodeStatus&, const NodeStatus&) = default;
 };
 
@@ -74,6 +76,10 @@ struct MissionStatus {
   std::vector<Worker> workers;     ///< By number.
   std::vector<Refusals> refusals;  ///< Messages.
   std::string trouble;             ///< For people; empty: none.
+  std::string finder;              ///< Who is asked for closures: to_string(MethodId).
+  std::uint64_t former_pairs = 0;  ///< With closures of other finders, in the map until this one has answered.
+  std::uint64_t waiting = 0;       ///< Pairs and refinements that none of the workers that are there can compute,
+  std::string why_waiting;         ///< and what the last one that tried said.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;
 };
 

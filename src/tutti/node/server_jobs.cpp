@@ -23,17 +23,76 @@ constexpr double kFailedAgain = 0.1;  // of the time for an answer
 void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step) {
   auto answer = wire::decode_verdicts(*envelope.bytes);
   if (!answer) return refuse(envelope, answer.error().message, now, step);
-  close(answer->job, now);
+  const bool was_open = close(answer->job, now).has_value();
+  if (answer->cannot) {
+    if (was_open) note_waiting(answer->failed, answer->why, now, step);
+    return;
+  }
+  std::vector<ClosureVerdict> strange;
+  const auto is_strange = [&](const ClosureVerdict& verdict) { return verdict.finder != server_.state().finder; };
+  std::ranges::copy_if(answer->verdicts, std::back_inserter(strange), is_strange);
+  std::erase_if(answer->verdicts, is_strange);
+  if (!strange.empty()) set_aside(envelope, strange, was_open, now, step);
   Verdicts refused{.job = answer->job, .verdicts = {}, .failed = {}, .why = {}};
   for (ClosureVerdict& verdict : answer->verdicts) {
     const bool is_workers = envelope.from.role == bus::Endpoint::Role::worker && !verdict.closures.empty();
     failed_.erase(verdict.pair);
+    waiting_.erase(verdict.pair);
     verdict.worker = is_workers ? std::optional(envelope.from.number) : std::nullopt;
     if (const Status taken = take(verdict, refused, step); !taken) refuse(envelope, taken.error().message, now, step);
   }
   for (const SubmapPair& pair : answer->failed) note_failed(pair, answer->why, now, refused, step);
   keep(refused, step);
   step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
+}
+
+/// Of another finder than the server's, as of a program of another version: believed when the server's is that one.
+/// Closures are kept until then, one answer for each pair.
+void ServerNode::set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, bool was_open,
+                           Timestamp now, Step& step) {
+  const std::string why = fmt::format("answers of finder {}, expected {}: not believed",
+                                      to_string(verdicts.front().finder), to_string(server_.state().finder));
+  refuse(envelope, why, now, step);
+  if (!was_open) return;
+  std::vector<SubmapPair> pairs;
+  for (const ClosureVerdict& verdict : verdicts) {
+    const SubmapPair& pair = verdict.pair;
+    const server::SubmapSet& submaps = server_.state().submaps;
+    if (!submaps.contains(pair.first) || !submaps.contains(pair.second)) continue;
+    pairs.push_back(pair);
+    if (verdict.closures.empty()) continue;
+    Verdicts aside{.job = fmt::format("aside/{}-{}", to_string(pair.first), to_string(pair.second)),
+                   .verdicts = {verdict}};
+    step.writes.push_back({"answers", aside.job, wire::encode(aside)});
+  }
+  note_waiting(pairs, why, now, step);
+}
+
+/// No fault of the pair: it waits for a worker that can, however long.
+void ServerNode::note_waiting(const std::vector<SubmapPair>& pairs, const std::string& why, Timestamp now, Step& step) {
+  const server::SubmapSet& submaps = server_.state().submaps;
+  const bool was_empty = waiting_.empty();
+  for (const SubmapPair& pair : pairs)
+    if (submaps.contains(pair.first) && submaps.contains(pair.second) && !server_.state().answered.contains(pair))
+      waiting_.insert(pair);
+  why_waiting_ = wire::plain_text(why);
+  if (was_empty && !waiting_.empty()) step.tell(now, VerificationFailed{*waiting_.begin(), why});
+  if (was_empty != waiting_.empty()) ++changes_;
+  if (std::ranges::any_of(workers_, [&](const auto& entry) {
+        return now - entry.second.last_seen <= kWorkerIsThere_s && can(entry.second.status, server_.finder().id());
+      }))
+    ask_waiting(now, step);
+}
+
+bool ServerNode::can(const NodeStatus& worker, const MethodId& id) {
+  return std::ranges::any_of(worker.can, [&](const MethodId& can) {
+    return can.name == id.name && can.version == id.version && (can.settings == 0 || can.settings == id.settings);
+  });
+}
+
+void ServerNode::ask_waiting(Timestamp now, Step& step) {
+  for (const SubmapPair& pair : std::exchange(waiting_, {})) give_back(pair);
+  send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
 }
 
 void ServerNode::keep(const Verdicts& refused, Step& step) {
@@ -77,13 +136,11 @@ double ServerNode::failed_again_after(unsigned times) const {
   return kFailedAgain * config_.job_timeout_s * static_cast<double>(1U << (times - 1));
 }
 
-/// The map goes on without it, and a newer finder asks again.
+/// The map goes on without it, and another finder asks again.
 void ServerNode::give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step) {
   failed_.erase(pair);
-  const ClosureVerdict verdict{.pair = pair,
-                               .closures = {},
-                               .refusal = Refusal{RefusalReason::unverified},
-                               .finder_version = server_.state().finder_version};
+  const ClosureVerdict verdict{
+      .pair = pair, .closures = {}, .refusal = Refusal{RefusalReason::unverified}, .finder = server_.state().finder};
   if (!take(verdict, refused, step)) return;
   note_refusal(bus::Endpoint::Role::worker, bus::MessageKind::job,
                fmt::format("submaps {} and {} are given up: {}", to_string(pair.first), to_string(pair.second), why));
@@ -121,7 +178,10 @@ void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsign
     for (std::size_t first = 0; first < of_it.size(); first += most_pairs) {
       const std::size_t last = std::min(of_it.size(), first + most_pairs);
       const auto at = [&](std::size_t i) { return of_it.begin() + static_cast<std::ptrdiff_t>(i); };
-      const Job job{.id = job_name(jobs_), .pairs = {at(first), at(last)}};
+      const Job job{.id = job_name(jobs_),
+                    .pairs = {at(first), at(last)},
+                    .finder = server_.state().finder,
+                    .settings = server_.finder().settings()};
       open_jobs_.emplace(jobs_++, OpenJob{job.pairs, nullptr, now, asked});
       step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::job, job.id,
                                std::make_shared<const std::string>(wire::encode(job))});

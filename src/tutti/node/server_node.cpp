@@ -57,12 +57,13 @@ struct ServerNode::Opened {
   bool news = false;
   std::optional<MapCounts> counts;
 
-  static Result<Opened> from(const storage::TableStore& store, std::uint32_t finder_version);
+  static Result<Opened> from(const storage::TableStore& store, MethodId finder);
 
  private:
   Status read_meta(const storage::TableStore& store);
   void add(wire::SubmapOutline outline);
   void add(ClosureVerdict verdict);
+  void add_answer(ClosureVerdict verdict);
 };
 
 void ServerNode::Opened::add(wire::SubmapOutline outline) {
@@ -94,25 +95,32 @@ Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
   return ok;
 }
 
-/// As MapServer::take() leaves it: the answers of older finders hold until the pair is asked again, but their refusals
-/// need not be known.
+/// As MapServer::take() leaves it: the closures of earlier finders hold until this one has answered.
 void ServerNode::Opened::add(ClosureVerdict verdict) {
+  if (verdict.refusal) return add_answer(std::move(verdict));
+  if (verdict.finder == state.finder) state.answered.insert(verdict.pair);
   const SubmapPair pair = verdict.pair;
-  const bool is_counted = verdict.refusal && verdict.finder_version == state.finder_version;
-  if (verdict.finder_version < state.finder_version) {
-    if (!verdict.refusal) state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
-    return;
-  }
-  if (!state.answered.insert(pair) && verdict.refusal) return;
-  if (is_counted)
-    count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state.refused);
-  else
-    state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
+  state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
 }
 
-Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& store, std::uint32_t finder_version) {
+/// After those. What others have refused need not be known; closures that were set aside are believed when their finder
+/// is the server's.
+void ServerNode::Opened::add_answer(ClosureVerdict verdict) {
+  const SubmapPair pair = verdict.pair;
+  if (verdict.finder != state.finder) return;
+  if (state.verdicts.contains(pair) && says(state.words, pair, Wish::accept)) return;
+  if (!state.answered.insert(pair)) return;
+  if (verdict.refusal) {
+    count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state.refused);
+    state.verdicts.erase(pair);
+  } else {
+    state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
+  }
+}
+
+Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& store, MethodId finder) {
   Opened opened;
-  opened.state.finder_version = finder_version;
+  opened.state.finder = std::move(finder);
   const auto meta = read_map_meta(store);
   if (!meta) return tl::unexpected(meta.error());
   if (!*meta) return opened;
@@ -121,8 +129,8 @@ Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& s
   opened.news = (*meta)->news;
   opened.start = (*meta)->start;
   const auto add = [&](auto decoded) { opened.add(std::move(decoded)); };
-  const auto add_refusals = [&](Verdicts answer) {
-    for (ClosureVerdict& verdict : answer.verdicts) opened.add(std::move(verdict));
+  const auto add_answers = [&](Verdicts answer) {
+    for (ClosureVerdict& verdict : answer.verdicts) opened.add_answer(std::move(verdict));
   };
   if (auto ok = opened.read_meta(store); !ok) return tl::unexpected(ok.error());
   auto words = read_words(store);
@@ -136,8 +144,7 @@ Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& s
   opened.state.refinements = std::move(*refinements);
   if (auto ok = read_rows(store, "submaps", wire::decode_outline, add); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_refusals); !ok)
-    return tl::unexpected(ok.error());
+  if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_answers); !ok) return tl::unexpected(ok.error());
   return opened;
 }
 
@@ -147,7 +154,7 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
                                                      const storage::TableStore& store) {
   TUTTI_CHECK(finder != nullptr && epoch > 0, "no finder or no epoch");
   TUTTI_CHECK(config.pairs_per_job > 0, "jobs of no pairs");
-  auto opened = Opened::from(store, finder->version());
+  auto opened = Opened::from(store, finder->id());
   if (!opened) return tl::unexpected(opened.error());
   if (opened->epoch > 0) epoch = opened->epoch;
   if (config.accepts_others) {

@@ -70,7 +70,8 @@ class ServerNode {
   [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_; }  ///< The last one; empty before.
 
  private:
-  struct Opened;  // what was found in the store
+  static constexpr double kWorkerIsThere_s = 10.0;  // five of its statuses
+  struct Opened;                                    // what was found in the store
   ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
              const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames, Opened opened);
 
@@ -119,6 +120,14 @@ class ServerNode {
   void settle(Timestamp now, Step& step);
   /// How long after the so-manieth failure, s.
   [[nodiscard]] double failed_again_after(unsigned times) const;
+  void set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, bool was_open,
+                 Timestamp now, Step& step);
+  /// The worker that had them has not got the finder: they are asked again when there is one that has.
+  void note_waiting(const std::vector<SubmapPair>& pairs, const std::string& why, Timestamp now, Step& step);
+  void ask_waiting(Timestamp now, Step& step);
+  static bool can(const NodeStatus& worker, const MethodId& id);
+  /// A worker says what it can.
+  void receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step);
   /// No worker could verify it this time: it is asked again later, or refused.
   void note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
   void give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
@@ -153,12 +162,15 @@ class ServerNode {
     std::optional<Timestamp> again;  // when it is to be asked; nothing: it is being asked
   };
   std::map<SubmapPair, Failed> failed_;  // in this start
-  unsigned failed_refinements_ = 0;      // since the last that was taken or given up
+  std::set<SubmapPair> waiting_;         // for a worker that has the finder
+  std::string why_waiting_;
+  unsigned failed_refinements_ = 0;  // since the last that was taken or given up
   struct RefineAgain {
     RefinementJob job;
     Timestamp due;
   };
   std::optional<RefineAgain> refine_again_;
+  std::optional<RefinementJob> refinement_waiting_;  // for a worker that has the refiner
   std::optional<Timestamp> settle_at_;
   std::uint64_t changes_ = 0;
   std::uint64_t start_ = 0;  // of all on this store; names jobs

@@ -336,7 +336,7 @@ TEST_F(ServerNodeTest, TheMapSaysWhoVerifiedAClosureAndWhenButTheServerDoesNotCa
   ASSERT_TRUE(row.has_value());
   EXPECT_EQ(row->worker, 4U);
   EXPECT_EQ(row->verified_ns, 1'700'000'000'000'000'000);
-  EXPECT_EQ(row->finder_version, 3U);
+  EXPECT_EQ(row->finder, finder_->id());
   const auto verdicts = node_->map_server().state().verdicts;
   EXPECT_EQ(verdicts.at(pair).worker, std::nullopt);
   restart();

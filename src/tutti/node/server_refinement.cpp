@@ -27,6 +27,8 @@ void ServerNode::send_refinement_job(Timestamp now, Step& step) {
 
 void ServerNode::ask_for_refinement(RefinementJob job, Timestamp now, unsigned asked, Step& step) {
   job.id = job_name(jobs_);
+  job.refiner = config_.refiner->id();
+  job.settings = config_.refiner->settings();
   if (const Status valid = wire::validate(job); !valid)
     return give_up_refinement(job.revision, valid.error().message, now, step);
   step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::refinement_job,
@@ -41,6 +43,12 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
   const auto failed = [&](const std::string& why) {
     if (closed && closed->refinement) note_failed_refinement(*closed->refinement, why, now, step);
   };
+  if (refinement->cannot && closed && closed->refinement) {
+    refinement_waiting_ = *closed->refinement;
+    why_waiting_ = wire::plain_text(refinement->why);
+    ++changes_;
+    return step.tell(now, RefinementFailed{refinement->revision, refinement->why});
+  }
   if (!refinement->why.empty()) return failed(refinement->why);
   const std::set<std::uint64_t> before = revisions(server_.state().refinements);
   if (const Status taken = server_.receive(*refinement); !taken) {

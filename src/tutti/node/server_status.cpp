@@ -32,9 +32,7 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
   const auto status = wire::decode_status(*envelope.bytes);
   if (!status) return refuse(envelope, status.error().message, now, step);
   if (envelope.from.role == bus::Endpoint::Role::worker) {
-    std::erase_if(workers_, [&](const auto& entry) { return now - entry.second.last_seen > kWorkerIsGone_s; });
-    if (workers_.size() >= wire::kMaxRobots && !workers_.contains(envelope.from.number)) return;
-    workers_.insert_or_assign(envelope.from.number, MissionStatus::Worker{envelope.from.number, now, *status});
+    receive_status_of_worker(envelope.from.number, *status, now, step);
     return;
   }
   const auto robot = envelope.from.robot();
@@ -43,6 +41,15 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
     return refuse(envelope, fmt::format("robot {} is none of the mission's {}", robot->value, robots_.size()), now,
                   step);
   receive_status_of_robot(*robot, *status, now, step);
+}
+
+void ServerNode::receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step) {
+  std::erase_if(workers_, [&](const auto& entry) { return now - entry.second.last_seen > kWorkerIsGone_s; });
+  if (workers_.size() >= wire::kMaxRobots && !workers_.contains(number)) return;
+  workers_.insert_or_assign(number, MissionStatus::Worker{number, now, status});
+  if (!waiting_.empty() && can(status, server_.finder().id())) ask_waiting(now, step);
+  if (refinement_waiting_ && can(status, refinement_waiting_->refiner))
+    ask_for_refinement(*std::exchange(refinement_waiting_, std::nullopt), now, 0, step);
 }
 
 void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step) {
@@ -83,6 +90,7 @@ bool ServerNode::waits_too_long(RobotId robot, const NodeStatus& status, Timesta
 MissionStatus ServerNode::mission_status(Timestamp now) const {
   const server::MapServerState& state = server_.state();
   const MapCounts made = counts();
+  const std::uint64_t waiting = waiting_.size() + (refinement_waiting_ ? 1 : 0);
   const auto later = std::ranges::count_if(failed_, [](const auto& failed) { return failed.second.again.has_value(); });
   MissionStatus out{.time = now,
                     .epoch = state.epoch,
@@ -91,8 +99,13 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
                     .closures = made.closures,
                     .components = made.components,
                     .pending_jobs = open_jobs_.size() + static_cast<std::uint64_t>(later) + (refine_again_ ? 1 : 0) +
-                                    (settle_at_ ? 1 : 0),
+                                    (settle_at_ ? 1 : 0) + waiting,
                     .has_news = server_.has_news()};
+  out.finder = to_string(state.finder);
+  out.former_pairs = static_cast<std::uint64_t>(
+      std::ranges::count_if(state.verdicts, [&](const auto& entry) { return entry.second.finder != state.finder; }));
+  out.waiting = waiting;
+  if (waiting > 0) out.why_waiting = why_waiting_;
   for (const RobotId robot : robots_) {
     if (out.robots.size() == wire::kMaxRobots) break;
     MissionStatus::Robot& entry = out.robots.emplace_back();

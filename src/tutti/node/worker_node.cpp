@@ -68,7 +68,7 @@ Result<ClosureVerdict> WorkerNode::verify_or_throw(const SubmapPair& pair) const
   if (!first) return tl::unexpected(first.error());
   const auto second = submaps_->submap(pair.second);
   if (!second) return tl::unexpected(second.error());
-  auto verdict = finder_->verify(**first, **second, *submaps_);
+  auto verdict = asked_finder_->verify(**first, **second, *submaps_);
   if (!verdict) return verdict;
   if (auto ok = wire::validate(*verdict); !ok) return tl::unexpected(ok.error());
   return verdict;
@@ -90,11 +90,69 @@ Result<WorkerNode::AnyJob> WorkerNode::decode(const bus::Envelope& envelope) {
   return wire::decode_refinement_job(*envelope.bytes);
 }
 
+std::vector<MethodId> WorkerNode::can() const {
+  std::vector<MethodId> out;
+  if (maker_) out = maker_->can();
+  out.push_back(finder_->id());
+  if (refiner_ && !refiner_->id().name.empty()) out.push_back(refiner_->id());
+  return out;
+}
+
+Status WorkerNode::prepare(const Job& job) {
+  if (job.finder.name.empty() || job.finder == finder_->id()) {
+    asked_finder_ = finder_;
+    return {};
+  }
+  if (asked_finder_ && asked_finder_->id() == job.finder) return {};
+  auto made = maker_ ? maker_->finder(job.finder, job.settings)
+                     : fail(ErrorCode::unsupported, "this worker has finder {} alone", to_string(finder_->id()));
+  if (!made) return tl::unexpected(made.error());
+  asked_finder_ = std::move(*made);
+  return {};
+}
+
+Status WorkerNode::prepare(const RefinementJob& job) {
+  if (job.refiner.name.empty() || (refiner_ && refiner_->id() == job.refiner)) {
+    asked_refiner_ = refiner_;
+    return {};
+  }
+  if (asked_refiner_ && asked_refiner_->id() == job.refiner) return {};
+  auto made = maker_ ? maker_->refiner(job.refiner, job.settings)
+                     : fail(ErrorCode::unsupported, "this worker has no refiner {}", to_string(job.refiner));
+  if (!made) return tl::unexpected(made.error());
+  asked_refiner_ = std::move(*made);
+  return {};
+}
+
+void WorkerNode::send(bus::MessageKind kind, const std::string& job, std::string bytes, Step& step) const {
+  step.messages.push_back(
+      {self_, bus::Endpoint::server(), kind, job, std::make_shared<const std::string>(std::move(bytes))});
+}
+
+void WorkerNode::decline(const Job& job, const std::string& why, Step& step) const {
+  const Verdicts answer{
+      .job = job.id, .verdicts = {}, .failed = job.pairs, .why = why.substr(0, wire::kMaxReasonBytes), .cannot = true};
+  send(bus::MessageKind::verdicts, job.id, wire::encode(answer), step);
+}
+
+void WorkerNode::decline(const RefinementJob& job, const std::string& why, Step& step) const {
+  Refinement answer = answer_to(job);
+  answer.why = why.substr(0, wire::kMaxReasonBytes);
+  answer.cannot = true;
+  send(bus::MessageKind::refinement, job.id, wire::encode(answer), step);
+}
+
 void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  TUTTI_CHECK(!held_, "a second job");
+  TUTTI_CHECK(!holds_job(), "a second job");
   auto job = decode(envelope);
   if (!job) {
     step.tell(now, MessageRefused{envelope.from, envelope.kind, job.error().message});
+    return;
+  }
+  const Status ready = std::visit([&](const auto& one) { return prepare(one); }, *job);
+  if (!ready) {
+    std::visit([&](const auto& one) { decline(one, ready.error().message, step); }, *job);
+    if (rest_s_ > 0.0) rests_until_ = now + rest_s_;
     return;
   }
   std::set<SubmapId> missing;
@@ -145,7 +203,7 @@ void WorkerNode::ask(Timestamp now, Step& step) {
 }
 
 std::optional<Timestamp> WorkerNode::next_timer() const {
-  if (!held_) return std::nullopt;
+  if (!held_) return rests_until_;
   Timestamp next = held_->last_came + kPatience_s;
   for (const auto& [id, asked] : held_->asked) next = std::min(next, asked + kAskAgain_s);
   return next;
@@ -153,6 +211,7 @@ std::optional<Timestamp> WorkerNode::next_timer() const {
 
 Step WorkerNode::on_timer(Timestamp now) {
   Step step;
+  if (rests_until_ && *rests_until_ <= now) rests_until_.reset();
   if (!held_) return step;
   if (now - held_->last_came < kPatience_s) {
     ask(now, step);
@@ -168,14 +227,14 @@ Result<Refinement> WorkerNode::refine(const RefinementJob& job) const {
 }
 
 Result<Refinement> WorkerNode::refine_or_throw(const RefinementJob& job) const {
-  if (!refiner_) return fail(ErrorCode::unsupported, "this worker refines no maps: its mission has no cameras");
+  if (!asked_refiner_) return fail(ErrorCode::unsupported, "this worker refines no maps: its mission has no cameras");
   server::SubmapSet submaps;
   for (const RefinementJob::Part& part : job.parts) {
     auto submap = submaps_->submap(part.submap);
     if (!submap) return tl::unexpected(submap.error());
     submaps[part.submap] = std::move(*submap);
   }
-  auto refinement = refiner_->refine(job, submaps, *submaps_);
+  auto refinement = asked_refiner_->refine(job, submaps, *submaps_);
   if (!refinement) return refinement;
   if (auto ok = wire::validate(*refinement); !ok) return tl::unexpected(ok.error());
   return refinement;
@@ -186,8 +245,7 @@ void WorkerNode::answer(const RefinementJob& job, Step& step) const {
   for_each_(1, [&](std::size_t) { result = refine(job); });
   Refinement answer = result ? std::move(*result) : answer_to(job);
   if (!result) answer.why = result.error().message.substr(0, wire::kMaxReasonBytes);
-  step.messages.push_back({self_, bus::Endpoint::server(), bus::MessageKind::refinement, job.id,
-                           std::make_shared<const std::string>(wire::encode(answer))});
+  send(bus::MessageKind::refinement, job.id, wire::encode(answer), step);
 }
 
 void WorkerNode::answer(const AnyJob& job, Step& step) const {
@@ -207,8 +265,7 @@ void WorkerNode::answer(const Job& job, Step& step) const {
     if (answer.failed.empty()) answer.why = results[i].error().message.substr(0, wire::kMaxReasonBytes);
     answer.failed.push_back(job.pairs[i]);
   }
-  step.messages.push_back({self_, bus::Endpoint::server(), bus::MessageKind::verdicts, job.id,
-                           std::make_shared<const std::string>(wire::encode(answer))});
+  send(bus::MessageKind::verdicts, job.id, wire::encode(answer), step);
 }
 
 }  // namespace tutti::node

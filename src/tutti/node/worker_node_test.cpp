@@ -62,7 +62,7 @@ TEST_F(WorkerNodeTest, AnswersEveryPairOfAJobTheSameOnAnyNumberOfThreads) {
 TEST_F(WorkerNodeTest, AFinderThatThrowsCostsThePairAndNothingElse) {
   class Throwing final : public server::ClosureFinder {
    public:
-    [[nodiscard]] std::uint32_t version() const override { return there_.version(); }
+    [[nodiscard]] MethodId id() const override { return there_.id(); }
     [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
       return there_.is_candidate(first, second);
     }
@@ -228,6 +228,22 @@ TEST_F(WorkerNodeTest, WhatIsNoJobIsRefused) {
     ASSERT_EQ(step.events.size(), 1U);
     EXPECT_TRUE(std::holds_alternative<MessageRefused>(step.events[0].what));
   }
+}
+
+TEST_F(WorkerNodeTest, AfterAJobThatItCannotDoItRestsForOthersToGetTheNext) {
+  WorkerNode worker(kWorker, finder_, frames());
+  const Job job{.id = "1/0", .pairs = {{{kAlpha, 0}, {kBravo, 2}}}, .finder = {"sonar", 2, 1}, .settings = "a: 1\n"};
+  const Verdicts declined = answer(worker.receive(envelope(job), Timestamp{}));
+  EXPECT_TRUE(declined.cannot);
+  EXPECT_EQ(declined.failed, job.pairs);
+  EXPECT_NE(declined.why.find("even 3"), std::string::npos) << declined.why;
+  EXPECT_TRUE(worker.holds_job());
+  ASSERT_EQ(worker.next_timer(), Timestamp{} + WorkerNode::kRest_s);
+  EXPECT_TRUE(worker.on_timer(Timestamp{} + WorkerNode::kRest_s).messages.empty());
+  EXPECT_FALSE(worker.holds_job());
+  EXPECT_FALSE(worker.next_timer().has_value());
+  worker.make_others_with(std::make_shared<test::EvenMaker>());
+  EXPECT_TRUE(answer(worker.receive(envelope(job), Timestamp{})).cannot);
 }
 
 TEST_F(WorkerNodeTest, AFrameOfAnotherSubmapIsNoAnswer) {

@@ -327,7 +327,7 @@ class Mapper final : public Hosted {
  public:
   class Finder final : public server::ClosureFinder {
    public:
-    [[nodiscard]] std::uint32_t version() const override { return there_.version(); }
+    [[nodiscard]] MethodId id() const override { return there_.id(); }
     [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
       return there_.can_compare(first, second);
     }

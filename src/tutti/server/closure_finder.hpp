@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "tutti/base/result.hpp"
 #include "tutti/model/loop_closure.hpp"
@@ -16,12 +18,13 @@ namespace tutti::server {
 class ClosureFinder {
  public:
   virtual ~ClosureFinder() = default;
-  /// The number of what this finder makes of two submaps; every verdict carries it, and one of a larger number replaces
-  /// one of a smaller. Raised by hand in the commit that changes gates, methods or which pairs are candidates, and by
-  /// whoever changes a deployed finder's settings so that old answers no longer hold: a server restored from a state
-  /// with smaller numbers asks every pair again, and keeps the old closures until they are answered. Nothing notices a
-  /// change that leaves it as it was. A finder that takes another's place has a larger number than it had. At least 1.
-  [[nodiscard]] virtual std::uint32_t version() const = 0;
+  /// Who this is: every verdict carries it. The version is raised by hand in the commit that changes gates, methods or
+  /// which pairs are candidates; the settings are a hash of what it was given. A server whose finder is another one
+  /// than before asks every pair again, and keeps the old closures until they are answered. With a name, and of version
+  /// 1 at least.
+  [[nodiscard]] virtual MethodId id() const = 0;
+  /// All that a worker of the same program needs to make it (FinderMaker); empty: it cannot be made of this alone.
+  [[nodiscard]] virtual std::string settings() const { return {}; }
   /// Do submaps that carry so much have what verify() looks at? Else they are no pair.
   [[nodiscard]] virtual bool can_compare(const PayloadSize& first, const PayloadSize& second) const = 0;
   /// Cheap: is the pair worth a verification?
@@ -30,6 +33,21 @@ class ClosureFinder {
   /// never a verdict, when one cannot be read: the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                       const PayloadStore& payloads) const = 0;
+};
+
+class MapRefiner;
+
+/// Makes finders and refiners of what a job says of them, so that a worker needs no settings of its own.
+class FinderMaker {
+ public:
+  virtual ~FinderMaker() = default;
+  /// What it can make: without settings when it can with any.
+  [[nodiscard]] virtual std::vector<MethodId> can() const = 0;
+  /// One of exactly this id, or an error that says what is missing. Not null.
+  [[nodiscard]] virtual Result<std::shared_ptr<const ClosureFinder>> finder(const MethodId& id,
+                                                                            const std::string& settings) const = 0;
+  [[nodiscard]] virtual Result<std::shared_ptr<const MapRefiner>> refiner(const MethodId& id,
+                                                                          const std::string& settings) const = 0;
 };
 
 }  // namespace tutti::server

@@ -148,14 +148,14 @@ class WordsToAServer : public testing::Test {
     for (const VerificationJob& job : server.take_jobs())
       EXPECT_TRUE(server.receive(*finder.verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
   }
-  /// Nothing is found anywhere, says a newer version.
-  class Newer final : public ClosureFinder {
+  /// Nothing is found anywhere, says another one.
+  class Other final : public ClosureFinder {
    public:
-    [[nodiscard]] std::uint32_t version() const override { return 2; }
+    [[nodiscard]] MethodId id() const override { return {"nothing", 1, 0}; }
     [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
     [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
     [[nodiscard]] Result<ClosureVerdict> verify(const Submap& a, const Submap& b, const PayloadStore&) const override {
-      return ClosureVerdict{{a.id, b.id}, {}, Refusal{RefusalReason::overlap, 0.1, 0.3}, 2};
+      return ClosureVerdict{{a.id, b.id}, {}, Refusal{RefusalReason::overlap, 0.1, 0.3}, id()};
     }
   };
 
@@ -191,15 +191,15 @@ TEST_F(WordsToAServer, TheLaterWordHoldsInWhateverOrderTheyCome) {
   } while (std::ranges::next_permutation(words, {}, &ClosureWord::given_ns).found);
 }
 
-TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverNewerFindersSay) {
+TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverOtherFindersSay) {
   ASSERT_TRUE(server_.receive(pair_, word(Wish::accept)).has_value());
-  const auto newer = std::make_shared<Newer>();
-  MapServer server = make(newer, server_.state());
+  const auto other = std::make_shared<Other>();
+  MapServer server = make(other, server_.state());
   const auto jobs = server.take_jobs();
   EXPECT_TRUE(std::ranges::none_of(jobs, [&](const VerificationJob& job) { return job.pair == pair_; }));
   for (const VerificationJob& job : jobs)
-    ASSERT_TRUE(server.receive(*newer->verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
-  const auto late = newer->verify(*server.state().submaps.at(pair_.first), *server.state().submaps.at(pair_.second),
+    ASSERT_TRUE(server.receive(*other->verify(*job.first, *job.second, MemoryPayloadStore())).has_value());
+  const auto late = other->verify(*server.state().submaps.at(pair_.first), *server.state().submaps.at(pair_.second),
                                   MemoryPayloadStore());
   ASSERT_TRUE(server.receive(*late).has_value());
   server.optimise();
@@ -211,7 +211,7 @@ TEST_F(WordsToAServer, WhatIsAcceptedStaysWhateverNewerFindersSay) {
   const auto asked = server.take_jobs();  // which it was not, of this finder
   ASSERT_EQ(asked.size(), 1U);
   EXPECT_EQ(asked.front().pair, pair_);
-  answer(server, *newer);
+  answer(server, *other);
   ASSERT_TRUE(server.receive(*late).has_value());
   server.optimise();
   EXPECT_TRUE(server.map().closures.empty());

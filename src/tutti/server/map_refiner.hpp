@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
+
 #include "tutti/base/result.hpp"
 #include "tutti/model/refinement.hpp"
 #include "tutti/server/map_estimate.hpp"
@@ -13,6 +15,9 @@ namespace tutti::server {
 class MapRefiner {
  public:
   virtual ~MapRefiner() = default;
+  /// As a finder's (closure_finder.hpp); without a name: only who was given this one can do its jobs.
+  [[nodiscard]] virtual MethodId id() const { return {}; }
+  [[nodiscard]] virtual std::string settings() const { return {}; }
   /// Does a submap that carries so much have what refine() looks at? Else it takes no part.
   [[nodiscard]] virtual bool can_refine(const PayloadSize& size) const = 0;
   /// Expensive: runs in a worker. A pure function; may be called from any thread. `submaps`: those of the job, without

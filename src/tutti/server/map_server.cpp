@@ -83,7 +83,7 @@ Status check_alone(const ClosureVerdict& verdict, const std::set<RobotId>& robot
   return {};
 }
 
-/// Of two verdicts of one version on one pair, does `a` hold, whichever came first? In doubt there is no closure.
+/// Of two verdicts of one finder on one pair, does `a` hold, whichever came first? In doubt there is no closure.
 bool holds_over(const ClosureVerdict& a, const ClosureVerdict& b) {
   if (a.closures.empty() || b.closures.empty()) return a.closures.empty() && !b.closures.empty();
   const auto numbers = [](const ClosureVerdict& verdict) {
@@ -117,10 +117,11 @@ MapServer::MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFind
       config_(config),
       state_(std::move(state)) {
   TUTTI_CHECK(finder_ != nullptr && payloads_ != nullptr, "no finder or no store of payloads");
-  TUTTI_CHECK(finder_->version() > 0, "a finder without a version");
+  const MethodId who = finder_->id();
+  TUTTI_CHECK(!who.name.empty() && who.version > 0, "a finder without a name or a version");
   state_.epoch = std::max(epoch, state_.epoch + 1);
-  if (state_.finder_version < finder_->version()) {
-    state_.finder_version = finder_->version();
+  if (state_.finder != who) {
+    state_.finder = who;
     state_.answered.forget_answers();
     state_.refused.clear();
   }
@@ -192,29 +193,29 @@ bool MapServer::is_asked(const SubmapPair& pair) const {
          finder_->is_candidate(*first->second, *second->second);
 }
 
-std::optional<std::uint32_t> MapServer::answered_by(const SubmapPair& pair) const {
+bool MapServer::is_answered(const SubmapPair& pair) const {
   if (const auto found = state_.verdicts.find(pair); found != state_.verdicts.end())
-    return says(state_.words, pair, Wish::accept) ? std::numeric_limits<std::uint32_t>::max()
-                                                  : found->second.finder_version;
-  return state_.answered.contains(pair) ? std::optional(state_.finder_version) : std::nullopt;
+    return found->second.finder == state_.finder || says(state_.words, pair, Wish::accept);
+  return state_.answered.contains(pair);
 }
 
 void MapServer::plan_verification(const SubmapPair& pair) {
-  if (answered_by(pair) < finder_->version()) {
-    if (is_asked(pair)) return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
-    state_.verdicts.erase(pair);  // of an older finder, which asked
-  }
-  state_.answered.insert(pair);
+  if (!is_answered(pair) && is_asked(pair))
+    return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
+  state_.answered.insert(pair);  // what an earlier finder has found there stays
 }
 
 std::vector<VerificationJob> MapServer::take_jobs() { return std::exchange(jobs_, {}); }
 
 void MapServer::give_back(VerificationJob job) {
-  if (answered_by(job.pair) < finder_->version() && is_asked(job.pair)) jobs_.push_back(std::move(job));
+  if (!is_answered(job.pair) && is_asked(job.pair)) jobs_.push_back(std::move(job));
 }
 
 Status MapServer::receive(const ClosureVerdict& verdict) {
   if (auto ok = check_alone(verdict, robots_); !ok) return ok;
+  if (verdict.finder != state_.finder)
+    return fail(ErrorCode::unsupported, "{}: of finder {}, expected {}", name_of(verdict), to_string(verdict.finder),
+                to_string(state_.finder));
   if (!has_submaps_of(verdict)) return wait_for_submaps(verdict);
   if (auto ok = check_against_submaps(verdict); !ok) return ok;
   take(verdict);
@@ -260,14 +261,13 @@ void MapServer::judge_waiting() {
 
 void MapServer::take(const ClosureVerdict& verdict) {
   const auto& pair = verdict.pair;
-  const auto known = answered_by(pair);
   const auto kept = state_.verdicts.find(pair);
   const bool is_kept = kept != state_.verdicts.end();
-  if (known > verdict.finder_version) return;
-  if (known == verdict.finder_version && !(is_kept && holds_over(verdict, kept->second))) return;
-  if (!verdict.closures.empty() || (is_kept && !kept->second.closures.empty())) note_news();
-  if (verdict.finder_version >= finder_->version()) state_.answered.insert(pair);
-  if (verdict.refusal && verdict.finder_version == state_.finder_version) {
+  if (is_kept && says(state_.words, pair, Wish::accept)) return;
+  if (is_answered(pair) && !(is_kept && holds_over(verdict, kept->second))) return;
+  if (!verdict.closures.empty() || is_kept) note_news();
+  state_.answered.insert(pair);
+  if (verdict.refusal) {
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state_.refused);
     state_.verdicts.erase(pair);
   } else {
@@ -292,16 +292,9 @@ Status MapServer::receive(const SubmapPair& pair, const ClosureWord& word) {
   const bool was_accepted = known != state_.words.end() && known->second.wish == Wish::accept;
   const bool changes = known == state_.words.end() ? word.wish != Wish::withdraw : known->second.wish != word.wish;
   state_.words.insert_or_assign(pair, word);
-  if (was_accepted && word.wish != Wish::accept) plan_verification(pair);  // newer finders were not asked
+  if (was_accepted && word.wish != Wish::accept) plan_verification(pair);  // other finders were not asked
   if (changes && has_closures) note_news();
   return {};
-}
-
-RefusalCounts MapServer::refusals() const {
-  RefusalCounts counts = state_.refused;
-  for (const auto& [pair, verdict] : state_.verdicts)
-    if (verdict.refusal) count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, counts);
-  return counts;
 }
 
 ProxyGraphMessage MapServer::optimise() {

@@ -58,13 +58,13 @@ struct VerificationJob {
 struct MapServerState {
   SubmapSet submaps;                              ///< Without their payloads.
   std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of those that carry any.
-  /// Those with closures. Refusals are only counted: a pair that is answered and not among these is refused by
-  /// `finder_version`. Refusals by other versions, which are few, stand here too.
+  /// Those with closures: of `finder`, and of earlier ones where that has not answered. Refusals are only counted: a
+  /// pair that is answered and not among these is refused, or not to be asked.
   VerdictSet verdicts;
-  std::uint32_t finder_version = 0;
+  MethodId finder;
   WordSet words;           ///< Of operators.
-  AnsweredPairs answered;  ///< By a finder at least as new as the server's, or not to be asked.
-  RefusalCounts refused;   ///< By `finder_version`.
+  AnsweredPairs answered;  ///< By `finder`, or not to be asked.
+  RefusalCounts refused;   ///< By `finder`.
   Refinements refinements;
   std::uint64_t epoch = 0;  ///< Of the server that this is the state of.
   std::uint64_t revision = 0;
@@ -78,7 +78,8 @@ class MapServer {
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch);
   /// Goes on from a saved state; verifications that had no verdict yet become jobs again. All of them when the finder
-  /// is newer than the state's: what older ones found stays in the map until it is answered. The epoch becomes larger
+  /// is another than the state's: what that found stays in the map until it is answered, for good where the new one has
+  /// nothing to compare. The epoch becomes larger
   /// than the saved one if it is not; only the starter's number tells two starts from one saved state apart.
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
@@ -96,15 +97,15 @@ class MapServer {
   /// has lost it.
   Status receive(const SubmapMessage& message);
   /// The answer to a job, in any order, any number of times. Closures join a keyframe of pair.first to one of
-  /// pair.second, and the finder would ask for the pair; anything else is an error and changes nothing. Of two verdicts
-  /// on one pair that of the newer finder holds; of one version a refusal, then the closures with the smaller numbers:
-  /// the map is the same whatever came first. A verdict that comes before its submaps waits for them and is judged
-  /// then; it is an error when kMostWaiting wait already, and costs only that the pair is asked again.
+  /// pair.second, and the finder would ask for the pair; anything else is an error and changes nothing, and so is one
+  /// of another finder than the server's. Of two verdicts on one pair a refusal holds, then the closures with the
+  /// smaller numbers: the map is the same whatever came first. A verdict that comes before its submaps waits for them
+  /// and is judged then; it is an error when kMostWaiting wait already, and costs only that the pair is asked again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
   /// What an operator says of the closures of a pair, any number of times; the map follows at the next optimise(). An
   /// error, and nothing changes: its submaps are not there, or there are no closures to accept. Of two words on one
-  /// pair the later one holds. A verdict whose closures are accepted stays as it is, whatever newer finders say.
+  /// pair the later one holds. A verdict whose closures are accepted stays as it is, whatever other finders say.
   Status receive(const SubmapPair& pair, const ClosureWord& word);
   /// The answer to a refinement job, in any order, any number of times, however late; the map follows at the next
   /// optimise(). Of two on one step the newer map's holds (Refinements). One that failed, and what is no refinement of
@@ -137,9 +138,9 @@ class MapServer {
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
   [[nodiscard]] const MapServerState& state() const { return state_; }
-  /// Pairs by the reason they were refused for. One that a newer finder than the server's has refused again counts
-  /// twice.
-  [[nodiscard]] RefusalCounts refusals() const;
+  /// Pairs by the reason they were refused for.
+  [[nodiscard]] const RefusalCounts& refusals() const { return state_.refused; }
+  [[nodiscard]] const ClosureFinder& finder() const { return *finder_; }
   [[nodiscard]] const PayloadStore& payloads() const { return *payloads_; }
 
  private:
@@ -149,8 +150,8 @@ class MapServer {
   [[nodiscard]] PayloadSize size_of(SubmapId id) const;
   /// Both submaps are there and the finder wants the pair.
   [[nodiscard]] bool is_asked(const SubmapPair& pair) const;
-  /// The version of the finder whose answer holds, if there is one.
-  [[nodiscard]] std::optional<std::uint32_t> answered_by(const SubmapPair& pair) const;
+  /// By the server's finder, or by an operator's word.
+  [[nodiscard]] bool is_answered(const SubmapPair& pair) const;
   void plan_verification(const SubmapPair& pair);
   [[nodiscard]] bool has_submaps_of(const ClosureVerdict& verdict) const;
   [[nodiscard]] Status check_against_submaps(const ClosureVerdict& verdict) const;

@@ -69,7 +69,7 @@ TEST(MapServer, HandsOutAJobThatWasGivenBackUntilItHasAVerdict) {
   const std::vector<VerificationJob> again = server.take_jobs();
   ASSERT_EQ(again.size(), 1U);
   EXPECT_EQ(again.front().pair, jobs[2].pair);
-  EXPECT_TRUE(server.receive(ClosureVerdict{jobs[2].pair, {}, Refusal{}, 1}));
+  EXPECT_TRUE(server.receive(ClosureVerdict{jobs[2].pair, {}, Refusal{}, finder->id()}));
   server.give_back(jobs[2]);
   EXPECT_TRUE(server.take_jobs().empty());
 }
@@ -223,7 +223,7 @@ TEST(MapServer, WithTwoSessionsTheMapIsAFunctionOfTheSet) {
 /// Verifies by looking at the clouds: as many points as the submap's number says, each at x = that number.
 class CloudReader final : public ClosureFinder {
  public:
-  [[nodiscard]] std::uint32_t version() const override { return 1; }
+  [[nodiscard]] MethodId id() const override { return {"clouds", 1, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.points > 0 && second.points > 0;
   }
@@ -239,7 +239,7 @@ class CloudReader final : public ClosureFinder {
       EXPECT_EQ((*cloud)->points.front().x(), static_cast<float>((*cloud)->points.size()));
       seen = 10.0 * seen + static_cast<double>((*cloud)->points.size());
     }
-    return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::too_small, seen, 1000.0}, version()};
+    return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::too_small, seen, 1000.0}, id()};
   }
 };
 

@@ -23,14 +23,14 @@ SubmapMessage message_of(const Submap& submap) {
 class Refuser final : public ClosureFinder {
  public:
   explicit Refuser(std::uint32_t version = 1) : version_(version) {}
-  [[nodiscard]] std::uint32_t version() const override { return version_; }
+  [[nodiscard]] MethodId id() const override { return {"refuser", version_, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return first.id.chain != second.id.chain || second.id.index - first.id.index > 1;
   }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const PayloadStore&) const override {
-    return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::overlap, 0.1, 0.3}, version_};
+    return ClosureVerdict{{first.id, second.id}, {}, Refusal{RefusalReason::overlap, 0.1, 0.3}, id()};
   }
 
  private:
@@ -113,7 +113,7 @@ TEST_F(Verdicts, ThatDoNotBelongToTheirPairAreErrorsAndChangeNothing) {
   refused("expected one of", [&](V& v) { v.closures[0].to.index = jobs_.front().second->keyframes.back().index + 1; });
   refused("no pose", [](V& v) { v.closures[0].measurement.T_a_b.translation.x() = std::nan(""); });
   refused("negative variance", [](V& v) { v.closures[0].measurement.covariance(3, 3) = -1.0; });
-  refused("not asked", [](V& v) { v = {{{RobotId{0}, 3}, {RobotId{0}, 4}}, {}, Refusal{}, 1}; });
+  refused("not asked", [](V& v) { v = {{{RobotId{0}, 3}, {RobotId{0}, 4}}, {}, Refusal{}, v.finder}; });
   refused("1 closures and a refusal", [](V& v) { v.refusal.emplace(); });
   refused("0 closures without", [](V& v) { v.closures.clear(); });
   ASSERT_TRUE(server_.receive(good_).has_value());
@@ -123,45 +123,43 @@ TEST_F(Verdicts, ThatDoNotBelongToTheirPairAreErrorsAndChangeNothing) {
   EXPECT_EQ(restored.take_jobs().size(), jobs_.size() - 1);  // the bad ones answered nothing
 }
 
-TEST_F(Verdicts, ANewerFinderReplacesAnOlderWhateverComesFirst) {
+TEST_F(Verdicts, OfOneFinderTheSameHoldsWhateverComesFirst) {
   ClosureVerdict other = good_;
   other.closures[0].measurement.T_a_b.translation.z() += 0.01;
-  const Refusal refusal{RefusalReason::misfit, 1.5, 1.2};
-  const auto of_version = [](ClosureVerdict verdict, std::uint32_t version) {
-    verdict.finder_version = version;
-    return verdict;
-  };
-  const ClosureVerdict no{good_.pair, {}, refusal, 2};
-  // The last one holds, however they are shuffled; the server's own finder is of version 2.
-  const std::vector<std::vector<ClosureVerdict>> cases = {
-      {of_version(other, 1), of_version(good_, 2)},
-      {of_version(good_, 2), of_version(other, 3)},
-      {of_version(good_, 1), no},
-      {no, of_version(good_, 3)},
-      {of_version(good_, 2), of_version(no, 3)},
-      {of_version(no, 1), of_version(other, 2), of_version(good_, 2)},  // of equals the one with smaller numbers
-      {of_version(good_, 2), of_version(other, 2), no},                 // and in doubt none
-      {of_version(good_, 3), of_version(other, 3), of_version(no, 3)},
-      {of_version(good_, 1), of_version(no, 2), of_version(no, 3), of_version(other, 4)}};
-  const auto finder = std::make_shared<const TestFinder>(1, 0, 2);
-  for (std::size_t c = 0; c < cases.size(); ++c) {
-    const ClosureVerdict& holds = cases[c].back();
+  const ClosureVerdict no{good_.pair, {}, Refusal{RefusalReason::misfit, 1.5, 1.2}, finder_->id()};
+  // The last one holds, however they are shuffled: the one with smaller numbers, and in doubt none.
+  for (const std::vector<ClosureVerdict>& all : {std::vector{other, good_}, {good_, other, no}, {good_, no}}) {
     for (std::uint64_t seed = 0; seed < 12; ++seed) {
       Rng rng(seed);
-      std::vector<ClosureVerdict> order = cases[c];
+      std::vector<ClosureVerdict> order = all;
       order.push_back(order[rng.index(order.size())]);  // one of them twice
       shuffle(order, rng);
-      MapServer server = make_server(finder);
+      MapServer server = make_server(finder_);
       for (const Submap& submap : submaps_) ASSERT_TRUE(server.receive(message_of(submap)).has_value());
       for (const ClosureVerdict& verdict : order) ASSERT_TRUE(server.receive(verdict).has_value());
       std::vector<LoopClosure> kept;
       for (const auto& [pair, verdict] : server.state().verdicts)
         kept.insert(kept.end(), verdict.closures.begin(), verdict.closures.end());
-      EXPECT_EQ(kept, holds.closures) << "case " << c << ", seed " << seed;
-      MapServer restored = make_server(finder, server.state());
+      EXPECT_EQ(kept, all.back().closures) << all.size() << " verdicts, seed " << seed;
+      MapServer restored = make_server(finder_, server.state());
       EXPECT_FALSE(pairs_of(restored.take_jobs()).contains(good_.pair));
     }
   }
+}
+
+TEST_F(Verdicts, OfAnotherFinderAreNotBelieved) {
+  const MethodId mine = finder_->id();
+  for (const MethodId& other : {MethodId{"test", 2, 0}, MethodId{"test", 1, 7}, MethodId{"other", 1, 0}, MethodId{}}) {
+    ClosureVerdict verdict = good_;
+    verdict.finder = other;
+    const Status status = server_.receive(verdict);
+    ASSERT_FALSE(status.has_value());
+    EXPECT_EQ(status.error().code, ErrorCode::unsupported);
+    EXPECT_NE(status.error().message.find(to_string(other)), std::string::npos) << status.error().message;
+    EXPECT_NE(status.error().message.find(to_string(mine)), std::string::npos) << status.error().message;
+  }
+  EXPECT_TRUE(server_.state().verdicts.empty());
+  EXPECT_EQ(pairs_of(make_server(finder_, server_.state()).take_jobs()), pairs_of(jobs_));
 }
 
 TEST_F(Verdicts, ThatOvertakeTheirSubmapsWaitForThem) {
@@ -187,7 +185,7 @@ TEST_F(Verdicts, ThatOvertakeTheirSubmapsWaitForThem) {
 }
 
 TEST_F(Verdicts, NoMoreThanSoManyWait) {
-  ClosureVerdict early{{{RobotId{0}, 0}, {RobotId{1}, 10'000}}, {}, Refusal{}, 1};
+  ClosureVerdict early{{{RobotId{0}, 0}, {RobotId{1}, 10'000}}, {}, Refusal{}, finder_->id()};
   for (std::size_t i = 0; i < MapServer::kMostWaiting; ++i, ++early.pair.second.index) {
     ASSERT_TRUE(server_.receive(early).has_value());
     ASSERT_TRUE(server_.receive(early).has_value());  // does not wait twice
@@ -240,30 +238,56 @@ TEST(VerdictState, AnHoursRefusalsAreAFewNumbersPerSubmap) {
   EXPECT_TRUE(make_server(finder, state).take_jobs().empty());
 }
 
-TEST_F(Verdicts, ANewerFinderAsksAgainAndReplacesWhatTheOlderFound) {
-  const ClosureVerdict once_refused{jobs_[1].pair, {}, Refusal{RefusalReason::misfit, 1.5, 1.2}, 1};
+TEST_F(Verdicts, AnotherFinderAsksAgainAndReplacesWhatTheFormerFound) {
+  const ClosureVerdict once_refused{jobs_[1].pair, {}, Refusal{RefusalReason::misfit, 1.5, 1.2}, finder_->id()};
   ASSERT_TRUE(server_.receive(once_refused).has_value());
   for (const VerificationJob& job : jobs_) ASSERT_TRUE(server_.receive(answer(*finder_, job)).has_value());
   EXPECT_EQ(total(server_.refusals()), 1U);
-  const auto newer = std::make_shared<const TestFinder>(2, 0, 2);
-  MapServer restored = make_server(newer, server_.state());
+  const auto other = std::make_shared<const TestFinder>(2, 0, 2);
+  MapServer restored = make_server(other, server_.state());
   EXPECT_EQ(restored.state().verdicts, server_.state().verdicts);  // the map stays as it was
   EXPECT_TRUE(restored.refusals().empty());
   auto again = restored.take_jobs();
   EXPECT_EQ(pairs_of(again), pairs_of(jobs_));
-  for (const VerificationJob& job : jobs_) ASSERT_TRUE(restored.receive(answer(*finder_, job)).has_value());  // late
-  for (std::size_t i = 1; i < again.size(); ++i) ASSERT_TRUE(restored.receive(answer(*newer, again[i])).has_value());
-  MapServer twice = make_server(newer, restored.state());
+  for (const VerificationJob& job : jobs_) EXPECT_FALSE(restored.receive(answer(*finder_, job)).has_value());  // late
+  for (std::size_t i = 1; i < again.size(); ++i) ASSERT_TRUE(restored.receive(answer(*other, again[i])).has_value());
+  MapServer twice = make_server(other, restored.state());
   EXPECT_EQ(pairs_of(twice.take_jobs()), std::set{again[0].pair});
-  const ClosureVerdict refusal{again[0].pair, {}, Refusal{RefusalReason::no_alignment}, 2};
+  EXPECT_EQ(twice.state().verdicts.at(again[0].pair).finder, finder_->id());
+  const ClosureVerdict refusal{again[0].pair, {}, Refusal{RefusalReason::no_alignment}, other->id()};
   ASSERT_TRUE(twice.receive(refusal).has_value());
   EXPECT_FALSE(twice.state().verdicts.contains(again[0].pair));
-  for (const auto& [pair, verdict] : twice.state().verdicts) EXPECT_EQ(verdict.finder_version, 2U);
+  for (const auto& [pair, verdict] : twice.state().verdicts) EXPECT_EQ(verdict.finder, other->id());
   EXPECT_EQ(total(twice.refusals()), 1U);
 
-  const auto older = make_server(finder_, twice.state());  // and back: the newer answers stay
-  EXPECT_EQ(MapServer(older).take_jobs().size(), 0U);
-  EXPECT_EQ(older.state().verdicts, twice.state().verdicts);
+  MapServer back = make_server(finder_, twice.state());  // none is better than the other
+  EXPECT_EQ(back.state().verdicts, twice.state().verdicts);
+  EXPECT_EQ(pairs_of(back.take_jobs()), pairs_of(jobs_));
+}
+
+/// Sees nothing in any submap.
+class Blind final : public ClosureFinder {
+ public:
+  [[nodiscard]] MethodId id() const override { return {"blind", 9, 0}; }
+  [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return false; }
+  [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap&, const Submap&, const PayloadStore&) const override {
+    return fail(ErrorCode::invalid, "was not to be asked");
+  }
+};
+
+TEST_F(Verdicts, AFinderThatHasNothingToCompareErasesNoClosure) {
+  for (const VerificationJob& job : jobs_) ASSERT_TRUE(server_.receive(answer(*finder_, job)).has_value());
+  ASSERT_GT(server_.state().verdicts.size(), 5U);
+  server_.optimise();
+  MapServer blind = make_server(std::make_shared<const Blind>(), server_.state());
+  EXPECT_TRUE(blind.take_jobs().empty());
+  EXPECT_EQ(blind.state().verdicts, server_.state().verdicts);
+  blind.optimise();
+  EXPECT_EQ(blind.map().closures.size(), server_.map().closures.size());
+  MapServer back = make_server(finder_, blind.state());
+  EXPECT_TRUE(back.take_jobs().empty());  // they are its own
+  EXPECT_EQ(back.state().verdicts, server_.state().verdicts);
 }
 
 }  // namespace

@@ -205,7 +205,7 @@ ClosureVerdict ReferenceClosures::verify(const Submap& a, const Submap& b) const
   const bool in_order = a.id < b.id;
   const PlacedSubmap first = place(in_order ? a : b);
   const PlacedSubmap second = place(in_order ? b : a);
-  ClosureVerdict verdict{.pair = {first.id, second.id}, .finder_version = kVersion};
+  ClosureVerdict verdict{.pair = {first.id, second.id}};
   if (first.id == second.id) {
     verdict.refusal = Refusal{RefusalReason::same_submap};
     return verdict;

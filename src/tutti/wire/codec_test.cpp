@@ -358,7 +358,7 @@ RC_GTEST_PROP(JobCodec, ReceiptsJobsAndVerdictsComeBackExactly, ()) {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
   const Receipt receipt = test::any_receipt(rng);
   RC_ASSERT(decode_receipt(encode(receipt)).value() == receipt);
-  const Job job{"1/0/7", test::any_pairs(rng, rng.index(20))};
+  const Job job{"1/0/7", test::any_pairs(rng, rng.index(20)), {"visual", 2, rng.index(3)}, "gates:\n  a: 1\n"};
   RC_ASSERT(decode_job(encode(job)).value() == job);
   const Verdicts verdicts = test::any_verdicts(rng);
   RC_ASSERT(decode_verdicts(encode(verdicts)).value() == verdicts);
@@ -419,6 +419,9 @@ TEST(JobCodec, WhatIsOutOfRangeIsRefused) {
   for (const Job& job : {Job{"", pairs}, Job{"a b", pairs}, Job{std::string(201, 'a'), pairs}, Job{"a", turned}})
     EXPECT_FALSE(validate(job).has_value());
   EXPECT_TRUE(validate(Job{std::string(200, 'a'), pairs}).has_value());
+  EXPECT_FALSE(validate(Job{"a", pairs, {"two words", 1, 0}}).has_value());
+  EXPECT_FALSE(validate(Job{"a", pairs, {std::string(65, 'a'), 1, 0}}).has_value());
+  EXPECT_FALSE(validate(Job{"a", pairs, {"lidar", 1, 0}, std::string((64U << 10U) + 1, 'a')}).has_value());
   EXPECT_FALSE(validate(Verdicts{.job = "a", .verdicts = {}, .failed = turned, .why = {}}).has_value());
   EXPECT_FALSE(validate(Verdicts{.job = "a", .verdicts = {}, .failed = {}, .why = std::string(1001, 'a')}).has_value());
   Receipt receipt;

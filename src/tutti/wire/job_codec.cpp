@@ -4,6 +4,7 @@
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/job_message.hpp"
+#include "tutti/wire/internal/method_message.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/verdict_message.hpp"
 #include "tutti/wire/limits.hpp"
@@ -123,6 +124,7 @@ Status validate(const Receipt& receipt) {
 Status validate(const Job& job) {
   if (auto ok = check_job_id(job.id); !ok) return in_context("job", ok.error());
   if (auto ok = check_pairs(job.pairs); !ok) return in_context("job", ok.error());
+  if (auto ok = check_method(job.finder, job.settings); !ok) return in_context("job", ok.error());
   return {};
 }
 
@@ -180,6 +182,8 @@ std::string encode(const Job& job) {
   v1::Job out;
   out.set_id(job.id);
   write(job.pairs, *out.mutable_pairs());
+  if (job.finder != MethodId{}) write(job.finder, *out.mutable_finder());
+  out.set_settings(job.settings);
   return pack_frame(MessageKind::job, out.SerializeAsString());
 }
 
@@ -188,7 +192,10 @@ Result<Job> decode_job(std::string_view bytes) {
   if (!parsed) return tl::unexpected(parsed.error());
   auto pairs = read(parsed->message.pairs());
   if (!pairs) return in_context("job", pairs.error());
-  Job job{.id = parsed->message.id(), .pairs = std::move(*pairs)};
+  Job job{.id = parsed->message.id(),
+          .pairs = std::move(*pairs),
+          .finder = read(parsed->message.finder()),
+          .settings = parsed->message.settings()};
   if (auto ok = validate(job); !ok) return tl::unexpected(ok.error());
   return job;
 }
@@ -200,6 +207,7 @@ std::string encode(const Verdicts& verdicts) {
   for (const ClosureVerdict& verdict : verdicts.verdicts) write(verdict, *out.add_verdict());
   write(verdicts.failed, *out.mutable_failed());
   out.set_why(verdicts.why);
+  out.set_cannot(verdicts.cannot);
   return pack_frame(MessageKind::verdicts, out.SerializeAsString());
 }
 
@@ -208,8 +216,11 @@ Result<Verdicts> decode_verdicts(std::string_view bytes) {
   if (!parsed) return tl::unexpected(parsed.error());
   auto failed = read(parsed->message.failed());
   if (!failed) return in_context("verdicts", failed.error());
-  Verdicts verdicts{
-      .job = parsed->message.job(), .verdicts = {}, .failed = std::move(*failed), .why = parsed->message.why()};
+  Verdicts verdicts{.job = parsed->message.job(),
+                    .verdicts = {},
+                    .failed = std::move(*failed),
+                    .why = parsed->message.why(),
+                    .cannot = parsed->message.cannot()};
   for (const v1::Verdict& in : parsed->message.verdict()) {
     auto verdict = read_verdict(in);
     if (!verdict) return tl::unexpected(verdict.error());

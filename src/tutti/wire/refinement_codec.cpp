@@ -11,6 +11,7 @@
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/job_message.hpp"
+#include "tutti/wire/internal/method_message.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/pose_numbers.hpp"
 #include "tutti/wire/limits.hpp"
@@ -92,6 +93,7 @@ Status validate(const RefinementJob& job) {
     if (auto ok = check_order(job.parts, "submaps", &RefinementJob::Part::submap); !ok) return ok;
     if (auto ok = check_pairs(job.closed); !ok) return ok;
     if (auto ok = check_order(job.closed, "pairs"); !ok) return ok;
+    if (auto ok = check_method(job.refiner, job.settings); !ok) return ok;
     for (const RefinementJob::Part& part : job.parts)
       for (const Pose3& T : part.T_world_body)
         if (auto ok = check_refined_pose(T); !ok) return ok;
@@ -133,6 +135,8 @@ std::string encode(const RefinementJob& job) {
     for (const Pose3& T : T_world_body) write(T, *out.mutable_pose());
   }
   write(job.closed, *out.mutable_closed());
+  if (job.refiner != MethodId{}) write(job.refiner, *out.mutable_refiner());
+  out.set_settings(job.settings);
   return pack_frame(MessageKind::refinement_job, out.SerializeAsString());
 }
 
@@ -150,7 +154,12 @@ Result<RefinementJob> decode_refinement_job(std::string_view bytes) {
       keyframes * kPoseNumbers != static_cast<std::uint64_t>(in.pose_size()))
     return fail(ErrorCode::parse, "refinement job: {} submaps in columns of {} and {}, {} keyframes with {} numbers",
                 submaps->size(), in.is_free_size(), in.keyframes_size(), keyframes, in.pose_size());
-  RefinementJob job{.id = in.id(), .revision = in.revision(), .whole = in.whole(), .closed = std::move(*closed)};
+  RefinementJob job{.id = in.id(),
+                    .revision = in.revision(),
+                    .whole = in.whole(),
+                    .closed = std::move(*closed),
+                    .refiner = read(in.refiner()),
+                    .settings = in.settings()};
   int at = 0;
   for (int i = 0; i < in.is_free_size(); ++i) {
     RefinementJob::Part& part = job.parts.emplace_back();
@@ -184,6 +193,7 @@ std::string encode(const Refinement& refinement) {
   out.add_rms_px(refinement.counts.rms_before_px);
   out.add_rms_px(refinement.counts.rms_after_px);
   out.set_why(refinement.why);
+  out.set_cannot(refinement.cannot);
   return pack_frame(MessageKind::refinement, out.SerializeAsString());
 }
 
@@ -203,7 +213,8 @@ Result<Refinement> decode_refinement(std::string_view bytes) {
                  .whole = in.whole(),
                  .submaps = std::move(*submaps),
                  .closed = std::move(*closed),
-                 .why = in.why()};
+                 .why = in.why(),
+                 .cannot = in.cannot()};
   if (auto ok = read_keyframes(in, out); !ok) return in_context("refinement", ok.error());
   for (std::size_t i = 0; i < kCounts.size(); ++i) out.counts.*kCounts[i] = in.count(static_cast<int>(i));
   out.counts.rms_before_px = in.rms_px(0);

@@ -5,6 +5,7 @@
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
+#include "tutti/wire/internal/method_message.hpp"
 #include "tutti/wire/internal/payload.hpp"
 #include "tutti/wire/internal/pose_numbers.hpp"
 #include "tutti/wire/limits.hpp"
@@ -46,6 +47,7 @@ void write(const NodeStatus& status, v1::Status& out) {
   out.set_finished(status.finished);
   out.set_jobs_done(status.jobs_done);
   out.set_trouble(status.trouble);
+  for (const MethodId& id : status.can) wire::write(id, *out.add_can());
 }
 
 Result<NodeStatus> read(const v1::Status& in) {
@@ -63,7 +65,9 @@ Result<NodeStatus> read(const v1::Status& in) {
                     .alerts = in.alerts(),
                     .finished = in.finished(),
                     .jobs_done = in.jobs_done(),
-                    .trouble = in.trouble()};
+                    .trouble = in.trouble(),
+                    .can = {}};
+  for (const v1::Method& id : in.can()) status.can.push_back(wire::read(id));
   if (in.has_update_age_s()) status.update_age_s = in.update_age_s();
   if (in.pose_size() == kPoseNumbers)
     status.T_odom_body = read_pose(in.pose(), 0);
@@ -119,6 +123,11 @@ Status validate(const NodeStatus& status) {
   if (auto ok = check_name(status.name); !ok) return wrong(ok.error());
   if (auto ok = check_text(status.version, "a version"); !ok) return wrong(ok.error());
   if (auto ok = check_text(status.trouble, "trouble"); !ok) return wrong(ok.error());
+  if (status.can.size() > kMaxMethods)
+    return fail(ErrorCode::invalid, "status: can do {} things, at most {} are accepted", status.can.size(),
+                kMaxMethods);
+  for (const MethodId& id : status.can)
+    if (auto ok = check_method(id); !ok) return wrong(ok.error());
   if (status.update_age_s && !(std::isfinite(*status.update_age_s) && *status.update_age_s >= 0.0))
     return fail(ErrorCode::invalid, "status: an update {} s ago, expected 0 or more", *status.update_age_s);
   if (!is_valid(status.T_odom_body) || status.T_odom_body.translation.cwiseAbs().maxCoeff() > kMaxCoordinate_m)
@@ -130,6 +139,8 @@ Status validate(const MissionStatus& status) {
   const auto wrong = [](const Error& error) { return in_context("mission status", error); };
   if (auto ok = check_text(status.version, "a version"); !ok) return wrong(ok.error());
   if (auto ok = check_text(status.trouble, "trouble"); !ok) return wrong(ok.error());
+  if (auto ok = check_text(status.finder, "a finder"); !ok) return wrong(ok.error());
+  if (auto ok = check_text(status.why_waiting, "a reason to wait"); !ok) return wrong(ok.error());
   if (status.robots.size() > kMaxRobots || status.workers.size() > kMaxRobots ||
       status.refusals.size() > kMaxRefusalKinds)
     return fail(
@@ -201,6 +212,10 @@ std::string encode(const MissionStatus& status) {
     entry.set_last_why(refusals.last_why);
   }
   out.set_trouble(status.trouble);
+  out.set_finder(status.finder);
+  out.set_former_pairs(status.former_pairs);
+  out.set_waiting(status.waiting);
+  out.set_why_waiting(status.why_waiting);
   return pack_frame(MessageKind::mission_status, out.SerializeAsString());
 }
 
@@ -221,7 +236,11 @@ Result<MissionStatus> decode_mission_status(std::string_view bytes) {
                        .robots = {},
                        .workers = {},
                        .refusals = {},
-                       .trouble = in.trouble()};
+                       .trouble = in.trouble(),
+                       .finder = in.finder(),
+                       .former_pairs = in.former_pairs(),
+                       .waiting = in.waiting(),
+                       .why_waiting = in.why_waiting()};
   for (const v1::RobotInMission& entry : in.robot()) {
     auto robot = read(entry);
     if (!robot) return in_context("mission status", robot.error());

@@ -6,6 +6,7 @@
 
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/internal/method_message.hpp"
 #include "tutti/wire/internal/visual_codec.hpp"
 #include "tutti/wire/limits.hpp"
 
@@ -221,11 +222,25 @@ Status validate(const ProxyGraphMessage& message) {
   return {};
 }
 
+Status check_method(const MethodId& id) {
+  const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
+  if (id.name.size() <= kMaxNameBytes && std::ranges::all_of(id.name, is_plain)) return {};
+  return fail(ErrorCode::invalid, "a finder or refiner with a name of {} letters, expected at most {}, all plain",
+              id.name.size(), kMaxNameBytes);
+}
+
+Status check_method(const MethodId& id, const std::string& settings) {
+  if (auto ok = check_method(id); !ok) return ok;
+  if (auto ok = at_most(settings.size(), kMaxSettingsBytes, "bytes of settings"); !ok) return ok;
+  return {};
+}
+
 Status validate(const ClosureVerdict& verdict) {
   const auto& [first, second] = verdict.pair;
   // Only of what is no good: of millions of verdicts in a large map all are.
   const auto where = [&] { return fmt::format("verdict on submaps {} and {}", to_string(first), to_string(second)); };
   if (!(first < second)) return fail(ErrorCode::invalid, "{}: expected the first to be the smaller", where());
+  if (auto ok = check_method(verdict.finder); !ok) return in_context(where(), ok.error());
   if (auto ok = at_most(verdict.closures.size(), kMaxClosures, "closures"); !ok) return in_context(where(), ok.error());
   if (verdict.closures.empty() != verdict.refusal.has_value())
     return fail(ErrorCode::invalid, "{}: {} closures {} a refusal, expected one of the two", where(),

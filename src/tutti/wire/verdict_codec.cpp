@@ -70,7 +70,9 @@ void write(const ClosureVerdict& verdict, v1::Verdict& out) {
     out.set_value(verdict.refusal->value);
     out.set_limit(verdict.refusal->limit);
   }
-  out.set_finder_version(verdict.finder_version);
+  out.set_finder_version(verdict.finder.version);
+  out.set_finder_name(verdict.finder.name);
+  out.set_finder_settings(verdict.finder.settings);
   for (const Refusal& measured : verdict.evidence) {
     out.add_gate(static_cast<std::uint32_t>(measured.reason));
     out.add_gate_value(measured.value);
@@ -88,7 +90,7 @@ Result<ClosureVerdict> read_verdict(const v1::Verdict& in) {
     if (!read_closure) return in_context("verdict", read_closure.error());
     verdict.closures.push_back(*read_closure);
   }
-  verdict.finder_version = in.finder_version();
+  verdict.finder = {in.finder_name(), in.finder_version(), in.finder_settings()};
   if (in.refused()) {
     const auto refusal = read_measured(in.refusal(), in.value(), in.limit());
     if (!refusal) return in_context("verdict", refusal.error());

@@ -22,7 +22,7 @@ namespace tutti::mapfile::test {
 /// True relative poses with evidence; every fourth is wrong. Sessions of one robot walk the same way at other times.
 class ExplainingFinder final : public server::ClosureFinder {
  public:
-  [[nodiscard]] std::uint32_t version() const override { return finder_.version(); }
+  [[nodiscard]] MethodId id() const override { return finder_.id(); }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return finder_.is_candidate(first, second);

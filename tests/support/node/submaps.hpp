@@ -4,10 +4,12 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "tutti/bus/envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/server/closure_finder.hpp"
+#include "tutti/server/map_refiner.hpp"
 #include "tutti/wire/codec.hpp"
 
 /// Submaps of robots that walk along straight lines, and who finds closures between them.
@@ -38,7 +40,9 @@ inline bus::Envelope envelope(const SubmapMessage& message) {
 /// Asks for every pair; those of even numbers are in one place, the others refused. Needs both clouds.
 class EvenFinder final : public server::ClosureFinder {
  public:
-  [[nodiscard]] std::uint32_t version() const override { return 3; }
+  explicit EvenFinder(std::string settings = "gap: 0\n") : settings_(std::move(settings)) {}
+  [[nodiscard]] MethodId id() const override { return {"even", 3, settings_hash(settings_)}; }
+  [[nodiscard]] std::string settings() const override { return settings_; }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return first.points > 0 && second.points > 0;
   }
@@ -47,7 +51,7 @@ class EvenFinder final : public server::ClosureFinder {
                                               const server::PayloadStore& payloads) const override {
     for (const Submap* submap : {&first, &second})
       if (const auto cloud = payloads.cloud(submap->id); !cloud) return tl::unexpected(cloud.error());
-    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder_version = version()};
+    ClosureVerdict verdict{.pair = {first.id, second.id}, .closures = {}, .refusal = {}, .finder = id()};
     if (first.id.index % 2 == 0 && second.id.index % 2 == 0)
       verdict.closures.push_back({{first.id.chain, first.keyframes.front().index},
                                   {second.id.chain, second.keyframes.front().index},
@@ -56,6 +60,25 @@ class EvenFinder final : public server::ClosureFinder {
     else
       verdict.refusal = Refusal{RefusalReason::overlap, 0.1, 0.3};
     return verdict;
+  }
+
+ private:
+  std::string settings_;
+};
+
+/// Makes such ones.
+class EvenMaker final : public server::FinderMaker {
+ public:
+  [[nodiscard]] std::vector<MethodId> can() const override { return {{"even", 3, 0}}; }
+  [[nodiscard]] Result<std::shared_ptr<const server::ClosureFinder>> finder(
+      const MethodId& id, const std::string& settings) const override {
+    auto made = std::make_shared<const EvenFinder>(settings);
+    if (made->id() != id) return fail(ErrorCode::unsupported, "no finder {}", to_string(id));
+    return made;
+  }
+  [[nodiscard]] Result<std::shared_ptr<const server::MapRefiner>> refiner(const MethodId& id,
+                                                                          const std::string&) const override {
+    return fail(ErrorCode::unsupported, "no refiner {}", to_string(id));
   }
 };
 

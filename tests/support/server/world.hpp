@@ -72,7 +72,7 @@ class TestFinder final : public ClosureFinder {
   explicit TestFinder(std::uint64_t seed, std::uint32_t wrong_every = 0, std::uint32_t version = 1)
       : seed_(seed), wrong_every_(wrong_every), version_(version) {}
 
-  [[nodiscard]] std::uint32_t version() const override { return version_; }
+  [[nodiscard]] MethodId id() const override { return {"test", version_, 0}; }
   [[nodiscard]] bool can_compare(const PayloadSize&, const PayloadSize&) const override { return true; }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     if (first.id.chain == second.id.chain && second.id.index - first.id.index < 3) return false;
@@ -91,7 +91,7 @@ class TestFinder final : public ClosureFinder {
                       draw(rng, 0.02, 0.005));
     if (wrong_every_ > 0 && rng.index(wrong_every_) == 0)
       T.translation += Eigen::Vector3d(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)).normalized() * 3.0;
-    return ClosureVerdict{{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, {}, version()};
+    return ClosureVerdict{{first.id, second.id}, {{a, b, {T, diagonal_covariance(0.02, 0.005)}}}, {}, id()};
   }
   static bool is_wrong(const LoopClosure& closure) {
     const Pose3 truth = true_pose(closure.from.chain.robot, closure.from.index).inverse() *

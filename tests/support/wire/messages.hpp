@@ -152,7 +152,8 @@ inline ClosureVerdict any_verdict(Rng& rng, std::size_t closures) {
                                 {two, static_cast<std::uint32_t>(rng.index(1000))},
                                 {any_pose(rng, 5.0), any_covariance(rng)}});
   if (closures == 0) verdict.refusal = Refusal{RefusalReason::overlap, rng.uniform(0.0, 0.3), 0.3};
-  verdict.finder_version = static_cast<std::uint32_t>(rng.index(3));
+  if (rng.bernoulli(0.7))
+    verdict.finder = {rng.bernoulli(0.5) ? "lidar" : "", static_cast<std::uint32_t>(rng.index(3)), rng.index(3)};
   if (closures > 0 && rng.bernoulli(0.7)) {
     verdict.evidence = {{RefusalReason::overlap, rng.uniform(0.3, 1.0), 0.3}, {RefusalReason::plane_rmse, 0.02, 0.1}};
     verdict.worker = static_cast<std::uint32_t>(rng.index(3));
@@ -214,7 +215,9 @@ inline NodeStatus any_status(Rng& rng) {
                     .alerts = count(),
                     .finished = rng.bernoulli(0.5),
                     .jobs_done = count(),
-                    .trouble = rng.bernoulli(0.5) ? "no room: 3 bytes left" : ""};
+                    .trouble = rng.bernoulli(0.5) ? "no room: 3 bytes left" : "",
+                    .can = {}};
+  for (std::uint64_t i = rng.index(3); i > 0; --i) status.can.push_back({"visual", 2, i - 1});
   if (rng.bernoulli(0.5)) status.update_age_s = rng.uniform(0.0, 1e4);
   return status;
 }
@@ -234,7 +237,11 @@ inline MissionStatus any_mission_status(Rng& rng) {
                        .robots = {},
                        .workers = {},
                        .refusals = {},
-                       .trouble = "none"};
+                       .trouble = "none",
+                       .finder = "visual 2",
+                       .former_pairs = rng.index(1000),
+                       .waiting = rng.index(2),
+                       .why_waiting = "no finder 'visual 3'"};
   for (std::uint32_t i = 0; i < rng.index(4); ++i) {
     MissionStatus::Robot& robot = status.robots.emplace_back();
     robot.robot = RobotId{3 * i};
@@ -258,7 +265,11 @@ inline ClosureWord any_word(Rng& rng) {
 }
 
 inline Verdicts any_verdicts(Rng& rng) {
-  Verdicts out{.job = "12/0.3:4-5_6", .verdicts = {}, .failed = any_pairs(rng, rng.index(3)), .why = "\xff no cloud"};
+  Verdicts out{.job = "12/0.3:4-5_6",
+               .verdicts = {},
+               .failed = any_pairs(rng, rng.index(3)),
+               .why = "\xff no cloud",
+               .cannot = rng.bernoulli(0.5)};
   for (std::size_t i = rng.index(5); i > 0; --i) out.verdicts.push_back(any_verdict(rng, rng.index(3)));
   return out;
 }
@@ -275,6 +286,8 @@ inline RefinementJob any_refinement_job(Rng& rng) {
   job.parts.erase(twice.begin(), twice.end());
   job.closed = any_pairs(rng, rng.index(4));
   std::ranges::sort(job.closed);
+  if (rng.bernoulli(0.5)) job.refiner = {"bundle", 1, 1 + rng.index(9)};
+  if (rng.bernoulli(0.5)) job.settings = "sigma_px: 1.0\n";
   return job;
 }
 
@@ -288,6 +301,7 @@ inline Refinement any_refinement(Rng& rng) {
     if (rng.bernoulli(0.7)) out.steps.push_back({id, {any_pose(rng, 5.0), any_covariance(rng)}});
   out.counts = {.keyframes = rng.index(1000), .two_things = rng.index(1000), .rms_before_px = 1.5, .rms_after_px = 0.5};
   if (rng.bernoulli(0.3)) out.why = "no images";
+  out.cannot = rng.bernoulli(0.2);
   return out;
 }
 

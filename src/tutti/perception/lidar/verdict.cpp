@@ -7,7 +7,7 @@ namespace tutti::lidar {
 ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerification& verification) {
   TUTTI_CHECK(!a.keyframes.empty() && !b.keyframes.empty() && a.id != b.id);
   if (b.id < a.id) return to_verdict(b, a, inverse(verification));
-  ClosureVerdict verdict{.pair = {a.id, b.id}, .refusal = verification.refusal, .finder_version = kFinderVersion};
+  ClosureVerdict verdict{.pair = {a.id, b.id}, .refusal = verification.refusal};
   if (!verification.accepted) return verdict;
   const Middle from = find_middle(a), to = find_middle(b);
   // T_from_to = T_a_from^-1 T_a_b T_b_to: the errors of all three, in the frame of `to`.

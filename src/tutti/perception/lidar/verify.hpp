@@ -13,7 +13,7 @@
 namespace tutti::lidar {
 
 /// Of what extract_features, plausible_pair, verify_pair and to_verdict make of two submaps. Raised by hand in the
-/// commit that changes it, be it by a gate's default: servers then ask again what older versions answered.
+/// commit that changes it, be it by a gate's default: servers then ask again what another version answered.
 inline constexpr std::uint32_t kFinderVersion = 1;
 
 /// What comparing two submaps found. The measured quantities are those of the best alignment, also when refused.
@@ -45,6 +45,7 @@ PairVerification inverse(PairVerification verification);
 
 /// The closure is expressed between the middle keyframes, where bent submaps agree best; its covariance is enlarged by
 /// the odometry between the middle and the rest of each submap. pair.first < pair.second whatever the order of a and b.
+/// Whose verdict it is, is not said.
 ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerification& verification);
 
 }  // namespace tutti::lidar

@@ -163,7 +163,6 @@ TEST(ToVerdict, aRefusalCarriesItsReason) {
   EXPECT_TRUE(verdict.closures.empty());
   EXPECT_EQ(verdict.refusal, refusal);
   EXPECT_EQ(to_string(refusal), "overlap: 0.10, at least 0.30 needed");
-  EXPECT_EQ(verdict.finder_version, kFinderVersion);
   EXPECT_LT(verdict.pair.first, verdict.pair.second);
 }
 

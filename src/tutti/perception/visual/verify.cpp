@@ -176,7 +176,7 @@ bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_s
 ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const VisualClosureConfig& config) {
   TUTTI_CHECK(a.id != b.id, "submap {} against itself", to_string(a.id));
   if (b.id < a.id) return verify_pair(b, a, config);
-  ClosureVerdict verdict{.pair = {a.id, b.id}, .finder_version = kFinderVersion};
+  ClosureVerdict verdict{.pair = {a.id, b.id}};
   verdict.refusal = why_not_comparable(a, b);
   if (verdict.refusal) return verdict;
 

@@ -10,7 +10,7 @@
 namespace tutti::visual {
 
 /// Of what extract_features, is_candidate and verify_pair make of two submaps. Raised by hand in the commit that
-/// changes it, be it by a gate's default: servers then ask again what older versions answered.
+/// changes it, be it by a gate's default: servers then ask again what another version answered.
 inline constexpr std::uint32_t kFinderVersion = 2;
 
 /// Cheap, without payloads: far enough apart in their chain, if it is one, and in time. first < second.
@@ -23,6 +23,7 @@ bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_s
 /// keyframe that saw most of those landmarks, and is believed for what it measures: how sure its position is, and over
 /// how much of an image its inliers are spread; many inliers in one patch prove nothing. In the order of the submap
 /// ids, whatever the order of a and b. Refused for the reason that the keyframe which came farthest met.
+/// Whose verdict it is, is not said.
 ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const VisualClosureConfig& config);
 
 }  // namespace tutti::visual

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/finder_maker.hpp"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "tutti/base/config_io.hpp"
+#include "tutti/mission/bundle_refiner.hpp"
+#include "tutti/mission/closure_finders.hpp"
+
+namespace tutti::mission {
+namespace {
+
+struct FinderSettings {
+  ClosureConfig closures;
+  std::uint64_t seed = 1;
+  template <class V>
+  void describe(V& v) {
+    v.field("closures", closures);
+    v.field("seed", seed, any(), "Of what is drawn.");
+  }
+};
+
+/// What the finder that is configured does not look at.
+bool is_idle(const ClosureConfig& config, std::string_view key) {
+  const auto used_by = [&](std::string_view finder) { return config.finder == finder || config.finder == "sensors"; };
+  if (key == "feature_cache_mb") return true;  // memory for time
+  if (key == "lidar" || key == "visual") return !used_by(key);
+  if (key == "reference" || key == "planted") return config.finder != "reference";
+  return key == "wrong" && config.wrong_share == 0.0;
+}
+
+bool is_of(const MethodId& can, const MethodId& id) { return can.name == id.name && can.version == id.version; }
+
+Status check_known(const MethodId& id, const std::vector<MethodId>& can, const std::string& settings) {
+  if (std::ranges::any_of(can, [&](const MethodId& one) { return one.name == id.name && one.version != id.version; }))
+    return fail(ErrorCode::unsupported, "{} is of another version of the program than this worker", to_string(id));
+  if (std::ranges::none_of(can, [&](const MethodId& one) { return is_of(one, id); }) || settings.empty())
+    return fail(ErrorCode::unsupported, "{} needs its mission: tutti worker MISSION.yaml, as the server has it",
+                to_string(id));
+  return {};
+}
+
+tl::unexpected<Error> other_settings(const MethodId& id, const MethodId& made) {
+  return fail(ErrorCode::unsupported, "{} cannot be made here, {} can: of another version of the program",
+              to_string(id), to_string(made));
+}
+
+}  // namespace
+
+std::string settings_of(const ClosureConfig& config, std::uint64_t seed) {
+  const bool draws = config.finder == "reference" || config.wrong_share > 0.0;
+  ConfigNode node = dump_config(FinderSettings{config, seed});
+  std::erase_if(node.map, [&](const auto& entry) { return entry.first == "seed" && !draws; });
+  std::erase_if(node.map.front().second.map, [&](const auto& entry) { return is_idle(config, entry.first); });
+  return to_yaml(node);
+}
+
+std::string settings_of(const bundle::RefinementConfig& config) { return to_yaml(dump_config(config)); }
+
+std::vector<MethodId> SensorFinderMaker::can() const {
+  return {{"lidar", lidar::kFinderVersion, 0},
+          {"visual", visual::kFinderVersion, 0},
+          {"sensors", JointClosureFinder::kVersion, 0},
+          {BundleRefiner::kName, BundleRefiner::kVersion, 0}};
+}
+
+Result<std::shared_ptr<const server::ClosureFinder>> SensorFinderMaker::finder(const MethodId& id,
+                                                                               const std::string& settings) const {
+  if (auto ok = check_known(id, can(), settings); !ok) return tl::unexpected(ok.error());
+  const auto node = parse_yaml(settings, "the job's settings");
+  if (!node) return tl::unexpected(node.error());
+  FinderSettings read;
+  if (auto ok = load_config(*node, read, "the job's settings"); !ok) return tl::unexpected(ok.error());
+  if (read.closures.finder != id.name)
+    return fail(ErrorCode::invalid, "the job's settings are of finder '{}', expected {}", read.closures.finder,
+                to_string(id));
+  read.closures.feature_cache_mb = feature_cache_mb_;
+  auto made = make_closure_finder(read.closures, {}, read.seed);
+  if (made->id() != id) return other_settings(id, made->id());
+  return made;
+}
+
+Result<std::shared_ptr<const server::MapRefiner>> SensorFinderMaker::refiner(const MethodId& id,
+                                                                             const std::string& settings) const {
+  if (auto ok = check_known(id, can(), settings); !ok) return tl::unexpected(ok.error());
+  const auto node = parse_yaml(settings, "the job's settings");
+  if (!node) return tl::unexpected(node.error());
+  bundle::RefinementConfig config;
+  if (auto ok = load_config(*node, config, "the job's settings"); !ok) return tl::unexpected(ok.error());
+  auto made = std::make_shared<const BundleRefiner>(config);
+  if (made->id() != id) return other_settings(id, made->id());
+  return made;
+}
+
+}  // namespace tutti::mission
