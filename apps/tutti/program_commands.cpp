@@ -17,6 +17,8 @@
 namespace tutti::app {
 namespace {
 
+constexpr const char* kFilesName = "as the mission file says (mission: NAME), else 'tutti'";
+
 void add_bus_option(CLI::App& command, std::string& bus, bool& insecure) {
   command.add_option("--bus", bus, "The bus, as the server prints it")->type_name("nats://HOST:PORT")->required();
   command.add_flag("--insecure", insecure, "Use a bus on another machine although there is no TLS yet");
@@ -50,6 +52,7 @@ void add_server_command(CLI::App& app, int& exit_code) {
       "--insecure", options->insecure,
       "Let other machines in although there is no TLS yet: whoever reaches the port can write to the map");
   add_mission_argument(*command, *common, "Names of the robots and all settings; without it any robot is welcome");
+  add_mission_name(*command, common->mission.name, kFilesName);
   command->add_option("--threads", options->threads, "Threads that verify loop closures here; 0 = only workers do")
       ->type_name("N")
       ->check(CLI::Range(0, 1024))
@@ -88,6 +91,7 @@ void add_robot_command(CLI::App& app, int& exit_code) {
                    "Folder of this robot: what it knows, and what is not sent yet; made if missing");
   add_mission_argument(*command, *common,
                        "The mission whose recording is replayed, or 'demo'; with --feed: only names and settings");
+  add_mission_name(*command, common->mission.name, kFilesName);
   command
       ->add_option("--feed", options->feed,
                    "Take odometry and scans on this Unix socket and answer with where the robot is (docs/protocol.md)")
@@ -122,7 +126,9 @@ void add_worker_command(CLI::App& app, int& exit_code) {
       "stop "
       "it.");
   add_bus_option(*command, options->bus, options->insecure);
-  add_mission_argument(*command, *common, "As the server has it, for how closures are found; without it from LiDAR");
+  add_mission_argument(*command, *common,
+                       "Needed only where closures come from its reference: all else the server says with each job");
+  add_mission_name(*command, common->mission.name, "the one that has a server on this bus");
   command->add_option("--threads", options->threads, "Pairs that are verified at a time; 0 = one on each core")
       ->type_name("N")
       ->check(CLI::Range(0, 1024))

@@ -20,6 +20,15 @@ struct ProgramArguments {
   int parent = 0;  ///< That it ends with; 0: none.
 };
 
+inline CLI::Option* add_mission_name(CLI::App& command, std::string& name, const std::string& otherwise) {
+  return command
+      .add_option("--mission", name,
+                  "What the mission is called on the bus: programs of other missions are not heard. Letters, digits, "
+                  "'-' and '_'; default: " +
+                      otherwise)
+      ->type_name("NAME");
+}
+
 inline CLI::Option* add_mission_argument(CLI::App& command, ProgramArguments& arguments, const std::string& what) {
   command.add_option("--data", arguments.mission.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");
@@ -32,7 +41,7 @@ inline CLI::Option* add_mission_argument(CLI::App& command, ProgramArguments& ar
       ->type_name("KEY=VALUE")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  return command.add_option("mission", arguments.mission.file, what)->type_name("MISSION.yaml");
+  return command.add_option("mission_file", arguments.mission.file, what)->type_name("MISSION.yaml");
 }
 
 inline void add_rate_option(CLI::App& command, double& rate, const std::string& what) {

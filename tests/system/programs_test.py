@@ -182,6 +182,77 @@ class Programs(unittest.TestCase):
         self.assertEqual(server.end()[0], 0)
         self.expect_same_map_file()
 
+    def mission_status(self, bus, *more):
+        done = run("status", "--bus", bus, "--json", *more)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        return json.loads(done.stdout)
+
+    def test_what_a_bare_worker_cannot_do_waits_for_one_that_can(self):
+        server, bus = self.start_server("--threads", "0")
+        bare = self.start("worker", "--bus", bus)  # has no reference, which this mission's closures come from
+        robots = [self.start_robot(name, bus) for name in ("alpha", "bravo")]
+        self.wait_for(lambda: self.mission_status(bus)["waiting"] > 0, "a job that is given back")
+        self.assertIn("reference", self.mission_status(bus)["why_waiting"])
+        proper = self.start("worker", "--bus", bus, MISSION)
+        for robot in robots:
+            self.assertEqual(robot.end(stop=False)[0], 0)
+        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "end")
+        self.assertEqual(self.mission_status(bus)["waiting"], 0)
+        for program in (bare, proper, server):
+            code, said = program.end()
+            self.assertEqual(code, 0, said)
+        self.expect_same_map_file()
+
+    def test_a_bare_worker_has_the_servers_settings(self):
+        """Of a LiDAR's mission, and not the default ones: no pair is ever one place."""
+        settings = ["--set", "closures.finder=lidar", "--set", "simulation.sensors=lidar", "--set", "duration_s=40",
+                    "--set", "agent.submap.duration_s=8", "--set", "closures.min_submap_gap=1",
+                    "--set", "closures.lidar.min_points=999000"]
+        server, bus = self.start_server("--threads", "0", *settings)
+        bare = self.start("worker", "--bus", bus, "--threads", "2")
+        robots = [self.start_robot(name, bus, *settings) for name in ("alpha", "bravo")]
+        for robot in robots:
+            self.assertEqual(robot.end(stop=False)[0], 0)
+        self.wait_for(lambda: self.status("server").get("submaps", 0) >= 6 and
+                      self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "answers")
+        self.assertEqual(self.status("server")["closures"], 0)
+        for program in (bare, server):
+            code, said = program.end()
+            self.assertEqual(code, 0, said)
+        info = run("map", "info", self.path / "server/map.tutti").stdout
+        self.assertRegex(info, r"finder +lidar 1 \(settings [0-9a-f]{16}\): closures between 0 pairs, [1-9]")
+
+    def test_a_mission_has_one_server_and_others_are_told(self):
+        server, bus = self.start_server("--mission", "alps")
+        code, said = self.start("server", "--state", self.path / "second", "--bus", bus, "--mission", "alps",
+                                MISSION).end(stop=False)
+        self.assertEqual(code, 1, said)
+        for word in ("'alps'", f"process {server.process.pid}", str(self.path / "server"), "since 20"):
+            self.assertIn(word, said)
+        other = self.start("server", "--state", self.path / "third", "--bus", bus, "--mission", "jura", MISSION)
+        self.assertIn("--mission jura", other.line())
+
+        self.assertIn("alps, jura", run("status", "--bus", bus).stderr)  # which?
+        robot = self.start_robot("alpha", bus, "--mission", "alpes")
+        self.wait_for(lambda: "alps" in self.status("alpha").get("alone", ""), "a robot that is told")
+        self.assertIn("'alpes'", self.status("alpha")["alone"])
+        robot.kill()
+        robot = self.start_robot("alpha", bus, "--mission", "jura", "--stay")
+        self.wait_for(lambda: self.status("alpha").get("finished") and self.status("alpha")["backlog"] == 0, "jura")
+        self.assertEqual(self.mission_status(bus, "--mission", "alps")["submaps"], 0)
+        self.assertGreater(self.mission_status(bus, "--mission", "jura")["submaps"], 3)
+        self.assertEqual(robot.end()[0], 0)
+
+        other.kill()  # its own restart takes its place at once
+        other = self.start("server", "--state", self.path / "third", "--bus", bus, "--mission", "jura", MISSION)
+        self.assertIn("--mission jura", other.line())
+        for program in (other, server):
+            code, said = program.end()
+            self.assertEqual(code, 0, said)
+        done = run("server", "--state", self.path / "fourth", "--mission", "two words")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("letters, digits", done.stderr)
+
     def test_a_killed_server_and_a_killed_robot_go_on(self):
         server, bus = self.start_server()
         robots = {name: self.start_robot(name, bus) for name in ("alpha", "bravo")}

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tutti/base/config_io.hpp"
+#include "tutti/bus/mission_lease.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/simulation/recordings.hpp"
 
@@ -24,6 +25,19 @@ Result<mission::MissionConfig> load(const MissionSource& source) {
   if (config.closures.finder == "reference")
     return fail(ErrorCode::configuration, "closures.finder is 'reference': without a mission there is none");
   return config;
+}
+
+bool is_named(const MissionSource& source) { return !source.name.empty() || !source.file.empty(); }
+
+Result<std::string> name_on_bus(const MissionSource& source, const mission::MissionConfig& config) {
+  std::string name = source.name;
+  const bool is_in_file = name.empty() && config.mission != mission::MissionConfig{}.mission;
+  if (is_in_file) name = config.mission;
+  if (name.empty()) return bus::NatsPortOptions{}.mission;
+  if (auto ok = bus::check_mission_name(name); !ok)
+    return fail(ErrorCode::configuration, "{}{}", ok.error().message,
+                is_in_file ? "; that is what the mission file calls it, --mission NAME gives another name" : "");
+  return name;
 }
 
 std::vector<std::string> robot_names(const mission::MissionConfig& config) {

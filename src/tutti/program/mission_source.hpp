@@ -22,9 +22,16 @@ struct MissionSource {
   std::filesystem::path data;
   std::vector<std::string> assignments;  ///< KEY=VALUE
   std::uint64_t seed = 1;
+  std::string name = {};  ///< That the mission is to have on the bus; empty: the file's.
 };
 
 Result<mission::MissionConfig> load(const MissionSource& source);
+
+/// What the mission is called on the bus: as the program was told, else as the file says, else as all are that are told
+/// nothing. An error: no name for a bus.
+Result<std::string> name_on_bus(const MissionSource& source, const mission::MissionConfig& config);
+/// Whether that was chosen by anybody.
+bool is_named(const MissionSource& source);
 
 /// The robots of the mission by their place in it, which is their number; empty when there is no mission.
 std::vector<std::string> robot_names(const mission::MissionConfig& config);

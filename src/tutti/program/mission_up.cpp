@@ -54,6 +54,7 @@ class MissionUp {
   const MissionUpOptions& options_;
   mission::MissionConfig config_;
   std::vector<std::string> names_;
+  std::string name_;  // on the bus
   fs::path state_;
   Children children_;
   std::string bus_;
@@ -72,6 +73,7 @@ std::vector<std::string> MissionUp::words(const std::string& command, const fs::
   if (!folder.empty()) add({"--state", folder.string()});
   if (replays) add({"--rate", fmt::format("{}", options_.rate)});
   if (!bus_.empty()) add({"--bus", bus_});
+  add({"--mission", name_});
   add({"--end-with-parent", std::to_string(getpid())});
   return out;
 }
@@ -102,6 +104,9 @@ Status MissionUp::start_server(const std::atomic<bool>& stop) {
 }
 
 Status MissionUp::start(const std::atomic<bool>& stop) {
+  auto on_bus = name_on_bus(options_.mission, config_);
+  if (!on_bus) return tl::unexpected(on_bus.error());
+  name_ = std::move(*on_bus);
   if (Status started = start_server(stop); !started) return started;
   for (int i = 0; i < options_.workers; ++i) {
     auto worker = words("worker", {}, false);
@@ -118,7 +123,8 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
 }
 
 Status MissionUp::watch(const std::atomic<bool>& stop) {
-  const auto port = bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), {.url = bus_});
+  const auto port =
+      bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), {.url = bus_, .mission = name_});
   if (!port) return tl::unexpected(port.error());
   while (true) {
     for (const bus::Received& message : (*port)->receive()) {

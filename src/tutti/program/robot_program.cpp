@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/node/status_envelope.hpp"
@@ -30,13 +31,14 @@ constexpr double kStarts_s = 15.0;       // so long a second program of this rob
 class HostedRobot final : public Hosted {
  public:
   HostedRobot(std::unique_ptr<mission::RobotActor> actor, double duration_s, const RobotOptions& options,
-              const Clock& clock, const bus::NatsPort& port, EventLog& log)
+              const Clock& clock, const bus::NatsPort& port, EventLog& log, const std::string& alone)
       : actor_(std::move(actor)),
         duration_s_(duration_s),
         options_(options),
         clock_(clock),
         port_(port),
         log_(log),
+        alone_(alone),
         begin_s_(clock.wall_s()) {}
   /// Its samples come from clients, not from a recording.
   Status feed_live(Host& host, RobotView view) {
@@ -82,6 +84,7 @@ class HostedRobot final : public Hosted {
   const Clock& clock_;
   const bus::NatsPort& port_;
   EventLog& log_;
+  const std::string& alone_;  // why it hears no server
   double begin_s_;
   std::unique_ptr<LiveFeed> feed_;  // null: it replays
   bool ended_ = false;              // the recording that it replays
@@ -170,9 +173,11 @@ Json HostedRobot::status(Timestamp now) const {
           {"keyframes", status.keyframes},
           {"revision", status.heard_revision},
           {"connected", link.connected},
-          {"line", fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}", progress(time_s),
-                               status.keyframes, status.backlog_submaps, status.heard_revision,
-                               link.connected ? "" : ", no link: " + link.last_error)}};
+          {"alone", alone_},
+          {"line",
+           fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
+                       status.keyframes, status.backlog_submaps, status.heard_revision,
+                       link.connected ? "" : ", no link: " + link.last_error, alone_.empty() ? "" : ", " + alone_)}};
 }
 
 /// The last event of a program: what only it knows.
@@ -215,6 +220,7 @@ class RobotProgram {
   [[nodiscard]] double begin_s(const mission::RobotActor& actor) const;
   Result<std::unique_ptr<mission::RobotActor>> open_actor();
   Result<std::unique_ptr<Hosted>> open_node(bus::Port& port);
+  void tell_alone();
 
   const RobotOptions& options_;
   mission::MissionConfig config_;
@@ -225,9 +231,19 @@ class RobotProgram {
   std::optional<StateFolder> folder_;
   std::unique_ptr<EventLog> log_;
   std::unique_ptr<storage::TableStore> store_;
+  std::unique_ptr<bus::MissionLease> lease_;  // not its own: it looks for the server's
+  std::string alone_;                         // as it was told last
   std::optional<Clock> clock_;
   std::optional<Host> host_;
 };
+
+/// Once a second: whether its mission has no server here, but others have.
+void RobotProgram::tell_alone() {
+  const std::string why = lease_->why_alone();
+  if (why == alone_) return;
+  log_->say(why.empty() ? Level::info : Level::warning, why.empty() ? "there is a server of its mission" : why);
+  alone_ = why;
+}
 
 Status RobotProgram::read_mission() {
   auto config = load(options_.mission);
@@ -265,7 +281,7 @@ Result<std::unique_ptr<Hosted>> RobotProgram::open_node(bus::Port& port) {
   auto actor = open_actor();
   if (!actor) return in_context((folder_->path() / kRobotFile).string(), actor.error());
   auto robot = std::make_unique<HostedRobot>(std::move(*actor), duration_s_, options_, *clock_,
-                                             dynamic_cast<const bus::NatsPort&>(port), *log_);
+                                             dynamic_cast<const bus::NatsPort&>(port), *log_, alone_);
   if (options_.feed.empty()) return robot;
   std::map<RobotId, std::string> names;
   for (std::size_t i = 0; i < names_.size(); ++i) names[RobotId{static_cast<std::uint32_t>(i)}] = names_[i];
@@ -294,13 +310,18 @@ Status RobotProgram::start() {
   const auto actor = open_actor();  // where the recording stood
   if (!actor) return in_context((folder_->path() / kRobotFile).string(), actor.error());
   clock_.emplace(options_.rate, begin_s(**actor));
-  const bus::NatsPortOptions where{.url = options_.bus, .allow_insecure = options_.insecure};
+  const auto mission = name_on_bus(options_.mission, config_);
+  if (!mission) return tl::unexpected(mission.error());
+  const bus::NatsPortOptions where{.url = options_.bus, .mission = *mission, .allow_insecure = options_.insecure};
+  auto lease = bus::MissionLease::open(where, std::nullopt);
+  if (!lease) return tl::unexpected(lease.error());
+  lease_ = std::move(*lease);
   host_.emplace(Host::Parts{.store = store_.get(),
                             .open_port = [this, where]() -> Result<std::unique_ptr<bus::Port>> {
                               return bus::open_nats_port(bus::Endpoint::of(robot_), where);
                             },
                             .open_node = [this](bus::Port& port) { return open_node(port); },
-                            .each_second = {},
+                            .each_second = [this] { tell_alone(); },
                             .status_file = folder_->path() / kStatusFile,
                             .table_aside = "meta",
                             .version = options_.version},

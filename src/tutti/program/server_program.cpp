@@ -2,6 +2,7 @@
 #include "tutti/program/server_program.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -13,6 +14,8 @@
 #include <thread>
 #include <utility>
 
+#include "tutti/base/file.hpp"
+#include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mission/bundle_refiner.hpp"
@@ -30,8 +33,9 @@ namespace {
 
 class HostedServer final : public Hosted {
  public:
-  HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, std::function<std::string()> trouble)
-      : node_(std::move(node)), version_(std::move(version)), trouble_(std::move(trouble)) {}
+  HostedServer(std::unique_ptr<node::ServerNode> node, std::string version, std::function<std::string()> trouble,
+               const bool& is_over)
+      : node_(std::move(node)), version_(std::move(version)), trouble_(std::move(trouble)), is_over_(is_over) {}
   Answer start(Timestamp now) override { return {node_->resume(now), {}}; }
   Answer receive(const bus::Received& message, Timestamp now) override {
     return {node_->receive(message.envelope, now), {message.ticket}};
@@ -47,6 +51,7 @@ class HostedServer final : public Hosted {
   }
   Answer report(Timestamp now) override { return {{.messages = {mission_status(now)}}, {}}; }
   [[nodiscard]] Json status(Timestamp now) const override;
+  [[nodiscard]] bool finished() const override { return is_over_; }
 
  private:
   bus::Envelope mission_status(Timestamp now) {
@@ -61,6 +66,7 @@ class HostedServer final : public Hosted {
   std::unique_ptr<node::ServerNode> node_;
   std::string version_;
   std::function<std::string()> trouble_;
+  const bool& is_over_;
   std::uint64_t told_changes_ = 0;
 };
 
@@ -95,6 +101,7 @@ class OwnWorker {
                const auto make = [&](node::WorkerNode::ForEach for_each) {
                  node::WorkerNode node(kSelf, finder, node::SubmapFrames::of(map), std::move(for_each));
                  node.refine_with(refiner);
+                 node.rest_for(0.0);
                  return node;
                };
                return std::make_unique<HostedWorker>(kSelf, version, make, threads, port, stop_);
@@ -154,15 +161,38 @@ Status check_addresses(const ServerOptions& options, const Address& address) {
               options.listen);
 }
 
+constexpr double kLeaseAnswer_s = 5.0;  // of a bus that is there
+
+std::string first_line(const char* file) {
+  const std::string text = read_file(file).value_or("");
+  return text.substr(0, text.find('\n'));
+}
+
+/// The lease of this state folder: a restart on this machine has the same seat, a copy elsewhere another one.
+bus::LeaseHolder holder_of(const StateFolder& folder) {
+  std::error_code ignored;
+  const auto path = std::filesystem::weakly_canonical(folder.path(), ignored);
+  const std::string machine = first_line("/proc/sys/kernel/random/boot_id");
+  return {.host = first_line("/proc/sys/kernel/hostname"),
+          .process = static_cast<std::uint64_t>(getpid()),
+          .state = path.string(),
+          .since_ns = static_cast<std::int64_t>(wall_clock_ns()),
+          .seat = fmt::format("{} {} {}", machine, folder.made_ns(), path.string())};
+}
+
 /// All that a running server holds, in the order in which it is made.
 class ServerProgram {
  public:
   explicit ServerProgram(const ServerOptions& options) : options_(options) {}
   Status start();
-  void run(const std::atomic<bool>& stop);
+  Status run(const std::atomic<bool>& stop);
 
  private:
   Result<std::unique_ptr<Hosted>> open_node();
+  Status take_lease();
+  /// Whether another server has the mission.
+  Status check_lease(const bus::MissionLease::State& seen) const;
+  void tend();
   void tend_bus();
   [[nodiscard]] std::string robot_command() const;
 
@@ -173,6 +203,8 @@ class ServerProgram {
   std::unique_ptr<EventLog> log_;
   std::unique_ptr<bus::NatsChild> child_;
   bus::NatsPortOptions bus_;
+  std::shared_ptr<const bus::MissionLease> lease_;
+  bool is_over_ = false;  // the lease is another's
   std::unique_ptr<storage::TableStore> store_;
   std::shared_ptr<const server::ClosureFinder> finder_;
   std::optional<Clock> clock_;
@@ -190,11 +222,35 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   for (std::uint32_t i = 0; i < names_.size(); ++i) robots.insert(RobotId{i});
   auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
-  return std::make_unique<HostedServer>(std::move(*node), options_.version,
-                                        [this] { return trouble_.empty() ? host_->trouble() : trouble_; });
+  return std::make_unique<HostedServer>(
+      std::move(*node), options_.version, [this] { return trouble_.empty() ? host_->trouble() : trouble_; }, is_over_);
 }
 
-/// Once a second: the bus may have ended, or its disk may be full.
+Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {
+  const bus::LeaseHolder* other = seen.held ? nullptr : seen.server_of(bus_.mission);
+  if (other == nullptr) return {};
+  return fail(ErrorCode::io,
+              "mission '{}' on bus {} has a server: {}. Stop that one (a killed one's place is free after {:g} s), or "
+              "give this one another --mission NAME",
+              bus_.mission, bus_.url, to_string(*other), bus::MissionLease::kLease_s);
+}
+
+/// Before it the port does not connect.
+Status ServerProgram::take_lease() {
+  auto lease = bus::MissionLease::open(bus_, holder_of(*folder_));
+  if (!lease) return tl::unexpected(lease.error());
+  lease_ = std::move(*lease);
+  bus_.may_connect = [lease = lease_] { return lease->state().held; };
+  return check_lease(lease_->wait(kLeaseAnswer_s));
+}
+
+/// Once a second.
+void ServerProgram::tend() {
+  tend_bus();
+  is_over_ = !check_lease(lease_->state());
+}
+
+/// The bus may have ended, or its disk may be full.
 void ServerProgram::tend_bus() {
   if (!child_) return;
   const Status runs = child_->tend();
@@ -204,7 +260,7 @@ void ServerProgram::tend_bus() {
 }
 
 std::string ServerProgram::robot_command() const {
-  return fmt::format("tutti robot --name NAME --bus {} --state DIR {}", bus_.url,
+  return fmt::format("tutti robot --name NAME --bus {} --mission {} --state DIR {}", bus_.url, bus_.mission,
                      options_.mission.file.empty() ? "--feed SOCKET" : options_.mission.file);
 }
 
@@ -216,7 +272,9 @@ Status ServerProgram::start() {
   if (!config) return tl::unexpected(config.error());
   config_ = std::move(*config);
   if (!options_.mission.file.empty()) names_ = robot_names(config_);
-  bus_ = {.url = options_.bus, .allow_insecure = options_.insecure};
+  const auto name = name_on_bus(options_.mission, config_);
+  if (!name) return tl::unexpected(name.error());
+  bus_ = {.url = options_.bus, .mission = *name, .allow_insecure = options_.insecure};
   auto folder = StateFolder::open(options_.state, "server");
   if (!folder) return tl::unexpected(folder.error());
   folder_.emplace(std::move(*folder));
@@ -235,13 +293,14 @@ Status ServerProgram::start() {
     child_ = std::move(*child);
     bus_.url = child_->url();
   }
+  if (Status taken = take_lease(); !taken) return taken;
   clock_.emplace(options_.rate, options_.rate * folder_->age_s());
   host_.emplace(Host::Parts{.store = store_.get(),
                             .open_port = [this]() -> Result<std::unique_ptr<bus::Port>> {
                               return bus::open_nats_port(bus::Endpoint::server(), bus_);
                             },
                             .open_node = [this](bus::Port&) { return open_node(); },
-                            .each_second = [this] { tend_bus(); },
+                            .each_second = [this] { tend(); },
                             .status_file = folder_->path() / kStatusFile,
                             .table_aside = node::kMetaTable,
                             .version = options_.version},
@@ -253,14 +312,15 @@ Status ServerProgram::start() {
   return worker_->start();
 }
 
-void ServerProgram::run(const std::atomic<bool>& stop) {
-  log_->say(Level::info, fmt::format("runs in {}, bus {}, {} threads of its own verify closures",
-                                     folder_->path().string(), bus_.url, options_.threads));
+Status ServerProgram::run(const std::atomic<bool>& stop) {
+  log_->say(Level::info, fmt::format("runs in {}, mission {}, bus {}, {} threads of its own verify closures",
+                                     folder_->path().string(), bus_.mission, bus_.url, options_.threads));
   if (options_.announce) options_.announce(robot_command());
   tell_service_manager("READY=1");
   host_->run(stop);
   tell_service_manager("STOPPING=1");
   log_->say(Level::info, "stops; the map is stored");
+  return is_over_ ? check_lease(lease_->state()) : Status();
 }
 
 }  // namespace
@@ -268,8 +328,7 @@ void ServerProgram::run(const std::atomic<bool>& stop) {
 Status run_server(const ServerOptions& options, const std::atomic<bool>& stop) {
   ServerProgram program(options);
   if (Status started = program.start(); !started) return started;
-  program.run(stop);
-  return {};
+  return program.run(stop);
 }
 
 }  // namespace tutti::program

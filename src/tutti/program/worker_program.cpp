@@ -13,8 +13,10 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/bus/delivery.hpp"
+#include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mission/bundle_refiner.hpp"
+#include "tutti/mission/finder_maker.hpp"
 #include "tutti/mission/parallel.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/stop.hpp"
@@ -32,6 +34,14 @@ struct Stopped {};
 std::uint32_t any_number() {
   const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid()));
   return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
+}
+
+constexpr double kLooksForServer_s = 10.0;
+
+/// Who was told no mission works for the one that is there.
+Result<std::string> mission_of(const WorkerOptions& options, const mission::MissionConfig& config) {
+  if (is_named(options.mission)) return name_on_bus(options.mission, config);
+  return bus::served_mission({.url = options.bus, .allow_insecure = options.insecure}, kLooksForServer_s);
 }
 
 }  // namespace
@@ -85,7 +95,7 @@ Answer HostedWorker::work(Timestamp now) {
 }
 
 Answer HostedWorker::report(Timestamp /*now*/) {
-  NodeStatus status{.name = node::default_name(self_), .version = version_, .jobs_done = jobs_};
+  NodeStatus status{.name = node::default_name(self_), .version = version_, .jobs_done = jobs_, .can = node_.can()};
   return {{.messages = {node::to_server(self_, std::move(status))}}, {}};
 }
 
@@ -100,13 +110,24 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
   if (!finder) return tl::unexpected(finder.error());
   const auto log = EventLog::on_console("worker", options.console);
   const bus::Endpoint self = bus::Endpoint::worker(any_number());
-  const bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
+  const auto mission = mission_of(options, *config);
+  if (!mission) return tl::unexpected(mission.error());
+  const bus::NatsPortOptions where{.url = options.bus, .mission = *mission, .allow_insecure = options.insecure};
+  const auto lease = bus::MissionLease::open(where, std::nullopt);
+  if (!lease) return tl::unexpected(lease.error());
+  std::string alone;
+  const auto tell_alone = [&] {
+    const std::string why = (*lease)->why_alone();
+    if (why != alone && !why.empty()) log->say(Level::warning, why);
+    alone = why;
+  };
   const std::size_t threads = options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                                   : std::max(1U, std::thread::hardware_concurrency());
   const auto cache = std::make_shared<node::FrameCache>(kCacheBytes);
   const auto make = [&](node::WorkerNode::ForEach for_each) {
     node::WorkerNode node(self, *finder, cache, std::move(for_each));
     node.refine_with(mission::make_refiner(*config));
+    node.make_others_with(std::make_shared<const mission::SensorFinderMaker>(config->closures.feature_cache_mb));
     return node;
   };
   const Clock clock;
@@ -115,11 +136,12 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
              .open_node = [&](bus::Port& port) -> Result<std::unique_ptr<Hosted>> {
                return std::make_unique<HostedWorker>(self, options.version, make, threads, port, stop);
              },
-             .each_second = {},
+             .each_second = tell_alone,
              .status_file = {}},
             clock, *log);
   if (Status opened = host.open(); !opened) return opened;
-  log->say(Level::info, fmt::format("worker {} runs, bus {}, {} threads", self.number, options.bus, threads));
+  log->say(Level::info,
+           fmt::format("worker {} runs, mission {}, bus {}, {} threads", self.number, *mission, options.bus, threads));
   tell_service_manager("READY=1");
   host.run(stop);
   tell_service_manager("STOPPING=1");
