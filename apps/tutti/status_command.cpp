@@ -99,19 +99,13 @@ Json seconds_before(Timestamp time, const std::optional<Timestamp>& then) {
 }
 
 Json json_of(const MissionStatus& status, double silent_s) {
-  Json out{{"server_silent_s", silent_s},
-           {"time_s", status.time - Timestamp{}},
-           {"version", status.version},
-           {"epoch", status.epoch},
-           {"revision", status.revision},
-           {"submaps", status.submaps},
-           {"closures", status.closures},
-           {"components", status.components},
-           {"pending_jobs", status.pending_jobs},
-           {"has_news", status.has_news},
-           {"trouble", status.trouble},
-           {"robots", Json::array()},
-           {"workers", Json::array()},
+  Json out{{"server_silent_s", silent_s},       {"time_s", status.time - Timestamp{}},
+           {"version", status.version},         {"epoch", status.epoch},
+           {"incarnation", status.incarnation}, {"revision", status.revision},
+           {"submaps", status.submaps},         {"closures", status.closures},
+           {"components", status.components},   {"pending_jobs", status.pending_jobs},
+           {"has_news", status.has_news},       {"trouble", status.trouble},
+           {"robots", Json::array()},           {"workers", Json::array()},
            {"refusals", Json::array()}};
   for (const MissionStatus::Robot& robot : status.robots) {
     Json entry = json_of(robot.status);
@@ -120,6 +114,7 @@ Json json_of(const MissionStatus& status, double silent_s) {
     entry["last_update_s_ago"] = seconds_before(status.time, robot.last_update);
     entry["submaps"] = robot.submaps;
     entry["refused_submaps"] = robot.refused;
+    entry["unread_submaps"] = robot.unread;
     entry["conflict"] = robot.conflict;
     out["robots"].push_back(std::move(entry));
   }

@@ -43,8 +43,9 @@ class WorkerNode {
   void refine_with(std::shared_ptr<const server::MapRefiner> refiner) { refiner_ = std::move(refiner); }
   /// A job, and only when none is held; the same one twice gives the same verdicts. Or a submap that was asked for.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// The job that came last is not answered yet.
-  [[nodiscard]] bool holds_job() const { return held_.has_value(); }
+  /// The job that came last is not answered yet, or never is: it, or a submap of it, is of a version that this program
+  /// does not read. Such a one is to be left to another worker.
+  [[nodiscard]] bool holds_job() const { return held_.has_value() || leaves_job_; }
   /// When on_timer() is to be called next; nothing while no job is held.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
   Step on_timer(Timestamp now);
@@ -78,6 +79,7 @@ class WorkerNode {
   std::function<std::int64_t()> clock_;
   std::shared_ptr<const server::MapRefiner> refiner_;
   std::optional<Held> held_;
+  bool leaves_job_ = false;
 };
 
 }  // namespace tutti::node

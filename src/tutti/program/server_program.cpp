@@ -2,17 +2,21 @@
 #include "tutti/program/server_program.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
 #include <thread>
 #include <utility>
 
+#include "tutti/base/random.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mission/bundle_refiner.hpp"
@@ -154,6 +158,13 @@ Status check_addresses(const ServerOptions& options, const Address& address) {
               options.listen);
 }
 
+/// Of this start and, but for one in 4e9 times, no other: not of the clock alone, which a base station may not have.
+std::uint32_t any_incarnation() {
+  const auto since_boot = static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+  const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid())).fork(since_boot);
+  return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
+}
+
 /// All that a running server holds, in the order in which it is made.
 class ServerProgram {
  public:
@@ -185,6 +196,7 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   node::ServerNodeConfig config{.server = config_.server,
                                 .refiner = mission::make_refiner(config_),
                                 .accepts_others = config_.closures.finder != "reference"};
+  config.incarnation = any_incarnation();
   config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time
   std::set<RobotId> robots;
   for (std::uint32_t i = 0; i < names_.size(); ++i) robots.insert(RobotId{i});
@@ -217,7 +229,7 @@ Status ServerProgram::start() {
   config_ = std::move(*config);
   if (!options_.mission.file.empty()) names_ = robot_names(config_);
   bus_ = {.url = options_.bus, .allow_insecure = options_.insecure};
-  auto folder = StateFolder::open(options_.state, "server");
+  auto folder = StateFolder::open(options_.state, "server", kMapFile);
   if (!folder) return tl::unexpected(folder.error());
   folder_.emplace(std::move(*folder));
   auto log = EventLog::open(folder_->path(), "server", options_.console);
