@@ -219,12 +219,14 @@ TEST(Upgrade, ARobotsFileOfVersionOneKeepsItsOutbox) {
 TEST(Upgrade, SubmapsOfEveryVersionAreInTheMap) {
   for (unsigned version = 1; version <= wire::versions(MessageKind::submap).current; ++version) {
     SCOPED_TRACE(version);
-    const auto frame =
-        read_file(test::source_path("src/tutti/wire/testdata/submap_v" + std::to_string(version) + ".bin").string());
+    const std::string file = "src/tutti/wire/testdata/submap_v" + std::to_string(version) + ".bin";
+    const auto frame = read_file(tutti::test::source_path(file).string());
     ASSERT_TRUE(frame.has_value()) << frame.error().message;
     const SubmapId id{{RobotId{2}, version < 5 ? 0 : 1234567890123U}, 16};
-    storage::MemoryStore store(storage::map_schema(), {{"submaps", {{key_of(id), *frame}}},
-                                                       {"meta", {{"map", storage::key_of({9, 3, 1, 2})}}}});
+    storage::MemoryStore::Tables map;
+    map["submaps"][key_of(id)] = *frame;
+    map["meta"]["map"] = storage::key_of({9, 3, 1, 2});
+    const storage::MemoryStore store(storage::map_schema(), map);
     const auto server = ServerNode::open({id.chain.robot}, std::make_shared<test::EvenFinder>(), {}, 1000, store);
     ASSERT_TRUE(server.has_value()) << server.error().message;
     EXPECT_TRUE((*server)->map_server().state().submaps.contains(id));
