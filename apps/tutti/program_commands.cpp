@@ -39,8 +39,10 @@ void add_server_command(CLI::App& app, int& exit_code) {
       "what it needs. Without --bus it starts a nats-server of its own. Prints one line: the command that starts a "
       "robot.\n"
       "Killed at any moment and started again with the same --state it goes on; SIGTERM or Ctrl-C stop it.");
-  add_state_option(*command, options->state, "Folder of this server: map, log, events, bus; made if missing. In a new one a map.tutti from elsewhere goes "
-                   "on");
+  add_state_option(
+      *command, options->state,
+      "Folder of this server: map, log, events, bus; made if missing. In a new one a map.tutti from elsewhere goes "
+      "on");
   command->add_option("--bus", options->bus, "A NATS bus that runs already")->type_name("nats://HOST:PORT");
   command
       ->add_option("--listen", options->listen,
