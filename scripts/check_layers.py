@@ -18,7 +18,7 @@ CONFINED = [
     (r"nats(/|\.h)", r"bus/(nats_.*\.cpp|internal/nats_connection\.hpp)$",
      "bus/nats_*.cpp and their bus/internal/nats_connection.hpp"),
     (r"(spdlog|systemd)/", r"program/.*\.cpp$", "program/*.cpp"),
-    (r"sqlite3", r"storage/sqlite_.*\.cpp$", "storage/sqlite_*.cpp"),
+    (r"sqlite3", r"storage/(sqlite_.*\.cpp|internal/sqlite\.hpp)$", "storage/sqlite_*.cpp and internal/sqlite.hpp"),
     (r"opencv2/", r"perception/visual/frontend/.*\.cpp$", "perception/visual/frontend/*.cpp"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),

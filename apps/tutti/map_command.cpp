@@ -22,6 +22,7 @@
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/mapfile/export.hpp"
 #include "tutti/mapfile/merge.hpp"
+#include "tutti/mapfile/salvage.hpp"
 #include "tutti/server/map_components.hpp"
 
 namespace tutti::app {
@@ -110,6 +111,9 @@ void print_tables(const mapfile::Content& content) {
     std::string versions;
     for (const auto& [version, rows] : table.versions)
       versions += fmt::format("{}v{}: {}", versions.empty() ? "" : ", ", version, rows);
+    if (table.unread > 0)
+      versions += fmt::format("{}of versions that this program does not read, and left out: {}",
+                              versions.empty() ? "" : ", ", table.unread);
     fmt::print("{:<10} {:>8} {:>12}  {}\n", name, table.rows, table.bytes, versions);
   }
 }
@@ -232,6 +236,18 @@ int merge_maps(const MergeOptions& options) {
   return 0;
 }
 
+int salvage_map(const fs::path& in, const fs::path& out) {
+  const auto salvaged = mapfile::salvage(in, out);
+  if (!salvaged) return complain("map salvage", salvaged.error().message);
+  for (const std::string& lost : salvaged->lost) fmt::print("lost  {}\n", lost);
+  std::string rows;
+  for (const auto& [table, count] : salvaged->rows)
+    rows += fmt::format("{}{} {}", rows.empty() ? "" : ", ", count, table);
+  fmt::print("{}: {}; {}\n", out.string(), rows.empty() ? "no rows" : rows,
+             salvaged->lost.empty() ? "nothing is lost" : "robots send again what they have of the rest");
+  return 0;
+}
+
 }  // namespace
 
 void add_map_command(CLI::App& app, int& exit_code) {
@@ -271,6 +287,14 @@ void add_map_command(CLI::App& app, int& exit_code) {
       ->type_name("MAP")
       ->required();
   merge->callback([merging, &exit_code] { exit_code = merge_maps(*merging); });
+
+  const auto damaged = std::make_shared<std::string>(), whole = std::make_shared<std::string>();
+  CLI::App* salvage = map->add_subcommand(
+      "salvage", "Copy every row of a damaged map that can be read into a new one, and say which cannot.");
+  salvage->footer("Example: tutti map salvage state/map.tutti -o salvaged.tutti\n");
+  salvage->add_option("map", *damaged, "The damaged map; it stays as it is.")->type_name("MAP")->required();
+  salvage->add_option("-o,--output", *whole, "The map to be made; it must not be there.")->type_name("MAP")->required();
+  salvage->callback([damaged, whole, &exit_code] { exit_code = salvage_map(*damaged, *whole); });
 
   add_map_closure_command(*map, exit_code);
 }

@@ -41,7 +41,10 @@ void add_server_command(CLI::App& app, int& exit_code) {
       "what it needs. Without --bus it starts a nats-server of its own. Prints one line: the command that starts a "
       "robot.\n"
       "Killed at any moment and started again with the same --state it goes on; SIGTERM or Ctrl-C stop it.");
-  add_state_option(*command, options->state, "Folder of this server: map, log, events, bus; made if missing");
+  add_state_option(
+      *command, options->state,
+      "Folder of this server: map, log, events, bus; made if missing. In a new one a map.tutti from elsewhere goes "
+      "on");
   command->add_option("--bus", options->bus, "A NATS bus that runs already")->type_name("nats://HOST:PORT");
   command
       ->add_option("--listen", options->listen,
@@ -98,6 +101,12 @@ void add_robot_command(CLI::App& app, int& exit_code) {
       ->type_name("SOCKET");
   add_number(*command, "--uplink-budget", options->uplink_bytes_per_s,
              "What its submaps may take of the link, the newest first; 0 = no limit", "BYTES_PER_S", within(0.0, 1e12));
+  command
+      ->add_option("--archive", options->max_archive_bytes,
+                   "Of submaps that the server has, so many are kept in STATE, the newest, in case its map loses them")
+      ->type_name("BYTES")
+      ->check(whole_number())
+      ->capture_default_str();
   add_rate_option(*command, options->rate, "Times real time: the recording; with --feed, mission time");
   command->add_flag("--stay", options->stay, "Go on listening after the recording, until SIGTERM");
   command->add_option("--session", options->session, "Number of its session; default: when STATE was made")

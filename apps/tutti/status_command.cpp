@@ -128,6 +128,7 @@ Json json_of(const MissionStatus& status, double silent_s) {
     entry["last_update_s_ago"] = seconds_before(status.time, robot.last_update);
     entry["submaps"] = robot.submaps;
     entry["refused_submaps"] = robot.refused;
+    entry["unread_submaps"] = robot.unread;
     entry["conflict"] = robot.conflict;
     out["robots"].push_back(std::move(entry));
   }

@@ -22,6 +22,15 @@ void NumberSet::insert(std::uint64_t number) {
   stretches_.erase(after);
 }
 
+void NumberSet::erase(std::uint64_t number) {
+  const auto found = std::ranges::upper_bound(stretches_, number, {}, &Stretch::end);
+  if (found == stretches_.end() || number < found->begin) return;
+  const Stretch before{found->begin, number}, after{number + 1, found->end};
+  auto at = stretches_.erase(found);
+  if (after.begin < after.end) at = stretches_.insert(at, after);
+  if (before.begin < before.end) stretches_.insert(at, before);
+}
+
 bool NumberSet::contains(std::uint64_t number) const {
   const auto next = std::ranges::upper_bound(stretches_, number, {}, &Stretch::end);
   return next != stretches_.end() && next->begin <= number;

@@ -18,6 +18,8 @@ class NumberSet {
 
   /// Again changes nothing. Not the largest number of 64 bits.
   void insert(std::uint64_t number);
+  /// One that is not in it changes nothing.
+  void erase(std::uint64_t number);
   [[nodiscard]] bool contains(std::uint64_t number) const;
   /// The first number, counted from 0, that is not in it.
   [[nodiscard]] std::uint64_t watermark() const;

@@ -139,6 +139,7 @@ void see_last_in(ProxyGraph& graph, const ChainId& chain) {
 ProxyGraph own_part(const ProxyGraph& whole, RobotId robot) {
   ProxyGraph own{.epoch = whole.epoch,
                  .revision = whole.revision,
+                 .incarnation = whole.incarnation,
                  .radius_m = whole.radius_m,
                  .sigma_m = whole.sigma_m,
                  .reduced = whole.reduced};

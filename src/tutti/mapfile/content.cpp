@@ -15,7 +15,8 @@
 namespace tutti::mapfile {
 namespace {
 
-/// Counts a table's rows; hands each, decoded, to `take`; the first error ends it.
+/// Counts a table's rows; hands each that is of a version that this program reads, decoded, to `take`; the first error
+/// ends it.
 template <class Decode, class Take>
 Status read_table(const storage::TableStore& map, const std::string& name, Decode&& decode, Take&& take,
                   Content& content) {
@@ -25,6 +26,10 @@ Status read_table(const storage::TableStore& map, const std::string& name, Decod
     ++table.rows;
     table.bytes += key.size() + bytes.size();
     auto decoded = decode(bytes);
+    if (!decoded && decoded.error().code == ErrorCode::unsupported) {
+      ++table.unread;
+      return true;
+    }
     if (!decoded) {
       ok = in_context(fmt::format("the map's table '{}'", name), decoded.error());
       return false;
@@ -59,7 +64,7 @@ Status read_verdicts(const storage::TableStore& map, Content& content) {
 }
 
 Status read_words(const storage::TableStore& map, Content& content) {
-  auto words = node::read_words(map);
+  auto words = node::read_words(map, [](const std::string&) {});
   if (!words) return tl::unexpected(words.error());
   content.words = std::move(*words);
   return read_table(

@@ -33,6 +33,7 @@ struct Content {
     std::size_t rows = 0;
     std::uint64_t bytes = 0;                          ///< Of keys and rows.
     std::map<std::uint16_t, std::size_t> versions{};  ///< Rows by the version of their message; not of `meta`.
+    std::size_t unread = 0;                           ///< Rows of versions that this program does not read: left out.
   };
   std::map<std::string, Table> tables;
 

@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mapfile/merge.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "tutti/mapfile/make_map.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/words.hpp"
-#include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/refinement_codec.hpp"
 
@@ -24,29 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using storage::TableStore, storage::Write;
-
-/// Commits rows in portions, so that a large map does not have to fit into memory.
-class Writer {
- public:
-  explicit Writer(TableStore& out) : out_(out) {}
-  Status put(Write write) {
-    bytes_ += write.bytes->size();
-    writes_.push_back(std::move(write));
-    return bytes_ < kPortion ? Status() : flush();
-  }
-  Status flush() {
-    const Status done = out_.commit(writes_);
-    writes_.clear();
-    bytes_ = 0;
-    return done;
-  }
-
- private:
-  static constexpr std::size_t kPortion = 16U << 20U;
-  TableStore& out_;
-  std::vector<Write> writes_;
-  std::size_t bytes_ = 0;
-};
 
 /// What becomes of a row of `b` when there is another one in `a`: the bytes that are taken.
 using Choose = std::function<Result<std::string>(std::string_view key, std::string a, std::string b)>;
@@ -208,12 +180,6 @@ Status join_answers(const TableStore& a, const TableStore& b, Writer& out) {
   return scanned ? ok : scanned;
 }
 
-/// Not in the place of a file that somebody else has made meanwhile, where the file system can tell.
-bool take_name(const fs::path& part, const fs::path& out) {
-  if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, out.c_str(), RENAME_NOREPLACE) == 0) return true;
-  return errno == EINVAL && ::rename(part.c_str(), out.c_str()) == 0;
-}
-
 }  // namespace
 
 Result<Merged> merge(const TableStore& a, const TableStore& b, TableStore& out) {
@@ -246,26 +212,12 @@ Result<Merged> merge(const fs::path& a, const fs::path& b, const fs::path& out) 
   const auto one = open(a), other = open(b);
   for (const auto* opened : {&one, &other})
     if (!*opened) return tl::unexpected(opened->error());
-  fs::path part = out;
-  part += fmt::format(".part-{}", getpid());
-  const auto forget = [&] {
-    for (const char* end : {"", "-wal", "-shm", "-journal"}) fs::remove(part.string() + end, failure);
-  };
-  forget();
   Result<Merged> merged;
-  {
-    auto made = storage::open_sqlite_store(part, storage::map_schema());
-    merged = made ? merge(**one, **other, **made) : tl::unexpected(made.error());
-  }  // closed: one file
-  if (merged && !take_name(part, out))
-    merged = fail(ErrorCode::io, "{}: cannot be written: {}", out.string(), std::generic_category().message(errno));
-  forget();
-  if (!merged) return merged;
-  const fs::path folder = out.has_parent_path() ? out.parent_path() : fs::path(".");
-  if (const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY); fd >= 0) {  // the name, too, is on the disk
-    ::fsync(fd);
-    ::close(fd);
-  }
+  const Status made = make_map(out, [&](TableStore& map) {
+    merged = merge(**one, **other, map);
+    return merged ? Status() : Status(tl::unexpected(merged.error()));
+  });
+  if (!made) return tl::unexpected(made.error());
   return merged;
 }
 

@@ -35,6 +35,7 @@ struct ProxyGraphMessage {  ///< server -> every robot
 };
 
 /// server -> one robot: which of its submaps are stored, or refused for good, and need not be sent again.
+/// What a server that has started again names no more it has forgotten, as when an older map was put in its place.
 struct Receipt {
   /// One of two programs that call themselves the same robot.
   struct Conflict {
@@ -44,14 +45,19 @@ struct Receipt {
     friend bool operator==(const Conflict&, const Conflict&) = default;
   };
   RobotId robot;
+  std::uint32_t incarnation = 0;               ///< ProxyGraph::incarnation
   std::map<std::uint64_t, NumberSet> stored;   ///< Numbers of submaps, by session.
   std::map<std::uint64_t, NumberSet> refused;  ///< Likewise, apart from those.
   std::string why_refused;                     ///< The last of them.
+  /// Likewise: they have come in a version that the server does not read. A newer one will: the robot keeps them, and
+  /// sends them again when the server has started again.
+  std::map<std::uint64_t, NumberSet> unread;
   std::optional<std::uint64_t> owner_session;  ///< Whose name and number these are, as far as the server was told.
   std::optional<Conflict> conflict;
 
   [[nodiscard]] bool contains(SubmapId id) const { return has(stored, id); }
   [[nodiscard]] bool refuses(SubmapId id) const { return has(refused, id); }
+  [[nodiscard]] bool leaves_unread(SubmapId id) const { return has(unread, id); }
   friend bool operator==(const Receipt&, const Receipt&) = default;
 
  private:

@@ -114,6 +114,9 @@ struct ProxyGraph {
   static constexpr std::size_t kMostChains = 1'000;  ///< Sessions of all robots together.
   std::uint64_t epoch = 0;     ///< Of the server that made it; grows whenever the server starts again.
   std::uint64_t revision = 0;  ///< Counts up with every broadcast of an epoch.
+  /// Of the server's start that made it, at random: of another one than was heard last, a graph is newer whatever its
+  /// epoch and revision, since the map may be an older one that was put back. 0: it was not said.
+  std::uint32_t incarnation = 0;
   double radius_m = 7.0;
   double sigma_m = 1.0;
   std::vector<ProxyNode> nodes;            ///< Sorted by (chain, stamp).

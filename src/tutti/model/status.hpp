@@ -43,8 +43,9 @@ struct MissionStatus {
     std::optional<Timestamp> last_update;  ///< When it last took up a proxy graph.
     std::uint64_t submaps = 0;             ///< In the map, of all its sessions.
     std::uint64_t refused = 0;             ///< Submaps that the map does not take.
-    std::string conflict;  ///< Why another program that calls itself the same is refused; empty: there is none.
-    NodeStatus status;     ///< The last one of the session that owns name and number.
+    std::string conflict;      ///< Why another program that calls itself the same is refused; empty: there is none.
+    NodeStatus status;         ///< The last one of the session that owns name and number.
+    std::uint64_t unread = 0;  ///< Submaps of versions that the server does not read: the robot keeps them.
     friend bool operator==(const Robot&, const Robot&) = default;
   };
   struct Worker {
@@ -66,6 +67,7 @@ struct MissionStatus {
   std::int64_t wall_ns = 0;  ///< Of the server's clock on the wall, since the Unix epoch; 0: unknown.
   std::string version;       ///< Of its program.
   std::uint64_t epoch = 0;
+  std::uint32_t incarnation = 0;  ///< ProxyGraph::incarnation
   std::uint64_t revision = 0;
   std::uint64_t submaps = 0;
   std::uint64_t closures = 0;    ///< Accepted.

@@ -73,6 +73,11 @@ struct StateLost {  ///< What was stored of the robot cannot be read: a new sess
   std::uint64_t session = 0;  ///< The new one.
   std::string why;
 };
+struct SubmapsForgotten {  ///< By the server's map, which is another than before: told by the robot, which sends them
+                           ///< again.
+  RobotId robot;
+  std::size_t submaps = 0;
+};
 struct SampleRefused {
   RobotId robot;
   std::string why;
@@ -89,8 +94,8 @@ struct ImagesRefused {
 struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
-               MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost, SampleRefused,
-               ScanRefused, ImagesRefused>
+               MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost, SubmapsForgotten,
+               SampleRefused, ScanRefused, ImagesRefused>
       what;
 };
 

@@ -15,11 +15,13 @@ namespace {
 constexpr const char* kCheckpoint = "checkpoint";
 constexpr const char* kWhole = "agent";  // the one row that was the checkpoint once
 constexpr const char* kJournal = "journal";
-constexpr const char* kOutbox = "outbox";
+constexpr const char* kOutbox = "outbox";    // submaps
+constexpr const char* kArchive = "archive";  // without bytes: which of them the server has named
 constexpr const char* kMeta = "meta";
-constexpr const char* kRobot = "robot";      // whose store it is
-constexpr const char* kStarts = "starts";    // on it
-constexpr const char* kSession = "session";  // the newest on it
+constexpr const char* kRobot = "robot";                // whose store it is
+constexpr const char* kStarts = "starts";              // on it
+constexpr const char* kSession = "session";            // the newest on it
+constexpr const char* kIncarnations = "incarnations";  // of the server: of the last graph, of the last receipt
 
 }  // namespace
 
@@ -85,28 +87,42 @@ Result<std::uint64_t> RobotNode::newest_session(const storage::TableStore& store
   if (!row) return tl::unexpected(row.error());
   std::uint64_t newest = 0;
   if (const auto session = storage::numbers_of(row->value_or(""), 1)) newest = session->front();
-  const auto look = [&](std::string_view key, std::string_view) {
+  const auto look = [&](std::string_view key, std::size_t) {
     if (const auto numbers = storage::numbers_of(key, 3)) newest = std::max(newest, (*numbers)[1]);
-    return true;
   };
-  if (auto scanned = store.scan(kOutbox, {}, look); !scanned) return tl::unexpected(scanned.error());
+  if (auto read = store.sizes(kOutbox, look); !read) return tl::unexpected(read.error());
   return newest;
 }
 
 Status RobotNode::read_outbox() {
   Status ok;
-  const auto read = [&](std::string_view key, std::string_view frame) {
-    const auto numbers = storage::numbers_of(key, 3);
-    if (!numbers || (*numbers)[0] != agent_.robot().value) {
+  std::map<SubmapId, std::size_t> kept;
+  const auto id_of = [&](std::string_view key) {
+    const auto id = submap_of_key(key);
+    if (!id || id->chain.robot != agent_.robot())
       ok = fail(ErrorCode::invalid, "a submap of somebody else in the outbox");
-      return false;
-    }
-    const SubmapId id{{agent_.robot(), (*numbers)[1]}, static_cast<std::uint32_t>((*numbers)[2])};
-    uplink_.add(id, frame.size());
-    return true;
+    return id;
   };
-  if (auto scanned = store_.scan(kOutbox, {}, read); !scanned) return scanned;
-  return ok;
+  const auto keep = [&](std::string_view key, std::size_t size) {
+    if (const auto id = id_of(key); ok) kept.emplace(*id, size);
+  };
+  const auto mark = [&](std::string_view key, std::size_t) {
+    const auto id = id_of(key);
+    if (auto known = ok ? kept.extract(*id) : decltype(kept)::node_type()) {
+      archive_bytes_ += known.mapped();
+      archive_.insert(std::move(known));
+    }
+  };
+  if (auto read = store_.sizes(kOutbox, keep); !read || !ok) return read ? ok : read;
+  if (auto read = store_.sizes(kArchive, mark); !read || !ok) return read ? ok : read;
+  for (const auto& [id, size] : kept) uplink_.add(id, size);
+  const auto heard = store_.read(kMeta, kIncarnations);
+  if (!heard) return tl::unexpected(heard.error());
+  if (const auto numbers = storage::numbers_of(heard->value_or(""), 2)) {
+    graph_incarnation_ = static_cast<std::uint32_t>((*numbers)[0]);
+    receipt_incarnation_ = static_cast<std::uint32_t>((*numbers)[1]);
+  }
+  return {};
 }
 
 /// No submap ends here: when one does, the journal goes in the same transaction.
@@ -124,6 +140,7 @@ Status RobotNode::hear_again(const JournalEntry& entry) {
   const auto& heard = std::get<HeardGraph>(entry);
   const auto message = wire::decode_proxy_graph(heard.frame);
   if (!message) return tl::unexpected(message.error());
+  agent_.forget_map_age();  // it was news when it was heard
   note(agent_.receive(*message, heard.budget));
   return {};
 }
@@ -275,8 +292,8 @@ void RobotNode::send_submaps(Timestamp now, const Frames& fresh, Step& step) {
 }
 
 bus::Envelope RobotNode::submap_envelope(SubmapId id, std::shared_ptr<const std::string> frame) const {
-  return {bus::Endpoint::of(agent_.robot()), bus::Endpoint::server(), bus::MessageKind::submap, message_id(id),
-          std::move(frame)};
+  return {bus::Endpoint::of(agent_.robot()), bus::Endpoint::server(), bus::MessageKind::submap,
+          message_id(id, receipt_incarnation_), std::move(frame)};
 }
 
 Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget) {
@@ -290,18 +307,39 @@ Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now, std::optio
   return step;
 }
 
+void RobotNode::refuse(const bus::Envelope& envelope, const Error& error, Timestamp now, Step& step) {
+  step.tell(now, MessageRefused{envelope.from, envelope.kind, error.message});
+  if (error.code != ErrorCode::unsupported) return;
+  Unread& unread = unread_[envelope.kind];
+  ++unread.count;
+  unread.why = error.message;
+}
+
+void RobotNode::remember_incarnations(Step& step) const {
+  if (config_.keeps_state)
+    step.writes.push_back({kMeta, kIncarnations, storage::key_of({graph_incarnation_, receipt_incarnation_})});
+}
+
+/// A server that has started again counts on from where its map was: an older one than the robot has heard of is
+/// another map. The newest of a kind comes last (bus::Delivery::retained), so that no start is heard after a later one
+/// for long.
 void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget,
                               Step& step) {
   const auto graph = graph_in(envelope);
-  if (!graph) {
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, graph.error().message});
-    return;
-  }
+  if (!graph) return refuse(envelope, graph.error(), now, step);
+  unread_.erase(envelope.kind);
   if (envelope.kind == bus::MessageKind::proxy_graph_delta)
     delta_ = envelope.bytes;
   else
     base_ = wire::decode_proxy_graph(*envelope.bytes).value().graph;
-  if (!*graph || !agent_.is_news((*graph)->graph)) return;
+  if (!*graph) return;
+  const ProxyGraph& heard = (*graph)->graph;
+  if (heard.incarnation != graph_incarnation_) {
+    graph_incarnation_ = heard.incarnation;
+    remember_incarnations(step);
+    if (heard.age() < agent_.newest_heard()) agent_.forget_map_age();
+  }
+  if (!agent_.is_news(heard)) return;
   if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph), budget}, now, step);
   write_journal(step);  // what is told of it holds
   step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, budget, observer_)});
@@ -326,11 +364,11 @@ Result<std::optional<ProxyGraphMessage>> RobotNode::graph_in(const bus::Envelope
 
 void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto receipt = wire::decode_receipt(*envelope.bytes);
-  if (!receipt || receipt->robot != agent_.robot()) {
-    const std::string why = receipt ? "a receipt for another robot" : receipt.error().message;
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, why});
-    return;
-  }
+  if (!receipt) return refuse(envelope, receipt.error(), now, step);
+  unread_.erase(envelope.kind);
+  if (receipt->robot != agent_.robot())
+    return step.tell(now, MessageRefused{envelope.from, envelope.kind, "a receipt for another robot"});
+  if (receipt->incarnation != receipt_incarnation_) note_start(*receipt, now, step);
   std::vector<SubmapId> known;
   for (const auto& [id, bytes] : uplink_.submaps()) {
     const bool is_refused = !receipt->contains(id) && receipt->refuses(id);
@@ -338,14 +376,47 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
       step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
                                     fmt::format("submap {} is refused by the server, which last said: {}",
                                                 to_string(id), receipt->why_refused)});
-    if (is_refused || receipt->contains(id)) known.push_back(id);
+    if (is_refused || receipt->contains(id))
+      known.push_back(id);
+    else if (receipt->leaves_unread(id))
+      uplink_.park(id);
   }
-  for (const SubmapId id : known) {
-    uplink_.remove(id);
-    step.writes.push_back({kOutbox, key_of(id), std::nullopt});
-  }
+  for (const SubmapId id : known) archive(id, step);
   note_conflict(*receipt, now, step);
   send_submaps(now, {}, step);
+}
+
+void RobotNode::note_start(const Receipt& receipt, Timestamp now, Step& step) {
+  receipt_incarnation_ = receipt.incarnation;
+  remember_incarnations(step);
+  uplink_.release();
+  std::vector<SubmapId> forgotten;
+  for (const auto& [id, bytes] : archive_)
+    if (!receipt.contains(id) && !receipt.refuses(id)) forgotten.push_back(id);
+  if (forgotten.empty()) return;
+  for (const SubmapId id : forgotten) {
+    const auto found = archive_.find(id);
+    archive_bytes_ -= found->second;
+    uplink_.add(id, found->second);
+    archive_.erase(found);
+    step.writes.push_back({kArchive, key_of(id), std::nullopt});
+  }
+  step.tell(now, SubmapsForgotten{agent_.robot(), forgotten.size()});
+}
+
+/// The oldest make room for it.
+void RobotNode::archive(SubmapId id, Step& step) {
+  const std::size_t bytes = uplink_.submaps().at(id);
+  uplink_.remove(id);
+  archive_.emplace(id, bytes);
+  archive_bytes_ += bytes;
+  step.writes.push_back({kArchive, key_of(id), ""});
+  while (archive_bytes_ > config_.max_archive_bytes) {
+    const auto oldest = archive_.begin();
+    for (const char* table : {kOutbox, kArchive}) step.writes.push_back({table, key_of(oldest->first), std::nullopt});
+    archive_bytes_ -= oldest->second;
+    archive_.erase(oldest);
+  }
 }
 
 void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step) {
@@ -374,6 +445,10 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .jobs_done = 0,
                     .trouble = {}};
   if (updated_) status.update_age_s = now - *updated_;
+  for (const auto& [kind, unread] : unread_)
+    status.trouble = wire::plain_text(
+        fmt::format("cannot read what the server sends ({} so far), one of the two is to be upgraded: {}", unread.count,
+                    unread.why));
   return status;
 }
 

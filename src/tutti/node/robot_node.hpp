@@ -23,14 +23,17 @@ struct RobotNodeConfig {
   bool keeps_state = true;
   std::string name;  ///< Empty: "robot_7".
   UplinkConfig uplink;
+  /// Of submaps that the server has named as stored or refused: kept in case its map loses them, the newest. 0: none.
+  std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;
   /// Odometry and scans are written together, at most this much mission time after the first of them: a kill loses no
   /// more, and the disk is not asked at every sample.
   double journal_period_s = 0.5;
 };
 
 /// A robot round RobotAgent: odometry, scans and proxy graphs in; submaps out, and kept until the server has stored
-/// them. Its store (storage::robot_schema()) holds the agent's state when the last submap ended, what it has heard
-/// since, and the submaps that are not known to be stored. Whoever can feed odometry and scans again, as a replay can,
+/// them, and longer, in case its map loses them: what a server names no more when it has started again is sent again.
+/// Its store (storage::robot_schema()) holds the agent's state when the last submap ended, what it has heard since, and
+/// the submaps. Whoever can feed odometry and scans again, as a replay can,
 /// does so after a start from agent().newest_sample() on, of that one the scan too: then nothing is lost.
 class RobotNode {
  public:
@@ -72,6 +75,8 @@ class RobotNode {
   [[nodiscard]] std::optional<std::uint64_t> owner_session() const { return owner_session_; }
 
   [[nodiscard]] const robot::RobotAgent& agent() const { return agent_; }
+  /// Submaps that the server is known to have stored or refused, as many as may be kept, with the bytes of each.
+  [[nodiscard]] const std::map<SubmapId, std::size_t>& archive() const { return archive_; }
   /// Submaps that the server is not known to have stored, with the bytes of each.
   [[nodiscard]] const std::map<SubmapId, std::size_t>& backlog() const { return uplink_.submaps(); }
 
@@ -95,19 +100,34 @@ class RobotNode {
   void note_conflict(const Receipt& receipt, Timestamp now, Step& step);
   void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);
+  /// What the server of another start does not name goes again.
+  void note_start(const Receipt& receipt, Timestamp now, Step& step);
+  void archive(SubmapId id, Step& step);
+  void remember_incarnations(Step& step) const;
+  /// Told, and, where it is of a version that this program does not read, kept for status().
+  void refuse(const bus::Envelope& envelope, const Error& error, Timestamp now, Step& step);
   [[nodiscard]] bus::Envelope submap_envelope(SubmapId id, std::shared_ptr<const std::string> frame) const;
 
   RobotNodeConfig config_;
   const storage::TableStore& store_;
   robot::RobotAgent agent_;
   robot::StageObserver observer_;
-  Uplink uplink_{config_.uplink};             // of what is in the outbox
-  std::optional<ProxyGraph> base_;            // the last that came in full
-  std::shared_ptr<const std::string> delta_;  // the last that came in terms of one
-  std::optional<Timestamp> last_scan_;        // since the checkpoint
-  std::optional<Timestamp> last_images_;      // since the checkpoint
-  std::uint64_t journal_ = 0;                 // entries since the checkpoint that are written
-  std::vector<std::string> unwritten_;        // and those that are not
+  Uplink uplink_{config_.uplink};            // of what is in the outbox
+  std::map<SubmapId, std::size_t> archive_;  // with the bytes of each
+  std::uint64_t archive_bytes_ = 0;
+  std::uint32_t graph_incarnation_ = 0;    // of the last graph
+  std::uint32_t receipt_incarnation_ = 0;  // of the last receipt
+  struct Unread {
+    std::uint64_t count = 0;
+    std::string why;
+  };
+  std::map<bus::MessageKind, Unread> unread_;  // since the last of the kind that could be read
+  std::optional<ProxyGraph> base_;             // the last that came in full
+  std::shared_ptr<const std::string> delta_;   // the last that came in terms of one
+  std::optional<Timestamp> last_scan_;         // since the checkpoint
+  std::optional<Timestamp> last_images_;       // since the checkpoint
+  std::uint64_t journal_ = 0;                  // entries since the checkpoint that are written
+  std::vector<std::string> unwritten_;         // and those that are not
   Timestamp unwritten_since_;
   wire::StoredState stored_;           // of the agent, in the checkpoint
   std::vector<std::string> obsolete_;  // rows of the checkpoint, until the next one

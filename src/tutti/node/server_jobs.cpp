@@ -188,14 +188,18 @@ void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsign
     }
 }
 
-std::string ServerNode::job_name(std::uint64_t number) const {
-  return fmt::format("{}/{}/{}", server_.state().epoch, start_, number);
+std::string ServerNode::job_name(std::uint64_t number) const { return fmt::format("{}{}", names_of_jobs(), number); }
+
+/// An older map that was put back counts its starts once more.
+std::string ServerNode::names_of_jobs() const {
+  const std::string start = fmt::format("{}/{}/", server_.state().epoch, start_);
+  return config_.incarnation == 0 ? start : fmt::format("{}{:08x}/", start, config_.incarnation);
 }
 
 /// The jobs that were sent later have not had their turn, as long as it goes on: a long queue is no reason to ask
 /// again.
 std::optional<ServerNode::OpenJob> ServerNode::close(const std::string& job, Timestamp now) {
-  const std::string mine = fmt::format("{}/{}/", server_.state().epoch, start_);
+  const std::string mine = names_of_jobs();
   std::uint64_t number = 0;
   if (!job.starts_with(mine)) return std::nullopt;
   const char* end = job.data() + job.size();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/server_node.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -30,20 +32,38 @@ Timestamp next_update(Timestamp now, double period_s) {
   return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
 }
 
-/// Rows of a table, decoded; the first error ends it.
-template <class Decode, class Take>
-Status read_rows(const storage::TableStore& store, const char* table, Decode&& decode, Take&& take) {
+/// Rows of a table, decoded; `leave` gets the keys of those in a version that this program does not read, and why. Any
+/// other error ends it.
+template <class Decode, class Take, class Leave>
+Status read_rows(const storage::TableStore& store, const char* table, Decode&& decode, Take&& take, Leave&& leave) {
   Status ok;
-  const auto visit = [&](std::string_view, std::string_view bytes) {
+  const auto visit = [&](std::string_view key, std::string_view bytes) {
     auto decoded = decode(bytes);
-    if (!decoded)
-      ok = in_context(fmt::format("the map's table '{}'", table), decoded.error());
-    else
+    if (decoded)
       take(std::move(*decoded));
+    else if (decoded.error().code == ErrorCode::unsupported)
+      leave(key, decoded.error().message);
+    else
+      ok = in_context(fmt::format("the map's table '{}'", table), decoded.error());
     return ok.has_value();
   };
   if (auto scanned = store.scan(table, {}, visit); !scanned) return scanned;
   return ok;
+}
+
+/// It has come in a version that is read.
+void forget_unread(SubmapId id, Receipt& receipt) {
+  if (!receipt.leaves_unread(id)) return;
+  NumberSet& numbers = receipt.unread.at(id.chain.session);
+  numbers.erase(id.index);
+  if (numbers.stretches().empty()) receipt.unread.erase(id.chain.session);
+}
+
+bus::MessageKind kind_of(std::string_view table) {
+  if (table == "submaps") return bus::MessageKind::submap;
+  if (table == "words") return bus::MessageKind::word;
+  if (table == kMetaTable) return bus::MessageKind::receipt;
+  return table == "verdicts" ? bus::MessageKind::verdict : bus::MessageKind::verdicts;
 }
 
 }  // namespace
@@ -51,6 +71,7 @@ Status read_rows(const storage::TableStore& store, const char* table, Decode&& d
 struct ServerNode::Opened {
   server::MapServerState state;
   std::map<RobotId, Receipt> receipts;
+  std::map<std::string, UnreadRows> unread_rows;
   RobotRegistry registry;
   std::uint64_t epoch = 0;
   std::uint64_t start = 0;
@@ -61,6 +82,8 @@ struct ServerNode::Opened {
 
  private:
   Status read_meta(const storage::TableStore& store);
+  void leave(const std::string& table, const std::string& why);
+  void note_stored(SubmapId id);
   void add(wire::SubmapOutline outline);
   void add(ClosureVerdict verdict);
   void add_answer(ClosureVerdict verdict);
@@ -71,10 +94,20 @@ void ServerNode::Opened::add(wire::SubmapOutline outline) {
   if (outline.size != PayloadSize()) state.payload_sizes[id] = outline.size;
   state.submaps[id] = std::make_shared<const Submap>(std::move(outline.submap));
   state.answered.add_submap(id);
+  note_stored(id);
+}
+
+void ServerNode::Opened::note_stored(SubmapId id) {
   Receipt& receipt = receipts[id.chain.robot];
   receipt.robot = id.chain.robot;
   receipt.stored[id.chain.session].insert(id.index);
   registry.note_session(id.chain);
+}
+
+void ServerNode::Opened::leave(const std::string& table, const std::string& why) {
+  UnreadRows& rows = unread_rows[table];
+  ++rows.count;
+  rows.why = why;
 }
 
 Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
@@ -86,6 +119,8 @@ Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
       auto receipt = wire::decode_receipt(bytes);
       if (receipt)
         receipts[receipt->robot] = std::move(*receipt);
+      else if (receipt.error().code == ErrorCode::unsupported)
+        leave(kMetaTable, receipt.error().message);
       else
         ok = in_context(fmt::format("the map's row '{}'", key), receipt.error());
     }
@@ -95,11 +130,13 @@ Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
   return ok;
 }
 
-/// As MapServer::take() leaves it: the closures of earlier finders hold until this one has answered.
+/// As MapServer::take() leaves it: the closures of earlier finders hold until this one has answered. A pair without both of
+/// its submaps, as in a map that was salvaged, is asked again when they come.
 void ServerNode::Opened::add(ClosureVerdict verdict) {
-  if (verdict.refusal) return add_answer(std::move(verdict));
-  if (verdict.finder == state.finder) state.answered.insert(verdict.pair);
   const SubmapPair pair = verdict.pair;
+  if (!state.submaps.contains(pair.first) || !state.submaps.contains(pair.second)) return;
+  if (verdict.refusal) return add_answer(std::move(verdict));
+  if (verdict.finder == state.finder) state.answered.insert(pair);
   state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
 }
 
@@ -107,6 +144,7 @@ void ServerNode::Opened::add(ClosureVerdict verdict) {
 /// is the server's.
 void ServerNode::Opened::add_answer(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
+  if (!state.submaps.contains(pair.first) || !state.submaps.contains(pair.second)) return;
   if (verdict.finder != state.finder) return;
   if (state.verdicts.contains(pair) && says(state.words, pair, Wish::accept)) return;
   if (!state.answered.insert(pair)) return;
@@ -133,7 +171,8 @@ Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& s
     for (ClosureVerdict& verdict : answer.verdicts) opened.add_answer(std::move(verdict));
   };
   if (auto ok = opened.read_meta(store); !ok) return tl::unexpected(ok.error());
-  auto words = read_words(store);
+  const auto leave_word = [&](const std::string& why) { opened.leave("words", why); };
+  auto words = read_words(store, leave_word);
   if (!words) return tl::unexpected(words.error());
   opened.state.words = std::move(*words);
   auto counts = read_map_counts(store);
@@ -142,9 +181,19 @@ Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& s
   auto refinements = read_refinements(store);
   if (!refinements) return tl::unexpected(refinements.error());
   opened.state.refinements = std::move(*refinements);
-  if (auto ok = read_rows(store, "submaps", wire::decode_outline, add); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_answers); !ok) return tl::unexpected(ok.error());
+  const auto leave_submap = [&](std::string_view key, const std::string& why) {  // it is in the map all the same
+    if (const auto id = submap_of_key(key)) opened.note_stored(*id);
+    opened.leave("submaps", why);
+  };
+  const auto leave = [&](const char* table) {
+    return [&opened, table](std::string_view, const std::string& why) { opened.leave(table, why); };
+  };
+  if (auto ok = read_rows(store, "submaps", wire::decode_outline, add, leave_submap); !ok)
+    return tl::unexpected(ok.error());
+  if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add, leave("verdicts")); !ok)
+    return tl::unexpected(ok.error());
+  if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_answers, leave("answers")); !ok)
+    return tl::unexpected(ok.error());
   return opened;
 }
 
@@ -174,6 +223,7 @@ ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::C
       server_(std::move(robots), std::move(finder), std::move(frames), config.server, epoch, std::move(opened.state)),
       receipts_(std::move(opened.receipts)),
       registry_(std::move(opened.registry)),
+      unread_rows_(std::move(opened.unread_rows)),
       start_(opened.start + 1),
       had_news_(opened.news),
       stored_counts_(opened.counts) {
@@ -198,6 +248,7 @@ Step ServerNode::resume(Timestamp now) {
   if (server_.has_news()) timer_ = next_update(now, config_.server.update_period_s);
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
+  tell_unread_rows(now, step);
   for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   note_settling(now);
@@ -262,9 +313,10 @@ void ServerNode::receive_submap(const bus::Envelope& envelope, Timestamp now, St
   if (taken) return;
   refuse(envelope, taken.error().message, now, step);
   const auto id = submap_of(envelope.id);
+  if (!id || id->chain.robot != envelope.from.robot()) return;
+  if (taken.error().code == ErrorCode::unsupported && admit(id->chain.robot)) return note_unread(*id, step);
   const bool may_be_good_later = taken.error().code == ErrorCode::io;
-  if (id && id->chain.robot == envelope.from.robot() && robots_.contains(id->chain.robot) && !may_be_good_later)
-    note_refused(*id, taken.error().message, step);
+  if (robots_.contains(id->chain.robot) && !may_be_good_later) note_refused(*id, taken.error().message, step);
 }
 
 Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -289,6 +341,7 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
     Receipt& receipt = receipts_[id.chain.robot];
     receipt.robot = id.chain.robot;
     receipt.stored[id.chain.session].insert(id.index);
+    forget_unread(id, receipt);
     registry_.note_session(id.chain);
     step.writes.push_back({"submaps", key_of(id), *envelope.bytes});
     step.tell(now, SubmapStored{id});
@@ -296,6 +349,26 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
   send_receipt(id.chain.robot, step);
   send_jobs(id, now, 0, config_.pairs_per_job, step);
   return {};
+}
+
+void ServerNode::tell_unread_rows(Timestamp now, Step& step) {
+  for (const auto& [table, rows] : unread_rows_) {
+    const std::string why =
+        fmt::format("{} rows of the map's table '{}' are left as they are: {}", rows.count, table, rows.why);
+    step.tell(now, MessageRefused{bus::Endpoint::server(), kind_of(table), why});
+    note_refusal(bus::Endpoint::Role::server, kind_of(table), why);
+  }
+}
+
+/// Not stored: it is for the robot to keep it, which has the right one where this is garbage. Bounded as refusals are.
+void ServerNode::note_unread(SubmapId id, Step& step) {
+  Receipt& receipt = receipts_[id.chain.robot];
+  receipt.robot = id.chain.robot;
+  const bool is_bounded = receipt.unread.size() < kMostRefusedSessions || receipt.unread.contains(id.chain.session);
+  if (!receipt.contains(id) && is_bounded &&
+      receipt.unread[id.chain.session].stretches().size() < kMostRefusedStretches)
+    receipt.unread[id.chain.session].insert(id.index);
+  send_receipt(id.chain.robot, step);
 }
 
 /// Bounded, so that nobody's garbage fills the receipt; beyond, a robot keeps what it is not told of.
@@ -331,11 +404,14 @@ void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step&
 }
 
 void ServerNode::send_receipt(RobotId robot, Step& step) const {
-  step.messages.push_back(to_robot(robot, bus::MessageKind::receipt,
-                                   std::make_shared<const std::string>(wire::encode(receipts_.at(robot)))));
+  Receipt receipt = receipts_.at(robot);
+  receipt.incarnation = config_.incarnation;
+  step.messages.push_back(
+      to_robot(robot, bus::MessageKind::receipt, std::make_shared<const std::string>(wire::encode(receipt))));
 }
 
 void ServerNode::send_graph(ProxyGraphMessage message, Step& step) {
+  message.graph.incarnation = config_.incarnation;
   for (const RobotId robot : robots_)
     if (const auto owner = registry_.owner(robot)) consistency::see_last_in(message.graph, *owner);
   broadcast_ = message.graph;

@@ -29,6 +29,8 @@ struct ServerNodeConfig {
   /// (without a timeout: with the next submap), so often in all; then it is refused.
   unsigned most_tries = 4;
   std::shared_ptr<const server::MapRefiner> refiner;  ///< Null: the map is its pose graph's.
+  /// Of this start, at random (ProxyGraph::incarnation); robots send again what is not in the map of a new one.
+  std::uint32_t incarnation = 0;
   bool accepts_others = false;  ///< Robots that it was not told of, up to ProxyGraph::kMostChains in all.
 };
 
@@ -48,9 +50,9 @@ class ServerNode {
   /// The first step after every start: receipts, and what is to be verified. The map is not computed yet; next_timer()
   /// says when on_timer() does, which may be at once, and what comes before is taken.
   Step resume(Timestamp now);
-  /// What has come to the server. A submap that it will never take is in the robot's receipt as refused. A second robot
-  /// with a name or number that is in use (RobotRegistry) is told so by the receipt, and its submaps are taken, but
-  /// what is sent to that number is the owner's.
+  /// What has come to the server. A submap that it will never take is in the robot's receipt as refused, one of a
+  /// version that it does not read as unread. A second robot with a name or number that is in use (RobotRegistry) is
+  /// told so by the receipt, and its submaps are taken, but what is sent to that number is the owner's.
   Step receive(const bus::Envelope& envelope, Timestamp now);
   /// In place of receive(), for what the host does not hand in (program/host.hpp): told, and counted as refused.
   Step put_aside(const bus::Envelope& envelope, const std::string& why, Timestamp now);
@@ -86,6 +88,10 @@ class ServerNode {
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// For good: the robot need not send it again.
   void note_refused(SubmapId id, const std::string& why, Step& step);
+  /// The robot need not send it again before the next start, which may be of a newer version.
+  void note_unread(SubmapId id, Step& step);
+  /// Says which rows of the map are left alone.
+  void tell_unread_rows(Timestamp now, Step& step);
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step);
@@ -97,6 +103,11 @@ class ServerNode {
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Takes one verdict of these; a refusal that now holds is kept in `refused`.
   Status take(const ClosureVerdict& verdict, Verdicts& refused, Step& step);
+  /// Rows of the map in versions that this program does not read, as those of a newer one that had it before.
+  struct UnreadRows {
+    std::size_t count = 0;
+    std::string why;
+  };
   /// What was asked for and has no answer yet: pairs, or a refinement.
   struct OpenJob {
     std::vector<SubmapPair> pairs;
@@ -106,6 +117,7 @@ class ServerNode {
   };
   void send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, std::size_t most_pairs, Step& step);
   [[nodiscard]] std::string job_name(std::uint64_t number) const;
+  [[nodiscard]] std::string names_of_jobs() const;  // what all of this start begin with
   /// It need not be asked again. Nothing: it is not open, or of an earlier start.
   std::optional<OpenJob> close(const std::string& job, Timestamp now);
   /// What the last map wants, if anything.
@@ -153,7 +165,8 @@ class ServerNode {
   server::MapServer server_;
   std::map<RobotId, Receipt> receipts_;
   RobotRegistry registry_;
-  std::map<RobotId, Timestamp> waits_since_;  // robots with a backlog: since then without a receipt that was due
+  std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are told
+  std::map<RobotId, Timestamp> waits_since_;       // robots with a backlog: since then without a receipt that was due
   std::map<std::uint32_t, MissionStatus::Worker> workers_;
   std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
   std::map<std::uint64_t, OpenJob> open_jobs_;  // of this start, by number

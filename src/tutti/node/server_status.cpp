@@ -94,6 +94,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
   const auto later = std::ranges::count_if(failed_, [](const auto& failed) { return failed.second.again.has_value(); });
   MissionStatus out{.time = now,
                     .epoch = state.epoch,
+                    .incarnation = config_.incarnation,
                     .revision = state.revision,
                     .submaps = state.submaps.size(),
                     .closures = made.closures,
@@ -113,6 +114,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
     if (const auto found = receipts_.find(robot); found != receipts_.end()) {
       entry.submaps = count(found->second.stored);
       entry.refused = count(found->second.refused);
+      entry.unread = count(found->second.unread);
     }
     if (const auto found = registry_.robots().find(robot); found != registry_.robots().end()) {
       const RobotRegistry::Robot& known = found->second;

@@ -90,6 +90,9 @@ std::string mission_status_text(const MissionStatus& status, double silent_s) {
   for (const MissionStatus::Robot& robot : status.robots) {
     if (!robot.conflict.empty()) say("two robots: {}\n", robot.conflict);
     if (robot.refused > 0) say("{}: {} submaps are no good and not in the map\n", robot.status.name, robot.refused);
+    if (robot.unread > 0)
+      say("{}: {} submaps are of a newer version than this server reads; the robot keeps them until it is upgraded\n",
+          robot.status.name, robot.unread);
   }
   for (const MissionStatus::Refusals& refusals : status.refusals)
     say("refused from {}s: {} x {}, the last because: {}\n", refusals.from, refusals.count, refusals.kind,

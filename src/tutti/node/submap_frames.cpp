@@ -9,21 +9,33 @@ namespace tutti::node {
 
 std::string key_of(SubmapId id) { return storage::key_of({id.chain.robot.value, id.chain.session, id.index}); }
 
-std::string message_id(SubmapId id) {
-  return fmt::format("{}/{}/{}", id.chain.robot.value, id.chain.session, id.index);
+std::optional<SubmapId> submap_of_key(std::string_view key) {
+  const auto numbers = storage::numbers_of(key, 3);
+  if (!numbers) return std::nullopt;
+  const SubmapId id{{RobotId{static_cast<std::uint32_t>((*numbers)[0])}, (*numbers)[1]},
+                    static_cast<std::uint32_t>((*numbers)[2])};
+  return key == key_of(id) ? std::optional(id) : std::nullopt;  // numbers of 32 bits
+}
+
+std::string message_id(SubmapId id, std::uint32_t incarnation) {
+  const std::string plain = fmt::format("{}/{}/{}", id.chain.robot.value, id.chain.session, id.index);
+  return incarnation == 0 ? plain : fmt::format("{}/{:08x}", plain, incarnation);
 }
 
 std::optional<SubmapId> submap_of(std::string_view message_id) {
   SubmapId id;
+  std::uint32_t incarnation = 0;
   const char* at = message_id.data();
   const char* const end = at + message_id.size();
-  const auto read = [&](auto& number, char after) {
-    const auto [stop, error] = std::from_chars(at, end, number);
-    if (error != std::errc() || (after == 0 ? stop != end : stop == end || *stop != after)) return false;
-    at = after == 0 ? stop : stop + 1;
-    return true;
+  const auto read = [&](auto& number, int base) {
+    const auto [stop, error] = std::from_chars(at, end, number, base);
+    at = stop;
+    return error == std::errc();
   };
-  if (!read(id.chain.robot.value, '/') || !read(id.chain.session, '/') || !read(id.index, '\0')) return std::nullopt;
+  const auto skip = [&] { return at != end && *at++ == '/'; };
+  if (!read(id.chain.robot.value, 10) || !skip() || !read(id.chain.session, 10) || !skip() || !read(id.index, 10))
+    return std::nullopt;
+  if (at != end && (!skip() || !read(incarnation, 16) || at != end)) return std::nullopt;
   return id;
 }
 

@@ -47,8 +47,11 @@ class SubmapFrames final : public server::PayloadStore {
 
 /// The key of a submap's row.
 std::string key_of(SubmapId id);
-/// The id of the message that carries it: "robot/session/index".
-std::string message_id(SubmapId id);
+/// Whose row it is; nothing: the key is none of these.
+std::optional<SubmapId> submap_of_key(std::string_view key);
+/// The id of the message that carries it: "robot/session/index", and the incarnation of the server that it is sent to,
+/// where that is known: what was sent to an earlier one comes again, also through a bus that has had it.
+std::string message_id(SubmapId id, std::uint32_t incarnation = 0);
 std::optional<SubmapId> submap_of(std::string_view message_id);
 
 }  // namespace tutti::node

@@ -16,7 +16,14 @@ bool Uplink::remove(SubmapId submap) {
   all_bytes_ -= found->second;
   if (sent_.erase(submap) > 0) under_way_bytes_ -= found->second;
   bytes_.erase(found);
+  parked_.erase(submap);
   return true;
+}
+
+void Uplink::park(SubmapId submap) {
+  if (sent_.erase(submap) == 0) return;
+  under_way_bytes_ -= bytes_.at(submap);
+  parked_.insert(submap);
 }
 
 /// One at least, however large.
@@ -30,6 +37,7 @@ std::vector<SubmapId> Uplink::take(Timestamp now) {
   bool is_full = false;  // then older ones do not overtake the newest that waits
   for (const auto& [submap, bytes] : std::views::reverse(bytes_)) {
     if (now < free_at_) break;
+    if (parked_.contains(submap)) continue;
     const auto sent = sent_.find(submap);
     const bool is_under_way = sent != sent_.end();
     if (is_under_way && now < sent->second + kAgain_s) continue;
@@ -48,7 +56,7 @@ std::optional<Timestamp> Uplink::next() const {
   const auto consider = [&](Timestamp t) { next = next ? std::min(*next, t) : t; };
   for (const auto& [submap, sent] : sent_) consider(std::max(free_at_, sent + kAgain_s));
   for (const auto& [submap, bytes] : std::views::reverse(bytes_)) {
-    if (sent_.contains(submap)) continue;
+    if (sent_.contains(submap) || parked_.contains(submap)) continue;
     if (has_room_for(bytes)) consider(free_at_);
     break;  // the newest that waits
   }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "tutti/base/config.hpp"
@@ -37,6 +38,9 @@ class Uplink {
   void add(SubmapId submap, std::size_t bytes);
   /// It need not go any more. False: it is not there.
   bool remove(SubmapId submap);
+  /// It has been sent, and need not go again until release(). Changes nothing of one that has not.
+  void park(SubmapId submap);
+  void release() { parked_.clear(); }
   /// Those to be sent now, in this order; they are under way from here on.
   std::vector<SubmapId> take(Timestamp now);
   /// When take() has something next, unless add() or remove() is called before; may be in the past.
@@ -51,6 +55,7 @@ class Uplink {
   UplinkConfig config_;
   std::map<SubmapId, std::size_t> bytes_;
   std::map<SubmapId, Timestamp> sent_;  ///< When, of those under way.
+  std::set<SubmapId> parked_;
   std::uint64_t all_bytes_ = 0;
   std::uint64_t under_way_bytes_ = 0;
   Timestamp free_at_ = kFirstTimestamp;  ///< The budget is used up to here.

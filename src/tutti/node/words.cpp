@@ -19,7 +19,7 @@ std::optional<SubmapPair> pair_of(std::string_view key) {
   return key == key_of(pair) ? std::optional(pair) : std::nullopt;  // numbers of 32 bits
 }
 
-Result<WordSet> read_words(const storage::TableStore& map) {
+Result<WordSet> read_words(const storage::TableStore& map, const std::function<void(const std::string&)>& leave) {
   WordSet words;
   Status ok;
   const auto scanned = map.scan("words", {}, [&](std::string_view key, std::string_view bytes) {
@@ -27,6 +27,8 @@ Result<WordSet> read_words(const storage::TableStore& map) {
     auto word = wire::decode_word(bytes);
     if (!pair)
       ok = fail(ErrorCode::parse, "the map's table 'words': a key that is no pair of submaps");
+    else if (!word && word.error().code == ErrorCode::unsupported)
+      leave(word.error().message);
     else if (!word)
       ok = in_context("the map's table 'words'", word.error());
     else

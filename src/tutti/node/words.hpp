@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,8 +12,9 @@
 
 namespace tutti::node {
 
-/// The words of operators in a map's store. An error: the table is damaged.
-Result<WordSet> read_words(const storage::TableStore& map);
+/// The words of operators in a map's store; `leave` is told why one of them, of a version that this program does not
+/// read, is not among them. An error: the table is damaged.
+Result<WordSet> read_words(const storage::TableStore& map, const std::function<void(const std::string&)>& leave);
 
 /// The key of the rows on a pair of submaps.
 std::string key_of(const SubmapPair& pair);

@@ -143,8 +143,9 @@ void WorkerNode::decline(const RefinementJob& job, const std::string& why, Step&
 }
 
 void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  TUTTI_CHECK(!holds_job(), "a second job");
+  TUTTI_CHECK(!held_ && !rests_until_, "a second job");
   auto job = decode(envelope);
+  leaves_job_ = !job && job.error().code == ErrorCode::unsupported;
   if (!job) {
     step.tell(now, MessageRefused{envelope.from, envelope.kind, job.error().message});
     return;
@@ -173,6 +174,10 @@ void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step
   if (!copy) return refuse(copy.error().message);
   if (!held_ || !held_->missing.contains(copy->id)) return;  // it came twice
   const auto message = wire::decode_submap(copy->frame);
+  if (!message && message.error().code == ErrorCode::unsupported) {
+    leaves_job_ = true;
+    held_.reset();
+  }
   if (!message) return refuse(message.error().message);
   if (message->submap.id != copy->id) return refuse("another submap than it says");
   cache_->put(copy->id, std::move(copy->frame));

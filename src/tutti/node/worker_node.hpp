@@ -54,8 +54,9 @@ class WorkerNode {
   [[nodiscard]] std::vector<MethodId> can() const;
   /// A job, and only when none is held; the same one twice gives the same verdicts. Or a submap that was asked for.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// The job that came last is not answered yet, or another one is not to come yet.
-  [[nodiscard]] bool holds_job() const { return held_.has_value() || rests_until_.has_value(); }
+  /// The job that came last is not answered yet, or another one is not to come yet; or it never is answered: it, or a
+  /// submap of it, is of a version that this program does not read. Such a one is to be left to another worker.
+  [[nodiscard]] bool holds_job() const { return held_.has_value() || leaves_job_ || rests_until_.has_value(); }
   /// When on_timer() is to be called next; nothing while no job is held.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
   Step on_timer(Timestamp now);
@@ -100,6 +101,7 @@ class WorkerNode {
   std::optional<Held> held_;
   double rest_s_ = kRest_s;
   std::optional<Timestamp> rests_until_;
+  bool leaves_job_ = false;
 };
 
 }  // namespace tutti::node

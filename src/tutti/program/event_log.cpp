@@ -129,6 +129,12 @@ Told tell(const node::StateLost& lost) {
                   lost.session, lost.why),
       Level::warning};
 }
+Told tell(const node::SubmapsForgotten& forgotten) {
+  return {{{"event", "submaps_forgotten"}, {"robot", forgotten.robot.value}, {"submaps", forgotten.submaps}},
+          fmt::format("the server's map is another than before and lacks {} submaps that it had: they are sent again",
+                      forgotten.submaps),
+          Level::warning};
+}
 Told tell(const node::SampleRefused& refused) {
   return {{{"event", "sample_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "an odometry sample was refused: " + refused.why,

@@ -270,8 +270,10 @@ Status RobotProgram::read_recording() {
 }
 
 Result<std::unique_ptr<mission::RobotActor>> RobotProgram::open_actor() {
-  const node::RobotNodeConfig config{
-      .agent = config_.agent, .name = options_.name, .uplink = {.bytes_per_s = options_.uplink_bytes_per_s}};
+  const node::RobotNodeConfig config{.agent = config_.agent,
+                                     .name = options_.name,
+                                     .uplink = {.bytes_per_s = options_.uplink_bytes_per_s},
+                                     .max_archive_bytes = options_.max_archive_bytes};
   return mission::RobotActor::open(recording_, config, config_.association,
                                    agent_randomness(options_.mission.seed, options_.name),
                                    options_.session.value_or(folder_->made_ns()), *store_);

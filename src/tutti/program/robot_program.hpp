@@ -20,12 +20,13 @@ struct RobotOptions {
   std::string bus;   ///< "nats://HOST:PORT"
   bool insecure = false;
   std::filesystem::path state;
-  MissionSource mission;                 ///< Its recording is replayed,
-  std::string feed;                      ///< unless samples come on this Unix socket; then it may be empty.
-  double rate = 1.0;                     ///< Times real time.
-  double uplink_bytes_per_s = 0.0;       ///< Of mission time, for submaps; 0: no limit.
-  bool stay = false;                     ///< After the recording, to hear later maps.
-  std::optional<std::uint64_t> session;  ///< Nothing: when the state folder was made.
+  MissionSource mission;            ///< Its recording is replayed,
+  std::string feed;                 ///< unless samples come on this Unix socket; then it may be empty.
+  double rate = 1.0;                ///< Times real time.
+  double uplink_bytes_per_s = 0.0;  ///< Of mission time, for submaps; 0: no limit.
+  std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;  ///< Of submaps that the server has.
+  bool stay = false;                                          ///< After the recording, to hear later maps.
+  std::optional<std::uint64_t> session;                       ///< Nothing: when the state folder was made.
   Level console = Level::warning;
   std::string version;
 };

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -15,6 +17,7 @@
 #include <utility>
 
 #include "tutti/base/file.hpp"
+#include "tutti/base/random.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/nats_port.hpp"
@@ -180,6 +183,13 @@ bus::LeaseHolder holder_of(const StateFolder& folder) {
           .seat = fmt::format("{} {} {}", machine, folder.made_ns(), path.string())};
 }
 
+/// Of this start and, but for one in 4e9 times, no other: not of the clock alone, which a base station may not have.
+std::uint32_t any_incarnation() {
+  const auto since_boot = static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+  const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid())).fork(since_boot);
+  return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
+}
+
 /// All that a running server holds, in the order in which it is made.
 class ServerProgram {
  public:
@@ -217,6 +227,7 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   node::ServerNodeConfig config{.server = config_.server,
                                 .refiner = mission::make_refiner(config_),
                                 .accepts_others = config_.closures.finder != "reference"};
+  config.incarnation = any_incarnation();
   config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time
   std::set<RobotId> robots;
   for (std::uint32_t i = 0; i < names_.size(); ++i) robots.insert(RobotId{i});
@@ -275,7 +286,7 @@ Status ServerProgram::start() {
   const auto name = name_on_bus(options_.mission, config_);
   if (!name) return tl::unexpected(name.error());
   bus_ = {.url = options_.bus, .mission = *name, .allow_insecure = options_.insecure};
-  auto folder = StateFolder::open(options_.state, "server");
+  auto folder = StateFolder::open(options_.state, "server", kMapFile);
   if (!folder) return tl::unexpected(folder.error());
   folder_.emplace(std::move(*folder));
   auto log = EventLog::open(folder_->path(), "server", options_.console);

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <set>
 
 #include "tutti/base/file.hpp"
 #include "tutti/program/clock.hpp"
@@ -40,13 +41,13 @@ Status replace_file(const fs::path& file, const std::string& text, bool durable)
   return {};
 }
 
-Result<StateFolder> StateFolder::open(const fs::path& folder, const std::string& owner) {
+Result<StateFolder> StateFolder::open(const fs::path& folder, const std::string& owner, const std::string& brought) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return fail(ErrorCode::io, "state folder {}: cannot be made: {}", folder.string(), error.message());
   StateFolder made(fs::absolute(folder));
   if (Status locked = made.lock(); !locked) return tl::unexpected(locked.error());
-  if (Status read = made.read_or_make(owner); !read) return tl::unexpected(read.error());
+  if (Status read = made.read_or_make(owner, brought); !read) return tl::unexpected(read.error());
   return made;
 }
 
@@ -64,7 +65,7 @@ Status StateFolder::lock() {
 }
 
 /// "tutti robot alpha" and the nanoseconds, a line each.
-Status StateFolder::read_or_make(const std::string& owner) {
+Status StateFolder::read_or_make(const std::string& owner, const std::string& brought) {
   const fs::path file = path_ / "owner";
   const std::string first = "tutti " + owner;
   std::error_code error;
@@ -80,8 +81,11 @@ Status StateFolder::read_or_make(const std::string& owner) {
     return fail(ErrorCode::parse, "{}: does not say when the folder was made", file.string());
   }
   // A program that was killed here before has left the beginnings of lock and owner.
+  std::set<fs::path> known{path_ / "lock", beside_of(file)};
+  if (!brought.empty())
+    for (const char* end : {"", "-wal", "-shm"}) known.insert(path_ / (brought + end));
   for (const auto& entry : fs::directory_iterator(path_, error))
-    if (entry.path() != path_ / "lock" && entry.path() != beside_of(file))
+    if (!known.contains(entry.path()))
       return fail(ErrorCode::io, "state folder {}: holds '{}' and is none of tutti's; a new or an empty one is needed",
                   path_.string(), entry.path().filename().string());
   is_new_ = true;

@@ -15,8 +15,9 @@ namespace tutti::program {
 class StateFolder {
  public:
   /// Made if it is missing. `owner`: "server", "robot NAME". Errors: another program has it open; it is another
-  /// owner's; it holds other things; the disk.
-  static Result<StateFolder> open(const std::filesystem::path& folder, const std::string& owner);
+  /// owner's; it holds other things; the disk. `brought`: a store that somebody may have put into a new one.
+  static Result<StateFolder> open(const std::filesystem::path& folder, const std::string& owner,
+                                  const std::string& brought = "");
   ~StateFolder();
   StateFolder(StateFolder&& other) noexcept
       : path_(std::move(other.path_)),
@@ -35,7 +36,7 @@ class StateFolder {
  private:
   explicit StateFolder(std::filesystem::path path) : path_(std::move(path)) {}
   [[nodiscard]] Status lock();
-  [[nodiscard]] Status read_or_make(const std::string& owner);
+  [[nodiscard]] Status read_or_make(const std::string& owner, const std::string& brought);
 
   std::filesystem::path path_;
   std::uint64_t made_ns_ = 0;

@@ -68,6 +68,16 @@ TEST_F(StateFolderTest, AFolderWithOtherThingsIsNotTaken) {
   EXPECT_NE(folder.error().message.find("thesis.tex"), std::string::npos);
 }
 
+TEST_F(StateFolderTest, AMapThatWasBroughtIsTaken) {
+  fs::create_directories(folder_);
+  std::ofstream(folder_ / "map.tutti") << "a map";
+  std::ofstream(folder_ / "map.tutti-wal") << "and its log";
+  EXPECT_FALSE(StateFolder::open(folder_, "robot alpha").has_value());
+  const auto folder = StateFolder::open(folder_, "server", "map.tutti");
+  ASSERT_TRUE(folder.has_value()) << folder.error().message;
+  EXPECT_TRUE(folder->is_new());
+}
+
 TEST_F(StateFolderTest, EventsComeBackInTheirOrderAndWithoutWhatAKillHasTorn) {
   fs::create_directories(folder_);
   {

@@ -132,6 +132,8 @@ class RobotAgent {
   UpdateSummary receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget = std::nullopt,
                         const StageObserver& stage_ended = {});
 
+  /// The next graph is news, whatever its age: the map is another one.
+  void forget_map_age() { state_.epoch = state_.revision = 0; }
   /// Newer than any that was received; another one changes nothing.
   [[nodiscard]] bool is_news(const ProxyGraph& graph) const { return graph.age() > newest_heard(); }
 

@@ -12,47 +12,15 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/storage/internal/scanning.hpp"
+#include "tutti/storage/internal/sqlite.hpp"
 
 namespace tutti::storage {
+
+using internal::kApplicationId, internal::Database, internal::Statement, internal::Use, internal::hash_of,
+    internal::hex;
 namespace {
 
-constexpr std::int64_t kApplicationId = 0x54757474;           // "Tutt", at byte 68 of the file
 constexpr std::size_t kLongestRow = std::size_t{256} << 20U;  // key and bytes; SQLite's own limit is 1e9
-
-struct Close {
-  void operator()(sqlite3* database) const { sqlite3_close(database); }
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-};
-using Database = std::unique_ptr<sqlite3, Close>;
-using Statement = std::unique_ptr<sqlite3_stmt, Close>;
-
-/// One use of a prepared statement: lets go of what is bound and locked when it ends.
-class Use {
- public:
-  explicit Use(const Statement& statement) : statement_(statement.get()) {}
-  ~Use() {
-    sqlite3_reset(statement_);
-    sqlite3_clear_bindings(statement_);
-  }
-  Use(const Use&) = delete;
-  Use& operator=(const Use&) = delete;
-
-  /// `bytes` outlives this.
-  void bind(int index, std::string_view bytes) {
-    const char* data = bytes.empty() ? "" : bytes.data();  // null would be bound as NULL
-    sqlite3_bind_blob64(statement_, index, data, bytes.size(), SQLITE_STATIC);
-  }
-  void bind(int index, std::int64_t number) { sqlite3_bind_int64(statement_, index, number); }
-  int step() { return sqlite3_step(statement_); }
-  [[nodiscard]] std::string_view bytes(int column) const {
-    const auto* data = static_cast<const char*>(sqlite3_column_blob(statement_, column));
-    return {data == nullptr ? "" : data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
-  }
-  [[nodiscard]] std::int64_t number(int column) const { return sqlite3_column_int64(statement_, column); }
-
- private:
-  sqlite3_stmt* statement_;
-};
 
 struct TableStatements {
   Statement put;
@@ -61,21 +29,6 @@ struct TableStatements {
   Statement scan;
   Statement sizes;
 };
-
-/// FNV-1a over the key, then over the bytes. Any change within eight neighbouring bits changes it.
-std::int64_t hash_of(std::string_view key, std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
-  for (const std::string_view part : {key, bytes})
-    for (const char c : part) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-  return static_cast<std::int64_t>(hash);
-}
-
-/// For messages: hexadecimal, as SQLite's x'..' wants it.
-std::string hex(std::string_view key) {
-  std::string text;
-  for (const char c : key) text += fmt::format("{:02x}", static_cast<unsigned>(static_cast<unsigned char>(c)));
-  return text;
-}
 
 std::string sql_of_table(const std::string& table) {
   return "CREATE TABLE " + table + " (key BLOB PRIMARY KEY NOT NULL, hash INTEGER NOT NULL, bytes BLOB NOT NULL)";

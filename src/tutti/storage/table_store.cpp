@@ -9,7 +9,8 @@ const Schema& map_schema() {
 }
 
 const Schema& robot_schema() {
-  static const Schema schema{.kind = "robot", .tables = {"checkpoint", "journal", "outbox", "meta"}};
+  static const Schema schema{
+      .kind = "robot", .version = 2, .tables = {"checkpoint", "journal", "outbox", "archive", "meta"}};
   return schema;
 }
 

@@ -47,8 +47,8 @@ Result<SubmapMessage> decode_submap(std::string_view bytes);
 /// variance in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4. Shape: 5 %.
 std::string encode(const ProxyGraphMessage& message);
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
-/// The same, to the bit, in fewer bytes for who has `base`, an earlier graph as decoded. Nothing: the delta is against
-/// another graph.
+/// The same, to the bit, in fewer bytes for who has `base`, an earlier graph of the same incarnation, as decoded.
+/// Nothing: the delta is against another graph.
 std::string encode_delta(const ProxyGraphMessage& message, const ProxyGraph& base);
 Result<std::optional<ProxyGraphMessage>> decode_delta(std::string_view bytes, const ProxyGraph& base);
 

@@ -252,19 +252,26 @@ RC_GTEST_PROP(ProxyGraphCodec, ADeltaIsTheFullGraphToTheBit, ()) {
     return test::any_proxy_graph(rng, *rc::gen::inRange<std::size_t>(0, 4), *rc::gen::inRange<std::size_t>(1, 40),
                                  *rc::gen::arbitrary<bool>());
   };
-  const ProxyGraphMessage before = any();
+  ProxyGraphMessage before = any();
+  before.graph.incarnation = static_cast<std::uint32_t>(rng.index(std::uint64_t{1} << 32U));
   const ProxyGraph base = decode_proxy_graph(encode(before))->graph;
-  for (const ProxyGraphMessage& message : {later(before, rng), any(), before}) {
+  ProxyGraphMessage another = any();
+  another.graph.incarnation = before.graph.incarnation;
+  for (const ProxyGraphMessage& message : {later(before, rng), another, before}) {
     const auto delta = decode_delta(encode_delta(message, base), base);
     RC_ASSERT(delta.has_value());
     RC_ASSERT(delta->has_value());
     const auto full = decode_proxy_graph(encode(message));
     RC_ASSERT((*delta)->header == full->header);
     RC_ASSERT((*delta)->graph == full->graph);
-    ProxyGraph other = base;
+    RC_ASSERT(full->graph.incarnation == message.graph.incarnation);
+    ProxyGraph other = base, of_another_start = base;
     ++other.revision;
-    const auto useless = decode_delta(encode_delta(message, base), other);
-    RC_ASSERT(useless.has_value() && !useless->has_value());
+    ++of_another_start.incarnation;
+    for (const ProxyGraph& wrong : {other, of_another_start}) {
+      const auto useless = decode_delta(encode_delta(message, base), wrong);
+      RC_ASSERT(useless.has_value() && !useless->has_value());
+    }
   }
 }
 

@@ -115,7 +115,7 @@ Result<Header> read_header(std::string_view bytes) {
   if (!bytes.starts_with(kMagic)) return fail(ErrorCode::parse, "frame: does not begin with \"{}\"", kMagic);
   const auto byte = [&](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(bytes[i])); };
   if (byte(4) < 1 || byte(4) > kLastKind || name(static_cast<MessageKind>(byte(4))) == kUnknown)
-    return fail(ErrorCode::unsupported, "frame: unknown message kind {}", byte(4));
+    return fail(ErrorCode::parse, "frame: unknown message kind {}", byte(4));
   const Header header{static_cast<MessageKind>(byte(4)), static_cast<std::uint16_t>(byte(2) | (byte(3) << 8U))};
   const auto [oldest, current] = versions(header.kind);
   if (header.version < oldest || header.version > current)

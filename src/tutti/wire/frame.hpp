@@ -21,7 +21,7 @@ struct Unpacked {
 };
 
 /// What a frame of this kind holds. Wrong magic, kind, size, checksum, a version that cannot be read, or anything left
-/// over is an error.
+/// over is an error; ErrorCode::unsupported is a version alone: the same bytes may be good for another program.
 Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame);
 
 /// The version that a frame which could be read is of.

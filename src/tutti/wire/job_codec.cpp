@@ -114,6 +114,7 @@ Result<std::map<std::uint64_t, NumberSet>> read(const Sessions& in) {
 Status validate(const Receipt& receipt) {
   if (auto ok = check_numbers(receipt.stored); !ok) return in_context("receipt", ok.error());
   if (auto ok = check_numbers(receipt.refused); !ok) return in_context("receipt", ok.error());
+  if (auto ok = check_numbers(receipt.unread); !ok) return in_context("receipt", ok.error());
   for (const std::string& text : {receipt.why_refused, receipt.conflict ? receipt.conflict->why : std::string()})
     if (text.size() > kMaxReasonBytes || text != plain_text(text))
       return fail(ErrorCode::invalid, "receipt: a reason of {} bytes, expected at most {}, all of printable ASCII",
@@ -145,6 +146,8 @@ std::string encode(const Receipt& receipt) {
   out.set_robot(receipt.robot.value);
   write(receipt.stored, *out.mutable_stored());
   write(receipt.refused, *out.mutable_refused());
+  write(receipt.unread, *out.mutable_unread());
+  out.set_incarnation(receipt.incarnation);
   out.set_why_refused(receipt.why_refused);
   if (receipt.owner_session) out.set_owner_session(*receipt.owner_session);
   if (receipt.conflict) {
@@ -164,10 +167,14 @@ Result<Receipt> decode_receipt(std::string_view bytes) {
   if (!stored) return tl::unexpected(stored.error());
   auto refused = read(in.refused());
   if (!refused) return tl::unexpected(refused.error());
+  auto unread = read(in.unread());
+  if (!unread) return tl::unexpected(unread.error());
   Receipt receipt{.robot = RobotId{in.robot()},
+                  .incarnation = in.incarnation(),
                   .stored = std::move(*stored),
                   .refused = std::move(*refused),
                   .why_refused = in.why_refused(),
+                  .unread = std::move(*unread),
                   .owner_session = {},
                   .conflict = {}};
   if (in.has_owner_session()) receipt.owner_session = in.owner_session();

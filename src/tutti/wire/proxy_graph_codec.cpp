@@ -167,6 +167,7 @@ std::string encode(const ProxyGraphMessage& message, MessageKind kind, const Pro
   out.mutable_header()->set_sequence(message.header.sequence);
   out.set_epoch(graph.epoch);
   out.set_revision(graph.revision);
+  out.set_incarnation(graph.incarnation);
   out.set_radius_m(graph.radius_m);
   out.set_sigma_m(graph.sigma_m);
   out.set_reduced(graph.reduced);
@@ -201,6 +202,7 @@ Result<ProxyGraphMessage> decode(const v1::ProxyGraph& in, const ProxyGraph& bas
   ProxyGraph& graph = message.graph;
   graph.epoch = in.epoch();
   graph.revision = in.revision();
+  graph.incarnation = in.incarnation();
   graph.radius_m = in.radius_m();
   graph.sigma_m = in.sigma_m();
   graph.reduced = in.reduced();
@@ -218,6 +220,7 @@ Result<ProxyGraphMessage> decode(const v1::ProxyGraph& in, const ProxyGraph& bas
 std::string encode(const ProxyGraphMessage& message) { return encode(message, MessageKind::proxy_graph, {}); }
 
 std::string encode_delta(const ProxyGraphMessage& message, const ProxyGraph& base) {
+  TUTTI_CHECK(message.graph.incarnation == base.incarnation, "a base of another start");
   return encode(message, MessageKind::proxy_graph_delta, base);
 }
 
@@ -230,7 +233,9 @@ Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes) {
 Result<std::optional<ProxyGraphMessage>> decode_delta(std::string_view bytes, const ProxyGraph& base) {
   const auto parsed = parse_frame<v1::ProxyGraph>(MessageKind::proxy_graph_delta, bytes);
   if (!parsed) return tl::unexpected(parsed.error());
-  if (std::pair(parsed->message.base_epoch(), parsed->message.base_revision()) != base.age()) return std::nullopt;
+  const bool is_of_base = std::pair(parsed->message.base_epoch(), parsed->message.base_revision()) == base.age() &&
+                          parsed->message.incarnation() == base.incarnation;
+  if (!is_of_base) return std::nullopt;
   return decode(parsed->message, base);
 }
 

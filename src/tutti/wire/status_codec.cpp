@@ -100,7 +100,8 @@ Result<MissionStatus::Robot> read(const v1::RobotInMission& in) {
                               .submaps = in.submaps(),
                               .refused = in.refused(),
                               .conflict = in.conflict(),
-                              .status = std::move(*status)};
+                              .status = std::move(*status),
+                              .unread = in.unread()};
 }
 
 Result<MissionStatus::Worker> read(const v1::WorkerInMission& in) {
@@ -182,6 +183,7 @@ std::string encode(const MissionStatus& status) {
   out.set_wall_ns(status.wall_ns);
   out.set_version(status.version);
   out.set_epoch(status.epoch);
+  out.set_incarnation(status.incarnation);
   out.set_revision(status.revision);
   out.set_submaps(status.submaps);
   out.set_closures(status.closures);
@@ -195,6 +197,7 @@ std::string encode(const MissionStatus& status) {
     if (robot.last_update) entry.set_last_update_ns(robot.last_update->ns);
     entry.set_submaps(robot.submaps);
     entry.set_refused(robot.refused);
+    entry.set_unread(robot.unread);
     entry.set_conflict(robot.conflict);
     write(robot.status, *entry.mutable_status());
   }
@@ -227,6 +230,7 @@ Result<MissionStatus> decode_mission_status(std::string_view bytes) {
                        .wall_ns = in.wall_ns(),
                        .version = in.version(),
                        .epoch = in.epoch(),
+                       .incarnation = in.incarnation(),
                        .revision = in.revision(),
                        .submaps = in.submaps(),
                        .closures = in.closures(),

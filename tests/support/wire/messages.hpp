@@ -180,6 +180,8 @@ inline Receipt any_receipt(Rng& rng) {
   }
   for (std::uint64_t sessions = rng.index(3); sessions > 0; --sessions) receipt.refused[any_session(rng)].insert(7);
   if (!receipt.refused.empty()) receipt.why_refused = "its odometry is no odometry";
+  if (rng.bernoulli(0.5)) receipt.incarnation = static_cast<std::uint32_t>(rng.index(std::uint64_t{1} << 32U));
+  if (rng.bernoulli(0.5)) receipt.unread[any_session(rng)].insert(rng.index(40));
   if (rng.bernoulli(0.5)) receipt.owner_session = any_session(rng);
   if (rng.bernoulli(0.5)) receipt.conflict = {any_session(rng), rng.index(9), "somebody else is alpha"};
   return receipt;
@@ -228,6 +230,7 @@ inline MissionStatus any_mission_status(Rng& rng) {
                        .wall_ns = -1,
                        .version = "0.9.1",
                        .epoch = rng.index(1000),
+                       .incarnation = static_cast<std::uint32_t>(rng.index(std::uint64_t{1} << 32U)),
                        .revision = rng.index(1000),
                        .submaps = rng.index(1000),
                        .closures = rng.index(1000),
@@ -249,6 +252,7 @@ inline MissionStatus any_mission_status(Rng& rng) {
     if (rng.bernoulli(0.5)) robot.last_update = stamp();
     robot.submaps = rng.index(1000);
     robot.refused = rng.index(1000);
+    robot.unread = rng.index(1000);
     robot.conflict = rng.bernoulli(0.5) ? "two of them" : "";
     robot.status = any_status(rng);
   }

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/salvage.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <set>
+
+#include "support/mapfile/small_map.hpp"
+#include "tutti/base/file.hpp"
+#include "tutti/mapfile/content.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+
+namespace tutti::mapfile {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Mapper;
+constexpr RobotId kAlpha{0};
+const ChainId kWalk{kAlpha, 5};
+
+/// A map in a file.
+class SalvagedMap : public testing::Test {
+ protected:
+  SalvagedMap() {
+    fs::create_directories(folder_);
+    const auto store = storage::open_sqlite_store(map_, storage::map_schema(), {.min_free_bytes = 0}).value();
+    Mapper mapper({kAlpha}, *store);
+    mapper.walk(kWalk);
+    submaps_ = mapper.server().state().submaps.size();
+  }
+  ~SalvagedMap() override { fs::remove_all(folder_); }
+  /// Turns a bit of this row.
+  void damage(const std::string& table, const std::string& key) {
+    const std::string bytes = **open(map_).value()->read(table, key);
+    std::string file = read_file(map_.string()).value();
+    const std::size_t at = file.find(bytes.substr(bytes.size() - std::min<std::size_t>(bytes.size(), 64)));
+    ASSERT_NE(at, std::string::npos);
+    file[at + 5] ^= 0x10;
+    ASSERT_TRUE(write_file(map_.string(), file));
+  }
+  const fs::path folder_ = fs::path(testing::TempDir()) / ("salvage_map_" + std::to_string(getpid()));
+  const fs::path map_ = folder_ / "map.tutti", out_ = folder_ / "out.tutti";
+  std::size_t submaps_ = 0;
+};
+
+TEST_F(SalvagedMap, LacksTheDamagedRowWhichIsNamedAndTakesItWhenItComesAgain) {
+  damage("submaps", node::key_of(SubmapId{kWalk, 2}));
+  EXPECT_FALSE(read(*open(map_).value()).has_value());
+  const std::string before = read_file(map_.string()).value();
+  const auto salvaged = salvage(map_, out_);
+  ASSERT_TRUE(salvaged.has_value()) << salvaged.error().message;
+  EXPECT_EQ(salvaged->rows.at("submaps"), submaps_ - 1);
+  ASSERT_EQ(salvaged->lost.size(), 1U);
+  EXPECT_NE(salvaged->lost[0].find("submaps: submap 0:5/2: "), std::string::npos) << salvaged->lost[0];
+  EXPECT_EQ(read_file(map_.string()).value(), before);
+  std::set<std::string> files;
+  for (const auto& entry : fs::directory_iterator(folder_)) files.insert(entry.path().filename());
+  EXPECT_EQ(files, (std::set<std::string>{"map.tutti", "out.tutti"}));
+
+  const auto store = open(out_).value();
+  EXPECT_EQ(read(*store)->submaps.size(), submaps_ - 1);
+  EXPECT_TRUE(read(*store)->meta.news);
+  Mapper mapper({kAlpha}, *store);
+  mapper.walk(kWalk);  // the robot sends all that it has
+  EXPECT_EQ(mapper.server().state().submaps.size(), submaps_);
+  EXPECT_EQ(mapper.server().map().components, 1U);
+}
+
+TEST_F(SalvagedMap, WithoutItsOwnRowGoesOn) {
+  damage("meta", "map");
+  EXPECT_FALSE(read(*open(map_).value()).has_value());
+  ASSERT_TRUE(salvage(map_, out_).has_value());
+  const auto store = open(out_).value();
+  Mapper mapper({kAlpha}, *store);
+  EXPECT_EQ(mapper.server().state().submaps.size(), submaps_);
+}
+
+TEST_F(SalvagedMap, IsNotThereWhenItFails) {
+  EXPECT_FALSE(salvage(folder_ / "missing", out_).has_value());
+  EXPECT_FALSE(salvage(map_, map_).has_value());
+  ASSERT_TRUE(write_file((folder_ / "garbage").string(), std::string(9000, 'x')));
+  EXPECT_FALSE(salvage(folder_ / "garbage", out_).has_value());
+  EXPECT_FALSE(fs::exists(out_));
+}
+
+}  // namespace
+}  // namespace tutti::mapfile
