@@ -9,6 +9,7 @@
 
 #include "tutti/base/result.hpp"
 #include "tutti/program/event_log.hpp"
+#include "tutti/program/feed/feed_server.hpp"
 #include "tutti/program/mission_source.hpp"
 
 namespace tutti::program {
@@ -20,8 +21,9 @@ struct RobotOptions {
   std::string bus;   ///< "nats://HOST:PORT"
   bool insecure = false;
   std::filesystem::path state;
-  MissionSource mission;                 ///< Its recording is replayed,
-  std::string feed;                      ///< unless samples come on this Unix socket; then it may be empty.
+  MissionSource mission;  ///< Its recording is replayed,
+  std::string feed;       ///< unless samples come on this Unix socket; then it may be empty.
+  FeedAccess feed_access;
   double rate = 1.0;                     ///< Times real time.
   double uplink_bytes_per_s = 0.0;       ///< Of mission time, for submaps; 0: no limit.
   bool stay = false;                     ///< After the recording, to hear later maps.
