@@ -99,6 +99,24 @@ void add_robot_command(CLI::App& app, int& exit_code) {
       ->add_option("--feed", options->feed,
                    "Take odometry and scans on this Unix socket and answer with where the robot is (docs/protocol.md)")
       ->type_name("SOCKET");
+  command
+      ->add_option("--feed-group", options->feed_access.group,
+                   "The group that the socket of --feed belongs to; default: this program's")
+      ->type_name("GROUP");
+  command
+      ->add_option_function<std::string>(
+          "--feed-mode",
+          [options](const std::string& mode) {
+            options->feed_access.mode = static_cast<unsigned>(std::stoul(mode, nullptr, 8));
+          },
+          "Who may connect to it, as of chmod: 0600 (default) this user, 0660 the group too")
+      ->check([](const std::string& mode) {
+        const bool is_mode = !mode.empty() && mode.size() <= 4 &&
+                             mode.find_first_not_of("01234567") == std::string::npos &&
+                             std::stoul(mode, nullptr, 8) <= 0777;
+        return is_mode ? std::string() : "expected an octal mode such as 0660, got '" + mode + "'";
+      })
+      ->type_name("MODE");
   add_number(*command, "--uplink-budget", options->uplink_bytes_per_s,
              "What its submaps may take of the link, the newest first; 0 = no limit", "BYTES_PER_S", within(0.0, 1e12));
   command

@@ -5,10 +5,11 @@
 
 namespace tutti::program {
 
-Result<std::unique_ptr<LiveFeed>> LiveFeed::open(const std::string& socket, mission::RobotActor& actor, Host& host,
-                                                 const Clock& clock, RobotView view) {
+Result<std::unique_ptr<LiveFeed>> LiveFeed::open(const std::string& socket, const FeedAccess& access,
+                                                 mission::RobotActor& actor, Host& host, const Clock& clock,
+                                                 RobotView view) {
   std::unique_ptr<LiveFeed> feed(new LiveFeed(actor, host, clock, std::move(view)));
-  auto server = FeedServer::listen(socket, *feed, {});
+  auto server = FeedServer::listen(socket, *feed, {}, access);
   if (!server) return tl::unexpected(server.error());
   feed->server_ = std::move(*server);
   return feed;

@@ -19,8 +19,9 @@ namespace tutti::program {
 class LiveFeed final : public FeedTarget {
  public:
   /// FeedServer::listen(). All that it is given outlives it.
-  static Result<std::unique_ptr<LiveFeed>> open(const std::string& socket, mission::RobotActor& actor, Host& host,
-                                                const Clock& clock, RobotView view);
+  static Result<std::unique_ptr<LiveFeed>> open(const std::string& socket, const FeedAccess& access,
+                                                mission::RobotActor& actor, Host& host, const Clock& clock,
+                                                RobotView view);
 
   Status add_odometry(const node::OdometrySample& sample) override;
   Status add_scan(const Scan& scan) override;

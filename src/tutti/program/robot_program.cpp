@@ -42,7 +42,7 @@ class HostedRobot final : public Hosted {
         begin_s_(clock.wall_s()) {}
   /// Its samples come from clients, not from a recording.
   Status feed_live(Host& host, RobotView view) {
-    auto feed = LiveFeed::open(options_.feed, *actor_, host, clock_, std::move(view));
+    auto feed = LiveFeed::open(options_.feed, options_.feed_access, *actor_, host, clock_, std::move(view));
     if (!feed) return tl::unexpected(feed.error());
     feed_ = std::move(*feed);
     return {};

@@ -9,6 +9,7 @@
 
 #include "tutti/base/result.hpp"
 #include "tutti/program/event_log.hpp"
+#include "tutti/program/feed/feed_server.hpp"
 #include "tutti/program/mission_source.hpp"
 
 namespace tutti::program {
@@ -20,10 +21,11 @@ struct RobotOptions {
   std::string bus;   ///< "nats://HOST:PORT"
   bool insecure = false;
   std::filesystem::path state;
-  MissionSource mission;            ///< Its recording is replayed,
-  std::string feed;                 ///< unless samples come on this Unix socket; then it may be empty.
-  double rate = 1.0;                ///< Times real time.
-  double uplink_bytes_per_s = 0.0;  ///< Of mission time, for submaps; 0: no limit.
+  MissionSource mission;  ///< Its recording is replayed,
+  std::string feed;       ///< unless samples come on this Unix socket; then it may be empty.
+  FeedAccess feed_access;
+  double rate = 1.0;                                          ///< Times real time.
+  double uplink_bytes_per_s = 0.0;                            ///< Of mission time, for submaps; 0: no limit.
   std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;  ///< Of submaps that the server has.
   bool stay = false;                                          ///< After the recording, to hear later maps.
   std::optional<std::uint64_t> session;                       ///< Nothing: when the state folder was made.

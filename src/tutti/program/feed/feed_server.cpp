@@ -2,6 +2,8 @@
 #include "tutti/program/feed/feed_server.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
+#include <grp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -11,6 +13,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 namespace tutti::program {
@@ -33,10 +36,19 @@ Status make_way(const std::string& path, const sockaddr_un& address) {
   return {};
 }
 
+std::optional<gid_t> group_of(const std::string& name) {
+  group found{};
+  group* is_there = nullptr;
+  std::vector<char> buffer(64U << 10U);
+  if (getgrnam_r(name.c_str(), &found, buffer.data(), buffer.size(), &is_there) != 0 || is_there == nullptr)
+    return std::nullopt;
+  return found.gr_gid;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<FeedServer>> FeedServer::listen(const std::string& path, FeedTarget& target,
-                                                       const FeedSettings& settings) {
+                                                       const FeedSettings& settings, const FeedAccess& access) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path)
@@ -53,7 +65,13 @@ Result<std::unique_ptr<FeedServer>> FeedServer::listen(const std::string& path, 
   if (listener < 0) return failed("make a socket");
   // Before anybody can connect: nobody can until listen().
   if (bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return failed("bind a socket");
-  if (chmod(path.c_str(), S_IRUSR | S_IWUSR) != 0) return failed("keep the socket to this user");
+  if (!access.group.empty()) {
+    const auto group = group_of(access.group);
+    if (!group) errno = ENOENT;
+    if (!group || chown(path.c_str(), static_cast<uid_t>(-1), *group) != 0)
+      return failed(fmt::format("give the socket to the group '{}'", access.group).c_str());
+  }
+  if (chmod(path.c_str(), access.mode) != 0) return failed("set the mode of the socket");
   if (::listen(listener, settings.max_clients) != 0) return failed("listen");
   return std::unique_ptr<FeedServer>(new FeedServer(path, listener, target, settings));
 }
@@ -91,12 +109,21 @@ void FeedServer::serve(int timeout_ms) {
 void FeedServer::accept_one() {
   const int file = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (file < 0) return;
-  if (files_.size() >= static_cast<std::size_t>(settings_.max_clients)) {
+  if (files_.size() >= static_cast<std::size_t>(settings_.max_clients) && !drop_silent()) {
     close(file);
     return;
   }
   files_[next_] = file;
   session_.connect(next_++);
+}
+
+bool FeedServer::drop_silent() {
+  for (const auto& [client, of_client] : files_)
+    if (!session_.is_greeted(client)) {
+      drop(client);
+      return true;
+    }
+  return false;
 }
 
 bool FeedServer::read_from(FeedSession::Client client, int file) {

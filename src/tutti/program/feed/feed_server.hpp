@@ -9,14 +9,20 @@
 
 namespace tutti::program {
 
+/// Who may connect, beside root.
+struct FeedAccess {
+  std::string group;     ///< Of the socket; empty: that of the program.
+  unsigned mode = 0600;  ///< Of its file.
+};
+
 /// FeedSession on a Unix socket. Without a thread of its own: its program calls serve() again and again, which may be
 /// what it waits in.
 class FeedServer {
  public:
-  /// Only this user may connect. A socket that a killed program left there is replaced; an error when somebody listens
-  /// on it, or it is another kind of file. `target` outlives the server.
+  /// Only who has `access` may connect. A socket that a killed program left there is replaced; an error when somebody
+  /// listens on it, or it is another kind of file. `target` outlives the server.
   static Result<std::unique_ptr<FeedServer>> listen(const std::string& path, FeedTarget& target,
-                                                    const FeedSettings& settings);
+                                                    const FeedSettings& settings, const FeedAccess& access = {});
   ~FeedServer();
   FeedServer(const FeedServer&) = delete;
   FeedServer& operator=(const FeedServer&) = delete;
@@ -30,6 +36,8 @@ class FeedServer {
   FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings)
       : path_(std::move(path)), listener_(listener), settings_(settings), session_(target, settings) {}
   void accept_one();
+  /// Of those that have not said who they are the one that came first; false: there is none.
+  bool drop_silent();
   /// False: the connection has ended.
   bool read_from(FeedSession::Client client, int file);
   bool write_to(FeedSession::Client client, int file);

@@ -2,6 +2,7 @@
 #include "tutti/program/feed/feed_server.hpp"
 
 #include <fcntl.h>
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -108,6 +109,48 @@ TEST_F(FeedServerTest, AClientThatNeverReadsHoldsUpNobody) {
   EXPECT_GT(server_->session().dropped(), 0U);
   EXPECT_EQ(server_->clients(), 3U);
   for (const int file : {feeder, sleeper, one_more, too_many}) close(file);
+}
+
+TEST_F(FeedServerTest, SilentConnectionsDoNotKeepTheFeederOut) {
+  std::vector<int> silent;
+  for (int i = 0; i < 5; ++i) {
+    silent.push_back(connect());
+    server_->serve(0);
+  }
+  const int feeder = connect();
+  EXPECT_EQ(say(feeder, test::hello() + sample(0)).size(), 3U);
+  for (int i = 0; i < 5; ++i) {
+    silent.push_back(connect());
+    server_->serve(0);
+  }
+  EXPECT_EQ(say(feeder, sample(1)).size(), 1U);
+  for (const int file : silent) close(file);
+  close(feeder);
+  for (int i = 0; i < 10; ++i) server_->serve(0);
+  // Nor do listeners: the last place is who feeds'.
+  const int one = connect(), two = connect(), three = connect();
+  EXPECT_EQ(say(one, test::hello(true)).size(), 2U);
+  EXPECT_EQ(say(two, test::hello(true)).size(), 2U);
+  const auto refused = say(three, test::hello(true));
+  ASSERT_EQ(refused.size(), 1U);
+  EXPECT_TRUE(refused[0].has_closed());
+  const int again = connect();
+  EXPECT_EQ(say(again, test::hello() + sample(2)).size(), 3U);
+  for (const int file : {one, two, three, again}) close(file);
+}
+
+TEST_F(FeedServerTest, TheSocketMayBeAGroups) {
+  server_.reset();
+  const std::string group = ::getgrgid(::getegid())->gr_name;
+  server_ = FeedServer::listen(path_, target_, settings_, {.group = group, .mode = 0660}).value();
+  struct stat found {};
+  ASSERT_EQ(stat(path_.c_str(), &found), 0);
+  EXPECT_EQ(found.st_mode & 0777U, 0660U);
+  EXPECT_EQ(found.st_gid, ::getegid());
+  server_.reset();
+  const auto nobodys = FeedServer::listen(path_, target_, settings_, {.group = "no-such-group"});
+  ASSERT_FALSE(nobodys.has_value());
+  EXPECT_NE(nobodys.error().message.find("no-such-group"), std::string::npos) << nobodys.error().message;
 }
 
 TEST_F(FeedServerTest, GarbageGetsAnErrorAndAClose) {

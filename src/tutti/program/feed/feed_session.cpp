@@ -59,6 +59,10 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
     if (feeder_) return close(client, "another client feeds this robot already; listens_only may join it");
     feeder_ = client;
   }
+  const auto listeners = std::ranges::count_if(clients_, [](const auto& other) { return other.second.listens_only; });
+  if (hello.listens_only && listeners + 1 >= settings_.max_clients)
+    return close(client, fmt::format("{} clients listen, no more may: one place is for who feeds", listeners));
+  connection.listens_only = hello.listens_only;
   connection.greeted = true;
   const FeedState state = target_.state();
   put(connection, welcome_frame(state, map_.T_map_odom()));

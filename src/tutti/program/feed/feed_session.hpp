@@ -38,6 +38,8 @@ class FeedSession {
   void sent(Client client, std::size_t bytes);
   /// Nothing more is to be read from this client; with no output() left, the connection ends.
   [[nodiscard]] bool is_over(Client client) const { return clients_.at(client).over; }
+  /// It has said who it is.
+  [[nodiscard]] bool is_greeted(Client client) const { return clients_.at(client).greeted; }
   [[nodiscard]] bool has_feeder() const { return feeder_.has_value(); }
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< Corrections, for all clients.
 
@@ -55,6 +57,7 @@ class FeedSession {
     bool greeted = false;
     bool over = false;
     bool ended = false;  ///< It said that the recording has.
+    bool listens_only = false;
   };
 
   void close(Client client, const std::string& why);
