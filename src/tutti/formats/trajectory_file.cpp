@@ -98,10 +98,14 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
 }
 
 Result<Trajectory> read_trajectory(const std::string& path, std::string_view format, double kitti_rate_hz) {
-  return read_file(path).and_then([&](const std::string& text) {
-    const std::string_view is = format == "auto" ? recognise(text) : format;
-    if (is == "euroc") return parse_euroc_csv(text, path);
-    return is == "kitti" ? parse_kitti_poses(text, path, kitti_rate_hz, {}) : parse_tum(text, path);
+  return read_file(path).and_then([&](const std::string& text) -> Result<Trajectory> {
+    const std::string_view looks = recognise(text), is = format == "auto" ? looks : format;
+    auto read = is == "euroc"   ? parse_euroc_csv(text, path)
+                : is == "kitti" ? parse_kitti_poses(text, path, kitti_rate_hz, {})
+                                : parse_tum(text, path);
+    if (read || is == looks || looks == "tum") return read;
+    return fail(read.error().code, "{}; it is read as {}, and looks like {}: state format: {}", read.error().message,
+                is, looks, looks);
   });
 }
 
