@@ -26,8 +26,9 @@ namespace fs = std::filesystem;
 
 constexpr double kSurveySpacing_m = 0.1;
 
-Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data) {
-  auto poses = formats::read_trajectory((data / source.file).string(), source.format, source.rate_hz);
+Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data,
+                                   std::vector<Error>* left_out = nullptr) {
+  auto poses = formats::read_trajectory((data / source.file).string(), source.format, source.rate_hz, left_out);
   if (!poses || source.format != "kitti" || source.times.empty()) return poses;
   const auto times = formats::read_times((data / source.times).string());
   if (!times) return tl::unexpected(times.error());
@@ -83,9 +84,16 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     if (!read) return tl::unexpected(read.error());
     maplab = std::move(*read);
   }
-  auto odometry = maplab ? Result<Trajectory>(maplab->odometry) : read_trajectory(robot.odometry, data);
+  // Scans that are numbered as the poses need all of these.
+  const bool is_numbered = !robot.scans.empty() && robot.scan_times.empty();
+  std::vector<Error> left_out;
+  auto odometry = maplab ? Result<Trajectory>(maplab->odometry)
+                         : read_trajectory(robot.odometry, data, is_numbered ? nullptr : &left_out);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
+  if (!left_out.empty())
+    out.notes.push_back(fmt::format("{}: {} odometry samples refused, the first because: {}", robot.name,
+                                    left_out.size(), left_out.front().message));
   if (!robot.reference.file.empty()) {
     auto reference = read_reference(robot, data);
     if (!reference) return tl::unexpected(reference.error());

@@ -177,5 +177,19 @@ TEST_F(Recordings, OdometryMayHaveAnotherRateThanItsSensors) {
     EXPECT_NEAR(sample.pose.translation.x(), sample.stamp - recorded_[0].stamp, 1e-6);
 }
 
+TEST_F(Recordings, ADuplicatedStampIsNotTheEndOfAMission) {
+  std::ofstream(folder_ / "odometry.tum", std::ios::app)
+      << "10.9 9.9 0 0 0 0 0 1\n3.5 0 0 0 0 0 0 1\n11 10 0 0 0 0 0 1\n";
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_FALSE(input.has_value());  // the reference is the same file, and has to be right
+  config_.robots[0].reference.file.clear();
+  const auto without = load_input(config_, folder_, 1);
+  ASSERT_TRUE(without.has_value()) << without.error().message;
+  EXPECT_EQ(without->robots[0].recording.odometry.size(), 101U);
+  ASSERT_EQ(without->robots[0].notes.size(), 1U);
+  EXPECT_NE(without->robots[0].notes[0].find("a: 2 odometry samples refused, the first because: "), std::string::npos)
+      << without->robots[0].notes[0];
+}
+
 }  // namespace
 }  // namespace tutti::mission

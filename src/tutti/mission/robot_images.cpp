@@ -42,7 +42,7 @@ class NoImages final : public VisualSource {
 /// Odometry with gaps shorter than this much of the images' is faster than they are.
 constexpr double kFaster = 0.75;
 
-std::vector<Timestamp> samples_of(const Trajectory& trajectory) {
+std::vector<Timestamp> stamps_of(const Trajectory& trajectory) {
   std::vector<Timestamp> out;
   for (const StampedPose& sample : trajectory) out.push_back(sample.stamp);
   return out;
@@ -121,10 +121,10 @@ Result<RobotImages> open_images(const ImagesConfig& config, const fs::path& data
                          stream.cameras.size() == 1 ? "one camera" : "each of two cameras",
                          out.imu.empty() ? "no IMU" : "and an IMU");
   Trajectory moments;
-  if (config.own_stamps || typical_gap_s(samples_of(odometry)) < kFaster * typical_gap_s(stream.stamps))
+  if (config.own_stamps || typical_gap_s(stamps_of(odometry)) < kFaster * typical_gap_s(stream.stamps))
     for (const Timestamp stamp : stream.stamps)
       if (const auto pose = pose_at(odometry, stamp)) moments.push_back({stamp, *pose});
-  out.stamps = samples_of(moments);
+  out.stamps = stamps_of(moments);
   if (!moments.empty()) out.note += ", at their own stamps";
   auto source = visual::TrackingSource::open(std::move(stream), moments.empty() ? odometry : moments, tracking);
   if (!source && source.error().code == ErrorCode::unsupported) return tl::unexpected(source.error());
