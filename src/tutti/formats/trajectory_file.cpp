@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <iterator>
+#include <utility>
 
 #include "tutti/formats/internal/text.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -17,38 +18,17 @@ std::string_view recognise(std::string_view text) {
   return blanks.next() && blanks.columns().size() == 12 ? "kitti" : "tum";
 }
 
-}  // namespace
-
-Result<Trajectory> parse_tum(std::string_view text, const std::string& name) {
-  internal::LineReader line(text, name);
-  Trajectory trajectory;
-  while (line.next()) {
-    if (auto ok = line.expect_columns(8, "stamp x y z qx qy qz qw"); !ok) return tl::unexpected(ok.error());
-    const auto stamp = internal::parse_seconds(line.columns()[0]);
-    if (!stamp) return line.fail(ErrorCode::parse, "stamp is {}, expected seconds", internal::shown(line.columns()[0]));
-    double v[7];
-    if (auto ok = line.numbers(1, v); !ok) return tl::unexpected(ok.error());
-    const auto q = internal::to_unit(line, {v[6], v[3], v[4], v[5]});
-    if (!q) return tl::unexpected(q.error());
-    if (auto ok = append(line, trajectory, {*stamp, {*q, {v[0], v[1], v[2]}}}); !ok) return tl::unexpected(ok.error());
-  }
-  return trajectory;
+/// Beside what append() takes: a pose whose stamp does not follow, if somebody is told.
+Status append_or_leave(const internal::LineReader& line, Trajectory& trajectory, const StampedPose& pose,
+                       std::vector<Error>* left_out) {
+  const bool follows = trajectory.empty() || pose.stamp > trajectory.back().stamp;
+  Status ok = append(line, trajectory, pose);
+  if (ok || follows || left_out == nullptr) return ok;
+  left_out->push_back(std::move(ok.error()));
+  return {};
 }
 
-std::string to_tum(const Trajectory& trajectory) {
-  std::string out = "# stamp[s] x y z qx qy qz qw\n";
-  for (const auto& [stamp, pose] : trajectory) {
-    const Eigen::Vector3d& t = pose.translation;
-    const Eigen::Quaterniond& q = pose.rotation;
-    fmt::format_to(std::back_inserter(out), "{} {} {} {} {} {} {} {}\n", internal::to_seconds(stamp), t.x(), t.y(),
-                   t.z(), q.x(), q.y(), q.z(), q.w());
-  }
-  return out;
-}
-
-Status write_tum(const std::string& path, const Trajectory& trajectory) { return write_file(path, to_tum(trajectory)); }
-
-Result<Trajectory> parse_euroc_csv(std::string_view text, const std::string& name) {
+Result<Trajectory> read_euroc(std::string_view text, const std::string& name, std::vector<Error>* left_out) {
   constexpr std::size_t kPoseColumns = 8;
   constexpr std::string_view kLayout = "stamp[ns],px,py,pz,qw,qx,qy,qz,...";
   internal::LineReader line(text, name, internal::Separator::comma);
@@ -68,9 +48,46 @@ Result<Trajectory> parse_euroc_csv(std::string_view text, const std::string& nam
     if (auto ok = line.numbers(1, v); !ok) return tl::unexpected(ok.error());
     const auto q = internal::to_unit(line, {v[3], v[4], v[5], v[6]});
     if (!q) return tl::unexpected(q.error());
-    if (auto ok = append(line, trajectory, {{*ns}, {*q, {v[0], v[1], v[2]}}}); !ok) return tl::unexpected(ok.error());
+    if (auto ok = append_or_leave(line, trajectory, {{*ns}, {*q, {v[0], v[1], v[2]}}}, left_out); !ok)
+      return tl::unexpected(ok.error());
   }
   return trajectory;
+}
+
+}  // namespace
+
+Result<Trajectory> parse_tum(std::string_view text, const std::string& name, std::vector<Error>* left_out) {
+  internal::LineReader line(text, name);
+  Trajectory trajectory;
+  while (line.next()) {
+    if (auto ok = line.expect_columns(8, "stamp x y z qx qy qz qw"); !ok) return tl::unexpected(ok.error());
+    const auto stamp = internal::parse_seconds(line.columns()[0]);
+    if (!stamp) return line.fail(ErrorCode::parse, "stamp is {}, expected seconds", internal::shown(line.columns()[0]));
+    double v[7];
+    if (auto ok = line.numbers(1, v); !ok) return tl::unexpected(ok.error());
+    const auto q = internal::to_unit(line, {v[6], v[3], v[4], v[5]});
+    if (!q) return tl::unexpected(q.error());
+    if (auto ok = append_or_leave(line, trajectory, {*stamp, {*q, {v[0], v[1], v[2]}}}, left_out); !ok)
+      return tl::unexpected(ok.error());
+  }
+  return trajectory;
+}
+
+std::string to_tum(const Trajectory& trajectory) {
+  std::string out = "# stamp[s] x y z qx qy qz qw\n";
+  for (const auto& [stamp, pose] : trajectory) {
+    const Eigen::Vector3d& t = pose.translation;
+    const Eigen::Quaterniond& q = pose.rotation;
+    fmt::format_to(std::back_inserter(out), "{} {} {} {} {} {} {} {}\n", internal::to_seconds(stamp), t.x(), t.y(),
+                   t.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  return out;
+}
+
+Status write_tum(const std::string& path, const Trajectory& trajectory) { return write_file(path, to_tum(trajectory)); }
+
+Result<Trajectory> parse_euroc_csv(std::string_view text, const std::string& name) {
+  return read_euroc(text, name, nullptr);
 }
 
 Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start) {
@@ -97,11 +114,16 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
   return trajectory;
 }
 
-Result<Trajectory> read_trajectory(const std::string& path, std::string_view format, double kitti_rate_hz) {
-  return read_file(path).and_then([&](const std::string& text) {
-    const std::string_view is = format == "auto" ? recognise(text) : format;
-    if (is == "euroc") return parse_euroc_csv(text, path);
-    return is == "kitti" ? parse_kitti_poses(text, path, kitti_rate_hz, {}) : parse_tum(text, path);
+Result<Trajectory> read_trajectory(const std::string& path, std::string_view format, double kitti_rate_hz,
+                                   std::vector<Error>* left_out) {
+  return read_file(path).and_then([&](const std::string& text) -> Result<Trajectory> {
+    const std::string_view looks = recognise(text), is = format == "auto" ? looks : format;
+    auto read = is == "euroc"   ? read_euroc(text, path, left_out)
+                : is == "kitti" ? parse_kitti_poses(text, path, kitti_rate_hz, {})
+                                : parse_tum(text, path, left_out);
+    if (read || is == looks || looks == "tum") return read;
+    return fail(read.error().code, "{}; it is read as {}, and looks like {}: state format: {}", read.error().message,
+                is, looks, looks);
   });
 }
 

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tutti/base/result.hpp"
 #include "tutti/model/trajectory.hpp"
@@ -12,8 +13,9 @@
 namespace tutti::formats {
 
 /// TUM: one `stamp[s] x y z qx qy qz qw` a line (metres, Hamilton quaternion). Stamps go between decimal text and
-/// nanoseconds exactly, never through a double.
-Result<Trajectory> parse_tum(std::string_view text, const std::string& name);
+/// nanoseconds exactly, never through a double. With `left_out`, a pose whose stamp does not come after the one before
+/// is left out and said there, and is no error.
+Result<Trajectory> parse_tum(std::string_view text, const std::string& name, std::vector<Error>* left_out = nullptr);
 /// Nine decimals for stamps, shortest digits that read back the same for the rest: parse_tum(to_tum(t)) == t.
 std::string to_tum(const Trajectory& trajectory);
 Status write_tum(const std::string& path, const Trajectory& trajectory);
@@ -28,8 +30,8 @@ Result<Trajectory> parse_euroc_csv(std::string_view text, const std::string& nam
 Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start);
 
 /// `format`: tum, euroc, kitti (stamps k / kitti_rate_hz), or auto, which looks at the first row that is not a comment:
-/// commas mean EuRoC csv, 12 columns KITTI, anything else TUM.
+/// commas mean EuRoC csv, 12 columns KITTI, anything else TUM. `left_out`: as of parse_tum(), also of EuRoC's.
 Result<Trajectory> read_trajectory(const std::string& path, std::string_view format = "auto",
-                                   double kitti_rate_hz = 10.0);
+                                   double kitti_rate_hz = 10.0, std::vector<Error>* left_out = nullptr);
 
 }  // namespace tutti::formats

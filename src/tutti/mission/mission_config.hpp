@@ -64,6 +64,7 @@ struct ImagesConfig {
   std::vector<std::string> maplab_submaps;  ///< Consecutive folders; the odometry is theirs, too.
   int most_cameras = 2;
   double time_offset_s = 0.0;
+  bool own_stamps = false;
   std::string imu;  ///< Empty: none, or that of `euroc_folder`.
   template <class V>
   void describe(V& v) {
@@ -82,6 +83,8 @@ struct ImagesConfig {
     v.field("most_cameras", most_cameras, between(1, 2), "1: of two cameras only the first is used.");
     v.field("time_offset_s", time_offset_s, between(-kMostOffset_s, kMostOffset_s),
             "Added to the images' stamps gives the odometry's time.");
+    v.field("own_stamps", own_stamps, any(),
+            "Images are between the odometry's samples. Found by itself where odometry is faster than they are.");
     v.field("imu", imu, any(), "EuRoC's csv of raw IMU samples, with list or maplab_submaps.");
   }
   /// Are there images to follow points through?
@@ -98,6 +101,7 @@ struct RobotConfig {
   std::vector<double> reference_offset_m;  ///< x, y, z; recordings of different places share no frame: put them apart.
   bool score_against_reference = true;     ///< false: the reference only judges closures and transforms.
   std::string scans;                       ///< Folder of NNNNNN.pcd, one per odometry pose; empty = no scans.
+  std::string scan_times;                  ///< Of each scan, when it is not one per pose.
   LidarPoseConfig T_body_lidar;
   std::string scans_deskewed = "auto";
   std::string scan_time_unit = "auto";
@@ -121,6 +125,9 @@ struct RobotConfig {
             "false: the reference judges only closures and transforms, not trajectories.");
     v.field("scans", scans, any(),
             "Folder with one PCD (or KITTI .bin) per odometry pose, numbered 000000.pcd up, in the LiDAR's frame.");
+    v.field("scan_times", scan_times, any(),
+            "File with one stamp in seconds per scan, by the odometry's clock: the odometry has a rate of its own. "
+            "Empty: one scan per odometry pose.");
     v.field("T_body_lidar", T_body_lidar, any(), "Where the LiDAR sits on the body; the identity by default.");
     v.field("scans_deskewed", scans_deskewed, one_of({"auto", "yes", "no"}),
             "no: points carry the time of their measurement, by which they are deskewed; yes: they need none; auto: as "
@@ -199,6 +206,7 @@ struct MissionConfig {
   std::string input;                          ///< In plain words: real, replayed or simulated.
   std::vector<std::string> notes;             ///< Shown in the report.
   double duration_s = 0.0;                    ///< 0 = until the last sample.
+  double odometry_hz = 0.0;                   ///< 0 = as recorded or simulated.
   evaluation::AssociationConfig association;  ///< Of estimates with the reference.
   ClosureCheckConfig closure_check;           ///< Of accepted closures against the reference.
   std::string source = "recordings";          ///< recordings (`robots`) | simulation | hall
@@ -220,6 +228,10 @@ struct MissionConfig {
     v.field("input", input, any(), "What is real, replayed or simulated, in plain words.");
     v.field("notes", notes, any(), "Sentences shown in the report.");
     v.field("duration_s", duration_s, at_least(0.0), "Mission time; 0 = until the last sample.");
+    v.field(
+        "odometry_hz", odometry_hz, between(0.0, 1e4),
+        "Robots have odometry at this rate instead, interpolated, from a moment drawn from the seed on; their scans "
+        "and images keep their stamps. 0: as recorded.");
     v.field("association", association);
     v.field("closure_check", closure_check, any(), "Accepted closures against the reference.");
     v.field("source", source, one_of({"recordings", "simulation", "hall"}),

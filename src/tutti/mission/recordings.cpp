@@ -6,12 +6,15 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "tutti/base/random.hpp"
+#include "tutti/evaluation/association.hpp"
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/mission/resample.hpp"
 #include "tutti/mission/robot_images.hpp"
 #include "tutti/mission/scan_folder.hpp"
 #include "tutti/simulation/surface.hpp"
@@ -23,8 +26,9 @@ namespace fs = std::filesystem;
 
 constexpr double kSurveySpacing_m = 0.1;
 
-Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data) {
-  auto poses = formats::read_trajectory((data / source.file).string(), source.format, source.rate_hz);
+Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data,
+                                   std::vector<Error>* left_out = nullptr) {
+  auto poses = formats::read_trajectory((data / source.file).string(), source.format, source.rate_hz, left_out);
   if (!poses || source.format != "kitti" || source.times.empty()) return poses;
   const auto times = formats::read_times((data / source.times).string());
   if (!times) return tl::unexpected(times.error());
@@ -40,6 +44,20 @@ std::pair<std::size_t, std::size_t> part_of(std::size_t count, const RobotConfig
 
 bool is_degraded(const simulation::DegradeConfig& degrade) {
   return degrade.yaw_deg_per_m != 0.0 || degrade.scale_percent != 0.0;
+}
+
+/// None: one scan per odometry pose.
+Result<std::vector<Timestamp>> read_scan_times(const RobotConfig& robot, const fs::path& data) {
+  if (robot.scan_times.empty()) return std::vector<Timestamp>();
+  const std::string file = (data / robot.scan_times).string();
+  auto times = formats::read_times(file);
+  if (!times) return times;
+  if (times->empty()) return fail(ErrorCode::invalid, "{}: no stamps", file);
+  const auto unordered = std::ranges::adjacent_find(*times, [](Timestamp a, Timestamp b) { return b <= a; });
+  if (unordered != times->end())
+    return fail(ErrorCode::invalid, "{}: stamp {} ns does not follow {} ns", file, std::next(unordered)->ns,
+                unordered->ns);
+  return times;
 }
 
 /// The reference in the common frame, and where its own frame lies in that.
@@ -66,9 +84,16 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     if (!read) return tl::unexpected(read.error());
     maplab = std::move(*read);
   }
-  auto odometry = maplab ? Result<Trajectory>(maplab->odometry) : read_trajectory(robot.odometry, data);
+  // Scans that are numbered as the poses need all of these.
+  const bool is_numbered = !robot.scans.empty() && robot.scan_times.empty();
+  std::vector<Error> left_out;
+  auto odometry = maplab ? Result<Trajectory>(maplab->odometry)
+                         : read_trajectory(robot.odometry, data, is_numbered ? nullptr : &left_out);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
+  if (!left_out.empty())
+    out.notes.push_back(fmt::format("{}: {} odometry samples refused, the first because: {}", robot.name,
+                                    left_out.size(), left_out.front().message));
   if (!robot.reference.file.empty()) {
     auto reference = read_reference(robot, data);
     if (!reference) return tl::unexpected(reference.error());
@@ -87,7 +112,10 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   }
   if (out.T_common_odom) out.T_common_odom = *out.T_common_odom * out.T_odom_recorded.inverse();
   if (!robot.scans.empty()) {
-    const auto scans = ScanFolder::open(data / robot.scans, from, raw, robot);
+    auto stamps = read_scan_times(robot, data);
+    if (!stamps) return tl::unexpected(stamps.error());
+    out.recording.scan_stamps = *stamps;
+    const auto scans = ScanFolder::open(data / robot.scans, {from, odometry->size(), std::move(*stamps)}, raw, robot);
     if (!scans) return tl::unexpected(scans.error());
     out.notes.push_back(fmt::format("{}: {}", robot.name, (*scans)->note()));
     out.recording.scans = *scans;
@@ -98,6 +126,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     if (!images) return tl::unexpected(images.error());
     out.notes.push_back(fmt::format("{}: {}", robot.name, images->note));
     out.recording.visual = std::move(images->visual);
+    out.recording.image_stamps = std::move(images->stamps);
     out.recording.imu = std::move(images->imu);
     out.recording.imu_noise = images->imu_noise;
   }
@@ -159,6 +188,22 @@ Result<MissionInput> replay_or_simulate(const MissionConfig& config, const fs::p
   return MissionInput{.robots = std::move(*robots), .survey = nullptr};
 }
 
+/// A reference of another clock would silently judge nothing.
+Status check_references(const MissionConfig& config, const std::vector<MissionRecording>& robots) {
+  for (const MissionRecording& robot : robots) {
+    const Trajectory &odometry = robot.recording.odometry, &reference = robot.recording.reference;
+    if (reference.empty() || !evaluation::associate(odometry, reference, config.association).empty()) continue;
+    return fail(ErrorCode::invalid,
+                "robot {}: reference: of its {} stamps, {} to {} ns, none meets the odometry's {}, {} to {} ns "
+                "(association.{} is {} s): is it by another clock?",
+                robot.recording.name, reference.size(), reference.front().stamp.ns, reference.back().stamp.ns,
+                odometry.size(), odometry.front().stamp.ns, odometry.back().stamp.ns,
+                config.association.interpolate ? "max_gap_s" : "max_difference_s",
+                config.association.interpolate ? config.association.max_gap_s : config.association.max_difference_s);
+  }
+  return {};
+}
+
 /// A closure planted on a robot that is not there would silently do nothing.
 Status check_planted(const MissionConfig& config, const std::vector<MissionRecording>& robots) {
   for (const PlantedClosureConfig& planted : config.closures.planted)
@@ -174,6 +219,13 @@ Result<MissionInput> load_input(const MissionConfig& config, const std::filesyst
   auto input = replay_or_simulate(config, data, seed);
   if (!input) return input;
   if (auto ok = check_planted(config, input->robots); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_references(config, input->robots); !ok) return tl::unexpected(ok.error());
+  if (config.odometry_hz > 0.0)
+    for (MissionRecording& robot : input->robots) {
+      Rng rng = Rng(seed).fork("odometry/" + robot.recording.name);
+      const auto ok = resample(robot.recording, config.odometry_hz, rng.uniform(0.0, 1.0 / config.odometry_hz));
+      if (!ok) return in_context("robot " + robot.recording.name, ok.error());
+    }
   return input;
 }
 

@@ -114,7 +114,7 @@ TEST_F(Recordings, OnlyScansThatAreThereAreReplayed) {
   EXPECT_EQ((*there)->cloud->points.size(), 1U);
   const auto absent = recording.scans->scan(3);  // the robot counts it among its troubles
   ASSERT_FALSE(absent.has_value());
-  EXPECT_EQ(absent.error().message, "scans/000013.pcd: is not there");
+  EXPECT_EQ(absent.error().message, (folder_ / "scans/000013.pcd").string() + " (or .bin): is not there");
   config_.robots[0].scans = std::string("nowhere");
   EXPECT_NE(problem().find("nowhere: no such folder"), std::string::npos) << problem();
 }
@@ -140,6 +140,55 @@ TEST_F(Recordings, ScansOfOtherNamesAreNotPassedOver) {
   EXPECT_NE(problem().find("scans: holds none of 000010.pcd (or .bin) to 000099.pcd"), std::string::npos) << problem();
   std::ofstream(folder_ / "scans" / "000099.pcd") << kOnePoint;
   EXPECT_EQ(problem(), "");
+}
+
+TEST_F(Recordings, AReferenceOfAnotherClockIsAnError) {
+  Trajectory late = recorded_;
+  for (StampedPose& sample : late) sample.stamp = sample.stamp + 1e6;
+  ASSERT_TRUE(formats::write_tum((folder_ / "reference.tum").string(), late).has_value());
+  config_.robots[0].reference.file = "reference.tum";
+  EXPECT_NE(problem().find("robot a: reference: of its 100 stamps"), std::string::npos) << problem();
+  EXPECT_NE(problem().find("none meets the odometry's 100"), std::string::npos) << problem();
+}
+
+TEST_F(Recordings, KittiPosesReadAsTumSaySo) {
+  std::ofstream(folder_ / "poses.txt") << "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n";
+  config_.robots[0].odometry.file = "poses.txt";
+  EXPECT_NE(problem().find("it is read as tum, and looks like kitti: state format: kitti"), std::string::npos)
+      << problem();
+}
+
+TEST_F(Recordings, OdometryMayHaveAnotherRateThanItsSensors) {
+  config_.odometry_hz = 47.0;
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_TRUE(input.has_value()) << input.error().message;
+  const Recording& recording = input->robots[0].recording;
+  ASSERT_GT(recording.odometry.size(), 460U);
+  ASSERT_EQ(recording.increment_covariance.size() + 1, recording.odometry.size());
+  ASSERT_EQ(recording.scan_stamps.size(), 100U);
+  EXPECT_EQ(recording.scan_stamps[7], recorded_[7].stamp);
+  Matrix6d sum = Matrix6d::Zero(), recorded = Matrix6d::Zero();
+  for (const Matrix6d& step : recording.increment_covariance) sum += step;
+  config_.odometry_hz = 0.0;
+  const auto as_it_was = load_input(config_, folder_, 1);
+  for (const Matrix6d& step : as_it_was->robots[0].recording.increment_covariance) recorded += step;
+  EXPECT_LT((sum - recorded).norm(), 0.01 * recorded.norm());  // but for what is cut off at the ends
+  for (const StampedPose& sample : recording.odometry)
+    EXPECT_NEAR(sample.pose.translation.x(), sample.stamp - recorded_[0].stamp, 1e-6);
+}
+
+TEST_F(Recordings, ADuplicatedStampIsNotTheEndOfAMission) {
+  std::ofstream(folder_ / "odometry.tum", std::ios::app)
+      << "10.9 9.9 0 0 0 0 0 1\n3.5 0 0 0 0 0 0 1\n11 10 0 0 0 0 0 1\n";
+  const auto input = load_input(config_, folder_, 1);
+  ASSERT_FALSE(input.has_value());  // the reference is the same file, and has to be right
+  config_.robots[0].reference.file.clear();
+  const auto without = load_input(config_, folder_, 1);
+  ASSERT_TRUE(without.has_value()) << without.error().message;
+  EXPECT_EQ(without->robots[0].recording.odometry.size(), 101U);
+  ASSERT_EQ(without->robots[0].notes.size(), 1U);
+  EXPECT_NE(without->robots[0].notes[0].find("a: 2 odometry samples refused, the first because: "), std::string::npos)
+      << without->robots[0].notes[0];
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConf
   std::vector<std::string> ordered = policies;
   std::stable_partition(ordered.begin(), ordered.end(), [](const std::string& p) { return p == kBudgetPolicy; });
   for (const std::string& policy : ordered) {
-    robot::AgentConfig own = config;
+    robot::AgentConfig own = with_sensors(config);
     own.policy.name = policy;
     const bool is_shadow = policy != config.policy.name;
     if (is_shadow) own.explain = false;  // shadows are not shown
@@ -51,23 +51,38 @@ Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& rec
   std::unique_ptr<RobotActor> actor(new RobotActor(recording, association));
   const std::string& policy = config.agent.policy.name;
   actor->members_.push_back({policy, nullptr, {.robot = recording.recording.name, .policy = policy}});
-  auto node = node::RobotNode::open(recording.recording.robot, session, config, rng.fork(policy), store);
+  node::RobotNodeConfig own = config;
+  own.agent = actor->with_sensors(config.agent);
+  auto node = node::RobotNode::open(recording.recording.robot, session, own, rng.fork(policy), store);
   if (!node) return tl::unexpected(node.error());
   actor->node_ = std::move(*node);
   if (const auto newest = actor->node_->agent().newest_sample()) {
     const Trajectory& odometry = recording.recording.odometry;
     const auto next = std::ranges::upper_bound(odometry, *newest, {}, &StampedPose::stamp);
     actor->next_ = static_cast<std::size_t>(next - odometry.begin());
+    const Timestamp settled = *actor->node_->agent().settled();
+    const Recording& from = recording.recording;
+    const auto skip = [&](const std::vector<Timestamp>& stamps, std::size_t& first) {
+      for (auto stamp = moment(from, stamps, first); stamp && *stamp < settled; stamp = moment(from, stamps, first))
+        ++first;
+    };
+    skip(from.scan_stamps, actor->next_scan_);
+    skip(from.image_stamps, actor->next_images_);
   }
   return actor;
 }
 
-/// The scan of the last sample, and the end of the recording, may not have been stored with it.
+robot::AgentConfig RobotActor::with_sensors(robot::AgentConfig config) const {
+  config.submap.has_scans = recording_.recording.scans != nullptr;
+  config.submap.has_images = recording_.recording.visual != nullptr;
+  return config;
+}
+
+/// What sensors saw since all was settled, and the end of the recording, may not have been stored.
 void RobotActor::resume(Timestamp now) {
   take(node_->resume(now));
   if (next_ == 0) return;
-  feed_scan(next_ - 1, now);
-  feed_images(next_ - 1, now);
+  feed_sensors(now);
   if (next_ == recording_.recording.odometry.size()) take(node_->finish(now));
 }
 
@@ -95,9 +110,9 @@ void RobotActor::replay_next(Timestamp now) {
       member.shadow->take_outgoing();  // shadows are never heard
     }
   }
-  feed_scan(next_, now);
-  feed_images(next_, now);
-  if (++next_ == recording.odometry.size()) take(node_->finish(now));
+  ++next_;
+  feed_sensors(now);
+  if (next_ == recording.odometry.size()) take(node_->finish(now));
 }
 
 void RobotActor::take(node::Step step) {
@@ -111,13 +126,41 @@ void RobotActor::note_event(const node::Event& event) {
   if (const auto* sample = std::get_if<node::SampleRefused>(&event.what)) note(refused_odometry_, sample->why);
   if (const auto* scan = std::get_if<node::ScanRefused>(&event.what)) note(refused_scans_, scan->why);
   if (const auto* images = std::get_if<node::ImagesRefused>(&event.what)) note(refused_images_, images->why);
+  if (const auto* missing = std::get_if<node::SensorMissing>(&event.what); missing != nullptr && missing->keyframes > 0)
+    note(missing_sensors_, fmt::format("from {:.0f} s on {} keyframes had no {}", event.time - kMissionStart,
+                                       missing->keyframes, missing->sensor));
   if (const auto* update = std::get_if<node::RobotUpdated>(&event.what)) note_update(*update, event.time);
 }
 
-void RobotActor::feed_scan(std::size_t sample, Timestamp now) {
+void RobotActor::feed_sensors(Timestamp now) {
   const Recording& recording = recording_.recording;
-  if (!recording.scans || !node_->agent().wants_scan()) return;  // only keyframes need one
-  const auto scan = recording.scans->scan(sample);
+  const Timestamp newest = recording.odometry[next_ - 1].stamp;
+  while (true) {
+    const auto scan = recording.scans ? moment(recording, recording.scan_stamps, next_scan_) : std::nullopt;
+    const auto images = recording.visual ? moment(recording, recording.image_stamps, next_images_) : std::nullopt;
+    if (!scan && !images) return;
+    const Timestamp stamp = scan && images ? std::min(*scan, *images) : scan ? *scan : *images;
+    if (stamp > newest) return;
+    const bool has_scan = scan == stamp, has_images = images == stamp;
+    if (stamp >= recording.odometry.front().stamp) feed_moment(stamp, has_scan, has_images, now);
+    if (has_scan) ++next_scan_;
+    if (has_images) ++next_images_;
+  }
+}
+
+void RobotActor::feed_moment(Timestamp stamp, bool has_scan, bool has_images, Timestamp now) {
+  const robot::RobotAgent& agent = node_->agent();
+  const bool wants_scan = has_scan && agent.wants_scan(stamp);
+  const bool wants_images = has_images && agent.wants_images(stamp);
+  if (wants_scan) feed_scan(now);
+  if (has_images) feed_images(stamp, wants_images, now);
+  if (agent.keyframes().empty() || agent.keyframes().back().stamp != stamp) return;
+  for (const Member& member : members_)
+    if (member.shadow) member.shadow->add_moment(stamp);
+}
+
+void RobotActor::feed_scan(Timestamp now) {
+  const auto scan = recording_.recording.scans->scan(next_scan_);
   if (!scan) return note(refused_scans_, scan.error().message);
   if (!*scan) return;
   const CpuScope cpu(cpu_s_);
@@ -126,12 +169,13 @@ void RobotActor::feed_scan(std::size_t sample, Timestamp now) {
   if (refused == refused_scans_.count) ++taken_scans_;
 }
 
-/// From the last sample before the keyframe before to the first one not before `stamp`, which is the newest keyframe's.
+/// From the last sample before the last keyframe before `stamp` to the first one not before it.
 std::vector<ImuSample> RobotActor::imu_since_keyframe(Timestamp stamp) const {
   const std::vector<ImuSample>& imu = recording_.recording.imu;
   const std::vector<Keyframe>& keyframes = node_->agent().keyframes();
-  if (keyframes.size() < 2) return {};
-  const Timestamp before = keyframes[keyframes.size() - 2].stamp;
+  const auto at = std::ranges::lower_bound(keyframes, stamp, {}, &Keyframe::stamp);
+  if (at == keyframes.begin()) return {};
+  const Timestamp before = std::prev(at)->stamp;
   auto first = std::ranges::upper_bound(imu, before, {}, &ImuSample::stamp);
   auto last = std::ranges::lower_bound(imu, stamp, {}, &ImuSample::stamp);
   if (first != imu.begin()) --first;
@@ -140,14 +184,12 @@ std::vector<ImuSample> RobotActor::imu_since_keyframe(Timestamp stamp) const {
 }
 
 /// Every image is tracked, those of keyframes are kept.
-void RobotActor::feed_images(std::size_t sample, Timestamp now) {
+void RobotActor::feed_images(Timestamp stamp, bool keyframe, Timestamp now) {
   const Recording& recording = recording_.recording;
-  if (!recording.visual) return;
-  const bool keyframe = node_->agent().wants_scan();
-  TrackedImages images = recording.visual->images(sample, keyframe);
+  TrackedImages images = recording.visual->images(next_images_, keyframe);
   refuse_images(recording.visual->take_errors(), now);
   if (!keyframe) return;
-  if (const auto stopped = sight_.add(recording.odometry[sample].stamp, images.images)) tell_refused(*stopped, now);
+  if (const auto stopped = sight_.add(stamp, images.images)) tell_refused(*stopped, now);
   if (images.images.empty()) return;
   const CpuScope cpu(cpu_s_);
   images.imu = imu_since_keyframe(images.stamp);
@@ -272,6 +314,7 @@ std::vector<std::string> RobotActor::troubles() const {
   add(refused_odometry_, "odometry samples refused");
   add(refused_scans_, "keyframes without a scan");
   add(refused_images_, "times images refused");
+  add(missing_sensors_, "times a sensor was missing");
   for (const std::string& line : sight_.notes()) out.push_back(fmt::format("{}: {}", recording_.recording.name, line));
   add(failed_updates_, "updates without a correction");
   return out;

@@ -103,10 +103,15 @@ class RobotActor {
               std::optional<std::size_t> budget, Timestamp now);
   /// How far every estimate is from the reference at the nodes of the broadcast.
   void score(const Trajectory& map, UpdateRecord& update) const;
-  void feed_scan(std::size_t sample, Timestamp now);
-  void feed_images(std::size_t sample, Timestamp now);
+  /// What sensors saw until the last sample that was fed.
+  void feed_sensors(Timestamp now);
+  void feed_moment(Timestamp stamp, bool has_scan, bool has_images, Timestamp now);
+  void feed_scan(Timestamp now);
+  void feed_images(Timestamp stamp, bool keyframe, Timestamp now);
   void refuse_images(const std::vector<Error>& errors, Timestamp now);
   void tell_refused(const std::string& why, Timestamp now);
+  /// `config` with what the recording is known to have.
+  [[nodiscard]] robot::AgentConfig with_sensors(robot::AgentConfig config) const;
   [[nodiscard]] std::vector<ImuSample> imu_since_keyframe(Timestamp stamp) const;
   static void note(Trouble& trouble, const std::string& message);
 
@@ -116,7 +121,8 @@ class RobotActor {
   std::unique_ptr<node::RobotNode> node_;
   node::Step step_;
   std::vector<Member> members_;  // `spectral` first, if it is there: it sets the budget
-  std::size_t next_ = 0;
+  std::size_t next_ = 0;         // odometry sample
+  std::size_t next_scan_ = 0, next_images_ = 0;
   std::pair<std::uint64_t, std::uint64_t> heard_;
   Timestamp mapped_until_ = kFirstTimestamp;  // the last own node in that graph
   std::vector<UpdateRecord> updates_;
@@ -126,6 +132,7 @@ class RobotActor {
   Trouble refused_scans_;
   std::size_t taken_scans_ = 0;
   Trouble refused_images_;
+  Trouble missing_sensors_;
   bool images_fail_ = false;  // at the last sample
   ImageTally sight_;
   Trouble failed_updates_;

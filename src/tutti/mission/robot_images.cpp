@@ -3,11 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "tutti/formats/image_file.hpp"
 #include "tutti/formats/image_folder.hpp"
 #include "tutti/formats/imu_file.hpp"
+#include "tutti/model/pose_at.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 
 namespace tutti::mission {
@@ -35,6 +38,25 @@ class NoImages final : public VisualSource {
  private:
   std::vector<Error> why_;
 };
+
+/// Odometry with gaps shorter than this much of the images' is faster than they are.
+constexpr double kFaster = 0.75;
+
+std::vector<Timestamp> stamps_of(const Trajectory& trajectory) {
+  std::vector<Timestamp> out;
+  for (const StampedPose& sample : trajectory) out.push_back(sample.stamp);
+  return out;
+}
+
+/// The median; 0 of fewer than two.
+double typical_gap_s(const std::vector<Timestamp>& stamps) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < stamps.size(); ++i) gaps.push_back(stamps[i] - stamps[i - 1]);
+  if (gaps.empty()) return 0.0;
+  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
+  std::ranges::nth_element(gaps, middle);
+  return *middle;
+}
 
 Result<std::vector<ImuSample>> read_imu(const ImagesConfig& config, const fs::path& data) {
   if (config.imu.empty()) return std::vector<ImuSample>();
@@ -98,14 +120,21 @@ Result<RobotImages> open_images(const ImagesConfig& config, const fs::path& data
   out.note = fmt::format("{} images of {}, {}", stream.stamps.size(),
                          stream.cameras.size() == 1 ? "one camera" : "each of two cameras",
                          out.imu.empty() ? "no IMU" : "and an IMU");
-  auto source = visual::TrackingSource::open(std::move(stream), odometry, tracking);
+  Trajectory moments;
+  if (config.own_stamps || typical_gap_s(stamps_of(odometry)) < kFaster * typical_gap_s(stream.stamps))
+    for (const Timestamp stamp : stream.stamps)
+      if (const auto pose = pose_at(odometry, stamp)) moments.push_back({stamp, *pose});
+  out.stamps = stamps_of(moments);
+  if (!moments.empty()) out.note += ", at their own stamps";
+  auto source = visual::TrackingSource::open(std::move(stream), moments.empty() ? odometry : moments, tracking);
   if (!source && source.error().code == ErrorCode::unsupported) return tl::unexpected(source.error());
   if (source)
     out.visual = std::move(*source);
   else
-    out.visual = std::make_shared<NoImages>(Error{
-        source.error().code,
-        fmt::format("{}; none are used (images.time_offset_s is {})", source.error().message, config.time_offset_s)});
+    out.visual = std::make_shared<NoImages>(
+        Error{source.error().code,
+              fmt::format("{}; none are used (images.time_offset_s is {}; images.own_stamps takes them where they are)",
+                          source.error().message, config.time_offset_s)});
   return out;
 }
 

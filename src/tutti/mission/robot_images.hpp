@@ -19,6 +19,8 @@ struct RobotImages {
   std::vector<ImuSample> imu;  ///< Empty when there is none.
   ImuNoise imu_noise;
   std::string note;  ///< What was found, for the report.
+  /// Recording::image_stamps
+  std::vector<Timestamp> stamps = {};
 };
 
 /// Of config.maplab_submaps.
@@ -28,8 +30,9 @@ Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const 
                                   const std::filesystem::path& data, const Trajectory& samples, std::size_t first);
 
 /// Images of config.euroc_folder or .list, which points are followed through; those of the odometry's samples are
-/// served. Files that are not there or say nothing sensible are an error that names them; images whose stamps are not
-/// the odometry's are not: then the source has none and says why, and the robot goes on with odometry alone.
+/// served, or all of them where odometry is faster than they are, and with config.own_stamps. Files that are not there
+/// or say nothing sensible are an error that names them; images whose stamps are not the odometry's are not: then the
+/// source has none and says why, and the robot goes on with odometry alone.
 Result<RobotImages> open_images(const ImagesConfig& config, const std::filesystem::path& data,
                                 const Trajectory& odometry, const visual::TrackingConfig& tracking);
 

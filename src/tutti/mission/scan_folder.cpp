@@ -56,32 +56,61 @@ Trajectory gone_on(const Samples& samples) {
 
 }  // namespace
 
-ScanFolder::ScanFolder(fs::path folder, std::size_t first, const Trajectory& odometry)
-    : folder_(std::move(folder)), first_(first), samples_(odometry.size()) {
+ScanFolder::ScanFolder(fs::path folder, ScanMoments moments, const Trajectory& odometry)
+    : folder_(std::move(folder)), moments_(std::move(moments)) {
+  if (moments_.stamps.empty()) {
+    for (const StampedPose& sample : odometry) moments_.stamps.push_back(sample.stamp);
+    moments_.recorded = std::max(moments_.recorded, moments_.first + odometry.size());
+  } else {
+    moments_.first = 0;
+    moments_.recorded = moments_.stamps.size();
+  }
   odometry_ = gone_on(odometry);  // the first sweep began before the odometry
   std::ranges::reverse(odometry_);
-  before_ = odometry_.size();
   odometry_.insert(odometry_.end(), odometry.begin(), odometry.end());
   const Trajectory after = gone_on(std::views::reverse(odometry));
   odometry_.insert(odometry_.end(), after.begin(), after.end());
 }
 
-Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, std::size_t first,
+Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, ScanMoments moments,
                                                            const Trajectory& odometry, const RobotConfig& robot) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) return fail(ErrorCode::io, "{}: no such folder of scans", folder.string());
   const auto T_body_lidar = to_pose(robot.T_body_lidar);
   if (!T_body_lidar) return in_context("T_body_lidar", T_body_lidar.error());
-  const std::shared_ptr<ScanFolder> scans(new ScanFolder(std::move(folder), first, odometry));
+  const std::shared_ptr<ScanFolder> scans(new ScanFolder(std::move(folder), std::move(moments), odometry));
   scans->T_body_lidar_ = *T_body_lidar;
+  if (auto ok = scans->check_numbers(); !ok) return tl::unexpected(ok.error());
   if (auto ok = scans->look_into(robot); !ok) return tl::unexpected(ok.error());
   return scans;
+}
+
+/// A file of no moment: then nobody knows whose the others are. They may be numbered from 1, or be of another
+/// recording.
+Status ScanFolder::check_numbers() const {
+  std::error_code failure;
+  std::size_t files = 0, highest = 0;
+  bool has_zero = false;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, failure)) {
+    const std::string stem = entry.path().stem().string();
+    if (std::ranges::find(kExtensions, entry.path().extension().string()) == kExtensions.end() || stem.size() != 6 ||
+        !std::ranges::all_of(stem, [](char c) { return c >= '0' && c <= '9'; }))
+      continue;
+    const std::size_t number = std::stoul(stem);
+    ++files;
+    highest = std::max(highest, number);
+    has_zero = has_zero || number == 0;
+  }
+  if (files == 0 || highest < moments_.recorded) return {};
+  return fail(ErrorCode::invalid, "{}: scan {} belongs to no pose or stamp: there are {} of these, numbered from 0{}",
+              folder_.string(), stem_of(highest), moments_.recorded,
+              has_zero ? "" : fmt::format("; the {} scans are not: they begin with another number", files));
 }
 
 Status ScanFolder::look_into(const RobotConfig& robot) {
   Result<std::optional<PointTimes>> found = no_scans();
   std::size_t tried = 0;
-  for (std::size_t sample = 0; sample < samples_ && tried < kTried; ++sample) {
+  for (std::size_t sample = 0; sample < moments_.stamps.size() && tried < kTried; ++sample) {
     if (!file_of(sample)) continue;
     auto times = times_of(sample, robot);
     if (times || tried++ == 0) found = std::move(times);
@@ -92,7 +121,7 @@ Status ScanFolder::look_into(const RobotConfig& robot) {
                       found.error());
   if (!found) return tl::unexpected(found.error());
   // Half way a clock that starts with the odometry at 0 can be told from the time since the sweep's begin.
-  const auto later = times_of(samples_ / 2, robot);
+  const auto later = times_of(moments_.stamps.size() / 2, robot);
   times_ = later ? *later : *found;
   return {};
 }
@@ -102,19 +131,19 @@ Result<std::optional<PointTimes>> ScanFolder::times_of(std::size_t sample, const
   if (!file) return no_scans();
   const auto scan = read(*file);
   if (!scan) return tl::unexpected(scan.error());
-  auto times = find_point_times(*scan, odometry_[before_ + sample].stamp, robot);
+  auto times = find_point_times(*scan, moments_.stamps[sample], robot);
   if (!times) return in_context(file->string(), times.error());
   return times;
 }
 
 tl::unexpected<Error> ScanFolder::no_scans() const {
-  return fail(ErrorCode::io, "{}: holds none of {}.pcd (or .bin) to {}.pcd, expected one per odometry pose",
-              folder_.string(), stem_of(first_), stem_of(first_ + samples_ - 1));
+  return fail(ErrorCode::io, "{}: holds none of {}.pcd (or .bin) to {}.pcd, expected one per odometry pose or stamp",
+              folder_.string(), stem_of(moments_.first), stem_of(moments_.first + moments_.stamps.size() - 1));
 }
 
 std::optional<fs::path> ScanFolder::file_of(std::size_t sample) const {
   for (const char* extension : kExtensions) {
-    const fs::path file = folder_ / (stem_of(first_ + sample) + extension);
+    const fs::path file = folder_ / (stem_of(moments_.first + sample) + extension);
     std::error_code failure;
     if (fs::exists(file, failure)) return file;
   }
@@ -124,10 +153,10 @@ std::optional<fs::path> ScanFolder::file_of(std::size_t sample) const {
 Result<std::optional<Scan>> ScanFolder::scan(std::size_t sample) const {
   const auto file = file_of(sample);
   if (!file)
-    return fail(ErrorCode::io, "{}.pcd: is not there", (folder_.filename() / stem_of(first_ + sample)).string());
+    return fail(ErrorCode::io, "{}.pcd (or .bin): is not there", (folder_ / stem_of(moments_.first + sample)).string());
   auto read_scan = read(*file);
   if (!read_scan) return tl::unexpected(read_scan.error());
-  Scan scan{.stamp = odometry_[before_ + sample].stamp, .cloud = nullptr, .age_s = nullptr};
+  Scan scan{.stamp = moments_.stamps.at(sample), .cloud = nullptr, .age_s = nullptr};
   if (times_) {
     auto ages = point_ages(*read_scan, scan.stamp, *times_);
     if (!ages) return in_context(file->string(), ages.error());

@@ -48,12 +48,12 @@ class Scans : public testing::Test {
     std::ofstream(folder_ / fmt::format("{:06d}.pcd", number)) << text;
   }
   [[nodiscard]] std::shared_ptr<const ScanFolder> opened(std::size_t first = 0) const {
-    auto scans = ScanFolder::open(folder_, first, odometry_, robot_);
+    auto scans = ScanFolder::open(folder_, {.first = first}, odometry_, robot_);
     EXPECT_TRUE(scans) << scans.error().message;
     return scans ? *scans : nullptr;
   }
   [[nodiscard]] std::string problem() const {
-    const auto scans = ScanFolder::open(folder_, 0, odometry_, robot_);
+    const auto scans = ScanFolder::open(folder_, {}, odometry_, robot_);
     return scans ? "" : scans.error().message;
   }
   /// The largest distance of the points from where they belong in the body frame of a sample.
@@ -129,7 +129,7 @@ TEST_F(Scans, NoneThatCanBeReadIsAnError) {
   EXPECT_EQ(problem(), "");
   std::ofstream(folder_ / "000003.pcd") << "none";
   EXPECT_NE(problem().find("000003.pcd"), std::string::npos) << problem();
-  EXPECT_FALSE(ScanFolder::open(folder_ / "nowhere", 0, odometry_, robot_));
+  EXPECT_FALSE(ScanFolder::open(folder_ / "nowhere", {}, odometry_, robot_));
 }
 
 TEST_F(Scans, WithoutPointsAreNoScans) {
@@ -146,6 +146,48 @@ TEST_F(Scans, TheirTroubleNamesTheFile) {
   const auto scan = opened()->scan(1);
   ASSERT_FALSE(scan);
   EXPECT_NE(scan.error().message.find("000001.pcd: points carry no time"), std::string::npos) << scan.error().message;
+}
+
+// A scan on the wrong pose is worse than none.
+TEST_F(Scans, NumberedFromOneOrOfNoPoseAreRefused) {
+  for (int number = 1; number <= 21; ++number) write_scan(number, 0.0, false);
+  EXPECT_NE(problem().find("scan 000021 belongs to no pose or stamp: there are 21 of these, numbered from 0; the 21 "
+                           "scans are not: they begin with another number"),
+            std::string::npos)
+      << problem();
+  write_scan(0, 0.0, false);
+  EXPECT_NE(problem().find("scan 000021 belongs to no pose"), std::string::npos) << problem();
+  std::filesystem::remove(folder_ / "000021.pcd");
+  EXPECT_EQ(problem(), "");
+  std::ofstream(folder_ / "000030.txt") << "something else";
+  EXPECT_EQ(problem(), "");
+  // Of a part of a recording, all may be there.
+  EXPECT_TRUE(ScanFolder::open(folder_, {.first = 5, .recorded = 30}, odometry_, robot_));
+}
+
+TEST_F(Scans, MayHaveStampsOfTheirOwn) {
+  ScanMoments moments;
+  for (int number = 0; number < 5; ++number) {
+    moments.stamps.push_back(odometry_[0].stamp + (0.213 + 0.13 * number));
+    write_scan(number, 0.213 + 0.13 * number - kSweep_s, true);
+  }
+  const auto scans = ScanFolder::open(folder_, moments, odometry_, robot_);
+  ASSERT_TRUE(scans) << scans.error().message;
+  for (std::size_t i = 0; i < 5; ++i) {
+    const auto scan = (*scans)->scan(i);
+    ASSERT_TRUE(scan && *scan);
+    EXPECT_EQ((*scan)->stamp, moments.stamps[i]);
+    const Pose3 T = T_odom_body((*scan)->stamp - odometry_[0].stamp);
+    for (std::size_t k = 0; k < kFixed.size(); ++k)
+      EXPECT_LT((T * (*scan)->cloud->points[k].cast<double>() - kFixed[k]).norm(), 0.05);
+  }
+}
+
+TEST_F(Scans, OneThatIsNotThereIsNamedInFull) {
+  write_scan(3, 0.2, false);
+  const auto scan = opened()->scan(2);
+  ASSERT_FALSE(scan);
+  EXPECT_EQ(scan.error().message, (folder_ / "000002.pcd").string() + " (or .bin): is not there");
 }
 
 }  // namespace

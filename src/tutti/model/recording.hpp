@@ -20,7 +20,7 @@ namespace tutti {
 class ScanSource {
  public:
   virtual ~ScanSource() = default;
-  /// The sweep that ends at this odometry sample; nothing when there is none.
+  /// The sweep that ends at this moment (Recording::scan_stamps); nothing when there is none.
   [[nodiscard]] virtual Result<std::optional<Scan>> scan(std::size_t sample) const = 0;
 };
 
@@ -29,7 +29,8 @@ class ScanSource {
 class VisualSource {
  public:
   virtual ~VisualSource() = default;
-  /// The images taken at this odometry sample, with its stamp; no images when there are none. At a keyframe, what is
+  /// The images taken at this moment (Recording::image_stamps), with its stamp; none when there are none. At a
+  /// keyframe, what is
   /// seen will be kept: only there descriptors are needed, which cost most. Tracks that begin after a
   /// restart in the middle have other numbers than those before.
   [[nodiscard]] virtual TrackedImages images(std::size_t sample, bool keyframe) = 0;
@@ -57,9 +58,18 @@ struct Recording {
   Trajectory reference;                     ///< T_reference_body, one frame for all robots; empty when there is none.
   std::shared_ptr<const ScanSource> scans;  ///< Null when there is no range sensor.
   std::shared_ptr<VisualSource> visual;     ///< Null when there is no camera.
-  std::vector<ImuSample> imu;               ///< Increasing stamps; empty when there is no IMU.
+  /// The moments of scans and of images, increasing; none: those of the odometry samples.
+  std::vector<Timestamp> scan_stamps, image_stamps;
+  std::vector<ImuSample> imu;  ///< Increasing stamps; empty when there is no IMU.
   ImuNoise imu_noise;
   std::vector<DriftOrigin> drift_origins;  ///< In time order; empty when unknown.
 };
+
+/// A moment of scans or images (`stamps`: Recording::scan_stamps or image_stamps); nothing after the last.
+inline std::optional<Timestamp> moment(const Recording& recording, const std::vector<Timestamp>& stamps,
+                                       std::size_t i) {
+  if (!stamps.empty()) return i < stamps.size() ? std::optional(stamps[i]) : std::nullopt;
+  return i < recording.odometry.size() ? std::optional(recording.odometry[i].stamp) : std::nullopt;
+}
 
 }  // namespace tutti

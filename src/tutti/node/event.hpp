@@ -85,17 +85,25 @@ struct SampleRefused {
 struct ScanRefused {
   RobotId robot;
   std::string why;
+  bool later = false;  ///< Not by the step that took it: its odometry came after it.
 };
 struct ImagesRefused {
   RobotId robot;
   std::string why;
+};
+/// Keyframe after keyframe without what a sensor of the robot sees: it is broken, or comes too late. Then no closures
+/// are found.
+struct SensorMissing {
+  RobotId robot;
+  std::string sensor;           ///< scan, images
+  std::uint64_t keyframes = 0;  ///< So many; 0: it is back.
 };
 
 struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
                MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost, SubmapsForgotten,
-               SampleRefused, ScanRefused, ImagesRefused>
+               SampleRefused, ScanRefused, ImagesRefused, SensorMissing>
       what;
 };
 

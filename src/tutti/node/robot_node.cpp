@@ -129,14 +129,8 @@ Status RobotNode::read_outbox() {
 Status RobotNode::hear_again(const JournalEntry& entry) {
   if (const auto* sample = std::get_if<OdometrySample>(&entry))
     return agent_.add_odometry(sample->stamp, sample->T_odom_body, sample->increment_covariance);
-  if (const auto* scan = std::get_if<Scan>(&entry)) {
-    last_scan_ = scan->stamp;
-    return agent_.add_scan(*scan);
-  }
-  if (const auto* images = std::get_if<TrackedImages>(&entry)) {
-    last_images_ = images->stamp;
-    return agent_.add_images(*images);
-  }
+  if (const auto* scan = std::get_if<Scan>(&entry)) return agent_.add_scan(*scan);
+  if (const auto* images = std::get_if<TrackedImages>(&entry)) return agent_.add_images(*images);
   const auto& heard = std::get<HeardGraph>(entry);
   const auto message = wire::decode_proxy_graph(heard.frame);
   if (!message) return tl::unexpected(message.error());
@@ -168,39 +162,53 @@ Step RobotNode::add_odometry(const OdometrySample& sample, Timestamp now) {
   }
   finished_ = false;
   remember(sample, now, step);
-  take_outgoing(now, step);
+  settle(now, step);
   return step;
 }
 
 Step RobotNode::add_scan(const Scan& scan, Timestamp now) {
   Step step;
-  if (scan.stamp == last_scan_) return step;  // again
+  if (!agent_.wants_scan(scan.stamp)) return step;  // again, or nothing new
   if (auto ok = agent_.add_scan(scan); !ok) {
     step.tell(now, ScanRefused{agent_.robot(), ok.error().message});
     return step;
   }
-  last_scan_ = scan.stamp;
   remember(scan, now, step);
+  settle(now, step);
   return step;
 }
 
 Step RobotNode::add_images(const TrackedImages& images, Timestamp now) {
   Step step;
-  if (images.stamp == last_images_) return step;  // again
+  if (images.stamp == agent_.heard_images()) return step;  // again
   if (auto ok = agent_.add_images(images); !ok) {
     step.tell(now, ImagesRefused{agent_.robot(), ok.error().message});
     return step;
   }
-  last_images_ = images.stamp;
   remember(images, now, step);
+  settle(now, step);
   return step;
+}
+
+void RobotNode::settle(Timestamp now, Step& step) {
+  for (Error& error : agent_.take_scan_errors())
+    step.tell(now, ScanRefused{agent_.robot(), std::move(error.message), true});
+  const auto watch = [&](const char* sensor, std::optional<std::uint64_t> keyframes, bool& told) {
+    const bool is_missing = keyframes && *keyframes >= config_.most_keyframes_without;
+    if (is_missing != told && keyframes)
+      step.tell(now, SensorMissing{agent_.robot(), sensor, is_missing ? *keyframes : 0});
+    told = is_missing;
+  };
+  watch("scan", agent_.keyframes_without_scan(), tells_no_scan_);
+  watch("images", agent_.keyframes_without_images(), tells_no_images_);
+  take_outgoing(now, step);
 }
 
 Step RobotNode::finish(Timestamp now) {
   Step step;
   finished_ = true;
   agent_.finish();
-  take_outgoing(now, step);
+  settle(now, step);
   write_journal(step);
   return step;
 }

@@ -28,6 +28,7 @@ struct RobotNodeConfig {
   /// Odometry and scans are written together, at most this much mission time after the first of them: a kill loses no
   /// more, and the disk is not asked at every sample.
   double journal_period_s = 0.5;
+  std::uint64_t most_keyframes_without = 20;  ///< Scan or images; then SensorMissing is told.
 };
 
 /// A robot round RobotAgent: odometry, scans and proxy graphs in; submaps out, and kept until the server has stored
@@ -97,6 +98,8 @@ class RobotNode {
   /// What may go now; `fresh`: what is not in the store yet.
   void send_submaps(Timestamp now, const Frames& fresh, Step& step);
   void receive_graph(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget, Step& step);
+  /// After each input: what became of it that was not told at once.
+  void settle(Timestamp now, Step& step);
   void note_conflict(const Receipt& receipt, Timestamp now, Step& step);
   void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);
@@ -124,10 +127,9 @@ class RobotNode {
   std::map<bus::MessageKind, Unread> unread_;  // since the last of the kind that could be read
   std::optional<ProxyGraph> base_;             // the last that came in full
   std::shared_ptr<const std::string> delta_;   // the last that came in terms of one
-  std::optional<Timestamp> last_scan_;         // since the checkpoint
-  std::optional<Timestamp> last_images_;       // since the checkpoint
-  std::uint64_t journal_ = 0;                  // entries since the checkpoint that are written
-  std::vector<std::string> unwritten_;         // and those that are not
+  bool tells_no_scan_ = false, tells_no_images_ = false;
+  std::uint64_t journal_ = 0;           // entries since the checkpoint that are written
+  std::vector<std::string> unwritten_;  // and those that are not
   Timestamp unwritten_since_;
   wire::StoredState stored_;           // of the agent, in the checkpoint
   std::vector<std::string> obsolete_;  // rows of the checkpoint, until the next one

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -266,7 +267,7 @@ TEST_F(RobotNodeTest, RefusesWhatIsNotForIt) {
 
 TEST_F(RobotNodeTest, AScanThatComesAgainCountsOnce) {
   walk(0, 51);
-  ASSERT_TRUE(node_->agent().wants_scan());
+  ASSERT_EQ(node_->agent().state().submaps.heard_scan, odometry_[50].stamp);
   const std::size_t scans = node_->agent().state().submaps.scans.size();
   PointCloud cloud;
   cloud.points.emplace_back(1.0F, 5.0F, 1.0F);
@@ -277,6 +278,75 @@ TEST_F(RobotNodeTest, AScanThatComesAgainCountsOnce) {
   restart();
   EXPECT_TRUE(done(node_->add_scan(again, now_)).writes.empty());
   EXPECT_EQ(node_->agent().state().submaps.scans.size(), scans);
+}
+
+// 200 samples a second, scans between them: what is killed and fed again makes the same, to the bit.
+TEST_F(RobotNodeTest, AKillBetweenSamplesAndScansThatNeverMeetLosesNothing) {
+  const auto cloud = std::make_shared<const PointCloud>(PointCloud{{{5.0F, 3.0F, 1.0F}}});
+  const auto pose = [&](double t) { return Pose3{Eigen::Quaterniond::Identity(), {0.9 * t, 0.0, 0.0}}; };
+  const Timestamp start = odometry_[0].stamp;
+  const auto scan_stamp = [&](int k) { return start + (0.0377 + 0.1 * k); };
+  int next_scan = 0;
+  const auto live = [&](int from, int to) {
+    for (int i = from; i < to; ++i) {
+      now_ = Timestamp{} + 0.005 * i;
+      done(node_->add_odometry({start + 0.005 * i, pose(0.005 * i), 1e-7 * Matrix6d::Identity()}, now_));
+      for (; scan_stamp(next_scan) < start + (0.005 * i - 0.03); ++next_scan)
+        done(node_->add_scan({scan_stamp(next_scan), cloud, {}}, now_));
+    }
+  };
+  live(0, 6000);
+  const std::string whole = wire::encode(node_->agent().state());
+  EXPECT_GE(sent_.size(), 2U);
+  EXPECT_LE(node_->agent().keyframes_without_scan().value(), 1U);
+  EXPECT_GE(node_->agent().keyframes().size(), 60U);
+  const auto frames = [&] {
+    std::map<std::string, std::string> out;  // what waits for a receipt is sent again
+    for (const bus::Envelope& message : std::exchange(sent_, {})) out[message.id] = *message.bytes;
+    return out;
+  };
+  const auto sent = frames();
+
+  store_.reset();
+  starts_ = 0;
+  restart();
+  next_scan = 0;
+  live(0, 4567);
+  restart();  // without what waited to be written
+  const Timestamp newest = node_->agent().newest_sample().value(), settled = node_->agent().settled().value();
+  ASSERT_LT(newest, start + 0.005 * 4566);
+  const int again = static_cast<int>(std::lround((newest - start) / 0.005)) + 1;
+  for (next_scan = 0; scan_stamp(next_scan) < settled;) ++next_scan;
+  live(again, 6000);
+  EXPECT_EQ(wire::encode(node_->agent().state()), whole);
+  EXPECT_EQ(frames(), sent);
+}
+
+TEST_F(RobotNodeTest, KeyframesWithoutAScanAreTold) {
+  const auto told = [&](int from, int to, bool with_scans) {
+    std::vector<SensorMissing> out;
+    const auto cloud = std::make_shared<const PointCloud>(PointCloud{{{5.0F, 3.0F, 1.0F}}});
+    for (int i = from; i < to; ++i) {
+      const Timestamp stamp = odometry_[0].stamp + 0.05 * i;
+      const auto note = [&](const Step& step) {
+        for (const Event& event : step.events)
+          if (const auto* missing = std::get_if<SensorMissing>(&event.what)) out.push_back(*missing);
+      };
+      note(done(node_->add_odometry(
+          {stamp, {Eigen::Quaterniond::Identity(), {0.05 * i, 0.0, 0.0}}, 1e-7 * Matrix6d::Identity()}, now_)));
+      if (with_scans) note(done(node_->add_scan({stamp, cloud, {}}, now_)));
+    }
+    return out;
+  };
+  EXPECT_TRUE(told(0, 400, false).empty());  // it has no such sensor, as far as anybody knows
+  EXPECT_TRUE(told(400, 600, true).empty());
+  auto missing = told(600, 1000, false);
+  ASSERT_EQ(missing.size(), 1U);
+  EXPECT_EQ(missing[0].sensor, "scan");
+  EXPECT_EQ(missing[0].keyframes, config_.most_keyframes_without);
+  missing = told(1000, 1100, true);
+  ASSERT_EQ(missing.size(), 1U);
+  EXPECT_EQ(missing[0].keyframes, 0U);
 }
 
 TEST_F(RobotNodeTest, WithoutAStoreToWriteToItWritesNothing) {

@@ -145,6 +145,18 @@ Told tell(const node::ScanRefused& refused) {
           "a scan was refused: " + refused.why,
           Level::warning};
 }
+Told tell(const node::SensorMissing& missing) {
+  return {{{"event", "sensor_missing"},
+           {"robot", missing.robot.value},
+           {"sensor", missing.sensor},
+           {"keyframes", missing.keyframes}},
+          missing.keyframes > 0
+              ? fmt::format("robot {}: {} keyframes without {}: no closures are found there", missing.robot.value,
+                            missing.keyframes, missing.sensor == "scan" ? "a scan" : missing.sensor)
+              : fmt::format("robot {}: keyframes have {} again", missing.robot.value,
+                            missing.sensor == "scan" ? "scans" : missing.sensor),
+          missing.keyframes > 0 ? Level::warning : Level::info};
+}
 Told tell(const node::ImagesRefused& refused) {
   return {{{"event", "images_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "images were refused: " + refused.why,

@@ -51,18 +51,20 @@ Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given,
     return in_context(fmt::format("robot {}: odometry at {} ns", chain_.robot.value, stamp.ns), ok.error());
   const Matrix6d covariance =
       invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
-  const std::uint32_t submap = submaps_.current_submap();
   const bool is_first = state_.keyframes.empty();
-  const auto step = submaps_.add_odometry(stamp, T_odom_body, covariance);
-  if (!step) return tl::unexpected(step.error());
+  if (auto ok = submaps_.add_odometry(stamp, T_odom_body, covariance); !ok) return ok;
   if (!is_first) {
     const Matrix6d moved =
         compound_covariance(state_.T_odom_body.inverse() * T_odom_body, state_.covariance, covariance);
     state_.covariance = 0.5 * (moved + moved.transpose());
   }
   state_.T_odom_body = T_odom_body;
-  if (*step) add_keyframe(**step, submap);
+  add_keyframes();
   return {};
+}
+
+void RobotAgent::add_keyframes() {
+  for (const NewKeyframe& keyframe : submaps_.take_keyframes()) add_keyframe(keyframe.step, keyframe.submap);
 }
 
 void RobotAgent::add_keyframe(const KeyframeStep& step, std::uint32_t submap) {
@@ -78,9 +80,39 @@ void RobotAgent::add_keyframe(const KeyframeStep& step, std::uint32_t submap) {
     state_.node_odometry.push_back(std::exchange(state_.since_node, {.T_a_b = {}, .covariance = Matrix6d::Zero()}));
 }
 
-Status RobotAgent::add_scan(const Scan& scan) { return submaps_.add_scan(scan); }
+Status RobotAgent::add_scan(const Scan& scan) {
+  Status ok = submaps_.add_scan(scan);
+  add_keyframes();
+  return ok;
+}
 
-void RobotAgent::finish() { submaps_.finish(); }
+Status RobotAgent::add_images(const TrackedImages& images) {
+  Status ok = submaps_.add_images(images);
+  add_keyframes();
+  return ok;
+}
+
+void RobotAgent::add_moment(Timestamp stamp) {
+  submaps_.add_moment(stamp);
+  add_keyframes();
+}
+
+void RobotAgent::finish() {
+  submaps_.finish();
+  add_keyframes();
+}
+
+std::optional<std::uint64_t> RobotAgent::keyframes_without_scan() const {
+  const SubmapBuilderState& submaps = submaps_.state();
+  if (!config_.submap.has_scans && !submaps.heard_scan) return std::nullopt;
+  return submaps.keyframes_without_scan;
+}
+
+std::optional<std::uint64_t> RobotAgent::keyframes_without_images() const {
+  const SubmapBuilderState& submaps = submaps_.state();
+  if (!config_.submap.has_images && !submaps.heard_images) return std::nullopt;
+  return submaps.keyframes_without_images;
+}
 
 std::vector<SubmapMessage> RobotAgent::take_outgoing() {
   std::vector<SubmapMessage> out;
@@ -181,7 +213,7 @@ Matrix6d RobotAgent::covariance_by(const ProxyGraph& graph) const {
   std::vector<Timestamp> stamps;
   for (const Keyframe& keyframe : state_.keyframes) stamps.push_back(keyframe.stamp);
   const Matrix6d at_keyframe = map_covariance(graph, chain_, stamps, state_.ledger, smoother_.state());
-  const RelativePose& since = submaps_.state().since_keyframe;
+  const RelativePose since = submaps_.since_keyframe();
   return compound_covariance(since.T_a_b, at_keyframe, since.covariance);
 }
 

@@ -114,11 +114,22 @@ class RobotAgent {
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
   Status add_scan(const Scan& scan);
   /// SubmapBuilder::add_images()
-  Status add_images(const TrackedImages& images) { return submaps_.add_images(images); }
-  /// The latest odometry sample is a keyframe; a scan elsewhere is hardly worth taking.
+  Status add_images(const TrackedImages& images);
+  /// SubmapBuilder::add_moment()
+  void add_moment(Timestamp stamp);
+  /// SubmapBuilder's functions of these names
   [[nodiscard]] bool wants_scan() const { return submaps_.wants_scan(); }
+  [[nodiscard]] bool wants_scan(Timestamp stamp) const { return submaps_.wants_scan(stamp); }
+  [[nodiscard]] bool wants_images(Timestamp stamp) const { return submaps_.wants_images(stamp); }
   /// Stamp of the latest odometry sample.
   [[nodiscard]] std::optional<Timestamp> newest_sample() const { return submaps_.newest_sample(); }
+  /// The newest; nothing: none yet.
+  [[nodiscard]] std::optional<Timestamp> heard_images() const { return submaps_.state().heard_images; }
+  /// SubmapBuilder::settled()
+  [[nodiscard]] std::optional<Timestamp> settled() const { return submaps_.settled(); }
+  /// Since the last one that was taken; nothing: the robot is not known to have that sensor.
+  [[nodiscard]] std::optional<std::uint64_t> keyframes_without_scan() const;
+  [[nodiscard]] std::optional<std::uint64_t> keyframes_without_images() const;
   /// Ends the run: the last, shorter submap becomes an outgoing message.
   void finish();
   /// Submaps ready to be sent, oldest first; taken once. Their scans are merged here, which add_odometry() and
@@ -126,6 +137,8 @@ class RobotAgent {
   std::vector<SubmapMessage> take_outgoing();
   /// SubmapBuilder::take_image_errors()
   std::vector<Error> take_image_errors() { return submaps_.take_image_errors(); }
+  /// SubmapBuilder::take_scan_errors()
+  std::vector<Error> take_scan_errors() { return submaps_.take_scan_errors(); }
 
   /// Compares the server's map with the own one and adds the constraints it takes. An older revision than the newest
   /// seen changes nothing (synchronised = 0). `budget` limits policies that need one.
@@ -170,6 +183,7 @@ class RobotAgent {
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:
+  void add_keyframes();
   void add_keyframe(const KeyframeStep& step, std::uint32_t submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
   [[nodiscard]] Matrix6d covariance_by(const ProxyGraph& graph) const;

@@ -280,7 +280,7 @@ TEST(Agent, KeepsKeyframesNotSamples) {
     const AgentState state = agent.state();
     EXPECT_EQ(state.smoother.odometry.size(), agent.keyframes().size() - 1);
     EXPECT_EQ(agent.odometry_factors(), agent.keyframes().size() - 1);
-    EXPECT_LE(state.submaps.recent.size(), static_cast<std::size_t>(SubmapBuilder::kSweepHistoryS * rate_hz) + 2);
+    EXPECT_LE(state.submaps.recent.size(), static_cast<std::size_t>(SubmapBuilder::kHistory_s * rate_hz) + 2);
     EXPECT_LE(state.submaps.keyframes.size(), 40U);
     EXPECT_TRUE(state.submaps.finished.empty());
     return state.smoother.odometry.size() + state.smoother.constraints.size() + state.keyframes.size() +

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/bundle/imu_preintegration.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/pose_at.hpp"
 #include "tutti/model/way.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
 
@@ -77,82 +80,252 @@ bool SubmapBuilder::is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const
          stamp - last.stamp >= config_.keyframe_time_s;
 }
 
-/// Keeps what is newer than the longest sweep's begin, and one sample before it.
+/// Keeps what is newer than the history, and one sample before it; of samples that are close together, fewer.
 void SubmapBuilder::remember(Timestamp stamp, const Pose3& T_odom_body) {
-  state_.recent.push_back({stamp, T_odom_body});
-  std::size_t old = 0;
-  while (old + 1 < state_.recent.size() && stamp - state_.recent[old + 1].stamp >= kSweepHistoryS) ++old;
-  state_.recent.erase(state_.recent.begin(), state_.recent.begin() + static_cast<std::ptrdiff_t>(old));
+  Trajectory& recent = state_.recent;
+  const bool is_close = recent.size() >= 2 && stamp - recent[recent.size() - 2].stamp < SensorTimeline::kFinest_s;
+  if (is_close)
+    recent.back() = {stamp, T_odom_body};
+  else
+    recent.push_back({stamp, T_odom_body});
+  std::ptrdiff_t old = 0;
+  while (old + 1 < std::ssize(recent) && stamp - recent[static_cast<std::size_t>(old + 1)].stamp >= kHistory_s) ++old;
+  recent.erase(recent.begin(), recent.begin() + old);
 }
 
-Result<std::optional<KeyframeStep>> SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body,
-                                                                const Matrix6d& increment_covariance) {
-  if (auto ok = check_sample(chain_.robot, stamp, T_odom_body, increment_covariance); !ok)
-    return tl::unexpected(ok.error());
+std::optional<Timestamp> SubmapBuilder::newest_sample() const {
+  if (!state_.waiting.odometry.empty()) return state_.waiting.odometry.back().stamp;
+  return state_.recent.empty() ? std::nullopt : std::optional(state_.recent.back().stamp);
+}
+
+std::optional<Timestamp> SubmapBuilder::settled() const {
+  return state_.recent.empty() ? std::nullopt : std::optional(state_.recent.back().stamp);
+}
+
+RelativePose SubmapBuilder::since_keyframe() const {
+  RelativePose since = state_.since_keyframe;
+  const Pose3* last = state_.recent.empty() ? nullptr : &state_.recent.back().pose;
+  for (const OdometryStep& step : state_.waiting.odometry) {
+    since = compound(since, {last->inverse() * step.T_odom_body, step.covariance});
+    last = &step.T_odom_body;
+  }
+  return since;
+}
+
+Status SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance) {
+  if (auto ok = check_sample(chain_.robot, stamp, T_odom_body, increment_covariance); !ok) return ok;
+  const OdometryStep step{stamp, T_odom_body, increment_covariance};
+  const auto newest = newest_sample();
+  if (!newest) {
+    take({step, std::nullopt});
+    return {};
+  }
+  if (stamp <= *newest)
+    return fail(ErrorCode::invalid, "robot {}: odometry stamp {} ns does not follow {} ns", chain_.robot.value,
+                stamp.ns, newest->ns);
+  if (stamp - *newest > kLongestGap_s)
+    std::erase_if(state_.waiting.sensors, [&](const SensorSample& sample) {
+      const bool is_in_gap = sample.stamp > *newest && sample.stamp < stamp;
+      if (is_in_gap && sample.scan)
+        scan_errors_.push_back({ErrorCode::invalid,
+                                fmt::format("robot {}: scan at {} ns is between odometry at {} "
+                                            "and {} ns, expected at most {} s between them",
+                                            chain_.robot.value, sample.stamp.ns, newest->ns, stamp.ns, kLongestGap_s)});
+      return is_in_gap;
+    });
+  state_.waiting.add(step);
+  advance();
+  return {};
+}
+
+/// Hands on what nothing can come before any more.
+void SubmapBuilder::advance() {
+  const std::optional<Timestamp> newest = newest_sample();
+  if (!newest) return;
+  Timestamp until = *newest;
+  if (has_scans() || has_images()) {
+    until = until - kLag_s;
+    const std::optional<Timestamp>& heard = has_images() ? state_.heard_images : state_.heard_scan;
+    if (heard) until = std::max(until, *heard);
+  }
+  while (auto moment = state_.waiting.take(state_.recent.back(), until)) take(std::move(*moment));
+}
+
+bool SubmapBuilder::makes_keyframe(const SensorTimeline::Moment& moment) {
+  const OdometryStep& step = moment.step;
+  const bool has_sensors = has_scans() || has_images();
+  const bool is_waited_for = moment.sensors && (moment.sensors->images || !moment.sensors->scan || !has_images());
+  if (is_waited_for) state_.is_blind = false;
+  if (!is_keyframe(step.stamp, step.T_odom_body)) return false;
+  if (state_.keyframes.empty() || !has_sensors || is_waited_for || state_.is_blind) return true;
+  if (!state_.due) state_.due = step.stamp;
+  state_.is_blind = step.stamp - *state_.due >= kPatience_s;
+  return state_.is_blind;
+}
+
+void SubmapBuilder::take(SensorTimeline::Moment moment) {
+  const auto& [stamp, T_odom_body, covariance] = moment.step;
   if (!state_.recent.empty()) {
-    const StampedPose& last = state_.recent.back();
-    if (stamp <= last.stamp)
-      return fail(ErrorCode::invalid, "robot {}: odometry stamp {} ns does not follow {} ns", chain_.robot.value,
-                  stamp.ns, last.stamp.ns);
-    const Pose3 step = last.pose.inverse() * T_odom_body;
+    const Pose3 step = state_.recent.back().pose.inverse() * T_odom_body;
     state_.distance_m += step.translation.norm();
-    state_.since_keyframe = compound(state_.since_keyframe, {step, increment_covariance});
+    state_.since_keyframe = compound(state_.since_keyframe, {step, covariance});
   }
   remember(stamp, T_odom_body);
   if (!state_.finished.empty()) state_.finished.back().awaits_images = false;
-  if (!is_keyframe(stamp, T_odom_body)) return std::optional<KeyframeStep>{};
+  if (makes_keyframe(moment)) add_keyframe(stamp, T_odom_body);
+  if (!moment.sensors) return;
+  auto& [at, scan, images] = *moment.sensors;
+  if (images && state_.keyframes.back().stamp == stamp) keep(*images);
+  if (!scan || state_.keyframes_without_scan == 0) return;
+  if (const auto undistorted_scan = undistorted(*scan))
+    merge(*undistorted_scan, T_odom_body);
+  else
+    scan_errors_.push_back(undistorted_scan.error());
+}
 
+void SubmapBuilder::add_keyframe(Timestamp stamp, const Pose3& T_odom_body) {
   const bool first = state_.keyframes.empty();
   Keyframe keyframe{first ? 0 : state_.keyframes.back().index + 1, stamp, T_odom_body};
   if (first || state_.distance_m - state_.representative_distance_m >= config_.representative_distance_m) {
     keyframe.representative = true;
     state_.representative_distance_m = state_.distance_m;
   }
+  state_.due.reset();
+  ++state_.keyframes_without_scan;
+  ++state_.keyframes_without_images;
+  const std::uint32_t submap = state_.next_submap;
   if (first) {
     start_submap(keyframe);
-    return std::optional(KeyframeStep{keyframe});
+    keyframes_.push_back({KeyframeStep{keyframe}, submap});
+    return;
   }
-  const KeyframeStep out{keyframe, std::exchange(state_.since_keyframe, KeyframeStep{}.odometry)};
+  const KeyframeStep step{keyframe, std::exchange(state_.since_keyframe, KeyframeStep{}.odometry)};
+  keyframes_.push_back({step, submap});
   state_.keyframes.push_back(keyframe);
-  state_.odometry.push_back(out.odometry);
-  if (is_full()) {
-    close_submap();
-    state_.finished.back().awaits_images = !state_.finished.back().images.empty();
-    start_submap(keyframe);
-  }
-  return std::optional(out);
+  state_.odometry.push_back(step.odometry);
+  if (!is_full()) return;
+  close_submap();
+  state_.finished.back().awaits_images = !state_.finished.back().images.empty();
+  start_submap(keyframe);
 }
 
-Status SubmapBuilder::add_scan(const Scan& scan) {
-  if (state_.recent.empty() || scan.stamp != state_.recent.back().stamp)
-    return fail(ErrorCode::invalid, "robot {}: scan at {} ns has no odometry at its stamp (latest: {} ns)",
-                chain_.robot.value, scan.stamp.ns, state_.recent.empty() ? 0 : state_.recent.back().stamp.ns);
-  if (!scan.cloud || scan.cloud->points.empty())
-    return fail(ErrorCode::invalid, "robot {}: scan at {} ns is empty", chain_.robot.value, scan.stamp.ns);
-  const auto undistorted = lidar::undistort(scan, state_.recent);
-  if (!undistorted) return fail(ErrorCode::invalid, "robot {}: {}", chain_.robot.value, undistorted.error().message);
-  state_.scans.push_back(
-      {state_.keyframes.front().T_odom_body.inverse() * state_.recent.back().pose, undistorted->cloud});
+bool SubmapBuilder::is_due_at(Timestamp stamp) const {
+  const auto T_odom_body = state_.waiting.pose_at(state_.recent.back(), stamp);
+  return T_odom_body && is_keyframe(stamp, *T_odom_body);
+}
+
+bool SubmapBuilder::wants_scan(Timestamp stamp) const {
+  if (state_.recent.empty() || stamp < state_.recent.front().stamp) return true;  // it is refused
+  if (state_.heard_scan && stamp <= *state_.heard_scan) return false;
+  if (!has_scans() || stamp > *newest_sample() || state_.keyframes_without_scan > 0) return true;
+  return stamp > state_.recent.back().stamp && is_due_at(stamp);
+}
+
+bool SubmapBuilder::wants_scan() const {
+  const auto newest = newest_sample();
+  if (!newest) return false;
+  if (has_scans()) return wants_scan(*newest);
+  return state_.keyframes.back().stamp == *newest || is_due_at(*newest);
+}
+
+bool SubmapBuilder::wants_images(Timestamp stamp) const {
+  if (state_.recent.empty() || (state_.heard_images && stamp <= *state_.heard_images)) return false;
+  if (stamp > *newest_sample()) return true;
+  if (stamp > state_.recent.back().stamp) return is_due_at(stamp);
+  return stamp == state_.recent.back().stamp && stamp == state_.keyframes.back().stamp;
+}
+
+/// That odometry is, or will be, at this moment.
+Status SubmapBuilder::check_moment(Timestamp stamp, const char* what) const {
+  const auto newest = newest_sample();
+  if (!newest || stamp - *newest > kLongestGap_s)
+    return fail(ErrorCode::invalid, "robot {}: {} at {} ns, no odometry within {} s before (latest: {} ns)",
+                chain_.robot.value, what, stamp.ns, kLongestGap_s, newest ? newest->ns : 0);
+  if (stamp < state_.recent.front().stamp)
+    return fail(ErrorCode::invalid,
+                "robot {}: {} at {} ns, no odometry is kept of that time (from {} ns on, latest: "
+                "{} ns): too late, or its clock is another one",
+                chain_.robot.value, what, stamp.ns, state_.recent.front().stamp.ns, newest->ns);
+  const std::deque<OdometryStep>& waiting = state_.waiting.odometry;
+  const auto after = std::ranges::lower_bound(waiting, stamp, {}, &OdometryStep::stamp);
+  if (after == waiting.end() || stamp <= state_.recent.back().stamp) return {};
+  const Timestamp before = after == waiting.begin() ? state_.recent.back().stamp : std::prev(after)->stamp;
+  if (after->stamp != stamp && after->stamp - before > kLongestGap_s)
+    return fail(ErrorCode::invalid,
+                "robot {}: {} at {} ns is between odometry at {} and {} ns, expected at most {} s "
+                "between them",
+                chain_.robot.value, what, stamp.ns, before.ns, after->stamp.ns, kLongestGap_s);
   return {};
 }
 
-Status SubmapBuilder::add_images(const TrackedImages& images) {
-  const auto where = [&] { return fmt::format("robot {}: images at {} ns", chain_.robot.value, images.stamp.ns); };
-  if (!wants_scan() || images.stamp != state_.recent.back().stamp)
-    return fail(ErrorCode::invalid, "{}: no keyframe has their stamp (latest sample: {} ns)", where(),
-                state_.recent.empty() ? 0 : state_.recent.back().stamp.ns);
-  if (auto ok = check_images(images); !ok) return in_context(where(), ok.error());
-  if (!state_.images.empty() && *state_.images.back().cameras != *images.cameras)
-    return fail(ErrorCode::invalid, "{}: other cameras than those of the images before", where());
-  if (!state_.images.empty() && state_.images.back().stamp == images.stamp)
-    return fail(ErrorCode::invalid, "{}: there are some already", where());
+Result<Scan> SubmapBuilder::undistorted(const Scan& scan) const {
+  Trajectory samples = state_.recent;
+  for (const OdometryStep& step : state_.waiting.odometry) samples.push_back({step.stamp, step.T_odom_body});
+  auto out = lidar::undistort(scan, samples);
+  if (!out) return fail(ErrorCode::invalid, "robot {}: {}", chain_.robot.value, out.error().message);
+  return out;
+}
+
+void SubmapBuilder::merge(const Scan& scan, const Pose3& T_odom_body) {
+  state_.scans.push_back({state_.keyframes.front().T_odom_body.inverse() * T_odom_body, scan.cloud});
+  state_.keyframes_without_scan = 0;
+}
+
+Status SubmapBuilder::add_scan(const Scan& scan) {
+  if (auto ok = check_moment(scan.stamp, "scan"); !ok) return ok;
+  if (!scan.cloud || scan.cloud->points.empty())
+    return fail(ErrorCode::invalid, "robot {}: scan at {} ns is empty", chain_.robot.value, scan.stamp.ns);
+  if (!wants_scan(scan.stamp)) return {};
+  const bool is_ahead = scan.stamp > *newest_sample();
+  auto usable = is_ahead ? Result<Scan>(scan) : undistorted(scan);
+  if (!usable) return tl::unexpected(usable.error());
+  state_.heard_scan = scan.stamp;
+  if (scan.stamp <= state_.recent.back().stamp) {
+    if (state_.keyframes_without_scan > 0) merge(*usable, *pose_at(state_.recent, scan.stamp));
+    return {};
+  }
+  state_.waiting.add(SensorSample{scan.stamp, std::move(*usable), std::nullopt});
+  advance();
+  return {};
+}
+
+void SubmapBuilder::keep(const TrackedImages& images) {
   state_.images.push_back(images);
+  state_.keyframes_without_images = 0;
   // The keyframe that two submaps share shows both the same.
   if (!state_.finished.empty() && state_.finished.back().awaits_images) {
     state_.finished.back().images.push_back(images);
     state_.finished.back().awaits_images = false;
   }
+}
+
+Status SubmapBuilder::add_images(const TrackedImages& images) {
+  if (auto ok = check_moment(images.stamp, "images"); !ok) return ok;
+  const auto where = [&] { return fmt::format("robot {}: images at {} ns", chain_.robot.value, images.stamp.ns); };
+  if (auto ok = check_images(images); !ok) return in_context(where(), ok.error());
+  if (!state_.images.empty() && *state_.images.back().cameras != *images.cameras)
+    return fail(ErrorCode::invalid, "{}: other cameras than those of the images before", where());
+  if (state_.heard_images && images.stamp <= *state_.heard_images)
+    return fail(ErrorCode::invalid, "{}: there are some of {} ns already", where(), state_.heard_images->ns);
+  if (!wants_images(images.stamp))
+    return fail(ErrorCode::invalid, "{}: no keyframe has their stamp (latest sample: {} ns, settled: {} ns)", where(),
+                newest_sample()->ns, state_.recent.back().stamp.ns);
+  state_.heard_images = images.stamp;
+  if (images.stamp == state_.recent.back().stamp) {
+    keep(images);
+    return {};
+  }
+  state_.waiting.add(SensorSample{images.stamp, std::nullopt, images});
+  advance();
   return {};
+}
+
+void SubmapBuilder::add_moment(Timestamp stamp) {
+  if (!check_moment(stamp, "moment") || stamp <= state_.recent.back().stamp) return;
+  if (has_scans()) state_.heard_scan = stamp;
+  if (has_images()) state_.heard_images = stamp;
+  state_.waiting.add(SensorSample{stamp, std::nullopt, std::nullopt});
+  advance();
 }
 
 void SubmapBuilder::start_submap(const Keyframe& first) {
@@ -193,6 +366,9 @@ std::optional<Submap> SubmapBuilder::take_submap() {
 }
 
 void SubmapBuilder::finish() {
+  if (state_.recent.empty()) return;
+  while (auto moment = state_.waiting.take(state_.recent.back(), Timestamp{std::numeric_limits<std::int64_t>::max()}))
+    take(std::move(*moment));
   if (state_.keyframes.size() < 2) return;
   close_submap();
   start_submap(state_.keyframes.back());

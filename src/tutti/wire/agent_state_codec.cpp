@@ -21,6 +21,7 @@ class Writer {
   void integer(const std::uint64_t& x) { out_.add_integer(x); }
   void number(const double& x) { out_.add_number(x); }
   void coordinate(const float& x) { out_.add_coordinate(x); }
+  [[nodiscard]] bool has_more() const { return true; }
   /// A list's length; returns how many elements follow.
   template <class T>
   std::size_t length(const std::vector<T>& list) {
@@ -49,6 +50,7 @@ class Reader {
     list.resize(short_ ? 0 : static_cast<std::size_t>(count));
     return list.size();
   }
+  [[nodiscard]] bool has_more() const { return integers_ < in_.integer_size(); }
   [[nodiscard]] bool is_complete() const {
     return !short_ && integers_ == in_.integer_size() && numbers_ == in_.number_size() &&
            coordinates_ == in_.coordinate_size();
@@ -214,6 +216,64 @@ void pass(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.representative_distance_m);
 }
 template <class A>
+void pass(A& a, std::optional<Timestamp>& stamp) {
+  bool is_known = stamp.has_value();
+  Timestamp value = stamp.value_or(Timestamp{});
+  pass(a, is_known);
+  pass(a, value);
+  stamp = is_known ? std::optional(value) : std::nullopt;
+}
+template <class A>
+void pass(A& a, Scan& scan) {
+  pass(a, scan.stamp);
+  PointCloud cloud;
+  if (scan.cloud != nullptr) cloud = *scan.cloud;
+  pass(a, cloud.points);
+  scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+  bool has_ages = scan.age_s != nullptr;
+  pass(a, has_ages);
+  if (!has_ages) return;
+  std::vector<float> ages;
+  if (scan.age_s != nullptr) ages = *scan.age_s;
+  a.length(ages);
+  for (float& age_s : ages) a.coordinate(age_s);
+  scan.age_s = std::make_shared<const std::vector<float>>(std::move(ages));
+}
+template <class A>
+void pass(A& a, robot::OdometryStep& step) {
+  pass(a, step.stamp);
+  pass(a, step.T_odom_body);
+  for (double& x : step.covariance.reshaped()) a.number(x);
+}
+template <class A>
+void pass(A& a, robot::SensorSample& sample) {
+  pass(a, sample.stamp);
+  const auto pass_optional = [&](auto& what) {
+    bool is_there = what.has_value();
+    pass(a, is_there);
+    if (!is_there) return;
+    if (!what) what.emplace();
+    pass(a, *what);
+  };
+  pass_optional(sample.scan);
+  pass_optional(sample.images);
+}
+/// What keyframes wait for: the last of a state, and not in one of before there was such a thing.
+template <class A>
+void pass_waiting(A& a, robot::SubmapBuilderState& builder) {
+  if (!a.has_more()) return;
+  std::vector<robot::OdometryStep> odometry(builder.waiting.odometry.begin(), builder.waiting.odometry.end());
+  pass(a, odometry);
+  builder.waiting.odometry.assign(odometry.begin(), odometry.end());
+  pass(a, builder.waiting.sensors);
+  pass(a, builder.heard_scan);
+  pass(a, builder.heard_images);
+  pass(a, builder.due);
+  pass(a, builder.is_blind);
+  pass(a, builder.keyframes_without_scan);
+  pass(a, builder.keyframes_without_images);
+}
+template <class A>
 void pass(A& a, AgentState& state) {
   pass(a, state.session);
   pass(a, state.sequence);
@@ -241,6 +301,7 @@ void pass(A& a, AgentState& state) {
   pass(a, has_component);
   pass(a, component);
   state.component = has_component ? std::optional(component) : std::nullopt;
+  pass_waiting(a, state.submaps);
 }
 
 // What is checked here is what an agent had to have checked: samples were within kMaxCoordinate_m when it took them,
@@ -267,6 +328,24 @@ bool is_chain(const std::vector<Keyframe>& keyframes, const std::vector<Relative
   return all_sound(odometry);
 }
 
+/// In the order of time, after the last step that was taken; sensors with what they saw.
+bool is_sound(const robot::SensorTimeline& waiting, const Trajectory& taken) {
+  const auto follows = [](const auto& a, const auto& b) { return a.stamp >= b.stamp; };
+  const auto is_after = [&](const auto& list) {
+    return list.empty() || (!taken.empty() && list.front().stamp > taken.back().stamp);
+  };
+  return is_after(waiting.odometry) && is_after(waiting.sensors) &&
+         std::ranges::adjacent_find(waiting.odometry, follows) == waiting.odometry.end() &&
+         std::ranges::adjacent_find(waiting.sensors, follows) == waiting.sensors.end() &&
+         std::ranges::all_of(waiting.odometry,
+                             [](const robot::OdometryStep& step) {
+                               return is_sound(step.T_odom_body) && step.covariance.allFinite();
+                             }) &&
+         std::ranges::all_of(waiting.sensors, [](const robot::SensorSample& sample) {
+           return !sample.images || is_sound(*sample.images);
+         });
+}
+
 bool is_sound(const robot::SubmapBuilderState& builder) {
   const auto is_whole = [](const robot::FinishedSubmap& finished) {
     return !finished.submap.keyframes.empty() && is_chain(finished.submap.keyframes, finished.submap.odometry) &&
@@ -278,7 +357,7 @@ bool is_sound(const robot::SubmapBuilderState& builder) {
          std::ranges::all_of(builder.recent, [](const StampedPose& at) { return is_sound(at.pose); }) &&
          std::ranges::adjacent_find(builder.recent, follows) == builder.recent.end() &&
          builder.keyframes.empty() == builder.recent.empty() && std::isfinite(builder.distance_m) &&
-         std::isfinite(builder.representative_distance_m);
+         std::isfinite(builder.representative_distance_m) && is_sound(builder.waiting, builder.recent);
 }
 
 /// What an agent relies on in the state that it goes on from.

@@ -42,6 +42,7 @@ struct Mission {
   robot::AgentConfig config;
   Trajectory odometry = robot::test::drifting_odometry(70);
   std::uint64_t seed = 0;
+  double sensors_after_s = 0.0;  ///< The samples: at, before or after their stamps.
 
   [[nodiscard]] RobotAgent start() const { return {kRobot, 7, config, Rng(seed)}; }
   [[nodiscard]] RobotAgent go_on(robot::AgentState state) const {
@@ -54,13 +55,14 @@ struct Mission {
     for (std::size_t i = from; i < to; ++i) {
       Rng rng = Rng(seed).fork(i);
       EXPECT_TRUE(agent.add_odometry(odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance).has_value());
-      if (agent.wants_scan() && rng.bernoulli(0.5)) {
+      const Timestamp stamp = odometry[i].stamp + (i == 0 ? 0.0 : sensors_after_s);
+      if (agent.wants_scan(stamp) && rng.bernoulli(0.5)) {
         PointCloud cloud;
         for (int p = 0; p < 20; ++p) cloud.points.push_back(3.0F * Eigen::Vector3d(rng.normal(), 1, 2).cast<float>());
-        EXPECT_TRUE(agent.add_scan({odometry[i].stamp, std::make_shared<const PointCloud>(cloud), {}}).has_value());
+        EXPECT_TRUE(agent.add_scan({stamp, std::make_shared<const PointCloud>(cloud), {}}).has_value());
       }
-      if (agent.wants_scan()) {
-        EXPECT_TRUE(agent.add_images(images_at(odometry[i].stamp, rng)).has_value());
+      if (agent.wants_images(stamp)) {
+        EXPECT_TRUE(agent.add_images(images_at(stamp, rng)).has_value());
       }
       if (rng.bernoulli(0.05)) {
         ProxyGraphMessage message = robot::test::broadcast(agent, i, robot::test::kWorld);
@@ -80,6 +82,7 @@ Mission any_mission() {
   mission.config.policy.name =
       *rc::gen::element<std::string>("skeleton", "spectral", "random", "every_node", "uniform");
   mission.config.submap.duration_s = 6.0;
+  mission.sensors_after_s = *rc::gen::element(0.0, -0.2, 0.1);
   return mission;
 }
 

@@ -22,7 +22,7 @@ struct TeamMate {
   friend bool operator==(const TeamMate&, const TeamMate&) = default;
 };
 
-/// A stretch of odometry where localisation failed, or the map is wrong.
+/// A stretch of odometry where localisation failed, or the map is wrong; or a sensor that is not heard.
 struct FeedAlert {
   std::string text;
   Timestamp since;  ///< The newest sample when it was first raised.
@@ -39,7 +39,7 @@ struct FeedState {
   Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance(): of T_map_odom * newest, right tangent.
   std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age() of the newest one heard; zeros: none yet.
   std::optional<std::uint32_t> component;           ///< Nothing: the map does not know this chain.
-  bool wants_scan = false;                          ///< A scan of the newest sample would be used.
+  bool wants_scan = false;                          ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;
 };

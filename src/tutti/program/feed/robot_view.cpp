@@ -11,6 +11,13 @@ namespace tutti::program {
 void RobotView::note(const node::Event& event, const node::RobotNode& node) {
   const auto* update = std::get_if<node::RobotUpdated>(&event.what);
   const auto newest = node.agent().newest_sample();
+  if (const auto* missing = std::get_if<node::SensorMissing>(&event.what); missing != nullptr && newest) {
+    missing_.erase(missing->sensor);
+    if (missing->keyframes > 0)
+      missing_[missing->sensor] = {fmt::format("{} keyframes without {}: no closures are found there",
+                                               missing->keyframes, missing->sensor == "scan" ? "a scan" : "images"),
+                                   *newest, *newest, *newest};
+  }
   if (update == nullptr || update->summary.synchronised == 0 || !newest) return;
   if (!first_) first_ = *newest;
   mission::UpdateRecord record{.time_s = *newest - *first_, .revision = update->summary.revision};
@@ -42,6 +49,7 @@ FeedState RobotView::state(const node::RobotNode& node) const {
                 .wants_scan = agent.wants_scan(),
                 .team_mates = {},
                 .alerts = alerts_};
+  for (const auto& [sensor, alert] : missing_) out.alerts.push_back(alert);
   if (const auto stamp = agent.newest_sample()) out.newest = {*stamp, agent.T_odom_body()};
   for (const robot::Whereabouts& other : agent.whereabouts()) {
     const auto name = names_.find(other.robot);
@@ -56,7 +64,7 @@ Status taken(const node::Step& step) {
   for (const node::Event& event : step.events) {
     if (const auto* sample = std::get_if<node::SampleRefused>(&event.what))
       return fail(ErrorCode::invalid, "{}", sample->why);
-    if (const auto* scan = std::get_if<node::ScanRefused>(&event.what))
+    if (const auto* scan = std::get_if<node::ScanRefused>(&event.what); scan != nullptr && !scan->later)
       return fail(ErrorCode::invalid, "{}", scan->why);
   }
   return {};

@@ -30,6 +30,7 @@ class RobotView {
   std::optional<Timestamp> first_;  ///< The newest sample at the first update; times of updates_ count from it.
   std::vector<mission::UpdateRecord> updates_;
   std::vector<FeedAlert> alerts_;
+  std::map<std::string, FeedAlert> missing_;  ///< By sensor.
 };
 
 /// An error when the node refused the sample or scan that this step is of.
