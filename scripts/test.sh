@@ -12,14 +12,14 @@ usage() {
   exit 2
 }
 
-sanitize=no targets=() tests=()
+sanitize=no preset=ci targets=() tests=()
 case "$#:${1-}" in
   0:) ;;
   1:--sanitize) sanitize=yes ;;
   2:--label)
     case "$2" in unit | property | mission | system) tests=(-L "^$2\$") ;; *) usage ;; esac ;;
   2:--module)
-    targets=("test_$2") tests=(-R "^$2/")
+    preset=dev targets=("test_$2") tests=(-R "^$2/")
     [ "$2" != integration ] || targets+=(tutti) # integration/cli runs the program
     ;;
   *) usage ;;
@@ -73,7 +73,7 @@ build_and_test() {
 stage "packages"
 "$root/scripts/install_dependencies.sh" --tests --bench
 trap finish EXIT
-build_and_test ci Release "${tests[@]}"
+build_and_test "$preset" Release "${tests[@]}"
 if [ "$sanitize" = yes ]; then
   export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
   export UBSAN_OPTIONS=print_stacktrace=1
