@@ -13,6 +13,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -54,7 +55,12 @@ inline double percentile(std::vector<double> values, double share) {
 
 template <class T>
 T value_or_exit(Result<T> result) {
-  if (result) return *std::move(result);
+  if (result) {
+    if constexpr (std::is_void_v<T>)
+      return;
+    else
+      return *std::move(result);
+  }
   fmt::print(stderr, "{}\n", result.error().message);
   std::exit(1);
 }

@@ -30,7 +30,7 @@ Status append_or_leave(const internal::LineReader& line, Trajectory& trajectory,
 
 Result<Trajectory> read_euroc(std::string_view text, const std::string& name, std::vector<Error>* left_out) {
   constexpr std::size_t kPoseColumns = 8;
-  constexpr std::string_view kLayout = "stamp[ns],px,py,pz,qw,qx,qy,qz,...";
+  constexpr std::string_view kEurocLayout = "stamp[ns],px,py,pz,qw,qx,qy,qz,...";
   internal::LineReader line(text, name, internal::Separator::comma);
   Trajectory trajectory;
   std::size_t columns = 0;
@@ -39,9 +39,9 @@ Result<Trajectory> read_euroc(std::string_view text, const std::string& name, st
       columns = line.columns().size();
       if (columns < kPoseColumns)
         return line.fail(ErrorCode::parse, "row has {} columns, expected at least {} ({})", columns, kPoseColumns,
-                         kLayout);
+                         kEurocLayout);
     }
-    if (auto ok = line.expect_columns(columns, kLayout); !ok) return tl::unexpected(ok.error());
+    if (auto ok = line.expect_columns(columns, kEurocLayout); !ok) return tl::unexpected(ok.error());
     const auto ns = line.integer(0, "stamp");
     if (!ns) return tl::unexpected(ns.error());
     double v[7];
