@@ -17,7 +17,7 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti {
-namespace {
+namespace asynchrony_test {
 
 struct SmallMission {
   std::vector<mission::MissionRecording> recordings;
@@ -125,5 +125,5 @@ TEST(Asynchrony, AHundredDisorderlyDeliveriesEndInTheSameMap) {
   }
 }
 
-}  // namespace
+}  // namespace asynchrony_test
 }  // namespace tutti

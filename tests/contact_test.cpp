@@ -9,7 +9,7 @@
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace contact_test {
 
 constexpr double kMinute_s = 60.0;
 
@@ -146,5 +146,5 @@ TEST(Contact, RobotsThatNeverMeetKeepTwoGoodMaps) {
   }
 }
 
-}  // namespace
+}  // namespace contact_test
 }  // namespace tutti::mission

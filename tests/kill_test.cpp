@@ -24,7 +24,7 @@
 #include "tutti/storage/memory_store.hpp"
 
 namespace tutti {
-namespace {
+namespace kill_test {
 
 using bus::Endpoint;
 using Role = Endpoint::Role;
@@ -422,5 +422,5 @@ TEST_F(Kill, JobsThatTheBusGivesUpAreAskedAgain) {
   expect_same_map(undisturbed.server(), mission.server());
 }
 
-}  // namespace
+}  // namespace kill_test
 }  // namespace tutti

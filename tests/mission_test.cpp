@@ -9,7 +9,7 @@
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace mission_test {
 
 MissionConfig small_mission() {
   MissionConfig config;
@@ -167,5 +167,5 @@ TEST(Mission, AMissingFileIsAClearError) {
   EXPECT_NE(record.error().message.find("nowhere/odometry.tum"), std::string::npos) << record.error().message;
 }
 
-}  // namespace
+}  // namespace mission_test
 }  // namespace tutti::mission

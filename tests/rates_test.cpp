@@ -10,7 +10,7 @@
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace rates_test {
 
 MissionRecord run(const Result<MissionConfig>& config, const std::string& data = {}) {
   EXPECT_TRUE(config.has_value()) << config.error().message;
@@ -49,5 +49,5 @@ TEST(Rates, OfOdometryDoNotChangeTheMapOfHku) {
   }
 }
 
-}  // namespace
+}  // namespace rates_test
 }  // namespace tutti::mission

@@ -11,7 +11,7 @@
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace real_missions_test {
 
 MissionConfig mission_file(const std::string& name) {
   auto config = load_mission(test::source_path("missions/" + name + ".yaml"), {});
@@ -112,5 +112,5 @@ TEST(RealMissions, EurocFlightsAgreeWithTheJointMap) {
   }
 }
 
-}  // namespace
+}  // namespace real_missions_test
 }  // namespace tutti::mission

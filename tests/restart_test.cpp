@@ -16,7 +16,7 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti {
-namespace {
+namespace restart_test {
 
 constexpr std::uint64_t kFirstSession = 1'700'000'000, kSecondSession = 1'700'000'300;
 
@@ -170,5 +170,5 @@ TEST_F(Restart, AServerBackFromAnOlderStateIsHeardAtOnce) {
   }
 }
 
-}  // namespace
+}  // namespace restart_test
 }  // namespace tutti

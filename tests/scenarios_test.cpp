@@ -17,7 +17,7 @@
 #include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace scenarios_test {
 
 MissionConfig scenario(const std::string& name, const std::vector<std::string>& assignments = {}) {
   auto config = load_mission(test::source_path("missions/" + name + ".yaml"), assignments);
@@ -321,5 +321,5 @@ TEST(Scenarios, KittiHalvesBecomeOneMap) {
   EXPECT_LT(*halves_of_07.server.joint.rmse_m, 0.88);
 }
 
-}  // namespace
+}  // namespace scenarios_test
 }  // namespace tutti::mission

@@ -10,7 +10,7 @@
 #include "tutti/server/map_estimate.hpp"
 
 namespace tutti {
-namespace {
+namespace stated_covariance_test {
 
 constexpr RobotId kRobot{1};
 constexpr double kRate_hz = 10.0;
@@ -115,5 +115,5 @@ TEST(StatedCovariance, UnknownBesideNeverMakesMattersWorse) {
   }
 }
 
-}  // namespace
+}  // namespace stated_covariance_test
 }  // namespace tutti

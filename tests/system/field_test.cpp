@@ -32,7 +32,7 @@
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti {
-namespace {
+namespace field_test {
 
 namespace fs = std::filesystem;
 using test::TcpRelay;
@@ -280,5 +280,5 @@ TEST_F(Field, OnFullDisksEverythingWaitsAndGoesOnWhenThereIsRoom) {
   expect_undisturbed_map(World(source));
 }
 
-}  // namespace
+}  // namespace field_test
 }  // namespace tutti

@@ -6,7 +6,7 @@
 #include "tutti/base/result.hpp"
 
 namespace tutti {
-namespace {
+namespace check_test {
 
 TEST(Check, SaysConditionPlaceAndMessage) {
   const int n = -1;
@@ -50,5 +50,5 @@ TEST(ResultTest, CarriesCodeMessageAndContext) {
   EXPECT_EQ(outer.error().message, "file.txt:3: 3 is odd");
 }
 
-}  // namespace
+}  // namespace check_test
 }  // namespace tutti

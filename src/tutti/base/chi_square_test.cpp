@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace tutti {
-namespace {
+namespace chi_square_test {
 
 // Abramowitz and Stegun, "Handbook of Mathematical Functions", table 26.8.
 TEST(ChiSquare, AgreesWithTables) {
@@ -31,5 +31,5 @@ TEST(ChiSquare, SmallProbabilitiesKeepTheirDigits) {
     EXPECT_NEAR(chi_square_exceeded_with(p, 2.0), -2.0 * std::log(p), 1e-6 * -std::log(p));
 }
 
-}  // namespace
+}  // namespace chi_square_test
 }  // namespace tutti

@@ -12,7 +12,7 @@
 #include <fstream>
 
 namespace tutti {
-namespace {
+namespace config_io_test {
 
 struct RobotSettings {
   std::string name = "alpha";
@@ -334,5 +334,5 @@ TEST(Config, DocumentsEveryField) {
   EXPECT_EQ(docs[1].help, "After verification.");
 }
 
-}  // namespace
+}  // namespace config_io_test
 }  // namespace tutti

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti {
-namespace {
+namespace disjoint_sets_test {
 
 TEST(DisjointSets, AreNumberedByTheirFirstMembers) {
   DisjointSets sets(7);
@@ -19,5 +19,5 @@ TEST(DisjointSets, AreNumberedByTheirFirstMembers) {
   EXPECT_EQ(DisjointSets(0).labels().second, 0);
 }
 
-}  // namespace
+}  // namespace disjoint_sets_test
 }  // namespace tutti

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti {
-namespace {
+namespace file_test {
 
 TEST(Files, MissingAndFolderAreIoErrors) {
   for (const std::string path : {"/does/not/exist", "."}) {
@@ -24,5 +24,5 @@ TEST(Files, BytesSurviveDisk) {
   EXPECT_EQ(read_file(path).value(), bytes);
 }
 
-}  // namespace
+}  // namespace file_test
 }  // namespace tutti

@@ -8,7 +8,7 @@
 #include <unordered_set>
 
 namespace tutti {
-namespace {
+namespace ids_test {
 
 // Mixing kinds of ids up must not compile.
 static_assert(!std::is_convertible_v<std::uint32_t, RobotId>);
@@ -47,5 +47,5 @@ TEST(ChainId, IsCalledByItsRobotAloneInTheFirstSession) {
   EXPECT_EQ(to_string(SubmapId{{RobotId{3}, 5}, 17}), "3:5/17");
 }
 
-}  // namespace
+}  // namespace ids_test
 }  // namespace tutti

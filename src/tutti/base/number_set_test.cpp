@@ -7,7 +7,7 @@
 #include <set>
 
 namespace tutti {
-namespace {
+namespace number_set_test {
 
 RC_GTEST_PROP(NumberSet, IsASetInAsFewStretchesAsThereAre, ()) {
   NumberSet set;
@@ -34,5 +34,5 @@ RC_GTEST_PROP(NumberSet, IsASetInAsFewStretchesAsThereAre, ()) {
   RC_ASSERT(again == set);
 }
 
-}  // namespace
+}  // namespace number_set_test
 }  // namespace tutti

@@ -8,7 +8,7 @@
 #include <vector>
 
 namespace tutti {
-namespace {
+namespace random_test {
 
 std::vector<double> draws(Rng rng, int n) {
   std::vector<double> out;
@@ -81,5 +81,5 @@ TEST(Rng, CertainAndImpossible) {
   }
 }
 
-}  // namespace
+}  // namespace random_test
 }  // namespace tutti

@@ -12,7 +12,7 @@ extern "C" void openblas_set_num_threads(int threads);
 extern "C" int openblas_get_num_threads();
 
 namespace tutti {
-namespace {
+namespace single_thread_test {
 
 class OpenBlas : public testing::Test {
  protected:
@@ -46,5 +46,5 @@ TEST_F(OpenBlas, HasOneThreadInEveryHolderOfMany) {
   EXPECT_EQ(openblas_get_num_threads(), kUsers);
 }
 
-}  // namespace
+}  // namespace single_thread_test
 }  // namespace tutti

@@ -7,7 +7,7 @@
 #include <unordered_set>
 
 namespace tutti {
-namespace {
+namespace timestamp_test {
 
 constexpr Timestamp kEpoch{1'403'636'579'763'555'584};  // a EuRoC stamp: doubles are 256 ns apart here
 
@@ -56,5 +56,5 @@ TEST(Timestamp, OrdersAndHashesByNanosecond) {
   EXPECT_EQ((std::unordered_set<Timestamp>{kEpoch, kEpoch, Timestamp{kEpoch.ns + 1}}.size()), 2U);
 }
 
-}  // namespace
+}  // namespace timestamp_test
 }  // namespace tutti

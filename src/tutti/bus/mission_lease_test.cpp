@@ -14,7 +14,7 @@
 #include "tutti/bus/nats_child.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace mission_lease_test {
 
 using namespace std::chrono_literals;
 
@@ -96,5 +96,5 @@ TEST(MissionNames, AreWordsOfASubject) {
     EXPECT_FALSE(check_mission_name(name)) << name;
 }
 
-}  // namespace
+}  // namespace mission_lease_test
 }  // namespace tutti::bus

@@ -20,7 +20,7 @@
 #include "tutti/base/file.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace nats_child_test {
 
 namespace fs = std::filesystem;
 
@@ -145,5 +145,5 @@ TEST_F(NatsChildTest, EndsWithAnOwnerThatIsKilled) {
   EXPECT_TRUE(soon([&] { return !is_alive(pid); }));
 }
 
-}  // namespace
+}  // namespace nats_child_test
 }  // namespace tutti::bus

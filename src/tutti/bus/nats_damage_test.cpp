@@ -15,7 +15,7 @@
 #include "tutti/bus/nats_port.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace nats_damage_test {
 
 using test::NatsNetwork;
 using test::within;
@@ -193,5 +193,5 @@ TEST_F(NatsDamage, NothingIsMendedThatIsWhole) {
   EXPECT_EQ(hub->state().streams_made_anew, 0U) << hub->state().last_error;
 }
 
-}  // namespace
+}  // namespace nats_damage_test
 }  // namespace tutti::bus

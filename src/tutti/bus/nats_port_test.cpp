@@ -18,7 +18,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace nats_port_test {
 
 using test::NatsNetwork;
 using test::within;
@@ -344,5 +344,5 @@ TEST(NatsPortOptionsTest, OtherMachinesNeedTlsAndMissionsAName) {
   EXPECT_EQ(refusal({.url = "nats://10.0.0.1:4222", .allow_insecure = true}), "");
 }
 
-}  // namespace
+}  // namespace nats_port_test
 }  // namespace tutti::bus

@@ -17,7 +17,7 @@
 #include "tutti/bus/simulated_network.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace port_conformance_test {
 
 /// A network of its own for one test.
 class PortNetwork {
@@ -389,5 +389,5 @@ INSTANTIATE_TEST_SUITE_P(Port, PortConformance,
                                            Implementation{"nats", &make<OverNats>}),
                          [](const auto& of) { return std::string(of.param.name); });
 
-}  // namespace
+}  // namespace port_conformance_test
 }  // namespace tutti::bus

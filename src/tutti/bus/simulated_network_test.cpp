@@ -6,7 +6,7 @@
 #include <memory>
 
 namespace tutti::bus {
-namespace {
+namespace simulated_network_test {
 
 TEST(SimulatedNetwork, WhatWaitsAtARobotGoesWithIt) {
   SimulatedNetwork network(SimulatedRadio(Timestamp{}, {.outages = {{0.0, 10.0}}}, 1), Timestamp{});
@@ -36,5 +36,5 @@ TEST(SimulatedNetwork, OneEndpointHasOnePortAndSpeaksForItself) {
   EXPECT_THROW(static_cast<void>(server->send(forged)), std::logic_error);
 }
 
-}  // namespace
+}  // namespace simulated_network_test
 }  // namespace tutti::bus

@@ -13,7 +13,7 @@
 #include "tutti/base/config_io.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace simulated_radio_test {
 
 constexpr Timestamp kStart{1'000'000'000'000};
 const Endpoint kServer = Endpoint::server();
@@ -327,5 +327,5 @@ TEST(SimulatedRadio, WhatBefallsAKindDoesNotDependOnOthers) {
   EXPECT_EQ(submaps_heard(true), submaps_heard(false));
 }
 
-}  // namespace
+}  // namespace simulated_radio_test
 }  // namespace tutti::bus

@@ -8,7 +8,7 @@
 #include "support/sanitized.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace adaptive_test {
 
 using namespace test;
 
@@ -176,5 +176,5 @@ TEST(AdaptiveLoop, AServerThatKnowsNothingChangesNothing) {
   EXPECT_LT(result.worst_agreement_m, 1e-6);
 }
 
-}  // namespace
+}  // namespace adaptive_test
 }  // namespace tutti::consistency

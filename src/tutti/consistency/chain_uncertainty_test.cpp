@@ -16,7 +16,7 @@
 #include "tutti/spectral/wavelet_transform.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace chain_uncertainty_test {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -316,5 +316,5 @@ TEST(ChainUncertainty, FewSamplesSayNothingOfScales) {
   EXPECT_GT(stated.whole.position_m, 0.0);
 }
 
-}  // namespace
+}  // namespace chain_uncertainty_test
 }  // namespace tutti::consistency

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::consistency {
-namespace {
+namespace closed_loop_test {
 
 using namespace test;
 
@@ -96,5 +96,5 @@ TEST(ClosedLoop, AServerThatKnowsNothingChangesNothing) {
   EXPECT_LT(result.worst_agreement_m, 1e-6);
 }
 
-}  // namespace
+}  // namespace closed_loop_test
 }  // namespace tutti::consistency

@@ -14,7 +14,7 @@
 #include "tutti/spectral/spectrum.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace compare_test {
 
 using test::kAlpha, test::kBravo;
 
@@ -236,5 +236,5 @@ TEST(Golden, DisagreementOnOneGraphIsPyGsps) {
   }
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace tutti::consistency

@@ -10,7 +10,7 @@
 #include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace constraint_test {
 
 using test::kAlpha;
 
@@ -92,5 +92,5 @@ TEST(ConstraintMaker, NothingToLink) {
   EXPECT_THROW((void)maker(one).make(0, 0, ConstraintKind::small), std::logic_error);
 }
 
-}  // namespace
+}  // namespace constraint_test
 }  // namespace tutti::consistency

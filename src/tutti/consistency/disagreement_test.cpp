@@ -11,7 +11,7 @@
 #include "support/sanitized.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace disagreement_test {
 
 using test::kAlpha;
 
@@ -160,5 +160,5 @@ TEST(DisagreementTest, WorksOnTwoNodesAndOnOneRoom) {
   }
 }
 
-}  // namespace
+}  // namespace disagreement_test
 }  // namespace tutti::consistency

@@ -10,7 +10,7 @@
 #include "support/consistency/uncertainty.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace explanation_test {
 
 using test::kAlpha;
 
@@ -142,5 +142,5 @@ TEST(Explanation, SaysLittleWhenTheServerSaysNothing) {
   EXPECT_TRUE(e.origins.empty());
 }
 
-}  // namespace
+}  // namespace explanation_test
 }  // namespace tutti::consistency

@@ -9,7 +9,7 @@
 #include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace ledger_test {
 
 Constraint link(std::size_t from, std::size_t to, double x = 1.0, double yaw_deg = 0.0, std::uint64_t revision = 1) {
   Constraint out{test::stamp_of(from), test::stamp_of(to), from, to};
@@ -163,5 +163,5 @@ RC_GTEST_PROP(Ledger, NeverHoldsAPairTwiceAndCountsAddUp, ()) {
   }
 }
 
-}  // namespace
+}  // namespace ledger_test
 }  // namespace tutti::consistency

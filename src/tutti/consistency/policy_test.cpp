@@ -9,7 +9,7 @@
 #include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace policy_test {
 
 using test::kAlpha;
 using Pairs = std::set<std::pair<std::size_t, std::size_t>>;  // of nodes
@@ -277,5 +277,5 @@ TEST(Skeleton, LooksAtRawOdometryNotAtWhatItCorrectedBefore) {
   EXPECT_EQ(linked(scene.choose("skeleton")), before);
 }
 
-}  // namespace
+}  // namespace policy_test
 }  // namespace tutti::consistency

@@ -10,7 +10,7 @@
 #include "tutti/consistency/chain_uncertainty.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace proxy_graph_builder_test {
 
 using test::kAlpha, test::kBravo;
 
@@ -196,5 +196,5 @@ TEST(OwnPart, OfARobotWithoutNodesIsEmpty) {
   EXPECT_EQ(own, (ProxyGraph{.revision = 3, .radius_m = 6.0}));
 }
 
-}  // namespace
+}  // namespace proxy_graph_builder_test
 }  // namespace tutti::consistency

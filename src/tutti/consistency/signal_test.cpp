@@ -10,7 +10,7 @@
 #include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace signal_test {
 
 constexpr const char* kSignals[] = {"distance", "pose", "relative_motion"};
 
@@ -192,5 +192,5 @@ TEST(SlowDrift, IsPlainInThePoseAndFaintInRelativeMotion) {
   EXPECT_LT(change("relative_motion", poses, drifting).norm(), 1.5 * change("relative_motion", poses, noisy).norm());
 }
 
-}  // namespace
+}  // namespace signal_test
 }  // namespace tutti::consistency

@@ -11,7 +11,7 @@
 #include "support/consistency/runs.hpp"
 
 namespace tutti::consistency {
-namespace {
+namespace synchronise_test {
 
 using test::kAlpha, test::kBravo;
 
@@ -74,5 +74,5 @@ RC_GTEST_PROP(Synchronise, IsOneToOneChronologicalAndComplete, ()) {
   RC_ASSERT(sync.pairs.size() == expected);
 }
 
-}  // namespace
+}  // namespace synchronise_test
 }  // namespace tutti::consistency

@@ -8,7 +8,7 @@
 #include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace between_factor_test {
 
 using testing::random_pose;
 using testing::random_tangent;
@@ -75,5 +75,5 @@ TEST(BetweenFactor, JacobiansAreThoseOfCentralDifferences) {
   }
 }
 
-}  // namespace
+}  // namespace between_factor_test
 }  // namespace tutti::estimation

@@ -14,7 +14,7 @@
 #include "tutti/formats/g2o.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace ceres_reference_test {
 
 using namespace testing;
 
@@ -181,5 +181,5 @@ TEST(PublicSets, ManhattanAsCeres) {
   expect_same_as_ceres("manhattan.g2o");
 }
 
-}  // namespace
+}  // namespace ceres_reference_test
 }  // namespace tutti::estimation

@@ -8,7 +8,7 @@
 #include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace fixed_nodes_test {
 
 using namespace testing;
 
@@ -73,5 +73,5 @@ TEST_P(FixedNodes, MayBeAll) {
 
 INSTANTIATE_TEST_SUITE_P(BothSolvers, FixedNodes, ::testing::Bool());
 
-}  // namespace
+}  // namespace fixed_nodes_test
 }  // namespace tutti::estimation

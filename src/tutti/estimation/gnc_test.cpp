@@ -6,7 +6,7 @@
 #include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace gnc_test {
 
 using namespace testing;
 
@@ -85,5 +85,5 @@ TEST(Gnc, SurvivesAComponentHeldByWrongEdgesOnly) {
   for (const Pose3& pose : result.solution.poses) EXPECT_TRUE(is_valid(pose));
 }
 
-}  // namespace
+}  // namespace gnc_test
 }  // namespace tutti::estimation

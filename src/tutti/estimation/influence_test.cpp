@@ -12,7 +12,7 @@
 #include "tutti/estimation/pose_graph_solver.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace influence_test {
 
 using namespace testing;
 
@@ -167,5 +167,5 @@ TEST(Influence, NothingToSay) {
   EXPECT_TRUE(largest_influences(graph, graph.poses, closures_of(graph), 3).empty());
 }
 
-}  // namespace
+}  // namespace influence_test
 }  // namespace tutti::estimation

@@ -12,7 +12,7 @@
 #include "tutti/estimation/between_factor.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace marginals_test {
 
 using namespace testing;
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
@@ -220,5 +220,5 @@ TEST(Marginals, SayWhatIsNotDetermined) {
   EXPECT_EQ(JointPosterior({}, {}).samples({}, 3, Rng(1)).rows(), 0);
 }
 
-}  // namespace
+}  // namespace marginals_test
 }  // namespace tutti::estimation

@@ -10,7 +10,7 @@
 #include "support/estimation/chain_mission.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace onboard_smoother_test {
 
 using namespace testing;
 
@@ -142,5 +142,5 @@ TEST(OnboardSmoother, BadNumbersLeaveThePosesAlone) {
   EXPECT_THROW(smoother.set_constraints({{0, 101, {}}}), std::logic_error);
 }
 
-}  // namespace
+}  // namespace onboard_smoother_test
 }  // namespace tutti::estimation

@@ -8,7 +8,7 @@
 #include "support/estimation/chain_mission.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace onboard_smoother_update_test {
 
 using namespace testing;
 
@@ -185,5 +185,5 @@ TEST(OnboardSmootherUpdate, ForgetsWhatWasWithdrawn) {
   EXPECT_LT(largest_position_difference(smoother.poses(), restored.poses()), 1e-4);
 }
 
-}  // namespace
+}  // namespace onboard_smoother_update_test
 }  // namespace tutti::estimation

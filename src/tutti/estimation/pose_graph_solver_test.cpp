@@ -12,7 +12,7 @@
 extern "C" void openblas_set_num_threads(int threads);
 
 namespace tutti::estimation {
-namespace {
+namespace pose_graph_solver_test {
 
 using namespace testing;
 
@@ -220,5 +220,5 @@ TEST(PoseGraphSolver, RobustLossSavesTheMapFromAFewWrongEdges) {
   }
 }
 
-}  // namespace
+}  // namespace pose_graph_solver_test
 }  // namespace tutti::estimation

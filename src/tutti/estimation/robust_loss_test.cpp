@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace tutti::estimation {
-namespace {
+namespace robust_loss_test {
 
 constexpr LossKind kKinds[] = {LossKind::none, LossKind::huber, LossKind::cauchy, LossKind::geman_mcclure};
 
@@ -53,5 +53,5 @@ TEST(RobustLoss, KnowsItsNames) {
   EXPECT_THROW(loss_kind("tukey"), std::logic_error);
 }
 
-}  // namespace
+}  // namespace robust_loss_test
 }  // namespace tutti::estimation

@@ -8,7 +8,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::evaluation {
-namespace {
+namespace association_test {
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -80,5 +80,5 @@ RC_GTEST_PROP(Associate, NearestIsTheNearest, ()) {
   RC_ASSERT(next == pairs.size());
 }
 
-}  // namespace
+}  // namespace association_test
 }  // namespace tutti::evaluation

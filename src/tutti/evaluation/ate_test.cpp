@@ -12,7 +12,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::evaluation {
-namespace {
+namespace ate_test {
 
 const std::vector<Eigen::Vector3d> kSquare = {{1, 1, 0}, {1, -1, 0}, {-1, 1, 0}, {-1, -1, 0}};
 
@@ -180,5 +180,5 @@ TEST(Agreement, OnlyEqualStampsCount) {
   EXPECT_FALSE(agreement(a, {{{1}, {}}}));
 }
 
-}  // namespace
+}  // namespace ate_test
 }  // namespace tutti::evaluation

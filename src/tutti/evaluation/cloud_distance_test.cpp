@@ -11,7 +11,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::evaluation {
-namespace {
+namespace cloud_distance_test {
 
 PointCloud random_cloud(std::size_t size, Rng rng) {
   PointCloud cloud;
@@ -127,5 +127,5 @@ TEST(CloudDistance, NothingToMeasure) {
   EXPECT_EQ(distances[1], 0.0F);
 }
 
-}  // namespace
+}  // namespace cloud_distance_test
 }  // namespace tutti::evaluation

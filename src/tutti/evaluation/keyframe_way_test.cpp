@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::evaluation {
-namespace {
+namespace keyframe_way_test {
 
 /// A pose a second, each a metre on.
 Trajectory line(int first, int last, int step = 1) {
@@ -43,5 +43,5 @@ TEST(KeyframeWay, NothingToShareOut) {
   EXPECT_EQ(KeyframeWay(line(0, 5), {}).whole_m(), 5.0);
 }
 
-}  // namespace
+}  // namespace keyframe_way_test
 }  // namespace tutti::evaluation

@@ -9,7 +9,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::evaluation {
-namespace {
+namespace kink_test {
 
 /// `n` poses, `step_s` and 2 m apart along x.
 Trajectory line(int n, double step_s) {
@@ -72,5 +72,5 @@ RC_GTEST_PROP(Kink, DoesNotSeeRigidMotions, ()) {
   RC_ASSERT(found->rotation_deg < 1e-5);
 }
 
-}  // namespace
+}  // namespace kink_test
 }  // namespace tutti::evaluation

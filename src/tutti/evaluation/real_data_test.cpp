@@ -10,7 +10,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 
 namespace tutti::evaluation {
-namespace {
+namespace real_data_test {
 
 struct Figure {
   std::string folder, file;
@@ -74,5 +74,5 @@ TEST(RealKitti, AteIsThePrintedOne) {
   }
 }
 
-}  // namespace
+}  // namespace real_data_test
 }  // namespace tutti::evaluation

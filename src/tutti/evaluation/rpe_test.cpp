@@ -8,7 +8,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::evaluation {
-namespace {
+namespace rpe_test {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
@@ -110,5 +110,5 @@ TEST(Rpe, MisuseIsCaught) {
   EXPECT_THROW((void)rpe_over_time(std::vector<PosePair>(2), 1.0), std::logic_error);  // equal stamps
 }
 
-}  // namespace
+}  // namespace rpe_test
 }  // namespace tutti::evaluation

@@ -8,7 +8,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::evaluation {
-namespace {
+namespace transform_error_test {
 
 TEST(TransformError, IsMeasuredWhereTheRobotWas) {
   const double angle = 0.01;
@@ -36,5 +36,5 @@ TEST(Centroid, MeanPositionOrNothing) {
   EXPECT_EQ(*centroid({{{0}, {q, {1, 2, 3}}}, {{1}, {q, {3, 2, -3}}}}), Eigen::Vector3d(2, 2, 0));
 }
 
-}  // namespace
+}  // namespace transform_error_test
 }  // namespace tutti::evaluation

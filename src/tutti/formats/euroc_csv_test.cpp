@@ -11,7 +11,7 @@
 #include "support/shared_data.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace euroc_csv_test {
 
 constexpr const char* kGroundTruth =
     "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_x, v_y, v_z\n"
@@ -83,5 +83,5 @@ TEST(TrajectoryFile, RecognisesWhatItReads) {
   EXPECT_FALSE(read_trajectory(path, "tum"));
 }
 
-}  // namespace
+}  // namespace euroc_csv_test
 }  // namespace tutti::formats

@@ -12,7 +12,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace g2o_test {
 
 using internal::any_double;
 using internal::any_pose;
@@ -357,5 +357,5 @@ TEST(G2o, ClosuresAloneAreNotOneGraph) {
   EXPECT_NE(file.error().message.find("connected components, expected 1"), std::string::npos) << file.error().message;
 }
 
-}  // namespace
+}  // namespace g2o_test
 }  // namespace tutti::formats

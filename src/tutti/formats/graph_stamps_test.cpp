@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::formats {
-namespace {
+namespace graph_stamps_test {
 
 TEST(GraphStamps, ReadsWhatAMissionWrites) {
   const auto stamps = parse_graph_stamps("id,robot,keyframe,stamp_ns\n0,1,0,1700000000123456789\n7,2,3,-5\n", "x");
@@ -25,5 +25,5 @@ TEST(GraphStamps, SaysWhatIsWrongAndWhere) {
   EXPECT_FALSE(read_graph_stamps("/nonexistent/graph_stamps.csv"));
 }
 
-}  // namespace
+}  // namespace graph_stamps_test
 }  // namespace tutti::formats

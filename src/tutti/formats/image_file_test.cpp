@@ -13,7 +13,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace image_file_test {
 
 const std::string kReal = "data/images/euroc_V1_01_visnav/data/1403715273262142976_0.jpg";
 
@@ -111,5 +111,5 @@ TEST(ImageFile, AStreamReadsTheImagesOfAMoment) {
   }
 }
 
-}  // namespace
+}  // namespace image_file_test
 }  // namespace tutti::formats

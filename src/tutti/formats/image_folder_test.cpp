@@ -7,7 +7,7 @@
 #include <fstream>
 
 namespace tutti::formats {
-namespace {
+namespace image_folder_test {
 
 namespace fs = std::filesystem;
 
@@ -191,5 +191,5 @@ TEST_F(ImageFolder, ErrorsInOurCamerasSayWhereAndWhat) {
   EXPECT_EQ(error("cameras: []\n"), "cameras.yaml: lists no cameras");
 }
 
-}  // namespace
+}  // namespace image_folder_test
 }  // namespace tutti::formats

@@ -7,7 +7,7 @@
 #include "support/shared_data.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace imu_file_test {
 
 constexpr const char* kTwoSamples =
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y,w_RS_S_z,a_RS_S_x [m s^-2],a_RS_S_y,a_RS_S_z\n"
@@ -56,5 +56,5 @@ TEST(ImuFile, ReadsARealOne) {
   EXPECT_NEAR(samples->front().accelerometer.norm(), 9.81, 0.1);  // at rest
 }
 
-}  // namespace
+}  // namespace imu_file_test
 }  // namespace tutti::formats

@@ -15,7 +15,7 @@
 #include "tutti/formats/internal/points.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace kitti_test {
 
 std::string row(const Pose3& pose, int digits) {
   const Eigen::Matrix4d m = pose.matrix();
@@ -145,5 +145,5 @@ TEST(Kitti, RealFastLio2Recordings) {
   }
 }
 
-}  // namespace
+}  // namespace kitti_test
 }  // namespace tutti::formats

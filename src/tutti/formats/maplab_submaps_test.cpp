@@ -17,7 +17,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace maplab_submaps_test {
 
 namespace fs = std::filesystem;
 
@@ -257,5 +257,5 @@ TEST(MaplabSubmapsReal, GoodLandmarksReprojectAsMeasured) {
   EXPECT_NEAR(errors[errors.size() * 9 / 10], 3.49, 0.02);
 }
 
-}  // namespace
+}  // namespace maplab_submaps_test
 }  // namespace tutti::formats

@@ -13,7 +13,7 @@
 #include "tutti/formats/internal/points.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace pcd_test {
 
 PointCloud any_cloud() {
   PointCloud cloud;
@@ -252,5 +252,5 @@ TEST(Pcd, ReadsFiles) {
   EXPECT_EQ(read_timed_pcd(path)->cloud, cloud);
 }
 
-}  // namespace
+}  // namespace pcd_test
 }  // namespace tutti::formats

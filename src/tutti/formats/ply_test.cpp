@@ -9,7 +9,7 @@
 #include "tutti/formats/internal/points.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace ply_test {
 
 std::vector<Eigen::Vector3f> any_points() {
   std::vector<Eigen::Vector3f> points(*rc::gen::inRange<std::size_t>(0, 20));
@@ -105,5 +105,5 @@ TEST(Ply, WritesFiles) {
   EXPECT_EQ(read_ply("/no/such.ply").error().code, ErrorCode::io);
 }
 
-}  // namespace
+}  // namespace ply_test
 }  // namespace tutti::formats

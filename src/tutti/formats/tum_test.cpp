@@ -9,7 +9,7 @@
 #include "support/shared_data.hpp"
 
 namespace tutti::formats {
-namespace {
+namespace tum_test {
 
 RC_GTEST_PROP(Tum, ReadsBackBitForBit, ()) {
   const Trajectory trajectory = internal::any_trajectory();
@@ -54,7 +54,8 @@ TEST(Tum, ErrorsSayWhereAndWhat) {
 
 TEST(Tum, SurvivesAnyBytes) {
   internal::expect_survives<Trajectory>(
-      "# t\n1.5 1 2 3 0.5 -0.5 0.5 0.5\n2.5 4 5 6 0 0 0 1\n3.25e1 -7 8e-3 9 0 0 1 0\n", parse_tum,
+      "# t\n1.5 1 2 3 0.5 -0.5 0.5 0.5\n2.5 4 5 6 0 0 0 1\n3.25e1 -7 8e-3 9 0 0 1 0\n",
+      [](const std::string& text, const std::string& name) { return parse_tum(text, name); },
       internal::is_sound_trajectory);
 }
 
@@ -87,5 +88,5 @@ TEST(Tum, RealFiles) {
   EXPECT_EQ(first->front().stamp.ns, 1403636580838555648);  // as text; the nearest double is another number
 }
 
-}  // namespace
+}  // namespace tum_test
 }  // namespace tutti::formats

@@ -13,7 +13,7 @@
 #include "support/random_pose.hpp"
 
 namespace tutti {
-namespace {
+namespace alignment_test {
 
 using test::pose_near;
 using test::random_pose;
@@ -120,5 +120,5 @@ TEST(AlignPoints, OppositeLinesTurnByPi) {
   EXPECT_LT(cost(T_a_b, a, b), 1e-24);
 }
 
-}  // namespace
+}  // namespace alignment_test
 }  // namespace tutti

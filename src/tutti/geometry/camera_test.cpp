@@ -14,7 +14,7 @@
 #include "support/random_pose.hpp"
 
 namespace tutti {
-namespace {
+namespace camera_test {
 
 using test::matrix_near;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
@@ -226,5 +226,5 @@ TEST(Camera, BadCalibrationsAreRefusedByName) {
   EXPECT_TRUE(has(refusal(sphere, [](auto& c) { c.distortion[3] = 0.1; }), "two coefficients"));
 }
 
-}  // namespace
+}  // namespace camera_test
 }  // namespace tutti

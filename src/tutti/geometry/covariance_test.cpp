@@ -7,7 +7,7 @@
 #include <limits>
 
 namespace tutti {
-namespace {
+namespace covariance_test {
 
 /// Standard deviations of 1 cm and 1 mrad; the first two coordinates correlated.
 Matrix6d example(double correlation = 0.5) {
@@ -76,5 +76,5 @@ TEST(Covariance, InvertibleAddsOnlyWhereNeeded) {
   }
 }
 
-}  // namespace
+}  // namespace covariance_test
 }  // namespace tutti

@@ -13,7 +13,7 @@
 #include "support/random_pose.hpp"
 
 namespace tutti {
-namespace {
+namespace pose3_test {
 
 using test::matrix_near;
 using test::pose_near;
@@ -181,5 +181,5 @@ TEST(Pose3, ValidMeansFiniteAndOfUnitNorm) {
   EXPECT_FALSE(is_valid({Eigen::Quaterniond::Identity(), {0.0, 0.0, nan}}));
 }
 
-}  // namespace
+}  // namespace pose3_test
 }  // namespace tutti

@@ -11,7 +11,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti {
-namespace {
+namespace rays_test {
 
 Eigen::Vector3d any_vector(Rng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
 
@@ -41,5 +41,5 @@ TEST(Rays, NoneOrOneMeetNowhereAndHaveNoAngle) {
   EXPECT_EQ(largest_angle(one), 0.0);
 }
 
-}  // namespace
+}  // namespace rays_test
 }  // namespace tutti

@@ -13,7 +13,7 @@
 #include "support/random_pose.hpp"
 
 namespace tutti {
-namespace {
+namespace so3_test {
 
 using test::matrix_near;
 using test::random_direction;
@@ -163,5 +163,5 @@ RC_GTEST_PROP(So3, ProjectionIsTheClosestRotation, (std::uint64_t seed)) {
   }
 }
 
-}  // namespace
+}  // namespace so3_test
 }  // namespace tutti

@@ -9,7 +9,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti {
-namespace {
+namespace stretch_covariance_test {
 
 struct Chain {
   std::vector<Pose3> poses;
@@ -67,5 +67,5 @@ TEST(StretchCovariance, IsPositiveDefiniteBesideStepsThatAreUnknown) {
   }
 }
 
-}  // namespace
+}  // namespace stretch_covariance_test
 }  // namespace tutti

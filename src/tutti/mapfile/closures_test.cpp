@@ -9,7 +9,7 @@
 #include "tutti/node/robot_registry.hpp"
 
 namespace tutti::mapfile {
-namespace {
+namespace closures_test {
 
 using test::Mapper;
 
@@ -118,5 +118,5 @@ TEST_F(ClosuresOfAMap, BytesAndVersionsOfEveryTableAreCounted) {
   EXPECT_EQ(content.payload_sizes.size(), content.submaps.size());
 }
 
-}  // namespace
+}  // namespace closures_test
 }  // namespace tutti::mapfile

@@ -11,7 +11,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 
 namespace tutti::mapfile {
-namespace {
+namespace export_test {
 
 using test::Mapper;
 namespace fs = std::filesystem;
@@ -117,5 +117,5 @@ TEST_F(Export, AFolderThatCannotBeMadeIsAnError) {
   EXPECT_FALSE(export_ply(store_, content, map, folder_ / "nowhere" / "map.ply").has_value());
 }
 
-}  // namespace
+}  // namespace export_test
 }  // namespace tutti::mapfile

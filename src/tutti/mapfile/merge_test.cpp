@@ -14,7 +14,7 @@
 #include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::mapfile {
-namespace {
+namespace merge_test {
 
 using storage::MemoryStore, storage::Write;
 using test::Mapper;
@@ -238,5 +238,5 @@ TEST_F(MergedFiles, AreNotThereWhenItFails) {
   EXPECT_EQ(files(), (std::set<std::string>{"a", "b"}));
 }
 
-}  // namespace
+}  // namespace merge_test
 }  // namespace tutti::mapfile

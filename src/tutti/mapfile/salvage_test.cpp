@@ -12,7 +12,7 @@
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::mapfile {
-namespace {
+namespace salvage_test {
 
 namespace fs = std::filesystem;
 using test::Mapper;
@@ -84,5 +84,5 @@ TEST_F(SalvagedMap, IsNotThereWhenItFails) {
   EXPECT_FALSE(fs::exists(out_));
 }
 
-}  // namespace
+}  // namespace salvage_test
 }  // namespace tutti::mapfile

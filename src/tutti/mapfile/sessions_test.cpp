@@ -13,7 +13,7 @@
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::mapfile {
-namespace {
+namespace sessions_test {
 
 using test::Mapper;
 
@@ -103,5 +103,5 @@ TEST(Sessions, OfTwoDaysJoinInAFile) {
   std::filesystem::remove(file);
 }
 
-}  // namespace
+}  // namespace sessions_test
 }  // namespace tutti::mapfile

@@ -12,7 +12,7 @@
 #include "tutti/mission/parallel.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace closure_finders_test {
 
 /// Counts how often each cloud is looked at: as often as features are computed.
 class CountingStore final : public server::PayloadStore {
@@ -101,5 +101,5 @@ TEST(LidarClosureFinder, FindsTheSameWhateverItKeeps) {
   }
 }
 
-}  // namespace
+}  // namespace closure_finders_test
 }  // namespace tutti::mission

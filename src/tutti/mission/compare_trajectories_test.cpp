@@ -9,7 +9,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace compare_trajectories_test {
 
 /// Ten poses a second at 1 m/s on a slowly winding way.
 Trajectory way(double duration_s) {
@@ -171,5 +171,5 @@ TEST(CompareTrajectories, RealOdometryAgainstGroundTruth) {
   EXPECT_LT(c->after.rmse_m, 0.3 * c->before.rmse_m);
 }
 
-}  // namespace
+}  // namespace compare_trajectories_test
 }  // namespace tutti::mission

@@ -5,7 +5,7 @@
 #include "tutti/mission/evaluate.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace evaluate_map_test {
 
 /// Both robots of the server's test world, on a circle with posts beside it, each seen by the submap that passes it.
 class EvaluateMap : public ::testing::Test {
@@ -168,5 +168,5 @@ TEST_F(EvaluateMap, WithoutReferenceTheOnboardMapIsLaidOnTheServers) {
   for (const float d : server.distances(record_.robots[0].onboard_cloud)) EXPECT_LT(d, 0.5F);
 }
 
-}  // namespace
+}  // namespace evaluate_map_test
 }  // namespace tutti::mission

@@ -4,7 +4,7 @@
 #include "tutti/mission/evaluate.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace evaluate_robots_test {
 
 constexpr int kSamples = 41;
 
@@ -140,5 +140,5 @@ TEST_F(EvaluateRobots, OnlyWhatWasReplayedCounts) {
   EXPECT_TRUE(none.drift_origins.empty());
 }
 
-}  // namespace
+}  // namespace evaluate_robots_test
 }  // namespace tutti::mission

@@ -7,7 +7,7 @@
 #include "tutti/mission/evaluate.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace evaluate_server_test {
 
 /// No submap is compared with any other.
 class NoClosures final : public server::ClosureFinder {
@@ -120,5 +120,5 @@ TEST_F(EvaluateServer, AGapNearTheStartLeavesTheLargerPiece) {
   EXPECT_NEAR(*record.server.joint.scored_share, 40.5 / 60.0, 1e-9);
 }
 
-}  // namespace
+}  // namespace evaluate_server_test
 }  // namespace tutti::mission

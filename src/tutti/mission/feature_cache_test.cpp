@@ -16,7 +16,7 @@
 #include "tutti/perception/lidar/submap_features.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace feature_cache_test {
 
 constexpr SubmapId id_of(std::uint32_t index) { return {RobotId{index % 3}, index / 3}; }
 
@@ -123,5 +123,5 @@ TEST(FeatureCache, BytesAreThoseOfTheParts) {
             1000 * sizeof(lidar::WallCell));
 }
 
-}  // namespace
+}  // namespace feature_cache_test
 }  // namespace tutti::mission

@@ -10,7 +10,7 @@
 #include "tutti/mission/closure_finders.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace finder_maker_test {
 
 MethodId id_of(const ClosureConfig& config, std::uint64_t seed = 1) {
   return make_closure_finder(config, {}, seed)->id();
@@ -96,5 +96,5 @@ TEST(FinderMaker, SaysWhatIsMissing) {
   expect(maker.refiner({"bundle", 9, 1}, "x: 1\n"), "version");
 }
 
-}  // namespace
+}  // namespace finder_maker_test
 }  // namespace tutti::mission

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::mission {
-namespace {
+namespace follow_alerts_test {
 
 consistency::SuspectedOrigin at(double from_s, double until_s, bool alert = true) {
   return {.from = Timestamp{} + from_s, .until = Timestamp{} + until_s, .alert = alert};
@@ -55,5 +55,5 @@ TEST(FollowAlerts, SplitsAndMerges) {
   EXPECT_EQ(alerts[0].known_since_revision, 1U);
 }
 
-}  // namespace
+}  // namespace follow_alerts_test
 }  // namespace tutti::mission

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::mission {
-namespace {
+namespace image_tally_test {
 
 std::vector<TrackedImage> image_with(std::size_t points) {
   TrackedImage image;
@@ -50,5 +50,5 @@ TEST(ImageTally, CountsImagesWithoutAnythingToFollow) {
                                       "no texture, blur or a wrong exposure"}));
 }
 
-}  // namespace
+}  // namespace image_tally_test
 }  // namespace tutti::mission

@@ -10,7 +10,7 @@
 #include "support/paths.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace mission_config_test {
 
 std::string problem_with(const std::string& yaml, const std::vector<std::string>& assignments = {}) {
   const auto file = std::filesystem::temp_directory_path() / "tutti_mission_config_test.yaml";
@@ -138,5 +138,5 @@ TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace mission_config_test
 }  // namespace tutti::mission

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::mission {
-namespace {
+namespace mission_events_test {
 
 TEST(MissionEvents, CountsRefusalsAndAPairThatCannotBeVerifiedOnce) {
   MissionEvents events;
@@ -33,5 +33,5 @@ TEST(MissionEvents, EveryUpdateOfTheMapIsOne) {
   }
 }
 
-}  // namespace
+}  // namespace mission_events_test
 }  // namespace tutti::mission

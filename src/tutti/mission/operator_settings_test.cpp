@@ -11,7 +11,7 @@
 #include "tutti/mission/mission_config.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace operator_settings_test {
 
 /// A key that was renamed or removed would vanish from `tutti settings` without a word.
 TEST(OperatorSettings, AreSettingsOfAMission) {
@@ -31,5 +31,5 @@ TEST(OperatorSettings, AreFewEnoughToRead) {
   EXPECT_LE(operator_settings().size(), 15U);
 }
 
-}  // namespace
+}  // namespace operator_settings_test
 }  // namespace tutti::mission

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 namespace tutti::mission {
-namespace {
+namespace parallel_test {
 
 TEST(ForEachParallel, DoesEveryTaskOnce) {
   for (const std::size_t count : {0U, 1U, 2U, 1000U})
@@ -26,5 +26,5 @@ TEST(ForEachParallel, AnExceptionReachesTheCaller) {
                  std::runtime_error);
 }
 
-}  // namespace
+}  // namespace parallel_test
 }  // namespace tutti::mission

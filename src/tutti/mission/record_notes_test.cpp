@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::mission {
-namespace {
+namespace record_notes_test {
 
 /// Two robots of six submaps each, joined by a closure.
 MissionRecord joined() {
@@ -88,5 +88,5 @@ TEST(Notes, OdometryThatSaysTooLittleOfItsErrors) {
   EXPECT_NE(record.notes[0].find("bravo: its odometry errs 6.0 times"), std::string::npos) << record.notes[0];
 }
 
-}  // namespace
+}  // namespace record_notes_test
 }  // namespace tutti::mission

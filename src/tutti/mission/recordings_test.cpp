@@ -10,7 +10,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace recordings_test {
 
 /// A folder with one straight recording of 100 samples, a tenth of a second and 10 cm apart.
 class Recordings : public testing::Test {
@@ -191,5 +191,5 @@ TEST_F(Recordings, ADuplicatedStampIsNotTheEndOfAMission) {
       << without->robots[0].notes[0];
 }
 
-}  // namespace
+}  // namespace recordings_test
 }  // namespace tutti::mission

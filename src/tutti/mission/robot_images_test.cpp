@@ -16,7 +16,7 @@
 #include "tutti/simulation/imu.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace robot_images_test {
 
 namespace fs = std::filesystem;
 
@@ -178,5 +178,5 @@ TEST_F(RobotImages, WhatIsNotThereIsNamedBeforeTheMission) {
   EXPECT_NE(first_error().find("nothing.yaml"), std::string::npos) << first_error();
 }
 
-}  // namespace
+}  // namespace robot_images_test
 }  // namespace tutti::mission

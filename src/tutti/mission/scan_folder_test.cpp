@@ -10,7 +10,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace scan_folder_test {
 
 constexpr double kSweep_s = 0.1;
 const std::vector<Eigen::Vector3d> kFixed = {{10, 0, 0}, {9, 4, 1}, {0, 8, 2}, {-6, 1, 0}, {3, -7, 1}};
@@ -190,5 +190,5 @@ TEST_F(Scans, OneThatIsNotThereIsNamedInFull) {
   EXPECT_EQ(scan.error().message, (folder_ / "000002.pcd").string() + " (or .bin): is not there");
 }
 
-}  // namespace
+}  // namespace scan_folder_test
 }  // namespace tutti::mission

@@ -9,7 +9,7 @@
 #include <limits>
 
 namespace tutti::mission {
-namespace {
+namespace scan_times_test {
 
 using Zero = PointTimes::Zero;
 
@@ -105,5 +105,5 @@ TEST(ScanTimes, AreToldInWords) {
       "scans are deskewed by the robot's odometry: their field 'timestamp' is taken as s by the odometry's clock");
 }
 
-}  // namespace
+}  // namespace scan_times_test
 }  // namespace tutti::mission

@@ -6,7 +6,7 @@
 #include "support/node/submaps.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace server_meter_test {
 
 /// A step in which the server stores a submap and asks for it in this job.
 node::Step stored(const std::string& job) {
@@ -40,5 +40,5 @@ TEST(ServerMeter, MeasuresFromASubmapsArrivalToTheUpdateThatContainsIt) {
   EXPECT_NEAR(timing.server_load.update_latency_ms[1], 7000.0, 500.0);
 }
 
-}  // namespace
+}  // namespace server_meter_test
 }  // namespace tutti::mission

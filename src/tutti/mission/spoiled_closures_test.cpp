@@ -9,7 +9,7 @@
 #include "tutti/mission/closure_finders.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace spoiled_closures_test {
 
 /// Submaps of three keyframes along a line; two robots side by side.
 Submap submap(std::uint32_t robot, std::uint32_t index) {
@@ -136,5 +136,5 @@ TEST_F(Planted, TheOrderOfThePairOnlyInvertsTheClosure) {
   EXPECT_LT(local(back.measurement.T_a_b, forth.measurement.T_a_b.inverse()).norm(), 1e-9);
 }
 
-}  // namespace
+}  // namespace spoiled_closures_test
 }  // namespace tutti::mission

@@ -18,7 +18,7 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace extreme_input_test {
 
 constexpr RobotId kRobot{1};
 
@@ -190,5 +190,5 @@ TEST(ExtremeInput, ASampleBeyondAllCoordinatesIsRefusedAndSaysSo) {
   }
 }
 
-}  // namespace
+}  // namespace extreme_input_test
 }  // namespace tutti::node

@@ -6,7 +6,7 @@
 #include "tutti/node/worker_node.hpp"
 
 namespace tutti::node {
-namespace {
+namespace incarnation_test {
 
 using test::Site;
 
@@ -122,5 +122,5 @@ TEST(MessageId, HasTheIncarnationWhereThereIsOne) {
     EXPECT_FALSE(submap_of(bad).has_value()) << bad;
 }
 
-}  // namespace
+}  // namespace incarnation_test
 }  // namespace tutti::node

@@ -10,7 +10,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::node {
-namespace {
+namespace journal_test {
 
 JournalEntry any_entry(Rng& rng) {
   if (rng.bernoulli(0.3))
@@ -58,5 +58,5 @@ RC_GTEST_PROP(Journal, EntriesComeBackToTheBitAndPartsOfThemDoNot, ()) {
   if (const auto other = decode_entry(bad)) RC_ASSERT(encode(*other) == bad);
 }
 
-}  // namespace
+}  // namespace journal_test
 }  // namespace tutti::node

@@ -15,7 +15,7 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace robot_node_test {
 
 using bus::Endpoint, bus::MessageKind;
 constexpr RobotId kRobot{1};
@@ -395,5 +395,5 @@ TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {
   EXPECT_TRUE(std::holds_alternative<MessageRefused>(garbage.events[0].what));
 }
 
-}  // namespace
+}  // namespace robot_node_test
 }  // namespace tutti::node

@@ -8,7 +8,7 @@
 #include <vector>
 
 namespace tutti::node {
-namespace {
+namespace robot_registry_test {
 
 constexpr RobotId kOne{1}, kTwo{2};
 
@@ -131,5 +131,5 @@ RC_GTEST_PROP(RegistryProperty, OwnersChangeOnlyWhenTheyAreGoneAndNeverBack, ())
   }
 }
 
-}  // namespace
+}  // namespace robot_registry_test
 }  // namespace tutti::node

@@ -19,7 +19,7 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace robot_state_test {
 
 constexpr RobotId kRobot{1};
 
@@ -120,7 +120,7 @@ TEST(RobotState, OfTheLinksToTheMapOnlyThoseThatChangedAreWritten) {
 class StoredRobot : public testing::Test {
  protected:
   void SetUp() override {
-    const auto from = test::source_path("tests/stored/robot_1.tutti");
+    const auto from = tutti::test::source_path("tests/stored/robot_1.tutti");
     const auto file = std::filesystem::path(testing::TempDir()) / "robot_1.tutti";
     std::filesystem::copy_file(from, file, std::filesystem::copy_options::overwrite_existing);
     const auto read = storage::open_sqlite_store(file, storage::robot_schema(), {.min_free_bytes = 0});
@@ -139,7 +139,7 @@ class StoredRobot : public testing::Test {
 
 TEST_F(StoredRobot, OfTheVersionBeforeRowsIsReadToTheBitAndGoesOnAsRows) {
   Robot robot(*store_, 7);
-  std::ifstream expected(test::source_path("tests/stored/robot_1.txt"));
+  std::ifstream expected(tutti::test::source_path("tests/stored/robot_1.txt"));
   for (const StampedPose& at : robot.node->agent().corrected()) {
     std::int64_t ns = 0;
     expected >> ns;
@@ -196,5 +196,5 @@ TEST_F(StoredRobot, WhoseStateCannotBeReadBeginsASessionAndKeepsItsOutbox) {
     }
 }
 
-}  // namespace
+}  // namespace robot_state_test
 }  // namespace tutti::node

@@ -14,7 +14,7 @@
 #include "tutti/node/worker_node.hpp"
 
 namespace tutti::node {
-namespace {
+namespace server_finders_test {
 
 using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
@@ -214,5 +214,5 @@ TEST_F(ServerFinders, ARefinementThatAWorkerCannotDoWaitsForOneThatCan) {
   EXPECT_TRUE(status().refusals.empty());  // none was given up
 }
 
-}  // namespace
+}  // namespace server_finders_test
 }  // namespace tutti::node

@@ -14,7 +14,7 @@
 #include "tutti/storage/memory_store.hpp"
 
 namespace tutti::node {
-namespace {
+namespace server_jobs_test {
 
 using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
@@ -147,5 +147,5 @@ TEST_F(ServerJobs, AJobOfAnEarlierStartComesBackForNothing) {
   expect_refused("every worker that had it has ended");
 }
 
-}  // namespace
+}  // namespace server_jobs_test
 }  // namespace tutti::node

@@ -16,7 +16,7 @@
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace server_node_test {
 
 using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
@@ -427,5 +427,5 @@ TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
   }
 }
 
-}  // namespace
+}  // namespace server_node_test
 }  // namespace tutti::node

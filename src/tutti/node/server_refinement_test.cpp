@@ -17,7 +17,7 @@
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace server_refinement_test {
 
 using bus::Endpoint, bus::MessageKind;
 const ChainId kAlpha{RobotId{0}, 7};
@@ -219,5 +219,5 @@ TEST_F(ServerRefinement, WhatIsNoneIsRefused) {
   EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
 }
 
-}  // namespace
+}  // namespace server_refinement_test
 }  // namespace tutti::node

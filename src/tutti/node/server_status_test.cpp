@@ -12,7 +12,7 @@
 #include "tutti/storage/memory_store.hpp"
 
 namespace tutti::node {
-namespace {
+namespace server_status_test {
 
 using bus::Endpoint, bus::MessageKind;
 constexpr RobotId kAlpha{0}, kStranger{77};
@@ -279,5 +279,5 @@ TEST_F(ServerStatus, NobodysGarbageFillsTheReceipt) {
   EXPECT_EQ(node_->mission_status(now_).refusals.at(0).count, 1800U);
 }
 
-}  // namespace
+}  // namespace server_status_test
 }  // namespace tutti::node

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::node {
-namespace {
+namespace status_text_test {
 
 const NodeStatus kAlpha{.name = "alpha",
                         .backlog_submaps = 12,
@@ -48,5 +48,5 @@ TEST(StatusText, SaysWhenNobodyIsThere) {
             "Nobody is there: no robot and no worker.\n");
 }
 
-}  // namespace
+}  // namespace status_text_test
 }  // namespace tutti::node

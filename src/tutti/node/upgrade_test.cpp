@@ -17,7 +17,7 @@
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace upgrade_test {
 
 using bus::Endpoint, bus::MessageKind;
 using test::raised, test::Site;
@@ -253,5 +253,5 @@ TEST(Upgrade, AnOlderWorkerLeavesAJobToAnother) {
   EXPECT_TRUE(leaves(worker.receive(envelope(MessageKind::submap_copy, wire::encode(copy)), {})));
 }
 
-}  // namespace
+}  // namespace upgrade_test
 }  // namespace tutti::node

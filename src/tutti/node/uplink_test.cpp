@@ -19,7 +19,7 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace uplink_test {
 
 using bus::Endpoint, bus::MessageKind;
 const ChainId kChain{RobotId{1}, 7};
@@ -150,5 +150,5 @@ TEST(UplinkRules, WhatIsNotConfirmedGoesAgainInItsPlace) {
   EXPECT_EQ(uplink.bytes(), 210U);
 }
 
-}  // namespace
+}  // namespace uplink_test
 }  // namespace tutti::node

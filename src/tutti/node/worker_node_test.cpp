@@ -12,7 +12,7 @@
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::node {
-namespace {
+namespace worker_node_test {
 
 const ChainId kAlpha{RobotId{0}, 7}, kBravo{RobotId{1}, 7};
 const bus::Endpoint kWorker = bus::Endpoint::worker(0);
@@ -254,5 +254,5 @@ TEST_F(WorkerNodeTest, AFrameOfAnotherSubmapIsNoAnswer) {
   EXPECT_FALSE(frames.cloud({kBravo, 1}).has_value());
 }
 
-}  // namespace
+}  // namespace worker_node_test
 }  // namespace tutti::node

@@ -13,7 +13,7 @@
 #include "tutti/storage/memory_store.hpp"
 
 namespace tutti::program {
-namespace {
+namespace host_test {
 
 using bus::Endpoint;
 using bus::MessageKind;
@@ -424,5 +424,5 @@ TEST_F(HostTest, CarriesOutWhatIsSaidWhileItWaitsUntilThatCannotBeStored) {
   EXPECT_TRUE(carry_out("d").has_value());
 }
 
-}  // namespace
+}  // namespace host_test
 }  // namespace tutti::program

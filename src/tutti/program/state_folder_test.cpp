@@ -9,7 +9,7 @@
 #include "tutti/program/event_log.hpp"
 
 namespace tutti::program {
-namespace {
+namespace state_folder_test {
 
 namespace fs = std::filesystem;
 
@@ -97,5 +97,5 @@ TEST_F(StateFolderTest, EventsComeBackInTheirOrderAndWithoutWhatAKillHasTorn) {
   EXPECT_FALSE(read_events(folder_ / "nowhere", [](const Json&) {}).has_value());
 }
 
-}  // namespace
+}  // namespace state_folder_test
 }  // namespace tutti::program

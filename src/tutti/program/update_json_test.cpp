@@ -6,7 +6,7 @@
 #include "tutti/program/mission_source.hpp"
 
 namespace tutti::program {
-namespace {
+namespace update_json_test {
 
 TEST(UpdateJson, ComesBackExactlyThroughText) {
   mission::UpdateRecord update{.time_s = 12.3,
@@ -71,5 +71,5 @@ TEST(MissionSource, WithoutAMissionClosuresAreFoundFromScans) {
   EXPECT_FALSE(load({.file = "nowhere.yaml"}).has_value());
 }
 
-}  // namespace
+}  // namespace update_json_test
 }  // namespace tutti::program

@@ -12,7 +12,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::robot {
-namespace {
+namespace agent_test {
 
 using namespace test;  // NOLINT: the robot and server of these tests
 
@@ -386,5 +386,5 @@ TEST(Agent, AnEmptyAgentTakesABroadcast) {
   EXPECT_EQ(agent.odometry_factors(), 0U);
 }
 
-}  // namespace
+}  // namespace agent_test
 }  // namespace tutti::robot

@@ -10,7 +10,7 @@
 #include "support/robot/drifting_robot.hpp"
 
 namespace tutti::robot {
-namespace {
+namespace map_covariance_test {
 
 using consistency::test::kAlpha, consistency::test::WalkWithClosures;
 
@@ -132,5 +132,5 @@ TEST(MapCovariance, OfAnAgentGrowsWithOdometryAndShrinksWithTheMap) {
   EXPECT_LT((agent.covariance() - expected).norm(), 1e-9 * expected.norm());
 }
 
-}  // namespace
+}  // namespace map_covariance_test
 }  // namespace tutti::robot

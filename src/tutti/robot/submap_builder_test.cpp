@@ -10,7 +10,7 @@
 #include "tutti/model/way.hpp"
 
 namespace tutti::robot {
-namespace {
+namespace submap_builder_test {
 
 const Matrix6d kStepCovariance = Matrix6d::Identity() * 1e-4;
 
@@ -307,5 +307,5 @@ TEST(SubmapBuilder, ImagesElsewhereThanAtAKeyframeAreRefused) {
   EXPECT_FALSE(builder.add_images(bad).has_value());  // not the robot's cameras
 }
 
-}  // namespace
+}  // namespace submap_builder_test
 }  // namespace tutti::robot

@@ -11,7 +11,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::server {
-namespace {
+namespace answered_pairs_test {
 
 SubmapPair ordered(SubmapId a, SubmapId b) { return a < b ? SubmapPair{a, b} : SubmapPair{b, a}; }
 
@@ -94,5 +94,5 @@ TEST(AnsweredPairs, KnowsNothingOfSubmapsThatHaveNotCome) {
   EXPECT_TRUE(answered.contains({{RobotId{0}, 0}, {RobotId{0}, 1}}));
 }
 
-}  // namespace
+}  // namespace answered_pairs_test
 }  // namespace tutti::server

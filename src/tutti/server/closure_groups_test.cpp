@@ -7,7 +7,7 @@
 #include <numeric>
 
 namespace tutti::server {
-namespace {
+namespace closure_groups_test {
 
 /// Two robots with a node a second, the second from index 200 on.
 std::vector<MapNode> two_robots() {
@@ -49,5 +49,5 @@ TEST(ClosureGroups, OnlyTheNamedEdgesCount) {
   EXPECT_EQ(closure_groups(two_robots(), edges, std::vector<std::size_t>{2}), (Groups{{2}}));
 }
 
-}  // namespace
+}  // namespace closure_groups_test
 }  // namespace tutti::server

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace tutti::server {
-namespace {
+namespace closure_names_test {
 
 const RobotId kAlpha{0}, kRover{1}, kNameless{2}, kTwin{3}, kOther{4}, kOdd{5};
 const std::set<ChainId> kChains{
@@ -64,5 +64,5 @@ TEST(ClosureNames, ANameThatLooksLikeASessionIsNotTakenForOne) {
   EXPECT_EQ(all.size(), 3U);
 }
 
-}  // namespace
+}  // namespace closure_names_test
 }  // namespace tutti::server

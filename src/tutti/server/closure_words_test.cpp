@@ -9,7 +9,7 @@
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::server {
-namespace {
+namespace closure_words_test {
 
 using test::TestFinder;
 
@@ -229,5 +229,5 @@ TEST_F(WordsToAServer, WhatCannotBeMeantIsRefused) {
   EXPECT_FALSE(server_.has_news());
 }
 
-}  // namespace
+}  // namespace closure_words_test
 }  // namespace tutti::server

@@ -15,7 +15,7 @@
 #include "tutti/server/map_components.hpp"
 
 namespace tutti::server {
-namespace {
+namespace graph_monitor_test {
 
 VerdictSet verdicts_of(const SubmapSet& submaps, const test::TestFinder& finder) {
   VerdictSet out;
@@ -319,5 +319,5 @@ TEST(MonitorGraph, TheExpectedErrorIsTheTrueOne) {
   EXPECT_LE(together.rejected, 2);
 }
 
-}  // namespace
+}  // namespace graph_monitor_test
 }  // namespace tutti::server

@@ -12,7 +12,7 @@
 #include "tutti/server/graph_monitor.hpp"
 
 namespace tutti::server {
-namespace {
+namespace map_estimate_test {
 
 using test::TestFinder;
 
@@ -237,5 +237,5 @@ TEST(MapEstimate, TheFirstPoseOfAComponentStaysWhereItsOdometryPutIt) {
   EXPECT_LT(local(map.nodes.front().T_odom_body, map.nodes.front().T_world_body).norm(), 1e-9);
 }
 
-}  // namespace
+}  // namespace map_estimate_test
 }  // namespace tutti::server

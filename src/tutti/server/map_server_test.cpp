@@ -8,7 +8,7 @@
 #include "support/server/world.hpp"
 
 namespace tutti::server {
-namespace {
+namespace map_server_test {
 
 using test::TestFinder;
 
@@ -378,5 +378,5 @@ TEST(MapServer, RefusesSessionsBeyondARobotsShare) {
   EXPECT_TRUE(server.receive(message_of(one)).has_value());
 }
 
-}  // namespace
+}  // namespace map_server_test
 }  // namespace tutti::server

@@ -11,7 +11,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::server {
-namespace {
+namespace odometry_honesty_test {
 
 constexpr RobotId kRobot{0};
 constexpr std::uint32_t kKeyframes = 400;
@@ -141,5 +141,5 @@ TEST(OdometryHonesty, ScalesOnlyRotations) {
             1e-12);
 }
 
-}  // namespace
+}  // namespace odometry_honesty_test
 }  // namespace tutti::server

@@ -10,7 +10,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::server {
-namespace {
+namespace odometry_loops_test {
 
 constexpr std::uint32_t kKeyframes = 60;
 constexpr RobotId kOne{0}, kTwo{1};
@@ -107,5 +107,5 @@ TEST(OdometryLoops, EveryRobotIsThere) {
   EXPECT_TRUE(loops.at(kTwo).empty());
 }
 
-}  // namespace
+}  // namespace odometry_loops_test
 }  // namespace tutti::server

@@ -13,7 +13,7 @@
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::server {
-namespace {
+namespace refinements_test {
 
 /// The true steps of every chain, known to a millimetre.
 std::vector<RefinedStep> true_steps(const MapEstimate& map) {
@@ -295,5 +295,5 @@ TEST(Refinements, WhatIsNoneOfThisMapIsRefused) {
   EXPECT_FALSE(refused(refinement));
 }
 
-}  // namespace
+}  // namespace refinements_test
 }  // namespace tutti::server

@@ -9,7 +9,7 @@
 #include "support/server/world.hpp"
 
 namespace tutti::server {
-namespace {
+namespace spare_pairs_test {
 
 struct Room {
   SubmapSet submaps;
@@ -106,5 +106,5 @@ TEST(SparePairs, TheMapIsAsGoodWithoutThem) {
   EXPECT_LT(error_m(10), 2.0 * error_m(1000) + 0.01);
 }
 
-}  // namespace
+}  // namespace spare_pairs_test
 }  // namespace tutti::server

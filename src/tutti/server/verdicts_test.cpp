@@ -9,7 +9,7 @@
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::server {
-namespace {
+namespace verdicts_test {
 
 using test::TestFinder;
 
@@ -290,5 +290,5 @@ TEST_F(Verdicts, AFinderThatHasNothingToCompareErasesNoClosure) {
   EXPECT_EQ(back.state().verdicts, server_.state().verdicts);
 }
 
-}  // namespace
+}  // namespace verdicts_test
 }  // namespace tutti::server

@@ -12,7 +12,7 @@
 #include "tutti/server/map_estimate.hpp"
 
 namespace tutti::server {
-namespace {
+namespace who_is_wrong_test {
 
 using test::corridor_run;
 using test::CorridorRun;
@@ -252,5 +252,5 @@ TEST(WhoIsWrong, TheProxyGraphIsAsSureOfARepairAsTheClosures) {
   EXPECT_GT(std::sqrt(sum(5, 5)), 0.01 * kRadPerDeg);
 }
 
-}  // namespace
+}  // namespace who_is_wrong_test
 }  // namespace tutti::server

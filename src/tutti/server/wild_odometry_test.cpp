@@ -11,7 +11,7 @@
 
 /// One robot's odometry and covariances are anything that a message may carry; the others must not feel it.
 namespace tutti::server {
-namespace {
+namespace wild_odometry_test {
 
 double any_magnitude(Rng& rng, double least, double most) {
   return std::exp(rng.uniform(std::log(least), std::log(most)));
@@ -95,5 +95,5 @@ TEST(WildOdometry, OfOneRobotHarmsNoOther) {
   EXPECT_GE(kept, without_it * 95 / 100);
 }
 
-}  // namespace
+}  // namespace wild_odometry_test
 }  // namespace tutti::server

@@ -12,7 +12,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace bvh_test {
 
 /// Triangles of any size down to none, some of them in one plane.
 TriangleMesh any_soup(std::size_t triangles, Rng& rng) {
@@ -123,5 +123,5 @@ TEST(Bvh, NormalIsOnTheCounterClockwiseSide) {
   EXPECT_THROW(Bvh({{{0, 0, 0}}, {{0, 0, 1}}}), std::logic_error);
 }
 
-}  // namespace
+}  // namespace bvh_test
 }  // namespace tutti::simulation

@@ -9,7 +9,7 @@
 #include "tutti/simulation/flight.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace camera_test {
 
 CameraModel small_camera() {
   return {.kind = CameraKind::pinhole,
@@ -107,5 +107,5 @@ TEST(SimulatedCamera, HalvedSeesTheSame) {
   EXPECT_GE(alike, 0.85 * 94 * 60) << alike;
 }
 
-}  // namespace
+}  // namespace camera_test
 }  // namespace tutti::simulation

@@ -9,7 +9,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace degrade_test {
 
 Trajectory any_odometry() {
   Rng rng(*rc::gen::arbitrary<std::uint32_t>());
@@ -117,5 +117,5 @@ TEST(IncrementCovariances, GrowWithEachCause) {
   EXPECT_NEAR(std::sqrt(standing[0](0, 0)), 0.003, 1e-12);
 }
 
-}  // namespace
+}  // namespace degrade_test
 }  // namespace tutti::simulation

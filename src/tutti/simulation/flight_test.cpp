@@ -9,7 +9,7 @@
 #include "tutti/simulation/hall.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace flight_test {
 
 RC_GTEST_PROP(Flight, DerivativesAreThoseOfThePose, ()) {
   FlightConfig config;
@@ -51,5 +51,5 @@ TEST(Flight, EveryRoundSeesThePlacesOfTheOneBefore) {
   EXPECT_GE(revisits, 300);
 }
 
-}  // namespace
+}  // namespace flight_test
 }  // namespace tutti::simulation

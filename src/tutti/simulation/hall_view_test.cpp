@@ -9,7 +9,7 @@
 #include "tutti/simulation/bvh.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace hall_view_test {
 
 /// Looks along z; 70 x 45 pixels, no multiple of anything; in the first column there are none.
 constexpr int kWidth_px = 70, kHeight_px = 45;
@@ -54,5 +54,5 @@ TEST(HallView, SeesWhatRaysHit) {
   EXPECT_GE(faces.size(), 60U);
 }
 
-}  // namespace
+}  // namespace hall_view_test
 }  // namespace tutti::simulation

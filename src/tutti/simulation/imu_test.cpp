@@ -8,7 +8,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace imu_test {
 
 const Eigen::Vector3d kGravity(0.0, 0.0, -kGravity_mps2);
 
@@ -72,5 +72,5 @@ TEST(SimulatedImu, NoiseAndBiasesAreAsAsked) {
   EXPECT_EQ(simulate_imu(still, Timestamp{0}, 1.0, config, Rng(3)), biased);
 }
 
-}  // namespace
+}  // namespace imu_test
 }  // namespace tutti::simulation

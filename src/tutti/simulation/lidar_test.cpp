@@ -11,7 +11,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace lidar_test {
 
 const Eigen::Vector3d kHalf(8.0, 5.0, 2.0);
 
@@ -181,5 +181,5 @@ TEST(Lidar, NoTurnBeforeTheFirstSample) {
   EXPECT_THROW((void)lidar.scan(80), std::logic_error);
 }
 
-}  // namespace
+}  // namespace lidar_test
 }  // namespace tutti::simulation

@@ -13,7 +13,7 @@
 #include "tutti/simulation/trajectory.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace odometry_test {
 
 constexpr double kRate_hz = 8.0;
 
@@ -355,5 +355,5 @@ TEST(SimulateOdometry, EmptyAndSinglePose) {
   EXPECT_TRUE(one.increment_covariance.empty());
 }
 
-}  // namespace
+}  // namespace odometry_test
 }  // namespace tutti::simulation

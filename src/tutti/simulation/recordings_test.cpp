@@ -6,7 +6,7 @@
 #include "tutti/base/config_io.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace recordings_test {
 
 SimulationConfig short_walks(std::size_t robots) {
   SimulationConfig config;
@@ -122,5 +122,5 @@ TEST(SimulateRecordings, SettingsThatCannotBeComputedAreRefused) {
   EXPECT_NE(problem_with(config).find("surface.cell_m is 0.05"), std::string::npos) << problem_with(config);
 }
 
-}  // namespace
+}  // namespace recordings_test
 }  // namespace tutti::simulation

@@ -12,7 +12,7 @@
 #include "tutti/simulation/recordings.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace reference_closures_test {
 
 /// Submaps of 10 s cut from the reference: keyframes every second, one shared with the previous submap.
 std::vector<Submap> cut_submaps(const Recording& recording) {
@@ -247,5 +247,5 @@ TEST(ReferenceClosures, AnswerTheSameFromSeveralThreads) {
   for (const auto& result : results) EXPECT_EQ(result, expected);
 }
 
-}  // namespace
+}  // namespace reference_closures_test
 }  // namespace tutti::simulation

@@ -15,7 +15,7 @@
 #include "tutti/simulation/world.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace surface_test {
 
 struct Place {
   CorridorWorld world;
@@ -218,5 +218,5 @@ TEST(Surface, SurveyPointsAreEvenlySpread) {
   EXPECT_EQ(sample_surface(mesh, 0.02, Rng(5)), cloud);
 }
 
-}  // namespace
+}  // namespace surface_test
 }  // namespace tutti::simulation

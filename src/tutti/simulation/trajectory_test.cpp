@@ -13,7 +13,7 @@
 #include "tutti/simulation/corridor_world.hpp"
 
 namespace tutti::simulation {
-namespace {
+namespace trajectory_test {
 
 CorridorWorld any_world(CorridorWorldConfig& config) {
   config.rows = *rc::gen::inRange(2, 6);
@@ -220,5 +220,5 @@ TEST(SimulateWalk, SameSeedSameBits) {
   EXPECT_NE(simulate_walk(world, config, {}, 3, Rng(5)), simulate_walk(world, config, {}, 3, Rng(6)));
 }
 
-}  // namespace
+}  // namespace trajectory_test
 }  // namespace tutti::simulation

@@ -10,7 +10,7 @@
 #include <vector>
 
 namespace tutti::simulation {
-namespace {
+namespace world_test {
 
 std::optional<std::size_t> corridor_between(const CorridorWorld& world, std::size_t a, std::size_t b) {
   for (std::size_t i = 0; i < world.corridors.size(); ++i)
@@ -114,5 +114,5 @@ RC_GTEST_PROP(World, CorridorAtFindsTheCorridorOfAPlace, (std::uint32_t seed)) {
   RC_ASSERT(!corridor_at(world, beside, 0.49));
 }
 
-}  // namespace
+}  // namespace world_test
 }  // namespace tutti::simulation

@@ -11,7 +11,7 @@
 #include "tutti/spectral/wavelet_transform.hpp"
 
 namespace tutti::spectral {
-namespace {
+namespace golden_test {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -164,5 +164,5 @@ TEST(OwnGolden, TwoComponentsAndAnIsolatedNode) {
   EXPECT_LE(difference(reduction.laplacian, matrix_of(golden["reduced"])), 1e-15);
 }
 
-}  // namespace
+}  // namespace golden_test
 }  // namespace tutti::spectral

@@ -10,7 +10,7 @@
 #include "support/spectral/graphs.hpp"
 
 namespace tutti::spectral {
-namespace {
+namespace graph_test {
 
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
@@ -151,5 +151,5 @@ TEST(ConnectedComponents, NumberedByTheirFirstNode) {
   EXPECT_EQ(connected_components(SparseMatrix(0, 0)).count, 0);
 }
 
-}  // namespace
+}  // namespace graph_test
 }  // namespace tutti::spectral

@@ -12,7 +12,7 @@
 #include "tutti/spectral/spectrum.hpp"
 
 namespace tutti::spectral {
-namespace {
+namespace kron_test {
 
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
@@ -198,5 +198,5 @@ TEST(SelectBudget, LowSpectrumOfATunnelSurvives) {
   for (int k = 1; k <= 8; ++k) EXPECT_NEAR(after[k] / before[k] / 2.0, 1.0, 0.05) << "k = " << k;
 }
 
-}  // namespace
+}  // namespace kron_test
 }  // namespace tutti::spectral

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 namespace tutti::spectral {
-namespace {
+namespace meyer_test {
 
 RC_GTEST_PROP(MeyerFilterBank, TightFrameOnTheSpectrum, ()) {
   const int scales = *rc::gen::inRange(1, 15);
@@ -60,5 +60,5 @@ TEST(MeyerFilterBank, DegenerateBanks) {
   EXPECT_THROW((void)no_edges.kernel(4, 0.0), std::logic_error);
 }
 
-}  // namespace
+}  // namespace meyer_test
 }  // namespace tutti::spectral

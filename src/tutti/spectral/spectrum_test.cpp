@@ -13,7 +13,7 @@
 extern "C" void openblas_set_num_threads(int threads);
 
 namespace tutti::spectral {
-namespace {
+namespace spectrum_test {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -122,5 +122,5 @@ TEST(Spectrum, SmallestGraphs) {
   EXPECT_NEAR(largest_eigenpair(testing::laplacian_of(100, {{98, 99, 0.5}})).value, 1.0, 1e-12);
 }
 
-}  // namespace
+}  // namespace spectrum_test
 }  // namespace tutti::spectral

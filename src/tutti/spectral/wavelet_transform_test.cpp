@@ -9,7 +9,7 @@
 #include "support/spectral/graphs.hpp"
 
 namespace tutti::spectral {
-namespace {
+namespace wavelet_transform_test {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -224,5 +224,5 @@ TEST(Transforms, SmallestGraphs) {
   EXPECT_THROW((void)chebyshev_transform(one, bank, MatrixXd(2, 1)), std::logic_error);
 }
 
-}  // namespace
+}  // namespace wavelet_transform_test
 }  // namespace tutti::spectral

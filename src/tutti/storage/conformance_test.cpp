@@ -19,7 +19,7 @@
 #include "tutti/storage/table_store.hpp"
 
 namespace tutti::storage {
-namespace {
+namespace conformance_test {
 
 using Row = std::pair<std::string, std::string>;
 
@@ -243,5 +243,5 @@ INSTANTIATE_TEST_SUITE_P(TableStore, Conformance,
                                            Implementation{"sqlite", &make<InSqliteFile>}),
                          [](const auto& of) { return std::string(of.param.name); });
 
-}  // namespace
+}  // namespace conformance_test
 }  // namespace tutti::storage

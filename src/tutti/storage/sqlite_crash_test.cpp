@@ -22,7 +22,7 @@
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::storage {
-namespace {
+namespace sqlite_crash_test {
 
 namespace fs = std::filesystem;
 
@@ -228,5 +228,5 @@ TEST_F(SqliteCrashTest, ADiskThatIsFullRefusesTheCommitAndTheStoreGoesOn) {
   EXPECT_GT(by_the_disk, 0U);  // and not only by the look at the free space before
 }
 
-}  // namespace
+}  // namespace sqlite_crash_test
 }  // namespace tutti::storage

@@ -12,7 +12,7 @@
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::storage {
-namespace {
+namespace sqlite_salvage_test {
 
 namespace fs = std::filesystem;
 
@@ -107,5 +107,5 @@ TEST_F(SqliteSalvage, WhatIsNoStoreOrAnotherIsNotTaken) {
   EXPECT_FALSE(salvage().has_value());
 }
 
-}  // namespace
+}  // namespace sqlite_salvage_test
 }  // namespace tutti::storage

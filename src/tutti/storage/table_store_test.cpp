@@ -7,7 +7,7 @@
 #include <tuple>
 
 namespace tutti::storage {
-namespace {
+namespace table_store_test {
 
 RC_GTEST_PROP(KeyOf, SortsAsItsNumbersAndGivesThemBack, ()) {
   using Numbers = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>;
@@ -31,5 +31,5 @@ TEST(KeyOf, OtherLengthsAreNoSuchKey) {
   EXPECT_FALSE(numbers_of(key.substr(1), 2));
 }
 
-}  // namespace
+}  // namespace table_store_test
 }  // namespace tutti::storage

@@ -15,7 +15,7 @@
 #include "tutti/wire/frame.hpp"
 
 namespace tutti::wire {
-namespace {
+namespace agent_state_test {
 
 using robot::RobotAgent;
 using robot::test::at;
@@ -238,5 +238,5 @@ TEST(AgentState, OtherBytesAreRefused) {
           .has_value());
 }
 
-}  // namespace
+}  // namespace agent_state_test
 }  // namespace tutti::wire

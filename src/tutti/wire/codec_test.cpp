@@ -20,7 +20,7 @@
 #include "tutti/wire/submap_outline.hpp"
 
 namespace tutti::wire {
-namespace {
+namespace codec_test {
 
 Rng any_rng() { return Rng(*rc::gen::arbitrary<std::uint32_t>()); }
 
@@ -673,5 +673,5 @@ TEST(Validate, Word) {
                                           {"one of 201", [](M& m) { m.by.assign(201, 'a'); }}});
 }
 
-}  // namespace
+}  // namespace codec_test
 }  // namespace tutti::wire

@@ -18,12 +18,12 @@
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::wire {
-namespace {
+namespace golden_test {
 
 std::string golden_bytes(MessageKind kind, unsigned version, const std::string& current) {
   std::string file = fmt::format("{}_v{}.bin", name(kind), version);
   std::ranges::replace(file, ' ', '_');
-  const std::filesystem::path path = test::source_path("src/tutti/wire/testdata/" + file);
+  const std::filesystem::path path = tutti::test::source_path("src/tutti/wire/testdata/" + file);
   if (version == versions(kind).current && std::getenv("TUTTI_WRITE_GOLDEN") != nullptr)
     std::ofstream(path, std::ios::binary) << current;
   std::ostringstream bytes;
@@ -328,5 +328,5 @@ TEST(Golden, Cloud) {
   }
 }
 
-}  // namespace
+}  // namespace golden_test
 }  // namespace tutti::wire

@@ -19,7 +19,7 @@
 #include "tutti/wire/submap_copy_codec.hpp"
 
 namespace tutti::wire {
-namespace {
+namespace hostile_test {
 
 constexpr std::array kKinds = {MessageKind::submap,      MessageKind::proxy_graph,
                                MessageKind::verdict,     MessageKind::cloud,
@@ -246,5 +246,5 @@ TEST(Hostile, ARobotIsSeenSomewhere) {
   }
 }
 
-}  // namespace
+}  // namespace hostile_test
 }  // namespace tutti::wire

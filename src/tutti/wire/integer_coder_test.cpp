@@ -12,7 +12,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::wire {
-namespace {
+namespace integer_coder_test {
 
 std::string coded(const std::vector<std::int64_t>& values) {
   RangeEncoder out;
@@ -95,5 +95,5 @@ TEST(IntegerCoder, TellsWhenThereIsLessOrMoreThanWasWritten) {
   EXPECT_FALSE(in.overrun());
 }
 
-}  // namespace
+}  // namespace integer_coder_test
 }  // namespace tutti::wire

@@ -14,7 +14,7 @@
 #include "tutti/wire/internal/columns.hpp"
 
 namespace tutti::wire {
-namespace {
+namespace quantise_test {
 
 Rng any_rng() { return Rng(*rc::gen::arbitrary<std::uint32_t>()); }
 
@@ -132,5 +132,5 @@ RC_GTEST_PROP(Columns, RoundTripEvenWhenDifferencesWrap, (const std::vector<std:
   RC_ASSERT(!read_columns<3>(field, rows.size() + 1).has_value());
 }
 
-}  // namespace
+}  // namespace quantise_test
 }  // namespace tutti::wire

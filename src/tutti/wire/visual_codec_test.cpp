@@ -13,7 +13,7 @@
 #include "tutti/wire/limits.hpp"
 
 namespace tutti::wire {
-namespace {
+namespace visual_codec_test {
 
 bool same(const ImuPreintegration& a, const ImuPreintegration& b, double covariance_error) {
   return a.from_keyframe == b.from_keyframe && a.duration_s == b.duration_s &&
@@ -133,5 +133,5 @@ TEST(VisualCodec, WhatIsWrongIsRefusedByName) {
     EXPECT_NE(refusal(change).find(words), std::string::npos) << words << ": " << refusal(change);
 }
 
-}  // namespace
+}  // namespace visual_codec_test
 }  // namespace tutti::wire

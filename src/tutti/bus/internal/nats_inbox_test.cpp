@@ -9,7 +9,7 @@
 #include "tutti/base/content_hash.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace nats_inbox_test {
 
 using Replies = std::vector<std::string>;
 
@@ -159,5 +159,5 @@ TEST(NatsInbox, ContentsOfOneIdAreOtherMessagesAndOneThatIsNotWhatItSaysIsNone) 
   EXPECT_EQ(*taken[0].envelope.bytes, "abcdef");
 }
 
-}  // namespace
+}  // namespace nats_inbox_test
 }  // namespace tutti::bus

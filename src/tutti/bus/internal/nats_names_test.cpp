@@ -10,7 +10,7 @@
 #include <vector>
 
 namespace tutti::bus {
-namespace {
+namespace nats_names_test {
 
 const Endpoint kServer = Endpoint::server();
 const Endpoint kRobot = Endpoint::of(RobotId{3});
@@ -91,5 +91,5 @@ RC_GTEST_PROP(NatsNames, AMessageIsPutTogetherFromItsPartsInAnyOrderAnyOfThemAga
   RC_ASSERT(put_together == all);
 }
 
-}  // namespace
+}  // namespace nats_names_test
 }  // namespace tutti::bus

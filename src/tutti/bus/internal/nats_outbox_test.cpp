@@ -12,7 +12,7 @@
 #include "tutti/bus/internal/nats_names.hpp"
 
 namespace tutti::bus {
-namespace {
+namespace nats_outbox_test {
 
 using namespace std::chrono_literals;
 
@@ -183,5 +183,5 @@ RC_GTEST_PROP(NatsOutbox, EverythingArrivesAndTheNewestRetainedValueLast, ()) {
   RC_ASSERT(outbox.bytes() == 0U);
 }
 
-}  // namespace
+}  // namespace nats_outbox_test
 }  // namespace tutti::bus

@@ -8,7 +8,7 @@
 #include "support/consistency/uncertainty.hpp"
 
 namespace tutti::consistency::internal {
-namespace {
+namespace drift_origins_test {
 
 constexpr std::size_t kNodes = 150;
 constexpr int kSeeds = 40;
@@ -162,5 +162,5 @@ TEST(DriftStretches, TooShortRunsHaveNone) {
   EXPECT_TRUE(stretches(s).empty());
 }
 
-}  // namespace
+}  // namespace drift_origins_test
 }  // namespace tutti::consistency::internal

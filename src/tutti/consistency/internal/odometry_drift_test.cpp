@@ -9,7 +9,7 @@
 #include "tutti/estimation/onboard_smoother.hpp"
 
 namespace tutti::consistency::internal {
-namespace {
+namespace odometry_drift_test {
 
 constexpr std::size_t kNodes = 50;
 
@@ -111,5 +111,5 @@ TEST(OdometryDrift, IsTheFirstStepOfTheOnboardSmoother) {
   }
 }
 
-}  // namespace
+}  // namespace odometry_drift_test
 }  // namespace tutti::consistency::internal

@@ -9,7 +9,7 @@
 #include "tutti/consistency/internal/links.hpp"
 
 namespace tutti::consistency::internal {
-namespace {
+namespace time_chain_test {
 
 using namespace test;
 
@@ -81,5 +81,5 @@ TEST(NodeAt, FindsSynchronisedNodesOnly) {
   EXPECT_FALSE(node_at(input, stamp_of(100)).has_value());
 }
 
-}  // namespace
+}  // namespace time_chain_test
 }  // namespace tutti::consistency::internal

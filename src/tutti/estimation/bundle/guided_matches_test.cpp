@@ -6,7 +6,7 @@
 #include "support/estimation/bundle/scene.hpp"
 
 namespace tutti::bundle {
-namespace {
+namespace guided_matches_test {
 
 std::vector<SubmapPair> all_pairs(const Scene& scene) {
   std::vector<SubmapPair> out;
@@ -51,5 +51,5 @@ TEST(GuidedMatches, NothingWhereNothingCanBeCompared) {
   EXPECT_TRUE(guided_matches(scene.input.submaps, pairs, {}).empty());
 }
 
-}  // namespace
+}  // namespace guided_matches_test
 }  // namespace tutti::bundle

@@ -9,7 +9,7 @@
 #include "support/estimation/bundle/scene.hpp"
 
 namespace tutti::bundle {
-namespace {
+namespace imu_factor_test {
 
 using namespace test;
 
@@ -119,5 +119,5 @@ TEST(ImuFactor, IsZeroAtTheTruth) {
   EXPECT_LT(r.cwiseAbs().maxCoeff(), 3e-4) << r.transpose();
 }
 
-}  // namespace
+}  // namespace imu_factor_test
 }  // namespace tutti::bundle

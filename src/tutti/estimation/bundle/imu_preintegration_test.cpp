@@ -14,7 +14,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 
 namespace tutti::bundle {
-namespace {
+namespace imu_preintegration_test {
 
 using namespace test;
 
@@ -168,5 +168,5 @@ TEST(GyroBias, OfTheRecording) {
   EXPECT_TRUE(matrix_near(bias, Eigen::Vector3d(-0.002, 0.021, 0.077), 0.003));  // EuRoC's own estimate, rounded
 }
 
-}  // namespace
+}  // namespace imu_preintegration_test
 }  // namespace tutti::bundle

@@ -9,7 +9,7 @@
 #include "support/estimation/bundle/scene.hpp"
 
 namespace tutti::bundle {
-namespace {
+namespace landmark_merge_test {
 
 using namespace test;
 
@@ -157,5 +157,5 @@ TEST(LandmarkMerge, RefusesByName) {
   EXPECT_NE(refusal([](Scene& s) { s.input.submaps.push_back(s.input.submaps[0]); }).find("twice"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace landmark_merge_test
 }  // namespace tutti::bundle

@@ -7,7 +7,7 @@
 #include "support/random_pose.hpp"
 
 namespace tutti::bundle {
-namespace {
+namespace projection_factor_test {
 
 using namespace test;
 
@@ -79,5 +79,5 @@ TEST(ProjectionFactor, StatisticsPerCamera) {
   EXPECT_EQ(residuals[1].unseen, 1U);
 }
 
-}  // namespace
+}  // namespace projection_factor_test
 }  // namespace tutti::bundle

@@ -10,7 +10,7 @@
 #include "support/sanitized.hpp"
 
 namespace tutti::bundle {
-namespace {
+namespace refine_map_test {
 
 using namespace test;
 using estimation::Termination;
@@ -219,5 +219,5 @@ TEST(RefineMap, WithEverythingConstantNothingHappens) {
   EXPECT_TRUE(refined.landmarks.empty());
 }
 
-}  // namespace
+}  // namespace refine_map_test
 }  // namespace tutti::bundle

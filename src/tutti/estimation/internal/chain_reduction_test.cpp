@@ -6,7 +6,7 @@
 #include "support/estimation/random_graphs.hpp"
 
 namespace tutti::estimation::internal {
-namespace {
+namespace chain_reduction_test {
 
 using namespace testing;
 
@@ -64,5 +64,5 @@ TEST(ChainReduction, CompoundsNothingWithoutTrustedEdges) {
   EXPECT_EQ(reduced.graph.edges.size(), s.graph.edges.size());
 }
 
-}  // namespace
+}  // namespace chain_reduction_test
 }  // namespace tutti::estimation::internal

@@ -12,7 +12,7 @@
 #include "tutti/estimation/between_factor.hpp"
 
 namespace tutti::estimation::internal {
-namespace {
+namespace chain_run_test {
 
 using namespace testing;
 
@@ -91,5 +91,5 @@ RC_GTEST_PROP(ChainRun, AsAnEdgeItIsTheSame, ()) {
   RC_ASSERT(near(Vector6d(linear.J_j.transpose() * force), Vector6d(-A.transpose() * W * sum.offset)));
 }
 
-}  // namespace
+}  // namespace chain_run_test
 }  // namespace tutti::estimation::internal

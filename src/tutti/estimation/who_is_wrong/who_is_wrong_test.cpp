@@ -13,7 +13,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::estimation {
-namespace {
+namespace who_is_wrong_test {
 
 constexpr std::size_t kLap = 100, kNodes = 2 * kLap + 1;
 constexpr double kStep_m = 2.0;
@@ -175,5 +175,5 @@ TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
   }
 }
 
-}  // namespace
+}  // namespace who_is_wrong_test
 }  // namespace tutti::estimation

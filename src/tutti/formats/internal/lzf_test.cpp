@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace tutti::formats::internal {
-namespace {
+namespace lzf_test {
 
 /// One random step after the other: literals, or a copy of what came before; and what they stand for.
 struct Coded {
@@ -58,5 +58,5 @@ RC_GTEST_PROP(Lzf, TakesAnyBytes, (const std::string& bytes)) {
   RC_ASSERT(!lzf_decode(bytes, 1000 * (bytes.size() + 1)));  // refused before it is allocated
 }
 
-}  // namespace
+}  // namespace lzf_test
 }  // namespace tutti::formats::internal

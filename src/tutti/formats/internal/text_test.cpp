@@ -8,7 +8,7 @@
 #include "support/formats/mutations.hpp"
 
 namespace tutti::formats::internal {
-namespace {
+namespace text_test {
 
 RC_GTEST_PROP(Seconds, EveryNanosecondSurvivesText, ()) {
   const Timestamp stamp{*rc::gen::inRange<std::int64_t>(-kMaxStampNs, kMaxStampNs)};
@@ -117,5 +117,5 @@ TEST(UnitQuaternion, NormalisedWithinToleranceRefusedBeyond) {
   EXPECT_FALSE(to_unit(where, Eigen::Quaterniond(1e200, 1e200, 0, 0)));
 }
 
-}  // namespace
+}  // namespace text_test
 }  // namespace tutti::formats::internal

@@ -11,7 +11,7 @@
 #include "support/mission/report/good_page.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace compare_test {
 
 using nlohmann::json;
 
@@ -140,5 +140,5 @@ TEST(CompareHtml, SurvivesWhatIsNotFinite) {
   EXPECT_TRUE(json::accept(compare_json(r)));
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace tutti::mission

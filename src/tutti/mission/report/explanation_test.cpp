@@ -8,7 +8,7 @@
 #include "support/mission/report/explanation_example.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace explanation_test {
 
 /// One pose a second along x, 1 m apart.
 Trajectory line(std::size_t poses) {
@@ -99,5 +99,5 @@ TEST(Words, OfAnOrigin) {
   EXPECT_EQ(format_significance(12.6), "13 x");
 }
 
-}  // namespace
+}  // namespace explanation_test
 }  // namespace tutti::mission

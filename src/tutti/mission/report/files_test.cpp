@@ -14,7 +14,7 @@
 #include "tutti/mission/report/report.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace files_test {
 
 namespace fs = std::filesystem;
 
@@ -154,5 +154,5 @@ TEST_F(ReportFiles, SaysWhereItCouldNotWrite) {
   EXPECT_NE(taken.error().message.find("report.json"), std::string::npos) << taken.error().message;
 }
 
-}  // namespace
+}  // namespace files_test
 }  // namespace tutti::mission

@@ -8,7 +8,7 @@
 #include "support/mission/report/report_example.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace geometry_test {
 
 TEST(RobotGeometry, ErrorsAreAgainstTheReferenceWhateverTheFrames) {
   MissionRecord record = test::example_record({.robots = 1, .keyframes = 50});
@@ -106,5 +106,5 @@ TEST(FindPosition, OnlyExactStamps) {
   EXPECT_EQ(find_position({}, Timestamp{19}), nullptr);
 }
 
-}  // namespace
+}  // namespace geometry_test
 }  // namespace tutti::mission

@@ -10,7 +10,7 @@
 #include "tutti/mission/report/report.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace html_test {
 
 using test::expect_good_page;
 using test::has_number_that_is_not_finite;
@@ -338,5 +338,5 @@ TEST(ReportHtml, LongMissionStaysSmall) {
             html.size() + 4'000'000U);  // pictures, however many the points
 }
 
-}  // namespace
+}  // namespace html_test
 }  // namespace tutti::mission

@@ -9,7 +9,7 @@
 #include "tutti/mission/report/report.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace json_test {
 
 using nlohmann::json;
 
@@ -259,5 +259,5 @@ TEST(TimingJson, MedianAndLargestPerPolicy) {
   EXPECT_DOUBLE_EQ(policy["optimisation"]["median_ms"], 5.0);
 }
 
-}  // namespace
+}  // namespace json_test
 }  // namespace tutti::mission

@@ -11,7 +11,7 @@
 #include "tutti/mission/report/label.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace map_pictures_test {
 
 using Colour = std::array<int, 4>;
 
@@ -171,5 +171,5 @@ TEST(Label, LettersDiffer) {
   EXPECT_NO_THROW(drawn("onboard server survey distance"));  // cut off, not written beyond
 }
 
-}  // namespace
+}  // namespace map_pictures_test
 }  // namespace tutti::mission

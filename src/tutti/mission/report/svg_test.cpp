@@ -11,7 +11,7 @@
 #include "tutti/mission/report/plot.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace svg_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -142,5 +142,5 @@ TEST(Labels, Lengths) {
   EXPECT_EQ(tick_label(-0.0), "0");
 }
 
-}  // namespace
+}  // namespace svg_test
 }  // namespace tutti::mission

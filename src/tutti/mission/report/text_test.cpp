@@ -9,7 +9,7 @@
 #include "tutti/mission/report/report.hpp"
 
 namespace tutti::mission {
-namespace {
+namespace text_test {
 
 void expect_readable(const std::string& text) {
   std::istringstream lines(text);
@@ -189,5 +189,5 @@ TEST(Format, SpreadIsMedianAndLargest) {
   EXPECT_EQ(format_spread(even), "3.0 / 9.0");
 }
 
-}  // namespace
+}  // namespace text_test
 }  // namespace tutti::mission

@@ -11,7 +11,7 @@
 #include "tutti/perception/lidar/submap_features.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace birds_eye_view_test {
 
 using namespace test;
 
@@ -60,5 +60,5 @@ TEST(FloorPatch, putsTheTwoSidesOfASlabApart) {
   EXPECT_NE(floor_patch({0.1F, 0.1F}, true, 0.8), floor_patch({-0.1F, 0.1F}, true, 0.8));
 }
 
-}  // namespace
+}  // namespace birds_eye_view_test
 }  // namespace tutti::lidar

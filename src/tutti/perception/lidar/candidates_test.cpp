@@ -8,7 +8,7 @@
 #include "support/perception/lidar/rooms.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace candidates_test {
 
 using namespace test;
 
@@ -41,5 +41,5 @@ TEST(ProposeAlignments, proposeNothingForUnusableSubmaps) {
   EXPECT_TRUE(plausible_pair(good, good));
 }
 
-}  // namespace
+}  // namespace candidates_test
 }  // namespace tutti::lidar

@@ -10,7 +10,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace fft_test {
 
 ComplexImage random_image(std::uint64_t seed) {
   Rng rng(seed);
@@ -42,5 +42,5 @@ TEST(Fft, inverseUndoesForward) {
   EXPECT_LT((back / static_cast<float>(kImageSize * kImageSize) - image).abs().maxCoeff(), 1e-5F);
 }
 
-}  // namespace
+}  // namespace fft_test
 }  // namespace tutti::lidar

@@ -10,7 +10,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace oriented_cloud_test {
 
 std::vector<Eigen::Vector3f> random_points(Rng& rng, std::size_t n) {
   std::vector<Eigen::Vector3f> points;
@@ -73,5 +73,5 @@ TEST(Orient, givesNoNormalWhereThePointsAreNotFlat) {
   EXPECT_EQ(orient({{1, 2, 3}}, {}, {}).normal(0), Eigen::Vector3f(0, 0, 0));
 }
 
-}  // namespace
+}  // namespace oriented_cloud_test
 }  // namespace tutti::lidar

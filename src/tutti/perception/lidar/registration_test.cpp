@@ -10,7 +10,7 @@
 #include "tutti/perception/lidar/submap_features.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace registration_test {
 
 using namespace test;
 
@@ -141,5 +141,5 @@ TEST(RegisterClouds, aCloudOnItselfStaysWhereItIs) {
   EXPECT_LT(local({}, result.T_target_source).norm(), 1e-6);
 }
 
-}  // namespace
+}  // namespace registration_test
 }  // namespace tutti::lidar

@@ -12,7 +12,7 @@
 #include "tutti/perception/lidar/levelling.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace submap_features_test {
 
 using namespace test;
 constexpr double kDegree = 0.017453292519943295;
@@ -101,5 +101,5 @@ TEST(ExtractFeatures, AFewSecondsAreEnoughWhereTheyLeadFar) {
   EXPECT_TRUE(extract_features(fast, config).usable);
 }
 
-}  // namespace
+}  // namespace submap_features_test
 }  // namespace tutti::lidar

@@ -12,7 +12,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace undistort_test {
 
 constexpr Timestamp kStart{1'700'000'000'000'000'000LL};
 
@@ -117,5 +117,5 @@ TEST(Undistort, BadSweepsAreRefusedWithTheReason) {
   EXPECT_FALSE(undistort({stamp, nullptr, nullptr}, odometry).has_value());
 }
 
-}  // namespace
+}  // namespace undistort_test
 }  // namespace tutti::lidar

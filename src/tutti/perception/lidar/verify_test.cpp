@@ -8,7 +8,7 @@
 #include "support/perception/lidar/rooms.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace verify_test {
 
 using namespace test;
 const LidarClosureConfig kConfig;
@@ -166,5 +166,5 @@ TEST(ToVerdict, aRefusalCarriesItsReason) {
   EXPECT_LT(verdict.pair.first, verdict.pair.second);
 }
 
-}  // namespace
+}  // namespace verify_test
 }  // namespace tutti::lidar

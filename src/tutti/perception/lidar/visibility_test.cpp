@@ -6,7 +6,7 @@
 #include <cmath>
 
 namespace tutti::lidar {
-namespace {
+namespace visibility_test {
 
 constexpr float kSpacing = 0.3F;
 
@@ -47,5 +47,5 @@ TEST(CountVisible, countsWhatStandsWhereOneLookedThrough) {
   EXPECT_EQ(behind.contradicting, 0);
 }
 
-}  // namespace
+}  // namespace visibility_test
 }  // namespace tutti::lidar

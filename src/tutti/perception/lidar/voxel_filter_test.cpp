@@ -14,7 +14,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::lidar {
-namespace {
+namespace voxel_filter_test {
 
 PointCloud random_cloud(Rng& rng, std::size_t n, double half_size) {
   PointCloud cloud;
@@ -100,5 +100,5 @@ RC_GTEST_PROP(MergeScans, doesNotDependOnTheOrderOfTheScans, (std::uint64_t seed
   RC_ASSERT(merge_scans(scans, 0.5) == forward);
 }
 
-}  // namespace
+}  // namespace voxel_filter_test
 }  // namespace tutti::lidar

@@ -9,7 +9,7 @@
 #include "support/random_pose.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace absolute_pose_test {
 
 const auto kCameras = test::stereo_cameras();
 const AbsolutePoseConfig kConfig;
@@ -119,5 +119,5 @@ TEST(AbsolutePose, dependsOnTheSeedAlone) {
   EXPECT_EQ(one->inliers, other->inliers);
 }
 
-}  // namespace
+}  // namespace absolute_pose_test
 }  // namespace tutti::visual

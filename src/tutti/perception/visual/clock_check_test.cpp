@@ -8,7 +8,7 @@
 #include "support/perception/visual/textured_room.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace clock_check_test {
 
 const auto kRoom = test::textured_room(400, Rng(1));
 const Camera kCamera = test::stereo_cameras()[0];
@@ -53,5 +53,5 @@ TEST(ClockCheck, SaysNothingWhereThereIsNoneOrNothingTells) {
   EXPECT_FALSE(ClockCheck(kCamera).offset_s(odometry()).has_value());
 }
 
-}  // namespace
+}  // namespace clock_check_test
 }  // namespace tutti::visual

@@ -8,7 +8,7 @@
 #include "tutti/perception/visual/hamming.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace descriptor_tables_test {
 
 using test::random_rows;
 
@@ -60,5 +60,5 @@ TEST(DescriptorTables, ofNothingFindNothing) {
   EXPECT_FALSE(DescriptorTables().has_near(queries.row(0), table_keys(queries)[0], none, 384));
 }
 
-}  // namespace
+}  // namespace descriptor_tables_test
 }  // namespace tutti::visual

@@ -11,7 +11,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace hamming_test {
 
 using test::random_rows;
 
@@ -59,5 +59,5 @@ TEST(TwoNearest, withoutGroupsEveryRowIsARival) {
   EXPECT_EQ(found.second_distance, 3U);
 }
 
-}  // namespace
+}  // namespace hamming_test
 }  // namespace tutti::visual

@@ -7,14 +7,14 @@
 #include "support/random_pose.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace p3p_test {
 
 struct Scene {
   Pose3 T_camera_map;
   std::array<Eigen::Vector3d, 3> directions, points;
 };
 Scene random_scene(Rng& rng) {
-  Scene out{.T_camera_map = test::random_pose(rng, 5.0)};
+  Scene out{.T_camera_map = tutti::test::random_pose(rng, 5.0)};
   for (std::size_t i = 0; i < 3; ++i) {
     const double depth = rng.uniform(0.5, 10.0);
     const Eigen::Vector3d p_camera{depth * rng.uniform(-1.0, 1.0), depth * rng.uniform(-1.0, 1.0), depth};
@@ -60,5 +60,5 @@ TEST(P3p, pointsOnALineGiveNothing) {
   EXPECT_TRUE(p3p(directions, {points[0], points[0], points[0]}).empty());
 }
 
-}  // namespace
+}  // namespace p3p_test
 }  // namespace tutti::visual

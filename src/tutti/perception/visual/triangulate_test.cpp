@@ -10,7 +10,7 @@
 #include "tutti/base/chi_square.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace triangulate_test {
 
 const CameraModel kCamera = test::stereo_cameras().front().model;
 const TriangulationConfig kConfig;
@@ -84,5 +84,5 @@ TEST(Triangulate, saysWhyThereIsNoPoint) {
   EXPECT_EQ(triangulate({}, kConfig).error(), TriangulationFault::misfit);
 }
 
-}  // namespace
+}  // namespace triangulate_test
 }  // namespace tutti::visual

@@ -10,7 +10,7 @@
 #include "tutti/perception/visual/matching.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace verify_test {
 
 using namespace test;
 const auto kCameras = stereo_cameras();
@@ -186,5 +186,5 @@ TEST(IsVisualCandidate, keepsApartWhatIsNearInChainOrTime) {
   EXPECT_TRUE(is_candidate(a, c, 2, kConfig));
 }
 
-}  // namespace
+}  // namespace verify_test
 }  // namespace tutti::visual

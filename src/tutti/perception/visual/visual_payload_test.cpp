@@ -10,7 +10,7 @@
 #include "tutti/perception/visual/hamming.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace visual_payload_test {
 
 using namespace test;
 const auto kRoom = textured_room(600, Rng(1));
@@ -185,5 +185,5 @@ TEST(VisualPayload, inputThatContradictsItselfIsAnError) {
   EXPECT_NE(complaint(s).find("another kind"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace visual_payload_test
 }  // namespace tutti::visual

@@ -15,7 +15,7 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::program {
-namespace {
+namespace feed_client_test {
 
 namespace fs = std::filesystem;
 
@@ -78,5 +78,5 @@ TEST(FeedClient, TheExampleFeedsARobotAndGoesOnWhereItStood) {
   fs::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace feed_client_test
 }  // namespace tutti::program

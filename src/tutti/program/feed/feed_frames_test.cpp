@@ -10,7 +10,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::program {
-namespace {
+namespace feed_frames_test {
 
 std::string header(std::size_t size) {
   std::string out(4, '\0');
@@ -112,5 +112,5 @@ TEST(FeedFrames, SamplesThatNoRobotCanTakeSayWhy) {
   EXPECT_FALSE(decode_from_client("").has_value());
 }
 
-}  // namespace
+}  // namespace feed_frames_test
 }  // namespace tutti::program

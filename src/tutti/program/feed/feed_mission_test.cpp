@@ -17,7 +17,7 @@
 #include "tutti/simulation/recordings.hpp"
 
 namespace tutti::program {
-namespace {
+namespace feed_mission_test {
 
 constexpr double kMission_s = 240.0;
 
@@ -177,5 +177,5 @@ TEST(FeedMission, TheTruthLiesWithinWhatTheFeedSays) {
   EXPECT_LT(static_cast<double>(all.outside), 0.02 * samples);
 }
 
-}  // namespace
+}  // namespace feed_mission_test
 }  // namespace tutti::program

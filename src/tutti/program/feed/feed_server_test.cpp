@@ -17,7 +17,7 @@
 #include "support/robot/drifting_robot.hpp"
 
 namespace tutti::program {
-namespace {
+namespace feed_server_test {
 
 class FeedServerTest : public testing::Test {
  protected:
@@ -187,5 +187,5 @@ TEST_F(FeedServerTest, TheSocketIsThisUsersAndReplacesADeadOne) {
   EXPECT_FALSE(FeedServer::listen(folder_ / std::string(120, 'x'), target_, settings_).has_value());
 }
 
-}  // namespace
+}  // namespace feed_server_test
 }  // namespace tutti::program

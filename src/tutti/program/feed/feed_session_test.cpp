@@ -9,7 +9,7 @@
 #include "support/program/feed/client.hpp"
 
 namespace tutti::program {
-namespace {
+namespace feed_session_test {
 
 using Feed = v1::Feed;
 
@@ -237,5 +237,5 @@ TEST_F(FeedSessionTest, AClientThatLosesWhatItMustHaveIsDropped) {
   EXPECT_TRUE(session_.output(1).empty());
 }
 
-}  // namespace
+}  // namespace feed_session_test
 }  // namespace tutti::program

@@ -10,7 +10,7 @@
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::program {
-namespace {
+namespace smooth_map_test {
 
 Pose3 small(Rng& rng, double metres, double degrees) {
   Vector6d xi;
@@ -69,5 +69,5 @@ TEST(SmoothMap, ArrivesInTheTimeThatTheWayTakes) {
   EXPECT_EQ(map.T_map_odom(), target);
 }
 
-}  // namespace
+}  // namespace smooth_map_test
 }  // namespace tutti::program

@@ -9,7 +9,7 @@
 #include "support/random_pose.hpp"
 
 namespace tutti::bundle::internal {
-namespace {
+namespace pose_block_test {
 
 /// What the adjuster gives to Ceres.
 class OurManifold final : public ceres::Manifold {
@@ -52,5 +52,5 @@ TEST(PoseBlock, IsAManifold) {
   }
 }
 
-}  // namespace
+}  // namespace pose_block_test
 }  // namespace tutti::bundle::internal

@@ -13,7 +13,7 @@
 #include "tutti/formats/image_file.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace describe_image_test {
 
 int distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b) {
   int bits = 0;
@@ -115,5 +115,5 @@ TEST(DescribeRealImages, HaveHundredsOfDescriptors) {
   }
 }
 
-}  // namespace
+}  // namespace describe_image_test
 }  // namespace tutti::visual

@@ -12,7 +12,7 @@
 #include "tutti/simulation/flight.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace hall_test {
 
 std::vector<Camera> stereo() {
   const CameraModel model =
@@ -135,5 +135,5 @@ TEST_F(Hall, RevisitsAreKnownByTheirDescriptors) {
   EXPECT_GE(revisit, 4 * other) << other;
 }
 
-}  // namespace
+}  // namespace hall_test
 }  // namespace tutti::visual

@@ -8,7 +8,7 @@
 #include "support/perception/visual/frontend/blocks.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace tracking_source_test {
 
 constexpr int kWidth = 320, kHeight = 240;
 
@@ -132,5 +132,5 @@ TEST(TrackingSource, StampsOfAnotherClockAreRefusedWithTheOffset) {
   EXPECT_FALSE(TrackingSource::open(broken, straight(11, 0.2), {}).has_value());
 }
 
-}  // namespace
+}  // namespace tracking_source_test
 }  // namespace tutti::visual

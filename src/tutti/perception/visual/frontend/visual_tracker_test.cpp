@@ -11,7 +11,7 @@
 #include "tutti/formats/image_file.hpp"
 
 namespace tutti::visual {
-namespace {
+namespace visual_tracker_test {
 
 constexpr int kWidth = 752, kHeight = 480;
 
@@ -189,5 +189,5 @@ TEST(VisualTracker, FindsTheSamePointsInRealStereoPairs) {
   }
 }
 
-}  // namespace
+}  // namespace visual_tracker_test
 }  // namespace tutti::visual

@@ -10,7 +10,7 @@
 #include "tutti/base/random.hpp"
 
 namespace tutti::visual::internal {
-namespace {
+namespace spread_test {
 
 constexpr SpreadRule kRule{.width_px = 200, .height_px = 120, .cell_px = 40, .distance_px = 5, .most = 30};
 
@@ -52,5 +52,5 @@ TEST(Spread, EveryCellGetsItsBestBeforeAnyGetsASecond) {
   EXPECT_EQ(cells.size(), 15U);  // There are 5 x 3.
 }
 
-}  // namespace
+}  // namespace spread_test
 }  // namespace tutti::visual::internal
