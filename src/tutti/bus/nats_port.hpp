@@ -62,8 +62,8 @@ struct NatsState {
 
 /// A port over NATS JetStream. A thread of its own connects, sends and acknowledges, and sends again what the bus has
 /// not confirmed, with the same id: the bus stores each once. What is sent first: status, retained, then the rest in
-/// the order of send(). Without a bus it waits for one. Ends within seconds, after what was acknowledged is so on the
-/// bus, if that can be reached.
+/// the order of send(), of submaps the newest. Without a bus it waits for one. Ends within seconds, after what was
+/// acknowledged is so on the bus, if that can be reached.
 class NatsPort : public Port {
  public:
   [[nodiscard]] virtual NatsState state() const = 0;

@@ -2,6 +2,8 @@
 #include "tutti/bus/internal/nats_outbox.hpp"
 
 #include <algorithm>
+#include <charconv>
+#include <limits>
 #include <vector>
 
 #include "tutti/base/content_hash.hpp"
@@ -15,11 +17,28 @@ constexpr std::size_t kUnderWay = 4;
 constexpr auto kConfirmation = std::chrono::seconds(20);
 constexpr auto kAgain = std::chrono::milliseconds(500);
 
+/// Session and index of a submap, "submap/ROBOT/SESSION/INDEX/..."; the highest of anything else.
+std::pair<std::uint64_t, std::uint64_t> age_of(std::string_view id) {
+  constexpr std::uint64_t kHighest = std::numeric_limits<std::uint64_t>::max();
+  std::pair<std::uint64_t, std::uint64_t> age{kHighest, kHighest};
+  const std::size_t robot = id.find('/');
+  const std::size_t session = robot == std::string_view::npos ? robot : id.find('/', robot + 1);
+  if (session == std::string_view::npos || !id.starts_with("submap/")) return age;
+  const char* const end = id.data() + id.size();
+  const auto first = std::from_chars(id.data() + session + 1, end, age.first);
+  if (first.ec != std::errc() || first.ptr == end || *first.ptr != '/') return {kHighest, kHighest};
+  const auto second = std::from_chars(first.ptr + 1, end, age.second);
+  if (second.ec != std::errc() || second.ptr == end || *second.ptr != '/') return {kHighest, kHighest};
+  return age;
+}
+
 }  // namespace
 
 Outbox::Order Outbox::order_of(const Piece& piece) {
-  if (piece.delivery == Delivery::best_effort) return {0, piece.number};
-  return {piece.delivery == Delivery::retained ? 1 : 2, piece.number};
+  if (piece.delivery == Delivery::best_effort) return {0, 0, 0, piece.number};
+  if (piece.delivery == Delivery::retained) return {1, 0, 0, piece.number};
+  const auto [session, index] = age_of(piece.id);
+  return {2, ~session, ~index, piece.number};
 }
 
 Status Outbox::add(const Envelope& envelope) {

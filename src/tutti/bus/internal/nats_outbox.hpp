@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "tutti/base/result.hpp"
@@ -61,8 +62,9 @@ class Outbox {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
-  /// First status, then retained values, then the rest; within these as they came.
-  using Order = std::pair<int, std::uint64_t>;
+  /// First status, then retained values, then the rest; within these as they came, but for submaps the newest first:
+  /// that of the highest numbers, as many as may have waited here for a link.
+  using Order = std::tuple<int, std::uint64_t, std::uint64_t, std::uint64_t>;
   struct UnderWay {
     Piece piece;
     Time until;

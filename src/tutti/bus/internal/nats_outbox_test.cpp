@@ -65,6 +65,20 @@ TEST(NatsOutbox, ALargeMessageIsCutAndOnlySoMuchIsUnderWay) {
   EXPECT_FALSE(outbox.next(kStart));
 }
 
+/// As after hours without a link.
+TEST(NatsOutbox, OfSubmapsTheNewestGoesFirst) {
+  Outbox outbox("m", 64U << 20U);
+  for (const char* id : {"3/17/8", "3/17/9", "3/17/10", "3/18/0"})
+    ASSERT_TRUE(outbox.add(envelope(MessageKind::submap, id, 200'000)));
+  std::vector<std::string> order;
+  while (const auto piece = outbox.next(kStart)) {
+    order.push_back(piece->id.substr(7, piece->id.find('h') - 8) + piece->id.substr(piece->id.rfind('/')));
+    outbox.confirm(piece->number);
+  }
+  EXPECT_EQ(order, (std::vector<std::string>{"3/18/0/0.2", "3/18/0/1.2", "3/17/10/0.2", "3/17/10/1.2", "3/17/9/0.2",
+                                             "3/17/9/1.2", "3/17/8/0.2", "3/17/8/1.2"}));
+}
+
 TEST(NatsOutbox, WhatIsHereAlreadyDoesNotWaitTwice) {
   Outbox outbox("m", 64U << 20U);
   for (int i = 0; i < 3; ++i)
