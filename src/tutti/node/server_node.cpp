@@ -130,8 +130,8 @@ Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
   return ok;
 }
 
-/// As MapServer::take() leaves it: the closures of earlier finders hold until this one has answered. A pair without both of
-/// its submaps, as in a map that was salvaged, is asked again when they come.
+/// As MapServer::take() leaves it: the closures of earlier finders hold until this one has answered. A pair without
+/// both of its submaps, as in a map that was salvaged, is asked again when they come.
 void ServerNode::Opened::add(ClosureVerdict verdict) {
   const SubmapPair pair = verdict.pair;
   if (!state.submaps.contains(pair.first) || !state.submaps.contains(pair.second)) return;

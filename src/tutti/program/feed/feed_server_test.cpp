@@ -93,10 +93,11 @@ TEST_F(FeedServerTest, OneThatHasSaidAllMayStillRead) {
 }
 
 TEST_F(FeedServerTest, AClientThatNeverReadsHoldsUpNobody) {
-  const int feeder = connect(), sleeper = connect(), one_more = connect(), too_many = connect();
-  EXPECT_EQ(say(feeder, test::hello()).size(), 2U);
+  const int feeder = connect(), sleeper = connect();
   const std::string greeting = test::hello(true);
   ASSERT_EQ(send(sleeper, greeting.data(), greeting.size(), 0), static_cast<ssize_t>(greeting.size()));
+  EXPECT_EQ(say(feeder, test::hello()).size(), 2U);
+  const int one_more = connect(), too_many = connect();
   std::size_t answers = 0;
   Trajectory way = robot::test::fine_odometry(400);  // 4,000 corrections of 600 bytes
   for (std::size_t i = 0; i < way.size(); i += 10) {
