@@ -228,10 +228,9 @@ struct MissionConfig {
     v.field("input", input, any(), "What is real, replayed or simulated, in plain words.");
     v.field("notes", notes, any(), "Sentences shown in the report.");
     v.field("duration_s", duration_s, at_least(0.0), "Mission time; 0 = until the last sample.");
-    v.field(
-        "odometry_hz", odometry_hz, between(0.0, 1e4),
-        "Robots have odometry at this rate instead, interpolated, from a moment drawn from the seed on; their scans "
-        "and images keep their stamps. 0: as recorded.");
+    v.field("odometry_hz", odometry_hz, between(0.0, 1e4),
+            "Robots have odometry at this rate instead, along a smooth curve, from a moment drawn from the seed on; "
+            "their scans and images keep their stamps. 0: as recorded.");
     v.field("association", association);
     v.field("closure_check", closure_check, any(), "Accepted closures against the reference.");
     v.field("source", source, one_of({"recordings", "simulation", "hall"}),

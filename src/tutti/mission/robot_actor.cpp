@@ -312,7 +312,7 @@ std::vector<std::string> RobotActor::troubles() const {
                                 trouble.first));
   };
   add(refused_odometry_, "odometry samples refused");
-  add(refused_scans_, "keyframes without a scan");
+  add(refused_scans_, "wanted scans that are not there or no good");
   add(refused_images_, "times images refused");
   add(missing_sensors_, "times a sensor was missing");
   for (const std::string& line : sight_.notes()) out.push_back(fmt::format("{}: {}", recording_.recording.name, line));
