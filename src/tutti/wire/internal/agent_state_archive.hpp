@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+#include "tutti/robot/agent.hpp"
+#include "tutti/v1/messages.pb.h"
+
+/// An agent's state as columns of numbers, to the bit.
+namespace tutti::wire::archive {
+
+using robot::AgentState;
+
+class Writer {
+ public:
+  explicit Writer(v1::AgentState& out) : out_(out) {}
+  void integer(const std::uint64_t& x) { out_.add_integer(x); }
+  void number(const double& x) { out_.add_number(x); }
+  void coordinate(const float& x) { out_.add_coordinate(x); }
+  [[nodiscard]] bool has_more() const { return true; }
+  /// A list's length; returns how many elements follow.
+  template <class T>
+  std::size_t length(const std::vector<T>& list) {
+    out_.add_integer(list.size());
+    return list.size();
+  }
+
+ private:
+  v1::AgentState& out_;
+};
+
+/// Gives zeros where there is nothing more; is_complete() tells at the end.
+class Reader {
+ public:
+  explicit Reader(const v1::AgentState& in) : in_(in) {}
+  void integer(std::uint64_t& x) { x = next(in_.integer(), integers_); }
+  void number(double& x) { x = next(in_.number(), numbers_); }
+  void coordinate(float& x) { x = next(in_.coordinate(), coordinates_); }
+  /// No list is made longer than what is left could fill.
+  template <class T>
+  std::size_t length(std::vector<T>& list) {
+    const std::uint64_t count = next(in_.integer(), integers_);
+    const auto left = [](const auto& column, int used) { return static_cast<std::size_t>(column.size() - used); };
+    if (count > left(in_.integer(), integers_) + left(in_.number(), numbers_) + left(in_.coordinate(), coordinates_))
+      short_ = true;
+    list.resize(short_ ? 0 : static_cast<std::size_t>(count));
+    return list.size();
+  }
+  [[nodiscard]] bool has_more() const { return integers_ < in_.integer_size(); }
+  [[nodiscard]] bool is_complete() const {
+    return !short_ && integers_ == in_.integer_size() && numbers_ == in_.number_size() &&
+           coordinates_ == in_.coordinate_size();
+  }
+
+ private:
+  template <class Column>
+  typename Column::value_type next(const Column& column, int& used) {
+    if (used < column.size()) return column.Get(used++);
+    short_ = true;
+    return 0;
+  }
+  const v1::AgentState& in_;
+  int integers_ = 0, numbers_ = 0, coordinates_ = 0;
+  bool short_ = false;
+};
+
+/// One way through a state for writing and reading: `pass(archive, value)` writes the value or fills it.
+
+template <class A, class Int>
+requires std::is_integral_v<Int> || std::is_enum_v<Int>
+void pass(A& a, Int& x) {
+  auto wide = static_cast<std::uint64_t>(x);
+  a.integer(wide);
+  x = static_cast<Int>(wide);
+}
+template <class A>
+void pass(A& a, double& x) {
+  a.number(x);
+}
+template <class A>
+void pass(A& a, Timestamp& t) {
+  pass(a, t.ns);
+}
+template <class A>
+void pass(A& a, Eigen::Vector3f& point) {
+  for (float& x : point) a.coordinate(x);
+}
+template <class A>
+void pass(A& a, Pose3& T) {
+  for (double& x : T.rotation.coeffs()) a.number(x);
+  for (double& x : T.translation) a.number(x);
+}
+template <class A>
+void pass(A& a, RelativePose& measured) {
+  pass(a, measured.T_a_b);
+  for (double& x : measured.covariance.reshaped()) a.number(x);
+}
+template <class A>
+void pass(A& a, StampedPose& pose) {
+  pass(a, pose.stamp);
+  pass(a, pose.pose);
+}
+template <class A>
+void pass(A& a, Keyframe& keyframe) {
+  pass(a, keyframe.index);
+  pass(a, keyframe.stamp);
+  pass(a, keyframe.T_odom_body);
+  pass(a, keyframe.representative);
+}
+template <class A>
+void pass(A& a, estimation::ChainConstraint& constraint) {
+  pass(a, constraint.from);
+  pass(a, constraint.to);
+  pass(a, constraint.measurement);
+}
+template <class A>
+void pass(A& a, consistency::Constraint& constraint) {
+  pass(a, constraint.from_stamp);
+  pass(a, constraint.to_stamp);
+  pass(a, constraint.from);
+  pass(a, constraint.to);
+  pass(a, constraint.measurement);
+  pass(a, constraint.kind);
+  pass(a, constraint.revision);
+}
+template <class A>
+void pass(A& a, robot::Whereabouts& other) {
+  pass(a, other.robot.value);
+  pass(a, other.stamp);
+  pass(a, other.T_map_body);
+}
+template <class A, class T>
+void pass(A& a, std::vector<T>& list) {
+  a.length(list);
+  for (T& element : list) pass(a, element);
+}
+/// Of no cloud and of an empty one, the points are none: nobody tells them apart.
+template <class A>
+void pass(A& a, lidar::PosedCloud& scan) {
+  pass(a, scan.T_submap_body);
+  PointCloud cloud;
+  if (scan.cloud != nullptr) cloud = *scan.cloud;
+  pass(a, cloud.points);
+  scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+}
+template <class A>
+void pass(A& a, TrackedKeypoint& keypoint) {
+  for (float& x : keypoint.pixel) a.coordinate(x);
+  a.coordinate(keypoint.sigma_px);
+  pass(a, keypoint.track);
+}
+template <class A>
+void pass(A& a, TrackedImage& image) {
+  pass(a, image.camera);
+  pass(a, image.keypoints);
+  pass(a, image.descriptors.kind);
+  pass(a, image.descriptors.words);
+  pass(a, image.descriptors.bits);
+}
+template <class A>
+void pass(A& a, Camera& camera) {
+  CameraModel& model = camera.model;
+  pass(a, model.kind);
+  pass(a, model.width_px);
+  pass(a, model.height_px);
+  for (double* x : {&model.fx, &model.fy, &model.cx, &model.cy}) a.number(*x);
+  for (double& x : model.distortion) a.number(x);
+  pass(a, camera.T_body_camera);
+}
+template <class A>
+void pass(A& a, ImuSample& sample) {
+  pass(a, sample.stamp);
+  for (double& x : sample.gyro) a.number(x);
+  for (double& x : sample.accelerometer) a.number(x);
+}
+template <class A>
+void pass(A& a, TrackedImages& images) {
+  pass(a, images.stamp);
+  std::vector<Camera> cameras;
+  if (images.cameras != nullptr) cameras = *images.cameras;
+  pass(a, cameras);
+  images.cameras = std::make_shared<const std::vector<Camera>>(std::move(cameras));
+  pass(a, images.images);
+  pass(a, images.imu);
+  ImuNoise& noise = images.imu_noise;
+  for (double* x : {&noise.gyro_noise_density, &noise.gyro_random_walk, &noise.accelerometer_noise_density,
+                    &noise.accelerometer_random_walk})
+    a.number(*x);
+}
+template <class A>
+void pass(A& a, robot::FinishedSubmap& finished) {
+  pass(a, finished.submap.id.chain.robot.value);
+  pass(a, finished.submap.id.chain.session);
+  pass(a, finished.submap.id.index);
+  pass(a, finished.submap.keyframes);
+  pass(a, finished.submap.odometry);
+  pass(a, finished.scans);
+  pass(a, finished.images);
+  pass(a, finished.awaits_images);
+}
+template <class A>
+void pass(A& a, robot::SubmapBuilderState& builder) {
+  pass(a, builder.next_submap);
+  pass(a, builder.keyframes);
+  pass(a, builder.odometry);
+  pass(a, builder.scans);
+  pass(a, builder.images);
+  pass(a, builder.finished);
+  pass(a, builder.since_keyframe);
+  pass(a, builder.recent);
+  pass(a, builder.distance_m);
+  pass(a, builder.representative_distance_m);
+}
+template <class A>
+void pass(A& a, std::optional<Timestamp>& stamp) {
+  bool is_known = stamp.has_value();
+  Timestamp value = stamp.value_or(Timestamp{});
+  pass(a, is_known);
+  pass(a, value);
+  stamp = is_known ? std::optional(value) : std::nullopt;
+}
+template <class A>
+void pass(A& a, Scan& scan) {
+  pass(a, scan.stamp);
+  PointCloud cloud;
+  if (scan.cloud != nullptr) cloud = *scan.cloud;
+  pass(a, cloud.points);
+  scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+  bool has_ages = scan.age_s != nullptr;
+  pass(a, has_ages);
+  if (!has_ages) return;
+  std::vector<float> ages;
+  if (scan.age_s != nullptr) ages = *scan.age_s;
+  a.length(ages);
+  for (float& age_s : ages) a.coordinate(age_s);
+  scan.age_s = std::make_shared<const std::vector<float>>(std::move(ages));
+}
+template <class A>
+void pass(A& a, robot::OdometryStep& step) {
+  pass(a, step.stamp);
+  pass(a, step.T_odom_body);
+  for (double& x : step.covariance.reshaped()) a.number(x);
+}
+template <class A>
+void pass(A& a, robot::SensorSample& sample) {
+  pass(a, sample.stamp);
+  const auto pass_optional = [&](auto& what) {
+    bool is_there = what.has_value();
+    pass(a, is_there);
+    if (!is_there) return;
+    if (!what) what.emplace();
+    pass(a, *what);
+  };
+  pass_optional(sample.scan);
+  pass_optional(sample.images);
+}
+/// What keyframes wait for: the last of a state, and not in one of before there was such a thing.
+template <class A>
+void pass_waiting(A& a, robot::SubmapBuilderState& builder) {
+  if (!a.has_more()) return;
+  std::vector<robot::OdometryStep> odometry(builder.waiting.odometry.begin(), builder.waiting.odometry.end());
+  pass(a, odometry);
+  builder.waiting.odometry.assign(odometry.begin(), odometry.end());
+  pass(a, builder.waiting.sensors);
+  pass(a, builder.heard_scan);
+  pass(a, builder.heard_images);
+  pass(a, builder.due);
+  pass(a, builder.is_blind);
+  pass(a, builder.keyframes_without_scan);
+  pass(a, builder.keyframes_without_images);
+}
+template <class A>
+void pass(A& a, AgentState& state) {
+  pass(a, state.session);
+  pass(a, state.sequence);
+  pass(a, state.epoch);
+  pass(a, state.revision);
+  pass(a, state.comparisons);
+  pass(a, state.submaps);
+  pass(a, state.smoother.first);
+  pass(a, state.smoother.odometry);
+  pass(a, state.smoother.constraints);
+  pass(a, state.smoother.poses);
+  std::vector<consistency::Constraint> ledger = state.ledger.constraints();
+  pass(a, ledger);
+  state.ledger = consistency::Ledger(std::move(ledger));
+  pass(a, state.keyframes);
+  pass(a, state.submap_of);
+  pass(a, state.node_odometry);
+  pass(a, state.since_node);
+  pass(a, state.T_odom_body);
+  pass(a, state.T_map_odom);
+  for (double& x : state.covariance.reshaped()) a.number(x);
+  pass(a, state.whereabouts);
+  bool has_component = state.component.has_value();
+  std::uint32_t component = state.component.value_or(0);
+  pass(a, has_component);
+  pass(a, component);
+  state.component = has_component ? std::optional(component) : std::nullopt;
+  pass_waiting(a, state.submaps);
+}
+
+}  // namespace tutti::wire::archive
