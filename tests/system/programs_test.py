@@ -344,6 +344,19 @@ class Programs(unittest.TestCase):
         self.assertIn("another name", said)
         self.assertIsNone(first.process.poll())
 
+    def test_a_robot_that_cannot_reach_its_bus_says_so(self):
+        nowhere = "nats://127.0.0.1:1"
+        robot = self.start("robot", "--name", "alpha", "--bus", nowhere, "--state", self.path / "alpha", MISSION, "--stay")
+        self.wait_for(lambda: "no link to the bus " + nowhere in self.status("alpha").get("trouble", ""), "its trouble")
+        self.assertFalse(self.status("alpha")["connected"])
+        self.assertIn("cannot reach the bus " + nowhere, (self.path / "alpha/log.txt").read_text())
+        self.assertEqual((self.path / "alpha").stat().st_mode & 0o777, 0o750)
+        for file in (self.path / "alpha").iterdir():
+            self.assertEqual(file.stat().st_mode & 0o027, 0, file)
+        code, said = robot.end()
+        self.assertEqual(code, 0, said)
+        self.assertIn("cannot reach the bus", said)
+
     def test_tells_the_service_manager(self):
         import socket
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
@@ -370,6 +383,8 @@ class Programs(unittest.TestCase):
         refused(2, "charlie", "alpha, bravo", args=["robot", "--name", "charlie", "--bus", "nats://127.0.0.1:1",
                                                     "--state", self.path / "charlie", MISSION])
         refused(2, "mission", args=["robot", "--name", "alpha", "--bus", "nats://127.0.0.1:1", "--state", state])
+        refused(2, "'al pha'", "' '", "letters, digits", args=["robot", "--name", "al pha", "--bus", "nats://127.0.0.1:1", "--state",
+                                                               self.path / "space", "--feed", self.path / "feed", MISSION])
         (self.path / "other").mkdir()
         (self.path / "other" / "thesis.tex").write_text("important")
         refused(1, "thesis.tex", args=["server", "--state", self.path / "other"])

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <utility>
 #include <vector>
 
@@ -171,6 +172,21 @@ Told tell_event(const node::Event& event) {
   return told;
 }
 
+/// Of events that others can cause as often as they like; empty: of another one. Who it was is not in it: they can say
+/// that, too.
+std::string throttled_kind(const node::Event& event) {
+  if (const auto* refused = std::get_if<node::MessageRefused>(&event.what))
+    return fmt::format("message {} {}", name(refused->from.role), wire::name(refused->kind));
+  if (std::holds_alternative<node::RobotRefused>(event.what)) return "robot refused";
+  if (std::holds_alternative<node::RobotJoined>(event.what)) return "robot joined";
+  if (std::holds_alternative<node::SampleRefused>(event.what)) return "sample";
+  if (std::holds_alternative<node::ScanRefused>(event.what)) return "scan";
+  if (std::holds_alternative<node::ImagesRefused>(event.what)) return "images";
+  return {};
+}
+
+double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
 }  // namespace
 
 Result<Level> level_of(const std::string& word) {
@@ -231,9 +247,17 @@ void EventLog::append(const std::string& line) {
 }
 
 void EventLog::write(const node::Event& event) {
-  const Told told = tell_event(event);
+  Told told = tell_event(event);
+  if (const std::string kind = throttled_kind(event); !kind.empty()) {
+    const std::scoped_lock guard(mutex_);
+    const Throttle::Verdict verdict = throttle_.ask(kind, steady_s());
+    if (!verdict.passes) return;
+    if (verdict.left_out > 0) told.json["left_out"] = verdict.left_out;
+    if (verdict.left_out > 0) told.sentence += fmt::format(" (and {} more of the kind before)", verdict.left_out);
+  }
   write(told.json);
-  say(told.level, told.sentence);
+  const std::scoped_lock guard(mutex_);
+  people(told.level, told.sentence);
 }
 
 void EventLog::write(const Json& line) {
@@ -243,6 +267,14 @@ void EventLog::write(const Json& line) {
 
 void EventLog::say(Level level, const std::string& sentence) {
   const std::scoped_lock guard(mutex_);
+  const double now_s = steady_s();
+  if (sentence == last_said_ && now_s < last_said_s_ + kSame_s) return;
+  last_said_ = sentence;
+  last_said_s_ = now_s;
+  people(level, sentence);
+}
+
+void EventLog::people(Level level, const std::string& sentence) {
   const bool over_line = !shown_.empty() && level >= console_;
   if (over_line) static_cast<void>(!::write(STDERR_FILENO, "\r\033[K", 4));
   people_->log(of_spdlog(level), sentence);

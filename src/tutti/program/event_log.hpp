@@ -12,6 +12,7 @@
 
 #include "tutti/base/result.hpp"
 #include "tutti/node/event.hpp"
+#include "tutti/program/throttle.hpp"
 
 namespace spdlog {
 class logger;
@@ -31,11 +32,13 @@ Json to_json(const node::Event& event);
 /// What a program tells: events for other programs in FOLDER/events.jsonl, one JSON object a line, and sentences for
 /// people in FOLDER/log.txt and, from a level on, on stderr. Both files begin anew when they are full: one older one of
 /// each is kept. Any thread may call at any time. What cannot be written, as on a full disk, is lost; the program goes
-/// on.
+/// on. What others can cause (refusals, and who says that he is here) is throttled, and the same sentence is said once
+/// in kSame_s.
 class EventLog {
  public:
   static constexpr std::uintmax_t kMaxEventBytes = std::uintmax_t{64} << 20U;
   static constexpr std::size_t kMaxLogBytes = std::size_t{10} << 20U;
+  static constexpr double kSame_s = 60.0;
 
   /// `name` stands in front of what people read. Goes on where an earlier program of this folder stopped.
   static Result<std::unique_ptr<EventLog>> open(const std::filesystem::path& folder, const std::string& name,
@@ -53,12 +56,16 @@ class EventLog {
  private:
   EventLog() = default;
   void append(const std::string& line);
+  void people(Level level, const std::string& sentence);
 
   std::mutex mutex_;
   std::filesystem::path file_;
   std::ofstream events_;
   std::uintmax_t bytes_ = 0;
   std::shared_ptr<spdlog::logger> people_;
+  Throttle throttle_;
+  std::string last_said_;
+  double last_said_s_ = 0.0;
   std::string shown_;
   Level console_ = Level::warning;
 };

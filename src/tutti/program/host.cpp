@@ -11,6 +11,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/bus/delivery.hpp"
+#include "tutti/bus/nats_port.hpp"
 #include "tutti/program/state_folder.hpp"
 
 namespace tutti::program {
@@ -154,9 +155,10 @@ bool Host::report() {
 
 double Host::turn() {
   const double wall_s = clock_.wall_s();
-  if (parts_.each_second && wall_s >= second_s_) {
+  if (wall_s >= second_s_) {
     second_s_ = wall_s + 1.0;
-    parts_.each_second();
+    look_at_link();
+    if (parts_.each_second) parts_.each_second();
   }
   if (!node_) {
     if (wall_s >= reopen_s_) reopen();
@@ -282,6 +284,12 @@ void Host::count(bool sent, const bus::Envelope& message) {
   traffic.largest = std::max<std::uint64_t>(traffic.largest, message.bytes->size());
 }
 
+void Host::look_at_link() {
+  const auto* port = dynamic_cast<const bus::NatsPort*>(port_.get());
+  if (port == nullptr) return;
+  for (const auto& [level, sentence] : link_.look(port->state(), clock_.wall_s())) log_.say(level, sentence);
+}
+
 void Host::tell_status() {
   const double wall_s = clock_.wall_s();
   if (wall_s < status_s_) return;
@@ -290,7 +298,8 @@ void Host::tell_status() {
   if (node_)
     if (const auto thrown = thrown_by([&] { status = node_->status(clock_.now()); }))
       status["line"] = "how it stands cannot be told: " + *thrown;
-  if (!trouble_.empty()) status["trouble"] = trouble_;
+  const std::string& trouble = trouble_.empty() ? link_.trouble() : trouble_;
+  if (!trouble.empty()) status["trouble"] = trouble;
   if (thrown_ > 0) status["thrown"] = {{"times", thrown_}, {"last", last_thrown_}, {"put_aside", aside_.count()}};
   if (status.contains("line")) log_.show(status.value("line", ""));
   if (!parts_.status_file.empty()) static_cast<void>(replace_file(parts_.status_file, status.dump() + "\n", false));

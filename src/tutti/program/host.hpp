@@ -16,6 +16,7 @@
 #include "tutti/node/step.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/event_log.hpp"
+#include "tutti/program/link_watch.hpp"
 #include "tutti/program/put_aside.hpp"
 #include "tutti/storage/table_store.hpp"
 
@@ -105,6 +106,8 @@ class Host {
   /// By direction (true: sent) and kind.
   using TrafficTable = std::map<std::pair<bool, bus::MessageKind>, Traffic>;
   [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }
+  /// What is wrong with the link to the bus; empty: nothing.
+  [[nodiscard]] const std::string& link_trouble() const { return link_.trouble(); }
   /// Why the node does not do all that it should; empty when it does.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
@@ -123,6 +126,7 @@ class Host {
   void close();
   void reopen();
   void tell_status();
+  void look_at_link();
   void count(bool sent, const bus::Envelope& message);
 
   Parts parts_;
@@ -142,6 +146,7 @@ class Host {
   std::string last_thrown_;
   double pause_s_ = 0.0, work_again_s_ = 0.0;  // of work that throws
   TrafficTable traffic_;
+  LinkWatch link_;
 };
 
 }  // namespace tutti::program

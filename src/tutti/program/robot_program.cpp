@@ -174,6 +174,7 @@ Json HostedRobot::status(Timestamp now) const {
           {"revision", status.heard_revision},
           {"connected", link.connected},
           {"alone", alone_},
+          {"refused", actor_->node().conflict().value_or("")},
           {"line",
            fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
                        status.keyframes, status.backlog_submaps, status.heard_revision,
@@ -199,8 +200,24 @@ Json last_words(const Host::TrafficTable& table, const HostedRobot* robot) {
   return event;
 }
 
+/// What a status may carry, and a unit of systemd, a folder and a subject of the bus can be called.
+Status check_robot_name(const std::string& name) {
+  constexpr std::size_t kLongest = 64;
+  const auto is_allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  const auto wrong = std::ranges::find_if_not(name, is_allowed);
+  if (!name.empty() && name.size() <= kLongest && wrong == name.end()) return {};
+  const std::string what =
+      wrong == name.end() ? fmt::format("{} letters", name.size()) : fmt::format("'{}' is none of these", *wrong);
+  return fail(ErrorCode::configuration,
+              "--name '{}': {}; a robot is known on the bus by 1 to {} letters, digits, '_' and '-'", name, what,
+              kLongest);
+}
+
 /// Only a robot that is not replayed may be in no mission.
 Result<RobotId> number_of(const std::string& name, const std::vector<std::string>& names, bool is_live) {
+  if (Status ok = check_robot_name(name); !ok) return tl::unexpected(ok.error());
   const auto found = std::ranges::find(names, name);
   if (found != names.end()) return RobotId{static_cast<std::uint32_t>(found - names.begin())};
   if (is_live) return robot_id_of(name);
@@ -342,7 +359,10 @@ Status RobotProgram::run(const std::atomic<bool>& stop) {
   const auto* robot = dynamic_cast<const HostedRobot*>(host_->hosted());
   log_->write(last_words(host_->traffic(), robot));
   if (robot != nullptr && robot->refused())
-    return fail(ErrorCode::invalid, "{}: stop that one, or give this one another name", *robot->refused());
+    return fail(ErrorCode::invalid,
+                "the server refuses this robot: {}: stop the other one, give this one another name, or name it in the "
+                "server's mission",
+                *robot->refused());
   if (robot == nullptr || stop || robot->is_whole_in_map())
     log_->say(Level::info, "stops; everything is stored");
   else

@@ -204,6 +204,7 @@ class ServerProgram {
   Status check_lease(const bus::MissionLease::State& seen) const;
   void tend();
   void tend_bus();
+  [[nodiscard]] std::string trouble() const;
   [[nodiscard]] std::string robot_command() const;
 
   const ServerOptions& options_;
@@ -234,7 +235,12 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
-      std::move(*node), options_.version, [this] { return trouble_.empty() ? host_->trouble() : trouble_; }, is_over_);
+      std::move(*node), options_.version, [this] { return trouble(); }, is_over_);
+}
+
+std::string ServerProgram::trouble() const {
+  if (!trouble_.empty()) return trouble_;
+  return host_->trouble().empty() ? host_->link_trouble() : host_->trouble();
 }
 
 Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -42,6 +43,7 @@ Status replace_file(const fs::path& file, const std::string& text, bool durable)
 }
 
 Result<StateFolder> StateFolder::open(const fs::path& folder, const std::string& owner, const std::string& brought) {
+  umask(umask(0) | S_IWGRP | S_IRWXO);  // the program's, before it makes any file: 0640, folders 0750
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return fail(ErrorCode::io, "state folder {}: cannot be made: {}", folder.string(), error.message());

@@ -2,6 +2,7 @@
 #include "tutti/program/state_folder.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -33,6 +34,21 @@ TEST_F(StateFolderTest, KeepsItsNumber) {
   ASSERT_TRUE(folder.has_value()) << folder.error().message;
   EXPECT_FALSE(folder->is_new());
   EXPECT_EQ(folder->made_ns(), made_ns);
+}
+
+TEST_F(StateFolderTest, OthersOfTheMachineReadNothing) {
+  umask(0);
+  const auto folder = StateFolder::open(folder_ / "deep", "robot alpha");
+  ASSERT_TRUE(folder.has_value()) << folder.error().message;
+  ASSERT_TRUE(EventLog::open(folder->path(), "alpha", Level::error).has_value());
+  ASSERT_TRUE(replace_file(folder->path() / "status.json", "{}", false));
+  int files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_)) {
+    const auto mode = static_cast<unsigned>(entry.status().permissions());
+    EXPECT_EQ(mode & 0027U, 0U) << entry.path() << " " << mode;
+    ++files;
+  }
+  EXPECT_GE(files, 6);
 }
 
 TEST_F(StateFolderTest, IsOneOwnersAndOneProgramsAtATime) {

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/link_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace tutti::program {
+
+std::vector<LinkWatch::Said> LinkWatch::look(const bus::NatsState& state, double wall_s) {
+  std::vector<Said> said;
+  const auto say = [&](Level level, std::string sentence) { said.push_back({level, std::move(sentence)}); };
+  trouble_.clear();
+  const std::string why = state.last_error.empty() ? "" : ": " + state.last_error;
+  if (!state.connected) {
+    if (!gone_since_s_) gone_since_s_ = wall_s;
+    const double gone_s = wall_s - *gone_since_s_;
+    if (gone_s < kPatience_s) return said;
+    trouble_ = fmt::format("no link to the bus {} for {:.0f} s{}", state.url, gone_s, why);
+    if (!std::exchange(said_gone_, true))
+      say(Level::warning, fmt::format("{} the bus {}{}; goes on without, and tries again and again",
+                                      was_there_ ? "lost its link to" : "cannot reach", state.url, why));
+    return said;
+  }
+  if (std::exchange(said_gone_, false))
+    say(Level::info,
+        fmt::format("the link to the bus {} is there, after {:.0f} s", state.url, wall_s - *gone_since_s_));
+  gone_since_s_.reset();
+  was_there_ = true;
+  if (state.streams_made_anew > made_anew_) say(Level::warning, state.last_error);
+  made_anew_ = state.streams_made_anew;
+  if (state.unconfirmed_s > kStores_s) {
+    trouble_ = fmt::format("the bus {} is there and has stored nothing for {:.0f} s: its disk may be full{}", state.url,
+                           state.unconfirmed_s, state.last_error.empty() ? "" : " (last error" + why + ")");
+    if (!std::exchange(said_full_, true)) say(Level::error, trouble_);
+  } else if (std::exchange(said_full_, false)) {
+    say(Level::info, fmt::format("the bus {} stores again", state.url));
+  }
+  return said;
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/link_watch.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::program {
+namespace link_watch_test {
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(LinkWatch, SaysOnceThatThereIsNoLinkAndThatItIsBack) {
+  LinkWatch watch;
+  bus::NatsState state{.url = "nats://base:4222", .last_error = "connecting: no server"};
+  for (int s = 0; s < 5; ++s) EXPECT_TRUE(watch.look(state, s).empty()) << s;
+  EXPECT_EQ(watch.trouble(), "");
+  auto said = watch.look(state, 5);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0].level, Level::warning);
+  EXPECT_TRUE(has(said[0].sentence, "cannot reach the bus nats://base:4222: connecting: no server"))
+      << said[0].sentence;
+  EXPECT_TRUE(watch.look(state, 50).empty());
+  EXPECT_TRUE(has(watch.trouble(), "for 50 s")) << watch.trouble();
+  state.connected = true;
+  said = watch.look(state, 60);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_TRUE(has(said[0].sentence, "is there, after 60 s")) << said[0].sentence;
+  EXPECT_EQ(watch.trouble(), "");
+  state.connected = false;
+  watch.look(state, 70);
+  said = watch.look(state, 76);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_TRUE(has(said[0].sentence, "lost its link to the bus")) << said[0].sentence;
+}
+
+TEST(LinkWatch, ACutThatNobodyNoticesIsNotSaid) {
+  LinkWatch watch;
+  bus::NatsState state{.url = "nats://base:4222", .connected = true};
+  for (int s = 0; s < 100; ++s) {
+    state.connected = s % 6 != 0;
+    EXPECT_TRUE(watch.look(state, s).empty()) << s;
+  }
+}
+
+TEST(LinkWatch, ABusThatStoresNothingIsSaidToBeFull) {
+  LinkWatch watch;
+  bus::NatsState state{.url = "nats://base:4222", .connected = true, .unconfirmed_s = 20.0};
+  EXPECT_TRUE(watch.look(state, 0).empty());
+  state.unconfirmed_s = 26.0;
+  auto said = watch.look(state, 6);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0].level, Level::error);
+  EXPECT_TRUE(has(said[0].sentence, "its disk may be full")) << said[0].sentence;
+  state.unconfirmed_s = 40.0;
+  EXPECT_TRUE(watch.look(state, 20).empty());
+  EXPECT_TRUE(has(watch.trouble(), "nothing for 40 s")) << watch.trouble();
+  state.unconfirmed_s = 0.0;
+  EXPECT_EQ(watch.look(state, 21).size(), 1U);
+  EXPECT_EQ(watch.trouble(), "");
+  state.streams_made_anew = 4;
+  state.last_error = "the bus had lost all";
+  said = watch.look(state, 22);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0].sentence, "the bus had lost all");
+  EXPECT_TRUE(watch.look(state, 23).empty());
+}
+
+}  // namespace link_watch_test
+}  // namespace tutti::program

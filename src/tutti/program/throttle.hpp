@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+namespace tutti::program {
+
+/// So that what strangers can cause as often as they like fills no log: of each kind of line so many at once, then one
+/// every kPeriod_s, which says how many were left out.
+class Throttle {
+ public:
+  static constexpr double kBurst = 20.0;
+  static constexpr double kPeriod_s = 10.0;
+
+  struct Verdict {
+    bool passes = false;
+    std::uint64_t left_out = 0;  ///< Of this kind, since the last that passed.
+  };
+  Verdict ask(const std::string& kind, double wall_s);
+
+ private:
+  struct Kind {
+    double tokens = kBurst;
+    double since_s = 0.0;
+    std::uint64_t left_out = 0;
+  };
+  std::map<std::string, Kind> kinds_;  // as many as there are kinds of events and messages
+};
+
+}  // namespace tutti::program
