@@ -177,7 +177,7 @@ class CommandLine(unittest.TestCase):
         self.assertFalse(report["robots"][0]["tied"])
         note, = [note for note in report["notes"] if "wanted scans that are not there" in note]
         self.assertGreaterEqual(int(note.split()[1]), report["robots"][0]["keyframes"] - 1, note)
-        self.assertIn(".pcd: is not there", note)
+        self.assertIn("000002.pcd (or .bin): is not there", note)
         (self.path / "scans" / "000000.pcd").write_text("no point cloud")
         self.expect(run(), 1, "robot a: not one scan could be read", "000000.pcd")
 
