@@ -12,6 +12,7 @@
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/wire/codec.hpp"
+#include "tutti/wire/limits.hpp"
 #include "tutti/wire/refinement_codec.hpp"
 
 namespace tutti::mapfile {
@@ -118,6 +119,8 @@ Result<std::string> joined_refusals(std::string_view key, const std::string& a, 
   if (!one || !other)
     return in_context(fmt::format("the row '{}' of table 'meta'", key), one ? other.error() : one.error());
   for (const auto& [session, refused] : other->refused) one->refused[session] = both(one->refused[session], refused);
+  for (const Receipt::Refusal& refusal : other->refusals)
+    one->refuse({{one->robot, refusal.session}, refusal.index}, refusal.content, wire::kMaxRefusals);
   if (one->why_refused.empty()) one->why_refused = other->why_refused;
   if (auto ok = wire::validate(*one); !ok) return tl::unexpected(ok.error());
   return wire::encode(*one);

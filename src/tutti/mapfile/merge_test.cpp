@@ -176,6 +176,8 @@ TEST(Merge, WhatEitherNeverTakesIsNotTaken) {
   const auto refuse = [](MemoryStore& store, std::uint64_t session, std::vector<std::uint64_t> numbers) {
     Receipt receipt{.robot = kAlpha};
     for (const std::uint64_t number : numbers) receipt.refused[session].insert(number);
+    for (const std::uint64_t number : numbers)
+      receipt.refusals.push_back({session, static_cast<std::uint32_t>(number), numbers.size()});
     receipt.why_refused = "garbage";
     ASSERT_TRUE(
         store.commit(std::vector<Write>{{"meta", std::string(node::kRefusedPrefix) + "0", wire::encode(receipt)}})
@@ -190,6 +192,10 @@ TEST(Merge, WhatEitherNeverTakesIsNotTaken) {
   const Receipt receipt = wire::decode_receipt(*row).value();
   for (std::uint32_t i = 88; i < 98; ++i)
     EXPECT_EQ(receipt.refuses({{kAlpha, 5}, i}), i == 90 || i == 91 || i == 92 || i == 95) << i;
+  EXPECT_EQ(receipt.refusals.size(), 5U);  // two contents of 91
+  EXPECT_TRUE(receipt.refuses({{kAlpha, 5}, 91}, 2));
+  EXPECT_TRUE(receipt.refuses({{kAlpha, 5}, 91}, 3));
+  EXPECT_FALSE(receipt.refuses({{kAlpha, 5}, 92}, 2));
 }
 
 class MergedFiles : public testing::Test {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -44,6 +45,13 @@ struct Receipt {
     std::string why;
     friend bool operator==(const Conflict&, const Conflict&) = default;
   };
+  /// A submap that was refused, with the content_hash() of its bytes: others that come under its id are not.
+  struct Refusal {
+    std::uint64_t session = 0;
+    std::uint32_t index = 0;
+    std::uint64_t content = 0;
+    friend bool operator==(const Refusal&, const Refusal&) = default;
+  };
   RobotId robot;
   std::uint32_t incarnation = 0;               ///< ProxyGraph::incarnation
   std::map<std::uint64_t, NumberSet> stored;   ///< Numbers of submaps, by session.
@@ -54,10 +62,18 @@ struct Receipt {
   std::map<std::uint64_t, NumberSet> unread;
   std::optional<std::uint64_t> owner_session;  ///< Whose name and number these are, as far as the server was told.
   std::optional<Conflict> conflict;
+  std::vector<Refusal> refusals;  ///< Of those refused, the last ones; older servers do not say them.
 
   [[nodiscard]] bool contains(SubmapId id) const { return has(stored, id); }
   [[nodiscard]] bool refuses(SubmapId id) const { return has(refused, id); }
   [[nodiscard]] bool leaves_unread(SubmapId id) const { return has(unread, id); }
+  /// This content under this id; of an older server, which does not say contents, whatever comes under it.
+  [[nodiscard]] bool refuses(SubmapId id, std::uint64_t content) const;
+  /// One more; false: it was before. Of more than `most` contents the oldest are forgotten, and submaps with their
+  /// last.
+  bool refuse(SubmapId id, std::uint64_t content, std::size_t most);
+  /// As if nothing had ever come under this id that was refused.
+  void forget_refusals(SubmapId id);
   friend bool operator==(const Receipt&, const Receipt&) = default;
 
  private:
@@ -65,6 +81,8 @@ struct Receipt {
     const auto session = numbers.find(id.chain.session);
     return id.chain.robot == robot && session != numbers.end() && session->second.contains(id.index);
   }
+  [[nodiscard]] bool has_refusal_of(std::uint64_t session, std::uint32_t index) const;
+  void remove_refused(std::uint64_t session, std::uint32_t index);
 };
 
 /// server -> one of the workers: pairs of submaps to be verified.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "tutti/base/content_hash.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/wire/agent_state.hpp"
@@ -379,7 +380,7 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
   if (receipt->incarnation != receipt_incarnation_) note_start(*receipt, now, step);
   std::vector<SubmapId> known;
   for (const auto& [id, bytes] : uplink_.submaps()) {
-    const bool is_refused = !receipt->contains(id) && receipt->refuses(id);
+    const bool is_refused = !receipt->contains(id) && is_refused_as_it_is(id, *receipt);
     if (is_refused)
       step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
                                     fmt::format("submap {} is refused by the server, which last said: {}",
@@ -400,7 +401,7 @@ void RobotNode::note_start(const Receipt& receipt, Timestamp now, Step& step) {
   uplink_.release();
   std::vector<SubmapId> forgotten;
   for (const auto& [id, bytes] : archive_)
-    if (!receipt.contains(id) && !receipt.refuses(id)) forgotten.push_back(id);
+    if (!receipt.contains(id) && !is_refused_as_it_is(id, receipt)) forgotten.push_back(id);
   if (forgotten.empty()) return;
   for (const SubmapId id : forgotten) {
     const auto found = archive_.find(id);
@@ -425,6 +426,13 @@ void RobotNode::archive(SubmapId id, Step& step) {
     archive_bytes_ -= oldest->second;
     archive_.erase(oldest);
   }
+}
+
+/// And not something else that came under its id.
+bool RobotNode::is_refused_as_it_is(SubmapId id, const Receipt& receipt) const {
+  if (!receipt.refuses(id)) return false;
+  const auto row = store_.read(kOutbox, key_of(id));
+  return row && *row && receipt.refuses(id, content_hash(**row));
 }
 
 void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step) {

@@ -100,6 +100,7 @@ class RobotNode {
   void receive_graph(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget, Step& step);
   /// After each input: what became of it that was not told at once.
   void settle(Timestamp now, Step& step);
+  [[nodiscard]] bool is_refused_as_it_is(SubmapId id, const Receipt& receipt) const;
   void note_conflict(const Receipt& receipt, Timestamp now, Step& step);
   void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/robot/drifting_robot.hpp"
+#include "tutti/base/content_hash.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/storage/memory_store.hpp"
 #include "tutti/wire/agent_state.hpp"
@@ -137,6 +138,34 @@ TEST_F(RobotNodeTest, WhatTheServerRefusesForGoodLeavesTheOutboxAndIsTold) {
   EXPECT_NE(why.find("1:101/0"), std::string::npos) << why;
   EXPECT_NE(why.find("no good"), std::string::npos) << why;
   EXPECT_TRUE(done(node_->receive(envelope, now_)).events.empty());
+}
+
+TEST_F(RobotNodeTest, WhatIsRefusedOfSomebodyElseUnderItsIdStays) {
+  walk(0, 100);
+  const SubmapId id = node_->backlog().begin()->first;
+  Receipt receipt{.robot = kRobot, .why_refused = "no good"};
+  receipt.refused[id.chain.session].insert(id.index);
+  receipt.refusals.push_back({id.chain.session, id.index, content_hash("garbage")});
+  EXPECT_TRUE(done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_)).events.empty());
+  EXPECT_TRUE(node_->backlog().contains(id));
+  const auto mine = std::ranges::find(sent_, message_id(id), &bus::Envelope::id);
+  ASSERT_NE(mine, sent_.end());
+  receipt.refusals.push_back({id.chain.session, id.index, content_hash(*mine->bytes)});
+  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  EXPECT_FALSE(node_->backlog().contains(id));
+}
+
+TEST_F(RobotNodeTest, WhatAServerHasForgottenGoesAgainAlsoWhenItRefusesGarbageUnderItsId) {
+  walk(0, 100);
+  const SubmapId id = node_->backlog().begin()->first;
+  Receipt receipt{.robot = kRobot, .incarnation = 1};
+  receipt.stored[id.chain.session].insert(id.index);
+  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  EXPECT_FALSE(node_->backlog().contains(id));
+  receipt = {.robot = kRobot, .incarnation = 2, .why_refused = "no good"};
+  receipt.refuse(id, content_hash("garbage"), 9);
+  done(node_->receive(from_server(MessageKind::receipt, wire::encode(receipt)), now_));
+  EXPECT_TRUE(node_->backlog().contains(id));
 }
 
 TEST_F(RobotNodeTest, SaysHowItIs) {

@@ -35,14 +35,44 @@ bool RobotRegistry::is_there(const Robot& robot, std::uint64_t rival, Timestamp 
   return robot.rivals.contains(rival) && now - started_ < kOwnerIsThere_s;
 }
 
+bool RobotRegistry::note_session(const ChainId& chain) {
+  const bool is_first = !mapped_.contains(chain.robot);
+  mapped_[chain.robot].insert(chain.session);
+  return is_first && owner(chain.robot).has_value();
+}
+
+bool RobotRegistry::is_mapped(RobotId robot, std::uint64_t session) const {
+  const auto found = mapped_.find(robot);
+  return found != mapped_.end() && found->second.contains(session);
+}
+
+void RobotRegistry::forget_strangers() {
+  std::erase_if(robots_, [&](const auto& entry) { return !is_mapped(entry.first); });
+}
+
+void RobotRegistry::make_room() {
+  std::size_t strangers = 0;
+  auto oldest = robots_.end();
+  for (auto at = robots_.begin(); at != robots_.end(); ++at) {
+    if (is_mapped(at->first)) continue;
+    ++strangers;
+    if (oldest == robots_.end() || at->second.last_seen < oldest->second.last_seen) oldest = at;
+  }
+  if (strangers >= kMostStrangers) robots_.erase(oldest);
+}
+
 std::string RobotRegistry::objection(RobotId id, const NodeStatus& status, Timestamp now) const {
+  const bool has_submaps = is_mapped(id, status.session);
   for (const auto& [other, robot] : robots_)
-    if (other != id && robot.status.name == status.name && is_there(robot, status.session, now))
+    if (other != id && robot.status.name == status.name && is_there(robot, status.session, now) &&
+        (is_mapped(other) || !has_submaps))
       return fmt::format("the name '{}' is in use by robot number {}, session {}; this one has number {}", status.name,
                          other.value, robot.status.session, id.value);
   const auto found = robots_.find(id);
   if (found == robots_.end() || !found->second.is_claimed) return {};
   const auto& [is_claimed, owner, former, rivals, seen, updated, conflicted, conflict] = found->second;
+  if (has_submaps && !is_mapped(id, owner.session)) return {};
+  if (!is_mapped(id) && owner.name != status.name && !is_there(found->second, status.session, now)) return {};
   if (owner.name != status.name)
     return fmt::format("number {} belongs to robot '{}' in this map, not to '{}'", id.value, owner.name, status.name);
   if (owner.session == status.session) return {};
@@ -67,6 +97,7 @@ void RobotRegistry::take_over(RobotId id, Robot& robot, const NodeStatus& status
 
 RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, Timestamp now) {
   Heard heard{.accepted = false, .must_be_stored = false, .why = objection(id, status, now)};
+  if (!robots_.contains(id)) make_room();
   Robot& robot = robots_[id];
   if (!heard.why.empty()) {
     robot.conflict = heard.why;
@@ -75,7 +106,7 @@ RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, T
       const std::size_t before = robot.rivals.size();
       if (!robot.former.contains(status.session) && robot.status.session != status.session)
         remember(robot.rivals, status.session);
-      heard.must_be_stored = robot.rivals.size() > before;
+      heard.must_be_stored = is_mapped(id) && robot.rivals.size() > before;
     } else {
       robot.status = status;
       robot.last_seen = now;
@@ -85,7 +116,7 @@ RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, T
   heard.accepted = true;
   if (!robot.is_claimed || robot.status.session != status.session) {
     take_over(id, robot, status);
-    heard.must_be_stored = true;
+    heard.must_be_stored = is_mapped(id);
   }
   robot.status = status;
   robot.last_seen = now;

@@ -63,13 +63,46 @@ TEST_F(Registry, AfterThirtySecondsANewSessionTakesItsPlaceForGood) {
     EXPECT_NE(why_.find("session 10 of robot 'alpha' has been replaced by session 11"), std::string::npos) << why_;
   }
   EXPECT_EQ(owner(kOne), 11U);
-  EXPECT_FALSE(hear(kOne, "bravo", 12, 1000));  // a number keeps its name
+  registry_.note_session({kOne, 11});
+  EXPECT_FALSE(hear(kOne, "bravo", 12, 1000));  // a number with submaps keeps its name
+}
+
+TEST_F(Registry, AClaimWithoutSubmapsHoldsWhileItIsThereAndGivesWayToOneWithSubmaps) {
+  EXPECT_TRUE(hear(kOne, "nobody", 99, 0));
+  EXPECT_FALSE(hear(kOne, "alpha", 10, 1));
+  EXPECT_TRUE(registry_.note_session({kOne, 10}));  // the robot's submaps come all the same
+  EXPECT_FALSE(registry_.note_session({kOne, 10}));
+  EXPECT_TRUE(hear(kOne, "alpha", 10, 2));
+  EXPECT_FALSE(hear(kOne, "nobody", 99, 1000));
+  EXPECT_FALSE(hear(kOne, "nobody", 98, 1000));
+  EXPECT_TRUE(hear(kTwo, "nobody", 99, 1000));
+  EXPECT_FALSE(hear(kTwo, "bravo", 11, 1029));
+  EXPECT_TRUE(hear(kTwo, "bravo", 11, 1031));
+  EXPECT_TRUE(hear(kOne, "alpha", 66, 2000));  // somebody who knows its name, while it is out of range
+  EXPECT_TRUE(hear(kOne, "alpha", 10, 2001));
+  EXPECT_EQ(owner(kOne), 10U);
+}
+
+TEST_F(Registry, StrangersAreBoundedNotStoredAndInNobodysWay) {
+  registry_.note_session({kOne, 10});
+  for (std::uint32_t i = 0; i < 1200; ++i) {
+    const auto heard = registry_.hear({100 + i}, status("fake_" + std::to_string(i), 1), at(i * 0.001));
+    EXPECT_TRUE(heard.accepted);
+    EXPECT_FALSE(heard.must_be_stored);
+  }
+  EXPECT_TRUE(registry_.hear(kOne, status("alpha", 10), at(2)).must_be_stored);
+  EXPECT_TRUE(hear(kTwo, "bravo", 11, 2));
+  EXPECT_EQ(registry_.robots().size(), RobotRegistry::kMostStrangers + 1);
+  EXPECT_TRUE(registry_.robots().contains(kTwo));
+  registry_.forget_strangers();
+  EXPECT_EQ(registry_.robots().size(), 1U);
 }
 
 TEST_F(Registry, WhatLiesInTheMapIsOlderThanWhoeverComesFirst) {
   registry_.note_session({kOne, 99});
   EXPECT_EQ(registry_.owner(kOne), std::nullopt);
   EXPECT_TRUE(hear(kOne, "alpha", 10, 0));  // its clock is behind that of its last start
+  registry_.note_session({kOne, 10});
   EXPECT_FALSE(hear(kOne, "alpha", 99, 500));
   EXPECT_EQ(owner(kOne), 10U);
 }
@@ -102,10 +135,14 @@ TEST_F(Registry, RowsThatAreDamagedAreNotTaken) {
 }
 
 /// Whatever programs say and however often the server starts again: a session that has lost its place never has it
-/// again, and only one that was not heard for 30 s loses it.
+/// again, and only one that was not heard for 30 s loses it. (All are strangers, or none is.)
 RC_GTEST_PROP(RegistryProperty, OwnersChangeOnlyWhenTheyAreGoneAndNeverBack, ()) {
   RobotRegistry registry;
   registry.start(at(0));
+  const bool are_mapped = *rc::gen::element(false, true);
+  const auto map_all = [&] {
+    for (std::uint64_t session = 0; are_mapped && session < 6; ++session) registry.note_session({kOne, session});
+  };
   double now = 0.0;
   std::vector<std::uint64_t> owners;
   double owner_seen = -1.0;  // since the last start; negative: not
@@ -116,6 +153,7 @@ RC_GTEST_PROP(RegistryProperty, OwnersChangeOnlyWhenTheyAreGoneAndNeverBack, ())
       fresh.start(at(now));
       RC_ASSERT(fresh.restore(kOne, registry.row(kOne)));
       registry = fresh;
+      map_all();
       owner_seen = -1.0;
     }
     const auto session = *rc::gen::inRange<std::uint64_t>(0, 6);

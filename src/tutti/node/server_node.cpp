@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/content_hash.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
@@ -20,8 +21,10 @@
 namespace tutti::node {
 namespace {
 
-constexpr std::size_t kMostRefusedSessions = 100;
-constexpr std::size_t kMostRefusedStretches = 500;  // in each of these
+constexpr std::size_t kMostUnreadSessions = 100;
+constexpr std::size_t kMostUnreadStretches = 500;  // in each of these
+constexpr std::size_t kMostRefused = 256;          // of a robot; the last ones
+constexpr std::size_t kMostStrangers = 1000;       // who are told something
 
 bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<const std::string> bytes) {
   return {bus::Endpoint::server(), bus::Endpoint::of(robot), kind, {}, std::move(bytes)};
@@ -57,6 +60,15 @@ void forget_unread(SubmapId id, Receipt& receipt) {
   NumberSet& numbers = receipt.unread.at(id.chain.session);
   numbers.erase(id.index);
   if (numbers.stretches().empty()) receipt.unread.erase(id.chain.session);
+}
+
+/// What is kept of a receipt: all else follows from the map.
+storage::Write refusals_of(const Receipt& receipt) {
+  const Receipt kept{.robot = receipt.robot,
+                     .refused = receipt.refused,
+                     .why_refused = receipt.why_refused,
+                     .refusals = receipt.refusals};
+  return {kMetaTable, fmt::format("{}{}", kRefusedPrefix, receipt.robot.value), wire::encode(kept)};
 }
 
 bus::MessageKind kind_of(std::string_view table) {
@@ -206,6 +218,7 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
   auto opened = Opened::from(store, finder->id());
   if (!opened) return tl::unexpected(opened.error());
   if (opened->epoch > 0) epoch = opened->epoch;
+  opened->registry.forget_strangers();
   if (config.accepts_others) {
     for (const auto& [robot, receipt] : opened->receipts) robots.insert(robot);
     for (const auto& [robot, entry] : opened->registry.robots()) robots.insert(robot);
@@ -300,12 +313,40 @@ void ServerNode::refuse(const bus::Envelope& envelope, const std::string& why, T
   note_refusal(envelope.from.role, envelope.kind, why);
 }
 
+std::string ServerNode::objection_to(RobotId robot) const {
+  if (robots_.contains(robot)) return {};
+  if (!config_.accepts_others) return fmt::format("robot {} is none of the mission's {}", robot.value, robots_.size());
+  if (robots_.size() >= ProxyGraph::kMostChains)
+    return fmt::format("the map has {} robots already and takes no other one", robots_.size());
+  return {};
+}
+
 bool ServerNode::admit(RobotId robot) {
-  if (robots_.contains(robot)) return true;
-  if (!config_.accepts_others || robots_.size() >= ProxyGraph::kMostChains) return false;
-  robots_.insert(robot);
+  if (!robots_.insert(robot).second) return false;
   server_.add_robot(robot);
+  if (auto known = strangers_.extract(robot)) receipts_.try_emplace(robot, std::move(known.mapped().receipt));
   return true;
+}
+
+void ServerNode::dismiss(RobotId robot, Timestamp now) {
+  robots_.erase(robot);
+  server_.remove_robot(robot);
+  if (auto told = receipts_.extract(robot)) strangers_.insert({robot, {std::move(told.mapped()), now}});
+}
+
+Receipt* ServerNode::receipt_of(RobotId robot, Timestamp now) {
+  if (robots_.contains(robot) || receipts_.contains(robot)) {
+    Receipt& receipt = receipts_[robot];
+    receipt.robot = robot;
+    return &receipt;
+  }
+  if (strangers_.size() >= kMostStrangers && !strangers_.contains(robot))
+    std::erase_if(strangers_, [&](const auto& entry) { return now - entry.second.heard >= kStrangerIsGone_s; });
+  if (strangers_.size() >= kMostStrangers && !strangers_.contains(robot)) return nullptr;
+  Stranger& stranger = strangers_[robot];
+  stranger.heard = now;
+  stranger.receipt.robot = robot;
+  return &stranger.receipt;
 }
 
 void ServerNode::receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -313,10 +354,10 @@ void ServerNode::receive_submap(const bus::Envelope& envelope, Timestamp now, St
   if (taken) return;
   refuse(envelope, taken.error().message, now, step);
   const auto id = submap_of(envelope.id);
-  if (!id || id->chain.robot != envelope.from.robot()) return;
-  if (taken.error().code == ErrorCode::unsupported && admit(id->chain.robot)) return note_unread(*id, step);
+  if (!id || id->chain.robot != envelope.from.robot() || !objection_to(id->chain.robot).empty()) return;
+  if (taken.error().code == ErrorCode::unsupported) return note_unread(*id, now, step);
   const bool may_be_good_later = taken.error().code == ErrorCode::io;
-  if (robots_.contains(id->chain.robot) && !may_be_good_later) note_refused(*id, taken.error().message, step);
+  if (!may_be_good_later) note_refused(*id, envelope, taken.error().message, now, step);
 }
 
 Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -327,7 +368,8 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
     return fail(ErrorCode::unknown_robot, "submap {} from somebody else", to_string(id));
   if (submap_of(envelope.id) != id)
     return fail(ErrorCode::invalid, "submap {} in a message with the id '{}'", to_string(id), envelope.id);
-  admit(id.chain.robot);
+  if (const std::string why = objection_to(id.chain.robot); !why.empty())
+    return fail(ErrorCode::unknown_robot, "submap {}: {}", to_string(id), why);
   const bool is_new = !server_.state().submaps.contains(id);
   if (!is_new) {
     const auto stored = frames_->frame(id);
@@ -336,13 +378,22 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
       return fail(ErrorCode::invalid, "submap {} comes with other content than the one in the map, which stays",
                   to_string(id));
   }
-  if (auto taken = server_.receive(*message); !taken) return taken;
+  const bool is_first = admit(id.chain.robot);
+  if (auto taken = server_.receive(*message); !taken) {
+    if (is_first) dismiss(id.chain.robot, now);
+    return taken;
+  }
   if (is_new) {
     Receipt& receipt = receipts_[id.chain.robot];
     receipt.robot = id.chain.robot;
     receipt.stored[id.chain.session].insert(id.index);
     forget_unread(id, receipt);
-    registry_.note_session(id.chain);
+    if (receipt.refuses(id)) {  // something else that came under its id
+      receipt.forget_refusals(id);
+      step.writes.push_back(refusals_of(receipt));
+    }
+    if (registry_.note_session(id.chain))
+      step.writes.push_back({kMetaTable, RobotRegistry::key(id.chain.robot), registry_.row(id.chain.robot)});
     step.writes.push_back({"submaps", key_of(id), *envelope.bytes});
     step.tell(now, SubmapStored{id});
   }
@@ -361,29 +412,28 @@ void ServerNode::tell_unread_rows(Timestamp now, Step& step) {
 }
 
 /// Not stored: it is for the robot to keep it, which has the right one where this is garbage. Bounded as refusals are.
-void ServerNode::note_unread(SubmapId id, Step& step) {
-  Receipt& receipt = receipts_[id.chain.robot];
-  receipt.robot = id.chain.robot;
-  const bool is_bounded = receipt.unread.size() < kMostRefusedSessions || receipt.unread.contains(id.chain.session);
-  if (!receipt.contains(id) && is_bounded &&
-      receipt.unread[id.chain.session].stretches().size() < kMostRefusedStretches)
-    receipt.unread[id.chain.session].insert(id.index);
-  send_receipt(id.chain.robot, step);
+/// A robot that nobody knows is told so too, and is none of the mission's for that.
+void ServerNode::note_unread(SubmapId id, Timestamp now, Step& step) {
+  Receipt* const receipt = receipt_of(id.chain.robot, now);
+  if (receipt == nullptr) return;
+  const bool is_bounded = receipt->unread.size() < kMostUnreadSessions || receipt->unread.contains(id.chain.session);
+  if (!receipt->contains(id) && is_bounded &&
+      receipt->unread[id.chain.session].stretches().size() < kMostUnreadStretches)
+    receipt->unread[id.chain.session].insert(id.index);
+  send_receipt(*receipt, step);
 }
 
-/// Bounded, so that nobody's garbage fills the receipt; beyond, a robot keeps what it is not told of.
-void ServerNode::note_refused(SubmapId id, const std::string& why, Step& step) {
-  Receipt& receipt = receipts_[id.chain.robot];
-  receipt.robot = id.chain.robot;
-  const bool is_bounded = receipt.refused.size() < kMostRefusedSessions || receipt.refused.contains(id.chain.session);
-  if (!receipt.contains(id) && !receipt.refuses(id) && is_bounded &&
-      receipt.refused[id.chain.session].stretches().size() < kMostRefusedStretches) {
-    receipt.refused[id.chain.session].insert(id.index);
-    receipt.why_refused = wire::plain_text(why);
-    const Receipt kept{.robot = receipt.robot, .refused = receipt.refused, .why_refused = receipt.why_refused};
-    step.writes.push_back({kMetaTable, fmt::format("{}{}", kRefusedPrefix, id.chain.robot.value), wire::encode(kept)});
+/// The last ones, each with its content: nobody's garbage fills the receipt, or keeps out the submap that a robot will
+/// send under this id.
+void ServerNode::note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now,
+                              Step& step) {
+  Receipt* const receipt = receipt_of(id.chain.robot, now);
+  if (receipt == nullptr) return;
+  if (!receipt->contains(id) && receipt->refuse(id, content_hash(*envelope.bytes), kMostRefused)) {
+    receipt->why_refused = wire::plain_text(why);
+    if (robots_.contains(id.chain.robot)) step.writes.push_back(refusals_of(*receipt));
   }
-  send_receipt(id.chain.robot, step);
+  send_receipt(*receipt, step);
 }
 
 /// What a worker asked for; what it does not get it asks for again.
@@ -403,11 +453,12 @@ void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step&
   }
 }
 
-void ServerNode::send_receipt(RobotId robot, Step& step) const {
-  Receipt receipt = receipts_.at(robot);
+void ServerNode::send_receipt(RobotId robot, Step& step) const { send_receipt(receipts_.at(robot), step); }
+
+void ServerNode::send_receipt(Receipt receipt, Step& step) const {
   receipt.incarnation = config_.incarnation;
   step.messages.push_back(
-      to_robot(robot, bus::MessageKind::receipt, std::make_shared<const std::string>(wire::encode(receipt))));
+      to_robot(receipt.robot, bus::MessageKind::receipt, std::make_shared<const std::string>(wire::encode(receipt))));
 }
 
 void ServerNode::send_graph(ProxyGraphMessage message, Step& step) {

@@ -31,7 +31,8 @@ struct ServerNodeConfig {
   std::shared_ptr<const server::MapRefiner> refiner;  ///< Null: the map is its pose graph's.
   /// Of this start, at random (ProxyGraph::incarnation); robots send again what is not in the map of a new one.
   std::uint32_t incarnation = 0;
-  bool accepts_others = false;  ///< Robots that it was not told of, up to ProxyGraph::kMostChains in all.
+  /// Robots that it was not told of, from their first submap on, up to ProxyGraph::kMostChains in all.
+  bool accepts_others = false;
 };
 
 /// The mapping server round MapServer: submaps, verdicts and operators' words in; receipts, jobs and proxy graphs out.
@@ -72,24 +73,36 @@ class ServerNode {
   [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_; }  ///< The last one; empty before.
 
  private:
-  static constexpr double kWorkerIsThere_s = 10.0;  // five of its statuses
-  struct Opened;                                    // what was found in the store
+  static constexpr double kWorkerIsThere_s = 10.0;   // five of its statuses
+  static constexpr double kStrangerIsGone_s = 60.0;  // a robot without submaps
+  struct Opened;                                     // what was found in the store
   ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
              const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames, Opened opened);
 
   /// Told, and counted.
   void refuse(const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
   void note_refusal(bus::Endpoint::Role from, bus::MessageKind kind, const std::string& why);
-  /// Whether it is one of the mission's robots, from now on if it was not.
+  /// It is one of the mission's robots from now on. False: it was before.
   bool admit(RobotId robot);
+  /// admit() back: its first submap was none.
+  void dismiss(RobotId robot, Timestamp now);
+  /// Why it cannot become one of the mission's robots; empty: it is one, or can.
+  [[nodiscard]] std::string objection_to(RobotId robot) const;
   void receive_status(const bus::Envelope& envelope, Timestamp now, Step& step);
+  void refuse_robot(const bus::Envelope& envelope, const NodeStatus& status, const std::string& why, Timestamp now,
+                    Step& step);
+  [[nodiscard]] std::set<RobotId> strangers_there(Timestamp now) const;
   void receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
   [[nodiscard]] bool waits_too_long(RobotId robot, const NodeStatus& status, Timestamp now);
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// For good: the robot need not send it again.
-  void note_refused(SubmapId id, const std::string& why, Step& step);
+  void note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
+  /// Of a robot that is none of the mission's, or not yet: nothing when too many of these have one.
+  [[nodiscard]] Receipt* receipt_of(RobotId robot, Timestamp now);
+  [[nodiscard]] const Receipt* told_to(RobotId robot) const;
+  void send_receipt(Receipt receipt, Step& step) const;
   /// The robot need not send it again before the next start, which may be of a newer version.
-  void note_unread(SubmapId id, Step& step);
+  void note_unread(SubmapId id, Timestamp now, Step& step);
   /// Says which rows of the map are left alone.
   void tell_unread_rows(Timestamp now, Step& step);
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
@@ -164,6 +177,11 @@ class ServerNode {
   std::shared_ptr<const SubmapFrames> frames_;
   server::MapServer server_;
   std::map<RobotId, Receipt> receipts_;
+  struct Stranger {
+    Receipt receipt;  // as it was told, or is to be told
+    Timestamp heard;
+  };
+  std::map<RobotId, Stranger> strangers_;  // robots that are none of the mission's, or not yet
   RobotRegistry registry_;
   std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are told
   std::map<RobotId, Timestamp> waits_since_;       // robots with a backlog: since then without a receipt that was due

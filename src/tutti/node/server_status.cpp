@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a ServerNode knows of the others, and says of the whole.
 #include <algorithm>
+#include <functional>
 
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
@@ -12,6 +13,8 @@ namespace {
 
 constexpr double kWorkerIsGone_s = 300.0;
 constexpr double kReceiptAgain_s = 60.0;
+constexpr std::size_t kMostWorkers = 1000;      // the last heard
+constexpr std::size_t kMostStrangersTold = 50;  // to viewers: the last heard
 
 std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
   std::uint64_t all = 0;
@@ -37,27 +40,39 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
   }
   const auto robot = envelope.from.robot();
   if (!robot) return refuse(envelope, "the status of neither a robot nor a worker", now, step);
-  if (!admit(*robot))
-    return refuse(envelope, fmt::format("robot {} is none of the mission's {}", robot->value, robots_.size()), now,
-                  step);
+  if (const std::string why = objection_to(*robot); !why.empty())
+    return refuse_robot(envelope, *status, why, now, step);
   receive_status_of_robot(*robot, *status, now, step);
 }
 
 void ServerNode::receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step) {
   std::erase_if(workers_, [&](const auto& entry) { return now - entry.second.last_seen > kWorkerIsGone_s; });
-  if (workers_.size() >= wire::kMaxRobots && !workers_.contains(number)) return;
+  if (workers_.size() >= kMostWorkers && !workers_.contains(number))
+    workers_.erase(std::ranges::min_element(workers_, {}, [](const auto& entry) { return entry.second.last_seen; }));
   workers_.insert_or_assign(number, MissionStatus::Worker{number, now, status});
   if (!waiting_.empty() && can(status, server_.finder().id())) ask_waiting(now, step);
   if (refinement_waiting_ && can(status, refinement_waiting_->refiner))
     ask_for_refinement(*std::exchange(refinement_waiting_, std::nullopt), now, 0, step);
 }
 
+/// It is told so, once.
+void ServerNode::refuse_robot(const bus::Envelope& envelope, const NodeStatus& status, const std::string& why,
+                              Timestamp now, Step& step) {
+  Receipt* const receipt = receipt_of(*envelope.from.robot(), now);
+  const Receipt::Conflict conflict{status.session, status.start, wire::plain_text(why)};
+  if (receipt == nullptr || receipt->conflict == conflict) return note_refusal(envelope.from.role, envelope.kind, why);
+  refuse(envelope, why, now, step);
+  receipt->conflict = conflict;
+  send_receipt(*receipt, step);
+}
+
 void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step) {
   const auto before = registry_.owner(robot);
   const auto heard = registry_.hear(robot, status, now);
   if (heard.must_be_stored) step.writes.push_back({"meta", RobotRegistry::key(robot), registry_.row(robot)});
-  Receipt& receipt = receipts_[robot];
-  receipt.robot = robot;
+  Receipt* const told = receipt_of(robot, now);
+  if (told == nullptr) return;
+  Receipt& receipt = *told;
   const auto owner = registry_.owner(robot);
   const Receipt old = receipt;
   if (owner) receipt.owner_session = owner->session;
@@ -71,7 +86,7 @@ void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status
   }
   const bool is_due = heard.accepted && waits_too_long(robot, status, now);
   if (receipt != old) ++changes_;
-  if (receipt != old || is_due) send_receipt(robot, step);
+  if (receipt != old || is_due) send_receipt(receipt, step);
 }
 
 /// Then its last receipt may have been lost, with a bus that was killed, and its submap does not come a second time:
@@ -85,6 +100,24 @@ bool ServerNode::waits_too_long(RobotId robot, const NodeStatus& status, Timesta
   if (now - since->second < kReceiptAgain_s) return false;
   since->second = now;
   return true;
+}
+
+const Receipt* ServerNode::told_to(RobotId robot) const {
+  if (const auto found = receipts_.find(robot); found != receipts_.end()) return &found->second;
+  const auto found = strangers_.find(robot);
+  return found == strangers_.end() ? nullptr : &found->second.receipt;
+}
+
+/// The last heard of those without submaps, who are there.
+std::set<RobotId> ServerNode::strangers_there(Timestamp now) const {
+  std::vector<std::pair<Timestamp, RobotId>> heard;
+  for (const auto& [robot, known] : registry_.robots())
+    if (!robots_.contains(robot) && known.last_seen && now - *known.last_seen < kStrangerIsGone_s)
+      heard.emplace_back(*known.last_seen, robot);
+  std::ranges::sort(heard, std::greater());
+  std::set<RobotId> there;
+  for (std::size_t i = 0; i < std::min(heard.size(), kMostStrangersTold); ++i) there.insert(heard[i].second);
+  return there;
 }
 
 MissionStatus ServerNode::mission_status(Timestamp now) const {
@@ -107,14 +140,16 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
       std::ranges::count_if(state.verdicts, [&](const auto& entry) { return entry.second.finder != state.finder; }));
   out.waiting = waiting;
   if (waiting > 0) out.why_waiting = why_waiting_;
-  for (const RobotId robot : robots_) {
+  std::set<RobotId> robots = robots_;
+  robots.merge(strangers_there(now));
+  for (const RobotId robot : robots) {
     if (out.robots.size() == wire::kMaxRobots) break;
     MissionStatus::Robot& entry = out.robots.emplace_back();
     entry.robot = robot;
-    if (const auto found = receipts_.find(robot); found != receipts_.end()) {
-      entry.submaps = count(found->second.stored);
-      entry.refused = count(found->second.refused);
-      entry.unread = count(found->second.unread);
+    if (const Receipt* const told = told_to(robot)) {
+      entry.submaps = count(told->stored);
+      entry.refused = count(told->refused);
+      entry.unread = count(told->unread);
     }
     if (const auto found = registry_.robots().find(robot); found != registry_.robots().end()) {
       const RobotRegistry::Robot& known = found->second;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "support/node/submaps.hpp"
+#include "tutti/base/content_hash.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/storage/memory_store.hpp"
@@ -219,9 +220,16 @@ TEST_F(ServerStatus, AndRefusedIfItIsNot) {
   restart();
   EXPECT_EQ(told<MessageRefused>(hear(kStranger, "stranger", 7)), 1U);
   EXPECT_EQ(told<MessageRefused>(receive(test::envelope(test::submap({kStranger, 7}, 0)))), 1U);
-  EXPECT_TRUE(receipts_.empty());
+  ASSERT_TRUE(receipt(kStranger).conflict.has_value());
+  EXPECT_NE(receipt(kStranger).conflict->why.find("none of the mission's"), std::string::npos);
+  EXPECT_TRUE(hear(kStranger, "stranger", 7).messages.empty());  // it has been told
   EXPECT_EQ(node_->mission_status(now_).robots.size(), 1U);
   EXPECT_EQ(node_->mission_status(now_).refusals.size(), 2U);
+  for (std::uint32_t i = 0; i < 1200; ++i) hear(RobotId{1000 + i}, "fake", 7);
+  EXPECT_EQ(receipts_.size(), 1000U);  // the bus keeps each
+  now_ = now_ + 61.0;
+  hear(RobotId{90}, "late", 7);
+  EXPECT_TRUE(receipt(RobotId{90}).conflict.has_value());  // the others say nothing more
 }
 
 TEST_F(ServerStatus, WhatItNeverTakesIsInTheReceiptAndSurvivesARestart) {
@@ -274,9 +282,77 @@ TEST_F(ServerStatus, NobodysGarbageFillsTheReceipt) {
     garbage.id = message_id({{kAlpha, 3}, i});
     receive(garbage);
   }
-  EXPECT_LE(receipt(kAlpha).refused.size(), 100U);
-  EXPECT_LE(receipt(kAlpha).refused.at(3).stretches().size(), 500U);
+  EXPECT_EQ(receipt(kAlpha).refusals.size(), 256U);
+  EXPECT_EQ(receipt(kAlpha).refused.at(3).stretches().size(), 256U);
   EXPECT_EQ(node_->mission_status(now_).refusals.at(0).count, 1800U);
+}
+
+TEST_F(ServerStatus, WhoSendsGarbageUnderARobotsNextIdDoesNotRefuseItsSubmap) {
+  const SubmapMessage next = test::submap({kAlpha, 7}, 3);
+  bus::Envelope garbage = test::envelope(next);
+  garbage.bytes = std::make_shared<const std::string>("TU garbage");
+  receive(garbage);
+  const std::uint64_t content = content_hash(*test::envelope(next).bytes);
+  EXPECT_TRUE(receipt(kAlpha).refuses(next.submap.id, content_hash(*garbage.bytes)));
+  EXPECT_FALSE(receipt(kAlpha).refuses(next.submap.id, content));
+  restart();
+  receive(garbage);
+  EXPECT_FALSE(receipt(kAlpha).refuses(next.submap.id, content));
+  EXPECT_EQ(told<SubmapStored>(receive(test::envelope(next))), 1U);
+  for (int start = 0; start < 2; ++start) {
+    EXPECT_TRUE(receipt(kAlpha).contains(next.submap.id));
+    EXPECT_FALSE(receipt(kAlpha).refuses(next.submap.id));  // nothing of it is lacking
+    EXPECT_EQ(node_->mission_status(now_).robots[0].refused, 0U);
+    restart();
+  }
+}
+
+/// As of a robot that was upgraded before its server.
+TEST_F(ServerStatus, ARobotThatNobodyKnowsIsToldOfAnUnreadOrRefusedSubmapAndIsNoneOfTheMissionsForIt) {
+  const auto before = store_->tables();
+  bus::Envelope newer = test::envelope(test::submap({kStranger, 7}, 0));
+  std::string frame = *newer.bytes;
+  ++frame[2];  // its version
+  newer.bytes = std::make_shared<const std::string>(frame);
+  EXPECT_EQ(told<MessageRefused>(receive(newer)), 1U);
+  bus::Envelope garbage = test::envelope(test::submap({kStranger, 7}, 1));
+  garbage.bytes = std::make_shared<const std::string>("TU garbage");
+  receive(garbage);
+  EXPECT_TRUE(receipt(kStranger).leaves_unread({{kStranger, 7}, 0}));
+  EXPECT_TRUE(receipt(kStranger).refuses({{kStranger, 7}, 1}, content_hash(*garbage.bytes)));
+  EXPECT_EQ(node_->mission_status(now_).robots.size(), 1U);
+  EXPECT_EQ(store_->tables(), before);
+  hear(kStranger, "stranger", 7);
+  EXPECT_EQ(node_->mission_status(now_).robots.at(1).unread, 1U);
+  receive(test::envelope(test::submap({kStranger, 7}, 2)));
+  EXPECT_TRUE(receipt(kStranger).leaves_unread({{kStranger, 7}, 0}));
+  EXPECT_TRUE(receipt(kStranger).contains({{kStranger, 7}, 2}));
+}
+
+/// More statuses of robots that nobody knows than a map has room for, and first submaps that are none.
+TEST_F(ServerStatus, StrangersLockNobodyOut) {
+  const auto before = store_->tables();
+  for (std::uint32_t i = 0; i < 1200; ++i) {
+    hear(RobotId{1000 + i}, "fake_" + std::to_string(i), 7);
+    SubmapMessage torn = test::submap({RobotId{5000 + i}, 7}, 2);
+    torn.submap.odometry[0].T_a_b.translation.x() += 5.0;
+    receive(test::envelope(torn));
+  }
+  EXPECT_EQ(store_->tables(), before);
+  now_ = now_ + 1.0;
+  hear(kStranger, "real", 7);
+  EXPECT_LE(node_->mission_status(now_).robots.size(), 100U);
+  EXPECT_TRUE(std::ranges::any_of(node_->mission_status(now_).robots,
+                                  [](const auto& robot) { return robot.status.name == "real"; }));
+  EXPECT_EQ(told<SubmapStored>(receive(test::envelope(test::submap({kStranger, 7}, 0)))), 1U);
+  EXPECT_TRUE(receipt(kStranger).contains({{kStranger, 7}, 0}));
+  now_ = now_ + 100.0;
+  EXPECT_EQ(node_->mission_status(now_).robots.size(), 2U);  // the others are forgotten
+  hear(RobotId{90}, "later", 7);
+  EXPECT_EQ(receipt(RobotId{90}).owner_session, 7U);
+  restart();
+  EXPECT_EQ(node_->mission_status(now_).robots.size(), 2U);
+  EXPECT_EQ(node_->mission_status(now_).robots[1].status.name, "real");
 }
 
 }  // namespace server_status_test

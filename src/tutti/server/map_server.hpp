@@ -90,6 +90,8 @@ class MapServer {
 
   /// One more that submaps may come from. Each has the less room for sessions, the more there are.
   void add_robot(RobotId robot) { robots_.insert(robot); }
+  /// One without submaps in the map.
+  void remove_robot(RobotId robot) { robots_.erase(robot); }
 
   /// A submap, in any order, any number of times, of any session of a known robot. Unknown robots, malformed submaps
   /// and sessions beyond a robot's share of ProxyGraph::kMostChains are refused; what is already mapped stays. So is

@@ -440,6 +440,8 @@ TEST(JobCodec, WhatIsOutOfRangeIsRefused) {
   receipt.refused[0].insert(0x100000000U);
   EXPECT_FALSE(validate(receipt).has_value());
   EXPECT_FALSE(validate(Receipt{.why_refused = "a\n"}).has_value());
+  EXPECT_TRUE(validate(Receipt{.refusals = std::vector<Receipt::Refusal>(1000)}).has_value());
+  EXPECT_FALSE(validate(Receipt{.refusals = std::vector<Receipt::Refusal>(1001)}).has_value());
   EXPECT_FALSE(validate(Receipt{.conflict = Receipt::Conflict{.why = std::string(1001, 'a')}}).has_value());
 }
 

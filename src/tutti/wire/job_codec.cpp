@@ -115,6 +115,9 @@ Status validate(const Receipt& receipt) {
   if (auto ok = check_numbers(receipt.stored); !ok) return in_context("receipt", ok.error());
   if (auto ok = check_numbers(receipt.refused); !ok) return in_context("receipt", ok.error());
   if (auto ok = check_numbers(receipt.unread); !ok) return in_context("receipt", ok.error());
+  if (receipt.refusals.size() > kMaxRefusals)
+    return fail(ErrorCode::invalid, "receipt: {} refusals, at most {} are accepted", receipt.refusals.size(),
+                kMaxRefusals);
   for (const std::string& text : {receipt.why_refused, receipt.conflict ? receipt.conflict->why : std::string()})
     if (text.size() > kMaxReasonBytes || text != plain_text(text))
       return fail(ErrorCode::invalid, "receipt: a reason of {} bytes, expected at most {}, all of printable ASCII",
@@ -156,6 +159,12 @@ std::string encode(const Receipt& receipt) {
     conflict.set_start(receipt.conflict->start);
     conflict.set_why(receipt.conflict->why);
   }
+  for (const Receipt::Refusal& refusal : receipt.refusals) {
+    v1::RefusedSubmap& entry = *out.add_refusals();
+    entry.set_session(refusal.session);
+    entry.set_index(refusal.index);
+    entry.set_content(refusal.content);
+  }
   return pack_frame(MessageKind::receipt, out.SerializeAsString());
 }
 
@@ -176,7 +185,10 @@ Result<Receipt> decode_receipt(std::string_view bytes) {
                   .why_refused = in.why_refused(),
                   .unread = std::move(*unread),
                   .owner_session = {},
-                  .conflict = {}};
+                  .conflict = {},
+                  .refusals = {}};
+  for (const v1::RefusedSubmap& entry : in.refusals())
+    receipt.refusals.push_back({entry.session(), entry.index(), entry.content()});
   if (in.has_owner_session()) receipt.owner_session = in.owner_session();
   if (in.has_conflict())
     receipt.conflict = Receipt::Conflict{in.conflict().session(), in.conflict().start(), in.conflict().why()};

@@ -32,6 +32,7 @@ inline constexpr std::size_t kMaxNameBytes = 64;              ///< Of a robot or
 inline constexpr std::size_t kMaxRobots = 10'000;             ///< Per mission status; of workers as many.
 inline constexpr std::size_t kMaxRefusalKinds = 1'000;        ///< Per mission status.
 inline constexpr std::size_t kMaxStretches = 100'000;         ///< Per receipt.
+inline constexpr std::size_t kMaxRefusals = 1'000;            ///< Per receipt, with their contents.
 
 inline constexpr double kMaxCloudRange_m = 1500.0;  ///< Of a point in its submap, per axis.
 inline constexpr double kMaxLandmarkRange_m = 10'000.0;

@@ -182,6 +182,8 @@ inline Receipt any_receipt(Rng& rng) {
   if (!receipt.refused.empty()) receipt.why_refused = "its odometry is no odometry";
   if (rng.bernoulli(0.5)) receipt.incarnation = static_cast<std::uint32_t>(rng.index(std::uint64_t{1} << 32U));
   if (rng.bernoulli(0.5)) receipt.unread[any_session(rng)].insert(rng.index(40));
+  for (const auto& [session, numbers] : receipt.refused)
+    if (rng.bernoulli(0.5)) receipt.refusals.push_back({session, 7, rng.index(100) << 40U});
   if (rng.bernoulli(0.5)) receipt.owner_session = any_session(rng);
   if (rng.bernoulli(0.5)) receipt.conflict = {any_session(rng), rng.index(9), "somebody else is alpha"};
   return receipt;

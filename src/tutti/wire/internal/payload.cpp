@@ -49,7 +49,8 @@ constexpr std::array kVerdict = {Field{v1::Verdict::kClosureFieldNumber, kMaxClo
 
 constexpr std::array kNumbers = {Field{v1::NumbersOfSession::kBoundFieldNumber, 2 * kMaxStretches, "bounds"}};
 constexpr std::array kReceipt = {Field{v1::Receipt::kStoredFieldNumber, kMostChains, "sessions", true, kNumbers},
-                                 Field{v1::Receipt::kRefusedFieldNumber, kMostChains, "sessions", true, kNumbers}};
+                                 Field{v1::Receipt::kRefusedFieldNumber, kMostChains, "sessions", true, kNumbers},
+                                 Field{v1::Receipt::kRefusalsFieldNumber, kMaxRefusals, "refusals", true}};
 constexpr std::array kPairs = {Field{v1::SubmapPairs::kFirstRobotFieldNumber, kMaxPairs, "pairs"},
                                Field{v1::SubmapPairs::kFirstSessionFieldNumber, kMaxPairs, "pairs"},
                                Field{v1::SubmapPairs::kFirstIndexFieldNumber, kMaxPairs, "pairs"},
