@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -19,6 +20,7 @@
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mapfile/closures.hpp"
+#include "tutti/node/word_sender.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::app {
@@ -26,12 +28,12 @@ namespace {
 
 constexpr const char* kCommand = "map closure";
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-constexpr auto kHandOver = std::chrono::seconds(10);
 constexpr double kLook_s = 2.0;  // for leases
 
 struct ClosureOptions {
   std::string map, closure, by, bus, mission;
   bool insecure = false, rejected = false;
+  double wait_s = 60.0;
 };
 
 std::string time_of(std::int64_t ns) {
@@ -109,7 +111,15 @@ int show(const ClosureOptions& options) {
   return 0;
 }
 
-/// To the server that has the map open.
+/// What the server answers, of those messages that have come.
+std::optional<std::string> heard_answer(bus::Port& port, const node::WordSender& sender) {
+  for (const bus::Received& received : port.receive())
+    if (const auto status = wire::decode_mission_status(*received.envelope.bytes))
+      if (auto answer = sender.answer(*status)) return answer;
+  return std::nullopt;
+}
+
+/// To the server that has the map open, until it has answered.
 Status send(const ClosureOptions& options, const ClosureWord& word) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
   bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
@@ -118,18 +128,25 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
   where.mission = std::move(*mission);
   auto port = bus::open_nats_port(self, where);
   if (!port) return tl::unexpected(port.error());
-  const bus::Envelope envelope{self, bus::Endpoint::server(), bus::MessageKind::word,
-                               fmt::format("{}/{}/{}", to_string(word.wish), word.given_ns, getpid()),
-                               std::make_shared<const std::string>(wire::encode(word))};
-  if (auto sent = (*port)->send(envelope); !sent) return sent;
-  const auto end = std::chrono::steady_clock::now() + kHandOver;
-  while ((*port)->state().waiting_messages > 0) {
-    if (std::chrono::steady_clock::now() > end)
-      return fail(ErrorCode::io, "{}: the bus has not taken the word within {} s: {}", options.bus, kHandOver.count(),
-                  (*port)->state().last_error);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  node::WordSender sender(self, word);
+  const auto begin = std::chrono::steady_clock::now();
+  for (;; std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
+    const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (const auto answer = heard_answer(**port, sender))
+      return answer->empty() ? Status() : fail(ErrorCode::invalid, "the server does not take it: {}", *answer);
+    const bus::NatsState state = (*port)->state();
+    if (now_s > options.wait_s && state.waiting_messages > 0)
+      return fail(ErrorCode::io, "{}: the bus has not taken the word within {} s: {}", options.bus, options.wait_s,
+                  state.last_error);
+    if (now_s > options.wait_s)
+      return fail(ErrorCode::io,
+                  "{}: the bus has the word, but the server has not said within {} s that it has it; say it again if "
+                  "`tutti map closure show` does not know it later",
+                  options.bus, options.wait_s);
+    if (state.waiting_messages > 0) continue;  // it has not left yet
+    if (const auto envelope = sender.due(now_s))
+      if (auto sent = (*port)->send(*envelope); !sent) return sent;
   }
-  return {};
 }
 
 int say(const ClosureOptions& options, Wish wish) {
@@ -141,8 +158,7 @@ int say(const ClosureOptions& options, Wish wish) {
   if (auto ok = wire::validate(word); !ok) return complain(kCommand, ok.error().message, 2);
   if (!options.bus.empty()) {
     if (auto sent = send(options, word); !sent) return complain(kCommand, sent.error().message);
-    fmt::print("{} {}: handed to the bus; the server's events say whether it was taken\n", to_string(wish),
-               options.closure);
+    fmt::print("{} {}: stored by the server; the map follows at its next update\n", to_string(wish), options.closure);
     return 0;
   }
   const auto map = mapfile::open(options.map);
@@ -167,6 +183,7 @@ void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_c
   word->add_option("--mission", options->mission, "Of several on that bus; default: the one that has a server.")
       ->type_name("NAME");
   word->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet.");
+  add_number(*word, "--wait", options->wait_s, "How long to say it again until the server has answered", "S");
   word->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
   word->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });
 }

@@ -10,6 +10,7 @@ import pathlib
 import random
 import shutil
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -19,7 +20,7 @@ import unittest
 
 TUTTI, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 MISSION = SOURCE / "tests/system/small_mission.yaml"
-HAS_NATS = shutil.which("nats-server") or os.path.exists("/usr/sbin/nats-server")
+HAS_NATS = shutil.which("nats-server") or (os.path.exists("/usr/sbin/nats-server") and "/usr/sbin/nats-server")
 RATE = ["--rate", "40"]  # 150 s in about 4
 PATIENCE_S = 120.0  # a busy machine
 
@@ -309,6 +310,46 @@ class Programs(unittest.TestCase):
             self.assertEqual(code, 0, said)
         self.expect_same_map_file()
 
+    def test_a_word_that_the_bus_has_lost_is_said_again(self):
+        server, bus = self.start_server()
+        robots = [self.start_robot(name, bus) for name in ("alpha", "bravo")]
+        for program in (*robots, server):
+            code, said = program.end(stop=program is server)
+            self.assertEqual(code, 0, said)
+        listed = run("map", "closure", "list", self.path / "server/map.tutti").stdout
+        closure = next(line.split()[0] for line in listed.splitlines() if " accepted" in line)
+
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+
+        def start_bus(store):
+            started = subprocess.Popen([HAS_NATS, "-js", "-a", "127.0.0.1", "-p", str(port), "-sd", str(store)],
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            self.addCleanup(started.wait)
+            self.addCleanup(started.kill)
+            return started
+
+        first = start_bus(self.path / "bus")
+        server, bus = self.start_server("--bus", f"nats://127.0.0.1:{port}")
+        server.process.send_signal(signal.SIGSTOP)
+        word = self.start("map", "closure", "reject", closure, "--bus", bus)
+        stream = self.path / "bus/jetstream/$G/streams"
+        self.wait_for(lambda: any(b"reject" in block.read_bytes() for block in stream.glob("VERDICTS_*/msgs/*.blk")),
+                      "the word in the stream")
+        first.kill()
+        start_bus(self.path / "another bus")
+        server.process.send_signal(signal.SIGCONT)
+        code, said = word.end(stop=False)
+        self.assertEqual(code, 0, said)
+        self.assertIn("stored by the server", said)
+        done = run("map", "closure", "accept", "nobody/1-bravo/2", "--bus", bus)
+        self.assertEqual(done.returncode, 1, done.stdout)
+        self.assertIn("nobody", done.stderr)
+        self.assertEqual(server.end()[0], 0)
+        show = run("map", "closure", "show", closure, self.path / "server/map.tutti").stdout
+        self.assertRegex(show, r"word +reject")
+
     def test_sigterm_is_a_clean_stop(self):
         slow = ["--rate", "5"]  # nobody has ended by then, however slow the machine is
         server, bus = self.start_server(rate=slow)
@@ -358,7 +399,6 @@ class Programs(unittest.TestCase):
         self.assertIn("cannot reach the bus", said)
 
     def test_tells_the_service_manager(self):
-        import socket
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
             listener.bind(str(self.path / "notify"))
             listener.settimeout(PATIENCE_S)

@@ -63,6 +63,13 @@ struct MissionStatus {
     friend bool operator==(const Refusals&, const Refusals&) = default;
   };
 
+  /// An operator's (ClosureWord), answered: it is stored, as long as no later one takes its place.
+  struct Word {
+    std::uint64_t content = 0;  ///< content_hash() of its frame.
+    std::string why;            ///< It is not stored, since; empty: it is.
+    friend bool operator==(const Word&, const Word&) = default;
+  };
+
   Timestamp time;
   std::int64_t wall_ns = 0;  ///< Of the server's clock on the wall, since the Unix epoch; 0: unknown.
   std::string version;       ///< Of its program.
@@ -82,6 +89,7 @@ struct MissionStatus {
   std::uint64_t former_pairs = 0;  ///< With closures of other finders, in the map until this one has answered.
   std::uint64_t waiting = 0;       ///< Pairs and refinements that none of the workers that are there can compute,
   std::string why_waiting;         ///< and what the last one that tried said.
+  std::vector<Word> words;         ///< The last ones.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;
 };
 

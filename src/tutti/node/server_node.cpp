@@ -262,6 +262,7 @@ Step ServerNode::resume(Timestamp now) {
   step.writes.push_back(meta());
   step.writes.push_back(to_row(config_.server));
   tell_unread_rows(now, step);
+  recall_words();
   for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   note_settling(now);

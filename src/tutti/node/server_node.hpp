@@ -111,7 +111,11 @@ class ServerNode {
   void receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
-  Status take_word(const bus::Envelope& envelope, Timestamp now, Step& step);
+  /// True: another word on this pair, given later, holds over it.
+  Result<bool> take_word(const bus::Envelope& envelope, const ClosureWord& word, Timestamp now, Step& step);
+  void note_word(const std::string& frame, const std::string& why);
+  /// Those that are stored are answered.
+  void recall_words();
   [[nodiscard]] server::ClosureNames closure_names() const;
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Takes one verdict of these; a refusal that now holds is kept in `refused`.
@@ -181,7 +185,8 @@ class ServerNode {
     Receipt receipt;  // as it was told, or is to be told
     Timestamp heard;
   };
-  std::map<RobotId, Stranger> strangers_;  // robots that are none of the mission's, or not yet
+  std::map<RobotId, Stranger> strangers_;   // robots that are none of the mission's, or not yet
+  std::vector<MissionStatus::Word> words_;  // the last that were answered
   RobotRegistry registry_;
   std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are told
   std::map<RobotId, Timestamp> waits_since_;       // robots with a backlog: since then without a receipt that was due

@@ -163,6 +163,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
   }
   for (const auto& [number, worker] : workers_) out.workers.push_back(worker);
   for (const auto& [from, refusals] : refusals_) out.refusals.push_back(refusals);
+  out.words = words_;
   return out;
 }
 

@@ -1,39 +1,68 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What operators say to the server of closures.
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "tutti/base/content_hash.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
+namespace {
+
+constexpr std::size_t kMostWords = 32;  // that are told as answered
+
+}  // namespace
 
 /// An operator's word is not a robot's or a worker's to give.
 void ServerNode::receive_word(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  const Status taken = take_word(envelope, now, step);
-  if (!taken) refuse(envelope, taken.error().message, now, step);
+  if (envelope.from.role != bus::Endpoint::Role::viewer)
+    return refuse(envelope,
+                  fmt::format("a word on closures from a {}, which is for operators to say", name(envelope.from.role)),
+                  now, step);
+  const auto word = wire::decode_word(*envelope.bytes);
+  if (!word) return refuse(envelope, word.error().message, now, step);
+  const auto is_late = take_word(envelope, *word, now, step);
+  if (!is_late) refuse(envelope, is_late.error().message, now, step);
+  note_word(*envelope.bytes, !is_late   ? is_late.error().message
+                             : *is_late ? "another word on it, given later, holds"
+                                        : "");
 }
 
-Status ServerNode::take_word(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  if (envelope.from.role != bus::Endpoint::Role::viewer)
-    return fail(ErrorCode::invalid, "a word on closures from a {}, which is for operators to say",
-                name(envelope.from.role));
-  const auto word = wire::decode_word(*envelope.bytes);
-  if (!word) return tl::unexpected(word.error());
-  const auto pair = closure_names().find(word->closure);
+Result<bool> ServerNode::take_word(const bus::Envelope& envelope, const ClosureWord& word, Timestamp now, Step& step) {
+  const auto pair = closure_names().find(word.closure);
   if (!pair) return tl::unexpected(pair.error());
   const WordSet& words = server_.state().words;
   const auto known = words.find(*pair);
   const auto before = known == words.end() ? std::nullopt : std::optional(known->second);
-  if (auto taken = server_.receive(*pair, *word); !taken) return taken;
-  if (before == words.at(*pair)) return {};
+  if (auto taken = server_.receive(*pair, word); !taken) return tl::unexpected(taken.error());
+  if (before == words.at(*pair)) return before != word;
   step.writes.push_back({"words", key_of(*pair), *envelope.bytes});
-  step.tell(now, WordTaken{*pair, word->wish});
+  step.tell(now, WordTaken{*pair, word.wish});
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
-  return {};
+  return false;
+}
+
+void ServerNode::note_word(const std::string& frame, const std::string& why) {
+  const MissionStatus::Word word{content_hash(frame), wire::plain_text(why)};
+  std::erase_if(words_, [&](const MissionStatus::Word& known) { return known.content == word.content; });
+  words_.push_back(word);
+  if (words_.size() > kMostWords) words_.erase(words_.begin());
+  ++changes_;
+}
+
+void ServerNode::recall_words() {
+  std::vector<ClosureWord> given;
+  for (const auto& [pair, word] : server_.state().words) given.push_back(word);
+  std::ranges::sort(given, {}, &ClosureWord::given_ns);
+  for (const ClosureWord& word : given) note_word(wire::encode(word), {});
 }
 
 server::ClosureNames ServerNode::closure_names() const {

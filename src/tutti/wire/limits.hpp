@@ -31,6 +31,7 @@ inline constexpr std::size_t kMaxRequested = 1'000;           ///< Submaps, per 
 inline constexpr std::size_t kMaxNameBytes = 64;              ///< Of a robot or a worker.
 inline constexpr std::size_t kMaxRobots = 10'000;             ///< Per mission status; of workers as many.
 inline constexpr std::size_t kMaxRefusalKinds = 1'000;        ///< Per mission status.
+inline constexpr std::size_t kMaxAnsweredWords = 1'000;       ///< Per mission status.
 inline constexpr std::size_t kMaxStretches = 100'000;         ///< Per receipt.
 inline constexpr std::size_t kMaxRefusals = 1'000;            ///< Per receipt, with their contents.
 

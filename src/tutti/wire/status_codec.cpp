@@ -147,6 +147,11 @@ Status validate(const MissionStatus& status) {
     return fail(
         ErrorCode::invalid, "mission status: {} robots, {} workers, {} refusals, at most {}, {}, {} are accepted",
         status.robots.size(), status.workers.size(), status.refusals.size(), kMaxRobots, kMaxRobots, kMaxRefusalKinds);
+  if (status.words.size() > kMaxAnsweredWords)
+    return fail(ErrorCode::invalid, "mission status: {} words, at most {} are accepted", status.words.size(),
+                kMaxAnsweredWords);
+  for (const MissionStatus::Word& word : status.words)
+    if (auto ok = check_text(word.why, "what is said of a word"); !ok) return wrong(ok.error());
   const auto not_after = [](const auto& a, const auto& b) { return a >= b; };
   if (std::ranges::adjacent_find(status.robots, not_after, &MissionStatus::Robot::robot) != status.robots.end() ||
       std::ranges::adjacent_find(status.workers, not_after, &MissionStatus::Worker::number) != status.workers.end())
@@ -219,6 +224,11 @@ std::string encode(const MissionStatus& status) {
   out.set_former_pairs(status.former_pairs);
   out.set_waiting(status.waiting);
   out.set_why_waiting(status.why_waiting);
+  for (const MissionStatus::Word& word : status.words) {
+    v1::AnsweredWord& entry = *out.add_words();
+    entry.set_content(word.content);
+    entry.set_why(word.why);
+  }
   return pack_frame(MessageKind::mission_status, out.SerializeAsString());
 }
 
@@ -244,7 +254,8 @@ Result<MissionStatus> decode_mission_status(std::string_view bytes) {
                        .finder = in.finder(),
                        .former_pairs = in.former_pairs(),
                        .waiting = in.waiting(),
-                       .why_waiting = in.why_waiting()};
+                       .why_waiting = in.why_waiting(),
+                       .words = {}};
   for (const v1::RobotInMission& entry : in.robot()) {
     auto robot = read(entry);
     if (!robot) return in_context("mission status", robot.error());
@@ -257,6 +268,7 @@ Result<MissionStatus> decode_mission_status(std::string_view bytes) {
   }
   for (const v1::RefusedMessages& entry : in.refusals())
     status.refusals.push_back({entry.from(), entry.kind(), entry.count(), entry.last_why()});
+  for (const v1::AnsweredWord& entry : in.words()) status.words.push_back({entry.content(), entry.why()});
   if (auto ok = validate(status); !ok) return tl::unexpected(ok.error());
   return status;
 }

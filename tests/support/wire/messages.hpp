@@ -246,7 +246,8 @@ inline MissionStatus any_mission_status(Rng& rng) {
                        .finder = "visual 2",
                        .former_pairs = rng.index(1000),
                        .waiting = rng.index(2),
-                       .why_waiting = "no finder 'visual 3'"};
+                       .why_waiting = "no finder 'visual 3'",
+                       .words = {}};
   for (std::uint32_t i = 0; i < rng.index(4); ++i) {
     MissionStatus::Robot& robot = status.robots.emplace_back();
     robot.robot = RobotId{3 * i};
@@ -260,6 +261,7 @@ inline MissionStatus any_mission_status(Rng& rng) {
   }
   for (std::uint32_t i = 0; i < rng.index(3); ++i) status.workers.push_back({7 + i, stamp(), any_status(rng)});
   for (std::uint64_t i = rng.index(3); i > 0; --i) status.refusals.push_back({"robot", "submap", i, "no good"});
+  for (std::uint64_t i = rng.index(3); i > 0; --i) status.words.push_back({i << 40U, i == 1 ? "no such closure" : ""});
   return status;
 }
 

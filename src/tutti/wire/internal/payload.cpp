@@ -85,7 +85,8 @@ constexpr std::array kWorker = {Field{v1::WorkerInMission::kStatusFieldNumber, 1
 constexpr std::array kMissionStatus = {
     Field{v1::MissionStatus::kRobotFieldNumber, kMaxRobots, "robots", true, kRobot},
     Field{v1::MissionStatus::kWorkerFieldNumber, kMaxRobots, "workers", true, kWorker},
-    Field{v1::MissionStatus::kRefusalsFieldNumber, kMaxRefusalKinds, "refusals", true}};
+    Field{v1::MissionStatus::kRefusalsFieldNumber, kMaxRefusalKinds, "refusals", true},
+    Field{v1::MissionStatus::kWordsFieldNumber, kMaxAnsweredWords, "words", true}};
 
 std::span<const Field> fields_of(MessageKind kind) {
   switch (kind) {

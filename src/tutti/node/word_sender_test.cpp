@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/word_sender.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <set>
+#include <string>
+
+#include "support/node/submaps.hpp"
+#include "tutti/node/server_node.hpp"
+#include "tutti/node/worker_node.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::node {
+namespace word_sender_test {
+
+using bus::Endpoint;
+
+/// A server with one closure, and whoever says words to it over a bus that loses some.
+class Words : public testing::Test {
+ protected:
+  Words() {
+    start();
+    for (std::uint32_t i = 0; i < 3; ++i)
+      for (const bus::Envelope& message :
+           does(server_->receive(test::envelope(test::submap({RobotId{0}, 7}, i)), {}))) {
+        if (message.kind != bus::MessageKind::job) continue;
+        WorkerNode worker(Endpoint::worker(0), finder_, SubmapFrames::of(store_));
+        for (const bus::Envelope& verdicts : worker.receive(message, {}).messages) does(server_->receive(verdicts, {}));
+      }
+  }
+  void start() {
+    server_ = ServerNode::open({RobotId{0}}, finder_, {}, 1000, store_).value();
+    does(server_->resume({}));
+  }
+  std::vector<bus::Envelope> does(const Step& step) {
+    EXPECT_TRUE(store_.commit(step.writes).has_value());
+    return step.messages;
+  }
+  /// As it comes over the bus.
+  [[nodiscard]] MissionStatus status() const {
+    return wire::decode_mission_status(wire::encode(server_->mission_status({}))).value();
+  }
+  [[nodiscard]] std::size_t words() const { return server_->map_server().state().words.size(); }
+
+  const Endpoint kSelf = Endpoint::viewer(9);
+  storage::MemoryStore store_{storage::map_schema()};
+  std::shared_ptr<const server::ClosureFinder> finder_ = std::make_shared<test::EvenFinder>();
+  std::unique_ptr<ServerNode> server_;
+};
+
+TEST_F(Words, IsSaidUntilItIsAnswered) {
+  const ClosureWord word{"0/0-0/2", Wish::reject, "ada", 5};
+  WordSender sender(kSelf, word);
+  std::set<std::string> ids;
+  for (double now_s = 100.0; now_s < 112.0; now_s += 0.5)  // the bus loses each
+    if (const auto envelope = sender.due(now_s)) {
+      EXPECT_TRUE(ids.insert(envelope->id).second) << envelope->id;
+      EXPECT_EQ(wire::decode_word(*envelope->bytes), word);
+    }
+  EXPECT_EQ(ids.size(), 3U);
+  EXPECT_EQ(sender.answer(status()), std::nullopt);
+  const auto again = sender.due(115.0);
+  ASSERT_TRUE(again.has_value());
+  const std::uint64_t changes = server_->changes();
+  for (int i = 0; i < 2; ++i) {  // it comes twice
+    does(server_->receive(*again, {}));
+    EXPECT_EQ(sender.answer(status()), "");
+    EXPECT_EQ(words(), 1U);
+  }
+  EXPECT_GT(server_->changes(), changes);  // the status comes at once
+  start();                                 // before the answer was heard
+  EXPECT_EQ(sender.answer(status()), "");
+}
+
+TEST_F(Words, WhatIsNotTakenIsAnsweredWithTheReason) {
+  const auto answer = [&](const ClosureWord& word) {
+    WordSender sender(kSelf, word);
+    does(server_->receive(*sender.due(0.0), {}));
+    return sender.answer(status()).value_or("not answered");
+  };
+  EXPECT_NE(answer({"nobody/0-0/2", Wish::reject, "ada", 5}).find("nobody"), std::string::npos);
+  EXPECT_EQ(answer({"0/0-0/2", Wish::reject, "ada", 5}), "");
+  EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 4}), "another word on it, given later, holds");
+  EXPECT_EQ(answer({"0/0-0/2", Wish::accept, "eve", 6}), "");
+  EXPECT_EQ(words(), 1U);
+}
+
+TEST_F(Words, OnlyTheLastAreTold) {
+  for (int i = 0; i < 100; ++i)
+    does(server_->receive(*WordSender(kSelf, {"0/0-0/2", Wish::reject, "ada", i}).due(0.0), {}));
+  EXPECT_EQ(status().words.size(), 32U);
+  EXPECT_EQ(WordSender(kSelf, {"0/0-0/2", Wish::reject, "ada", 99}).answer(status()), "");
+  EXPECT_EQ(WordSender(kSelf, {"0/0-0/2", Wish::reject, "ada", 50}).answer(status()), std::nullopt);
+}
+
+}  // namespace word_sender_test
+}  // namespace tutti::node
