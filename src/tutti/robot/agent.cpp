@@ -10,6 +10,7 @@
 #include "tutti/consistency/chain_uncertainty.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/robot/map_covariance.hpp"
+#include "tutti/robot/odometry_sample.hpp"
 
 namespace tutti::robot {
 namespace {
@@ -19,14 +20,6 @@ std::unique_ptr<consistency::ConstraintPolicy> known_policy(const consistency::P
   TUTTI_CHECK(policy.has_value(), "{}", policy.error().message);
   return std::move(*policy);
 }
-
-/// A step less sure than this says nothing about a run of many: the few links of a graph of runs hold it or do not.
-/// With 100 m and 3 rad that graph is often without a solution; a robot moves less from one sample to the next.
-constexpr double kUnknownStep_m = 10.0;
-constexpr double kUnknownStep_rad = 0.3;
-
-/// Quaternions printed with few digits are off by this much at most.
-constexpr double kRoundedQuaternion = 1e-3;
 
 }  // namespace
 
@@ -45,14 +38,11 @@ RobotAgent::RobotAgent(RobotAgent&&) noexcept = default;
 RobotAgent& RobotAgent::operator=(RobotAgent&&) noexcept = default;
 
 Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given, const Matrix6d& increment_covariance) {
-  Pose3 T_odom_body = T_odom_body_given;
-  if (is_valid(T_odom_body, kRoundedQuaternion)) T_odom_body.rotation.normalize();
-  if (auto ok = check_covariance(increment_covariance); !ok)
-    return in_context(fmt::format("robot {}: odometry at {} ns", chain_.robot.value, stamp.ns), ok.error());
-  const Matrix6d covariance =
-      invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
+  const auto step = usable_step(chain_.robot, stamp, T_odom_body_given, increment_covariance);
+  if (!step) return tl::unexpected(step.error());
+  const auto& [at, T_odom_body, covariance] = *step;
   const bool is_first = state_.keyframes.empty();
-  if (auto ok = submaps_.add_odometry(stamp, T_odom_body, covariance); !ok) return ok;
+  if (auto ok = submaps_.add_odometry(at, T_odom_body, covariance); !ok) return ok;
   if (!is_first) {
     const Matrix6d moved =
         compound_covariance(state_.T_odom_body.inverse() * T_odom_body, state_.covariance, covariance);

@@ -121,6 +121,7 @@ class RobotAgent {
   [[nodiscard]] bool wants_scan() const { return submaps_.wants_scan(); }
   [[nodiscard]] bool wants_scan(Timestamp stamp) const { return submaps_.wants_scan(stamp); }
   [[nodiscard]] bool wants_images(Timestamp stamp) const { return submaps_.wants_images(stamp); }
+  [[nodiscard]] NextKeyframe next_keyframe() const { return submaps_.next_keyframe(); }
   /// Stamp of the latest odometry sample.
   [[nodiscard]] std::optional<Timestamp> newest_sample() const { return submaps_.newest_sample(); }
   /// The newest; nothing: none yet.

@@ -9,26 +9,14 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/bundle/imu_preintegration.hpp"
-#include "tutti/geometry/covariance.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/model/way.hpp"
 #include "tutti/perception/lidar/undistort.hpp"
+#include "tutti/robot/odometry_sample.hpp"
 
 namespace tutti::robot {
 namespace {
-
-Status check_sample(RobotId robot, Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& covariance) {
-  if (!is_valid(T_odom_body))
-    return fail(ErrorCode::invalid, "robot {}: odometry at {} ns is not a pose (|q| = {}, expected finite and 1)",
-                robot.value, stamp.ns, T_odom_body.rotation.norm());
-  if (const double largest = T_odom_body.translation.cwiseAbs().maxCoeff(); largest > kMaxCoordinate_m)
-    return fail(ErrorCode::invalid, "robot {}: odometry at {} ns has a coordinate of {} m, at most {:.0f} m",
-                robot.value, stamp.ns, largest, kMaxCoordinate_m);
-  if (auto ok = check_covariance(covariance); !ok)
-    return in_context(fmt::format("robot {}: odometry at {} ns", robot.value, stamp.ns), ok.error());
-  return {};
-}
 
 /// What the IMU measured from keyframe to keyframe, where it covers that time, at the gyro bias that the odometry
 /// shows.
@@ -71,13 +59,17 @@ Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>
 SubmapBuilder::SubmapBuilder(const ChainId& chain, const SubmapConfig& config, SubmapBuilderState state)
     : chain_(chain), config_(config), state_(std::move(state)) {}
 
+NextKeyframe SubmapBuilder::next_keyframe() const {
+  NextKeyframe next{.last = {},
+                    .distance_m = config_.keyframe_distance_m,
+                    .angle_rad = config_.keyframe_angle_deg * kRadPerDeg,
+                    .time_s = config_.keyframe_time_s};
+  if (!state_.keyframes.empty()) next.last = {state_.keyframes.back().stamp, state_.keyframes.back().T_odom_body};
+  return next;
+}
+
 bool SubmapBuilder::is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const {
-  if (state_.keyframes.empty()) return true;
-  const Keyframe& last = state_.keyframes.back();
-  const Pose3 step = last.T_odom_body.inverse() * T_odom_body;
-  return step.translation.norm() >= config_.keyframe_distance_m ||
-         rotation_angle(step) >= config_.keyframe_angle_deg * kRadPerDeg ||
-         stamp - last.stamp >= config_.keyframe_time_s;
+  return next_keyframe().is_due({stamp, T_odom_body});
 }
 
 /// Keeps what is newer than the history, and one sample before it; of samples that are close together, fewer.
@@ -113,16 +105,14 @@ RelativePose SubmapBuilder::since_keyframe() const {
 }
 
 Status SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance) {
-  if (auto ok = check_sample(chain_.robot, stamp, T_odom_body, increment_covariance); !ok) return ok;
   const OdometryStep step{stamp, T_odom_body, increment_covariance};
+  if (auto ok = check_step(chain_.robot, step); !ok) return ok;
   const auto newest = newest_sample();
   if (!newest) {
     take({step, std::nullopt});
     return {};
   }
-  if (stamp <= *newest)
-    return fail(ErrorCode::invalid, "robot {}: odometry stamp {} ns does not follow {} ns", chain_.robot.value,
-                stamp.ns, newest->ns);
+  if (auto ok = check_follows(chain_.robot, stamp, newest); !ok) return ok;
   if (stamp - *newest > kLongestGap_s)
     std::erase_if(state_.waiting.sensors, [&](const SensorSample& sample) {
       const bool is_in_gap = sample.stamp > *newest && sample.stamp < stamp;

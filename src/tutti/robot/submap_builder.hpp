@@ -12,6 +12,7 @@
 #include "tutti/model/trajectory.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 #include "tutti/perception/visual/visual_payload.hpp"
+#include "tutti/robot/next_keyframe.hpp"
 #include "tutti/robot/sensor_timeline.hpp"
 
 namespace tutti::robot {
@@ -119,6 +120,8 @@ class SubmapBuilder {
   [[nodiscard]] bool wants_images(Timestamp stamp) const;
   /// A scan from now on would be taken.
   [[nodiscard]] bool wants_scan() const;
+  /// As of all that is settled.
+  [[nodiscard]] NextKeyframe next_keyframe() const;
 
   /// Those made since the last call.
   std::vector<NewKeyframe> take_keyframes() { return std::exchange(keyframes_, {}); }

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/robot/odometry_sample.hpp"
+
+#include "tutti/geometry/covariance.hpp"
+
+namespace tutti::robot {
+namespace {
+
+/// A step less sure than this says nothing about a run of many: the few links of a graph of runs hold it or do not.
+/// With 100 m and 3 rad that graph is often without a solution; a robot moves less from one sample to the next.
+constexpr double kUnknownStep_m = 10.0;
+constexpr double kUnknownStep_rad = 0.3;
+
+/// Quaternions printed with few digits are off by this much at most.
+constexpr double kRoundedQuaternion = 1e-3;
+
+}  // namespace
+
+Result<OdometryStep> usable_step(RobotId robot, Timestamp stamp, const Pose3& T_odom_body,
+                                 const Matrix6d& increment_covariance) {
+  OdometryStep step{stamp, T_odom_body, increment_covariance};
+  if (is_valid(step.T_odom_body, kRoundedQuaternion)) step.T_odom_body.rotation.normalize();
+  if (auto ok = check_step(robot, step); !ok) return tl::unexpected(ok.error());
+  step.covariance = invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
+  return step;
+}
+
+Status check_step(RobotId robot, const OdometryStep& step) {
+  const auto& [stamp, T_odom_body, covariance] = step;
+  if (!is_valid(T_odom_body))
+    return fail(ErrorCode::invalid, "robot {}: odometry at {} ns is not a pose (|q| = {}, expected finite and 1)",
+                robot.value, stamp.ns, T_odom_body.rotation.norm());
+  if (const double largest = T_odom_body.translation.cwiseAbs().maxCoeff(); largest > kMaxCoordinate_m)
+    return fail(ErrorCode::invalid, "robot {}: odometry at {} ns has a coordinate of {} m, at most {:.0f} m",
+                robot.value, stamp.ns, largest, kMaxCoordinate_m);
+  if (auto ok = check_covariance(covariance); !ok)
+    return in_context(fmt::format("robot {}: odometry at {} ns", robot.value, stamp.ns), ok.error());
+  return {};
+}
+
+Status check_follows(RobotId robot, Timestamp stamp, const std::optional<Timestamp>& newest) {
+  if (!newest || stamp > *newest) return {};
+  return fail(ErrorCode::invalid, "robot {}: odometry stamp {} ns does not follow {} ns", robot.value, stamp.ns,
+              newest->ns);
+}
+
+}  // namespace tutti::robot
