@@ -10,6 +10,7 @@ import math
 import os
 import pathlib
 import random
+import resource
 import socket
 import struct
 import subprocess
@@ -302,6 +303,50 @@ class LiveRobots(unittest.TestCase):
                            if int.from_bytes(key[:8], "big") == robot) for robot in (blind, seeing)}
         self.assertGreater(size[blind], 0)
         self.assertGreater(size[seeing], size[blind] + 2000)  # a byte per point at least
+
+    def test_a_full_disk_costs_the_map_and_never_the_pose(self):
+        odometry = [(i * 10**8, 0.05 * i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) for i in range(800)]
+        server, bus = self.start_server()
+        alone = Client(self.path / "alone.feed", odometry)
+        self.assertEqual(self.feed_robot("alone", bus).end(stop=False)[0], 0)
+        self.assertNotIn("refused", alone.heard)
+        robot = self.feed_robot("alpha", bus)
+
+        def feed(until, **more):
+            client = Client(self.path / "alpha.feed", odometry[:until], **more)
+            client.join(common.PATIENCE_S)
+            self.assertEqual(len(client.answers), 200)  # every one, at once
+            self.assertNotIn("refused", client.heard)
+            return client
+
+        feed(200, ends=False)
+        self.wait_for(lambda: self.status("alpha").get("keyframes", 0) > 20, "a map")
+        # Files may grow no more: of the robot's only its store is longer than this.
+        resource.prlimit(robot.process.pid, resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
+        feed(400, ends=False)
+        self.wait_for(lambda: "cannot store" in self.status("alpha").get("trouble", ""), "a word of it")
+        blind = feed(600, ends=False)
+        self.assertEqual(blind.welcome.last_stamp_ns, odometry[399][0])  # received, not stored
+        alerts = [alert.text for situation in blind.heard["situation"] for alert in situation.alert]
+        self.assertTrue(any("cannot store" in text for text in alerts), alerts)
+        stored = {said.stored_stamp_ns for _, _, said in blind.answers}
+        self.assertEqual(len(stored), 1)
+        self.assertGreaterEqual(max(stored), odometry[100][0])
+        self.assertLess(max(stored), odometry[399][0])
+        self.assertGreater(blind.answers[-1][2].T_map_odom_covariance[0], blind.answers[0][2].T_map_odom_covariance[0])
+        self.assertIsNone(robot.process.poll())
+        resource.prlimit(robot.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        self.assertIn("ended", feed(800).heard)
+        code, said = robot.end(stop=False)
+        self.assertEqual(code, 0, said)
+        self.assertIn("cannot store anything", said)
+        self.assertEqual(self.status("alpha")["keyframes"], self.status("alone")["keyframes"])
+        numbers = {robot["number"] for robot in self.seen(bus).values()}
+        self.assertEqual(server.end()[0], 0)
+        kept = common.rows(self.path / "server/map.tutti", "submaps")
+        counts = [sum(int.from_bytes(key[:8], "big") == number for key, _ in kept) for number in numbers]
+        self.assertEqual(counts[0], counts[1])
+        self.assertGreater(counts[0], 2)
 
     def test_a_small_budget_of_the_uplink_leaves_a_backlog_and_nothing_is_lost(self):
         server, bus = self.start_server(common.MISSION)

@@ -55,6 +55,8 @@ class RobotNode {
   Step finish(Timestamp now);
   /// Writes what waits to be written, as before a planned end.
   Step store_all();
+  /// What it has been told is in the store, once its steps are carried out.
+  [[nodiscard]] bool is_stored() const { return unwritten_.empty(); }
   /// What has come to the robot. `budget`: for policies that need one.
   Step receive(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget = std::nullopt);
   /// The newest graph that the robot would know with this message; nothing: none, or one in terms of a graph that has

@@ -178,19 +178,17 @@ double Host::turn() {
   return next ? std::min(kLongestSleep_s, clock_.wall_s_until(*next)) : kLongestSleep_s;
 }
 
-void Host::run(const std::atomic<bool>& stop) {
-  while (!stop && !(node_ && node_->finished())) {
-    const double wait_s = turn();
-    if (node_) {
-      if (const auto thrown = thrown_by([&] { node_->wait(wait_s); })) {
-        note_thrown("what it was fed", *thrown);
-        lost_ = true;
-      }
-    } else {
-      std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
-    }
-    if (std::exchange(lost_, false)) close();
+void Host::wait(double wall_s) {
+  if (!node_) return std::this_thread::sleep_for(std::chrono::duration<double>(wall_s));
+  if (const auto thrown = thrown_by([&] { node_->wait(wall_s); })) {
+    note_thrown("what it was fed", *thrown);
+    lost_ = true;
   }
+  if (std::exchange(lost_, false)) close();
+}
+
+void Host::run(const std::atomic<bool>& stop) {
+  while (!stop && !(node_ && node_->finished())) wait(turn());
   if (node_) {
     const auto thrown = thrown_by([&] {
       add(node_->end());

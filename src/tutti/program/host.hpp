@@ -96,13 +96,17 @@ class Host {
   Status open();
   /// What is there to be done now. Returns after how many wall seconds to call it again.
   double turn();
+  /// Waits at most so many wall seconds, for what the node hears otherwise than by the port, too.
+  void wait(double wall_s);
   /// Turns until the node has finished or `stop`. Then all that it said is stored.
   void run(const std::atomic<bool>& stop);
-  /// A step from within Hosted::wait(). An error: it cannot be stored, and the node goes when it has waited.
+  /// A step from within Hosted::wait() or end(). An error: it cannot be stored, and the node goes when it has waited.
   Status carry_out(node::Step step);
 
   /// Null while it cannot be committed.
   [[nodiscard]] Hosted* hosted() const { return node_.get(); }
+  /// There is no node because nothing can be stored, or it has thrown: turn() makes it again.
+  [[nodiscard]] bool tries_again() const { return !node_ && reopen_s_ > 0.0; }
   /// By direction (true: sent) and kind.
   using TrafficTable = std::map<std::pair<bool, bus::MessageKind>, Traffic>;
   [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }

@@ -11,175 +11,17 @@
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/mission/robot_actor.hpp"
-#include "tutti/node/status_envelope.hpp"
+#include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/host.hpp"
-#include "tutti/program/live_feed.hpp"
+#include "tutti/program/hosted_robot.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/state_folder.hpp"
 #include "tutti/program/stop.hpp"
-#include "tutti/program/update_json.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/message_kind.hpp"
 
 namespace tutti::program {
 namespace {
-
-constexpr double kWaitsForMap_s = 60.0;  // after the server has stored everything
-constexpr double kLongestWork_s = 0.05;  // then it listens again
-constexpr double kStarts_s = 15.0;       // so long a second program of this robot ends when it is told so
-
-class HostedRobot final : public Hosted {
- public:
-  HostedRobot(std::unique_ptr<mission::RobotActor> actor, double duration_s, const RobotOptions& options,
-              const Clock& clock, const bus::NatsPort& port, EventLog& log, const std::string& alone)
-      : actor_(std::move(actor)),
-        duration_s_(duration_s),
-        options_(options),
-        clock_(clock),
-        port_(port),
-        log_(log),
-        alone_(alone),
-        begin_s_(clock.wall_s()) {}
-  /// Its samples come from clients, not from a recording.
-  Status feed_live(Host& host, RobotView view) {
-    auto feed = LiveFeed::open(options_.feed, options_.feed_access, *actor_, host, clock_, std::move(view));
-    if (!feed) return tl::unexpected(feed.error());
-    feed_ = std::move(*feed);
-    return {};
-  }
-
-  Answer start(Timestamp now) override {
-    actor_->resume(now);
-    return said();
-  }
-  Answer receive(const bus::Received& message, Timestamp now) override;
-  [[nodiscard]] std::optional<Timestamp> next_work() const override;
-  Answer work(Timestamp now) override;
-  void wait(double wall_s) override { feed_ ? feed_->serve(wall_s) : Hosted::wait(wall_s); }
-  Answer end() override {
-    actor_->store_all();
-    return said();
-  }
-  Answer report(Timestamp now) override;
-  [[nodiscard]] bool finished() const override;
-  [[nodiscard]] Json status(Timestamp now) const override;
-  [[nodiscard]] bool is_whole_in_map() const { return actor_->is_whole_in_map(); }
-  [[nodiscard]] const mission::RobotActor& actor() const { return *actor_; }
-  /// Why this program is not to be: another one is this robot.
-  [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
-
- private:
-  Answer said(std::vector<std::uint64_t> done = {}) {
-    Answer out{actor_->take_step(), std::move(done)};
-    if (feed_) feed_->note(out.step);
-    return out;
-  }
-  void note_conflict();
-  [[nodiscard]] bool has_ended() const { return feed_ ? feed_->has_ended() : ended_; }
-  [[nodiscard]] std::string progress(double time_s) const;
-
-  std::unique_ptr<mission::RobotActor> actor_;
-  double duration_s_;
-  const RobotOptions& options_;
-  const Clock& clock_;
-  const bus::NatsPort& port_;
-  EventLog& log_;
-  const std::string& alone_;  // why it hears no server
-  double begin_s_;
-  std::unique_ptr<LiveFeed> feed_;  // null: it replays
-  bool ended_ = false;              // the recording that it replays
-  bool warned_ = false;
-  std::optional<std::string> refused_;
-  mutable std::optional<double> settled_s_;
-};
-
-Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
-  const std::size_t before = actor_->updates().size();
-  actor_->receive(message.envelope, now);
-  for (std::size_t i = before; i < actor_->updates().size(); ++i) log_.write(to_json(actor_->updates()[i]));
-  note_conflict();
-  return said({message.ticket});
-}
-
-/// Who has just started ends; who maps goes on, whatever others say.
-void HostedRobot::note_conflict() {
-  const auto& conflict = actor_->node().conflict();
-  if (!conflict || warned_) return;
-  warned_ = true;
-  if (clock_.wall_s() - begin_s_ < kStarts_s)
-    refused_ = *conflict;
-  else
-    log_.say(Level::warning, *conflict + "; this one goes on all the same");
-}
-
-std::optional<Timestamp> HostedRobot::next_work() const {
-  std::optional<Timestamp> next = actor_->node().next_timer();
-  if (feed_ || ended_) return next;
-  const double next_s = actor_->next_time();
-  const Timestamp sample = next_s > duration_s_ ? Timestamp{} : Timestamp{} + next_s;  // at its end: at once
-  return next ? std::min(*next, sample) : sample;
-}
-
-/// All samples that are due, as far as they get in a while and within one submap: what the node sends later it reads
-/// from its store.
-Answer HostedRobot::work(Timestamp now) {
-  if (const auto timer = actor_->node().next_timer(); timer && *timer <= now) actor_->on_timer(now);
-  const double until_s = clock_.wall_s() + kLongestWork_s;
-  const std::size_t backlog = actor_->node().backlog().size();
-  while (!feed_ && !ended_ && clock_.wall_s() < until_s && actor_->node().backlog().size() == backlog) {
-    const double next_s = actor_->next_time();
-    if (next_s > duration_s_) {
-      actor_->finish(now);
-      ended_ = true;
-    } else if (Timestamp{} + next_s <= now) {
-      actor_->replay_next(now);
-    } else {
-      break;
-    }
-  }
-  return said();
-}
-
-Answer HostedRobot::report(Timestamp now) {
-  NodeStatus status = actor_->node().status(now);
-  status.version = options_.version;
-  return {{.messages = {node::to_server(bus::Endpoint::of(actor_->id()), std::move(status))}}, {}};
-}
-
-bool HostedRobot::finished() const {
-  if (refused_) return true;
-  if (options_.stay || !has_ended() || !actor_->node().backlog().empty()) {
-    settled_s_.reset();
-    return false;
-  }
-  if (!settled_s_) settled_s_ = clock_.wall_s();
-  return actor_->is_whole_in_map() || clock_.wall_s() > *settled_s_ + kWaitsForMap_s;
-}
-
-std::string HostedRobot::progress(double time_s) const {
-  if (!feed_) return fmt::format("{:.0f} of {:.0f} s", std::min(time_s, duration_s_), duration_s_);
-  return feed_->has_ended() ? "the recording has ended" : feed_->is_fed() ? "a client feeds" : "no client feeds";
-}
-
-Json HostedRobot::status(Timestamp now) const {
-  const NodeStatus status = actor_->node().status(now);
-  const bus::NatsState link = port_.state();
-  const double time_s = now - Timestamp{};
-  return {{"program", "robot"},
-          {"name", status.name},
-          {"time_s", time_s},
-          {"finished", has_ended()},
-          {"backlog", status.backlog_submaps},
-          {"keyframes", status.keyframes},
-          {"revision", status.heard_revision},
-          {"connected", link.connected},
-          {"alone", alone_},
-          {"refused", actor_->node().conflict().value_or("")},
-          {"line",
-           fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
-                       status.keyframes, status.backlog_submaps, status.heard_revision,
-                       link.connected ? "" : ", no link: " + link.last_error, alone_.empty() ? "" : ", " + alone_)}};
-}
 
 /// The last event of a program: what only it knows.
 Json last_words(const Host::TrafficTable& table, const HostedRobot* robot) {
@@ -237,7 +79,10 @@ class RobotProgram {
   [[nodiscard]] double begin_s(const mission::RobotActor& actor) const;
   Result<std::unique_ptr<mission::RobotActor>> open_actor();
   Result<std::unique_ptr<Hosted>> open_node(bus::Port& port);
+  [[nodiscard]] RobotView view() const;
+  Status open_feed(const node::RobotNode& node);
   void tell_alone();
+  void tell_feed();
 
   const RobotOptions& options_;
   mission::MissionConfig config_;
@@ -251,6 +96,8 @@ class RobotProgram {
   std::unique_ptr<bus::MissionLease> lease_;  // not its own: it looks for the server's
   std::string alone_;                         // as it was told last
   std::optional<Clock> clock_;
+  std::unique_ptr<LiveFeed> feed_;  // null: it replays
+  FeedFront::Load load_;            // as it was told last
   std::optional<Host> host_;
 };
 
@@ -301,12 +148,43 @@ Result<std::unique_ptr<Hosted>> RobotProgram::open_node(bus::Port& port) {
   if (!actor) return in_context((folder_->path() / kRobotFile).string(), actor.error());
   auto robot = std::make_unique<HostedRobot>(std::move(*actor), duration_s_, options_, *clock_,
                                              dynamic_cast<const bus::NatsPort&>(port), *log_, alone_);
-  if (options_.feed.empty()) return robot;
+  if (feed_) robot->feed_live(*feed_, *host_, view());
+  return robot;
+}
+
+RobotView RobotProgram::view() const {
   std::map<RobotId, std::string> names;
   for (std::size_t i = 0; i < names_.size(); ++i) names[RobotId{static_cast<std::uint32_t>(i)}] = names_[i];
-  if (Status fed = robot->feed_live(*host_, RobotView(options_.name, std::move(names))); !fed)
-    return tl::unexpected(fed.error());
-  return robot;
+  return RobotView(options_.name, std::move(names));
+}
+
+Status RobotProgram::open_feed(const node::RobotNode& node) {
+  if (options_.feed.empty()) return {};
+  auto feed = LiveFeed::open(options_.feed, options_.feed_access, view().state(node));
+  if (!feed) return tl::unexpected(feed.error());
+  feed_ = std::move(*feed);
+  return {};
+}
+
+/// Once a second: what the feed must know of the host, and the log of the feed.
+void RobotProgram::tell_feed() {
+  if (!feed_) return;
+  const std::string& trouble = host_->trouble();
+  feed_->front().say_trouble(trouble.empty() ? "" : "the map waits, localisation goes on by odometry: " + trouble);
+  if (const std::string thrown = feed_->take_thrown(); !thrown.empty())
+    log_->say(Level::error, "the feed has thrown, which is a defect of it; clients have to connect again: " + thrown);
+  const FeedFront::Load load = feed_->front().load(), before = std::exchange(load_, load);
+  const std::size_t now = load.scans_left_out + load.samples_joined,
+                    was = before.scans_left_out + before.samples_joined;
+  if (now > 0 && was == 0)
+    log_->say(Level::warning,
+              fmt::format("the map is behind what is fed: {} inputs wait; scans are left out, {} so far, "
+                          "then odometry is taken together; poses are answered all the same",
+                          load.waiting, load.scans_left_out));
+  if (now == 0 && was > 0)
+    log_->say(Level::info, fmt::format("the map has caught up with what is fed: {} scans were left out, {} odometry "
+                                       "samples taken together",
+                                       before.scans_left_out, before.samples_joined));
 }
 
 /// A recording is replayed from where it stood; for a robot that is fed, time has passed.
@@ -340,12 +218,18 @@ Status RobotProgram::start() {
                               return bus::open_nats_port(bus::Endpoint::of(robot_), where);
                             },
                             .open_node = [this](bus::Port& port) { return open_node(port); },
-                            .each_second = [this] { tell_alone(); },
+                            .each_second =
+                                [this] {
+                                  tell_alone();
+                                  tell_feed();
+                                },
                             .status_file = folder_->path() / kStatusFile,
                             .table_aside = "meta",
                             .version = options_.version},
                 *clock_, *log_);
-  if (Status opened = host_->open(); !opened) return opened;
+  if (Status opened = open_feed((*actor)->node()); !opened) return opened;
+  // On a full disk there is no map, but clients are told where they are.
+  if (Status opened = host_->open(); !opened && !(feed_ && host_->tries_again())) return opened;
   log_->say(Level::info, fmt::format("robot {} runs in {}, bus {}, {}, {}", robot_.value, folder_->path().string(),
                                      options_.bus, options_.feed.empty() ? "replays" : "is fed at " + options_.feed,
                                      folder_->is_new() ? "a new session" : "goes on"));
@@ -363,12 +247,14 @@ Status RobotProgram::run(const std::atomic<bool>& stop) {
                 "the server refuses this robot: {}: stop the other one, give this one another name, or name it in the "
                 "server's mission",
                 *robot->refused());
-  if (robot == nullptr || stop || robot->is_whole_in_map())
+  if (robot == nullptr)
+    log_->say(Level::error, "stops; what came last is not stored: " + host_->trouble());
+  else if (stop || robot->is_whole_in_map())
     log_->say(Level::info, "stops; everything is stored");
   else
     log_->say(Level::warning, fmt::format("stops; in {} s no map came that contains this robot's last submap, which "
                                           "the server has",
-                                          kWaitsForMap_s));
+                                          HostedRobot::kWaitsForMap_s));
   return {};
 }
 

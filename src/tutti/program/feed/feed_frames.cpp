@@ -155,6 +155,8 @@ std::string correction_frame(const FeedState& state, const SmoothMap::Answer& an
   out.set_in_map(state.component.has_value());
   out.set_wants_scan(state.wants_scan);
   out.set_dropped(dropped);
+  out.set_has_stored(state.stored.has_value());
+  if (state.stored) out.set_stored_stamp_ns(state.stored->ns);
   return framed(message);
 }
 

@@ -87,7 +87,8 @@ void FeedServer::serve(int timeout_ms) {
   std::vector<pollfd> wanted{{.fd = listener_, .events = POLLIN, .revents = 0}};
   std::vector<FeedSession::Client> clients;
   for (const auto& [client, file] : files_) {
-    const auto events = (session_.is_over(client) ? 0 : POLLIN) | (session_.output(client).empty() ? 0 : POLLOUT);
+    const bool listens = !session_.is_over(client) && !silent_.contains(client);
+    const auto events = (listens ? POLLIN : 0) | (session_.output(client).empty() ? 0 : POLLOUT);
     wanted.push_back({.fd = file, .events = static_cast<short>(events), .revents = 0});
     clients.push_back(client);
   }
@@ -95,15 +96,17 @@ void FeedServer::serve(int timeout_ms) {
   for (std::size_t i = 0; i < clients.size(); ++i) {
     const short ready = wanted[i + 1].revents;
     const int file = wanted[i + 1].fd;
+    const bool is_gone = (ready & (POLLERR | POLLHUP | POLLNVAL)) != 0;
+    if ((ready & POLLIN) != 0 ? read_from(clients[i], file) : !is_gone) continue;
     // One that has said all it has to say may still read.
-    if ((ready & POLLIN) != 0 ? !read_from(clients[i], file) : (ready & (POLLERR | POLLHUP | POLLNVAL)) != 0) {
-      static_cast<void>(write_to(clients[i], file));
-      drop(clients[i]);
-    }
+    silent_.insert(clients[i]);
+    if (!is_gone && session_.waits_for_end(clients[i])) continue;
+    static_cast<void>(write_to(clients[i], file));
+    drop(clients[i]);
   }
   if ((wanted[0].revents & POLLIN) != 0) accept_one();
   for (const auto& [client, file] : std::map(files_))
-    if (!write_to(client, file)) drop(client);
+    if (!write_to(client, file) || (silent_.contains(client) && !session_.waits_for_end(client))) drop(client);
 }
 
 void FeedServer::accept_one() {
@@ -151,6 +154,7 @@ void FeedServer::drop(FeedSession::Client client) {
   session_.disconnect(client);
   close(files_.at(client));
   files_.erase(client);
+  silent_.erase(client);
 }
 
 }  // namespace tutti::program

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "tutti/program/feed/feed_session.hpp"
@@ -48,6 +49,7 @@ class FeedServer {
   FeedSettings settings_;
   FeedSession session_;
   std::map<FeedSession::Client, int> files_;
+  std::set<FeedSession::Client> silent_;  // they have said all they have to say
   FeedSession::Client next_ = 0;
 };
 

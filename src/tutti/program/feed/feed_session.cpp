@@ -44,8 +44,8 @@ void FeedSession::take(Client client, const FromClient& message) {
   else if (const Status ok = target_.finish(); !ok)
     put(connection, refused_frame({}, ok.error().message));
   else {
-    connection.ended = true;
-    put(connection, ended_frame());
+    connection.ended = connection.waits_for_end = true;
+    answer_end();
   }
 }
 
@@ -85,12 +85,19 @@ void FeedSession::take_odometry(Client client, const node::OdometrySample& sampl
 void FeedSession::take_scan(Client client, const Scan& scan) {
   Connection& connection = clients_.at(client);
   if (connection.ended) return put(connection, refused_frame(scan.stamp, "the recording has ended"));
-  const FeedState state = target_.state();
-  if (state.newest && state.newest->stamp == scan.stamp && !state.wants_scan) return;  // nothing new from here
   if (const Status ok = target_.add_scan(scan); !ok) put(connection, refused_frame(scan.stamp, ok.error().message));
 }
 
+void FeedSession::answer_end() {
+  if (!target_.state().ended) return;
+  for (auto& [number, connection] : clients_)
+    if (std::exchange(connection.waits_for_end, false)) put(connection, ended_frame());
+}
+
 void FeedSession::refresh() {
+  for (const FeedRefusal& refusal : target_.take_refusals())
+    if (feeder_) put(clients_.at(*feeder_), refused_frame(refusal.stamp, refusal.why));
+  answer_end();
   std::string now = situation_frame(target_.state());
   if (now == situation_) return;
   situation_ = std::move(now);

@@ -29,7 +29,7 @@ class FeedSession {
   void disconnect(Client client);
   /// Carries out every message that is whole now.
   void receive(Client client, std::string_view bytes);
-  /// The robot may have heard something: says so to those who listen, if it matters to them.
+  /// The robot may have heard or done something: says so to those who listen, if it matters to them.
   void refresh();
 
   /// What is to be written next; empty: nothing.
@@ -40,6 +40,8 @@ class FeedSession {
   [[nodiscard]] bool is_over(Client client) const { return clients_.at(client).over; }
   /// It has said who it is.
   [[nodiscard]] bool is_greeted(Client client) const { return clients_.at(client).greeted; }
+  /// It has said all, and the answer to that is still to come.
+  [[nodiscard]] bool waits_for_end(Client client) const { return clients_.at(client).waits_for_end; }
   [[nodiscard]] bool has_feeder() const { return feeder_.has_value(); }
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< Corrections, for all clients.
 
@@ -56,7 +58,8 @@ class FeedSession {
     std::uint64_t dropped = 0;
     bool greeted = false;
     bool over = false;
-    bool ended = false;  ///< It said that the recording has.
+    bool ended = false;          ///< It said that the recording has,
+    bool waits_for_end = false;  ///< and is not answered yet.
     bool listens_only = false;
   };
 
@@ -67,6 +70,7 @@ class FeedSession {
   void broadcast(const std::string& frame);
   void take(Client client, const FromClient& message);
   void greet(Client client, const FeedHello& hello);
+  void answer_end();
   void take_odometry(Client client, const node::OdometrySample& sample);
   void take_scan(Client client, const Scan& scan);
 

@@ -28,13 +28,17 @@ class ScriptedTarget final : public FeedTarget {
   }
   Status finish() override {
     ++finished;
+    known.ended = ends_at_once;
     return {};
   }
   [[nodiscard]] FeedState state() const override { return known; }
+  std::vector<FeedRefusal> take_refusals() override { return std::exchange(refusals, {}); }
 
   FeedState known{.chain = {RobotId{4}, 77}, .name = "alpha", .newest = {}};
   std::vector<Timestamp> scans;
   int finished = 0;
+  bool ends_at_once = true;
+  std::vector<FeedRefusal> refusals;
 };
 
 class FeedSessionTest : public testing::Test {
@@ -88,9 +92,8 @@ TEST_F(FeedSessionTest, AnswersHelloAndEverySample) {
   ASSERT_EQ(correction.t_map_odom_covariance_size(), 36);
   EXPECT_NEAR(correction.t_map_odom_covariance(7), 0.01, 1e-12);
   EXPECT_TRUE(say(1, test::scan({10}, 5)).empty());
-  target_.known.wants_scan = false;
-  EXPECT_TRUE(say(1, test::scan({10}, 5)).empty());  // of no use: left out
   EXPECT_EQ(target_.scans.size(), 1U);
+  EXPECT_FALSE(correction.has_stored());
   EXPECT_TRUE(say(1, test::end_of_recording())[0].has_ended());
   EXPECT_EQ(target_.finished, 1);
   EXPECT_EQ(say(1, sample(20))[0].refused().why(), "the recording has ended");
@@ -109,6 +112,32 @@ TEST_F(FeedSessionTest, RefusesWhatIsNoGoodAndGoesOn) {
   EXPECT_TRUE(say(1, test::framed(half))[0].has_refused());
   EXPECT_FALSE(session_.is_over(1));
   EXPECT_TRUE(say(1, sample(12))[0].has_correction());
+}
+
+TEST_F(FeedSessionTest, SaysLaterWhatTheRobotSaysLater) {
+  join(1);
+  join(2, true);
+  target_.ends_at_once = false;
+  target_.refusals = {{{5}, "too far"}};
+  session_.refresh();
+  const auto refused = read(1);
+  ASSERT_EQ(refused.size(), 1U);
+  EXPECT_EQ(refused[0].refused().why(), "too far");
+  EXPECT_TRUE(read(2).empty());
+  target_.known.stored = Timestamp{7};
+  const auto answer = say(1, sample(8));
+  EXPECT_TRUE(answer[0].correction().has_stored());
+  EXPECT_EQ(answer[0].correction().stored_stamp_ns(), 7);
+  EXPECT_TRUE(say(1, test::end_of_recording()).empty());
+  EXPECT_TRUE(session_.waits_for_end(1));
+  session_.refresh();
+  EXPECT_TRUE(read(1).empty());
+  target_.known.ended = true;
+  session_.refresh();
+  ASSERT_EQ(read(1).size(), 1U);
+  EXPECT_FALSE(session_.waits_for_end(1));
+  session_.refresh();
+  EXPECT_TRUE(read(1).empty());
 }
 
 TEST_F(FeedSessionTest, ClosesAfterGarbage) {

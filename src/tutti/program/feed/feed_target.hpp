@@ -11,6 +11,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
+#include "tutti/robot/next_keyframe.hpp"
 
 namespace tutti::program {
 
@@ -42,6 +43,15 @@ struct FeedState {
   bool wants_scan = false;                          ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;
+  std::optional<Timestamp> stored;    ///< The newest sample that a kill would not lose.
+  robot::NextKeyframe next_keyframe;  ///< A scan of a later sample would be used when one is due there.
+  bool ended = false;                 ///< The client has said so, and all before is stored.
+};
+
+/// A sample or scan that was taken from the client and turned out to be no good.
+struct FeedRefusal {
+  Timestamp stamp;
+  std::string why;
 };
 
 /// The robot behind a live feed.
@@ -51,7 +61,10 @@ class FeedTarget {
   /// An error: it was refused, and why; nothing has changed.
   virtual Status add_odometry(const node::OdometrySample& sample) = 0;
   virtual Status add_scan(const Scan& scan) = 0;
+  /// FeedState::ended says when it is done.
   virtual Status finish() = 0;
+  /// Since the last call.
+  virtual std::vector<FeedRefusal> take_refusals() { return {}; }
   [[nodiscard]] virtual FeedState state() const = 0;
 };
 

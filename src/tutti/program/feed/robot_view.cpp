@@ -48,7 +48,8 @@ FeedState RobotView::state(const node::RobotNode& node) const {
                 .component = agent.component(),
                 .wants_scan = agent.wants_scan(),
                 .team_mates = {},
-                .alerts = alerts_};
+                .alerts = alerts_,
+                .next_keyframe = agent.next_keyframe()};
   for (const auto& [sensor, alert] : missing_) out.alerts.push_back(alert);
   if (const auto stamp = agent.newest_sample()) out.newest = {*stamp, agent.T_odom_body()};
   for (const robot::Whereabouts& other : agent.whereabouts()) {

@@ -22,11 +22,19 @@ class NodeTarget final : public FeedTarget {
     carry_out(node_->resume({}));
   }
   Status add_odometry(const node::OdometrySample& sample) override {
+    ended_ = false;
     return carry_out(node_->add_odometry(sample, {}));
   }
   Status add_scan(const Scan& scan) override { return carry_out(node_->add_scan(scan, {})); }
-  Status finish() override { return carry_out(node_->finish({})); }
-  [[nodiscard]] FeedState state() const override { return view_.state(*node_); }
+  Status finish() override {
+    ended_ = true;
+    return carry_out(node_->finish({}));
+  }
+  [[nodiscard]] FeedState state() const override {
+    FeedState state = view_.state(*node_);
+    state.ended = ended_;
+    return state;
+  }
 
   void receive(const bus::Envelope& envelope) { static_cast<void>(carry_out(node_->receive(envelope, {}))); }
   [[nodiscard]] const node::RobotNode& node() const { return *node_; }
@@ -44,6 +52,7 @@ class NodeTarget final : public FeedTarget {
   std::unique_ptr<node::RobotNode> node_;
   RobotView view_;
   std::vector<bus::Envelope> sent_;
+  bool ended_ = false;
 };
 
 }  // namespace tutti::program::test

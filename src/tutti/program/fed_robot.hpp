@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <utility>
+
+#include "tutti/mission/robot_actor.hpp"
+#include "tutti/program/clock.hpp"
+#include "tutti/program/feed/feed_front.hpp"
+#include "tutti/program/feed/robot_view.hpp"
+#include "tutti/program/host.hpp"
+
+namespace tutti::program {
+
+/// The robot's end of a live feed: takes what waits at the front in its order, lets the host carry out what the robot
+/// says to it, and tells the front what the robot knows. It goes with its node; the front stays, and what it still
+/// holds comes to the next one.
+class FedRobot {
+ public:
+  static constexpr double kLongest_s = 0.05;  ///< Of work at a time, unless one input takes longer.
+  static constexpr double kPublish_s = 0.05;  ///< At least so often, while it is behind.
+
+  /// All that it is given outlives it.
+  FedRobot(FeedFront& front, mission::RobotActor& actor, Host& host, const Clock& clock, RobotView view)
+      : front_(front), actor_(actor), host_(host), clock_(clock), view_(std::move(view)) {
+    front_.begin_again(actor_.node().agent().newest_sample());
+  }
+
+  /// Of the robot's steps that come from elsewhere.
+  void note(const node::Step& step);
+  /// Waits at most so many wall seconds for what is fed, and takes it. All steps of before are carried out.
+  void wait(double wall_s);
+  /// Takes what has come until now, and clients nothing more.
+  void end();
+
+ private:
+  /// False: it cannot be stored, and the robot goes.
+  bool take(const FeedInput& input);
+  void publish();
+
+  FeedFront& front_;
+  mission::RobotActor& actor_;
+  Host& host_;
+  const Clock& clock_;
+  RobotView view_;
+  double publish_s_ = 0.0;
+};
+
+}  // namespace tutti::program

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/fed_robot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "support/robot/drifting_robot.hpp"
+#include "tutti/storage/memory_store.hpp"
+
+namespace tutti::program {
+namespace fed_robot_test {
+
+constexpr RobotId kRobot{1};
+const Trajectory kOdometry = robot::test::drifting_odometry(400);
+
+node::OdometrySample sample(std::size_t i) {
+  return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
+}
+
+Scan scan(std::size_t i) {
+  PointCloud cloud;
+  for (int k = 0; k < 50; ++k) cloud.points.emplace_back(5.0F, static_cast<float>(k), static_cast<float>(i));
+  return {kOdometry[i].stamp, std::make_shared<const PointCloud>(std::move(cloud)), {}};
+}
+
+/// On a disk that may be full.
+class Disk final : public storage::TableStore {
+ public:
+  Status commit(std::span<const storage::Write> writes) override {
+    if (full) return fail(ErrorCode::io, "disk full");
+    return rows_.commit(writes);
+  }
+  [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override {
+    return rows_.read(table, key);
+  }
+  [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override {
+    return rows_.scan(table, from, visit);
+  }
+  [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override {
+    return rows_.sizes(table, visit);
+  }
+  bool full = false;
+
+ private:
+  storage::MemoryStore rows_{storage::robot_schema()};
+};
+
+class NoPort final : public bus::Port {
+ public:
+  Status send(bus::Envelope) override { return {}; }
+  std::vector<bus::Received> receive() override { return {}; }
+  void acknowledge(std::uint64_t) override {}
+  void still_busy(std::uint64_t) override {}
+};
+
+/// What of HostedRobot is about being fed.
+class Hosting final : public Hosted {
+ public:
+  Hosting(std::unique_ptr<mission::RobotActor> actor, FeedFront& front, Host& host, const Clock& clock)
+      : actor_(std::move(actor)), fed_(front, *actor_, host, clock, RobotView("alpha")) {}
+  Answer start(Timestamp now) override {
+    actor_->resume(now);
+    return said();
+  }
+  Answer receive(const bus::Received&, Timestamp) override { return {}; }
+  [[nodiscard]] std::optional<Timestamp> next_work() const override { return actor_->node().next_timer(); }
+  Answer work(Timestamp now) override {
+    actor_->on_timer(now);
+    return said();
+  }
+  void wait(double) override { fed_.wait(0.0); }
+  Answer end() override {
+    fed_.end();
+    actor_->store_all();
+    return said();
+  }
+  [[nodiscard]] Json status(Timestamp) const override { return {}; }
+  [[nodiscard]] const robot::RobotAgent& agent() const { return actor_->node().agent(); }
+
+ private:
+  Answer said() {
+    Answer out{actor_->take_step(), {}};
+    fed_.note(out.step);
+    return out;
+  }
+  std::unique_ptr<mission::RobotActor> actor_;
+  FedRobot fed_;
+};
+
+class FedRobotTest : public testing::Test {
+ protected:
+  FedRobotTest() {
+    recording_.recording.robot = kRobot;
+    recording_.recording.name = "alpha";
+    recording_.score_against_reference = false;
+    front_ = std::make_unique<FeedFront>(RobotView("alpha").state(open_actor()->node()), FeedFront::Limits{});
+    Host::Parts parts;
+    parts.store = &disk_;
+    parts.open_port = []() -> Result<std::unique_ptr<bus::Port>> { return std::make_unique<NoPort>(); };
+    parts.open_node = [this](bus::Port&) -> Result<std::unique_ptr<Hosted>> {
+      return std::make_unique<Hosting>(open_actor(), *front_, *host_, clock_);
+    };
+    host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
+  }
+  std::unique_ptr<mission::RobotActor> open_actor() {
+    return std::move(mission::RobotActor::open(recording_, {}, {}, Rng(1), 7, disk_).value());
+  }
+  void feed(std::size_t from, std::size_t until) {
+    for (std::size_t i = from; i < until; ++i) {
+      ASSERT_TRUE(front_->add_odometry(sample(i)));
+      ASSERT_EQ(front_->state().newest->stamp, kOdometry[i].stamp);
+      if (i % 5 != 0) continue;
+      ASSERT_TRUE(front_->add_scan(scan(i)));
+    }
+  }
+  /// As Host::run() does, `count` times, until everything is taken.
+  void turns(int count) {
+    for (int i = 0; i < count; ++i, wall_s_ += 0.02) {
+      host_->turn();
+      host_->wait(0.0);
+    }
+  }
+  [[nodiscard]] const robot::RobotAgent& agent() const { return dynamic_cast<Hosting*>(host_->hosted())->agent(); }
+  void expect_the_robot_of_all_that_was_fed() {
+    robot::RobotAgent alone(kRobot, 7, {}, Rng(1));
+    for (std::size_t i = 0; i < kOdometry.size(); ++i) {
+      ASSERT_TRUE(alone.add_odometry(sample(i).stamp, sample(i).T_odom_body, sample(i).increment_covariance));
+      if (i % 5 != 0 || !alone.wants_scan()) continue;
+      ASSERT_TRUE(alone.add_scan(scan(i)));
+    }
+    EXPECT_EQ(agent().keyframes(), alone.keyframes());
+    EXPECT_EQ(agent().newest_sample(), kOdometry.back().stamp);
+    EXPECT_EQ(agent().covariance(), alone.covariance());
+  }
+
+  double wall_s_ = 0.0;
+  Clock clock_{1.0, 0.0, [this] { return wall_s_; }};
+  std::unique_ptr<EventLog> log_ = EventLog::on_console("test", Level::error);
+  mission::MissionRecording recording_;
+  Disk disk_;
+  std::unique_ptr<FeedFront> front_;
+  std::unique_ptr<Host> host_;
+};
+
+TEST_F(FedRobotTest, TakesWhatIsFedAndSaysHowFarItIsStored) {
+  ASSERT_TRUE(host_->open());
+  feed(0, 100);
+  turns(1);
+  EXPECT_TRUE(front_->is_drained());
+  feed(100, 200);
+  turns(100);  // the journal is written every half second
+  EXPECT_EQ(front_->state().stored, kOdometry[199].stamp);
+  EXPECT_EQ(agent().newest_sample(), kOdometry[199].stamp);
+  EXPECT_EQ(open_actor()->node().agent().newest_sample(), kOdometry[199].stamp);  // after a kill
+  feed(200, kOdometry.size());
+  turns(100);
+  expect_the_robot_of_all_that_was_fed();
+}
+
+TEST_F(FedRobotTest, AFullDiskCostsTheMapAndNeverThePose) {
+  ASSERT_TRUE(host_->open());
+  feed(0, 100);
+  turns(100);
+  disk_.full = true;
+  feed(100, 150);
+  turns(100);
+  EXPECT_EQ(host_->hosted(), nullptr);
+  EXPECT_TRUE(host_->tries_again());
+  EXPECT_NE(host_->trouble().find("disk full"), std::string::npos) << host_->trouble();
+  feed(150, 300);  // each is answered
+  wall_s_ += Host::kReopen_s;
+  turns(10);  // and it tries again, in vain
+  feed(300, 350);
+  const FeedState said = front_->state();
+  EXPECT_EQ(said.newest->stamp, kOdometry[349].stamp);
+  EXPECT_EQ(said.stored, kOdometry[99].stamp);
+  EXPECT_GT(said.covariance(0, 0), 0.0);
+  disk_.full = false;
+  wall_s_ += Host::kReopen_s;
+  turns(100);
+  EXPECT_EQ(host_->trouble(), "");
+  feed(350, kOdometry.size());
+  turns(100);
+  EXPECT_TRUE(front_->take_refusals().empty());
+  EXPECT_EQ(front_->state().stored, kOdometry.back().stamp);
+  expect_the_robot_of_all_that_was_fed();
+}
+
+TEST_F(FedRobotTest, AStartOnAFullDiskWaitsForRoom) {
+  disk_.full = true;
+  EXPECT_FALSE(host_->open());
+  EXPECT_TRUE(host_->tries_again());
+  feed(0, 200);
+  turns(10);
+  disk_.full = false;
+  wall_s_ += Host::kReopen_s;
+  feed(200, kOdometry.size());
+  turns(200);
+  expect_the_robot_of_all_that_was_fed();
+}
+
+TEST_F(FedRobotTest, WhatHasComeIsStoredBeforeItEnds) {
+  ASSERT_TRUE(host_->open());
+  feed(0, kOdometry.size());
+  const std::atomic<bool> stop = true;
+  host_->run(stop);
+  EXPECT_FALSE(front_->add_odometry({kOdometry.back().stamp + 1.0, {}, Matrix6d::Identity()}));
+  EXPECT_EQ(open_actor()->node().agent().newest_sample(), kOdometry.back().stamp);
+}
+
+}  // namespace fed_robot_test
+}  // namespace tutti::program

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/feed_front.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <utility>
+
+#include "tutti/model/relative_pose.hpp"
+#include "tutti/robot/odometry_sample.hpp"
+
+namespace tutti::program {
+namespace {
+
+std::size_t bytes_of(const FeedInput& input) {
+  const auto* scan = std::get_if<Scan>(&input);
+  if (scan == nullptr) return 0;
+  const std::size_t ages = scan->age_s ? scan->age_s->size() : 0;
+  return scan->cloud->points.size() * sizeof(Eigen::Vector3f) + ages * sizeof(float);
+}
+
+Timestamp stamp_of(const FeedInput& input) {
+  if (const auto* sample = std::get_if<node::OdometrySample>(&input)) return sample->stamp;
+  const auto* scan = std::get_if<Scan>(&input);
+  return scan != nullptr ? scan->stamp : Timestamp{};
+}
+
+bool is_odometry(const FeedInput& input) { return std::holds_alternative<node::OdometrySample>(input); }
+
+/// One sample that says what both did. Both were taken, so both are usable.
+node::OdometrySample joined(const node::OdometrySample& first, const node::OdometrySample& second) {
+  const auto usable = [](const node::OdometrySample& sample) {
+    return robot::usable_step({}, sample.stamp, sample.T_odom_body, sample.increment_covariance).value();
+  };
+  const robot::OdometryStep before = usable(first), after = usable(second);
+  const Matrix6d both =
+      compound_covariance(before.T_odom_body.inverse() * after.T_odom_body, before.covariance, after.covariance);
+  return {second.stamp, second.T_odom_body, 0.5 * (both + both.transpose())};
+}
+
+}  // namespace
+
+FeedFront::FeedFront(FeedState robot, const Limits& limits)
+    : limits_(limits), robot_(std::move(robot)), localiser_(robot_.chain.robot) {
+  if (!robot_.newest) return;
+  stored_ = robot_.newest->stamp;
+  localiser_.correct(*robot_.newest, robot_.covariance);
+}
+
+Status FeedFront::add_odometry(const node::OdometrySample& sample) {
+  const std::scoped_lock lock(mutex_);
+  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+  if (auto ok = localiser_.add(sample); !ok) return ok;
+  ended_ = false;
+  push(sample);
+  fed_.notify_one();
+  if (waiting() > limits_.inputs) {
+    note_behind(sample.stamp);
+    thin();
+  }
+  return {};
+}
+
+Status FeedFront::add_scan(const Scan& scan) {
+  const std::scoped_lock lock(mutex_);
+  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+  if (!scan.cloud) return fail(ErrorCode::invalid, "scan at {} ns has no cloud", scan.stamp.ns);
+  const std::size_t bytes = bytes_of(scan);
+  if (scan_bytes_ + bytes > limits_.scan_bytes || waiting() >= limits_.inputs / 2) {
+    note_behind(scan.stamp);
+    ++scans_left_out_;
+    return fail(ErrorCode::io,
+                "the map is behind: {} inputs with {} bytes of scans wait, at most {} with {}; the scan at {} ns is "
+                "left out",
+                waiting(), scan_bytes_, limits_.inputs / 2, limits_.scan_bytes, scan.stamp.ns);
+  }
+  scan_bytes_ += bytes;
+  push(scan);
+  fed_.notify_one();
+  return {};
+}
+
+Status FeedFront::finish() {
+  const std::scoped_lock lock(mutex_);
+  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+  push(FeedEnded{});
+  fed_.notify_one();
+  return {};
+}
+
+void FeedFront::note_behind(Timestamp stamp) {
+  if (samples_joined_ + scans_left_out_ == 0) behind_since_ = stamp;
+}
+
+/// Of samples that are closer than finest_s_, as SensorTimeline::add() does, two become one.
+void FeedFront::push(FeedInput input) {
+  const auto* sample = std::get_if<node::OdometrySample>(&input);
+  if (sample != nullptr && waiting() >= 2) {
+    const auto* last = std::get_if<node::OdometrySample>(&inputs_.back());
+    const auto* before = std::get_if<node::OdometrySample>(&inputs_[inputs_.size() - 2]);
+    if (last != nullptr && before != nullptr && sample->stamp - before->stamp < finest_s_) {
+      inputs_.back() = joined(*last, *sample);
+      ++samples_joined_;
+      return;
+    }
+  }
+  inputs_.push_back(std::move(input));
+}
+
+/// The way evenly, as fine as it can be, until there is room for a while. Scans are half of what waits at most, and
+/// behind the last of them all is odometry.
+void FeedFront::thin() {
+  const auto first = std::find_if(inputs_.begin() + static_cast<std::ptrdiff_t>(taken_), inputs_.end(), is_odometry);
+  const double span_s = localiser_.newest()->stamp - stamp_of(*first);
+  finest_s_ = std::max(2.0 * finest_s_, 2.0 * span_s / static_cast<double>(limits_.inputs));
+  while (waiting() > limits_.inputs / 4 * 3 && finest_s_ < 4.0 * span_s) {
+    std::deque<FeedInput> all = std::exchange(inputs_, {});
+    const auto of_robot = all.begin() + static_cast<std::ptrdiff_t>(taken_);
+    inputs_.assign(std::make_move_iterator(all.begin()), std::make_move_iterator(of_robot));
+    for (auto input = of_robot; input != all.end(); ++input) push(std::move(*input));
+    finest_s_ *= 2.0;
+  }
+}
+
+FeedState FeedFront::state() const {
+  const std::scoped_lock lock(mutex_);
+  FeedState out = robot_;
+  out.newest = localiser_.newest();
+  out.covariance = localiser_.covariance();
+  out.stored = stored_;
+  out.ended = ended_ && inputs_.empty();
+  // Of samples that the robot has not heard yet it would want one where it wanted one, or a keyframe is due.
+  if (localiser_.steps() > 0 || (out.newest && !robot_.newest))
+    out.wants_scan = robot_.wants_scan || robot_.next_keyframe.is_due(*out.newest);
+  if (!trouble_.empty()) out.alerts.push_back({trouble_, trouble_since_, trouble_since_, trouble_since_});
+  if (scans_left_out_ + samples_joined_ > 0) {
+    const std::string text = fmt::format("the map is behind what is fed, localisation goes on: scans are left out{}",
+                                         samples_joined_ > 0 ? ", odometry is taken together" : "");
+    out.alerts.push_back({text, behind_since_, behind_since_, behind_since_});
+  }
+  return out;
+}
+
+std::vector<FeedRefusal> FeedFront::take_refusals() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(refusals_, {});
+}
+
+std::optional<FeedInput> FeedFront::take(double wall_s) {
+  std::unique_lock lock(mutex_);
+  const auto has_more = [&] { return inputs_.size() > taken_; };
+  if (!fed_.wait_for(lock, std::chrono::duration<double>(wall_s), has_more)) return std::nullopt;
+  in_hand_ = true;
+  return inputs_[taken_++];
+}
+
+void FeedFront::note_heard() {
+  const std::scoped_lock lock(mutex_);
+  in_hand_ = false;
+}
+
+bool FeedFront::is_drained() const {
+  const std::scoped_lock lock(mutex_);
+  return taken_ == inputs_.size();
+}
+
+void FeedFront::note_stored() {
+  const std::scoped_lock lock(mutex_);
+  for (; taken_ > 0; --taken_) {
+    ended_ = std::holds_alternative<FeedEnded>(inputs_.front());
+    if (const auto* sample = std::get_if<node::OdometrySample>(&inputs_.front())) stored_ = sample->stamp;
+    scan_bytes_ -= bytes_of(inputs_.front());
+    inputs_.pop_front();
+  }
+  if (!inputs_.empty()) return;
+  scans_left_out_ = samples_joined_ = 0;
+  finest_s_ = 0.0;
+}
+
+void FeedFront::begin_again(const std::optional<Timestamp>& stored) {
+  const std::scoped_lock lock(mutex_);
+  if (std::exchange(in_hand_, false)) leave_out_what_fails();
+  taken_ = 0;
+  stored_ = stored;
+  std::erase_if(inputs_,
+                [&](const FeedInput& input) { return is_odometry(input) && stored && stamp_of(input) <= *stored; });
+}
+
+/// The last one taken made the robot go.
+void FeedFront::leave_out_what_fails() {
+  const auto input = inputs_.begin() + static_cast<std::ptrdiff_t>(taken_ - 1);
+  if (failed_.kind != input->index() || failed_.stamp != stamp_of(*input)) failed_ = {input->index(), stamp_of(*input)};
+  if (++failed_.times < limits_.tries) return;
+  refusals_.push_back({stamp_of(*input), fmt::format("left out: the robot's program failed {} times with it, which is "
+                                                     "a defect of it",
+                                                     failed_.times)});
+  scan_bytes_ -= bytes_of(*input);
+  inputs_.erase(input);
+  failed_ = {};
+}
+
+void FeedFront::refuse(Timestamp stamp, std::string why) {
+  const std::scoped_lock lock(mutex_);
+  refusals_.push_back({stamp, std::move(why)});
+}
+
+void FeedFront::publish(FeedState robot) {
+  const std::scoped_lock lock(mutex_);
+  const bool is_same = robot.chain == robot_.chain;
+  // One that was made again says nothing until it has caught up.
+  if (is_same && robot_.newest && (!robot.newest || robot.newest->stamp < robot_.newest->stamp)) return;
+  robot_ = std::move(robot);
+  if (robot_.newest) localiser_.correct(*robot_.newest, robot_.covariance);
+}
+
+void FeedFront::say_trouble(std::string trouble) {
+  const std::scoped_lock lock(mutex_);
+  if (trouble_.empty() && localiser_.newest()) trouble_since_ = localiser_.newest()->stamp;
+  trouble_ = std::move(trouble);
+}
+
+void FeedFront::close() {
+  const std::scoped_lock lock(mutex_);
+  closed_ = true;
+}
+
+bool FeedFront::has_ended() const {
+  const std::scoped_lock lock(mutex_);
+  return ended_ && inputs_.empty();
+}
+
+FeedFront::Load FeedFront::load() const {
+  const std::scoped_lock lock(mutex_);
+  return {inputs_.size() - taken_, scans_left_out_, samples_joined_};
+}
+
+}  // namespace tutti::program

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/feed_front.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <thread>
+
+#include "support/program/feed/node_target.hpp"
+#include "support/robot/drifting_robot.hpp"
+#include "tutti/wire/codec.hpp"
+
+namespace tutti::program {
+namespace feed_front_test {
+
+const Trajectory kOdometry = robot::test::drifting_odometry(400);
+
+node::OdometrySample sample(std::size_t i) {
+  return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
+}
+
+Scan scan(std::size_t i, std::size_t points = 10) {
+  PointCloud cloud;
+  cloud.points.assign(points, Eigen::Vector3f(1.0F, 2.0F, static_cast<float>(i)));
+  return {kOdometry[i].stamp, std::make_shared<const PointCloud>(std::move(cloud)), {}};
+}
+
+Status give(FeedTarget& robot, const FeedInput& input) {
+  if (const auto* odometry = std::get_if<node::OdometrySample>(&input)) return robot.add_odometry(*odometry);
+  if (const auto* of = std::get_if<Scan>(&input)) return robot.add_scan(*of);
+  return robot.finish();
+}
+
+/// Every `every`-th.
+Status give_scan(FeedTarget& robot, std::size_t i, std::size_t every) {
+  return i % every == 0 ? robot.add_scan(scan(i)) : Status();
+}
+
+/// A robot that takes what the front has, as far as it is let.
+struct Behind {
+  explicit Behind(const FeedFront::Limits& limits = {}) : front(robot.state(), limits) {}
+  /// Returns what it took.
+  std::size_t work(std::size_t most = 1'000'000) {
+    std::size_t count = 0;
+    for (; count < most; ++count) {
+      const auto input = front.take(0.0);
+      if (!input) break;
+      EXPECT_TRUE(give(robot, *input));
+      front.note_heard();
+    }
+    front.note_stored();
+    front.publish(robot.state());
+    return count;
+  }
+  test::NodeTarget robot;
+  FeedFront front;
+};
+
+TEST(FeedFront, AnswersWhatTheRobotWouldHaveAnsweredWhileItIsBehind) {
+  Behind behind;
+  test::NodeTarget other;  // that answers at once
+  for (std::size_t i = 0; i < 300; ++i) {
+    ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+    ASSERT_TRUE(other.add_odometry(sample(i)));
+    const FeedState said = behind.front.state(), expected = other.state();
+    ASSERT_EQ(said.newest->stamp, expected.newest->stamp);
+    ASSERT_LT(local(said.newest->pose, expected.newest->pose).norm(), 1e-12) << i;
+    ASSERT_TRUE(said.covariance.isApprox(expected.covariance, 1e-9)) << i;
+    ASSERT_TRUE(said.wants_scan || !expected.wants_scan) << i;
+    ASSERT_TRUE(said.alerts.empty());
+    ASSERT_TRUE(give_scan(behind.front, i, 7));
+    ASSERT_TRUE(give_scan(other, i, 7));
+    if (i % 50 == 20) behind.work(15);
+  }
+  behind.work();
+  EXPECT_EQ(behind.robot.node().agent().keyframes(), other.node().agent().keyframes());
+  EXPECT_EQ(behind.front.state().wants_scan, other.state().wants_scan);
+}
+
+TEST(FeedFront, CarriesOnFromTheLastCorrection) {
+  Behind behind;
+  for (std::size_t i = 0; i < 200; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  behind.work(150);
+  const auto graph = robot::test::broadcast(behind.robot.node().agent(), 1, robot::test::kWorld);
+  behind.robot.receive({bus::Endpoint::server(),
+                        bus::Endpoint::of(RobotId{1}),
+                        bus::MessageKind::proxy_graph,
+                        {},
+                        std::make_shared<const std::string>(wire::encode(graph))});
+  const Pose3 T_map_odom = behind.robot.node().agent().T_map_odom();
+  ASSERT_GT(local(T_map_odom, Pose3{}).norm(), 0.1);
+  behind.front.publish(behind.robot.state());
+  const FeedState said = behind.front.state();
+  EXPECT_EQ(said.T_map_odom, T_map_odom);
+  EXPECT_EQ(said.newest->stamp, kOdometry[199].stamp);
+  EXPECT_GT(said.covariance(0, 0), behind.robot.state().covariance(0, 0));
+  behind.work();
+  EXPECT_TRUE(behind.front.state().covariance.isApprox(said.covariance, 1e-9));
+}
+
+TEST(FeedFront, RefusesWhatTheRobotWouldRefuseAtOnce) {
+  Behind behind;
+  test::NodeTarget robot;
+  ASSERT_TRUE(behind.front.add_odometry(sample(1)));
+  ASSERT_TRUE(robot.add_odometry(sample(1)));
+  std::vector<node::OdometrySample> bad(6, sample(2));
+  bad[0].stamp = sample(1).stamp;
+  bad[1].T_odom_body.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  bad[2].T_odom_body.translation.x() = 1e300;
+  bad[3].T_odom_body.rotation.coeffs() *= 1.1;
+  bad[4].increment_covariance(0, 0) = -1.0;
+  bad[5].increment_covariance(0, 1) = 1.0;
+  for (const node::OdometrySample& one : bad) {
+    const Status by_front = behind.front.add_odometry(one), by_robot = robot.add_odometry(one);
+    ASSERT_FALSE(by_front);
+    ASSERT_FALSE(by_robot);
+    EXPECT_EQ(by_front.error().message, by_robot.error().message);
+  }
+  EXPECT_EQ(behind.work(), 1U);
+}
+
+TEST(FeedFront, WhatIsTooMuchCostsTheMapNotTheWay) {
+  Behind behind({.inputs = 50, .scan_bytes = 3 * 120});
+  std::size_t refused = 0;
+  for (std::size_t i = 0; i < 300; ++i) {
+    ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+    const Status taken = behind.front.add_scan(scan(i));
+    if (!taken) ++refused;
+    EXPECT_TRUE(taken || taken.error().message.find("left out") != std::string::npos);
+    ASSERT_EQ(behind.front.state().newest->stamp, kOdometry[i].stamp);
+    ASSERT_LE(behind.front.load().waiting, 50U);
+  }
+  EXPECT_EQ(refused, 297U);
+  EXPECT_EQ(behind.front.load().scans_left_out, 297U);
+  const FeedState said = behind.front.state();
+  ASSERT_EQ(said.alerts.size(), 1U);
+  EXPECT_NE(said.alerts[0].text.find("odometry is taken together"), std::string::npos) << said.alerts[0].text;
+  EXPECT_GT(behind.work(), 25U);
+  const FeedState caught_up = behind.front.state();
+  EXPECT_TRUE(caught_up.alerts.empty());
+  EXPECT_EQ(caught_up.newest->stamp, said.newest->stamp);
+  EXPECT_LT(local(caught_up.newest->pose, said.newest->pose).norm(), 1e-12);
+  EXPECT_TRUE(caught_up.covariance.isApprox(said.covariance, 1e-6));  // what was taken together says the same
+  EXPECT_EQ(behind.robot.node().agent().newest_sample(), kOdometry[299].stamp);
+}
+
+TEST(FeedFront, OfALongTimeTheWholeWayStaysEvenly) {
+  FeedFront front(test::NodeTarget().state(), {.inputs = 100});
+  for (std::size_t i = 0; i < kOdometry.size() * 20; ++i)
+    ASSERT_TRUE(front.add_odometry({Timestamp{} + 0.005 * static_cast<double>(i), {}, 1e-9 * Matrix6d::Identity()}));
+  std::optional<Timestamp> before;
+  double longest_s = 0.0, variance = 0.0;
+  std::size_t kept = 0;
+  while (const auto input = front.take(0.0)) {
+    const auto& one = std::get<node::OdometrySample>(*input);
+    if (before) longest_s = std::max(longest_s, one.stamp - *before);
+    if (before) variance += one.increment_covariance(0, 0);
+    before = one.stamp;
+    ++kept;
+  }
+  EXPECT_GT(kept, 20U);
+  EXPECT_LE(kept, 100U);
+  EXPECT_LT(longest_s, 40.0 / 20.0);
+  EXPECT_GT(variance, 7900 * 1e-9);  // nothing of it is forgotten
+}
+
+TEST(FeedFront, ARobotThatIsMadeAgainGetsWhatItHadNotStored) {
+  Behind behind;
+  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  EXPECT_FALSE(behind.front.state().stored.has_value());
+  behind.work();
+  EXPECT_EQ(behind.front.state().stored, kOdometry[9].stamp);
+  for (std::size_t i = 10; i < 20; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  for (std::size_t i = 0; i < 5; ++i) ASSERT_TRUE(behind.front.take(0.0).has_value());
+  behind.front.note_heard();
+  EXPECT_EQ(behind.front.state().stored, kOdometry[9].stamp);
+  behind.front.begin_again(behind.robot.node().agent().newest_sample());
+  behind.front.say_trouble("the disk is full");
+  EXPECT_EQ(behind.front.state().alerts.size(), 1U);
+  behind.front.say_trouble("");
+  EXPECT_TRUE(behind.front.state().alerts.empty());
+  EXPECT_EQ(behind.work(), 10U);
+  EXPECT_EQ(behind.robot.node().agent().keyframes().size(), 20U);
+  EXPECT_EQ(behind.front.state().stored, kOdometry[19].stamp);
+  EXPECT_TRUE(behind.front.take_refusals().empty());
+}
+
+TEST(FeedFront, AnInputWithWhichTheRobotGoesIsLeftOutAfterThreeTimes) {
+  Behind behind({.tries = 3});
+  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  for (int time = 0; time < 3; ++time) {
+    EXPECT_TRUE(behind.front.take_refusals().empty());
+    for (std::size_t i = 0; i <= 5; ++i) {
+      EXPECT_EQ(std::get<node::OdometrySample>(*behind.front.take(0.0)).stamp, kOdometry[i].stamp);
+      if (i < 5) behind.front.note_heard();
+    }
+    behind.front.begin_again(std::nullopt);
+  }
+  const auto refused = behind.front.take_refusals();
+  ASSERT_EQ(refused.size(), 1U);
+  EXPECT_EQ(refused[0].stamp, kOdometry[5].stamp);
+  EXPECT_EQ(behind.work(), 9U);
+}
+
+TEST(FeedFront, EndsWhenEverythingIsStored) {
+  Behind behind;
+  for (std::size_t i = 0; i < 10; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));
+  ASSERT_TRUE(behind.front.finish());
+  EXPECT_FALSE(behind.front.state().ended);
+  while (behind.front.take(0.0)) behind.front.note_heard();
+  EXPECT_FALSE(behind.front.state().ended);
+  behind.front.begin_again(std::nullopt);
+  behind.work();
+  EXPECT_TRUE(behind.front.state().ended);
+  EXPECT_TRUE(behind.front.has_ended());
+  ASSERT_TRUE(behind.front.add_odometry(sample(10)));
+  EXPECT_FALSE(behind.front.has_ended());
+  behind.front.close();
+  EXPECT_FALSE(behind.front.add_odometry(sample(11)));
+  EXPECT_EQ(behind.work(), 1U);
+}
+
+TEST(FeedFront, TwoThreadsMakeTheSameRobot) {
+  Behind behind;
+  std::jthread feeder([&] {
+    for (std::size_t i = 0; i < kOdometry.size(); ++i) {
+      EXPECT_TRUE(behind.front.add_odometry(sample(i)));
+      EXPECT_TRUE(give_scan(behind.front, i, 3));
+      EXPECT_EQ(behind.front.state().newest->stamp, kOdometry[i].stamp);
+      static_cast<void>(behind.front.take_refusals());
+    }
+    EXPECT_TRUE(behind.front.finish());
+  });
+  while (!behind.front.has_ended()) {
+    if (auto input = behind.front.take(0.01)) {
+      EXPECT_TRUE(give(behind.robot, *input));
+      behind.front.note_heard();
+      behind.front.refuse({}, "for nothing");
+      behind.front.publish(behind.robot.state());
+    }
+    behind.front.note_stored();
+  }
+  test::NodeTarget alone;
+  for (std::size_t i = 0; i < kOdometry.size(); ++i) {
+    ASSERT_TRUE(alone.add_odometry(sample(i)));
+    ASSERT_TRUE(give_scan(alone, i, 3));
+  }
+  ASSERT_TRUE(alone.finish());
+  EXPECT_EQ(behind.robot.node().agent().keyframes(), alone.node().agent().keyframes());
+  EXPECT_TRUE(behind.front.state().covariance.isApprox(alone.state().covariance, 1e-9));
+}
+
+}  // namespace feed_front_test
+}  // namespace tutti::program

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/live_feed.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <latch>
+#include <string>
+#include <thread>
+
+#include "support/program/feed/client.hpp"
+#include "support/program/feed/node_target.hpp"
+#include "support/robot/drifting_robot.hpp"
+
+namespace tutti::program {
+namespace live_feed_test {
+
+constexpr int kSamples = 300;
+
+/// Says bytes to the feed, and waits for what is said to that.
+class Client {
+ public:
+  explicit Client(const std::string& path) : file_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+    EXPECT_EQ(connect(file_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0) << std::strerror(errno);
+  }
+  ~Client() { close(file_); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  void say(const std::string& bytes) const {
+    ASSERT_EQ(send(file_, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
+  }
+  /// The next message; empty when the connection has ended.
+  v1::Feed hear() {
+    while (true) {
+      std::string_view rest = bytes_;
+      FrameReader reader;
+      if (const auto payload = reader.take(rest); payload && *payload) {
+        v1::Feed message;
+        message.ParseFromString(**payload);
+        bytes_.erase(0, bytes_.size() - rest.size());
+        return message;
+      }
+      std::string more(4096, '\0');
+      const ssize_t count = recv(file_, more.data(), more.size(), 0);
+      if (count <= 0) return {};
+      bytes_ += more.substr(0, static_cast<std::size_t>(count));
+    }
+  }
+
+ private:
+  int file_;
+  std::string bytes_;
+};
+
+Status give(FeedTarget& robot, const FeedInput& input) {
+  if (const auto* odometry = std::get_if<node::OdometrySample>(&input)) return robot.add_odometry(*odometry);
+  if (const auto* of = std::get_if<Scan>(&input)) return robot.add_scan(*of);
+  return robot.finish();
+}
+
+/// The robot is stuck in its first sample until all others are answered.
+TEST(LiveFeed, AnswersWhileTheRobotIsStuck) {
+  const Trajectory odometry = robot::test::drifting_odometry(kSamples);
+  const std::string path = testing::TempDir() + "live_feed_" + std::to_string(getpid());
+  test::NodeTarget robot;
+  auto feed = LiveFeed::open(path, {}, robot.state());
+  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  FeedFront& front = (*feed)->front();
+  std::latch answered(1);
+  std::jthread behind([&] {
+    while (!front.has_ended()) {
+      const auto input = front.take(0.01);
+      if (!input) continue;
+      answered.wait();
+      EXPECT_TRUE(give(robot, *input));
+      front.note_heard();
+      front.note_stored();
+      front.publish(robot.state());
+    }
+  });
+  Client client(path);
+  client.say(test::hello());
+  EXPECT_TRUE(client.hear().has_welcome());
+  EXPECT_TRUE(client.hear().has_situation());
+  for (int i = 0; i < kSamples; ++i) {
+    client.say(test::odometry(odometry[static_cast<std::size_t>(i)], robot::test::kStepCovariance));
+    const v1::Feed answer = client.hear();
+    ASSERT_TRUE(answer.has_correction()) << i;
+    ASSERT_EQ(answer.correction().stamp_ns(), odometry[static_cast<std::size_t>(i)].stamp.ns);
+    ASSERT_FALSE(answer.correction().has_stored());
+    if (answer.correction().wants_scan()) client.say(test::scan(odometry[static_cast<std::size_t>(i)].stamp, 5));
+  }
+  answered.count_down();
+  client.say(test::end_of_recording());
+  EXPECT_TRUE(client.hear().has_ended());
+  behind.join();
+  EXPECT_EQ(robot.node().agent().newest_sample(), odometry.back().stamp);
+  EXPECT_EQ(robot.node().agent().keyframes().size(), static_cast<std::size_t>(kSamples));
+  EXPECT_EQ(front.state().stored, odometry.back().stamp);
+  EXPECT_EQ((*feed)->take_thrown(), "");
+  feed->reset();
+  EXPECT_NE(access(path.c_str(), F_OK), 0);
+}
+
+/// What a robot program that ends has still to say is said.
+TEST(LiveFeed, SaysTheEndBeforeItGoes) {
+  const Trajectory odometry = robot::test::drifting_odometry(3);
+  const std::string path = testing::TempDir() + "live_feed_end_" + std::to_string(getpid());
+  test::NodeTarget robot;
+  auto feed = LiveFeed::open(path, {}, robot.state());
+  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  Client client(path);
+  client.say(test::hello() + test::odometry(odometry[0], Matrix6d::Zero()) + test::end_of_recording());
+  EXPECT_TRUE(client.hear().has_welcome());
+  EXPECT_TRUE(client.hear().has_situation());
+  EXPECT_TRUE(client.hear().has_correction());
+  FeedFront& front = (*feed)->front();
+  for (int i = 0; i < 2; ++i) {
+    const auto input = front.take(10.0);
+    ASSERT_TRUE(input.has_value());
+    EXPECT_TRUE(give(robot, *input));
+    front.note_heard();
+  }
+  front.note_stored();
+  feed->reset();
+  EXPECT_TRUE(client.hear().has_ended());
+}
+
+}  // namespace live_feed_test
+}  // namespace tutti::program

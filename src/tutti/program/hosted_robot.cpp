@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/hosted_robot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tutti/node/status_envelope.hpp"
+#include "tutti/program/update_json.hpp"
+
+namespace tutti::program {
+namespace {
+
+constexpr double kLongestWork_s = 0.05;  // then it listens again
+constexpr std::size_t kBehind = 1'000;   // samples and scans that wait: 5 s at 200 Hz
+constexpr double kStarts_s = 15.0;       // so long a second program of this robot ends when it is told so
+
+}  // namespace
+
+Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
+  const std::size_t before = actor_->updates().size();
+  actor_->receive(message.envelope, now);
+  for (std::size_t i = before; i < actor_->updates().size(); ++i) log_.write(to_json(actor_->updates()[i]));
+  note_conflict();
+  return said({message.ticket});
+}
+
+/// Who has just started ends; who maps goes on, whatever others say.
+void HostedRobot::note_conflict() {
+  const auto& conflict = actor_->node().conflict();
+  if (!conflict || warned_) return;
+  warned_ = true;
+  if (clock_.wall_s() - begin_s_ < kStarts_s)
+    refused_ = *conflict;
+  else
+    log_.say(Level::warning, *conflict + "; this one goes on all the same");
+}
+
+std::optional<Timestamp> HostedRobot::next_work() const {
+  std::optional<Timestamp> next = actor_->node().next_timer();
+  if (feed_ || ended_) return next;
+  const double next_s = actor_->next_time();
+  const Timestamp sample = next_s > duration_s_ ? Timestamp{} : Timestamp{} + next_s;  // at its end: at once
+  return next ? std::min(*next, sample) : sample;
+}
+
+/// All samples that are due, as far as they get in a while and within one submap: what the node sends later it reads
+/// from its store.
+Answer HostedRobot::work(Timestamp now) {
+  if (const auto timer = actor_->node().next_timer(); timer && *timer <= now) actor_->on_timer(now);
+  const double until_s = clock_.wall_s() + kLongestWork_s;
+  const std::size_t backlog = actor_->node().backlog().size();
+  while (!feed_ && !ended_ && clock_.wall_s() < until_s && actor_->node().backlog().size() == backlog) {
+    const double next_s = actor_->next_time();
+    if (next_s > duration_s_) {
+      actor_->finish(now);
+      ended_ = true;
+    } else if (Timestamp{} + next_s <= now) {
+      actor_->replay_next(now);
+    } else {
+      break;
+    }
+  }
+  return said();
+}
+
+Answer HostedRobot::report(Timestamp now) {
+  NodeStatus status = actor_->node().status(now);
+  status.version = options_.version;
+  return {{.messages = {node::to_server(bus::Endpoint::of(actor_->id()), std::move(status))}}, {}};
+}
+
+bool HostedRobot::finished() const {
+  if (refused_) return true;
+  if (options_.stay || !has_ended() || !actor_->node().backlog().empty()) {
+    settled_s_.reset();
+    return false;
+  }
+  if (!settled_s_) settled_s_ = clock_.wall_s();
+  return actor_->is_whole_in_map() || clock_.wall_s() > *settled_s_ + kWaitsForMap_s;
+}
+
+std::string HostedRobot::progress(double time_s) const {
+  if (!feed_) return fmt::format("{:.0f} of {:.0f} s", std::min(time_s, duration_s_), duration_s_);
+  const std::string behind = feed_->front().load().waiting > kBehind ? ", the map is behind what is fed" : "";
+  return (has_ended() ? "the recording has ended" : feed_->is_fed() ? "a client feeds" : "no client feeds") + behind;
+}
+
+Json HostedRobot::status(Timestamp now) const {
+  const NodeStatus status = actor_->node().status(now);
+  const bus::NatsState link = port_.state();
+  const double time_s = now - Timestamp{};
+  return {{"program", "robot"},
+          {"name", status.name},
+          {"time_s", time_s},
+          {"finished", has_ended()},
+          {"backlog", status.backlog_submaps},
+          {"keyframes", status.keyframes},
+          {"revision", status.heard_revision},
+          {"connected", link.connected},
+          {"alone", alone_},
+          {"refused", actor_->node().conflict().value_or("")},
+          {"line",
+           fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
+                       status.keyframes, status.backlog_submaps, status.heard_revision,
+                       link.connected ? "" : ", no link: " + link.last_error, alone_.empty() ? "" : ", " + alone_)}};
+}
+
+}  // namespace tutti::program

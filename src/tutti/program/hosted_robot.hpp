@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/bus/nats_port.hpp"
+#include "tutti/mission/robot_actor.hpp"
+#include "tutti/program/fed_robot.hpp"
+#include "tutti/program/feed/live_feed.hpp"
+#include "tutti/program/host.hpp"
+#include "tutti/program/robot_program.hpp"
+
+namespace tutti::program {
+
+/// A robot in its program: its samples come from its recording, or from a live feed.
+class HostedRobot final : public Hosted {
+ public:
+  static constexpr double kWaitsForMap_s = 60.0;  ///< After the server has stored everything.
+
+  HostedRobot(std::unique_ptr<mission::RobotActor> actor, double duration_s, const RobotOptions& options,
+              const Clock& clock, const bus::NatsPort& port, EventLog& log, const std::string& alone)
+      : actor_(std::move(actor)),
+        duration_s_(duration_s),
+        options_(options),
+        clock_(clock),
+        port_(port),
+        log_(log),
+        alone_(alone),
+        begin_s_(clock.wall_s()) {}
+  /// Its samples come from clients, not from a recording.
+  void feed_live(LiveFeed& feed, Host& host, RobotView view) {
+    feed_ = &feed;
+    fed_.emplace(feed.front(), *actor_, host, clock_, std::move(view));
+  }
+
+  Answer start(Timestamp now) override {
+    actor_->resume(now);
+    return said();
+  }
+  Answer receive(const bus::Received& message, Timestamp now) override;
+  [[nodiscard]] std::optional<Timestamp> next_work() const override;
+  Answer work(Timestamp now) override;
+  void wait(double wall_s) override { fed_ ? fed_->wait(wall_s) : Hosted::wait(wall_s); }
+  Answer end() override {
+    if (fed_) fed_->end();
+    actor_->store_all();
+    return said();
+  }
+  Answer report(Timestamp now) override;
+  [[nodiscard]] bool finished() const override;
+  [[nodiscard]] Json status(Timestamp now) const override;
+  [[nodiscard]] bool is_whole_in_map() const { return actor_->is_whole_in_map(); }
+  [[nodiscard]] const mission::RobotActor& actor() const { return *actor_; }
+  /// Why this program is not to be: another one is this robot.
+  [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
+
+ private:
+  Answer said(std::vector<std::uint64_t> done = {}) {
+    Answer out{actor_->take_step(), std::move(done)};
+    if (fed_) fed_->note(out.step);
+    return out;
+  }
+  void note_conflict();
+  [[nodiscard]] bool has_ended() const { return feed_ ? feed_->front().has_ended() : ended_; }
+  [[nodiscard]] std::string progress(double time_s) const;
+
+  std::unique_ptr<mission::RobotActor> actor_;
+  double duration_s_;
+  const RobotOptions& options_;
+  const Clock& clock_;
+  const bus::NatsPort& port_;
+  EventLog& log_;
+  const std::string& alone_;  // why it hears no server
+  double begin_s_;
+  LiveFeed* feed_ = nullptr;     // null: it replays
+  std::optional<FedRobot> fed_;  // of that feed
+  bool ended_ = false;           // the recording that it replays
+  bool warned_ = false;
+  std::optional<std::string> refused_;
+  mutable std::optional<double> settled_s_;
+};
+
+}  // namespace tutti::program
