@@ -16,6 +16,7 @@
 #include "support/sanitized.hpp"
 #include "support/server/refiners.hpp"
 #include "tutti/bus/simulated_network.hpp"
+#include "tutti/evaluation/agreement.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/node/robot_node.hpp"
 #include "tutti/node/server_node.hpp"
@@ -57,6 +58,17 @@ World make_world() {
   closures.reference.min_time_gap_s = 20.0;
   out.finder = mission::make_closure_finder(closures, out.recordings, 5);
   return out;
+}
+
+/// The front end of each robot begins anew at its origin half way.
+World begun_anew(World world) {
+  for (auto& recording : world.recordings) {
+    Trajectory& odometry = recording.recording.odometry;
+    const std::size_t half = odometry.size() / 2;
+    const Pose3 anew = odometry.front().pose * odometry[half].pose.inverse();
+    for (std::size_t i = half; i < odometry.size(); ++i) odometry[i].pose = anew * odometry[i].pose;
+  }
+  return world;
 }
 
 /// Before which part of a step a node is dropped, or after all.
@@ -148,6 +160,7 @@ class Mission {
   [[nodiscard]] const server::MapServer& server() const { return server_.node->map_server(); }
   [[nodiscard]] const robot::RobotAgent& agent(std::size_t r) const { return robots_[r].node->agent(); }
   [[nodiscard]] std::size_t robots() const { return robots_.size(); }
+  [[nodiscard]] int jumps() const { return jumps_; }  ///< Of odometry, as they were told.
   [[nodiscard]] const std::vector<std::string>& refusals() const { return refusals_; }
   /// Nothing is kept back anywhere.
   void expect_settled() const {
@@ -219,6 +232,7 @@ class Mission {
       EXPECT_TRUE(program.port->send(step.messages[i]).has_value());
     }
     if (dies(Part::tell)) return dropped();
+    for (const node::Event& event : step.events) jumps_ += std::holds_alternative<node::OdometryJumped>(event.what);
     for (const node::Event& event : step.events)
       if (const auto* refused = std::get_if<node::MessageRefused>(&event.what)) refusals_.push_back(refused->why);
     if (dies(Part::acknowledge)) return dropped();
@@ -306,6 +320,7 @@ class Mission {
   std::array<Program<node::WorkerNode>, 2> workers_;
   std::vector<std::size_t> next_;  // of each robot: sample to be fed
   std::vector<std::string> refusals_;
+  int jumps_ = 0;
   Rng luck_{3};
   double lost_share_ = 0.0;
   bool computes_at_once_ = true;
@@ -386,6 +401,50 @@ TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
   RecordProperty("kills", static_cast<int>(kills));
   EXPECT_GE(kills, tutti::seeds(4U) * 50);
   EXPECT_EQ(killed.size(), nobody.seen.size());  // every node, at every input, before every part of a step
+}
+
+// A jump of the front end is told, the joint map is as good as without (closures decide where the robots are), and so
+// are the robots' own; whoever is killed meanwhile.
+TEST_F(Kill, FrontEndsThatBeginAnewCostNoMap) {
+  const World anew = begun_anew(world_);
+  const bus::LinkConfig at_once{.latency_s = 0.0};
+  Killer nobody;
+  Mission smooth(world_, at_once, nobody);
+  smooth.run();
+  EXPECT_EQ(smooth.jumps(), 0);
+  nobody = {};
+  Mission undisturbed(anew, at_once, nobody);
+  undisturbed.run();
+  undisturbed.expect_settled();
+  EXPECT_EQ(undisturbed.jumps(), 2);
+  EXPECT_EQ(undisturbed.server().map().components, smooth.server().map().components);
+  const auto robot_rmse_m = [&](const Mission& mission, std::size_t r) {
+    return evaluation::agreement(mission.agent(r).corrected(), world_.recordings[r].recording.reference)->rmse_m;
+  };
+  const auto map_rmse_m = [&](const Mission& mission, std::size_t r) {
+    Trajectory map;
+    for (const server::MapNode& node : mission.server().map().nodes)
+      if (node.id.chain.robot == mission.agent(r).robot() && (map.empty() || map.back().stamp < node.stamp))
+        map.push_back({node.stamp, node.T_world_body});
+    return evaluation::agreement(map, world_.recordings[r].recording.reference)->rmse_m;
+  };
+  for (std::size_t r = 0; r < smooth.robots(); ++r) {
+    EXPECT_LT(map_rmse_m(undisturbed, r), 1.2 * map_rmse_m(smooth, r) + 0.02) << "robot " << r;
+    EXPECT_LT(robot_rmse_m(undisturbed, r), 1.2 * robot_rmse_m(smooth, r) + 0.02) << "robot " << r;
+  }
+  for (std::uint64_t seed = 200; seed < 200 + tutti::seeds(2U); ++seed) {
+    Killer killer = planned(nobody, Rng(seed), 1);
+    Mission mission(anew, at_once, killer);
+    mission.run();
+    mission.expect_settled();
+    EXPECT_GT(count(killer), 20U);
+    EXPECT_GE(mission.jumps(), 1);  // one that is killed before it has told a step never does
+    expect_same_map(undisturbed.server(), mission.server());
+    for (std::size_t r = 0; r < mission.robots(); ++r) {
+      EXPECT_EQ(mission.agent(r).corrected(), undisturbed.agent(r).corrected()) << "robot " << r << ", seed " << seed;
+      EXPECT_EQ(mission.agent(r).T_odom_fed(), undisturbed.agent(r).T_odom_fed());
+    }
+  }
 }
 
 TEST_F(Kill, OnABadRadioTooTheMapIsTheSame) {

@@ -124,6 +124,7 @@ void RobotActor::take(node::Step step) {
 
 void RobotActor::note_event(const node::Event& event) {
   if (const auto* sample = std::get_if<node::SampleRefused>(&event.what)) note(refused_odometry_, sample->why);
+  if (const auto* jumped = std::get_if<node::OdometryJumped>(&event.what)) note(jumps_, to_string(jumped->jump));
   if (const auto* scan = std::get_if<node::ScanRefused>(&event.what)) note(refused_scans_, scan->why);
   if (const auto* images = std::get_if<node::ImagesRefused>(&event.what)) note(refused_images_, images->why);
   if (const auto* missing = std::get_if<node::SensorMissing>(&event.what); missing != nullptr && missing->keyframes > 0)
@@ -312,6 +313,7 @@ std::vector<std::string> RobotActor::troubles() const {
                                 trouble.first));
   };
   add(refused_odometry_, "odometry samples refused");
+  add(jumps_, "steps of odometry that no body makes");
   add(refused_scans_, "wanted scans that are not there or no good");
   add(refused_images_, "times images refused");
   add(missing_sensors_, "times a sensor was missing");

@@ -129,6 +129,7 @@ class RobotActor {
   std::optional<consistency::Explanation> explanation_;
   double cpu_s_ = 0.0;
   Trouble refused_odometry_;
+  Trouble jumps_;
   Trouble refused_scans_;
   std::size_t taken_scans_ = 0;
   Trouble refused_images_;

@@ -82,6 +82,11 @@ struct SampleRefused {
   RobotId robot;
   std::string why;
 };
+/// A step of odometry that no body makes: the robot is taken to stay, and goes on from there.
+struct OdometryJumped {
+  RobotId robot;
+  robot::OdometryJump jump;
+};
 struct ScanRefused {
   RobotId robot;
   std::string why;
@@ -103,7 +108,7 @@ struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
                MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost, SubmapsForgotten,
-               SampleRefused, ScanRefused, ImagesRefused, SensorMissing>
+               SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing>
       what;
 };
 

@@ -128,8 +128,11 @@ Status RobotNode::read_outbox() {
 
 /// No submap ends here: when one does, the journal goes in the same transaction.
 Status RobotNode::hear_again(const JournalEntry& entry) {
-  if (const auto* sample = std::get_if<OdometrySample>(&entry))
-    return agent_.add_odometry(sample->stamp, sample->T_odom_body, sample->increment_covariance);
+  if (const auto* sample = std::get_if<OdometrySample>(&entry)) {
+    Status ok = agent_.add_odometry(sample->stamp, sample->T_odom_body, sample->increment_covariance);
+    agent_.take_odometry_jumps();  // told when it was heard
+    return ok;
+  }
   if (const auto* scan = std::get_if<Scan>(&entry)) return agent_.add_scan(*scan);
   if (const auto* images = std::get_if<TrackedImages>(&entry)) return agent_.add_images(*images);
   const auto& heard = std::get<HeardGraph>(entry);
@@ -159,8 +162,11 @@ Step RobotNode::add_odometry(const OdometrySample& sample, Timestamp now) {
   Step step;
   if (auto ok = agent_.add_odometry(sample.stamp, sample.T_odom_body, sample.increment_covariance); !ok) {
     step.tell(now, SampleRefused{agent_.robot(), ok.error().message});
+    ++refused_samples_;
+    why_refused_ = ok.error().message;
     return step;
   }
+  refused_samples_ = 0;
   finished_ = false;
   remember(sample, now, step);
   settle(now, step);
@@ -192,6 +198,11 @@ Step RobotNode::add_images(const TrackedImages& images, Timestamp now) {
 }
 
 void RobotNode::settle(Timestamp now, Step& step) {
+  for (const robot::OdometryJump& jump : agent_.take_odometry_jumps()) {
+    step.tell(now, OdometryJumped{agent_.robot(), jump});
+    ++jumps_;
+    newest_jump_ = {now, jump};
+  }
   for (Error& error : agent_.take_scan_errors())
     step.tell(now, ScanRefused{agent_.robot(), std::move(error.message), true});
   const auto watch = [&](const char* sensor, std::optional<std::uint64_t> keyframes, bool& told) {
@@ -444,6 +455,15 @@ void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step)
   if (conflict_ != before) step.tell(now, RobotRefused{agent_.robot(), conflict->session, conflict->why});
 }
 
+std::string RobotNode::odometry_trouble(Timestamp now) const {
+  if (refused_samples_ >= config_.most_refused_samples)
+    return fmt::format("the last {} odometry samples were refused, the newest because: {}", refused_samples_,
+                       why_refused_);
+  if (newest_jump_ && now - newest_jump_->first < config_.jump_told_s)
+    return fmt::format("{} ({} so far)", to_string(newest_jump_->second), jumps_);
+  return {};
+}
+
 NodeStatus RobotNode::status(Timestamp now) const {
   NodeStatus status{.name = config_.name.empty() ? default_name(bus::Endpoint::of(agent_.robot())) : config_.name,
                     .session = agent_.chain().session,
@@ -461,6 +481,7 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .jobs_done = 0,
                     .trouble = {}};
   if (updated_) status.update_age_s = now - *updated_;
+  status.trouble = wire::plain_text(odometry_trouble(now));
   for (const auto& [kind, unread] : unread_)
     status.trouble = wire::plain_text(
         fmt::format("cannot read what the server sends ({} so far), one of the two is to be upgraded: {}", unread.count,

@@ -29,6 +29,8 @@ struct RobotNodeConfig {
   /// more, and the disk is not asked at every sample.
   double journal_period_s = 0.5;
   std::uint64_t most_keyframes_without = 20;  ///< Scan or images; then SensorMissing is told.
+  std::uint64_t most_refused_samples = 20;    ///< In a row; then status() says so.
+  double jump_told_s = 600.0;                 ///< So long status() says that odometry has jumped.
 };
 
 /// A robot round RobotAgent: odometry, scans and proxy graphs in; submaps out, and kept until the server has stored
@@ -103,6 +105,7 @@ class RobotNode {
   /// After each input: what became of it that was not told at once.
   void settle(Timestamp now, Step& step);
   [[nodiscard]] bool is_refused_as_it_is(SubmapId id, const Receipt& receipt) const;
+  [[nodiscard]] std::string odometry_trouble(Timestamp now) const;
   void note_conflict(const Receipt& receipt, Timestamp now, Step& step);
   void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);
@@ -130,6 +133,10 @@ class RobotNode {
   std::map<bus::MessageKind, Unread> unread_;  // since the last of the kind that could be read
   std::optional<ProxyGraph> base_;             // the last that came in full
   std::shared_ptr<const std::string> delta_;   // the last that came in terms of one
+  std::uint64_t refused_samples_ = 0;          // since the last that was taken
+  std::string why_refused_;
+  std::uint64_t jumps_ = 0;                                               // since the start
+  std::optional<std::pair<Timestamp, robot::OdometryJump>> newest_jump_;  // when it was told
   bool tells_no_scan_ = false, tells_no_images_ = false;
   std::uint64_t journal_ = 0;           // entries since the checkpoint that are written
   std::vector<std::string> unwritten_;  // and those that are not

@@ -141,6 +141,18 @@ Told tell(const node::SampleRefused& refused) {
           "an odometry sample was refused: " + refused.why,
           Level::warning};
 }
+Told tell(const node::OdometryJumped& jumped) {
+  const robot::OdometryJump& jump = jumped.jump;
+  return {{{"event", "odometry_jumped"},
+           {"robot", jumped.robot.value},
+           {"stamp_ns", jump.to.ns},
+           {"within_s", jump.to - jump.from},
+           {"translation_m", jump.translation_m},
+           {"rotation_rad", jump.rotation_rad}},
+          fmt::format("robot {}: {}: no body moves so; it is taken to have stayed, and only the map tells where it is",
+                      jumped.robot.value, to_string(jump)),
+          Level::warning};
+}
 Told tell(const node::ScanRefused& refused) {
   return {{{"event", "scan_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "a scan was refused: " + refused.why,
@@ -180,6 +192,7 @@ std::string throttled_kind(const node::Event& event) {
   if (std::holds_alternative<node::RobotRefused>(event.what)) return "robot refused";
   if (std::holds_alternative<node::RobotJoined>(event.what)) return "robot joined";
   if (std::holds_alternative<node::SampleRefused>(event.what)) return "sample";
+  if (std::holds_alternative<node::OdometryJumped>(event.what)) return "jump";
   if (std::holds_alternative<node::ScanRefused>(event.what)) return "scan";
   if (std::holds_alternative<node::ImagesRefused>(event.what)) return "images";
   return {};

@@ -32,17 +32,25 @@ RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentS
       policy_(known_policy(config.policy)),
       submaps_(chain_, config.submap, std::move(state.submaps)),
       smoother_(config.smoother, std::move(state.smoother)),
-      state_(std::move(state)) {}
+      state_(std::move(state)) {
+  // One of a program that did not watch jumps yet.
+  if (const auto newest = newest_sample(); newest && !state_.watch.newest)
+    state_.watch.newest = {*newest, state_.T_odom_body};
+}
 RobotAgent::~RobotAgent() = default;
 RobotAgent::RobotAgent(RobotAgent&&) noexcept = default;
 RobotAgent& RobotAgent::operator=(RobotAgent&&) noexcept = default;
 
-Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_odom_body_given, const Matrix6d& increment_covariance) {
-  const auto step = usable_step(chain_.robot, stamp, T_odom_body_given, increment_covariance);
-  if (!step) return tl::unexpected(step.error());
-  const auto& [at, T_odom_body, covariance] = *step;
+Status RobotAgent::add_odometry(Timestamp stamp, const Pose3& T_fed_body, const Matrix6d& increment_covariance) {
+  const auto fed = usable_step(chain_.robot, stamp, T_fed_body, increment_covariance);
+  if (!fed) return tl::unexpected(fed.error());
+  OdometryWatch watch = this->watch();
+  const auto [T_odom_body, jump] = watch.take({stamp, fed->T_odom_body});
+  const Matrix6d covariance = jump ? unknown_step() : fed->covariance;
   const bool is_first = state_.keyframes.empty();
-  if (auto ok = submaps_.add_odometry(at, T_odom_body, covariance); !ok) return ok;
+  if (auto ok = submaps_.add_odometry(stamp, T_odom_body, covariance, jump.has_value()); !ok) return ok;
+  state_.watch = watch.state();
+  if (jump) jumps_.push_back(*jump);
   if (!is_first) {
     const Matrix6d moved =
         compound_covariance(state_.T_odom_body.inverse() * T_odom_body, state_.covariance, covariance);

@@ -18,6 +18,7 @@
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/model/messages.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/robot/odometry_watch.hpp"
 #include "tutti/robot/submap_builder.hpp"
 
 namespace tutti::robot {
@@ -30,6 +31,7 @@ struct AgentConfig {
   estimation::OnboardSmootherConfig smoother{.polishing_steps =
                                                  1};  ///< Few links, long runs: one step gives them back millimetres.
   bool explain = true;
+  OdometryWatchConfig jumps;
   template <class V>
   void describe(V& v) {
     v.field("submap", submap);
@@ -37,6 +39,7 @@ struct AgentConfig {
     v.field("disagreement", disagreement);
     v.field("policy", policy);
     v.field("smoother", smoother);
+    v.field("jumps", jumps);
     v.field("explain", explain, any(), "Say after every update where and when odometry and map part.");
   }
 };
@@ -76,7 +79,8 @@ struct AgentHead {
   std::uint64_t comparisons = 0;  ///< Proxy graphs compared.
   SubmapBuilderState submaps;
   RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  Pose3 T_odom_body;  ///< Newest sample.
+  OdometryWatch::State watch;  ///< What was fed.
+  Pose3 T_odom_body;           ///< Newest sample.
   Pose3 T_map_odom;
   Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance().
   std::vector<Whereabouts> whereabouts;
@@ -110,7 +114,8 @@ class RobotAgent {
   /// Raw odometry, see SubmapBuilder::add_odometry; a bad sample is refused and nothing changes. Quaternions are
   /// normalised where they are off by rounding only (1e-3). Covariances may lack a coordinate (odometry in the plane)
   /// or call one unknown; what is used and uploaded has standard deviations of at most 10 m and 0.3 rad and an inverse
-  /// (geometry/covariance.hpp).
+  /// (geometry/covariance.hpp). Where it jumps (OdometryWatch) the robot is taken to stay, as unsure as a step may be,
+  /// and a submap of its own leads across: what sensors see before and after is never in one.
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
   Status add_scan(const Scan& scan);
   /// SubmapBuilder::add_images()
@@ -138,6 +143,8 @@ class RobotAgent {
   std::vector<SubmapMessage> take_outgoing();
   /// SubmapBuilder::take_image_errors()
   std::vector<Error> take_image_errors() { return submaps_.take_image_errors(); }
+  /// Told once.
+  std::vector<OdometryJump> take_odometry_jumps() { return std::exchange(jumps_, {}); }
   /// SubmapBuilder::take_scan_errors()
   std::vector<Error> take_scan_errors() { return submaps_.take_scan_errors(); }
 
@@ -171,7 +178,14 @@ class RobotAgent {
   [[nodiscard]] Trajectory corrected() const;
   /// Takes odometry into the corrected map. Only receive() changes it; the identity while nothing is corrected.
   [[nodiscard]] const Pose3& T_map_odom() const { return state_.T_map_odom; }
-  [[nodiscard]] const Pose3& T_odom_body() const { return state_.T_odom_body; }  ///< The newest sample.
+  /// The newest sample, in the frame of the first one, whatever has jumped since.
+  [[nodiscard]] const Pose3& T_odom_body() const { return state_.T_odom_body; }
+  [[nodiscard]] OdometryWatch watch() const { return {config_.jumps, state_.watch}; }
+  /// From the frame of what is fed now, which is another one after each jump; the identity while there was none.
+  [[nodiscard]] const std::optional<StampedPose>& newest_fed() const {
+    return state_.watch.newest;
+  }  ///< As it was fed.
+  [[nodiscard]] Pose3 T_odom_fed() const { return watch().T_odom_fed(); }
   /// The corrected pose at the newest odometry sample: T_map_odom * T_odom_body. It jumps when receive() corrects.
   [[nodiscard]] Pose3 T_map_body() const { return state_.T_map_odom * state_.T_odom_body; }
   /// Newest proxy graph heard; zeros: none.
@@ -199,6 +213,7 @@ class RobotAgent {
   SubmapBuilder submaps_;
   estimation::OnboardSmoother smoother_;
   AgentState state_;  // but for what submaps_ and smoother_ hold
+  std::vector<OdometryJump> jumps_;
 };
 
 }  // namespace tutti::robot

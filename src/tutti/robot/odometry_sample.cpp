@@ -18,15 +18,21 @@ constexpr double kRoundedQuaternion = 1e-3;
 
 Result<OdometryStep> usable_step(RobotId robot, Timestamp stamp, const Pose3& T_odom_body,
                                  const Matrix6d& increment_covariance) {
-  OdometryStep step{stamp, T_odom_body, increment_covariance};
+  OdometryStep step{.stamp = stamp, .T_odom_body = T_odom_body, .covariance = increment_covariance};
   if (is_valid(step.T_odom_body, kRoundedQuaternion)) step.T_odom_body.rotation.normalize();
   if (auto ok = check_step(robot, step); !ok) return tl::unexpected(ok.error());
   step.covariance = invertible_covariance(bounded_covariance(increment_covariance, kUnknownStep_m, kUnknownStep_rad));
   return step;
 }
 
+Matrix6d unknown_step() {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(kUnknownStep_m), Eigen::Vector3d::Constant(kUnknownStep_rad);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
 Status check_step(RobotId robot, const OdometryStep& step) {
-  const auto& [stamp, T_odom_body, covariance] = step;
+  const auto& [stamp, T_odom_body, covariance, is_jump] = step;
   if (!is_valid(T_odom_body))
     return fail(ErrorCode::invalid, "robot {}: odometry at {} ns is not a pose (|q| = {}, expected finite and 1)",
                 robot.value, stamp.ns, T_odom_body.rotation.norm());

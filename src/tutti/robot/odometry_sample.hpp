@@ -14,6 +14,8 @@ namespace tutti::robot {
 /// standard deviations of at most 10 m and 0.3 rad and an inverse (geometry/covariance.hpp). An error: it is refused.
 Result<OdometryStep> usable_step(RobotId robot, Timestamp stamp, const Pose3& T_odom_body,
                                  const Matrix6d& increment_covariance);
+/// Of a step of which nothing is known, as sure as any may be.
+Matrix6d unknown_step();
 /// The pose is finite, of a unit quaternion, within kMaxCoordinate_m; the covariance what check_covariance() says.
 Status check_step(RobotId robot, const OdometryStep& step);
 /// Stamps increase.

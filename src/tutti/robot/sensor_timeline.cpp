@@ -15,15 +15,17 @@ std::pair<OdometryStep, OdometryStep> split(const StampedPose& from, const Odome
   // compound_covariance(B, C_1, C_2) = Ad(B)^-1 C_1 Ad(B)^-T + C_2, with B the motion of the second part.
   const Matrix6d ad = adjoint(middle.inverse() * to.T_odom_body);
   const Matrix6d first = share * (ad * to.covariance * ad.transpose());
-  return {{at, middle, 0.5 * (first + first.transpose())}, {to.stamp, to.T_odom_body, (1.0 - share) * to.covariance}};
+  return {{at, middle, 0.5 * (first + first.transpose()), to.is_jump},
+          {to.stamp, to.T_odom_body, (1.0 - share) * to.covariance, to.is_jump}};
 }
 
 void SensorTimeline::add(const OdometryStep& step) {
-  if (odometry.size() >= 2 && step.stamp - odometry[odometry.size() - 2].stamp < kFinest_s) {
+  const bool is_motion = !step.is_jump && (odometry.empty() || !odometry.back().is_jump);
+  if (is_motion && odometry.size() >= 2 && step.stamp - odometry[odometry.size() - 2].stamp < kFinest_s) {
     const OdometryStep& before = odometry.back();
     const Matrix6d both =
         compound_covariance(before.T_odom_body.inverse() * step.T_odom_body, before.covariance, step.covariance);
-    odometry.back() = {step.stamp, step.T_odom_body, 0.5 * (both + both.transpose())};
+    odometry.back() = {step.stamp, step.T_odom_body, 0.5 * (both + both.transpose()), false};
     return;
   }
   odometry.push_back(step);

@@ -22,6 +22,7 @@ struct OdometryStep {
   Timestamp stamp;
   Pose3 T_odom_body;
   Matrix6d covariance = Matrix6d::Zero();  ///< Right tangent.
+  bool is_jump = false;                    ///< How the robot moved is not known (OdometryWatch).
 };
 
 /// The step from `from` to `to` in two, at a moment between them: the motion straight and of constant turn, the

@@ -18,6 +18,9 @@
 namespace tutti::robot {
 namespace {
 
+const std::string kTooFarApart = fmt::format("expected at most {} s between them", SubmapBuilder::kLongestGap_s);
+const std::string kAcrossJump = "across which odometry jumps";
+
 /// What the IMU measured from keyframe to keyframe, where it covers that time, at the gyro bias that the odometry
 /// shows.
 std::vector<ImuPreintegration> imu_steps(const Submap& submap, const std::vector<TrackedImages>& images) {
@@ -104,8 +107,21 @@ RelativePose SubmapBuilder::since_keyframe() const {
   return since;
 }
 
-Status SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance) {
-  const OdometryStep step{stamp, T_odom_body, increment_covariance};
+/// What sensors saw at moments of which nobody knows where the robot was.
+void SubmapBuilder::drop_between(Timestamp before, Timestamp after, const std::string& why) {
+  std::erase_if(state_.waiting.sensors, [&](const SensorSample& sample) {
+    const bool is_between = sample.stamp > before && sample.stamp < after;
+    if (is_between && sample.scan)
+      scan_errors_.push_back(
+          {ErrorCode::invalid, fmt::format("robot {}: scan at {} ns is between odometry at {} and {} ns, {}",
+                                           chain_.robot.value, sample.stamp.ns, before.ns, after.ns, why)});
+    return is_between;
+  });
+}
+
+Status SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance,
+                                   bool is_jump) {
+  const OdometryStep step{stamp, T_odom_body, increment_covariance, is_jump};
   if (auto ok = check_step(chain_.robot, step); !ok) return ok;
   const auto newest = newest_sample();
   if (!newest) {
@@ -113,16 +129,7 @@ Status SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body, co
     return {};
   }
   if (auto ok = check_follows(chain_.robot, stamp, newest); !ok) return ok;
-  if (stamp - *newest > kLongestGap_s)
-    std::erase_if(state_.waiting.sensors, [&](const SensorSample& sample) {
-      const bool is_in_gap = sample.stamp > *newest && sample.stamp < stamp;
-      if (is_in_gap && sample.scan)
-        scan_errors_.push_back({ErrorCode::invalid,
-                                fmt::format("robot {}: scan at {} ns is between odometry at {} "
-                                            "and {} ns, expected at most {} s between them",
-                                            chain_.robot.value, sample.stamp.ns, newest->ns, stamp.ns, kLongestGap_s)});
-      return is_in_gap;
-    });
+  if (is_jump || stamp - *newest > kLongestGap_s) drop_between(*newest, stamp, is_jump ? kAcrossJump : kTooFarApart);
   state_.waiting.add(step);
   advance();
   return {};
@@ -153,16 +160,37 @@ bool SubmapBuilder::makes_keyframe(const SensorTimeline::Moment& moment) {
   return state_.is_blind;
 }
 
+/// The submap that is open ends at the last sample, the next one goes from there to this one.
+void SubmapBuilder::take_jump(const OdometryStep& jump) {
+  const StampedPose last = state_.recent.back();
+  const auto end_submap = [&] {
+    if (state_.keyframes.size() > 1) change_submap();
+    if (!state_.finished.empty()) state_.finished.back().awaits_images = false;
+  };
+  if (state_.keyframes.back().stamp != last.stamp) add_keyframe(last.stamp, last.pose);
+  end_submap();
+  state_.scans.clear();
+  state_.images.clear();
+  state_.since_keyframe = {last.pose.inverse() * jump.T_odom_body, jump.covariance};
+  add_keyframe(jump.stamp, jump.T_odom_body);
+  end_submap();
+  state_.recent = {{jump.stamp, jump.T_odom_body}};
+}
+
 void SubmapBuilder::take(SensorTimeline::Moment moment) {
-  const auto& [stamp, T_odom_body, covariance] = moment.step;
-  if (!state_.recent.empty()) {
-    const Pose3 step = state_.recent.back().pose.inverse() * T_odom_body;
-    state_.distance_m += step.translation.norm();
-    state_.since_keyframe = compound(state_.since_keyframe, {step, covariance});
+  const auto& [stamp, T_odom_body, covariance, is_jump] = moment.step;
+  if (is_jump) {
+    take_jump(moment.step);
+  } else {
+    if (!state_.recent.empty()) {
+      const Pose3 step = state_.recent.back().pose.inverse() * T_odom_body;
+      state_.distance_m += step.translation.norm();
+      state_.since_keyframe = compound(state_.since_keyframe, {step, covariance});
+    }
+    remember(stamp, T_odom_body);
+    if (!state_.finished.empty()) state_.finished.back().awaits_images = false;
+    if (makes_keyframe(moment)) add_keyframe(stamp, T_odom_body);
   }
-  remember(stamp, T_odom_body);
-  if (!state_.finished.empty()) state_.finished.back().awaits_images = false;
-  if (makes_keyframe(moment)) add_keyframe(stamp, T_odom_body);
   if (!moment.sensors) return;
   auto& [at, scan, images] = *moment.sensors;
   if (images && state_.keyframes.back().stamp == stamp) keep(*images);
@@ -193,10 +221,7 @@ void SubmapBuilder::add_keyframe(Timestamp stamp, const Pose3& T_odom_body) {
   keyframes_.push_back({step, submap});
   state_.keyframes.push_back(keyframe);
   state_.odometry.push_back(step.odometry);
-  if (!is_full()) return;
-  close_submap();
-  state_.finished.back().awaits_images = !state_.finished.back().images.empty();
-  start_submap(keyframe);
+  if (is_full()) change_submap();
 }
 
 bool SubmapBuilder::is_due_at(Timestamp stamp) const {
@@ -240,17 +265,18 @@ Status SubmapBuilder::check_moment(Timestamp stamp, const char* what) const {
   const auto after = std::ranges::lower_bound(waiting, stamp, {}, &OdometryStep::stamp);
   if (after == waiting.end() || stamp <= state_.recent.back().stamp) return {};
   const Timestamp before = after == waiting.begin() ? state_.recent.back().stamp : std::prev(after)->stamp;
-  if (after->stamp != stamp && after->stamp - before > kLongestGap_s)
-    return fail(ErrorCode::invalid,
-                "robot {}: {} at {} ns is between odometry at {} and {} ns, expected at most {} s "
-                "between them",
-                chain_.robot.value, what, stamp.ns, before.ns, after->stamp.ns, kLongestGap_s);
+  if (after->stamp != stamp && (after->is_jump || after->stamp - before > kLongestGap_s))
+    return fail(ErrorCode::invalid, "robot {}: {} at {} ns is between odometry at {} and {} ns, {}", chain_.robot.value,
+                what, stamp.ns, before.ns, after->stamp.ns, after->is_jump ? kAcrossJump : kTooFarApart);
   return {};
 }
 
 Result<Scan> SubmapBuilder::undistorted(const Scan& scan) const {
   Trajectory samples = state_.recent;
-  for (const OdometryStep& step : state_.waiting.odometry) samples.push_back({step.stamp, step.T_odom_body});
+  for (const OdometryStep& step : state_.waiting.odometry) {
+    if (step.is_jump && step.stamp <= scan.stamp) samples.clear();  // what was seen before is somewhere else
+    samples.push_back({step.stamp, step.T_odom_body});
+  }
   auto out = lidar::undistort(scan, samples);
   if (!out) return fail(ErrorCode::invalid, "robot {}: {}", chain_.robot.value, out.error().message);
   return out;
@@ -336,6 +362,13 @@ void SubmapBuilder::close_submap() {
       {{.id = {chain_, state_.next_submap++}, .keyframes = state_.keyframes, .odometry = state_.odometry},
        std::move(state_.scans),
        std::move(state_.images)});
+}
+
+void SubmapBuilder::change_submap() {
+  const Keyframe shared = state_.keyframes.back();
+  close_submap();
+  state_.finished.back().awaits_images = !state_.finished.back().images.empty();
+  start_submap(shared);
 }
 
 std::optional<Submap> SubmapBuilder::take_submap() {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -103,7 +104,9 @@ class SubmapBuilder {
   /// Raw pose with the covariance of the increment since the previous one (ignored for the first). Stamps must
   /// increase; poses must be within kMaxCoordinate_m with unit quaternions, covariances what check_covariance() says
   /// (geometry/covariance.hpp): otherwise an error, and nothing changes.
-  Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
+  /// Across a jump there is a submap of its own, from the sample before to this one: it sees nothing.
+  Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance,
+                      bool is_jump = false);
   /// A scan that ends at its stamp, which may lie between odometry samples, up to `kLongestGap_s` before the next one;
   /// points in the body frame. A sweep with ages is undistorted by the odometry; it must not begin before the first
   /// sample, nor more than `kSweepHistoryS` ago. One that shows nothing new is left out.
@@ -157,6 +160,7 @@ class SubmapBuilder {
   [[nodiscard]] bool has_scans() const { return config_.has_scans || state_.heard_scan; }
   [[nodiscard]] bool has_images() const { return config_.has_images || state_.heard_images; }
   [[nodiscard]] bool is_due_at(Timestamp stamp) const;
+  void drop_between(Timestamp before, Timestamp after, const std::string& why);
   Status check_moment(Timestamp stamp, const char* what) const;
   void advance();
   void take(SensorTimeline::Moment moment);
@@ -170,6 +174,8 @@ class SubmapBuilder {
   [[nodiscard]] bool is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const;
   [[nodiscard]] bool is_full() const;
   void close_submap();
+  void change_submap();
+  void take_jump(const OdometryStep& jump);
 
   ChainId chain_;
   SubmapConfig config_;

@@ -160,7 +160,7 @@ std::string correction_frame(const FeedState& state, const SmoothMap::Answer& an
   return framed(message);
 }
 
-std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump) {
+std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump, const std::string& why) {
   v1::Feed message;
   auto& out = *message.mutable_jump();
   out.set_stamp_ns(state.newest->stamp.ns);
@@ -168,7 +168,8 @@ std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump) {
   write(jump.to, *out.mutable_t_map_odom_to());
   out.set_translation_m(jump.translation_m);
   out.set_rotation_rad(jump.rotation_rad);
-  out.set_why(fmt::format("proxy graph, epoch {}, revision {}", state.map_age.first, state.map_age.second));
+  out.set_why(why.empty() ? fmt::format("proxy graph, epoch {}, revision {}", state.map_age.first, state.map_age.second)
+                          : why);
   return framed(message);
 }
 

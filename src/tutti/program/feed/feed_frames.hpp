@@ -49,7 +49,8 @@ Result<FromClient> decode_from_client(std::string_view payload);
 /// What it is told, as whole frames.
 std::string welcome_frame(const FeedState& state, const Pose3& T_map_odom);
 std::string correction_frame(const FeedState& state, const SmoothMap::Answer& answer, std::uint64_t dropped);
-std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump);
+/// `why`: empty for the map's newest correction.
+std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump, const std::string& why = {});
 std::string situation_frame(const FeedState& state);
 std::string refused_frame(Timestamp stamp, const std::string& why);
 std::string ended_frame();

@@ -46,7 +46,7 @@ FeedFront::FeedFront(FeedState robot, const Limits& limits)
     : limits_(limits), robot_(std::move(robot)), localiser_(robot_.chain.robot) {
   if (!robot_.newest) return;
   stored_ = robot_.newest->stamp;
-  localiser_.correct(*robot_.newest, robot_.covariance);
+  localiser_.correct(*robot_.newest, robot_.covariance, robot_.watch);
 }
 
 Status FeedFront::add_odometry(const node::OdometrySample& sample) {
@@ -129,11 +129,16 @@ FeedState FeedFront::state() const {
   FeedState out = robot_;
   out.newest = localiser_.newest();
   out.covariance = localiser_.covariance();
+  out.T_odom_fed = localiser_.watch().T_odom_fed();
+  // Where odometry has jumped since the robot's sample, `odom` is another frame.
+  if (!(out.T_odom_fed == robot_.T_odom_fed))
+    out.T_map_odom = robot_.T_map_odom * robot_.T_odom_fed.inverse() * out.T_odom_fed;
   out.stored = stored_;
   out.ended = ended_ && inputs_.empty();
   // Of samples that the robot has not heard yet it would want one where it wanted one, or a keyframe is due.
   if (localiser_.steps() > 0 || (out.newest && !robot_.newest))
-    out.wants_scan = robot_.wants_scan || robot_.next_keyframe.is_due(*out.newest);
+    out.wants_scan =
+        robot_.wants_scan || robot_.next_keyframe.is_due({out.newest->stamp, localiser_.watch().T_odom_body()});
   if (!trouble_.empty()) out.alerts.push_back({trouble_, trouble_since_, trouble_since_, trouble_since_});
   if (scans_left_out_ + samples_joined_ > 0) {
     const std::string text = fmt::format("the map is behind what is fed, localisation goes on: scans are left out{}",
@@ -212,7 +217,7 @@ void FeedFront::publish(FeedState robot) {
   // One that was made again says nothing until it has caught up.
   if (is_same && robot_.newest && (!robot.newest || robot.newest->stamp < robot_.newest->stamp)) return;
   robot_ = std::move(robot);
-  if (robot_.newest) localiser_.correct(*robot_.newest, robot_.covariance);
+  if (robot_.newest) localiser_.correct(*robot_.newest, robot_.covariance, robot_.watch);
 }
 
 void FeedFront::say_trouble(std::string trouble) {

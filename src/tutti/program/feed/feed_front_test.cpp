@@ -78,6 +78,30 @@ TEST(FeedFront, AnswersWhatTheRobotWouldHaveAnsweredWhileItIsBehind) {
   EXPECT_EQ(behind.front.state().wants_scan, other.state().wants_scan);
 }
 
+// The client's front end begins anew and jumps, also several times before the robot hears of it.
+TEST(FeedFront, SeesWhereOdometryJumpsAsTheRobotDoes) {
+  Behind behind;
+  test::NodeTarget other;  // that answers at once
+  Pose3 T_fed_odom;
+  const Pose3 elsewhere{Eigen::Quaterniond(0.6, 0.0, 0.0, 0.8), {300.0, -500.0, 20.0}};
+  for (std::size_t i = 0; i < 300; ++i) {
+    if (i == 100) T_fed_odom = kOdometry[i].pose.inverse();
+    if (i == 105 || i == 200) T_fed_odom = elsewhere * T_fed_odom;
+    node::OdometrySample fed = sample(i);
+    fed.T_odom_body = T_fed_odom * fed.T_odom_body;
+    ASSERT_TRUE(behind.front.add_odometry(fed));
+    ASSERT_TRUE(other.add_odometry(fed));
+    const FeedState said = behind.front.state(), expected = other.state();
+    ASSERT_EQ(said.newest, expected.newest) << i;
+    ASSERT_LT(local(said.T_odom_fed, expected.T_odom_fed).norm(), 1e-9) << i;
+    ASSERT_LT(local(said.T_map_odom, expected.T_map_odom).norm(), 1e-9) << i;
+    ASSERT_TRUE(said.covariance.isApprox(expected.covariance, 1e-9)) << i;
+    ASSERT_TRUE(said.wants_scan || !expected.wants_scan) << i;
+    if (i % 41 == 0) behind.work(30);
+  }
+  ASSERT_GT(behind.front.state().T_odom_fed.translation.norm(), 100.0);
+}
+
 TEST(FeedFront, CarriesOnFromTheLastCorrection) {
   Behind behind;
   for (std::size_t i = 0; i < 200; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));

@@ -11,6 +11,7 @@ FeedSession::FeedSession(FeedTarget& target, const FeedSettings& settings)
     : target_(target),
       settings_(settings),
       map_(settings, target.state().T_map_odom),
+      T_odom_fed_(target.state().T_odom_fed),
       situation_(situation_frame(target.state())) {}
 
 void FeedSession::disconnect(Client client) {
@@ -75,6 +76,11 @@ void FeedSession::take_odometry(Client client, const node::OdometrySample& sampl
   if (const Status ok = target_.add_odometry(sample); !ok)
     return put(connection, refused_frame(sample.stamp, ok.error().message));
   const FeedState state = target_.state();
+  if (!(state.T_odom_fed == T_odom_fed_)) {
+    const Pose3 before = std::exchange(T_odom_fed_, state.T_odom_fed);
+    broadcast(jump_frame(state, map_.change_odom(before.inverse() * T_odom_fed_),
+                         "odometry jumps: its front end began anew"));
+  }
   const SmoothMap::Answer answer = map_.step(*state.newest, state.T_map_odom, state.covariance);
   if (answer.jump) broadcast(jump_frame(state, *answer.jump));
   for (auto& [number, listener] : clients_)

@@ -77,6 +77,7 @@ class FeedSession {
   FeedTarget& target_;
   FeedSettings settings_;
   SmoothMap map_;
+  Pose3 T_odom_fed_;       ///< Of map_: changes where the client's odometry jumps.
   std::string situation_;  ///< The frame that was last told.
   std::map<Client, Connection> clients_;
   std::optional<Client> feeder_;

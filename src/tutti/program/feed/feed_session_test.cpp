@@ -99,6 +99,27 @@ TEST_F(FeedSessionTest, AnswersHelloAndEverySample) {
   EXPECT_EQ(say(1, sample(20))[0].refused().why(), "the recording has ended");
 }
 
+// The client's own odometry begins anew: its `odom` is another frame, and the body stays where it is.
+TEST_F(FeedSessionTest, SaysWhereTheClientsOdometryIsAfterItBeganAnew) {
+  const auto at = [](double x_m) { return Pose3{Eigen::Quaterniond::Identity(), {x_m, 0.0, 0.0}}; };
+  const auto feed = [&](std::int64_t ns, double x_m) {
+    return say(1, test::odometry({{ns}, at(x_m)}, Matrix6d::Identity()));
+  };
+  join(1);
+  EXPECT_NEAR(feed(100, 20.0).at(0).correction().t_map_body().x(), 20.0, 1e-9);
+  target_.known.T_odom_fed = at(20.0);
+  target_.known.T_map_odom = at(20.0);
+  const auto answer = feed(200, 0.0);
+  ASSERT_EQ(answer.size(), 2U);
+  EXPECT_NEAR(answer[0].jump().t_map_odom_from().x(), 0.0, 1e-9);
+  EXPECT_NEAR(answer[0].jump().t_map_odom_to().x(), 20.0, 1e-9);
+  EXPECT_EQ(answer[0].jump().translation_m(), 0.0);  // the body does not
+  EXPECT_NE(answer[0].jump().why().find("began anew"), std::string::npos);
+  EXPECT_NEAR(answer[1].correction().t_map_body().x(), 20.0, 1e-9);
+  EXPECT_NEAR(answer[1].correction().t_map_odom().x(), 20.0, 1e-9);
+  EXPECT_EQ(feed(300, 0.1).size(), 1U);  // told once
+}
+
 TEST_F(FeedSessionTest, RefusesWhatIsNoGoodAndGoesOn) {
   join(1);
   EXPECT_TRUE(say(1, sample(10))[0].has_correction());

@@ -12,6 +12,7 @@
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/robot/next_keyframe.hpp"
+#include "tutti/robot/odometry_watch.hpp"
 
 namespace tutti::program {
 
@@ -35,8 +36,10 @@ struct FeedAlert {
 struct FeedState {
   ChainId chain;
   std::string name;
+  // `odom` is the client's here, and begins anew where that does.
   std::optional<StampedPose> newest;       ///< T_odom_body of the newest sample taken.
-  Pose3 T_map_odom;                        ///< RobotAgent::T_map_odom(): jumps with every correction.
+  Pose3 T_map_odom;                        ///< Jumps with every correction, and where the client's odometry jumps.
+  Pose3 T_odom_fed;                        ///< RobotAgent::T_odom_fed(): changes where the client's odometry jumps.
   Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance(): of T_map_odom * newest, right tangent.
   std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age() of the newest one heard; zeros: none yet.
   std::optional<std::uint32_t> component;           ///< Nothing: the map does not know this chain.
@@ -45,6 +48,7 @@ struct FeedState {
   std::vector<FeedAlert> alerts;
   std::optional<Timestamp> stored;    ///< The newest sample that a kill would not lose.
   robot::NextKeyframe next_keyframe;  ///< A scan of a later sample would be used when one is due there.
+  robot::OdometryWatch watch;         ///< RobotAgent::watch()
   bool ended = false;                 ///< The client has said so, and all before is stored.
 };
 

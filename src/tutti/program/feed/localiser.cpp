@@ -8,31 +8,38 @@ namespace tutti::program {
 Status Localiser::add(const node::OdometrySample& sample) {
   const auto step = robot::usable_step(robot_, sample.stamp, sample.T_odom_body, sample.increment_covariance);
   if (!step) return tl::unexpected(step.error());
-  const auto before = newest_ ? std::optional(newest_->stamp) : std::nullopt;
+  const auto before = newest() ? std::optional(newest()->stamp) : std::nullopt;
   if (auto ok = robot::check_follows(robot_, sample.stamp, before); !ok) return ok;
-  if (newest_) {
-    const RelativePose motion{newest_->pose.inverse() * step->T_odom_body, step->covariance};
-    carry(motion);
-    steps_.push_back({sample.stamp, motion});
-    if (steps_.size() > kMostSteps) {
-      steps_[1].motion = compound(steps_[0].motion, steps_[1].motion);
-      steps_.pop_front();
-    }
+  const Step next{{sample.stamp, step->T_odom_body}, step->covariance};
+  if (!newest()) {
+    watch_.take(next.fed);
+    return {};
   }
-  newest_ = {sample.stamp, step->T_odom_body};
+  carry(next);
+  steps_.push_back(next);
+  if (steps_.size() > kMostSteps) {
+    const Step &first = steps_[0], &second = steps_[1];
+    const Matrix6d both =
+        compound_covariance(first.fed.pose.inverse() * second.fed.pose, first.covariance, second.covariance);
+    steps_[1].covariance = 0.5 * (both + both.transpose());
+    steps_.pop_front();
+  }
   return {};
 }
 
-void Localiser::carry(const RelativePose& motion) {
-  const Matrix6d moved = compound_covariance(motion.T_a_b, covariance_, motion.covariance);
+void Localiser::carry(const Step& step) {
+  const Pose3 before = watch_.T_odom_body();
+  const auto [T_odom_body, jump] = watch_.take(step.fed);
+  const Matrix6d moved =
+      compound_covariance(before.inverse() * T_odom_body, covariance_, jump ? robot::unknown_step() : step.covariance);
   covariance_ = 0.5 * (moved + moved.transpose());
 }
 
-void Localiser::correct(const StampedPose& at, const Matrix6d& covariance) {
-  while (!steps_.empty() && steps_.front().end <= at.stamp) steps_.pop_front();
-  if (!newest_ || newest_->stamp < at.stamp) newest_ = at;
+void Localiser::correct(const StampedPose& at, const Matrix6d& covariance, const robot::OdometryWatch& watch) {
+  while (!steps_.empty() && steps_.front().fed.stamp <= at.stamp) steps_.pop_front();
+  watch_ = watch.at(at);
   covariance_ = covariance;
-  for (const Step& step : steps_) carry(step.motion);
+  for (const Step& step : steps_) carry(step);
 }
 
 }  // namespace tutti::program

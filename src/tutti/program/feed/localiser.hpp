@@ -10,11 +10,12 @@
 #include "tutti/model/relative_pose.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
+#include "tutti/robot/odometry_watch.hpp"
 
 namespace tutti::program {
 
 /// Where a robot is in its odometry, and how sure it is of that on its map, while its agent is samples behind: what the
-/// agent said at its own newest sample, carried on by odometry. Takes and refuses samples as
+/// agent said at its own newest sample, carried on by odometry. Takes and refuses samples, and sees where they jump, as
 /// RobotAgent::add_odometry() does.
 class Localiser {
  public:
@@ -24,23 +25,25 @@ class Localiser {
 
   /// An error: it is refused, and why; nothing has changed.
   Status add(const node::OdometrySample& sample);
-  /// The agent was here, this sure.
-  void correct(const StampedPose& at, const Matrix6d& covariance);
+  /// The agent was here (as fed), this sure, and knew this of odometry.
+  void correct(const StampedPose& at, const Matrix6d& covariance, const robot::OdometryWatch& watch = {});
 
-  [[nodiscard]] const std::optional<StampedPose>& newest() const { return newest_; }  ///< T_odom_body
-  [[nodiscard]] const Matrix6d& covariance() const { return covariance_; }            ///< Of T_map_body, right tangent.
+  [[nodiscard]] const std::optional<StampedPose>& newest() const { return watch_.state().newest; }  ///< As fed.
+  /// OdometryWatch: T_odom_body of the newest, and T_odom_fed.
+  [[nodiscard]] const robot::OdometryWatch& watch() const { return watch_; }
+  [[nodiscard]] const Matrix6d& covariance() const { return covariance_; }  ///< Of T_map_body, right tangent.
   /// Samples that the agent has not said anything about yet; at most kMostSteps.
   [[nodiscard]] std::size_t steps() const { return steps_.size(); }
 
  private:
   struct Step {
-    Timestamp end;
-    RelativePose motion;
+    StampedPose fed;
+    Matrix6d covariance;
   };
-  void carry(const RelativePose& motion);
+  void carry(const Step& step);
 
   RobotId robot_;
-  std::optional<StampedPose> newest_;
+  robot::OdometryWatch watch_;
   Matrix6d covariance_ = Matrix6d::Zero();
   std::deque<Step> steps_;  // since the agent's sample
 };

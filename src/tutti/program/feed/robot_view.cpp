@@ -7,6 +7,11 @@
 #include "tutti/mission/follow_alerts.hpp"
 
 namespace tutti::program {
+namespace {
+
+constexpr double kJumpAlert_s = 600.0;  // of odometry
+
+}  // namespace
 
 void RobotView::note(const node::Event& event, const node::RobotNode& node) {
   const auto* update = std::get_if<node::RobotUpdated>(&event.what);
@@ -18,6 +23,9 @@ void RobotView::note(const node::Event& event, const node::RobotNode& node) {
                                                missing->keyframes, missing->sensor == "scan" ? "a scan" : "images"),
                                    *newest, *newest, *newest};
   }
+  if (const auto* jumped = std::get_if<node::OdometryJumped>(&event.what))
+    jump_ = {to_string(jumped->jump) + ": no body moves so, and only the map tells where the robot is", jumped->jump.to,
+             jumped->jump.from, jumped->jump.to};
   if (update == nullptr || update->summary.synchronised == 0 || !newest) return;
   if (!first_) first_ = *newest;
   mission::UpdateRecord record{.time_s = *newest - *first_, .revision = update->summary.revision};
@@ -42,16 +50,19 @@ FeedState RobotView::state(const node::RobotNode& node) const {
   FeedState out{.chain = agent.chain(),
                 .name = name_,
                 .newest = {},
-                .T_map_odom = agent.T_map_odom(),
+                .T_map_odom = agent.T_map_odom() * agent.T_odom_fed(),
+                .T_odom_fed = agent.T_odom_fed(),
                 .covariance = agent.covariance(),
                 .map_age = agent.map_age(),
                 .component = agent.component(),
                 .wants_scan = agent.wants_scan(),
                 .team_mates = {},
                 .alerts = alerts_,
-                .next_keyframe = agent.next_keyframe()};
+                .next_keyframe = agent.next_keyframe(),
+                .watch = agent.watch()};
   for (const auto& [sensor, alert] : missing_) out.alerts.push_back(alert);
-  if (const auto stamp = agent.newest_sample()) out.newest = {*stamp, agent.T_odom_body()};
+  out.newest = agent.newest_fed();
+  if (jump_ && out.newest->stamp - jump_->until < kJumpAlert_s) out.alerts.push_back(*jump_);
   for (const robot::Whereabouts& other : agent.whereabouts()) {
     const auto name = names_.find(other.robot);
     out.team_mates.push_back({other.robot,

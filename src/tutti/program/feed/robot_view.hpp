@@ -31,6 +31,7 @@ class RobotView {
   std::vector<mission::UpdateRecord> updates_;
   std::vector<FeedAlert> alerts_;
   std::map<std::string, FeedAlert> missing_;  ///< By sensor.
+  std::optional<FeedAlert> jump_;             ///< The newest of odometry.
 };
 
 /// An error when the node refused the sample or scan that this step is of.

@@ -2,6 +2,7 @@
 #include "tutti/program/feed/smooth_map.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "tutti/geometry/so3.hpp"
 
@@ -37,6 +38,11 @@ SmoothMap::Answer SmoothMap::step(const StampedPose& sample, const Pose3& target
   out.covariance = 0.5 * (of_odom + of_odom.transpose());
   out.T_map_odom = T_map_odom_;
   return out;
+}
+
+SmoothMap::Jump SmoothMap::change_odom(const Pose3& T_old_new) {
+  const Pose3 before = std::exchange(T_map_odom_, T_map_odom_ * T_old_new);
+  return {before, T_map_odom_};
 }
 
 }  // namespace tutti::program

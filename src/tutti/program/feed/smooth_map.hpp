@@ -28,6 +28,8 @@ class SmoothMap {
   /// At a sample T_odom_body, where the robot's own T_map_odom is `target`; `covariance`: of target * T_odom_body,
   /// right tangent.
   Answer step(const StampedPose& sample, const Pose3& target, const Matrix6d& covariance);
+  /// `odom` is another frame from now on: its front end began anew. The body stays where it is on the map.
+  Jump change_odom(const Pose3& T_old_new);
   [[nodiscard]] const Pose3& T_map_odom() const { return T_map_odom_; }
 
  private:

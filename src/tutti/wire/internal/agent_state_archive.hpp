@@ -273,6 +273,33 @@ void pass_waiting(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.keyframes_without_images);
 }
 template <class A>
+void pass(A& a, std::optional<double>& number) {
+  bool is_known = number.has_value();
+  double value = number.value_or(0.0);
+  pass(a, is_known);
+  pass(a, value);
+  number = is_known ? std::optional(value) : std::nullopt;
+}
+/// What odometry was before it was made one that does not jump: after pass_waiting(), and as that not in older states.
+template <class A>
+void pass_watch(A& a, AgentState& state) {
+  if (!a.has_more()) return;
+  robot::OdometryWatch::State& watch = state.watch;
+  bool has_newest = watch.newest.has_value(), has_anchor = watch.anchor.has_value();
+  StampedPose newest = watch.newest.value_or(StampedPose{});
+  auto anchor = watch.anchor.value_or(robot::OdometryWatch::State::Anchor{});
+  pass(a, has_newest);
+  pass(a, newest);
+  pass(a, watch.speed_mps);
+  pass(a, watch.turn_rate_radps);
+  pass(a, has_anchor);
+  pass(a, anchor.T_odom_body);
+  pass(a, anchor.T_fed_body);
+  watch.newest = has_newest ? std::optional(newest) : std::nullopt;
+  watch.anchor = has_anchor ? std::optional(anchor) : std::nullopt;
+  for (robot::OdometryStep& step : state.submaps.waiting.odometry) pass(a, step.is_jump);
+}
+template <class A>
 void pass(A& a, AgentState& state) {
   pass(a, state.session);
   pass(a, state.sequence);
@@ -301,6 +328,7 @@ void pass(A& a, AgentState& state) {
   pass(a, component);
   state.component = has_component ? std::optional(component) : std::nullopt;
   pass_waiting(a, state.submaps);
+  pass_watch(a, state);
 }
 
 }  // namespace tutti::wire::archive

@@ -66,6 +66,15 @@ bool is_sound(const robot::SubmapBuilderState& builder) {
          std::isfinite(builder.representative_distance_m) && is_sound(builder.waiting, builder.recent);
 }
 
+bool is_sound(const robot::OdometryWatch::State& watch) {
+  const auto is_rate = [](const std::optional<double>& rate) {
+    return !rate || (std::isfinite(*rate) && *rate >= 0.0);
+  };
+  return (!watch.newest || is_sound(watch.newest->pose)) && is_rate(watch.speed_mps) &&
+         is_rate(watch.turn_rate_radps) &&
+         (!watch.anchor || (is_sound(watch.anchor->T_odom_body) && is_sound(watch.anchor->T_fed_body)));
+}
+
 }  // namespace
 
 const char* what_is_wrong(const robot::AgentState& state) {
@@ -94,8 +103,8 @@ const char* what_is_wrong(const robot::AgentState& state) {
     return "its nodes are not those of its keyframes";
   if (!is_sound(state.submaps) || state.submaps.keyframes.empty() != state.keyframes.empty())
     return "its open submap is none";
-  if (!is_sound(state.T_odom_body) || !is_sound(state.T_map_odom) || !state.covariance.allFinite() ||
-      !all_sound(state.whereabouts))
+  if (!is_sound(state.watch) || !is_sound(state.T_odom_body) || !is_sound(state.T_map_odom) ||
+      !state.covariance.allFinite() || !all_sound(state.whereabouts))
     return "it is nowhere";
   return nullptr;
 }

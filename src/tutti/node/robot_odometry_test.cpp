@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Odometry that jumps, or is refused: what a robot's node tells of it, and that a kill changes nothing.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tutti/node/robot_node.hpp"
+#include "tutti/storage/memory_store.hpp"
+#include "tutti/wire/agent_state.hpp"
+
+namespace tutti::node {
+namespace robot_odometry_test {
+
+constexpr Timestamp kStart{1'700'000'000'000'000'000LL};
+
+/// A robot on a store, whose steps are committed.
+class RobotOdometry : public testing::Test {
+ protected:
+  RobotOdometry() { restart(); }
+  void restart() {
+    store_ = std::make_unique<storage::MemoryStore>(storage::robot_schema(),
+                                                    store_ ? store_->tables() : storage::MemoryStore::Tables{});
+    node_ = RobotNode::open(RobotId{1}, 100, config_, Rng(1), *store_).value();
+    resumed_ = done(node_->resume(now_));
+  }
+  Step done(Step step) {
+    EXPECT_TRUE(store_->commit(step.writes).has_value());
+    return step;
+  }
+
+  RobotNodeConfig config_;
+  std::unique_ptr<storage::MemoryStore> store_;
+  std::unique_ptr<RobotNode> node_;
+  Step resumed_;
+  Timestamp now_;
+};
+
+// A jump is told once, with its size and stamp, and a kill right before or after it changes nothing.
+TEST_F(RobotOdometry, OdometryThatJumpsIsToldAndAKillChangesNothing) {
+  const auto pose = [](int i) {
+    return Pose3{Eigen::Quaterniond::Identity(),
+                 {0.1 * i + (i < 150 ? 0.0 : -15.0) + (i < 253 ? 0.0 : 500.0), 0.0, 0.0}};
+  };
+  std::vector<OdometryJumped> told;
+  const auto live = [&](int from, int to) {
+    for (int i = from; i < to; ++i) {
+      now_ = Timestamp{} + 0.1 * i;
+      const Step step = done(node_->add_odometry({kStart + 0.1 * i, pose(i), 1e-6 * Matrix6d::Identity()}, now_));
+      for (const Event& event : step.events)
+        if (const auto* jumped = std::get_if<OdometryJumped>(&event.what)) told.push_back(*jumped);
+    }
+  };
+  EXPECT_EQ(node_->status(now_).trouble, "");
+  live(0, 400);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[0].jump.to, kStart + 15.0);
+  EXPECT_NEAR(told[0].jump.translation_m, 14.9, 1e-9);
+  EXPECT_NEAR(told[1].jump.translation_m, 500.1, 1e-9);
+  EXPECT_EQ(node_->status(now_).trouble, to_string(told[1].jump) + " (2 so far)");
+  EXPECT_EQ(node_->status(now_ + config_.jump_told_s).trouble, "");
+  const std::string whole = wire::encode(node_->agent().state());
+  const Pose3 T_odom_fed = node_->agent().T_odom_fed();
+
+  for (const int kill : {149, 150, 151, 153, 155, 200, 252, 253, 254, 399}) {
+    store_.reset();
+    now_ = {};
+    restart();
+    live(0, kill);
+    told.clear();
+    restart();  // without what waited to be written
+    EXPECT_TRUE(resumed_.events.empty());
+    const auto newest = node_->agent().newest_sample().value();
+    live(static_cast<int>(std::lround((newest - kStart) / 0.1)) + 1, 400);
+    EXPECT_EQ(wire::encode(node_->agent().state()), whole) << kill;
+    EXPECT_EQ(node_->agent().T_odom_fed(), T_odom_fed) << kill;
+    EXPECT_LE(told.size(), 2U) << kill;
+  }
+}
+
+TEST_F(RobotOdometry, SamplesThatAreRefusedInARowAreItsTrouble) {
+  const auto add = [&](double t) {
+    return done(node_->add_odometry({kStart + t, {}, 1e-6 * Matrix6d::Identity()}, now_));
+  };
+  for (int i = 0; i < 10; ++i) add(0.1 * i);
+  const auto refused = [&](std::uint64_t samples) {
+    for (std::uint64_t i = 0; i < samples; ++i) {
+      const Step step = add(-1e9 + 0.1 * static_cast<double>(i));
+      EXPECT_TRUE(std::holds_alternative<SampleRefused>(step.events.at(0).what));
+    }
+  };
+  refused(config_.most_refused_samples - 1);
+  EXPECT_EQ(node_->status(now_).trouble, "");
+  refused(1);
+  const std::string trouble = node_->status(now_).trouble;
+  EXPECT_NE(trouble.find("the last 20 odometry samples were refused"), std::string::npos) << trouble;
+  EXPECT_NE(trouble.find("does not follow"), std::string::npos) << trouble;
+  add(1.0);
+  EXPECT_EQ(node_->status(now_).trouble, "");
+}
+
+}  // namespace robot_odometry_test
+}  // namespace tutti::node
