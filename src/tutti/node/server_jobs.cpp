@@ -58,7 +58,7 @@ void ServerNode::set_aside(const bus::Envelope& envelope, const std::vector<Clos
   for (const ClosureVerdict& verdict : verdicts) {
     const SubmapPair& pair = verdict.pair;
     const server::SubmapSet& submaps = server_.state().submaps;
-    if (!submaps.contains(pair.first) || !submaps.contains(pair.second)) continue;
+    if (!server::has_both(submaps, pair)) continue;
     pairs.push_back(pair);
     if (verdict.closures.empty()) continue;
     Verdicts aside{.job = fmt::format("aside/{}-{}", to_string(pair.first), to_string(pair.second)),
@@ -73,8 +73,7 @@ void ServerNode::note_waiting(const std::vector<SubmapPair>& pairs, const std::s
   const server::SubmapSet& submaps = server_.state().submaps;
   const bool was_empty = waiting_.empty();
   for (const SubmapPair& pair : pairs)
-    if (submaps.contains(pair.first) && submaps.contains(pair.second) && !server_.state().answered.contains(pair))
-      waiting_.insert(pair);
+    if (server::has_both(submaps, pair) && !server_.state().answered.contains(pair)) waiting_.insert(pair);
   why_waiting_ = wire::plain_text(why);
   if (was_empty && !waiting_.empty()) step.tell(now, VerificationFailed{*waiting_.begin(), why});
   if (was_empty != waiting_.empty()) ++changes_;
@@ -120,7 +119,7 @@ void ServerNode::receive_returned_job(const bus::Envelope& envelope, Timestamp n
 void ServerNode::note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused,
                              Step& step) {
   const server::SubmapSet& submaps = server_.state().submaps;
-  if (!submaps.contains(pair.first) || !submaps.contains(pair.second)) return;
+  if (!server::has_both(submaps, pair)) return;
   Failed& failed = failed_[pair];
   if (failed.again) return;  // it is known: the answer has come twice
   if (++failed.times >= config_.most_tries)

@@ -10,13 +10,12 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/content_hash.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/node/internal/opened_map.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
-#include "tutti/node/words.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/submap_copy_codec.hpp"
-#include "tutti/wire/submap_outline.hpp"
 
 namespace tutti::node {
 namespace {
@@ -33,25 +32,6 @@ bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<con
 /// The first multiple of the period that is not before `now`.
 Timestamp next_update(Timestamp now, double period_s) {
   return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
-}
-
-/// Rows of a table, decoded; `leave` gets the keys of those in a version that this program does not read, and why. Any
-/// other error ends it.
-template <class Decode, class Take, class Leave>
-Status read_rows(const storage::TableStore& store, const char* table, Decode&& decode, Take&& take, Leave&& leave) {
-  Status ok;
-  const auto visit = [&](std::string_view key, std::string_view bytes) {
-    auto decoded = decode(bytes);
-    if (decoded)
-      take(std::move(*decoded));
-    else if (decoded.error().code == ErrorCode::unsupported)
-      leave(key, decoded.error().message);
-    else
-      ok = in_context(fmt::format("the map's table '{}'", table), decoded.error());
-    return ok.has_value();
-  };
-  if (auto scanned = store.scan(table, {}, visit); !scanned) return scanned;
-  return ok;
 }
 
 /// It has come in a version that is read.
@@ -80,142 +60,13 @@ bus::MessageKind kind_of(std::string_view table) {
 
 }  // namespace
 
-struct ServerNode::Opened {
-  server::MapServerState state;
-  std::map<RobotId, Receipt> receipts;
-  std::map<std::string, UnreadRows> unread_rows;
-  RobotRegistry registry;
-  std::uint64_t epoch = 0;
-  std::uint64_t start = 0;
-  bool news = false;
-  std::optional<MapCounts> counts;
-
-  static Result<Opened> from(const storage::TableStore& store, MethodId finder);
-
- private:
-  Status read_meta(const storage::TableStore& store);
-  void leave(const std::string& table, const std::string& why);
-  void note_stored(SubmapId id);
-  void add(wire::SubmapOutline outline);
-  void add(ClosureVerdict verdict);
-  void add_answer(ClosureVerdict verdict);
-};
-
-void ServerNode::Opened::add(wire::SubmapOutline outline) {
-  const SubmapId id = outline.submap.id;
-  if (outline.size != PayloadSize()) state.payload_sizes[id] = outline.size;
-  state.submaps[id] = std::make_shared<const Submap>(std::move(outline.submap));
-  state.answered.add_submap(id);
-  note_stored(id);
-}
-
-void ServerNode::Opened::note_stored(SubmapId id) {
-  Receipt& receipt = receipts[id.chain.robot];
-  receipt.robot = id.chain.robot;
-  receipt.stored[id.chain.session].insert(id.index);
-  registry.note_session(id.chain);
-}
-
-void ServerNode::Opened::leave(const std::string& table, const std::string& why) {
-  UnreadRows& rows = unread_rows[table];
-  ++rows.count;
-  rows.why = why;
-}
-
-Status ServerNode::Opened::read_meta(const storage::TableStore& store) {
-  Status ok;
-  const auto visit = [&](std::string_view key, std::string_view bytes) {
-    if (const auto robot = RobotRegistry::robot_of(key)) {
-      if (!registry.restore(*robot, bytes)) ok = fail(ErrorCode::parse, "the map's row '{}' is damaged", key);
-    } else if (key.starts_with(kRefusedPrefix)) {
-      auto receipt = wire::decode_receipt(bytes);
-      if (receipt)
-        receipts[receipt->robot] = std::move(*receipt);
-      else if (receipt.error().code == ErrorCode::unsupported)
-        leave(kMetaTable, receipt.error().message);
-      else
-        ok = in_context(fmt::format("the map's row '{}'", key), receipt.error());
-    }
-    return ok.has_value();
-  };
-  if (auto scanned = store.scan(kMetaTable, {}, visit); !scanned) return scanned;
-  return ok;
-}
-
-/// As MapServer::take() leaves it: the closures of earlier finders hold until this one has answered. A pair without
-/// both of its submaps, as in a map that was salvaged, is asked again when they come.
-void ServerNode::Opened::add(ClosureVerdict verdict) {
-  const SubmapPair pair = verdict.pair;
-  if (!state.submaps.contains(pair.first) || !state.submaps.contains(pair.second)) return;
-  if (verdict.refusal) return add_answer(std::move(verdict));
-  if (verdict.finder == state.finder) state.answered.insert(pair);
-  state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
-}
-
-/// After those. What others have refused need not be known; closures that were set aside are believed when their finder
-/// is the server's.
-void ServerNode::Opened::add_answer(ClosureVerdict verdict) {
-  const SubmapPair pair = verdict.pair;
-  if (!state.submaps.contains(pair.first) || !state.submaps.contains(pair.second)) return;
-  if (verdict.finder != state.finder) return;
-  if (state.verdicts.contains(pair) && says(state.words, pair, Wish::accept)) return;
-  if (!state.answered.insert(pair)) return;
-  if (verdict.refusal) {
-    count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state.refused);
-    state.verdicts.erase(pair);
-  } else {
-    state.verdicts.insert_or_assign(pair, without_evidence(std::move(verdict)));
-  }
-}
-
-Result<ServerNode::Opened> ServerNode::Opened::from(const storage::TableStore& store, MethodId finder) {
-  Opened opened;
-  opened.state.finder = std::move(finder);
-  const auto meta = read_map_meta(store);
-  if (!meta) return tl::unexpected(meta.error());
-  if (!*meta) return opened;
-  opened.epoch = (*meta)->epoch;
-  opened.state.revision = (*meta)->revision;
-  opened.news = (*meta)->news;
-  opened.start = (*meta)->start;
-  const auto add = [&](auto decoded) { opened.add(std::move(decoded)); };
-  const auto add_answers = [&](Verdicts answer) {
-    for (ClosureVerdict& verdict : answer.verdicts) opened.add_answer(std::move(verdict));
-  };
-  if (auto ok = opened.read_meta(store); !ok) return tl::unexpected(ok.error());
-  const auto leave_word = [&](const std::string& why) { opened.leave("words", why); };
-  auto words = read_words(store, leave_word);
-  if (!words) return tl::unexpected(words.error());
-  opened.state.words = std::move(*words);
-  auto counts = read_map_counts(store);
-  if (!counts) return tl::unexpected(counts.error());
-  opened.counts = *counts;
-  auto refinements = read_refinements(store);
-  if (!refinements) return tl::unexpected(refinements.error());
-  opened.state.refinements = std::move(*refinements);
-  const auto leave_submap = [&](std::string_view key, const std::string& why) {  // it is in the map all the same
-    if (const auto id = submap_of_key(key)) opened.note_stored(*id);
-    opened.leave("submaps", why);
-  };
-  const auto leave = [&](const char* table) {
-    return [&opened, table](std::string_view, const std::string& why) { opened.leave(table, why); };
-  };
-  if (auto ok = read_rows(store, "submaps", wire::decode_outline, add, leave_submap); !ok)
-    return tl::unexpected(ok.error());
-  if (auto ok = read_rows(store, "verdicts", wire::decode_verdict, add, leave("verdicts")); !ok)
-    return tl::unexpected(ok.error());
-  if (auto ok = read_rows(store, "answers", wire::decode_verdicts, add_answers, leave("answers")); !ok)
-    return tl::unexpected(ok.error());
-  return opened;
-}
-
 Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
                                                      std::shared_ptr<const server::ClosureFinder> finder,
                                                      const ServerNodeConfig& config, std::uint64_t epoch,
                                                      const storage::TableStore& store) {
   TUTTI_CHECK(finder != nullptr && epoch > 0, "no finder or no epoch");
   TUTTI_CHECK(config.pairs_per_job > 0, "jobs of no pairs");
-  auto opened = Opened::from(store, finder->id());
+  auto opened = OpenedMap::from(store, finder->id());
   if (!opened) return tl::unexpected(opened.error());
   if (opened->epoch > 0) epoch = opened->epoch;
   opened->registry.forget_strangers();
@@ -229,7 +80,7 @@ Result<std::unique_ptr<ServerNode>> ServerNode::open(std::set<RobotId> robots,
 
 ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
                        const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
-                       Opened opened)
+                       OpenedMap opened)
     : robots_(robots),
       config_(config),
       frames_(frames),

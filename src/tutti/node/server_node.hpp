@@ -13,11 +13,14 @@
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/step.hpp"
+#include "tutti/node/stored_rows.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/server/closure_names.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::node {
+
+struct OpenedMap;
 
 struct ServerNodeConfig {
   server::ServerConfig server;
@@ -75,9 +78,9 @@ class ServerNode {
  private:
   static constexpr double kWorkerIsThere_s = 10.0;   // five of its statuses
   static constexpr double kStrangerIsGone_s = 60.0;  // a robot without submaps
-  struct Opened;                                     // what was found in the store
   ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
-             const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames, Opened opened);
+             const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
+             OpenedMap opened);
 
   /// Told, and counted.
   void refuse(const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
@@ -120,11 +123,6 @@ class ServerNode {
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Takes one verdict of these; a refusal that now holds is kept in `refused`.
   Status take(const ClosureVerdict& verdict, Verdicts& refused, Step& step);
-  /// Rows of the map in versions that this program does not read, as those of a newer one that had it before.
-  struct UnreadRows {
-    std::size_t count = 0;
-    std::string why;
-  };
   /// What was asked for and has no answer yet: pairs, or a refinement.
   struct OpenJob {
     std::vector<SubmapPair> pairs;

@@ -18,6 +18,10 @@ AnsweredPairs::Place AnsweredPairs::place_of(const SubmapPair& pair) const {
   return {later, earlier};
 }
 
+bool AnsweredPairs::has_both(const SubmapPair& pair) const {
+  return number_.contains(pair.first) && number_.contains(pair.second);
+}
+
 bool AnsweredPairs::insert(const SubmapPair& pair) {
   const auto [later, earlier] = place_of(pair);
   if (answered_[later].contains(earlier)) return false;
@@ -26,7 +30,7 @@ bool AnsweredPairs::insert(const SubmapPair& pair) {
 }
 
 bool AnsweredPairs::contains(const SubmapPair& pair) const {
-  if (!number_.contains(pair.first) || !number_.contains(pair.second)) return false;
+  if (!has_both(pair)) return false;
   const auto [later, earlier] = place_of(pair);
   return answered_[later].contains(earlier);
 }

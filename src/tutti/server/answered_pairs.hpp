@@ -19,6 +19,8 @@ class AnsweredPairs {
  public:
   /// Submaps that are there already stay where they are.
   void add_submap(SubmapId id);
+  /// Both submaps have been added.
+  [[nodiscard]] bool has_both(const SubmapPair& pair) const;
   /// Both submaps have been added. False: it was there.
   bool insert(const SubmapPair& pair);
   [[nodiscard]] bool contains(const SubmapPair& pair) const;

@@ -71,7 +71,7 @@ Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, cons
                           const NodeIndex& index, const std::set<SubmapPair>& spare) {
   std::vector<std::pair<LoopClosure, std::optional<Wish>>> all;
   for (const auto& [pair, verdict] : verdicts) {
-    if (!submaps.contains(pair.first) || !submaps.contains(pair.second)) continue;
+    if (!has_both(submaps, pair)) continue;
     const auto word = words.find(pair);
     const auto wish = word == words.end() ? std::nullopt : std::optional(word->second.wish);
     if (spare.contains(pair) && wish != Wish::accept && wish != Wish::reject) continue;

@@ -21,6 +21,10 @@ namespace tutti::server {
 
 /// Everything the map is made from; kept sorted by id, so the map is a function of the set.
 using SubmapSet = std::map<SubmapId, std::shared_ptr<const Submap>>;
+
+inline bool has_both(const SubmapSet& submaps, const SubmapPair& pair) {
+  return submaps.contains(pair.first) && submaps.contains(pair.second);
+}
 using VerdictSet = std::map<SubmapPair, ClosureVerdict>;
 
 struct MapNode {

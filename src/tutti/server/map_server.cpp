@@ -222,9 +222,7 @@ Status MapServer::receive(const ClosureVerdict& verdict) {
   return {};
 }
 
-bool MapServer::has_submaps_of(const ClosureVerdict& verdict) const {
-  return state_.submaps.contains(verdict.pair.first) && state_.submaps.contains(verdict.pair.second);
-}
+bool MapServer::has_submaps_of(const ClosureVerdict& verdict) const { return has_both(state_.submaps, verdict.pair); }
 
 Status MapServer::check_against_submaps(const ClosureVerdict& verdict) const {
   const auto& [first, second] = verdict.pair;

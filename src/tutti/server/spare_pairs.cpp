@@ -32,7 +32,7 @@ std::set<SubmapPair> spare_pairs(const VerdictSet& verdicts, const SubmapSet& su
   std::vector<std::pair<SubmapPair, std::uint64_t>> closed;
   std::map<Line, std::vector<std::uint64_t>> lines;
   for (const auto& [pair, verdict] : verdicts) {
-    if (verdict.closures.empty() || !submaps.contains(pair.first) || !submaps.contains(pair.second)) continue;
+    if (verdict.closures.empty() || !has_both(submaps, pair)) continue;
     closed.emplace_back(pair, place_in_line(pair));
     for (const Line& line : lines_of(pair)) lines[line].push_back(closed.back().second);
   }

@@ -231,16 +231,19 @@ std::string encode(const Verdicts& verdicts) {
 }
 
 Result<Verdicts> decode_verdicts(std::string_view bytes) {
-  const auto parsed = parse_frame<v1::Verdicts>(MessageKind::verdicts, bytes);
+  google::protobuf::Arena arena;
+  const auto parsed = parse_frame<v1::Verdicts>(MessageKind::verdicts, bytes, arena);
   if (!parsed) return tl::unexpected(parsed.error());
-  auto failed = read(parsed->message.failed());
+  const v1::Verdicts& message = **parsed;
+  auto failed = read(message.failed());
   if (!failed) return in_context("verdicts", failed.error());
-  Verdicts verdicts{.job = parsed->message.job(),
+  Verdicts verdicts{.job = message.job(),
                     .verdicts = {},
                     .failed = std::move(*failed),
-                    .why = parsed->message.why(),
-                    .cannot = parsed->message.cannot()};
-  for (const v1::Verdict& in : parsed->message.verdict()) {
+                    .why = message.why(),
+                    .cannot = message.cannot()};
+  verdicts.verdicts.reserve(static_cast<std::size_t>(message.verdict_size()));
+  for (const v1::Verdict& in : message.verdict()) {
     auto verdict = read_verdict(in);
     if (!verdict) return tl::unexpected(verdict.error());
     verdicts.verdicts.push_back(std::move(*verdict));

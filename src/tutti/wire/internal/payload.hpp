@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <google/protobuf/arena.h>
+
 #include <cstdint>
 #include <string_view>
 
@@ -24,16 +26,34 @@ struct Parsed {
   Message message;
 };
 
-/// The protobuf message in a frame of this kind.
+/// Parses the frame's message into `message`; the frame's version.
 template <class Message>
-Result<Parsed<Message>> parse_frame(MessageKind kind, std::string_view bytes) {
+Result<std::uint16_t> parse_frame(MessageKind kind, std::string_view bytes, Message& message) {
   const Result<Unpacked> frame = unpack_frame(kind, bytes);
   if (!frame) return tl::unexpected(frame.error());
   if (auto ok = check_counts(kind, frame->payload); !ok) return in_context(name(kind), ok.error());
-  Parsed<Message> parsed{.version = frame->version, .message = {}};
-  if (!parsed.message.ParseFromString(frame->payload))
+  if (!message.ParseFromString(frame->payload))
     return fail(ErrorCode::parse, "{}: not the protobuf message expected", name(kind));
+  return frame->version;
+}
+
+/// The protobuf message in a frame of this kind.
+template <class Message>
+Result<Parsed<Message>> parse_frame(MessageKind kind, std::string_view bytes) {
+  Parsed<Message> parsed;
+  const auto version = parse_frame(kind, bytes, parsed.message);
+  if (!version) return tl::unexpected(version.error());
+  parsed.version = *version;
   return parsed;
+}
+
+/// Likewise, in the arena's memory, which it leaves with the arena: of many parts each is an allocation otherwise.
+template <class Message>
+Result<const Message*> parse_frame(MessageKind kind, std::string_view bytes, google::protobuf::Arena& arena) {
+  auto* const message = google::protobuf::Arena::CreateMessage<Message>(&arena);
+  const auto version = parse_frame(kind, bytes, *message);
+  if (!version) return tl::unexpected(version.error());
+  return message;
 }
 
 }  // namespace tutti::wire
