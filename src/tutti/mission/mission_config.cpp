@@ -57,6 +57,12 @@ void check_images(const RobotConfig& robot, const std::string& path, const Probl
     problem(path + ".images.imu: given, but images.euroc_folder has its own in imu0");
 }
 
+void check_imu(const MissionConfig& config, const Problem& problem) {
+  if (config.refinement.merge.use_imu && !config.agent.submap.visual.send_imu)
+    problem(
+        "refinement.merge.use_imu: true, but robots send nothing of their IMU: agent.submap.visual.send_imu is false");
+}
+
 void check_robots(const MissionConfig& config, const Problem& problem) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
@@ -92,6 +98,7 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
   if (config.source == "recordings" && config.robots.empty())
     problem("robots: none given, expected at least one (or source: simulation)");
   check_robots(config, problem);
+  check_imu(config, problem);
   if (config.source == "simulation" && config.closures.finder == "lidar" && config.simulation.sensors != "lidar")
     problem(fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
                         config.simulation.sensors));

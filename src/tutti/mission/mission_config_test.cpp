@@ -68,6 +68,15 @@ TEST(MissionConfig, ImagesComeFromOnePlace) {
   EXPECT_NE(problem("euroc_folder: f", "{}").find("robots.0.odometry.file: missing"), std::string::npos);
 }
 
+TEST(MissionConfig, ImuFactorsNeedRobotsThatSendTheirImu) {
+  const auto problem = [](const std::string& send) {
+    const auto mission = demo_mission({"refinement.merge.use_imu=true", "agent.submap.visual.send_imu=" + send});
+    return mission ? std::string() : mission.error().message;
+  };
+  EXPECT_EQ(problem("true"), "");
+  EXPECT_NE(problem("false").find("refinement.merge.use_imu: true, but"), std::string::npos) << problem("false");
+}
+
 TEST(MissionConfig, EurocsImagesAreAMission) {
   const auto mission = load_mission(test::source_path("missions/euroc_mh_images.yaml"), {});
   ASSERT_TRUE(mission.has_value()) << mission.error().message;

@@ -53,7 +53,7 @@ Result<VisualPayload> see(const Submap& submap, const std::vector<TrackedImages>
   }
   auto payload = visual::make_visual_payload(seen, *images.front().cameras, config);
   if (!payload) return in_context("images of submap " + to_string(submap.id), payload.error());
-  payload->imu = imu_steps(submap, images);
+  if (config.send_imu) payload->imu = imu_steps(submap, images);
   return payload;
 }
 

@@ -252,8 +252,16 @@ std::vector<Submap> look_around(SubmapBuilder& builder, double seconds, bool swa
   return out;
 }
 
-TEST(SubmapBuilder, TheSharedKeyframesImagesAreInBothSubmaps) {
+TEST(SubmapBuilder, WhatTheImuMeasuredStaysAtHomeUnlessItIsAskedFor) {
   SubmapBuilder builder(RobotId{3}, {});
+  for (const Submap& submap : look_around(builder, 34.0)) {
+    ASSERT_NE(submap.visual, nullptr);
+    EXPECT_TRUE(submap.visual->imu.empty());
+  }
+}
+
+TEST(SubmapBuilder, TheSharedKeyframesImagesAreInBothSubmaps) {
+  SubmapBuilder builder(RobotId{3}, {.visual = {.send_imu = true}});
   const std::vector<Submap> submaps = look_around(builder, 34.0);
   ASSERT_EQ(submaps.size(), 4U);
   for (std::size_t i = 0; i < submaps.size(); ++i) {

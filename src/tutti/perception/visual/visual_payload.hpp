@@ -19,6 +19,7 @@ struct VisualSubmapConfig {
   double max_residual_px = 5.0;  ///< Or twice what the odometry explains: more, and calibration or odometry is wrong.
   bool one_descriptor_per_landmark = false;  ///< The one most like its others; keypoints without landmark are dropped.
   double budget_kb = 300.0;                  ///< Of a submap; the best-observed landmarks are kept.
+  bool send_imu = false;                     ///< What the IMU measured between keyframes, for who adjusts the map.
   template <class V>
   void describe(V& v) {
     v.field("triangulation", triangulation, any(), "Landmarks from tracks.");
@@ -28,6 +29,9 @@ struct VisualSubmapConfig {
     v.field("one_descriptor_per_landmark", one_descriptor_per_landmark, any(),
             "Keep one descriptor of a landmark instead of one per image, and no keypoint without a landmark.");
     v.field("budget_kb", budget_kb, greater_than(0.0), "Size of a submap's visual payload, about.");
+    v.field("send_imu", send_imu, any(),
+            "Submaps carry what the IMU measured between keyframes, about 0.8 kB a keyframe: only "
+            "refinement.merge.use_imu makes use of it.");
   }
 };
 
