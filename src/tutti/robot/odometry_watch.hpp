@@ -66,12 +66,6 @@ class OdometryWatch {
   [[nodiscard]] Pose3 T_odom_body() const { return state_.newest ? in_odom(state_.newest->pose) : Pose3{}; }
   /// From the front end's frame of now; the identity while nothing has jumped.
   [[nodiscard]] Pose3 T_odom_fed() const;
-  /// The same, but for where the newest sample is.
-  [[nodiscard]] OdometryWatch at(const StampedPose& fed) const {
-    OdometryWatch out = *this;
-    out.state_.newest = fed;
-    return out;
-  }
   [[nodiscard]] const State& state() const { return state_; }
 
  private:

@@ -44,15 +44,16 @@ node::OdometrySample joined(const node::OdometrySample& first, const node::Odome
 
 FeedFront::FeedFront(FeedState robot, const Limits& limits)
     : limits_(limits), robot_(std::move(robot)), localiser_(robot_.chain.robot) {
-  if (!robot_.newest) return;
-  stored_ = robot_.newest->stamp;
-  localiser_.correct(*robot_.newest, robot_.covariance, robot_.watch);
+  if (robot_.newest) stored_ = robot_.newest->stamp;
+  localiser_.correct(robot_.watch, robot_.covariance);
 }
 
 Status FeedFront::add_odometry(const node::OdometrySample& sample) {
   const std::scoped_lock lock(mutex_);
   if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  if (auto ok = localiser_.add(sample); !ok) return ok;
+  const auto has_jumped = localiser_.add(sample);
+  if (!has_jumped) return tl::unexpected(has_jumped.error());
+  if (*has_jumped) jumps_.insert(sample.stamp);
   ended_ = false;
   push(sample);
   fed_.notify_one();
@@ -94,13 +95,15 @@ void FeedFront::note_behind(Timestamp stamp) {
   if (samples_joined_ + scans_left_out_ == 0) behind_since_ = stamp;
 }
 
-/// Of samples that are closer than finest_s_, as SensorTimeline::add() does, two become one.
+/// Of samples that are closer than finest_s_, as SensorTimeline::add() does, two become one; never across a jump.
 void FeedFront::push(FeedInput input) {
   const auto* sample = std::get_if<node::OdometrySample>(&input);
   if (sample != nullptr && waiting() >= 2) {
     const auto* last = std::get_if<node::OdometrySample>(&inputs_.back());
     const auto* before = std::get_if<node::OdometrySample>(&inputs_[inputs_.size() - 2]);
-    if (last != nullptr && before != nullptr && sample->stamp - before->stamp < finest_s_) {
+    const auto jumps = [&](const node::OdometrySample& one) { return jumps_.contains(one.stamp); };
+    if (last != nullptr && before != nullptr && sample->stamp - before->stamp < finest_s_ && !jumps(*last) &&
+        !jumps(*sample)) {
       inputs_.back() = joined(*last, *sample);
       ++samples_joined_;
       return;
@@ -128,11 +131,10 @@ FeedState FeedFront::state() const {
   const std::scoped_lock lock(mutex_);
   FeedState out = robot_;
   out.newest = localiser_.newest();
-  out.covariance = localiser_.covariance();
   out.T_odom_fed = localiser_.watch().T_odom_fed();
-  // Where odometry has jumped since the robot's sample, `odom` is another frame.
   if (!(out.T_odom_fed == robot_.T_odom_fed))
     out.T_map_odom = robot_.T_map_odom * robot_.T_odom_fed.inverse() * out.T_odom_fed;
+  out.covariance = localiser_.covariance();
   out.stored = stored_;
   out.ended = ended_ && inputs_.empty();
   // Of samples that the robot has not heard yet it would want one where it wanted one, or a keyframe is due.
@@ -182,6 +184,7 @@ void FeedFront::note_stored() {
   if (!inputs_.empty()) return;
   scans_left_out_ = samples_joined_ = 0;
   finest_s_ = 0.0;
+  jumps_.clear();
 }
 
 void FeedFront::begin_again(const std::optional<Timestamp>& stored) {
@@ -217,7 +220,7 @@ void FeedFront::publish(FeedState robot) {
   // One that was made again says nothing until it has caught up.
   if (is_same && robot_.newest && (!robot.newest || robot.newest->stamp < robot_.newest->stamp)) return;
   robot_ = std::move(robot);
-  if (robot_.newest) localiser_.correct(*robot_.newest, robot_.covariance, robot_.watch);
+  localiser_.correct(robot_.watch, robot_.covariance);
 }
 
 void FeedFront::say_trouble(std::string trouble) {

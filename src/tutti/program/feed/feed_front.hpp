@@ -6,6 +6,7 @@
 #include <deque>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -98,6 +99,7 @@ class FeedFront final : public FeedTarget {
   std::vector<FeedRefusal> refusals_;
   std::size_t scans_left_out_ = 0, samples_joined_ = 0;  // since all was taken last
   double finest_s_ = 0.0;                                // samples that are closer are one
+  std::set<Timestamp> jumps_;                            // samples before which odometry has jumped
   Timestamp behind_since_;
   std::string trouble_;
   Timestamp trouble_since_;

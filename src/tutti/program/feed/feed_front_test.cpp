@@ -102,6 +102,26 @@ TEST(FeedFront, SeesWhereOdometryJumpsAsTheRobotDoes) {
   ASSERT_GT(behind.front.state().T_odom_fed.translation.norm(), 100.0);
 }
 
+TEST(FeedFront, WhatIsTakenTogetherIsNeverAcrossAJump) {
+  Behind behind({.inputs = 40});
+  for (std::size_t i = 0; i < 400; ++i) {
+    node::OdometrySample fed = sample(i);
+    if (i >= 123) fed.T_odom_body.translation.x() += 100.0;
+    ASSERT_TRUE(behind.front.add_odometry(fed));
+  }
+  std::optional<Timestamp> before;
+  bool is_there = false;
+  while (const auto input = behind.front.take(0.0)) {
+    const auto& one = std::get<node::OdometrySample>(*input);
+    if (one.stamp == kOdometry[123].stamp) {
+      is_there = true;
+      EXPECT_EQ(before, kOdometry[122].stamp);
+    }
+    before = one.stamp;
+  }
+  EXPECT_TRUE(is_there);
+}
+
 TEST(FeedFront, CarriesOnFromTheLastCorrection) {
   Behind behind;
   for (std::size_t i = 0; i < 200; ++i) ASSERT_TRUE(behind.front.add_odometry(sample(i)));

@@ -5,41 +5,36 @@
 
 namespace tutti::program {
 
-Status Localiser::add(const node::OdometrySample& sample) {
-  const auto step = robot::usable_step(robot_, sample.stamp, sample.T_odom_body, sample.increment_covariance);
-  if (!step) return tl::unexpected(step.error());
+Result<bool> Localiser::add(const node::OdometrySample& sample) {
+  const auto fed = robot::usable_step(robot_, sample.stamp, sample.T_odom_body, sample.increment_covariance);
+  if (!fed) return tl::unexpected(fed.error());
   const auto before = newest() ? std::optional(newest()->stamp) : std::nullopt;
-  if (auto ok = robot::check_follows(robot_, sample.stamp, before); !ok) return ok;
-  const Step next{{sample.stamp, step->T_odom_body}, step->covariance};
-  if (!newest()) {
-    watch_.take(next.fed);
-    return {};
-  }
-  carry(next);
-  steps_.push_back(next);
+  if (auto ok = robot::check_follows(robot_, sample.stamp, before); !ok) return tl::unexpected(ok.error());
+  const Pose3 T_odom_before = watch_.T_odom_body();
+  const auto [T_odom_body, jump] = watch_.take({sample.stamp, fed->T_odom_body});
+  if (!before) return false;
+  const RelativePose motion{T_odom_before.inverse() * T_odom_body, jump ? robot::unknown_step() : fed->covariance};
+  carry(motion);
+  steps_.push_back({sample.stamp, motion});
   if (steps_.size() > kMostSteps) {
-    const Step &first = steps_[0], &second = steps_[1];
-    const Matrix6d both =
-        compound_covariance(first.fed.pose.inverse() * second.fed.pose, first.covariance, second.covariance);
-    steps_[1].covariance = 0.5 * (both + both.transpose());
+    steps_[1].motion = compound(steps_[0].motion, steps_[1].motion);
     steps_.pop_front();
   }
-  return {};
+  return jump.has_value();
 }
 
-void Localiser::carry(const Step& step) {
-  const Pose3 before = watch_.T_odom_body();
-  const auto [T_odom_body, jump] = watch_.take(step.fed);
-  const Matrix6d moved =
-      compound_covariance(before.inverse() * T_odom_body, covariance_, jump ? robot::unknown_step() : step.covariance);
+void Localiser::carry(const RelativePose& motion) {
+  const Matrix6d moved = compound_covariance(motion.T_a_b, covariance_, motion.covariance);
   covariance_ = 0.5 * (moved + moved.transpose());
 }
 
-void Localiser::correct(const StampedPose& at, const Matrix6d& covariance, const robot::OdometryWatch& watch) {
-  while (!steps_.empty() && steps_.front().fed.stamp <= at.stamp) steps_.pop_front();
-  watch_ = watch.at(at);
+void Localiser::correct(const robot::OdometryWatch& watch, const Matrix6d& covariance) {
+  const auto& heard = watch.state().newest;
+  while (!steps_.empty() && heard && steps_.front().end <= heard->stamp) steps_.pop_front();
+  // Of samples that were taken together the agent may make something else.
+  if (!newest() || (heard && heard->stamp >= newest()->stamp)) watch_ = watch;
   covariance_ = covariance;
-  for (const Step& step : steps_) carry(step);
+  for (const Step& step : steps_) carry(step.motion);
 }
 
 }  // namespace tutti::program

@@ -15,7 +15,7 @@
 namespace tutti::program {
 
 /// Where a robot is in its odometry, and how sure it is of that on its map, while its agent is samples behind: what the
-/// agent said at its own newest sample, carried on by odometry. Takes and refuses samples, and sees where they jump, as
+/// agent said at its own newest sample, carried on by odometry. Takes and refuses samples, and sees them jump, as
 /// RobotAgent::add_odometry() does.
 class Localiser {
  public:
@@ -23,13 +23,13 @@ class Localiser {
 
   explicit Localiser(RobotId robot) : robot_(robot) {}
 
-  /// An error: it is refused, and why; nothing has changed.
-  Status add(const node::OdometrySample& sample);
-  /// The agent was here (as fed), this sure, and knew this of odometry.
-  void correct(const StampedPose& at, const Matrix6d& covariance, const robot::OdometryWatch& watch = {});
+  /// An error: it is refused, and why; nothing has changed. Otherwise whether odometry has jumped there.
+  Result<bool> add(const node::OdometrySample& sample);
+  /// The agent has heard these samples, and is this sure.
+  void correct(const robot::OdometryWatch& watch, const Matrix6d& covariance);
 
-  [[nodiscard]] const std::optional<StampedPose>& newest() const { return watch_.state().newest; }  ///< As fed.
-  /// OdometryWatch: T_odom_body of the newest, and T_odom_fed.
+  /// As fed.
+  [[nodiscard]] const std::optional<StampedPose>& newest() const { return watch_.state().newest; }
   [[nodiscard]] const robot::OdometryWatch& watch() const { return watch_; }
   [[nodiscard]] const Matrix6d& covariance() const { return covariance_; }  ///< Of T_map_body, right tangent.
   /// Samples that the agent has not said anything about yet; at most kMostSteps.
@@ -37,10 +37,10 @@ class Localiser {
 
  private:
   struct Step {
-    StampedPose fed;
-    Matrix6d covariance;
+    Timestamp end;
+    RelativePose motion;
   };
-  void carry(const Step& step);
+  void carry(const RelativePose& motion);
 
   RobotId robot_;
   robot::OdometryWatch watch_;
