@@ -181,7 +181,7 @@ def main():
             time.sleep(0.05)
         heard = bytearray()
         counts = {"refused": 0, "jump": 0, "situation": 0, "closed": 0}
-        alerts, revisions, first_refusal = set(), set(), None
+        alerts, revisions, first_refusal = {}, set(), None
         correction = b"\x8a\x01"  # of a Feed that is one
 
         def frame():
@@ -204,7 +204,7 @@ def main():
             if kind == "refused":
                 first_refusal = first_refusal or message.refused.why
             if kind == "situation":
-                alerts.update(alert.text[:60] for alert in message.situation.alert)
+                alerts.update((alert.text[:20], alert.text) for alert in message.situation.alert)  # the last of a kind
             return kind
 
         def say(**what):
@@ -254,7 +254,7 @@ def main():
         print(json.dumps({"minutes": arguments.minutes, "samples": len(took_ms), "scans": scans, "answered after ms": shares(took_ms),
                           "client itself late by ms": shares(late_ms), "over 2 ms": sum(t > 2 for t in took_ms),
                           "over 20 ms": sum(t > 20 for t in took_ms), **counts, "first refusal": first_refusal,
-                          "alerts": sorted(alerts), "map revisions heard": len(revisions), "ended after s": round(ended_s, 2),
+                          "alerts": sorted(alerts.values()), "map revisions heard": len(revisions), "ended after s": round(ended_s, 2),
                           "robot CPU s": cpu(robot) / os.sysconf("SC_CLK_TCK"), "load average": os.getloadavg(),
                           "status": status.get("line")}, indent=1))
         for program in (robot, server):
