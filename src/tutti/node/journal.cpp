@@ -61,17 +61,56 @@ class Bytes {
   bool short_ = false;
 };
 
+/// The first byte of an entry; of another kind than odometry it is the entry's index. Odometry comes hundreds of times
+/// a second, and of its covariance what follows from the rest is left out.
+constexpr char kOdometry = 0;           // all 36 numbers: what robots wrote once, and of any matrix
+constexpr char kDiagonalOdometry = 4;   // the 6 of a diagonal matrix
+constexpr char kSymmetricOdometry = 5;  // the 21 of a symmetric one
+
+bool is_same(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }  // to the bit
+
+/// Calls `pass` with each number above the diagonal, or on it, and the one that it is mirrored to.
+template <class Matrix, class Pass>
+void each_of_upper(Matrix& matrix, const Pass& pass) {
+  for (int row = 0; row < 6; ++row)
+    for (int column = row; column < 6; ++column) pass(matrix(row, column), matrix(column, row), row == column);
+}
+
+char kind_of(const OdometrySample& sample) {
+  bool is_diagonal = true, is_symmetric = true;
+  each_of_upper(sample.increment_covariance, [&](double upper, double lower, bool on_diagonal) {
+    is_diagonal = is_diagonal && (on_diagonal || (is_same(upper, 0.0) && is_same(lower, 0.0)));
+    is_symmetric = is_symmetric && is_same(upper, lower);
+  });
+  return is_diagonal ? kDiagonalOdometry : is_symmetric ? kSymmetricOdometry : kOdometry;
+}
+
 void write(const OdometrySample& sample, std::string& out) {
+  const char kind = kind_of(sample);
+  out.back() = kind;
   put(out, sample.stamp.ns);
   put_all(out, sample.T_odom_body.rotation.coeffs().data(), 4);
   put_all(out, sample.T_odom_body.translation.data(), 3);
-  put_all(out, sample.increment_covariance.data(), 36);
+  if (kind == kOdometry) return put_all(out, sample.increment_covariance.data(), 36);
+  each_of_upper(sample.increment_covariance, [&](double upper, double, bool on_diagonal) {
+    if (on_diagonal || kind == kSymmetricOdometry) put(out, upper);
+  });
 }
-void read(Bytes& in, OdometrySample& sample) {
+Result<JournalEntry> read_odometry(Bytes in, char kind) {
+  OdometrySample sample;
   sample.stamp.ns = in.take<std::int64_t>();
   in.take_all(sample.T_odom_body.rotation.coeffs().data(), 4);
   in.take_all(sample.T_odom_body.translation.data(), 3);
-  in.take_all(sample.increment_covariance.data(), 36);
+  if (kind == kOdometry)
+    in.take_all(sample.increment_covariance.data(), 36);
+  else
+    each_of_upper(sample.increment_covariance, [&](double& upper, double& lower, bool on_diagonal) {
+      if (on_diagonal || kind == kSymmetricOdometry) upper = lower = in.take<double>();
+    });
+  if (!in.is_done()) return fail(ErrorCode::parse, "journal: an entry is not as long as it says");
+  if (kind != kOdometry && kind_of(sample) != kind)
+    return fail(ErrorCode::parse, "journal: odometry of kind {}, expected {}", int{kind}, int{kind_of(sample)});
+  return JournalEntry(sample);
 }
 
 void write(const Scan& scan, std::string& out) {
@@ -124,8 +163,10 @@ Result<JournalEntry> decode_entry(std::string_view bytes) {
   if (bytes.empty()) return fail(ErrorCode::parse, "journal: an entry without bytes");
   const Bytes rest(bytes.substr(1));
   switch (bytes.front()) {
-    case 0:
-      return read_entry<OdometrySample>(rest);
+    case kOdometry:
+    case kDiagonalOdometry:
+    case kSymmetricOdometry:
+      return read_odometry(rest, bytes.front());
     case 1:
       return read_entry<Scan>(rest);
     case 2:

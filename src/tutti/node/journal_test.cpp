@@ -19,7 +19,12 @@ JournalEntry any_entry(Rng& rng) {
     OdometrySample sample{.stamp = {static_cast<std::int64_t>(rng.index(1'000'000))}};
     for (double& x : sample.T_odom_body.rotation.coeffs()) x = rng.normal();
     for (double& x : sample.T_odom_body.translation) x = rng.normal();
-    for (double& x : sample.increment_covariance.reshaped()) x = rng.normal();
+    Matrix6d& covariance = sample.increment_covariance;
+    for (double& x : covariance.reshaped()) x = rng.normal();
+    if (rng.bernoulli(0.3))
+      covariance = Matrix6d(covariance.diagonal().asDiagonal());
+    else if (rng.bernoulli(0.5))
+      covariance = (covariance + covariance.transpose()).eval();
     return sample;
   }
   if (rng.bernoulli(0.3)) {
@@ -56,6 +61,25 @@ RC_GTEST_PROP(Journal, EntriesComeBackToTheBitAndPartsOfThemDoNot, ()) {
   std::string bad = bytes;
   for (int edits = 0; edits < 3; ++edits) bad[rng.index(bad.size())] = static_cast<char>(rng.index(256));
   if (const auto other = decode_entry(bad)) RC_ASSERT(encode(*other) == bad);
+}
+
+/// As hundreds of them come in a second.
+TEST(Journal, OdometryIsWrittenWithoutWhatFollowsFromTheRest) {
+  const std::size_t pose = 1 + 8 + 7 * sizeof(double);
+  OdometrySample sample;
+  sample.increment_covariance.diagonal().setConstant(1e-6);
+  EXPECT_EQ(encode(sample).size(), pose + 6 * sizeof(double));
+  sample.increment_covariance(1, 2) = sample.increment_covariance(2, 1) = 1e-7;
+  EXPECT_EQ(encode(sample).size(), pose + 21 * sizeof(double));
+  sample.increment_covariance(1, 2) = -1e-7;
+  EXPECT_EQ(encode(sample).size(), pose + 36 * sizeof(double));
+  // What robots wrote once: all of any matrix.
+  std::string old = encode(sample);
+  const std::string zeros(36 * sizeof(double), '\0');
+  old.replace(pose, zeros.size(), zeros);
+  const auto read = decode_entry(old);
+  ASSERT_TRUE(read.has_value());
+  EXPECT_EQ(std::get<OdometrySample>(*read).increment_covariance, Matrix6d::Zero());
 }
 
 }  // namespace journal_test
