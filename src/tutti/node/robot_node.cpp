@@ -4,27 +4,15 @@
 #include <algorithm>
 #include <utility>
 
-#include "tutti/base/content_hash.hpp"
+#include "tutti/node/robot_tables.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/wire/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
-namespace {
 
-constexpr const char* kCheckpoint = "checkpoint";
-constexpr const char* kWhole = "agent";  // the one row that was the checkpoint once
-constexpr const char* kJournal = "journal";
-constexpr const char* kOutbox = "outbox";    // submaps
-constexpr const char* kArchive = "archive";  // without bytes: which of them the server has named
-constexpr const char* kMeta = "meta";
-constexpr const char* kRobot = "robot";                // whose store it is
-constexpr const char* kStarts = "starts";              // on it
-constexpr const char* kSession = "session";            // the newest on it
-constexpr const char* kIncarnations = "incarnations";  // of the server: of the last graph, of the last receipt
-
-}  // namespace
+using namespace robot_tables;  // NOLINT
 
 Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
                                                    Rng rng, const storage::TableStore& store) {
@@ -314,145 +302,6 @@ void RobotNode::send_submaps(Timestamp now, const Frames& fresh, Step& step) {
 bus::Envelope RobotNode::submap_envelope(SubmapId id, std::shared_ptr<const std::string> frame) const {
   return {bus::Endpoint::of(agent_.robot()), bus::Endpoint::server(), bus::MessageKind::submap,
           message_id(id, receipt_incarnation_), std::move(frame)};
-}
-
-Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget) {
-  Step step;
-  if (envelope.kind == bus::MessageKind::proxy_graph || envelope.kind == bus::MessageKind::proxy_graph_delta)
-    receive_graph(envelope, now, budget, step);
-  else if (envelope.kind == bus::MessageKind::receipt)
-    receive_receipt(envelope, now, step);
-  else
-    step.tell(now, MessageRefused{envelope.from, envelope.kind, "not for a robot"});
-  return step;
-}
-
-void RobotNode::refuse(const bus::Envelope& envelope, const Error& error, Timestamp now, Step& step) {
-  step.tell(now, MessageRefused{envelope.from, envelope.kind, error.message});
-  if (error.code != ErrorCode::unsupported) return;
-  Unread& unread = unread_[envelope.kind];
-  ++unread.count;
-  unread.why = error.message;
-}
-
-void RobotNode::remember_incarnations(Step& step) const {
-  if (config_.keeps_state)
-    step.writes.push_back({kMeta, kIncarnations, storage::key_of({graph_incarnation_, receipt_incarnation_})});
-}
-
-/// A server that has started again counts on from where its map was: an older one than the robot has heard of is
-/// another map. The newest of a kind comes last (bus::Delivery::retained), so that no start is heard after a later one
-/// for long.
-void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget,
-                              Step& step) {
-  const auto graph = graph_in(envelope);
-  if (!graph) return refuse(envelope, graph.error(), now, step);
-  unread_.erase(envelope.kind);
-  if (envelope.kind == bus::MessageKind::proxy_graph_delta)
-    delta_ = envelope.bytes;
-  else
-    base_ = wire::decode_proxy_graph(*envelope.bytes).value().graph;
-  if (!*graph) return;
-  const ProxyGraph& heard = (*graph)->graph;
-  if (heard.incarnation != graph_incarnation_) {
-    graph_incarnation_ = heard.incarnation;
-    remember_incarnations(step);
-    if (heard.age() < agent_.newest_heard()) agent_.forget_map_age();
-  }
-  if (!agent_.is_news(heard)) return;
-  if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph), budget}, now, step);
-  write_journal(step);  // what is told of it holds
-  step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, budget, observer_)});
-  note(std::get<RobotUpdated>(step.events.back().what).summary);
-  updated_ = now;
-}
-
-void RobotNode::note(const robot::UpdateSummary& summary) {
-  alerts_ = static_cast<std::uint64_t>(
-      std::ranges::count_if(summary.explanation.origins, [](const auto& origin) { return origin.alert; }));
-}
-
-Result<std::optional<ProxyGraphMessage>> RobotNode::graph_in(const bus::Envelope& envelope) const {
-  if (envelope.kind == bus::MessageKind::proxy_graph_delta)
-    return wire::decode_delta(*envelope.bytes, base_ ? *base_ : ProxyGraph{});
-  auto message = wire::decode_proxy_graph(*envelope.bytes);
-  if (!message) return tl::unexpected(message.error());
-  auto newer = delta_ ? wire::decode_delta(*delta_, message->graph) : std::nullopt;
-  if (newer && *newer) return newer;
-  return std::optional(std::move(*message));
-}
-
-void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step) {
-  const auto receipt = wire::decode_receipt(*envelope.bytes);
-  if (!receipt) return refuse(envelope, receipt.error(), now, step);
-  unread_.erase(envelope.kind);
-  if (receipt->robot != agent_.robot())
-    return step.tell(now, MessageRefused{envelope.from, envelope.kind, "a receipt for another robot"});
-  if (receipt->incarnation != receipt_incarnation_) note_start(*receipt, now, step);
-  std::vector<SubmapId> known;
-  for (const auto& [id, bytes] : uplink_.submaps()) {
-    const bool is_refused = !receipt->contains(id) && is_refused_as_it_is(id, *receipt);
-    if (is_refused)
-      step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
-                                    fmt::format("submap {} is refused by the server, which last said: {}",
-                                                to_string(id), receipt->why_refused)});
-    if (is_refused || receipt->contains(id))
-      known.push_back(id);
-    else if (receipt->leaves_unread(id))
-      uplink_.park(id);
-  }
-  for (const SubmapId id : known) archive(id, step);
-  note_conflict(*receipt, now, step);
-  send_submaps(now, {}, step);
-}
-
-void RobotNode::note_start(const Receipt& receipt, Timestamp now, Step& step) {
-  receipt_incarnation_ = receipt.incarnation;
-  remember_incarnations(step);
-  uplink_.release();
-  std::vector<SubmapId> forgotten;
-  for (const auto& [id, bytes] : archive_)
-    if (!receipt.contains(id) && !is_refused_as_it_is(id, receipt)) forgotten.push_back(id);
-  if (forgotten.empty()) return;
-  for (const SubmapId id : forgotten) {
-    const auto found = archive_.find(id);
-    archive_bytes_ -= found->second;
-    uplink_.add(id, found->second);
-    archive_.erase(found);
-    step.writes.push_back({kArchive, key_of(id), std::nullopt});
-  }
-  step.tell(now, SubmapsForgotten{agent_.robot(), forgotten.size()});
-}
-
-/// The oldest make room for it.
-void RobotNode::archive(SubmapId id, Step& step) {
-  const std::size_t bytes = uplink_.submaps().at(id);
-  uplink_.remove(id);
-  archive_.emplace(id, bytes);
-  archive_bytes_ += bytes;
-  step.writes.push_back({kArchive, key_of(id), ""});
-  while (archive_bytes_ > config_.max_archive_bytes) {
-    const auto oldest = archive_.begin();
-    for (const char* table : {kOutbox, kArchive}) step.writes.push_back({table, key_of(oldest->first), std::nullopt});
-    archive_bytes_ -= oldest->second;
-    archive_.erase(oldest);
-  }
-}
-
-/// And not something else that came under its id.
-bool RobotNode::is_refused_as_it_is(SubmapId id, const Receipt& receipt) const {
-  if (!receipt.refuses(id)) return false;
-  const auto row = store_.read(kOutbox, key_of(id));
-  return row && *row && receipt.refuses(id, content_hash(**row));
-}
-
-void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step) {
-  owner_session_ = receipt.owner_session;
-  const std::optional<std::string> before = std::exchange(conflict_, std::nullopt);
-  const auto& conflict = receipt.conflict;
-  if (!conflict || conflict->session != agent_.chain().session || conflict->start != start_) return;
-  conflict_ = conflict->why;
-  if (conflict_ != before) step.tell(now, RobotRefused{agent_.robot(), conflict->session, conflict->why});
 }
 
 std::string RobotNode::odometry_trouble(Timestamp now) const {
