@@ -3,7 +3,8 @@
 """How long a robot's live feed takes to answer, in real time: a server and a robot as programs, odometry at 200 Hz and all
 scans through the feed's socket, updates of the map meanwhile. Without --hku a simulated walk round a hall with 10 scans a
 second; with it the first of the HKU recordings, its odometry interpolated, forth and back. What is measured is from before
-a sample is written to the socket until all of its correction was read. Prints JSON for docs/results/robustness.md.
+a sample is written to the socket until all of its correction was read; beside it, as what this machine does to any program,
+how long a process that only echoes takes for as many bytes, and how late the client wakes up. Prints JSON for docs/results/robustness.md.
 
 usage: feed_latency.py TUTTI PROTO_PYTHON_DIR [--minutes 5] [--points 20000] [--hku FOLDER_OF_THE_SESSION]
 """
@@ -151,6 +152,27 @@ class Recorded:
             self.next = (scan, way)
 
 
+class Echo:
+    """A process that answers whatever it is sent."""
+
+    def __init__(self):
+        self.end, other = socket.socketpair(socket.AF_UNIX)
+        if os.fork() == 0:
+            self.end.close()
+            while data := other.recv(1 << 16):
+                other.sendall(data)
+            os._exit(0)
+        other.close()
+
+    def ms(self, payload):
+        sent = time.perf_counter()
+        self.end.sendall(payload)
+        left = len(payload)
+        while left > 0:
+            left -= len(self.end.recv(1 << 16))
+        return 1e3 * (time.perf_counter() - sent)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("tutti")
@@ -214,7 +236,8 @@ def main():
         say(hello=Feed.Hello(protocol_version=1, client_name=b"latency"))
         while note(frame()) != "welcome":
             pass
-        took_ms, late_ms, scans, begin = [], [], 0, time.monotonic()
+        echo = Echo()
+        took_ms, echo_ms, late_ms, scans, begin = [], [], [], 0, time.monotonic()
         last = b""
         for i in range(round(arguments.minutes * 60 * RATE_HZ)):
             x, y, z, qx, qy, qz, qw = walk.pose(i)
@@ -235,6 +258,7 @@ def main():
             took_ms.append(1e3 * (time.perf_counter() - sent))
             if i % RATE_HZ == 0 and last.startswith(correction):
                 revisions.add(Feed.FromString(last).correction.map_revision)
+            echo_ms.append(echo.ms(payload))
             for at_s, cloud in walk.scans(i):
                 client.sendall(scan_frame(START_NS + round(at_s * 1e9), cloud))
                 scans += 1
@@ -252,6 +276,7 @@ def main():
 
         cpu = lambda process: sum(map(int, pathlib.Path(f"/proc/{process.pid}/stat").read_text().rpartition(") ")[2].split()[11:13]))
         print(json.dumps({"minutes": arguments.minutes, "samples": len(took_ms), "scans": scans, "answered after ms": shares(took_ms),
+                          "a bare echo after ms": shares(echo_ms), "echo over 20 ms": sum(t > 20 for t in echo_ms),
                           "client itself late by ms": shares(late_ms), "over 2 ms": sum(t > 2 for t in took_ms),
                           "over 20 ms": sum(t > 20 for t in took_ms), **counts, "first refusal": first_refusal,
                           "alerts": sorted(alerts.values()), "map revisions heard": len(revisions), "ended after s": round(ended_s, 2),
