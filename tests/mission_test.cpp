@@ -80,6 +80,17 @@ TEST(Mission, ClosesTheLoop) {
   }
 }
 
+TEST(Mission, AMapAmongWrongClosuresIsAsGoodAsAPerfectJudges) {
+  MissionConfig config = small_mission();
+  config.closures.reference.wrong_share = 0.2;
+  const MissionRecord record = run(config);
+  for (const RobotRecord& robot : record.robots) {
+    ASSERT_TRUE(robot.perfect && robot.perfect->rmse_m);
+    EXPECT_LT(*robot.server.rmse_m, 1.2 * *robot.perfect->rmse_m + 0.005) << robot.name;
+    EXPECT_LT(*robot.perfect->rmse_m, 0.5 * *robot.onboard.rmse_m) << robot.name;
+  }
+}
+
 TEST(Mission, TheReportDependsOnTheSeedAndNotOnTheThreads) {
   const MissionConfig config = small_mission();
   const std::string one = report_json(run(config, 3, 1));

@@ -32,9 +32,10 @@ struct RobotOutcome {
 /// over 10 m, at keyframes, each beside the share of the way it was scored on; kink of every correction; the server's
 /// joint figure over all robots of its largest component with one alignment. Agreement: ATE of a robot's estimate with
 /// the server's in the role of the reference.
-/// Robots whose reference is not for scoring get no accuracy.
+/// Robots whose reference is not for scoring get no accuracy. `perfect`: the map of perfect_judge.hpp, or null.
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
-                     const evaluation::AssociationConfig& association, MissionRecord& record);
+                     const server::MapEstimate* perfect, const evaluation::AssociationConfig& association,
+                     MissionRecord& record);
 /// Accepted closures against the reference poses of their ends; nothing where none can be checked.
 std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
                                                  const std::vector<const MissionRecording*>& robots,

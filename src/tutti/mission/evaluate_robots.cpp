@@ -49,20 +49,25 @@ Accuracy accuracy_of(const Trajectory& estimate, const Scoring& scoring) {
 
 /// Only of the robot's component: a chain with a gap may lie in several, and their frames are unrelated. How many
 /// keyframes are left out.
-std::size_t read_server_estimate(const server::MapEstimate& map, const server::MapComponents& components,
-                                 RobotRecord& out) {
-  const auto component = components.of_robot.find(out.id);
-  if (component == components.of_robot.end()) return 0;
-  out.component = component->second;
+struct ServerEstimate {
+  std::uint32_t component = 0;
+  Trajectory trajectory;
   std::size_t left_out = 0;
+};
+ServerEstimate read_server_estimate(const server::MapEstimate& map, const server::MapComponents& components,
+                                    RobotId robot) {
+  ServerEstimate out;
+  const auto component = components.of_robot.find(robot);
+  if (component == components.of_robot.end()) return out;
+  out.component = component->second;
   for (const server::MapNode& node : map.nodes) {
-    if (node.id.chain.robot != out.id) continue;
+    if (node.id.chain.robot != robot) continue;
     if (node.component == out.component)
-      out.server_estimate.push_back({node.stamp, node.T_world_body});
+      out.trajectory.push_back({node.stamp, node.T_world_body});
     else
-      ++left_out;
+      ++out.left_out;
   }
-  return left_out;
+  return out;
 }
 
 PolicyRecord policy_record(const std::string& name, const robot::RobotAgent& agent, const Scoring& scoring,
@@ -91,7 +96,8 @@ void read_run(const RobotOutcome& robot, RobotRecord& out) {
 }  // namespace
 
 void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapEstimate& map,
-                     const evaluation::AssociationConfig& association, MissionRecord& record) {
+                     const server::MapEstimate* perfect, const evaluation::AssociationConfig& association,
+                     MissionRecord& record) {
   const server::MapComponents components = server::choose_components(map);
   for (std::size_t i = 0; i < robots.size(); ++i) {
     const RobotOutcome& robot = robots[i];
@@ -107,7 +113,10 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     for (const Keyframe& k : agent->second->keyframes()) out.odometry.push_back({k.stamp, k.T_odom_body});
     const Scoring scoring{recording, association, evaluation::KeyframeWay(robot.way(), out.odometry)};
     out.distance_m = scoring.way.whole_m();
-    if (const std::size_t left_out = read_server_estimate(map, components, out); left_out > 0)
+    auto [component, server_estimate, left_out] = read_server_estimate(map, components, out.id);
+    out.component = component;
+    out.server_estimate = std::move(server_estimate);
+    if (left_out > 0)
       record.notes.push_back(
           fmt::format("{}: the server holds pieces of its way that nothing joins; {} of {} keyframes are not in the "
                       "largest and left out of its figures",
@@ -118,6 +127,9 @@ void evaluate_robots(const std::vector<RobotOutcome>& robots, const server::MapE
     if (recording.score_against_reference) out.reference = recording.recording.reference;
     out.onboard = accuracy_of(out.odometry, scoring);
     out.server = accuracy_of(out.server_estimate, scoring);
+    if (perfect != nullptr)
+      out.perfect =
+          accuracy_of(read_server_estimate(*perfect, server::choose_components(*perfect), out.id).trajectory, scoring);
     for (const auto& [name, policy_agent] : robot.agents)
       out.policies.push_back(policy_record(name, *policy_agent, scoring, out.odometry, out.server_estimate));
     for (const robot::Whereabouts& other : agent->second->whereabouts())

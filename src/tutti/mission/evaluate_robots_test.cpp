@@ -49,7 +49,7 @@ class EvaluateRobots : public ::testing::Test {
   }
   const RobotRecord& evaluate() {
     record_.robots.resize(1);
-    evaluate_robots({{&recording_, "spectral", {{"spectral", &agent_}}, replayed_}}, map_, {}, record_);
+    evaluate_robots({{&recording_, "spectral", {{"spectral", &agent_}}, replayed_}}, map_, nullptr, {}, record_);
     return record_.robots[0];
   }
 

@@ -8,6 +8,7 @@
 #include "tutti/geometry/alignment.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/evaluate.hpp"
+#include "tutti/mission/true_poses.hpp"
 #include "tutti/server/map_components.hpp"
 
 namespace tutti::mission {
@@ -64,25 +65,6 @@ void name_failures(const server::MapEstimate& map, ServerRecord& out) {
                                    .error_rad = failed.jump_rad});
 }
 
-/// Reference poses of the keyframes at which accepted closures end.
-std::map<KeyframeId, Pose3> true_ends(const server::MapEstimate& map,
-                                      const std::vector<const MissionRecording*>& robots,
-                                      const evaluation::AssociationConfig& association) {
-  std::map<RobotId, std::map<Timestamp, KeyframeId>> ends;
-  for (const server::JudgedClosure& judged : map.closures)
-    if (judged.accepted)
-      for (const KeyframeId& id : {judged.closure.from, judged.closure.to})
-        ends[id.chain.robot][find_node(map, id)->stamp] = id;
-  std::map<KeyframeId, Pose3> out;
-  for (const MissionRecording* robot : robots) {
-    Trajectory moments;
-    for (const auto& [stamp, id] : ends[robot->recording.robot]) moments.push_back({stamp, {}});
-    for (const auto& pair : evaluation::associate(moments, robot->recording.reference, association))
-      out[ends[robot->recording.robot].at(pair.stamp)] = pair.reference;
-  }
-  return out;
-}
-
 /// T_odom-of-robot <- world, from the server's and the raw poses of the robot's keyframes: the rigid motion that fits
 /// the whole trajectory best.
 std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& map, std::uint32_t component) {
@@ -129,20 +111,19 @@ std::optional<ClosureCheckRecord> check_closures(const server::MapEstimate& map,
                                                  const std::vector<const MissionRecording*>& robots,
                                                  const evaluation::AssociationConfig& association,
                                                  const ClosureCheckConfig& config) {
-  const std::map<KeyframeId, Pose3> truth = true_ends(map, robots, association);
+  std::vector<LoopClosure> accepted;
+  for (const server::JudgedClosure& judged : map.closures)
+    if (judged.accepted) accepted.push_back(judged.closure);
+  const std::map<KeyframeId, Pose3> truth = true_ends(accepted, map, robots, association);
   std::optional<ClosureCheckRecord> check;
-  for (const server::JudgedClosure& judged : map.closures) {
-    if (!judged.accepted) continue;
-    const auto from = truth.find(judged.closure.from);
-    const auto to = truth.find(judged.closure.to);
-    if (from == truth.end() || to == truth.end()) continue;
-    const Vector6d error = local(from->second.inverse() * to->second, judged.closure.measurement.T_a_b);
+  for (const LoopClosure& closure : accepted) {
+    const auto error = closure_error(closure, truth);
+    if (!error) continue;
     if (!check) check = ClosureCheckRecord{.wrong_m = config.wrong_m, .wrong_deg = config.wrong_deg};
     ++check->checked;
-    if (error.head<3>().norm() > config.wrong_m || error.tail<3>().norm() > config.wrong_deg * kRadPerDeg)
-      ++check->wrong;
-    check->max_error_m = std::max(check->max_error_m, error.head<3>().norm());
-    check->max_error_deg = std::max(check->max_error_deg, error.tail<3>().norm() / kRadPerDeg);
+    check->wrong += is_wrong(*error, config) ? 1 : 0;
+    check->max_error_m = std::max(check->max_error_m, error->head<3>().norm());
+    check->max_error_deg = std::max(check->max_error_deg, error->tail<3>().norm() / kRadPerDeg);
   }
   return check;
 }

@@ -53,7 +53,7 @@ class EvaluateServer : public ::testing::Test {
     for (const SubmapMessage& message : messages_) EXPECT_TRUE(server.receive(message));
     server.optimise();
     record_.robots.resize(runs_.size());
-    evaluate_robots(outcomes, server.map(), {}, record_);
+    evaluate_robots(outcomes, server.map(), nullptr, {}, record_);
     evaluate_server(outcomes, server, {}, {}, record_);
     return record_;
   }

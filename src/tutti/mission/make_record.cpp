@@ -7,6 +7,7 @@
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/mission/follow_alerts.hpp"
+#include "tutti/mission/perfect_judge.hpp"
 #include "tutti/mission/record_notes.hpp"
 
 namespace tutti::mission {
@@ -51,7 +52,10 @@ MissionRecord make_record(const FinishedMission& mission) {
   const server::MapServer& server = mission.server.map_server();
   const ProxyGraph& broadcast = mission.server.broadcast();
   record.robots.resize(mission.robots.size());
-  evaluate_robots(outcomes, server.map(), config.association, record);
+  std::vector<const MissionRecording*> recordings;
+  for (const RobotOutcome& robot : outcomes) recordings.push_back(robot.recording);
+  const auto perfect = judge_perfectly(server, config.server.map, recordings, config.association, config.closure_check);
+  evaluate_robots(outcomes, server.map(), perfect ? &*perfect : nullptr, config.association, record);
   note_undelivered(mission.undelivered, record);
   note_what_the_map_lacks(server.map(), record);
   evaluate_server(outcomes, server, config.association, config.closure_check, record);

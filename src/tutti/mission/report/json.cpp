@@ -5,6 +5,7 @@
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/json_parts.hpp"
 #include "tutti/mission/report/report.hpp"
+#include "tutti/mission/worst_moment.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -130,6 +131,13 @@ Json course_json(const RobotRecord& robot) {
   return out;
 }
 
+Json worst_json(const std::optional<WorstMoment>& worst) {
+  if (!worst) return nullptr;
+  return {{"time_s", number(worst->time_s)},
+          {"rmse_m", number(worst->rmse_m)},
+          {"onboard_rmse_m", number(worst->onboard_rmse_m)}};
+}
+
 Json traffic_json(const std::vector<TrafficRecord>& traffic) {
   Json rows = Json::array();
   for (const auto& row : traffic)
@@ -152,7 +160,7 @@ Json images_json(const std::optional<ImagesRecord>& images) {
           {"reprojection_rms_px", number(images->reprojection_rms_px)}};
 }
 
-Json robot_json(const RobotRecord& robot, bool tied) {
+Json robot_json(const RobotRecord& robot, const std::string& default_policy, bool tied) {
   Json policies = Json::object();
   for (const auto& policy : robot.policies) policies[policy.name] = policy_json(robot, policy);
   Json out{{"name", robot.name},
@@ -168,6 +176,9 @@ Json robot_json(const RobotRecord& robot, bool tied) {
            {"tied", tied}};
   add_accuracy(out, "onboard_", robot.onboard);
   add_accuracy(out, "server_", robot.server);
+  out["worst_server"] = worst_json(worst_of_server(robot.updates));
+  out["worst_corrected"] = worst_json(worst_of_policy(robot.updates, default_policy));
+  out["perfect_rmse_m"] = robot.perfect ? number(robot.perfect->rmse_m) : Json(nullptr);
   out.update({{"map_error",
                {{"onboard", map_error_json(robot.map_error.onboard)},
                 {"corrected", map_error_json(robot.map_error.corrected)}}},
@@ -292,7 +303,8 @@ std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error
 
 std::string report_json(const MissionRecord& record) {
   Json robots = Json::array();
-  for (const auto& robot : record.robots) robots.push_back(robot_json(robot, is_tied(record, robot.id)));
+  for (const auto& robot : record.robots)
+    robots.push_back(robot_json(robot, record.default_policy, is_tied(record, robot.id)));
   Json transforms = Json::array();
   for (const auto& transform : record.transforms) transforms.push_back(transform_json(transform));
   return dump(Json{{"format", kFormat},

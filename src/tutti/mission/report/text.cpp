@@ -9,6 +9,7 @@
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/mission/report/table.hpp"
+#include "tutti/mission/worst_moment.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -149,6 +150,16 @@ std::string correction_lines(const RobotRecord& robot, const PolicyRecord& polic
               "  kink     ");
 }
 
+/// When correcting did more harm than good, if it ever did.
+std::string worst_lines(const RobotRecord& robot, const std::string& policy) {
+  const auto worst = worst_of_policy(robot.updates, policy);
+  if (!worst || worst->rmse_m <= worst->onboard_rmse_m) return "";
+  return wrap(fmt::format("{}: corrected was worse than odometry by {} at most, at {} ({} instead of {}).", robot.name,
+                          format_metres(worst->rmse_m - worst->onboard_rmse_m), format_moment(worst->time_s),
+                          format_metres(worst->rmse_m), format_metres(worst->onboard_rmse_m)),
+              "  worst    ");
+}
+
 /// Where odometry and map part, what the robots warned of, and how gently they were corrected.
 std::string explanation_lines(const MissionRecord& record) {
   std::string out;
@@ -171,6 +182,7 @@ std::string explanation_lines(const MissionRecord& record) {
       out += wrap(text + ".", "  compare  ");
     }
     if (policy != nullptr) out += correction_lines(robot, *policy);
+    out += worst_lines(robot, record.default_policy);
   }
   return out;
 }

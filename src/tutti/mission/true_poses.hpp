@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tutti/evaluation/association.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/mission/recordings.hpp"
+#include "tutti/server/map_estimate.hpp"
+
+/// Closures against the reference, where there is one (also when it does not score trajectories).
+namespace tutti::mission {
+
+/// Reference poses of the map's keyframes at which these closures end, of those that have one.
+std::map<KeyframeId, Pose3> true_ends(std::span<const LoopClosure> closures, const server::MapEstimate& map,
+                                      const std::vector<const MissionRecording*>& robots,
+                                      const evaluation::AssociationConfig& association);
+
+/// By how much a closure is off (right tangent; m, rad); nothing when an end has no reference.
+std::optional<Vector6d> closure_error(const LoopClosure& closure, const std::map<KeyframeId, Pose3>& truth);
+
+bool is_wrong(const Vector6d& error, const ClosureCheckConfig& check);
+
+}  // namespace tutti::mission

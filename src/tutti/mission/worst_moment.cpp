@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/worst_moment.hpp"
+
+#include <algorithm>
+
+namespace tutti::mission {
+namespace {
+
+template <class Rmse>
+std::optional<WorstMoment> worst_moment(std::span<const UpdateRecord> updates, const Rmse& rmse_of) {
+  std::optional<WorstMoment> worst;
+  for (const UpdateRecord& update : updates) {
+    const std::optional<double> rmse_m = rmse_of(update);
+    if (!rmse_m || !update.onboard_rmse_m) continue;
+    const WorstMoment moment{update.time_s, *rmse_m, *update.onboard_rmse_m};
+    if (!worst || moment.rmse_m - moment.onboard_rmse_m > worst->rmse_m - worst->onboard_rmse_m) worst = moment;
+  }
+  return worst;
+}
+
+}  // namespace
+
+std::optional<WorstMoment> worst_of_server(std::span<const UpdateRecord> updates) {
+  return worst_moment(updates, [](const UpdateRecord& update) { return update.server_rmse_m; });
+}
+
+std::optional<WorstMoment> worst_of_policy(std::span<const UpdateRecord> updates, const std::string& policy) {
+  return worst_moment(updates, [&](const UpdateRecord& update) -> std::optional<double> {
+    const auto answer = std::ranges::find(update.answers, policy, &AnswerRecord::policy);
+    return answer == update.answers.end() ? std::nullopt : answer->rmse_m;
+  });
+}
+
+}  // namespace tutti::mission
