@@ -27,9 +27,24 @@ std::string why_odometry_alone(const std::vector<RejectionRecord>& rejections) {
                      pairs(most) == refused ? "all" : std::to_string(pairs(most)), to_string(most.nearest));
 }
 
+std::string names_of(const std::pair<RobotId, RobotId>& robots, const MissionRecord& record) {
+  const std::string& one = record.robots[robots.first.value].name;
+  return robots.first == robots.second ? one + " with itself"
+                                       : fmt::format("{} with {}", one, record.robots[robots.second.value].name);
+}
+
 /// Of closures between two robots, or of one with itself, this share and this many are more than wrong ones would be.
 constexpr double kManyInconsistent = 0.4;
 constexpr std::size_t kEnoughInconsistent = 8;
+
+void note_understated_closures(const server::MapEstimate& map, MissionRecord& record) {
+  for (const auto& [chains, factor] : map.closure_factors)
+    record.notes.push_back(fmt::format(
+        "{}: closures err {:.1f} times as much as they say in rotation and {:.1f} times in position, by their "
+        "neighbours; the map counts them so (stamps of a sensor that are late do this, or a finder that is too sure)",
+        names_of({chains.first.robot, chains.second.robot}, record), std::sqrt(factor.rotation),
+        std::sqrt(factor.translation)));
+}
 
 void note_inconsistent_closures(const server::MapEstimate& map, MissionRecord& record) {
   struct Count {
@@ -46,14 +61,10 @@ void note_inconsistent_closures(const server::MapEstimate& map, MissionRecord& r
     if (count.refused < kEnoughInconsistent ||
         static_cast<double>(count.refused) < kManyInconsistent * static_cast<double>(count.all))
       continue;
-    const std::string& one = record.robots[robots.first.value].name;
     record.notes.push_back(fmt::format(
         "{}: {} of {} closures contradict the map and are not in it; so many are seldom all wrong: odometry may be "
-        "worse "
-        "than its covariance says, or have failed where nothing tells",
-        robots.first == robots.second ? one + " with itself"
-                                      : fmt::format("{} with {}", one, record.robots[robots.second.value].name),
-        count.refused, count.all));
+        "worse than its covariance says, or have failed where nothing tells",
+        names_of(robots, record), count.refused, count.all));
   }
 }
 
@@ -99,6 +110,7 @@ void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& reco
         fmt::format("{}: its odometry errs {:.1f} times as much as its covariance says, by the loops it makes; the map "
                     "counts it so",
                     record.robots[chain.robot.value].name, std::sqrt(factor)));
+  note_understated_closures(map, record);
   note_inconsistent_closures(map, record);
   if (map.spare_pairs > 0)
     record.notes.push_back(

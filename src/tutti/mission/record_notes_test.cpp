@@ -88,5 +88,17 @@ TEST(Notes, OdometryThatSaysTooLittleOfItsErrors) {
   EXPECT_NE(record.notes[0].find("bravo: its odometry errs 6.0 times"), std::string::npos) << record.notes[0];
 }
 
+TEST(Notes, ClosuresThatSayTooLittleOfTheirErrors) {
+  MissionRecord record = joined();
+  record.notes.clear();
+  server::MapEstimate map;
+  map.closure_factors[{{RobotId{0}}, {RobotId{1}}}] = {1.0, 25.0};
+  note_what_the_map_lacks(map, record);
+  ASSERT_EQ(record.notes.size(), 1U);
+  EXPECT_NE(record.notes[0].find("alpha with bravo: closures err 5.0 times as much as they say in rotation and 1.0"),
+            std::string::npos)
+      << record.notes[0];
+}
+
 }  // namespace record_notes_test
 }  // namespace tutti::mission

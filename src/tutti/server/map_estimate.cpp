@@ -10,6 +10,7 @@
 #include "tutti/base/chi_square.hpp"
 #include "tutti/base/disjoint_sets.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/server/closure_honesty.hpp"
 #include "tutti/server/closure_judge.hpp"
 #include "tutti/server/odometry_honesty.hpp"
 #include "tutti/server/spare_pairs.hpp"
@@ -95,6 +96,15 @@ Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, cons
     out.certain.push_back(wish == Wish::accept);
   }
   return out;
+}
+
+/// Closures that err by more than they say now say so.
+void raise_understated(const std::vector<OdometryChain>& chains, Closures& closures, MapEstimate& map) {
+  map.closure_factors = closure_honesty(chains, closures.judged);
+  for (LoopClosure& closure : closures.judged)
+    if (const auto found = map.closure_factors.find(std::minmax(closure.from.chain, closure.to.chain));
+        found != map.closure_factors.end())
+      closure.measurement.covariance = scaled(closure.measurement.covariance, found->second);
 }
 
 /// Odometry's rotations count as much as the closures show that they are worth.
@@ -201,7 +211,9 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   const NodeIndex index = attach_submaps(submaps, map);
   const auto spare = spare_pairs(verdicts, submaps, static_cast<std::size_t>(config.most_closed_pairs));
   map.spare_pairs = spare.size();
-  const Closures closures = collect_closures(verdicts, words, submaps, index, spare);
+  Closures closures = collect_closures(verdicts, words, submaps, index, spare);
+  const std::vector<LoopClosure> stated = closures.judged;
+  if (config.judge_closures) raise_understated(odometry_chains(map.nodes, stated_steps(submaps, index)), closures, map);
   if (config.judge_odometry) {
     for (const auto& [chain, worth] :
          odometry_honesty(odometry_chains(map.nodes, stated_steps(submaps, index)), closures.judged))
@@ -216,7 +228,7 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   }
   for (const auto& [chain, worth] : honesty) map.overstated[chain] = std::min(1.0, worth.whole);
   for (std::size_t c = 0; c < closures.judged.size(); ++c)
-    map.closures.push_back({closures.judged[c], false, closures.certain[c], Objection::no_map});
+    map.closures.push_back({stated[c], false, closures.certain[c], Objection::no_map});
   map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
   if (map.converged) adopt(optimum, config.who_is_wrong.min_jump_m, map);
   for (const LoopClosure& closure : closures.rejected)

@@ -15,7 +15,7 @@
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/submap.hpp"
-#include "tutti/server/odometry_loops.hpp"
+#include "tutti/server/closure_honesty.hpp"
 
 namespace tutti::server {
 
@@ -72,6 +72,9 @@ struct MapEstimate {
   std::size_t odometry_edges = 0;               ///< graph.edges[0 .. odometry_edges) are odometry.
   std::vector<JudgedClosure> closures;          ///< Sorted by (from, to).
   std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (chain, from).
+  /// By which the variances of closures between two chains count, where they err by more than they say
+  /// (closure_honesty.hpp); `graph` has them so, `closures` as stated.
+  std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_factors;
   /// By which the variances of each chain's odometry count, in rotation (odometry_honesty.hpp); `graph` has them so.
   std::map<ChainId, double> rotation_factors;
   /// Of chains whose odometry is far worse than it says: by which all its variances count; `graph` has them so.
@@ -91,12 +94,15 @@ struct MapEstimate {
 struct MapConfig {
   estimation::WhoIsWrongConfig who_is_wrong;
   estimation::GncConfig gnc;
+  bool judge_closures = true;
   bool judge_odometry = true;
   int most_closed_pairs = 40;
   template <class V>
   void describe(V& v) {
     v.field("who_is_wrong", who_is_wrong);
     v.field("gnc", gnc);
+    v.field("judge_closures", judge_closures, any(),
+            "Closures that err by more than they say count as their neighbours show (off: as they say).");
     v.field("judge_odometry", judge_odometry, any(),
             "Odometry that turns better than it says, or is far worse, counts as the closures show (off: as it says).");
     v.field("most_closed_pairs", most_closed_pairs, at_least(1),

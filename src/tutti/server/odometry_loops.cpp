@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -53,29 +54,18 @@ class Ways {
   std::map<KeyframeId, Piece> pieces_;  // by first keyframe
 };
 
+LoopClosure turned(const LoopClosure& closure) { return {closure.to, closure.from, inverse(closure.measurement)}; }
+
 /// Closures between two chains, the end of `one` first, in its order.
 std::vector<LoopClosure> closures_with(std::span<const LoopClosure> closures, const ChainId& one,
                                        const ChainId& other) {
   std::vector<LoopClosure> out;
   for (LoopClosure closure : closures) {
-    if (closure.from.chain == other && closure.to.chain == one) {
-      closure.measurement = inverse(closure.measurement);
-      std::swap(closure.from, closure.to);
-    }
+    if (closure.from.chain == other && closure.to.chain == one) closure = turned(closure);
     if (closure.from.chain == one && closure.to.chain == other) out.push_back(closure);
   }
   std::ranges::stable_sort(out, {}, [](const LoopClosure& c) { return c.from.index; });
   return out;
-}
-
-/// One way by closure, then odometry of the second chain; the other by odometry of the first, then closure.
-OdometryLoop loop_of(const LoopClosure& first, const RelativePose& of_two, const RelativePose& of_one,
-                     const LoopClosure& second) {
-  const Matrix6d over_two = adjoint(of_two.T_a_b.inverse());
-  const Matrix6d over_second = adjoint(second.measurement.T_a_b.inverse());
-  return {.missed = local(first.measurement.T_a_b * of_two.T_a_b, of_one.T_a_b * second.measurement.T_a_b),
-          .odometry = of_two.covariance + over_second * of_one.covariance * over_second.transpose(),
-          .closures = over_two * first.measurement.covariance * over_two.transpose() + second.measurement.covariance};
 }
 
 /// As a loop of the robot whose odometry between these keyframes it goes over.
@@ -84,7 +74,48 @@ OdometryLoop over(OdometryLoop loop, const KeyframeId& a, const KeyframeId& b) {
   return loop;
 }
 
+std::uint32_t keyframes_between(const KeyframeId& a, const KeyframeId& b) {
+  return std::max(a.index, b.index) - std::min(a.index, b.index);
+}
+
 }  // namespace
+
+OdometryLoop loop_of(const ClosurePair& pair) {
+  const auto& [first, second, of_one, of_two] = pair;
+  const Matrix6d over_two = adjoint(of_two.T_a_b.inverse());
+  const Matrix6d over_second = adjoint(second.measurement.T_a_b.inverse());
+  return {.missed = local(first.measurement.T_a_b * of_two.T_a_b, of_one.T_a_b * second.measurement.T_a_b),
+          .odometry = of_two.covariance + over_second * of_one.covariance * over_second.transpose(),
+          .closures = over_two * first.measurement.covariance * over_two.transpose() + second.measurement.covariance};
+}
+
+std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
+    std::span<const OdometryChain> chains, std::span<const LoopClosure> closures) {
+  const Ways ways(chains);
+  std::map<std::pair<ChainId, ChainId>, std::vector<LoopClosure>> between;
+  for (const LoopClosure& closure : closures) {
+    const LoopClosure forth = closure.to < closure.from ? turned(closure) : closure;
+    between[{forth.from.chain, forth.to.chain}].push_back(forth);
+  }
+  std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> out;
+  for (auto& [two, all] : between) {
+    std::ranges::stable_sort(all, {}, [](const LoopClosure& c) { return std::pair(c.from, c.to); });
+    std::set<std::pair<std::size_t, std::size_t>> known;
+    for (std::size_t a = 0; a < all.size(); ++a) {
+      const auto apart = [&](std::size_t b) {
+        return std::max(keyframes_between(all[a].from, all[b].from), keyframes_between(all[a].to, all[b].to));
+      };
+      std::optional<std::size_t> nearest;
+      for (std::size_t b = 0; b < all.size(); ++b)
+        if (b != a && apart(b) > 0 && (!nearest || apart(b) < apart(*nearest))) nearest = b;
+      if (!nearest || !known.insert(std::minmax(a, *nearest)).second) continue;
+      const auto& [first, second] = std::pair(all[std::min(a, *nearest)], all[std::max(a, *nearest)]);
+      const auto of_one = ways.between(first.from, second.from), of_two = ways.between(first.to, second.to);
+      if (of_one && of_two) out[two].push_back({first, second, *of_one, *of_two});
+    }
+  }
+  return out;
+}
 
 std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
                                                             std::span<const LoopClosure> closures) {
@@ -105,7 +136,7 @@ std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const Odom
         const auto of_one = ways.between(first.from, second.from);
         const auto of_two = ways.between(first.to, second.to);
         if (!of_one || !of_two) continue;
-        const OdometryLoop loop = loop_of(first, *of_two, *of_one, second);
+        const OdometryLoop loop = loop_of({first, second, *of_one, *of_two});
         one->second.push_back(over(loop, first.from, second.from));
         two->second.push_back(over(loop, first.to, second.to));
       }

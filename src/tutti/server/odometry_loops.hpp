@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
@@ -35,5 +36,21 @@ struct OdometryLoop {
 /// are left out.
 std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
                                                             std::span<const LoopClosure> closures);
+
+/// Two closures between the same two chains, with the odometry between their ends.
+struct ClosurePair {
+  LoopClosure first;    ///< Both from the chain with the smaller id, or from the earlier keyframe.
+  LoopClosure second;   ///< Begins no earlier than `first`.
+  RelativePose of_one;  ///< Odometry from first.from to second.from,
+  RelativePose of_two;  ///< ... and from first.to to second.to.
+};
+
+/// One way by closure, then odometry of the second chain; the other by odometry of the first, then closure.
+OdometryLoop loop_of(const ClosurePair& pair);
+
+/// Of each two chains with closures (or of one with itself) every closure and the nearest other one, by the larger
+/// distance in keyframes of their two ends, without gaps in odometry between them; each pair once.
+std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
+    std::span<const OdometryChain> chains, std::span<const LoopClosure> closures);
 
 }  // namespace tutti::server
