@@ -19,20 +19,17 @@ struct Directed {
   std::size_t to = 0;
   RelativePose measurement;
   double turn_variance = 0.0;
-  std::pair<long, long> places;
 };
 
 class Agreement {
  public:
   Agreement(const OdometryWays& odometry, const WhoIsWrongConfig& config)
-      : odometry_(odometry), limit_(chi_square_quantile(config.confidence, 6)), place_m_(config.place_m) {}
+      : odometry_(odometry), limit_(chi_square_quantile(config.confidence, 6)) {}
 
   [[nodiscard]] Directed directed(const PoseGraphEdge& closure) const {
     Directed out{closure.from, closure.to, {closure.T_from_to, closure.information.llt().solve(Matrix6d::Identity())}};
     if (closure.to < closure.from) out = {closure.to, closure.from, inverse(out.measurement)};
     out.turn_variance = out.measurement.covariance.bottomRightCorner<3, 3>().trace();
-    out.places = {std::lround(std::floor(odometry_.way_m(out.from) / place_m_)),
-                  std::lround(std::floor(odometry_.way_m(out.to) / place_m_))};
     return out;
   }
 
@@ -60,7 +57,6 @@ class Agreement {
  private:
   const OdometryWays& odometry_;
   double limit_;
-  double place_m_;
 };
 
 }  // namespace
@@ -80,19 +76,12 @@ std::vector<bool> supported_closures(const OdometryWays& odometry, std::span<con
   for (const auto& [pieces, members] : by_pieces) {
     const auto count = [](const auto& of) { return static_cast<int>(of.size()); };
     if (pieces.first != pieces.second && count(members) < config.min_joining_closures) continue;
-    // Where there are too few others, or too few elsewhere, those there are must do.
-    std::map<std::pair<long, long>, int> at_places;
-    for (const std::size_t c : members) {
-      ++at_places[all[c].places];
-      support[c] += std::max(0, config.least_support - count(members) + 1);
-    }
-    const auto tells = [&](std::size_t a, std::size_t b) {
-      return all[a].places != all[b].places || count(members) - at_places[all[a].places] < config.least_support;
-    };
+    // Where there are too few others, those there are must do.
+    for (const std::size_t c : members) support[c] += std::max(0, config.least_support - count(members) + 1);
     for (std::size_t k = 0; k < members.size(); ++k)
       for (std::size_t m = k + 1; m < members.size(); ++m) {
         const std::size_t a = members[k], b = members[m];
-        if ((!is_open(a) && !is_open(b)) || !tells(a, b) || !agreement.agree(all[a], all[b])) continue;
+        if ((!is_open(a) && !is_open(b)) || !agreement.agree(all[a], all[b])) continue;
         ++support[a];
         ++support[b];
       }

@@ -50,19 +50,15 @@ std::size_t HypothesisSolver::end_of(std::size_t run) const {
   return reduced_.nodes[reduced_.graph.edges[runs_[run]].to];
 }
 
-/// Closures that look alike come by the square of the places they join, so each shares the vote of the busier of its
-/// two ends with all others there between the same two pieces.
+/// Closures that look alike come by the square of the scans they join, so each shares the vote of the busier of its two
+/// ends with all others that end there, at the same keyframe, between the same two pieces.
 void HypothesisSolver::count_votes() {
-  using End = std::tuple<std::size_t, long, std::size_t, bool>;  // piece, place, the other piece, which end
+  using End = std::tuple<std::size_t, std::size_t, bool>;  // node, the other piece, which end
   std::map<End, int> closures_at;
   const auto ends_of = [&](std::size_t edge) {
     const auto [i, j] =
         std::minmax(reduced_.nodes[reduced_.graph.edges[edge].from], reduced_.nodes[reduced_.graph.edges[edge].to]);
-    const auto place = [&](std::size_t node) {
-      return std::lround(std::floor(odometry_.way_m(node) / config_.place_m));
-    };
-    return std::pair(End{odometry_.piece(i), place(i), odometry_.piece(j), false},
-                     End{odometry_.piece(j), place(j), odometry_.piece(i), true});
+    return std::pair(End{i, odometry_.piece(j), false}, End{j, odometry_.piece(i), true});
   };
   for (const std::size_t edge : closures_) {
     const auto [i, j] = ends_of(edge);
@@ -125,7 +121,7 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const
   for (std::size_t c = 0; c < closures_.size(); ++c) out.accepted.push_back(robust.inlier_weight[closures_[c]] >= 0.5);
   for (const auto& group : out.hypothesis.wrong)
     for (const std::size_t c : group) out.accepted[c] = 0;
-  out.misfit += config_.least_places * static_cast<double>(out.hypothesis.wrong.size());
+  out.misfit += config_.least_votes * static_cast<double>(out.hypothesis.wrong.size());
   for (std::size_t c = 0; c < closures_.size(); ++c) {
     const double most = certain_[c] ? kInfinite : 1.0;
     out.misfit += votes_[c] * (out.accepted[c] ? std::min(error(closures_[c]), most) : 1.0);
@@ -161,7 +157,7 @@ void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& ou
     if (out.failed.size() == known) continue;
     double size = 0.0;
     for (std::size_t f = known; f < out.failed.size(); ++f) size += least_size(out.failed[f]);
-    out.price += size < config_.min_jump_m ? kInfinite : config_.least_places + size / config_.jump_per_place_m;
+    out.price += size < config_.min_jump_m ? kInfinite : config_.least_votes + size / config_.jump_per_vote_m;
   }
   out.misfit += out.price;
 }

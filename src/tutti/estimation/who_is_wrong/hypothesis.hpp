@@ -21,7 +21,7 @@ struct Hypothesis {
   std::vector<std::vector<std::size_t>> wrong;  ///< Groups of closures.
 };
 
-/// What a hypothesis makes of the closures. Votes: closures that end at one place share one.
+/// What a hypothesis makes of the closures. Votes: closures that end at one keyframe share one.
 struct Solution {
   Hypothesis hypothesis;
   bool solved = false;

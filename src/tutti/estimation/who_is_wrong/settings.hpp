@@ -10,9 +10,8 @@ struct WhoIsWrongConfig {
   bool let_odometry_fail = true;
   double confidence = 0.999;
   int least_support = 2;
-  double place_m = 10.0;
-  double least_places = 2.0;
-  double jump_per_place_m = 4.0;
+  double least_votes = 2.0;
+  double jump_per_vote_m = 4.0;
   double min_jump_m = 0.3;
   double search_m = 20.0;
   int candidate_groups = 3;
@@ -26,11 +25,9 @@ struct WhoIsWrongConfig {
     v.field("confidence", confidence, between(0.5, 0.999999999), "Share of pairs of true closures that should agree.");
     v.field("least_support", least_support, at_least(0),
             "A closure with which fewer others agree, and odometry neither, is not considered.");
-    v.field("place_m", place_m, greater_than(0.0),
-            "A place is this much of a robot's way. Closures that end at one place share one vote.");
-    v.field("least_places", least_places, at_least(0.0),
-            "A failed stretch must explain more places than this (and one more for every run that is let go),");
-    v.field("jump_per_place_m", jump_per_place_m, greater_than(0.0),
+    v.field("least_votes", least_votes, at_least(0.0),
+            "A failed stretch must explain more votes than this (and one more for every run that is let go),");
+    v.field("jump_per_vote_m", jump_per_vote_m, greater_than(0.0),
             "... and one more for every so many metres (0.2 rad each) that its odometry would have missed.");
     v.field("min_jump_m", min_jump_m, at_least(0.0),
             "Smaller failures are left to the optimisation. 0.2 rad count as a metre.");
@@ -38,7 +35,7 @@ struct WhoIsWrongConfig {
             "Odometry so far around a candidate may have failed, too, before the candidate must pay for itself.");
     v.field("candidate_groups", candidate_groups, at_least(0),
             "Groups of neighbouring closures, the largest, that are tried as wrong all together; each must "
-            "explain more than least_places.");
+            "explain more than least_votes.");
     v.field("most_refused_groups", most_refused_groups, at_least(0), "Groups that can be wrong all together.");
     v.field("min_joining_closures", min_joining_closures, at_least(1.0),
             "Fewer closures do not join two robots, or two pieces of one robot's odometry.");

@@ -44,7 +44,7 @@ class Search {
   Solution run(std::vector<std::vector<std::size_t>> groups) const {
     Solution best = solver_.solve({});
     // Whatever failed pays for its places and at least one run.
-    if (!best.solved || !config_.let_odometry_fail || !best.suspicious || best.unexplained < config_.least_places + 1.0)
+    if (!best.solved || !config_.let_odometry_fail || !best.suspicious || best.unexplained < config_.least_votes + 1.0)
       return best;
     if (Solution proposal = proposed(); proposal.solved && !proposal.failed.empty())
       keep_better(best, without_idle(std::move(proposal)));

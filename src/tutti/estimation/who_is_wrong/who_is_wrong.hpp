@@ -33,12 +33,12 @@ struct Explanation {
 /// Decides between closures and odometry that contradict each other (docs/math.md, "Who is wrong?"). A hypothesis says
 /// which runs of odometry (between two ends of closures) may be let go and which closures are wrong for certain; its
 /// misfit is that of the pose graph solved under it by graduated non-convexity, every closure truncated and the
-/// closures at one place sharing one vote, plus what its failed stretches must pay (settings.hpp). The hypothesis with
-/// the least misfit counts. Tried are: nothing failed; what fails when all odometry may, less whatever does not pay for
-/// itself; and the largest `groups` of closures (positions in `closures`) as wrong all together.
-/// `graph`: odometry, then closures. `certain`: per closure, or empty: none; such a closure is right whatever it
-/// strains, as somebody knows who stands above this: it is never truncated, nor tried as wrong. Does not depend on the
-/// order of the closures, but for rounding.
+/// closures at one keyframe sharing one vote, plus what its failed stretches must pay (settings.hpp). The hypothesis
+/// with the least misfit counts. Tried are: nothing failed; what fails when all odometry may, less whatever does not
+/// pay for itself; and the largest `groups` of closures (positions in `closures`) as wrong all together. `graph`:
+/// odometry, then closures. `certain`: per closure, or empty: none; such a closure is right whatever it strains, as
+/// somebody knows who stands above this: it is never truncated, nor tried as wrong. Does not depend on the order of the
+/// closures, but for rounding.
 Explanation explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
                              std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,
                              const GncConfig& gnc, const std::vector<bool>& certain = {});

@@ -170,7 +170,7 @@ TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
     EXPECT_NEAR(judged.misfit, solved.misfit, 0.01);
     EXPECT_EQ(judged.let_go, solved.let_go);
     EXPECT_EQ(judged.accepted, solved.accepted);
-    EXPECT_GT(judged.price, config.least_places);
+    EXPECT_GT(judged.price, config.least_votes);
     EXPECT_LT(judged.misfit, solver.solve({}).misfit);
   }
 }
