@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "support/bus/nats_server.hpp"
+#include "support/bus/tcp_relay.hpp"
 #include "tutti/bus/nats_child.hpp"
 
 namespace tutti::bus {
@@ -69,6 +70,27 @@ TEST_F(MissionLeases, GoToTheSuccessorOnTheSameSeatAtOnce) {
   const auto killed = open("alps", holder("/var/lib/a", 17));  // as if: it is not told
   EXPECT_TRUE(killed->wait(10.0).held);
   EXPECT_TRUE(open("alps", holder("/var/lib/a", 99))->wait(10.0).held);
+}
+
+// Half a minute, the time that a lease lasts.
+TEST_F(MissionLeases, GoToAnotherServerWhenTheFirstIsOutOfReach) {
+  const std::string url = bus_->url();
+  test::TcpRelay relay(std::stoi(url.substr(url.rfind(':') + 1)), {});
+  const auto first = MissionLease::open({.url = "nats://127.0.0.1:" + std::to_string(relay.port()), .mission = "alps"},
+                                        holder("/var/lib/a", 17))
+                         .value();
+  ASSERT_TRUE(first->wait(10.0).held);
+  const auto second = open("alps", holder("/var/lib/b", 18));
+  ASSERT_FALSE(second->wait(10.0).held);
+  relay.refuse(true);
+  const auto cut = std::chrono::steady_clock::now();
+  while (!second->state().held && std::chrono::steady_clock::now() < cut + 60s) std::this_thread::sleep_for(100ms);
+  EXPECT_TRUE(second->state().held);
+  EXPECT_GT(std::chrono::steady_clock::now() - cut, 20s);  // not at once: it may be a short cut
+  relay.refuse(false);
+  EXPECT_TRUE(comes([&] { return !first->state().held; }));
+  ASSERT_NE(first->state().server_of("alps"), nullptr);
+  EXPECT_EQ(first->state().server_of("alps")->state, "/var/lib/b");
 }
 
 TEST_F(MissionLeases, AreSeenByWhoLooks) {

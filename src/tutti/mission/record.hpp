@@ -132,9 +132,9 @@ struct RobotRecord {
   double distance_m = 0.0;  ///< Along the raw odometry, every pose replayed.
   double duration_s = 0.0;  ///< First to last odometry pose replayed.
   std::size_t odometry_factors = 0;
-  double rotation_factor = 1.0;  ///< By which the server scales its odometry's variances of rotation; 1: as stated.
-  Accuracy onboard;              ///< Raw odometry.
-  Accuracy server;               ///< This robot's part of the server's estimate, aligned alone.
+  double rotation_factor = 1.0;     ///< By which the server scales its odometry's variances of rotation; 1: as stated.
+  Accuracy onboard;                 ///< Raw odometry.
+  Accuracy server;                  ///< This robot's part of the server's estimate, aligned alone.
   std::optional<Accuracy> perfect;  ///< The same of the map that a perfect judge makes (perfect_judge.hpp).
   std::vector<PolicyRecord> policies;  ///< In the order they are to be shown.
   std::uint64_t bytes_up = 0;          ///< Encoded messages robot -> server.
