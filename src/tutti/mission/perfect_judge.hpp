@@ -12,9 +12,9 @@
 namespace tutti::mission {
 
 /// The pose graph's map of the same submaps and closures, made by a judge who knows the reference: closures that are
-/// wrong (ClosureCheckConfig) are not there, all others are right for certain, whatever they strain. No map judged
-/// without the reference is expected to be better, so a map's error over this one's is what judging costs. Closures
-/// whose ends have no reference are judged as ever. Nothing where no closure can be checked.
+/// wrong (ClosureCheckConfig) are not there, all others are right for certain, whatever they strain. A map's error over
+/// this one's is what judging costs; it is below 1 where closures that are off by less than that are better left out.
+/// Closures whose ends have no reference are judged as ever. Nothing where no closure can be checked.
 std::optional<server::MapEstimate> judge_perfectly(const server::MapServer& server, const server::MapConfig& config,
                                                    const std::vector<const MissionRecording*>& robots,
                                                    const evaluation::AssociationConfig& association,

@@ -150,10 +150,13 @@ std::string correction_lines(const RobotRecord& robot, const PolicyRecord& polic
               "  kink     ");
 }
 
+/// Less harm than this is not worth a line, m.
+constexpr double kHarm_m = 0.01;
+
 /// When correcting did more harm than good, if it ever did.
 std::string worst_lines(const RobotRecord& robot, const std::string& policy) {
   const auto worst = worst_of_policy(robot.updates, policy);
-  if (!worst || worst->rmse_m <= worst->onboard_rmse_m) return "";
+  if (!worst || worst->rmse_m - worst->onboard_rmse_m < kHarm_m) return "";
   return wrap(fmt::format("{}: corrected was worse than odometry by {} at most, at {} ({} instead of {}).", robot.name,
                           format_metres(worst->rmse_m - worst->onboard_rmse_m), format_moment(worst->time_s),
                           format_metres(worst->rmse_m), format_metres(worst->onboard_rmse_m)),
