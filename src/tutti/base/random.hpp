@@ -5,6 +5,8 @@
 #include <random>
 #include <string_view>
 
+#include "tutti/base/content_hash.hpp"
+
 namespace tutti {
 
 /// Every bit of the outcome depends on every bit of x, and no two x have the same: the finaliser of splitmix64 (Steele,
@@ -21,11 +23,7 @@ class Rng {
  public:
   explicit Rng(std::uint64_t seed) : seed_(mixed(seed)), engine_(seed_) {}
 
-  [[nodiscard]] Rng fork(std::string_view name) const {
-    std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
-    for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-    return Rng(seed_ ^ hash);
-  }
+  [[nodiscard]] Rng fork(std::string_view name) const { return Rng(seed_ ^ content_hash(name)); }
   [[nodiscard]] Rng fork(std::uint64_t number) const { return Rng(seed_ ^ mixed(number + 0x9e3779b97f4a7c15ULL)); }
 
   /// Uniform in [low, high).

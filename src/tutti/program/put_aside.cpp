@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "tutti/base/content_hash.hpp"
+
 namespace tutti::program {
 namespace {
 
@@ -13,13 +15,10 @@ constexpr std::string_view kPrefix = "aside/";
 
 }  // namespace
 
-/// FNV-1a of 64 bits; each text is followed by its length, so that no two messages are one text.
+/// Each text is followed by its length, so that no two messages are one text.
 std::string PutAside::hash_of(const bus::Envelope& message) {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
-  const auto add = [&](std::string_view text) {
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-    hash = (hash ^ text.size()) * 0x100000001b3ULL;
-  };
+  std::uint64_t hash = kEmptyHash;
+  const auto add = [&](std::string_view text) { hash = hashed_on(content_hash(text, hash), text.size()); };
   add(fmt::format("{} {} {}", static_cast<int>(message.from.role), message.from.number,
                   static_cast<int>(message.kind)));
   if (message.kind != bus::MessageKind::status) {

@@ -3,13 +3,12 @@
 
 #include <fmt/format.h>
 
+#include "tutti/base/content_hash.hpp"
+
 namespace tutti::storage::internal {
 
 std::int64_t hash_of(std::string_view key, std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
-  for (const std::string_view part : {key, bytes})
-    for (const char c : part) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-  return static_cast<std::int64_t>(hash);
+  return static_cast<std::int64_t>(content_hash(bytes, content_hash(key)));
 }
 
 std::string hex(std::string_view key) {
