@@ -19,13 +19,16 @@ std::pair<OdometryStep, OdometryStep> split(const StampedPose& from, const Odome
           {to.stamp, to.T_odom_body, (1.0 - share) * to.covariance, to.is_jump}};
 }
 
+OdometryStep joined(const OdometryStep& first, const OdometryStep& second) {
+  const Matrix6d both =
+      compound_covariance(first.T_odom_body.inverse() * second.T_odom_body, first.covariance, second.covariance);
+  return {second.stamp, second.T_odom_body, 0.5 * (both + both.transpose()), false};
+}
+
 void SensorTimeline::add(const OdometryStep& step) {
   const bool is_motion = !step.is_jump && (odometry.empty() || !odometry.back().is_jump);
   if (is_motion && odometry.size() >= 2 && step.stamp - odometry[odometry.size() - 2].stamp < kFinest_s) {
-    const OdometryStep& before = odometry.back();
-    const Matrix6d both =
-        compound_covariance(before.T_odom_body.inverse() * step.T_odom_body, before.covariance, step.covariance);
-    odometry.back() = {step.stamp, step.T_odom_body, 0.5 * (both + both.transpose()), false};
+    odometry.back() = joined(odometry.back(), step);
     return;
   }
   odometry.push_back(step);

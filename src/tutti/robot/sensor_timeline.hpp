@@ -25,6 +25,9 @@ struct OdometryStep {
   bool is_jump = false;                    ///< How the robot moved is not known (OdometryWatch).
 };
 
+/// Two steps, the second of which follows the first, as one to the end of the second; neither is a jump.
+OdometryStep joined(const OdometryStep& first, const OdometryStep& second);
+
 /// The step from `from` to `to` in two, at a moment between them: the motion straight and of constant turn, the
 /// covariance in proportion to time. Their compound is the step as it was, to rounding.
 std::pair<OdometryStep, OdometryStep> split(const StampedPose& from, const OdometryStep& to, Timestamp at);

@@ -34,10 +34,7 @@ node::OdometrySample joined(const node::OdometrySample& first, const node::Odome
   const auto usable = [](const node::OdometrySample& sample) {
     return robot::usable_step({}, sample.stamp, sample.T_odom_body, sample.increment_covariance).value();
   };
-  const robot::OdometryStep before = usable(first), after = usable(second);
-  const Matrix6d both =
-      compound_covariance(before.T_odom_body.inverse() * after.T_odom_body, before.covariance, after.covariance);
-  return {second.stamp, second.T_odom_body, 0.5 * (both + both.transpose())};
+  return {second.stamp, second.T_odom_body, robot::joined(usable(first), usable(second)).covariance};
 }
 
 }  // namespace
