@@ -213,10 +213,10 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   map.spare_pairs = spare.size();
   Closures closures = collect_closures(verdicts, words, submaps, index, spare);
   const std::vector<LoopClosure> stated = closures.judged;
-  if (config.judge_closures) raise_understated(odometry_chains(map.nodes, stated_steps(submaps, index)), closures, map);
+  const std::vector<OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
+  if (config.judge_closures) raise_understated(chains, closures, map);
   if (config.judge_odometry) {
-    for (const auto& [chain, worth] :
-         odometry_honesty(odometry_chains(map.nodes, stated_steps(submaps, index)), closures.judged))
+    for (const auto& [chain, worth] : odometry_honesty(chains, closures.judged))
       map.rotation_factors[chain] = worth.rotation;
     see_through(map);
   }

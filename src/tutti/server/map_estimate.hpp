@@ -16,6 +16,7 @@
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/server/closure_honesty.hpp"
+#include "tutti/server/odometry_loops.hpp"
 
 namespace tutti::server {
 

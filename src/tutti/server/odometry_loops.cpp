@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <set>
 #include <tuple>
@@ -78,6 +79,25 @@ std::uint32_t keyframes_between(const KeyframeId& a, const KeyframeId& b) {
   return std::max(a.index, b.index) - std::min(a.index, b.index);
 }
 
+/// The nearest other one of `all`, which are sorted by where they begin, on one chain; the first of equals. Those that
+/// begin farther away than the nearest so far are not looked at: a day has tens of thousands of closures.
+std::optional<std::size_t> nearest_to(std::size_t a, std::span<const LoopClosure> all) {
+  std::optional<std::size_t> nearest;
+  std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
+  const auto look = [&](std::size_t b) {  // false: no farther this way
+    const std::uint32_t begin = keyframes_between(all[a].from, all[b].from);
+    if (begin > least) return false;
+    const std::uint32_t apart = std::max(begin, keyframes_between(all[a].to, all[b].to));
+    if (apart == 0 || apart > least || (apart == least && nearest && b > *nearest)) return true;
+    nearest = b;
+    least = apart;
+    return true;
+  };
+  for (std::size_t b = a; b > 0 && look(b - 1);) --b;
+  for (std::size_t b = a + 1; b < all.size() && look(b);) ++b;
+  return nearest;
+}
+
 }  // namespace
 
 OdometryLoop loop_of(const ClosurePair& pair) {
@@ -102,12 +122,7 @@ std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_clo
     std::ranges::stable_sort(all, {}, [](const LoopClosure& c) { return std::pair(c.from, c.to); });
     std::set<std::pair<std::size_t, std::size_t>> known;
     for (std::size_t a = 0; a < all.size(); ++a) {
-      const auto apart = [&](std::size_t b) {
-        return std::max(keyframes_between(all[a].from, all[b].from), keyframes_between(all[a].to, all[b].to));
-      };
-      std::optional<std::size_t> nearest;
-      for (std::size_t b = 0; b < all.size(); ++b)
-        if (b != a && apart(b) > 0 && (!nearest || apart(b) < apart(*nearest))) nearest = b;
+      const auto nearest = nearest_to(a, all);
       if (!nearest || !known.insert(std::minmax(a, *nearest)).second) continue;
       const auto& [first, second] = std::pair(all[std::min(a, *nearest)], all[std::max(a, *nearest)]);
       const auto of_one = ways.between(first.from, second.from), of_two = ways.between(first.to, second.to);

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <cstdlib>
 
 #include "support/server/world.hpp"
 #include "tutti/base/random.hpp"
@@ -98,6 +100,37 @@ TEST(OdometryLoops, NotOverAGap) {
   const auto loops = odometry_loops(walk.chains, closures);
   ASSERT_EQ(loops.at(kOne).size(), 1U);
   EXPECT_NEAR(loops.at(kOne).front().odometry(5, 5), 15 * 0.002 * 0.002, 1e-9);
+}
+
+TEST(NeighbouringClosures, AreTheNearestOfAll) {
+  Rng rng(4);
+  const Walk walk(0.01, 0.002, rng);
+  for (const RobotId other : {kOne, kTwo}) {
+    std::vector<LoopClosure> closures;
+    for (int k = 0; k < 60; ++k) {
+      const auto a = static_cast<std::uint32_t>(rng.index(30)), b = 30 + static_cast<std::uint32_t>(rng.index(30));
+      closures.push_back(walk.closure({kOne, a}, {other, b}, 0.02, 0.01, rng));
+    }
+    const auto apart = [](const LoopClosure& a, const LoopClosure& b) {
+      const auto away = [](KeyframeId one, KeyframeId two) { return std::abs(int(one.index) - int(two.index)); };
+      return std::max(away(a.from, b.from), away(a.to, b.to));
+    };
+    const auto pairs = neighbouring_closures(walk.chains, closures).at({kOne, other});
+    EXPECT_LT(pairs.size(), closures.size());  // each pair once
+    const auto has = [&](const LoopClosure& closure, int least) {
+      return std::ranges::any_of(pairs, [&](const ClosurePair& pair) {
+        const bool is_of = (pair.first.from == closure.from && pair.first.to == closure.to) ||
+                           (pair.second.from == closure.from && pair.second.to == closure.to);
+        return is_of && apart(pair.first, pair.second) == least;
+      });
+    };
+    for (const LoopClosure& closure : closures) {
+      int least = kKeyframes;
+      for (const LoopClosure& of : closures)
+        if (const int away = apart(closure, of); away > 0) least = std::min(least, away);
+      EXPECT_TRUE(has(closure, least));
+    }
+  }
 }
 
 TEST(OdometryLoops, EveryRobotIsThere) {
