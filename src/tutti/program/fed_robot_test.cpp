@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "support/program/full_disk.hpp"
 #include "support/robot/drifting_robot.hpp"
-#include "tutti/storage/memory_store.hpp"
 
 namespace tutti::program {
 namespace fed_robot_test {
@@ -26,28 +26,6 @@ Scan scan(std::size_t i) {
   for (int k = 0; k < 50; ++k) cloud.points.emplace_back(5.0F, static_cast<float>(k), static_cast<float>(i));
   return {kOdometry[i].stamp, std::make_shared<const PointCloud>(std::move(cloud)), {}};
 }
-
-/// On a disk that may be full.
-class Disk final : public storage::TableStore {
- public:
-  Status commit(std::span<const storage::Write> writes) override {
-    if (full) return fail(ErrorCode::io, "disk full");
-    return rows_.commit(writes);
-  }
-  [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override {
-    return rows_.read(table, key);
-  }
-  [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override {
-    return rows_.scan(table, from, visit);
-  }
-  [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override {
-    return rows_.sizes(table, visit);
-  }
-  bool full = false;
-
- private:
-  storage::MemoryStore rows_{storage::robot_schema()};
-};
 
 class NoPort final : public bus::Port {
  public:
@@ -141,7 +119,7 @@ class FedRobotTest : public testing::Test {
   Clock clock_{1.0, 0.0, [this] { return wall_s_; }};
   std::unique_ptr<EventLog> log_ = EventLog::on_console("test", Level::error);
   mission::MissionRecording recording_;
-  Disk disk_;
+  test::FullDisk disk_{storage::robot_schema()};
   std::unique_ptr<FeedFront> front_;
   std::unique_ptr<Host> host_;
 };

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/node/submaps.hpp"
+#include "support/program/full_disk.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 
@@ -21,28 +22,16 @@ using bus::MessageKind;
 /// What happened, in order, as all of the parts below tell it.
 using Diary = std::vector<std::string>;
 
-class DiaryStore final : public storage::TableStore {
+class DiaryStore final : public test::FullDisk {
  public:
-  explicit DiaryStore(Diary& diary) : diary_(diary), rows_({"test", 1, {"rows", "meta"}}) {}
+  explicit DiaryStore(Diary& diary) : FullDisk({"test", 1, {"rows", "meta"}}), diary_(diary) {}
   Status commit(std::span<const storage::Write> writes) override {
-    if (full) return fail(ErrorCode::io, "disk full");
-    diary_.push_back("commit " + std::to_string(writes.size()));
-    return rows_.commit(writes);
+    if (!full) diary_.push_back("commit " + std::to_string(writes.size()));
+    return FullDisk::commit(writes);
   }
-  [[nodiscard]] Result<std::optional<std::string>> read(std::string_view table, std::string_view key) const override {
-    return rows_.read(table, key);
-  }
-  [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override {
-    return rows_.scan(table, from, visit);
-  }
-  [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override {
-    return rows_.sizes(table, visit);
-  }
-  bool full = false;
 
  private:
   Diary& diary_;
-  storage::MemoryStore rows_;
 };
 
 /// What has come and is not acknowledged, whatever ports come and go.
