@@ -9,6 +9,7 @@
 
 #include "support/shared_data.hpp"
 #include "tutti/mission/runner.hpp"
+#include "tutti/mission/worst_moment.hpp"
 
 namespace tutti::mission {
 namespace real_missions_test {
@@ -110,6 +111,23 @@ TEST(RealMissions, EurocFlightsAgreeWithTheJointMap) {
     EXPECT_LT(*robot.server.rmse_m, *robot.onboard.rmse_m);
     EXPECT_LT(*corrected(record, robot).accuracy.rmse_m, 1.1 * *robot.server.rmse_m + 0.02);
   }
+}
+
+/// Three parts of one flight with a camera, adjusted apart at first: a dozen closures are asked for before two of them
+/// are one map. When they join, neither map nor robots leave the room.
+TEST(RealMissions, PartsThatJoinLateAreNeverFarOff) {
+  TUTTI_REQUIRE_SHARED("data/euroc/V1_01");
+  MissionConfig config = mission_file("euroc_v101_rovio");
+  config.server.map.who_is_wrong.min_joining_closures = 12;
+  config.duration_s = 45.0;
+  const MissionRecord record = run(config, 1);
+  EXPECT_EQ(record.server.components, 1U);
+  EXPECT_TRUE(record.server.refinement.has_value());
+  for (const RobotRecord& robot : record.robots)
+    for (const auto& worst : {worst_of_server(robot.updates), worst_of_policy(robot.updates, record.default_policy)}) {
+      ASSERT_TRUE(worst.has_value());
+      EXPECT_LT(worst->rmse_m, worst->onboard_rmse_m + 0.05) << robot.name << " at " << worst->time_s << " s";
+    }
 }
 
 /// Flights of other people's odometry through one room; closures from the truth, one in ten wrong.

@@ -112,7 +112,7 @@ Result<Content> read(const storage::TableStore& map) {
 
 server::MapEstimate estimate(const Content& content) {
   return server::refined(server::estimate_map(content.submaps, content.verdicts, content.settings.map, content.words),
-                         content.refinements);
+                         content.submaps, content.refinements);
 }
 
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {

@@ -340,7 +340,7 @@ void MapServer::plan_refinement(bool settle) {
 ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
   if (!estimate_) estimate_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
-  map_ = refined(*estimate_, state_.refinements);
+  map_ = refined(*estimate_, state_.submaps, state_.refinements);
   plan_refinement(false);
   if (refiner_ == nullptr) estimate_.reset();  // nobody asks for it
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},

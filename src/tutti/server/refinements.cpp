@@ -44,13 +44,37 @@ void put_steps(const Refinements& refinements, MapEstimate& map) {
   }
 }
 
-void put_closures(const Refinements& refinements, MapEstimate& map) {
+/// Of the keyframes that closures join: the submaps that have them, two where they are shared.
+std::map<KeyframeId, std::vector<SubmapId>> submaps_of_closures(const MapEstimate& map, const SubmapSet& submaps) {
+  std::map<KeyframeId, std::vector<SubmapId>> out;
+  for (std::size_t e = map.odometry_edges; e < map.graph.edges.size(); ++e)
+    for (const std::size_t node : {map.graph.edges[e].from, map.graph.edges[e].to}) out[map.nodes[node].id];
+  for (const auto& [id, submap] : submaps) {
+    const KeyframeId last{id.chain, submap->keyframes.back().index};
+    for (auto it = out.lower_bound({id.chain, submap->keyframes.front().index}); it != out.end() && it->first <= last;
+         ++it)
+      it->second.push_back(id);
+  }
+  return out;
+}
+
+bool ties(const Refinement& refinement, const std::vector<SubmapId>& some, const std::vector<SubmapId>& others) {
+  return std::ranges::any_of(some, [&](const SubmapId& a) {
+    return std::ranges::any_of(others, [&](const SubmapId& b) {
+      return std::ranges::binary_search(refinement.closed, a < b ? SubmapPair{a, b} : SubmapPair{b, a});
+    });
+  });
+}
+
+void put_closures(const Refinements& refinements, const SubmapSet& submaps, MapEstimate& map) {
+  const auto submaps_with = submaps_of_closures(map, submaps);
   for (std::size_t e = map.odometry_edges; e < map.graph.edges.size(); ++e) {
     PoseGraphEdge& edge = map.graph.edges[e];
+    const KeyframeId a = map.nodes[edge.from].id, b = map.nodes[edge.to].id;
     for (const auto& [revision, refinement] : std::views::reverse(refinements.all())) {
-      const auto& poses = refinement->T_world_body;
-      const auto from = poses.find(map.nodes[edge.from].id), to = poses.find(map.nodes[edge.to].id);
-      if (from == poses.end() || to == poses.end()) continue;
+      const auto from = refinement->T_world_body.find(a), to = refinement->T_world_body.find(b);
+      if (from == refinement->T_world_body.end() || to == refinement->T_world_body.end()) continue;
+      if (!ties(*refinement, submaps_with.at(a), submaps_with.at(b))) continue;
       edge.T_from_to = from->second.inverse() * to->second;
       break;
     }
@@ -132,12 +156,12 @@ RefinementScope Refinements::scope() const {
 
 std::size_t Refinements::parts() const { return all_.size() - (has_whole() ? 1 : 0); }
 
-MapEstimate refined(const MapEstimate& map, const Refinements& refinements) {
+MapEstimate refined(const MapEstimate& map, const SubmapSet& submaps, const Refinements& refinements) {
   if (refinements.all().empty() || !map.converged) return map;
   MapEstimate out = map;
   put_steps(refinements, out);
   if (out.odometry_of_steps.empty()) return map;
-  put_closures(refinements, out);
+  put_closures(refinements, submaps, out);
   auto solution = estimation::solve_pose_graph(out.graph, {.initialisation = "given"});
   if (!estimation::is_usable(solution.summary.termination)) return map;
   out.graph.poses = std::move(solution.poses);

@@ -39,10 +39,12 @@ class Refinements {
 };
 
 /// The map with the refined steps, of each the newest, in the place of its odometry's, solved again from where it
-/// stands. Its closures stay as sure as they were, but say what the newest refinement with both their ends says: a
-/// chain of steps is looser than all of the refinement, and would be drawn back to where the closures had it before.
-/// Odometry that failed is no step's place. The map as it was when that cannot be solved.
-MapEstimate refined(const MapEstimate& map, const Refinements& refinements);
+/// stands. Its closures stay as sure as they were, but say what the newest refinement that they tied their submaps in
+/// says: a chain of steps is looser than all of the refinement, and would be drawn back to where the closures had it
+/// before. A closure that a refinement did not know says what it measured: what that refinement has between its ends
+/// may be two maps in unrelated frames. Odometry that failed is no step's place. The map as it was when that cannot be
+/// solved.
+MapEstimate refined(const MapEstimate& map, const SubmapSet& submaps, const Refinements& refinements);
 
 /// The submaps that the refiner can use and that are in the map, and the pairs of them with accepted closures.
 RefinementScope refinable(const MapEstimate& map, const SubmapSet& submaps,

@@ -35,6 +35,18 @@ double error_at_the_end(const MapEstimate& map, RobotId robot) {
   return local(truth, first->T_world_body.inverse() * last->T_world_body).norm();
 }
 
+/// By how much the map misses what its closures measured.
+double worst_closure_m(const MapEstimate& map) {
+  double worst_m = 0.0;
+  for (const JudgedClosure& judged : map.closures) {
+    if (!judged.accepted) continue;
+    const Pose3 in_map =
+        find_node(map, judged.closure.from)->T_world_body.inverse() * find_node(map, judged.closure.to)->T_world_body;
+    worst_m = std::max(worst_m, local(judged.closure.measurement.T_a_b, in_map).head<3>().norm());
+  }
+  return worst_m;
+}
+
 Refinements only(Refinement refinement) {
   Refinements out;
   out.add(std::move(refinement));
@@ -52,7 +64,7 @@ SubmapSet one_robot() {
 TEST(Refinements, StepsTakeThePlaceOfOdometry) {
   const MapEstimate map = estimate_map(one_robot(), {}, {});
   ASSERT_GT(error_at_the_end(map, RobotId{0}), 0.05);
-  const MapEstimate better = refined(map, only(true_steps(map)));
+  const MapEstimate better = refined(map, one_robot(), only(true_steps(map)));
   EXPECT_LT(error_at_the_end(better, RobotId{0}), 1e-6);
   EXPECT_EQ(better.odometry_of_steps.size(), map.odometry_edges);
   for (const auto& [edge, covariance] : better.odometry_of_steps)
@@ -62,9 +74,9 @@ TEST(Refinements, StepsTakeThePlaceOfOdometry) {
 
 TEST(Refinements, WithoutStepsOrForOtherKeyframesTheMapIsAsItWas) {
   const MapEstimate map = estimate_map(one_robot(), {}, {});
-  EXPECT_EQ(error_at_the_end(refined(map, {}), RobotId{0}), error_at_the_end(map, RobotId{0}));
+  EXPECT_EQ(error_at_the_end(refined(map, one_robot(), {}), RobotId{0}), error_at_the_end(map, RobotId{0}));
   const RefinedStep other{.from = {RobotId{5}, 3}, .measurement = {}};
-  EXPECT_TRUE(refined(map, only({other})).odometry_of_steps.empty());
+  EXPECT_TRUE(refined(map, one_robot(), only({other})).odometry_of_steps.empty());
 }
 
 TEST(Refinements, ClosuresSayWhatTheRefinedKeyframesSay) {
@@ -78,18 +90,20 @@ TEST(Refinements, ClosuresSayWhatTheRefinedKeyframesSay) {
   const MapEstimate map = estimate_map(submaps, verdicts, {});
   ASSERT_GT(map.graph.edges.size(), map.odometry_edges);
   Refinement truth{.steps = true_steps(map)};
-  const double off = error_at_the_end(refined(map, only(truth)), RobotId{0});  // drawn away by the closures
+  const double off = error_at_the_end(refined(map, submaps, only(truth)), RobotId{0});  // drawn away by the closures
   const Pose3 T_world_truth = map.nodes[0].T_world_body * test::true_pose(RobotId{0}, 0).inverse();
   for (const MapNode& node : map.nodes)
     truth.T_world_body[node.id] = T_world_truth * test::true_pose(node.id.chain.robot, node.id.index);
   EXPECT_GT(off, 1e-4);
-  EXPECT_LT(error_at_the_end(refined(map, only(truth)), RobotId{0}), 1e-6);
+  EXPECT_GT(error_at_the_end(refined(map, submaps, only(truth)), RobotId{0}), 1e-4);  // these it does not know
+  for (const auto& [pair, verdict] : verdicts) truth.closed.push_back(pair);
+  EXPECT_LT(error_at_the_end(refined(map, submaps, only(truth)), RobotId{0}), 1e-6);
 }
 
 TEST(Refinements, OdometryThatFailedIsNoStepsPlace) {
   MapEstimate map = estimate_map(one_robot(), {}, {});
   map.failed_odometry.push_back({RobotId{0}, 20, 23, 1.0, 0.1});
-  EXPECT_EQ(refined(map, only(true_steps(map))).odometry_of_steps.size(), map.odometry_edges - 3);
+  EXPECT_EQ(refined(map, one_robot(), only(true_steps(map))).odometry_of_steps.size(), map.odometry_edges - 3);
 }
 
 /// A server that is fed one submap after the other of two robots; every job is answered by an oracle.
@@ -111,8 +125,10 @@ class RefinedServer {
   }
   void take(const SubmapMessage& message) {
     ASSERT_TRUE(server_.receive(message).has_value());
-    for (const VerificationJob& job : server_.take_jobs())
-      ASSERT_TRUE(server_.receive(*finder_->verify(*job.first, *job.second, *payloads_)).has_value());
+    for (const VerificationJob& job : server_.take_jobs()) answer(job);
+  }
+  void answer(const VerificationJob& job) {
+    ASSERT_TRUE(server_.receive(*finder_->verify(*job.first, *job.second, *payloads_)).has_value());
   }
   std::optional<RefinementJob> update() {
     server_.optimise();
@@ -246,6 +262,31 @@ TEST(Refinements, InAnyOrderTheyEndInOneMap) {
     for (std::size_t k = 0; k < map.nodes.size(); ++k)
       ASSERT_EQ(map.nodes[k].T_world_body, expected.nodes[k].T_world_body) << "seed " << seed;
   }
+}
+
+/// A refinement of two maps that nothing joined has them in unrelated frames. The closures that join them then say
+/// what they measured, until a refinement knows them.
+TEST(Refinements, WhatItHadInUnrelatedFramesTiesNothing) {
+  RefinedServer server(5);
+  std::vector<VerificationJob> between;
+  for (const SubmapMessage& message : RefinedServer::messages()) {
+    ASSERT_TRUE(server->receive(message).has_value());
+    for (VerificationJob& pair : server->take_jobs())
+      if (pair.pair.first.chain != pair.pair.second.chain)
+        between.push_back(std::move(pair));
+      else
+        server.answer(pair);
+  }
+  const auto job = server.update();
+  ASSERT_TRUE(job.has_value() && server->map().components == 2U);
+  Refinement refinement = server.answer(*job);  // the oracle knows where the two are; nothing tells a real one
+  for (auto& [id, T_world_body] : refinement.T_world_body)
+    if (id.chain.robot == RobotId{1}) T_world_body = Pose3{Eigen::Quaterniond(0, 0, 1, 0), {3, 4, 5}} * T_world_body;
+  ASSERT_TRUE(server->receive(refinement).has_value());
+  for (const VerificationJob& pair : between) server.answer(pair);
+  ASSERT_TRUE(server.update().has_value());
+  ASSERT_EQ(server->map().components, 1U);
+  EXPECT_LT(worst_closure_m(server->map()), 0.1);
 }
 
 TEST(Refinements, WhatIsGivenUpIsAskedForWhenSomethingNewHasCome) {
