@@ -9,11 +9,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -21,81 +18,15 @@
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/perception/visual/frontend/describe_image.hpp"
-#include "tutti/perception/visual/hamming.hpp"
 #include "tutti/perception/visual/verify.hpp"
 #include "tutti/perception/visual/visual_payload.hpp"
+#include "visnav_images.hpp"
 
 namespace {
 
 using namespace tutti;
 using namespace tutti::visual;
-
-const std::string kFolder = TUTTI_SHARED_DIR "/data/images/euroc_V1_01_visnav/";
-
-template <class T>
-T value(Result<T> result) {
-  if (result) return std::move(*result);
-  fmt::print(stderr, "{}\n", result.error().message);
-  std::exit(1);
-}
-
-std::vector<Camera> read_cameras() {
-  const auto json = nlohmann::json::parse(std::ifstream(kFolder + "calibration.json")).at("value0");
-  std::vector<Camera> out;
-  for (std::size_t c = 0; c < 2; ++c) {
-    const auto number = [&](const char* list, const char* name) { return json.at(list).at(c).at(name).get<double>(); };
-    const auto intrinsic = [&](const char* name) { return number("cam.intrinsics", name); };
-    const auto pose = [&](const char* name) { return number("cam.T_i_c", name); };
-    const CameraModel model{.kind = CameraKind::double_sphere,
-                            .width_px = static_cast<int>(intrinsic("width")),
-                            .height_px = static_cast<int>(intrinsic("height")),
-                            .fx = intrinsic("fx"),
-                            .fy = intrinsic("fy"),
-                            .cx = intrinsic("cx"),
-                            .cy = intrinsic("cy"),
-                            .distortion = {intrinsic("p1"), intrinsic("p2"), 0.0, 0.0}};
-    const Eigen::Quaterniond rotation(pose("qw"), pose("qx"), pose("qy"), pose("qz"));
-    out.push_back({model, {rotation.normalized(), {pose("px"), pose("py"), pose("pz")}}});
-  }
-  return out;
-}
-
-struct Listed {
-  Timestamp stamp;
-  std::string left, right;
-};
-
-std::vector<std::vector<std::string>> read_csv(const std::string& path) {
-  std::ifstream in(path);
-  std::vector<std::vector<std::string>> out;
-  for (std::string line; std::getline(in, line);) {
-    if (line.empty() || line[0] == '#') continue;
-    std::vector<std::string> row;
-    std::stringstream cells(line);
-    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
-    out.push_back(std::move(row));
-  }
-  return out;
-}
-
-/// Keypoints of both images that are each other's nearest get the same track; what does not meet in a point is not
-/// triangulated.
-void match_stereo(TrackedImage& left, TrackedImage& right) {
-  std::vector<TwoNearest> forth, back;
-  std::vector<std::uint16_t> distances(right.descriptors.size());
-  for (std::size_t i = 0; i < left.descriptors.size(); ++i) {
-    hamming_distances(left.descriptors.row(i), right.descriptors, distances);
-    forth.push_back(two_nearest(distances));
-  }
-  distances.resize(left.descriptors.size());
-  for (std::size_t i = 0; i < right.descriptors.size(); ++i) {
-    hamming_distances(right.descriptors.row(i), left.descriptors, distances);
-    back.push_back(two_nearest(distances));
-  }
-  for (std::uint32_t i = 0; i < forth.size(); ++i)
-    if (forth[i].nearest != kNoIndex && back[forth[i].nearest].nearest == i)
-      left.keypoints[i].track = right.keypoints[forth[i].nearest].track = i + 1;
-}
+using namespace tutti::visual::bench;
 
 Submap describe(std::uint32_t index, const Listed& listed, const std::vector<Camera>& cameras,
                 const DescriptorConfig& config) {

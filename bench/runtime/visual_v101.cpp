@@ -137,6 +137,7 @@ struct Tally {
   std::size_t pairs = 0, closed_pairs = 0, closures = 0, wrong = 0;
   std::vector<double> errors_m, errors_deg, chi2_position, chi2_rotation, sigma_m;
   std::set<KeyframeId> closed;
+  VerificationWork work;
 };
 
 void count(const LoopClosure& closure, const Truth& truth, Tally& tally) {
@@ -167,12 +168,15 @@ void report(const Tally& t, const Truth& truth, std::uint64_t seed, double secon
   fmt::print(
       "seed {}: {} pairs, {} closed, {} closures, {} wrong; {} of {} revisiting keyframes closed ({:.0f} %); error "
       "median {:.3f} m {:.2f} deg, 90 % {:.3f} m {:.2f} deg; sigma median {:.4f} m; chi2 of 3 (2.37, 6.25 expected): "
-      "position median {:.1f}, 90 % {:.1f}, rotation median {:.1f}, 90 % {:.1f}; {:.0f} ms of CPU a pair\n",
+      "position median {:.1f}, 90 % {:.1f}, rotation median {:.1f}, 90 % {:.1f}; {:.0f} ms of CPU a pair; of {} "
+      "keyframes {} looked at "
+      "closely, {:.0f} million distances, {} samples\n",
       seed, t.pairs, t.closed_pairs, t.closures, t.wrong, closed, truth.revisiting.size(),
       100.0 * static_cast<double>(closed) / static_cast<double>(truth.revisiting.size()), quantile(t.errors_m, 0.5),
       quantile(t.errors_deg, 0.5), quantile(t.errors_m, 0.9), quantile(t.errors_deg, 0.9), quantile(t.sigma_m, 0.5),
       quantile(t.chi2_position, 0.5), quantile(t.chi2_position, 0.9), quantile(t.chi2_rotation, 0.5),
-      quantile(t.chi2_rotation, 0.9), 1e3 * seconds / static_cast<double>(t.pairs));
+      quantile(t.chi2_rotation, 0.9), 1e3 * seconds / static_cast<double>(t.pairs), t.work.keyframes, t.work.looked_at,
+      1e-6 * static_cast<double>(t.work.distances), t.work.samples);
 }
 
 void run(const std::string& name, const std::vector<std::vector<int>>& robots, int seeds, const Settings& settings) {
@@ -193,7 +197,7 @@ void run(const std::string& name, const std::vector<std::vector<int>>& robots, i
     Tally tally;
     const std::clock_t start = std::clock();
     for (const auto& [a, b] : candidates(submaps, config)) {
-      const auto verdict = verify_pair(features.at(a->id), features.at(b->id), config);
+      const auto verdict = verify_pair(features.at(a->id), features.at(b->id), config, &tally.work);
       ++tally.pairs;
       tally.closed_pairs += !verdict.closures.empty();
       for (const LoopClosure& closure : verdict.closures) count(closure, truth, tally);

@@ -152,15 +152,21 @@ double samples_needed(double inlier_share, double confidence) {
 }
 
 std::optional<Pose3> ransac(std::span<const Sighting> sightings, const std::vector<Camera>& cameras,
-                            const Problem& problem, const AbsolutePoseConfig& config, Rng& rng) {
+                            const Problem& problem, const AbsolutePoseConfig& config, Rng& rng,
+                            std::size_t least_inliers, std::size_t* samples) {
   const auto prepared = prepare(sightings, cameras);
   const double most = config.max_reprojection_px * config.max_reprojection_px;
   std::optional<Pose3> best;
   double best_score = most * static_cast<double>(sightings.size());
-  double needed = config.max_samples;
+  const auto needed_for = [&](std::size_t inliers) {
+    const double share = std::min(1.0, static_cast<double>(inliers) / static_cast<double>(sightings.size()));
+    return std::min<double>(config.max_samples, samples_needed(share, config.confidence));
+  };
+  double needed = needed_for(std::max(least_inliers, kLeastInliers));
   for (int i = 0; i < needed; ++i) {
     const auto sample = draw(prepared, rng);
     if (!sample) return std::nullopt;
+    if (samples != nullptr) ++*samples;
     const Prepared& its = prepared[sample->camera];
     std::array<Eigen::Vector3d, 3> directions, points;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -174,9 +180,7 @@ std::optional<Pose3> ransac(std::span<const Sighting> sightings, const std::vect
       if (score >= best_score) continue;
       best_score = score;
       best = T_map_body;
-      const double share =
-          static_cast<double>(problem.inliers(T_map_body, most).size()) / static_cast<double>(sightings.size());
-      needed = std::min<double>(config.max_samples, samples_needed(share, config.confidence));
+      needed = std::min(needed, needed_for(problem.inliers(T_map_body, most).size()));
     }
   }
   return best;
@@ -185,10 +189,11 @@ std::optional<Pose3> ransac(std::span<const Sighting> sightings, const std::vect
 }  // namespace
 
 std::optional<AbsolutePose> absolute_pose(std::span<const Sighting> sightings, const std::vector<Camera>& cameras,
-                                          const AbsolutePoseConfig& config, Rng rng) {
+                                          const AbsolutePoseConfig& config, Rng rng, std::size_t least_inliers,
+                                          std::size_t* samples) {
   if (sightings.size() < kLeastInliers) return std::nullopt;
   const Problem problem(sightings, cameras);
-  const auto start = ransac(sightings, cameras, problem, config, rng);
+  const auto start = ransac(sightings, cameras, problem, config, rng, least_inliers, samples);
   if (!start) return std::nullopt;
   const double most = config.max_reprojection_px * config.max_reprojection_px;
   AbsolutePose out{.T_map_body = *start, .inliers = problem.inliers(*start, most)};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -45,8 +46,11 @@ struct AbsolutePose {
 
 /// Where the body is: P3P on three sightings of one camera in RANSAC, scored over the sightings of all cameras by the
 /// truncated squared error (Torr and Zisserman, MSAC, 2000), then Gauss-Newton on the inliers with Cauchy's loss.
-/// Nothing when fewer than four sightings agree. Camera indices are of `cameras`.
+/// Nothing when fewer than four sightings agree; where fewer than `least_inliers` do, the search may end without them.
+/// Camera indices are of `cameras`. The samples drawn are added to
+/// `samples`, if asked for.
 std::optional<AbsolutePose> absolute_pose(std::span<const Sighting> sightings, const std::vector<Camera>& cameras,
-                                          const AbsolutePoseConfig& config, Rng rng);
+                                          const AbsolutePoseConfig& config, Rng rng, std::size_t least_inliers = 4,
+                                          std::size_t* samples = nullptr);
 
 }  // namespace tutti::visual

@@ -43,6 +43,34 @@ template <std::uint32_t Words>
   }
 }
 
+template <std::uint32_t Words>
+[[gnu::always_inline]] inline void near_rows(const std::uint64_t* query, const Descriptors& rows, std::uint32_t most,
+                                             std::vector<NearRow>& out) {
+  const std::uint32_t n = Words == 0 ? rows.words : Words;
+  const std::uint64_t* row = rows.bits.data();
+  const auto size = static_cast<std::uint32_t>(rows.size());
+  for (std::uint32_t i = 0; i < size; ++i, row += n) {
+    std::uint32_t bits = 0;
+    for (std::uint32_t w = 0; w < n; ++w) bits += static_cast<std::uint32_t>(std::popcount(query[w] ^ row[w]));
+    if (bits <= most) [[unlikely]]
+      out.push_back({i, bits});
+  }
+}
+
+[[gnu::always_inline]] inline void all_near_rows(const std::uint64_t* query, const Descriptors& rows,
+                                                 std::uint32_t most, std::vector<NearRow>& out) {
+  switch (rows.words) {
+    case 4:
+      return near_rows<4>(query, rows, most, out);
+    case 6:
+      return near_rows<6>(query, rows, most, out);
+    case 8:
+      return near_rows<8>(query, rows, most, out);
+    default:
+      return near_rows<0>(query, rows, most, out);
+  }
+}
+
 [[gnu::always_inline]] inline std::uint32_t distance_to_nearest(std::span<const std::uint64_t> query,
                                                                 const Descriptors& rows,
                                                                 std::span<const std::uint32_t> which) {
@@ -63,6 +91,10 @@ template <std::uint32_t Words>
 [[gnu::target("popcnt")]] void with_popcnt(const std::uint64_t* query, const Descriptors& rows,
                                            std::span<std::uint16_t> out) {
   distances_to_all(query, rows, out);
+}
+[[gnu::target("popcnt")]] void with_popcnt(const std::uint64_t* query, const Descriptors& rows, std::uint32_t most,
+                                           std::vector<NearRow>& out) {
+  all_near_rows(query, rows, most, out);
 }
 bool has_popcnt() {
   static const bool has = __builtin_cpu_supports("popcnt") != 0;
@@ -98,6 +130,16 @@ void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& 
   if (has_popcnt()) return with_popcnt(query.data(), rows, distances);
 #endif
   distances_to_all(query.data(), rows, distances);
+}
+
+void rows_within(std::span<const std::uint64_t> query, const Descriptors& rows, std::uint32_t most,
+                 std::vector<NearRow>& out) {
+  TUTTI_CHECK(query.size() == rows.words || rows.size() == 0, "{} words against rows of {}", query.size(), rows.words);
+  out.clear();
+#ifdef __x86_64__
+  if (has_popcnt()) return with_popcnt(query.data(), rows, most, out);
+#endif
+  all_near_rows(query.data(), rows, most, out);
 }
 
 TwoNearest two_nearest(std::span<const std::uint16_t> distances, std::span<const std::uint32_t> groups) {

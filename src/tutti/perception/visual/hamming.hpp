@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "tutti/model/visual.hpp"
 
@@ -21,6 +22,16 @@ inline constexpr std::uint32_t kNoDistance = 0xFFFF;  ///< More than any descrip
 /// The least of these over rows by their index, which exist; kNoDistance of none.
 std::uint32_t least_distance(std::span<const std::uint64_t> query, const Descriptors& rows,
                              std::span<const std::uint32_t> which);
+
+/// A row and its distance.
+struct NearRow {
+  std::uint32_t row = 0;
+  std::uint32_t distance = 0;
+};
+
+/// The rows within `most` bits of the query, by their index, in place of what is in `out`.
+void rows_within(std::span<const std::uint64_t> query, const Descriptors& rows, std::uint32_t most,
+                 std::vector<NearRow>& out);
 
 /// The two rows nearest to a descriptor; of equal ones those of smaller index.
 struct TwoNearest {

@@ -30,6 +30,16 @@ RC_GTEST_PROP(Hamming, countsTheBitsThatDiffer, ()) {
     RC_ASSERT(distances[i] == expected);
     RC_ASSERT(hamming_distance(query.row(0), rows.row(i)) == expected);
   }
+  const auto most = *rc::gen::inRange<std::uint32_t>(0, 64 * words);
+  std::vector<NearRow> near;
+  rows_within(query.row(0), rows, most, near);
+  auto next = near.begin();
+  for (std::uint32_t i = 0; i < rows.size(); ++i) {
+    if (distances[i] > most) continue;
+    RC_ASSERT(next != near.end() && next->row == i && next->distance == distances[i]);
+    ++next;
+  }
+  RC_ASSERT(next == near.end());
   const auto which = *rc::gen::container<std::vector<std::uint32_t>>(rc::gen::inRange(0U, 20U));
   std::uint32_t least = kNoDistance;
   for (const std::uint32_t i : which) least = std::min<std::uint32_t>(least, distances[i]);

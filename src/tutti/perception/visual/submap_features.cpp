@@ -69,6 +69,7 @@ void map_points(const VisualPayload& payload, const Places& places, SubmapFeatur
 std::vector<std::uint32_t> describe_landmarks(const VisualPayload& payload, SubmapFeatures& out) {
   std::vector<std::uint32_t> row_of(payload.landmarks.size(), kNoIndex);
   Descriptors& rows = out.landmark_descriptors;
+  out.rows_of_landmark.resize(payload.landmarks.size());
   rows = {.kind = payload.descriptors.kind, .words = payload.descriptors.words};
   for (const VisualFrame& frame : payload.frames)
     for (const Observation& o : frame.observations) {
@@ -76,6 +77,7 @@ std::vector<std::uint32_t> describe_landmarks(const VisualPayload& payload, Subm
       if (row_of[o.landmark] == kNoIndex) row_of[o.landmark] = o.descriptor;
       const auto row = payload.descriptors.row(o.descriptor);
       rows.bits.insert(rows.bits.end(), row.begin(), row.end());
+      out.rows_of_landmark[o.landmark].push_back(static_cast<std::uint32_t>(out.landmark_of_row.size()));
       out.landmark_of_row.push_back(o.landmark);
     }
   return row_of;
@@ -143,6 +145,7 @@ std::size_t bytes_of(const SubmapFeatures& features) {
                     bytes(features.descriptors.bits) + bytes(features.landmark_descriptors.bits) +
                     bytes(features.keys) + bytes(features.landmark_of_row) + features.tables.bytes() +
                     bytes(features.keyframes);
+  for (const auto& rows : features.rows_of_landmark) out += sizeof(rows) + bytes(rows);
   for (const QueryKeyframe& keyframe : features.keyframes) {
     out += bytes(keyframe.frames) + bytes(keyframe.landmarks);
     for (const QueryFrame& frame : keyframe.frames) out += bytes(frame.observations);

@@ -41,12 +41,13 @@ struct SubmapFeatures {
   SubmapId id;
   std::optional<Refusal> refusal;  ///< Why it cannot be compared with any other; then the rest is not to be used.
   std::vector<Camera> cameras;
-  std::vector<MappedPoint> points;             ///< By landmark.
-  Descriptors descriptors;                     ///< Of the payload.
-  std::vector<TableKeys> keys;                 ///< Of its rows.
-  Descriptors landmark_descriptors;            ///< Those of landmarks alone.
-  std::vector<std::uint32_t> landmark_of_row;  ///< Of landmark_descriptors.
-  DescriptorTables tables;                     ///< Of landmark_descriptors.
+  std::vector<MappedPoint> points;                           ///< By landmark.
+  Descriptors descriptors;                                   ///< Of the payload.
+  std::vector<TableKeys> keys;                               ///< Of its rows.
+  Descriptors landmark_descriptors;                          ///< Those of landmarks alone.
+  std::vector<std::uint32_t> landmark_of_row;                ///< Of landmark_descriptors.
+  std::vector<std::vector<std::uint32_t>> rows_of_landmark;  ///< The inverse.
+  DescriptorTables tables;                                   ///< Of landmark_descriptors.
   std::vector<QueryKeyframe> keyframes;
   StretchCovariance odometry;  ///< Between Submap::keyframes.
   double residual_px = 0.0;    ///< RMS of the landmarks in the submap's own images.

@@ -18,6 +18,8 @@
 namespace tutti::visual {
 namespace {
 
+constexpr int kTogether = 3;  // landmarks that look familiar, by one keyframe: with fewer there is no place
+
 using Evidence = std::vector<Refusal>;
 
 /// A keyframe among another submap's landmarks.
@@ -32,17 +34,30 @@ struct SeenMap {
   std::vector<std::uint32_t> landmarks;  ///< Of each sighting.
 };
 
-SeenMap look_up(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
-                const VisualClosureConfig& config) {
+/// `matches` of each image of the keyframe.
+SeenMap seen_by(const QueryKeyframe& keyframe, const std::vector<std::vector<Match>>& matches,
+                const SubmapFeatures& map) {
   SeenMap out;
-  for (const QueryFrame& image : keyframe.frames)
-    for (const Match& m : match(image, query.descriptors, map, config)) {
+  for (std::size_t f = 0; f < matches.size(); ++f) {
+    const QueryFrame& image = keyframe.frames[f];
+    for (const Match& m : matches[f]) {
       const Observation& o = image.observations[m.observation];
       const MappedPoint& point = map.points[m.landmark];
       out.sightings.push_back({image.camera, o.pixel.cast<double>(), o.sigma_px, point.position, point.covariance_m2});
       out.landmarks.push_back(m.landmark);
     }
+  }
   return out;
+}
+
+SeenMap look_up(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
+                const VisualClosureConfig& config, VerificationWork& work) {
+  std::vector<std::vector<Match>> matches;
+  for (const QueryFrame& image : keyframe.frames) {
+    matches.push_back(match(image, query.descriptors, map, config));
+    work.distances += image.observations.size() * map.landmark_descriptors.size();
+  }
+  return seen_by(keyframe, matches, map);
 }
 
 /// Area of the box around the inliers over that of the image, of the camera where it is largest.
@@ -107,23 +122,44 @@ LoopClosure closure_to(const QueryKeyframe& to, const SubmapFeatures& query, con
            pose.covariance + odometry_share(map, counts, from, pose.T_map_body)}};
 }
 
+/// Votes first: is it worth to compare a keyframe with all of the map? If not, how many landmarks of it looked
+/// familiar, as far as that was asked: fewer than config.min_matches. Each question costs more than the one before and
+/// is asked of what that left; what is asked for leaves room for the matches that votes() does not see.
+std::optional<double> why_not_look(const QueryKeyframe& keyframe, const SubmapFeatures& query,
+                                   const SubmapFeatures& map, const VisualClosureConfig& config, const Rng& rng,
+                                   VerificationWork& work) {
+  const int near_enough = (config.min_matches + 1) / 2;
+  if (const int near = count_near(keyframe, query, map, config, near_enough); near < near_enough) return near;
+  const Votes voted = votes(keyframe, query, map, config);
+  work.distances += voted.distances;
+  if (voted.landmarks < (3 * config.min_matches) / 4 || voted.together < kTogether)
+    return std::min(voted.landmarks, voted.together);
+  const auto agreeing = static_cast<std::size_t>(config.min_matches / 2 + 1);
+  const auto pose = absolute_pose(seen_by(keyframe, voted.matches, map).sightings, query.cameras, config.pose, rng,
+                                  agreeing, &work.samples);
+  const std::size_t agree = pose ? pose->inliers.size() : 0;
+  return agree < agreeing ? std::optional(static_cast<double>(agree)) : std::nullopt;
+}
+
 /// Where a keyframe of `query` is in `map`; the closure is from a keyframe of the map to it.
 Localised localise(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
-                   const VisualClosureConfig& config, Rng rng) {
+                   const VisualClosureConfig& config, Rng rng, VerificationWork& work) {
   using enum RefusalReason;
   Localised out;
   const auto missed = [&](RefusalReason reason, double value, double limit) {
     out.gates.push_back({reason, value, limit});
     return misses(out.gates.back());
   };
-  const int enough = (config.min_matches + 1) / 2;  // to look closely: a first look misses some
-  if (const int near = count_near(keyframe, query, map, config, enough); near < enough) {
-    out.gates.push_back({too_few_matches, static_cast<double>(near), static_cast<double>(config.min_matches)});
+  ++work.keyframes;
+  if (const auto familiar = why_not_look(keyframe, query, map, config, rng, work)) {
+    out.gates.push_back({too_few_matches, *familiar, static_cast<double>(config.min_matches)});
     return out;
   }
-  const SeenMap seen = look_up(keyframe, query, map, config);
+  ++work.looked_at;
+  const SeenMap seen = look_up(keyframe, query, map, config, work);
   if (missed(too_few_matches, static_cast<double>(seen.sightings.size()), config.min_matches)) return out;
-  const auto pose = absolute_pose(seen.sightings, query.cameras, config.pose, rng);
+  const auto pose = absolute_pose(seen.sightings, query.cameras, config.pose, rng,
+                                  static_cast<std::size_t>(config.min_matches), &work.samples);
   if (missed(too_few_inliers, pose ? static_cast<double>(pose->inliers.size()) : 0.0, config.min_matches)) return out;
   if (missed(position_sigma, largest_sigma(pose->covariance.topLeftCorner<3, 3>()), config.max_position_sigma_m))
     return out;
@@ -165,6 +201,14 @@ std::optional<Refusal> why_not_comparable(const SubmapFeatures& a, const SubmapF
 
 }  // namespace
 
+VerificationWork& VerificationWork::operator+=(const VerificationWork& other) {
+  keyframes += other.keyframes;
+  looked_at += other.looked_at;
+  distances += other.distances;
+  samples += other.samples;
+  return *this;
+}
+
 bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_submap_gap,
                   const VisualClosureConfig& config) {
   if (first.id.chain == second.id.chain && second.id.index - first.id.index < min_submap_gap) return false;
@@ -173,9 +217,10 @@ bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_s
   return config.min_time_apart_s <= 0.0 || apart_s >= config.min_time_apart_s;
 }
 
-ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const VisualClosureConfig& config) {
+ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const VisualClosureConfig& config,
+                           VerificationWork* work) {
   TUTTI_CHECK(a.id != b.id, "submap {} against itself", to_string(a.id));
-  if (b.id < a.id) return verify_pair(b, a, config);
+  if (b.id < a.id) return verify_pair(b, a, config, work);
   ClosureVerdict verdict{.pair = {a.id, b.id}};
   verdict.refusal = why_not_comparable(a, b);
   if (verdict.refusal) return verdict;
@@ -183,9 +228,10 @@ ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, con
   const Rng rng = Rng(config.ransac_seed).fork(packed(a.id.chain, a.id.index)).fork(packed(b.id.chain, b.id.index));
   std::map<std::pair<KeyframeId, KeyframeId>, LoopClosure> closures;
   Evidence farthest{{RefusalReason::too_few_matches, 0.0, static_cast<double>(config.min_matches)}};
+  VerificationWork counted;
   const auto look_for = [&](const SubmapFeatures& query, const SubmapFeatures& map, bool forwards) {
     for (const QueryKeyframe& keyframe : query.keyframes) {
-      auto found = localise(keyframe, query, map, config, rng.fork(packed(query.id.chain, keyframe.index)));
+      auto found = localise(keyframe, query, map, config, rng.fork(packed(query.id.chain, keyframe.index)), counted);
       if (!found.closure) {
         if (progress(found.gates) > progress(farthest)) farthest = std::move(found.gates);
         continue;
@@ -198,6 +244,7 @@ ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, con
   };
   look_for(b, a, true);
   look_for(a, b, false);
+  if (work != nullptr) *work += counted;
   for (const auto& [ends, closure] : closures) verdict.closures.push_back(closure);
   if (closures.empty()) verdict.refusal = farthest.back();
   return verdict;

@@ -122,6 +122,46 @@ TEST(VerifyVisualPair, theFirstLookMissesNoKeyframeThatMatches) {
   for (const QueryKeyframe& keyframe : elsewhere.keyframes) EXPECT_EQ(count(elsewhere, keyframe), 0);
 }
 
+/// As corners of real windows and shelves are: each looks like many others.
+std::vector<RoomPoint> of_few_words(std::vector<RoomPoint> room) {
+  constexpr std::size_t kVocabulary = 150;
+  constexpr double kFlips = 0.08;
+  Rng rng(7);
+  std::vector<Bits> words;
+  for (std::size_t i = 0; i < kVocabulary; ++i) words.push_back(random_bits(rng));
+  for (RoomPoint& point : room) {
+    point.descriptor = words[rng.index(kVocabulary)];
+    for (std::uint64_t& word : point.descriptor)
+      for (unsigned bit = 0; bit < 64; ++bit) word ^= std::uint64_t{rng.bernoulli(kFlips)} << bit;
+  }
+  return room;
+}
+
+TEST(VerifyVisualPair, votesRefuseAPlaceOfTheSameWordsForLessThanHalfOfTheWork) {
+  const auto room = of_few_words(kRoom), other = of_few_words(textured_room(700, Rng(2)));
+  const auto map = extract_features(see(kA, kFlightA, room), kConfig);
+  const auto here = extract_features(see(kB, kFlightB, room), kConfig),
+             elsewhere = extract_features(see(kB, kFlightB, other), kConfig);
+  VerificationWork seen_again, nothing;
+  EXPECT_GE(verify_pair(map, here, kConfig, &seen_again).closures.size(), 8U);
+  EXPECT_GE(seen_again.looked_at, 8U);
+  std::size_t looks_alike = 0, all_distances = 0;
+  const auto add = [&](const SubmapFeatures& query, const SubmapFeatures& of) {
+    for (const QueryKeyframe& keyframe : query.keyframes) {
+      looks_alike += count_near(keyframe, query, of, kConfig, 4) == 4;
+      for (const QueryFrame& image : keyframe.frames)
+        all_distances += image.observations.size() * of.landmark_descriptors.size();
+    }
+  };
+  add(elsewhere, map);
+  add(map, elsewhere);
+  EXPECT_TRUE(verify_pair(map, elsewhere, kConfig, &nothing).closures.empty());
+  EXPECT_EQ(nothing.keyframes, map.keyframes.size() + elsewhere.keyframes.size());
+  EXPECT_EQ(looks_alike, nothing.keyframes);  // so that a first look alone refuses none
+  EXPECT_EQ(nothing.looked_at, 0U);
+  EXPECT_LT(nothing.distances, all_distances / 2);
+}
+
 TEST(VerifyVisualPair, anotherRoomIsRefused) {
   EXPECT_EQ(reason(verify(see(kA, kFlightA), see(kB, kFlightB, textured_room(700, Rng(2))))),
             RefusalReason::too_few_matches);
