@@ -25,7 +25,7 @@ using Eigen::MatrixXd;
 
 /// A scale with fewer waves than these is left out: the rigid motion has taken most of it away.
 constexpr double kLeastWaves = 2.0;
-constexpr Index kProbes = 32;
+constexpr Index kProbes = 48;
 /// Closures know a direction far better than odometry does below this ratio of variances.
 constexpr double kKnownFarBetter = 0.25;
 constexpr Index kMostDirections = 4;
@@ -63,25 +63,20 @@ double whole(const MatrixXd& samples) {
   return std::sqrt(3.0 * samples.squaredNorm() / static_cast<double>(samples.size()));
 }
 
-/// Per block of nodes, the sigma of the wavelet coefficients of one kind at one scale: n x (3 samples). `rounding`:
-/// that of what is sent, at this scale.
-std::vector<double> sigmas(const Eigen::Ref<const MatrixXd>& samples, double rounding) {
+/// Per block of nodes, the sigma of the wavelet coefficients of one kind at one scale, from so many samples' products
+/// (spectral::WaveletFilter::scatter). `rounding`: that of what is sent, at this scale.
+std::vector<double> sigmas(const MatrixXd& products, double samples, double rounding) {
   const double rounding_squared = rounding * rounding;
-  const auto used = static_cast<double>(samples.cols() / 3);
-  MatrixXd products = MatrixXd::Zero(samples.rows(), 6);
-  for (Index k = 0; k < samples.cols(); k += 3)
-    for (Index i = 0, c = 0; i < 3; ++i)
-      for (Index j = 0; j <= i; ++j, ++c) products.col(c) += samples.col(k + i).cwiseProduct(samples.col(k + j));
-  std::vector<double> out(ChainUncertainty::blocks(static_cast<std::size_t>(samples.rows())), 0.0);
-  for (Index n = 0; n < samples.rows(); ++n) {
+  std::vector<double> out(ChainUncertainty::blocks(static_cast<std::size_t>(products.rows())), 0.0);
+  for (Index n = 0; n < products.rows(); ++n) {
     Eigen::Matrix3d S;
     S << products(n, 0), products(n, 1), products(n, 3), products(n, 1), products(n, 2), products(n, 4), products(n, 3),
         products(n, 4), products(n, 5);
     double& block = out[static_cast<std::size_t>(n) / ChainUncertainty::kBlock];
     const double mean = S.trace() / 3.0, apart = std::max(0.0, S.squaredNorm() / 3.0 - mean * mean);
-    const double most = (mean + std::sqrt(2.0 * apart)) / used;  // no eigenvalue is larger (Samuelson 1968)
+    const double most = (mean + std::sqrt(2.0 * apart)) / samples;  // no eigenvalue is larger (Samuelson 1968)
     if ((1.0 + 1e-7) * (most + rounding_squared) <= block * block) continue;
-    block = std::max(block, std::sqrt(std::pow(internal::worst_sigma(S, used), 2) + rounding_squared));
+    block = std::max(block, std::sqrt(std::pow(internal::worst_sigma(S, samples), 2) + rounding_squared));
   }
   return out;
 }
@@ -93,29 +88,24 @@ std::vector<double> waves(const spectral::WaveletFilter& filter, Index nodes) {
   MatrixXd z(nodes, kProbes);
   for (double& value : z.reshaped()) value = rng.bernoulli(0.5) ? 1.0 : -1.0;
   z.rowwise() -= Eigen::RowVectorXd(z.colwise().mean());
-  const MatrixXd W = filter(z);
   std::vector<double> out;
-  for (int s = 0; s < filter.bank().scales(); ++s)
-    out.push_back(W.middleCols(s * kProbes, kProbes).squaredNorm() / static_cast<double>(kProbes));
+  for (const MatrixXd& products : filter.scatter(z))
+    out.push_back((products.col(0) + products.col(2) + products.col(5)).sum() / static_cast<double>(kProbes));
   return out;
 }
 
 std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, const Errors& samples) {
   const spectral::WaveletFilter filter(laplacian, internal::kScales);
   const std::vector<double> held = waves(filter, laplacian.rows());
-  const Errors W{filter(samples.position_m), filter(samples.rotation_rad)};
-  const Index columns = samples.position_m.cols();
+  const auto position_m = filter.scatter(samples.position_m), rotation_rad = filter.scatter(samples.rotation_rad);
+  const double count = static_cast<double>(samples.position_m.cols()) / 3.0;
   std::vector<ScaleUncertainty> out(internal::kScales);
-  for (Index s = 0; s < internal::kScales; ++s) {
-    ScaleUncertainty& scale = out[static_cast<std::size_t>(s)];
-    if (held[static_cast<std::size_t>(s)] < kLeastWaves) continue;
-    const double share = std::sqrt(held[static_cast<std::size_t>(s)] / static_cast<double>(laplacian.rows()));
-    const auto of = [&](const MatrixXd Errors::*kind, double rounding) {
-      return sigmas((W.*kind).middleCols(s * columns, columns), share * rounding);
-    };
-    const std::vector<double> metres = of(&Errors::position_m, internal::kRounding.position_m);
-    const std::vector<double> radians = of(&Errors::rotation_rad, internal::kRounding.rotation_rad);
-    for (std::size_t b = 0; b < metres.size(); ++b) scale.sigma.push_back({metres[b], radians[b]});
+  for (std::size_t s = 0; s < out.size(); ++s) {
+    if (held[s] < kLeastWaves) continue;
+    const double share = std::sqrt(held[s] / static_cast<double>(laplacian.rows()));
+    const std::vector<double> metres = sigmas(position_m[s], count, share * internal::kRounding.position_m);
+    const std::vector<double> radians = sigmas(rotation_rad[s], count, share * internal::kRounding.rotation_rad);
+    for (std::size_t b = 0; b < metres.size(); ++b) out[s].sigma.push_back({metres[b], radians[b]});
   }
   return out;
 }

@@ -2,6 +2,7 @@
 #include "tutti/spectral/wavelet_transform.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <map>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/spectral/internal/column_slabs.hpp"
 #include "tutti/spectral/internal/row_blocks.hpp"
 
 namespace tutti::spectral {
@@ -189,6 +191,64 @@ const Expansion& unit_expansion(int scales) {
 
 }  // namespace
 
+namespace {
+
+using internal::ColumnSlabs;
+using Slab = ColumnSlabs::Slab;
+using Slabs = std::vector<Slab>;
+
+/// Signals of the nodes, at most as many as there are lanes.
+Slab slab_of(const ColumnSlabs& slabs, const Eigen::Ref<const Eigen::MatrixXd>& signals) {
+  Slab out(slabs.size(), 0.0F);
+  for (Index lane = 0; lane < signals.cols(); ++lane)
+    for (std::size_t place = 0; place < slabs.nodes().size(); ++place)
+      out[place * ColumnSlabs::kLanes + static_cast<std::size_t>(lane)] =
+          static_cast<float>(signals(slabs.nodes()[place], lane));
+  return out;
+}
+
+/// g_s(0) f.
+void add_unfiltered(const MeyerFilterBank& bank, const ColumnSlabs& slabs, const Eigen::MatrixXd& signals, Slabs& out) {
+  const Slab slab = slab_of(slabs, signals);
+  for (std::size_t s = 0; s < out.size(); ++s)
+    if (const auto gain = static_cast<float>(bank.kernel(static_cast<int>(s), 0.0)); gain != 0.0F)
+      for (std::size_t k = 0; k < slab.size(); ++k) out[s][k] += gain * slab[k];
+}
+
+/// As the function of this name above, of all lanes at once.
+void add_filtered(const ColumnSlabs& slabs, double domain, const Expansion& expansion, std::span<const Index> degrees,
+                  const Eigen::MatrixXd& smoothed, Slabs& out) {
+  Slab current = slab_of(slabs, smoothed), previous(slabs.size(), 0.0F);
+  for (std::size_t s = 0; s < out.size(); ++s) {
+    const auto weight = static_cast<float>(expansion.coefficient(0, static_cast<Index>(s)));
+    for (std::size_t k = 0; k < current.size(); ++k) out[s][k] += weight * current[k];
+  }
+  auto active = degrees.size();
+  for (Index k = 1; k <= degrees.front(); ++k) {
+    while (degrees[active - 1] < k) --active;
+    const double half = k == 1 ? 0.5 : 1.0;  // T_1 = X T_0, then T_{k+1} = 2 X T_k - T_{k-1}
+    const std::span weights(&expansion.coefficient(k, 0), active);
+    slabs.step(static_cast<float>(half * 4.0 / domain), static_cast<float>(half * -2.0), current, previous, weights,
+               out);
+    std::swap(current, previous);
+  }
+}
+
+void add_products(const std::vector<int>& nodes, const Slab& x, const Slab& y, const Slab& z, Eigen::MatrixXd& out) {
+  for (std::size_t place = 0; place < nodes.size(); ++place) {
+    const auto of = [&](const Slab& slab) {
+      return Eigen::Map<const Eigen::ArrayXf>(slab.data() + place * ColumnSlabs::kLanes, ColumnSlabs::kLanes)
+          .cast<double>();
+    };
+    const auto X = of(x), Y = of(y), Z = of(z);
+    Eigen::Matrix<double, 1, 6> products;
+    products << (X * X).sum(), (X * Y).sum(), (Y * Y).sum(), (X * Z).sum(), (Y * Z).sum(), (Z * Z).sum();
+    out.row(nodes[place]) += products;
+  }
+}
+
+}  // namespace
+
 struct WaveletFilter::Prepared {
   SparseMatrix laplacian;
   Layout layout;
@@ -226,6 +286,30 @@ Eigen::MatrixXd WaveletFilter::operator()(const Eigen::Ref<const Eigen::MatrixXd
   if (degrees.empty()) return out;
   const Eigen::MatrixXd smoothed = laplacian * signals / layout.domain;
   for (Index c = 0; c < signals.cols(); ++c) add_filtered(layout, *expansion, degrees, smoothed, c, out);
+  return out;
+}
+
+std::vector<Eigen::MatrixXd> WaveletFilter::scatter(const Eigen::Ref<const Eigen::MatrixXd>& samples) const {
+  const auto& [laplacian, layout, bank, expansion, degrees] = *prepared_;
+  TUTTI_CHECK(samples.rows() == laplacian.rows() && samples.cols() % 3 == 0, "{} signals of {} nodes, graph of {}",
+              samples.cols(), samples.rows(), laplacian.rows());
+  std::vector<Eigen::MatrixXd> out(static_cast<std::size_t>(bank.scales()), Eigen::MatrixXd::Zero(samples.rows(), 6));
+  const internal::ColumnSlabs slabs(laplacian);
+  constexpr auto kLanes = static_cast<Index>(internal::ColumnSlabs::kLanes);
+  std::array<Slabs, 3> of_axis;
+  for (Index first = 0; first < samples.cols() / 3; first += kLanes) {
+    const Index lanes = std::min(kLanes, samples.cols() / 3 - first);
+    for (Index axis = 0; axis < 3; ++axis) {
+      const Eigen::MatrixXd signals = samples(Eigen::all, Eigen::seqN(3 * first + axis, lanes, 3));
+      Slabs& filtered = of_axis[static_cast<std::size_t>(axis)];
+      filtered.assign(static_cast<std::size_t>(bank.scales()), Slab(slabs.size(), 0.0F));
+      add_unfiltered(bank, slabs, signals, filtered);
+      if (!degrees.empty())
+        add_filtered(slabs, layout.domain, *expansion, degrees, laplacian * signals / layout.domain, filtered);
+    }
+    for (std::size_t s = 0; s < out.size(); ++s)
+      add_products(slabs.nodes(), of_axis[0][s], of_axis[1][s], of_axis[2][s], out[s]);
+  }
   return out;
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <vector>
 
 #include "tutti/spectral/graph.hpp"
 #include "tutti/spectral/meyer.hpp"
@@ -51,6 +52,9 @@ class WaveletFilter {
   [[nodiscard]] int degree() const;  ///< Products with the Laplacian per signal.
   /// nodes x d -> nodes x (scales * d), ordered as above.
   [[nodiscard]] Eigen::MatrixXd operator()(const Eigen::Ref<const Eigen::MatrixXd>& signals) const;
+  /// Of many samples of a vector at every node, three signals each, in single precision: per scale nodes x 6, the sums
+  /// over the samples of the products of their coefficients: xx, xy, yy, xz, yz, zz.
+  [[nodiscard]] std::vector<Eigen::MatrixXd> scatter(const Eigen::Ref<const Eigen::MatrixXd>& samples) const;
 
  private:
   struct Prepared;

@@ -201,6 +201,27 @@ TEST(WaveletFilter, IsOneLinearMapWhateverTheSignal) {
     EXPECT_LT((mixed.col(s) - 2.0 * W.col(3 * s) + 1e-5 * W.col(3 * s + 1)).norm(), 1e-11 * f.norm());
 }
 
+// Twenty samples: more than are filtered at a time, and not a multiple of that.
+TEST(WaveletFilter, ScatterIsThatOfTheCoefficients) {
+  Rng rng(12);
+  const SparseMatrix L = laplacian(proximity_adjacency(testing::tunnel(150, 1.0, Rng(5)), 7.0, 1.0));
+  const WaveletFilter filter(L, 4);
+  const MatrixXd samples = random_signals(150, 60, rng);
+  const MatrixXd W = filter(samples);
+  const std::vector<MatrixXd> scatter = filter.scatter(samples);
+  ASSERT_EQ(scatter.size(), 4U);
+  for (int s = 0; s < 4; ++s) {
+    MatrixXd expected = MatrixXd::Zero(150, 6);
+    for (int k = 60 * s; k < 60 * (s + 1); k += 3)
+      for (int i = 0, c = 0; i < 3; ++i)
+        for (int j = 0; j <= i; ++j, ++c) expected.col(c) += W.col(k + i).cwiseProduct(W.col(k + j));
+    EXPECT_LT((scatter[static_cast<std::size_t>(s)] - expected).norm(), 1e-5 * expected.norm()) << s;
+  }
+  const WaveletFilter none(SparseMatrix(0, 0), 3);
+  EXPECT_EQ(none.scatter(MatrixXd(0, 6)).size(), 3U);
+  EXPECT_THROW((void)filter.scatter(MatrixXd(150, 4)), std::logic_error);
+}
+
 TEST(WaveletFilter, SmallestGraphs) {
   EXPECT_EQ(WaveletFilter(SparseMatrix(0, 0), 3)(MatrixXd(0, 2)).cols(), 6);
   const WaveletFilter one(testing::laplacian_of(1, {}), 3);
