@@ -115,16 +115,25 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
                                           std::span<const std::size_t> candidates, std::size_t count,
                                           double least_distance) {
   TUTTI_CHECK(poses.size() == graph.poses.size(), "{} poses, {} nodes", poses.size(), graph.poses.size());
-  const BlockStructure structure = internal::analyse_blocks(graph);
-  internal::GraphEquations equations(graph, structure);
-  equations.linearise(poses, {}, true);
-  if (candidates.empty() || count == 0 || structure.variables == 0 || !equations.hessian().factorise()) return {};
+  if (candidates.empty() || count == 0) return {};
+  std::vector<EdgeRole> roles(graph.edges.size(), EdgeRole::trusted);
+  for (const std::size_t e : candidates) {
+    TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
+    roles[e] = EdgeRole::robust;
+  }
+  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles, {}, poses);
+  std::vector<Pose3> at;
+  for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
+  const BlockStructure structure = internal::analyse_blocks(reduced.graph);
+  internal::GraphEquations equations(reduced.graph, structure);
+  equations.linearise(at, {}, true);
+  if (structure.variables == 0 || !equations.hessian().factorise()) return {};
   std::vector<Pull> pulls;
   {  // the inverse is as large as the factor, and goes before the shifts come
     const SelectedInverse inverse(equations.hessian().factor());
     for (const std::size_t e : candidates) {
-      TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
-      Pull pull = pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, structure.edges[e]));
+      const EdgeSlot& slot = structure.edges[*reduced.edge[e]];
+      Pull pull = pull_of(e, graph.edges[e], poses, covariance_of_ends(inverse, slot));
       if (pull.distance > least_distance) pulls.push_back(std::move(pull));
     }
   }
@@ -134,23 +143,21 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
 
   Eigen::MatrixXd shifts = Eigen::MatrixXd::Zero(6 * structure.variables, static_cast<Eigen::Index>(pulls.size()));
   for (std::size_t k = 0; k < pulls.size(); ++k) {
-    const EdgeSlot& slot = structure.edges[pulls[k].edge];
+    const EdgeSlot& slot = structure.edges[*reduced.edge[pulls[k].edge]];
     auto column = shifts.col(static_cast<Eigen::Index>(k));
     if (slot.from >= 0) column.segment<6>(6 * slot.from) = pulls[k].force.head<6>();
     if (slot.to >= 0) column.segment<6>(6 * slot.to) = pulls[k].force.tail<6>();
   }
   equations.hessian().solve(shifts);
 
+  Eigen::MatrixXd moves = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(6 * reduced.nodes.size()), shifts.cols());
+  for (std::size_t node = 0; node < reduced.nodes.size(); ++node)
+    if (const int v = structure.variable[node]; v >= 0)
+      moves.middleRows<6>(static_cast<Eigen::Index>(6 * node)) = shifts.middleRows<6>(6 * v);
+  moves = internal::expand_moves(graph, reduced, poses, moves);
   std::vector<Influence> out;
-  for (std::size_t k = 0; k < pulls.size(); ++k) {
-    Influence influence{pulls[k].edge, pulls[k].distance,
-                        Eigen::VectorXd::Zero(static_cast<Eigen::Index>(6 * poses.size()))};
-    for (std::size_t node = 0; node < poses.size(); ++node)
-      if (const int v = structure.variable[node]; v >= 0)
-        influence.shift.segment<6>(static_cast<Eigen::Index>(6 * node)) =
-            shifts.col(static_cast<Eigen::Index>(k)).segment<6>(6 * v);
-    out.push_back(std::move(influence));
-  }
+  for (std::size_t k = 0; k < pulls.size(); ++k)
+    out.push_back({pulls[k].edge, pulls[k].distance, moves.col(static_cast<Eigen::Index>(k))});
   return out;
 }
 

@@ -131,19 +131,40 @@ bool BlockCholesky::pivots_are_sound() const {
 }
 
 BlockCholesky::Columns BlockCholesky::factor() {
-  auto& c = *cholmod_;
   Columns out{.start = {0}, .row = {}, .value = {}};
-  cholmod_factor* copy = c.factor != nullptr ? cholmod_copy_factor(c.factor, &c.common) : nullptr;
-  if (copy != nullptr && cholmod_change_factor(CHOLMOD_REAL, /*to_ll=*/1, /*to_super=*/0, /*to_packed=*/1,
-                                               /*to_monotonic=*/1, copy, &c.common) != 0) {
-    const auto* start = static_cast<const int*>(copy->p);
-    const auto* row = static_cast<const int*>(copy->i);
-    const auto* value = static_cast<const double*>(copy->x);
-    out.start.assign(start, start + copy->n + 1);
-    out.row.assign(row, row + out.start.back());
-    out.value.assign(value, value + out.start.back());
+  const cholmod_factor* factor = cholmod_->factor;
+  if (factor == nullptr || factor->xtype != CHOLMOD_REAL || factor->minor < factor->n) return out;
+  const auto* value = static_cast<const double*>(factor->x);
+  if (factor->is_super == 0) {
+    const auto* start = static_cast<const int*>(factor->p);
+    const auto* row = static_cast<const int*>(factor->i);
+    const auto* count = static_cast<const int*>(factor->nz);
+    for (std::size_t j = 0; j < factor->n; ++j) {
+      out.row.insert(out.row.end(), row + start[j], row + start[j] + count[j]);
+      out.value.insert(out.value.end(), value + start[j], value + start[j] + count[j]);
+      out.start.push_back(static_cast<int>(out.row.size()));
+    }
+    return out;
   }
-  if (copy != nullptr) cholmod_free_factor(&copy, &c.common);
+  // A supernode is a dense panel, its rows in order, of which the first are its own columns.
+  const auto* super = static_cast<const int*>(factor->super);
+  const auto* rows = static_cast<const int*>(factor->s);
+  const auto* row_start = static_cast<const int*>(factor->pi);
+  const auto* value_start = static_cast<const int*>(factor->px);
+  const auto from_diagonal = [&](auto&& take) {
+    for (std::size_t k = 0; k < factor->nsuper; ++k) {
+      const int height = row_start[k + 1] - row_start[k];
+      for (int c = 0; c < super[k + 1] - super[k]; ++c)
+        take(rows + row_start[k] + c, value + value_start[k] + static_cast<std::ptrdiff_t>(c) * height + c, height - c);
+    }
+  };
+  from_diagonal([&](const int*, const double*, int count) { out.start.push_back(out.start.back() + count); });
+  out.row.reserve(static_cast<std::size_t>(out.start.back()));
+  out.value.reserve(static_cast<std::size_t>(out.start.back()));
+  from_diagonal([&](const int* row, const double* values, int count) {
+    out.row.insert(out.row.end(), row, row + count);
+    out.value.insert(out.value.end(), values, values + count);
+  });
   return out;
 }
 

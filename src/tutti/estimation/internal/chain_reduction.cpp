@@ -40,10 +40,17 @@ RelativePose step_of(const PoseGraphEdge& edge) {
   return {edge.T_from_to, edge.information.llt().solve(Matrix6d::Identity())};
 }
 
+/// Poses of the nodes of a run of these steps.
+std::vector<Pose3> poses_of(const PoseGraph& graph, std::span<const std::size_t> steps, std::span<const Pose3> all) {
+  std::vector<Pose3> out{all[graph.edges[steps.front()].from]};
+  for (const std::size_t e : steps) out.push_back(all[graph.edges[e].to]);
+  return out;
+}
+
 }  // namespace
 
-ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles,
-                           std::span<const std::size_t> fixed) {
+ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles, std::span<const std::size_t> fixed,
+                           std::span<const Pose3> about) {
   std::vector<Passage> nodes = passages(graph, roles);
   for (const std::size_t i : fixed) nodes[i].other = true;
   ReducedGraph out;
@@ -72,7 +79,8 @@ ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> rol
       run.steps.push_back(nodes[end].out);
       steps.push_back(step_of(graph.edges[run.steps.back()]));
     }
-    out.graph.edges.push_back(as_edge(sum_odometry(steps), position[edge.from], position[end]));
+    const RunSum sum = about.empty() ? sum_odometry(steps) : sum_about(steps, poses_of(graph, run.steps, about));
+    out.graph.edges.push_back(as_edge(sum, position[edge.from], position[end]));
     out.roles.push_back(EdgeRole::trusted);
     out.runs.push_back(std::move(run));
   }
@@ -93,6 +101,26 @@ void expand_chains(const PoseGraph& graph, const ReducedGraph& reduced, std::spa
     distribute_odometry(steps, compound, run_poses);
     for (std::size_t k = 1; k < steps.size(); ++k) poses[graph.edges[run.steps[k]].from] = run_poses[k];
   }
+}
+
+Eigen::MatrixXd expand_moves(const PoseGraph& graph, const ReducedGraph& reduced, std::span<const Pose3> about,
+                             const Eigen::MatrixXd& reduced_moves) {
+  const auto row = [](std::size_t node) { return static_cast<Eigen::Index>(6 * node); };
+  Eigen::MatrixXd out(row(graph.poses.size()), reduced_moves.cols());
+  for (std::size_t k = 0; k < reduced.nodes.size(); ++k)
+    out.middleRows<6>(row(reduced.nodes[k])) = reduced_moves.middleRows<6>(row(k));
+  std::vector<RelativePose> steps;
+  for (const auto& run : reduced.runs) {
+    steps.clear();
+    for (const std::size_t e : run.steps) steps.push_back(step_of(graph.edges[e]));
+    const PoseGraphEdge& compound = reduced.graph.edges[run.edge];
+    const Eigen::MatrixXd inner =
+        spread_about(steps, poses_of(graph, run.steps, about), reduced_moves.middleRows<6>(row(compound.from)),
+                     reduced_moves.middleRows<6>(row(compound.to)));
+    for (std::size_t k = 1; k < steps.size(); ++k)
+      out.middleRows<6>(row(graph.edges[run.steps[k]].from)) = inner.middleRows<6>(row(k - 1));
+  }
+  return out;
 }
 
 }  // namespace tutti::estimation::internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -28,12 +29,18 @@ struct ReducedGraph {
 };
 
 /// Only steps with from < to are compounded; `fixed` nodes stay. `roles`: per edge, or empty: all robust, so nothing
-/// is.
+/// is. With `about`, poses of all nodes, runs are linearised there, and the reduced graph's equations at those poses
+/// are the whole graph's without the nodes that are left out.
 ReducedGraph reduce_chains(const PoseGraph& graph, std::span<const EdgeRole> roles,
-                           std::span<const std::size_t> fixed = {});
+                           std::span<const std::size_t> fixed = {}, std::span<const Pose3> about = {});
 
 /// Poses of all nodes of the original from those of the reduced graph: every run is bent to meet its ends.
 void expand_chains(const PoseGraph& graph, const ReducedGraph& reduced, std::span<const Pose3> reduced_poses,
                    std::vector<Pose3>& poses);
+
+/// To first order about the poses that the graph was reduced about: how all nodes of the original move with those of
+/// the reduced one; right tangents, 6 rows a node, any number of columns.
+Eigen::MatrixXd expand_moves(const PoseGraph& graph, const ReducedGraph& reduced, std::span<const Pose3> about,
+                             const Eigen::MatrixXd& reduced_moves);
 
 }  // namespace tutti::estimation::internal

@@ -2,6 +2,7 @@
 #include "tutti/estimation/internal/chain_run.hpp"
 
 #include <Eigen/Cholesky>
+#include <vector>
 
 #include "tutti/geometry/so3.hpp"
 
@@ -168,6 +169,24 @@ void distribute_odometry(std::span<const RelativePose> steps, const PoseGraphEdg
     poses[k + 1].rotation = (T_w_a.rotation * (small_exp(zeta_r) * q)).normalized();
     poses[k + 1].translation = T_w_a.translation + R_w_a * (t + zeta_t - t.cross(zeta_r));
   }
+}
+
+Eigen::MatrixXd spread_about(std::span<const RelativePose> steps, std::span<const Pose3> poses,
+                             const Eigen::Ref<const Eigen::MatrixXd>& deltas_a,
+                             const Eigen::Ref<const Eigen::MatrixXd>& deltas_b) {
+  std::vector<Matrix6d> up_to{Matrix6d::Zero()};  // covariance of zeta_k
+  std::vector<Matrix6d> to_nodes;
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    linearise(steps[k], poses.front(), poses[k], poses[k + 1])
+        .map.add_covariance(steps[k].covariance, up_to.emplace_back(up_to.back()));
+    to_nodes.push_back(adjoint(poses[k + 1].inverse() * poses.front()));
+  }
+  const Eigen::MatrixXd lambda =
+      up_to.back().llt().solve(adjoint(poses.front().inverse() * poses.back()) * deltas_b - deltas_a);
+  Eigen::MatrixXd out(6 * (static_cast<Eigen::Index>(steps.size()) - 1), deltas_a.cols());
+  for (std::size_t k = 0; k + 1 < steps.size(); ++k)
+    out.middleRows<6>(static_cast<Eigen::Index>(6 * k)) = to_nodes[k] * (deltas_a + up_to[k + 1] * lambda);
+  return out;
 }
 
 }  // namespace tutti::estimation::internal

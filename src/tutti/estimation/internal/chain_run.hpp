@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <span>
 
@@ -38,5 +39,11 @@ void distribute_about(std::span<const RelativePose> steps, const RunSum& run, co
 /// The same for raw odometry, `run` being as_edge(sum_odometry(steps)): bent to meet the poses of both ends, the first
 /// and the last of `poses`; writes those between.
 void distribute_odometry(std::span<const RelativePose> steps, const PoseGraphEdge& run, std::span<Pose3> poses);
+
+/// To first order about `poses`, how the inner poses move with the ends: 6 rows each, columns as those of the ends'
+/// moves.
+Eigen::MatrixXd spread_about(std::span<const RelativePose> steps, std::span<const Pose3> poses,
+                             const Eigen::Ref<const Eigen::MatrixXd>& deltas_a,
+                             const Eigen::Ref<const Eigen::MatrixXd>& deltas_b);
 
 }  // namespace tutti::estimation::internal
