@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
+
+#include "tutti/base/random.hpp"
 
 namespace tutti::server {
 namespace closure_groups_test {
@@ -42,6 +46,54 @@ TEST(ClosureGroups, WaysWalkedTogetherAreManyPlaces) {
   EXPECT_TRUE(groups_of(ends).empty()) << "36 s";
   ends.pop_back();
   EXPECT_EQ(groups_of(ends), (Groups{{0, 1, 2, 3}})) << "27 s";
+}
+
+/// By comparing every two.
+Groups one_by_one(const std::vector<MapNode>& nodes, const std::vector<PoseGraphEdge>& edges,
+                  const GroupLimits& limits) {
+  const auto is_near = [&](std::size_t a, std::size_t b, double most_s) {
+    const auto [from_a, to_a] = std::minmax(edges[a].from, edges[a].to);
+    const auto [from_b, to_b] = std::minmax(edges[b].from, edges[b].to);
+    const auto end_is_near = [&](std::size_t x, std::size_t y) {
+      return nodes[x].id.chain == nodes[y].id.chain && std::abs(nodes[x].stamp - nodes[y].stamp) <= most_s;
+    };
+    return end_is_near(from_a, from_b) && end_is_near(to_a, to_b);
+  };
+  Groups out;
+  std::vector<bool> taken(edges.size(), false);
+  for (std::size_t first = 0; first < edges.size(); ++first) {
+    if (taken[first]) continue;
+    std::vector<std::size_t> group;
+    const auto take = [&](std::size_t e) {
+      taken[e] = true;
+      group.push_back(e);
+    };
+    take(first);
+    for (std::size_t k = 0; k < group.size(); ++k)
+      for (std::size_t e = 0; e < edges.size(); ++e)
+        if (!taken[e] && is_near(group[k], e, limits.near_s)) take(e);
+    std::ranges::sort(group);
+    const bool is_long = std::ranges::any_of(group, [&](std::size_t a) {
+      return std::ranges::any_of(group, [&](std::size_t b) { return !is_near(a, b, limits.longest_s); });
+    });
+    if (group.size() <= limits.most_closures && !is_long) out.push_back(group);
+  }
+  return out;
+}
+
+TEST(ClosureGroups, AreThoseOfEveryTwoCompared) {
+  const std::vector<MapNode> nodes = two_robots();
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Rng rng(seed);
+    std::vector<PoseGraphEdge> edges(1 + rng.index(150));
+    std::vector<std::size_t> closures(edges.size());
+    std::iota(closures.begin(), closures.end(), 0U);
+    for (PoseGraphEdge& edge : edges) edge.from = rng.index(nodes.size()), edge.to = rng.index(nodes.size());
+    for (const GroupLimits& limits :
+         {GroupLimits{}, GroupLimits{0.0, 30.0, 24}, GroupLimits{15.0, std::numeric_limits<double>::infinity(), 1000},
+          GroupLimits{std::numeric_limits<double>::infinity(), 150.0, 1000}})
+      EXPECT_EQ(closure_groups(nodes, edges, closures, limits), one_by_one(nodes, edges, limits)) << seed;
+  }
 }
 
 TEST(ClosureGroups, OnlyTheNamedEdgesCount) {
