@@ -94,8 +94,11 @@ std::vector<double> waves(const spectral::WaveletFilter& filter, Index nodes) {
   return out;
 }
 
-std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, const Errors& samples) {
+std::vector<ScaleUncertainty> scales(const spectral::SparseMatrix& laplacian, const Errors& samples,
+                                     std::size_t* products) {
   const spectral::WaveletFilter filter(laplacian, internal::kScales);
+  if (products != nullptr)
+    *products += static_cast<std::size_t>((2 * samples.position_m.cols() + kProbes) * filter.degree());
   const std::vector<double> held = waves(filter, laplacian.rows());
   const auto position_m = filter.scatter(samples.position_m), rotation_rad = filter.scatter(samples.rotation_rad);
   const double count = static_cast<double>(samples.position_m.cols()) / 3.0;
@@ -194,7 +197,8 @@ std::optional<KnownDirection> doubted(const MatrixXd& O, const MatrixXd& shifts)
 
 }  // namespace
 
-ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known) {
+ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known,
+                                   std::size_t* products) {
   const std::span<const ProxyNode> nodes = nodes_of(graph, chain);
   const auto n = static_cast<Index>(nodes.size());
   TUTTI_CHECK(n > 0 && known.samples.rows() == 6 * n && known.samples.cols() > 0, "{} x {} samples of {} nodes",
@@ -206,7 +210,7 @@ ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain
   free_of_gauge(rigid, samples);
   ChainUncertainty out{.chain = chain, .whole = {whole(samples.position_m), whole(samples.rotation_rad)}};
   if (n >= 2 && known.samples.cols() >= kLeastSamples)
-    out.scales = scales(internal::chain_laplacian(graph, chain), samples);
+    out.scales = scales(internal::chain_laplacian(graph, chain), samples, products);
 
   const std::vector<std::size_t> spread = ChainUncertainty::spread(nodes.size());
   const auto m = static_cast<Index>(spread.size());

@@ -29,8 +29,10 @@ inline constexpr Eigen::Index kLeastSamples = 16;
 /// coefficient is that of the worst direction, from the samples' covariance shrunk towards its mean (OAS). Directions:
 /// v with the smallest v^T P v / v^T O v below a quarter, at most four, P the map's covariance of the spread nodes seen
 /// from the first, O odometry's; what is doubted is one shift, the more of it the less likely odometry finds it
-/// (docs/math.md).
-ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known);
+/// (docs/math.md). `products`, unless null, counts up by the columns that were filtered, times the products with the
+/// graph's Laplacian that each took.
+ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known,
+                                   std::size_t* products = nullptr);
 
 /// The graph with this chain's nodes where a robot should follow them: without what is doubted, which motions of space
 /// spread over the nodes between the spread ones.

@@ -81,7 +81,9 @@ GncResult internal::truncated_least_squares(const PoseGraph& graph, const GncCon
       scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
     }
     if (binary) inner = config.solver;
+    const int before = out.solution.summary.factorisations;
     out.solution.summary = internal::minimise(equations, out.solution.poses, costs, inner);
+    out.solution.summary.factorisations += before;
     if (!is_usable(out.solution.summary.termination)) return out;
     mu *= kControlStep;
   }
@@ -136,8 +138,10 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
   internal::expand_chains(graph, reduced, reduced_poses, out.solution.poses);
   const auto structure = internal::analyse_blocks(graph, {}, fixed);
   internal::GraphEquations equations(graph, structure);
+  const int before = out.solution.summary.factorisations;
   out.solution.summary =
       internal::minimise(equations, out.solution.poses, {.loss = {}, .roles = roles, .scale = scale}, config.solver);
+  out.solution.summary.factorisations += before;
   return out;
 }
 

@@ -39,6 +39,7 @@ std::vector<EdgeRole> roles_from_numbering(const PoseGraph& graph);
 struct SolveSummary {
   Termination termination = Termination::not_run;
   int iterations = 0;
+  int factorisations = 0;       ///< Of the Hessian; GNC: of all its solutions together.
   double initial_cost = -1.0;   ///< Sum of rho(r^T Omega r) (chi2 without a loss) at the initial poses.
   double final_cost = -1.0;     ///< The same at the returned poses.
   double gradient_norm = -1.0;  ///< Largest entry of J^T Omega r at the last linearisation.

@@ -273,6 +273,16 @@ struct ServerLoadRecord {
   double refinement_cpu_s = 0.0;  ///< Bundle adjustment.
 };
 
+/// What the server did, counted: deterministic, so that a test can hold its cost.
+struct ServerWorkRecord {
+  std::size_t updates = 0;
+  std::size_t pairs_looked_at = 0;  ///< Of submaps.
+  std::size_t pairs_verified = 0;
+  std::size_t hypotheses = 0;       ///< Of who is wrong, tried.
+  std::size_t factorisations = 0;   ///< Of normal equations of poses.
+  std::size_t sample_products = 0;  ///< Columns of samples, times products with a graph's Laplacian.
+};
+
 /// One refinement of the map.
 struct RefinementTiming {
   bool whole = false;
@@ -291,6 +301,7 @@ struct TimingRecord {
   std::vector<double> server_optimisation_ms;
   std::vector<RefinementTiming> server_refinements;
   ServerLoadRecord server_load;
+  ServerWorkRecord server_work;
   std::vector<LoadRecord> load;
 };
 

@@ -278,6 +278,13 @@ std::vector<TrafficRecord> MissionRun::traffic_of(const MissionRecording& robot)
 
 void MissionRun::record_timing(MissionRecord& record) const {
   meter_.record(duration_s_, record.timing);
+  const server::ServerWork& work = server_->map_server().work();
+  record.timing.server_work = {.updates = work.updates,
+                               .pairs_looked_at = work.pairs_looked_at,
+                               .pairs_verified = work.pairs_verified,
+                               .hypotheses = work.search.hypotheses,
+                               .factorisations = work.search.factorisations + work.monitor.factorisations,
+                               .sample_products = work.monitor.products};
   record.timing.machine = machine_description();
   record.timing.wall_s = pace_.wall_s();
   record.timing.rate = options_.rate;

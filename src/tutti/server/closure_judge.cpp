@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "tutti/base/chi_square.hpp"
@@ -37,15 +38,16 @@ class Optimiser {
   }
 
   [[nodiscard]] Optimum decide() const {
-    auto [objections, failed] = explain();
-    Optimum best = optimise(std::move(objections), std::move(failed));
+    auto [objections, failed, work] = explain();
+    Optimum best = optimise(std::move(objections), std::move(failed), work);
     for (int round = 0; round < kRefusals && refuse_lone_witness(best);) ++round;
     return best;
   }
 
  private:
   /// Objections to each closure, and the odometry that failed. What it takes is gone when the map is optimised.
-  [[nodiscard]] std::pair<std::vector<Objection>, std::vector<estimation::FailedStretch>> explain() const {
+  [[nodiscard]] std::tuple<std::vector<Objection>, std::vector<estimation::FailedStretch>, estimation::SearchWork>
+  explain() const {
     PoseGraph graph = map_.graph;
     graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
     const estimation::OdometryWays odometry(graph.poses.size(), map_.graph.edges);
@@ -59,7 +61,7 @@ class Optimiser {
     for (const bool accepted : found.accepted)
       objections.push_back(accepted ? Objection::none : Objection::contradicted);
     leave_unjoined(odometry, objections);
-    return {std::move(objections), std::move(found.failed)};
+    return {std::move(objections), std::move(found.failed), found.work};
   }
 
   /// Too few closures do not join two pieces of odometry, unless an operator says so.
@@ -79,14 +81,15 @@ class Optimiser {
     }
   }
 
-  [[nodiscard]] Optimum optimise(std::vector<Objection> objections,
-                                 std::vector<estimation::FailedStretch> failed) const {
+  [[nodiscard]] Optimum optimise(std::vector<Objection> objections, std::vector<estimation::FailedStretch> failed,
+                                 const estimation::SearchWork& work) const {
     Optimum out{.failed = std::move(failed),
                 .graph = map_.graph,
                 .closure_of_edge = {},
                 .robust = {},
                 .fitting = {},
-                .objections = std::move(objections)};
+                .objections = std::move(objections),
+                .work = work};
     for (const estimation::FailedStretch& stretch : out.failed)
       weaken(out.graph, map_, stretch.from, stretch.to, kDoubt * stretch.missed.head<3>().norm(),
              kDoubt * stretch.missed.tail<3>().norm());
@@ -102,6 +105,7 @@ class Optimiser {
     for (std::size_t e = map_.odometry_edges; e < roles.size(); ++e)
       if (is_certain(out, e)) roles[e] = estimation::EdgeRole::trusted;
     out.robust = estimation::solve_pose_graph_gnc(out.graph, config_.gnc, roles);
+    out.work.factorisations += static_cast<std::size_t>(out.robust.solution.summary.factorisations);
     for (std::size_t e = map_.odometry_edges; e < out.graph.edges.size(); ++e) {
       if (out.robust.inlier_weight[e] >= 0.5)
         out.fitting.push_back(e);
@@ -131,13 +135,14 @@ class Optimiser {
     std::vector<estimation::EdgeRole> roles(fitted.edges.size(), estimation::EdgeRole::robust);
     std::fill_n(roles.begin(), map_.odometry_edges, estimation::EdgeRole::trusted);
     const auto groups = closure_groups(map_.nodes, fitted.edges, closures);
+    ++best.work.factorisations;
     const auto misfits = estimation::group_misfits(fitted, best.robust.solution.poses, roles, groups);
     const auto worst = std::ranges::max_element(misfits);
     if (worst == misfits.end() || *worst <= chi_square_quantile(config_.who_is_wrong.confidence, 6)) return false;
     for (const std::size_t e : groups[static_cast<std::size_t>(worst - misfits.begin())])
       best.objections[best.closure_of_edge[best.fitting[e - map_.odometry_edges] - map_.odometry_edges]] =
           Objection::lone;
-    best = optimise(std::move(best.objections), std::move(best.failed));
+    best = optimise(std::move(best.objections), std::move(best.failed), best.work);
     return true;
   }
 

@@ -29,6 +29,7 @@ struct Optimum {
   estimation::GncResult robust;
   std::vector<std::size_t> fitting;   ///< Edges of closures that fit the map.
   std::vector<Objection> objections;  ///< To each closure.
+  estimation::SearchWork work;        ///< What it took, with the optima before this one.
 };
 
 /// Decides on a map whose nodes and odometry are there. Closures that an operator is certain of are never refused.

@@ -114,7 +114,7 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyG
                                             const std::map<ChainId, std::vector<std::size_t>>& chosen,
                                             std::unique_ptr<const estimation::JointPosterior> posterior,
                                             std::span<const double> weights,
-                                            const consistency::ProxyGraphConfig& config) {
+                                            const consistency::ProxyGraphConfig& config, MonitorWork& work) {
   std::vector<std::size_t> kept;  // indices into map.nodes of graph.nodes
   for (const auto& [chain, nodes] : chosen)
     for (const std::size_t i : nodes)
@@ -140,6 +140,7 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyG
     chain.covariance = posterior->covariance(chain.spread);
   }
   posterior.reset();
+  ++work.factorisations;
   const Eigen::MatrixXd shifts = shifts_without_a_closure(map, kept, static_cast<std::size_t>(config.shape_deletions));
   for (Chain& chain : chains) {
     const auto first = static_cast<Eigen::Index>(6 * chain.begin);
@@ -148,7 +149,8 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyG
                                                  {.samples = samples.middleRows(first, rows),
                                                   .shifts = shifts.middleRows(first, rows),
                                                   .spread_covariance = std::move(chain.covariance),
-                                                  .spread_odometry = spread_odometry(map, chain.spread, weights)}));
+                                                  .spread_odometry = spread_odometry(map, chain.spread, weights)},
+                                                 &work.products));
   }
   return out;
 }
@@ -165,7 +167,10 @@ std::vector<double> honest_weights(const MapEstimate& map) {
 
 }  // namespace
 
-ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config) {
+ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config,
+                         MonitorWork* work) {
+  MonitorWork unasked;
+  MonitorWork& counted = work != nullptr ? *work : unasked;
   auto chosen = choose_nodes(map);
   std::vector<std::pair<std::size_t, std::size_t>> stretches;
   for (const auto& [chain, nodes] : chosen) {
@@ -174,6 +179,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
   }
   const std::vector<double> weights = honest_weights(map);
   auto posterior = std::make_unique<const estimation::JointPosterior>(map.graph, map.graph.poses, stretches, weights);
+  ++counted.factorisations;
   const std::vector<Matrix6d> covariances = posterior->relative_covariances();
 
   std::vector<consistency::ServerNode> nodes;
@@ -212,7 +218,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
   }
   ProxyGraph graph = consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
   if (config.shape_samples > 0)
-    graph.uncertainties = uncertainties(map, graph, chosen, std::move(posterior), weights, config);
+    graph.uncertainties = uncertainties(map, graph, chosen, std::move(posterior), weights, config, counted);
   return graph;
 }
 

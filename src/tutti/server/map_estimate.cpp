@@ -223,9 +223,12 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   Optimum optimum = judge_closures(map, index, closures, config);
   auto honesty = honesty_after(map, optimum, closures.judged);
   if (config.judge_odometry && raise_understated(honesty, map)) {
+    const estimation::SearchWork before = optimum.work;
     optimum = judge_closures(map, index, closures, config);
+    optimum.work += before;
     honesty = honesty_after(map, optimum, closures.judged);
   }
+  map.work = optimum.work;
   for (const auto& [chain, worth] : honesty) map.overstated[chain] = std::min(1.0, worth.whole);
   for (std::size_t c = 0; c < closures.judged.size(); ++c)
     map.closures.push_back({stated[c], false, closures.certain[c], Objection::no_map});

@@ -10,6 +10,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/gnc.hpp"
 #include "tutti/estimation/who_is_wrong/settings.hpp"
+#include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
 #include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/pose_graph.hpp"
@@ -89,6 +90,7 @@ struct MapEstimate {
   /// order. And all of a chain without which the map can be solved, and with which it cannot.
   std::vector<SubmapId> left_out;
   std::size_t spare_pairs = 0;  ///< Of submaps whose closures were not judged (MapConfig::most_closed_pairs).
+  estimation::SearchWork work;  ///< What judging the closures took.
   bool converged = false;       ///< Otherwise no closure is accepted, and every robot's odometry stands alone.
 };
 

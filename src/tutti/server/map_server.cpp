@@ -200,6 +200,7 @@ bool MapServer::is_answered(const SubmapPair& pair) const {
 }
 
 void MapServer::plan_verification(const SubmapPair& pair) {
+  ++work_.pairs_looked_at;
   if (!is_answered(pair) && is_asked(pair))
     return jobs_.push_back({pair, state_.submaps.at(pair.first), state_.submaps.at(pair.second)});
   state_.answered.insert(pair);  // what an earlier finder has found there stays
@@ -265,6 +266,7 @@ void MapServer::take(const ClosureVerdict& verdict) {
   if (is_answered(pair) && !(is_kept && holds_over(verdict, kept->second))) return;
   if (!verdict.closures.empty() || is_kept) note_news();
   state_.answered.insert(pair);
+  ++work_.pairs_verified;
   if (verdict.refusal) {
     count_refusal(*verdict.refusal, pair.first.chain.robot, pair.second.chain.robot, state_.refused);
     state_.verdicts.erase(pair);
@@ -339,12 +341,16 @@ void MapServer::plan_refinement(bool settle) {
 
 ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
-  if (!estimate_) estimate_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
+  ++work_.updates;
+  if (!estimate_) {
+    estimate_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
+    work_.search += estimate_->work;
+  }
   map_ = refined(*estimate_, state_.submaps, state_.refinements);
   plan_refinement(false);
   if (refiner_ == nullptr) estimate_.reset();  // nobody asks for it
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},
-                            .graph = monitor_graph(map_, state_.revision, config_.proxy_graph)};
+                            .graph = monitor_graph(map_, state_.revision, config_.proxy_graph, &work_.monitor)};
   message.graph.epoch = state_.epoch;
   return message;
 }

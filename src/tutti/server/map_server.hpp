@@ -16,6 +16,7 @@
 #include "tutti/model/messages.hpp"
 #include "tutti/server/answered_pairs.hpp"
 #include "tutti/server/closure_finder.hpp"
+#include "tutti/server/graph_monitor.hpp"
 #include "tutti/server/map_estimate.hpp"
 #include "tutti/server/payload_store.hpp"
 #include "tutti/server/refinements.hpp"
@@ -68,6 +69,15 @@ struct MapServerState {
   Refinements refinements;
   std::uint64_t epoch = 0;  ///< Of the server that this is the state of.
   std::uint64_t revision = 0;
+};
+
+/// What the server has done since it started. Deterministic, and so what a test can hold the cost to.
+struct ServerWork {
+  std::size_t pairs_looked_at = 0;  ///< Of submaps.
+  std::size_t pairs_verified = 0;   ///< Verdicts taken.
+  std::size_t updates = 0;
+  estimation::SearchWork search;  ///< Of all updates.
+  MonitorWork monitor;
 };
 
 /// Submaps in; attach, close loops, optimise; proxy graphs out. No threads, sockets or clocks inside.
@@ -139,6 +149,7 @@ class MapServer {
   void nothing_is_new() { news_ = false; }
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
+  [[nodiscard]] const ServerWork& work() const { return work_; }
   [[nodiscard]] const MapServerState& state() const { return state_; }
   /// Pairs by the reason they were refused for.
   [[nodiscard]] const RefusalCounts& refusals() const { return state_.refused; }
@@ -185,6 +196,7 @@ class MapServer {
   };
   std::optional<Asked> asked_;  // last
   bool news_ = false;
+  ServerWork work_;
 };
 
 }  // namespace tutti::server

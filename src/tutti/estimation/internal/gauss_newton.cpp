@@ -68,6 +68,7 @@ SolveSummary minimise(GraphEquations& equations, std::vector<Pose3>& poses, cons
   bool reuse_factor = false;
   while (summary.iterations < config.max_iterations) {
     equations.linearise(poses, costs, !reuse_factor);
+    if (!reuse_factor) ++summary.factorisations;
     if (!reuse_factor && !equations.factorise()) {
       summary.termination = Termination::singular;
       break;

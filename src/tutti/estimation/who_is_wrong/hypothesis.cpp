@@ -41,6 +41,7 @@ HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryWays& o
   std::ranges::sort(runs_, {}, [&](std::size_t e) { return reduced_.graph.edges[e].from; });
   count_votes();
   all_held_ = internal::least_squares(reduced_.graph, gnc_);
+  work_.factorisations += static_cast<std::size_t>(all_held_.summary.factorisations);
 }
 
 std::size_t HypothesisSolver::begin_of(std::size_t run) const {
@@ -90,13 +91,21 @@ Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
     if (certain_[c]) truncation[closures_[c]] = kInfinite;
   for (const Window& window : hypothesis.windows)
     for (std::size_t run = window.first; run <= window.last; ++run) truncation[runs_[run]] = limit_;
+  ++work_.hypotheses;
+  const auto counted = [&](GncResult optimum, int before) {
+    work_.factorisations += static_cast<std::size_t>(optimum.solution.summary.factorisations - before);
+    return optimum;
+  };
   if (hypothesis.wrong.empty())
-    return judge(std::move(hypothesis), internal::truncated_least_squares(reduced_.graph, gnc_, truncation, all_held_));
+    return judge(std::move(hypothesis),
+                 counted(internal::truncated_least_squares(reduced_.graph, gnc_, truncation, all_held_),
+                         all_held_.summary.factorisations));
   PoseGraph graph = reduced_.graph;
   for (const auto& group : hypothesis.wrong)
     for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
-  return judge(std::move(hypothesis),
-               internal::truncated_least_squares(graph, gnc_, truncation, internal::least_squares(graph, gnc_)));
+  return judge(
+      std::move(hypothesis),
+      counted(internal::truncated_least_squares(graph, gnc_, truncation, internal::least_squares(graph, gnc_)), 0));
 }
 
 Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const {

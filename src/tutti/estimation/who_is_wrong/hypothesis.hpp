@@ -49,6 +49,8 @@ class HypothesisSolver {
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
   /// The runs around one, within the search distance on its piece.
   [[nodiscard]] Window around(std::size_t run) const;
+  /// So far.
+  [[nodiscard]] const SearchWork& work() const { return work_; }
   [[nodiscard]] double votes(std::size_t closure) const { return votes_[closure]; }
 
  private:
@@ -69,6 +71,7 @@ class HypothesisSolver {
   std::vector<std::size_t> closures_;  // edges of the reduced graph
   std::vector<bool> certain_;          // per closure
   std::vector<double> votes_;          // per closure
+  mutable SearchWork work_;
 };
 
 }  // namespace tutti::estimation

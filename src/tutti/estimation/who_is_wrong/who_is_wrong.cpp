@@ -165,7 +165,10 @@ Explanation explain_closures(const PoseGraph& graph, const OdometryWays& odometr
   const HypothesisSolver solver(considered, odometry, odometry_edges, config, gnc, std::move(considered_certain));
   const Solution best = Search(solver, config).run(std::move(considered_groups));
 
-  Explanation out{.accepted = std::vector<bool>(closures.size(), false), .failed = {}, .solved = best.solved};
+  Explanation out{.accepted = std::vector<bool>(closures.size(), false),
+                  .failed = {},
+                  .solved = best.solved,
+                  .work = solver.work()};
   if (!best.solved) return out;
   for (std::size_t k = 0; k < closure_of.size(); ++k) out.accepted[closure_of[k]] = best.accepted[k] != 0;
   for (const FailedStretch& failed : best.failed) out.failed.push_back(narrowed(odometry, failed));

@@ -24,10 +24,22 @@ struct FailedStretch {
 /// The size of a failure as seen from a node of its stretch: a wrong turn shifts more the farther away it was.
 double failure_size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node);
 
+/// What a search took.
+struct SearchWork {
+  std::size_t hypotheses = 0;      ///< Tried.
+  std::size_t factorisations = 0;  ///< Of the normal equations, nearly all of them of the graph of the closures' ends.
+  SearchWork& operator+=(const SearchWork& other) {
+    hypotheses += other.hypotheses;
+    factorisations += other.factorisations;
+    return *this;
+  }
+};
+
 struct Explanation {
   std::vector<bool> accepted;         ///< Per closure.
   std::vector<FailedStretch> failed;  ///< By `from`; none overlap.
   bool solved = false;                ///< Otherwise nothing is accepted.
+  SearchWork work;
 };
 
 /// Decides between closures and odometry that contradict each other (docs/math.md, "Who is wrong?"). A hypothesis says

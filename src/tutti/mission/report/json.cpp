@@ -293,6 +293,15 @@ Json load_json(const ServerLoadRecord& load) {
           {"peak_memory_mb", load.peak_memory_mb > 0.0 ? number(load.peak_memory_mb) : Json(nullptr)}};
 }
 
+Json work_json(const ServerWorkRecord& work) {
+  return {{"updates", work.updates},
+          {"pairs_looked_at", work.pairs_looked_at},
+          {"pairs_verified", work.pairs_verified},
+          {"hypotheses", work.hypotheses},
+          {"factorisations", work.factorisations},
+          {"sample_products", work.sample_products}};
+}
+
 /// Of report.json and timing.json; keys are added without a new one.
 constexpr int kFormat = 2;
 
@@ -359,6 +368,7 @@ std::string timing_json(const MissionRecord& record) {
                     {{"verification", spread_json(timing.server_verification_ms)},
                      {"optimisation", spread_json(timing.server_optimisation_ms)},
                      {"refinements", std::move(refinements)},
+                     {"work", work_json(timing.server_work)},
                      {"load", load_json(timing.server_load)}}},
                    {"load", std::move(load)}});
 }

@@ -55,11 +55,18 @@ TEST(ReportJson, SaysWhatTheAdjustmentMadeOfTheMap) {
   EXPECT_TRUE(json::parse(report_json(record))["server"]["refinement"].is_null());
   record.server.refinement = RefinementCounts{152, 7417, 26486, 811, 1204, 93, 12, 377, 41, 2.5, 1.125};
   record.timing.server_refinements = {{false, 2, 5, 0.25}};
+  record.timing.server_work = {31, 27730, 36, 33, 230, 2303424};
   const json refinement = json::parse(report_json(record))["server"]["refinement"];
   EXPECT_EQ(refinement["joined_by_keyframe"], 811);
   EXPECT_EQ(refinement["two_positions"], 93);
   EXPECT_EQ(refinement["rms_after_px"], 1.125);
   EXPECT_EQ(json::parse(timing_json(record))["server"]["refinements"][0]["submaps"], 5);
+  EXPECT_EQ(json::parse(timing_json(record))["server"]["work"], (json{{"updates", 31},
+                                                                      {"pairs_looked_at", 27730},
+                                                                      {"pairs_verified", 36},
+                                                                      {"hypotheses", 33},
+                                                                      {"factorisations", 230},
+                                                                      {"sample_products", 2303424}}));
 }
 
 TEST(ReportJson, CarriesTheRecordsFigures) {
