@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/bundle_refiner.hpp"
 
+#include <fmt/format.h>
+
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -40,6 +43,36 @@ RefinementCounts counts_of(const bundle::Refinement& refined) {
           .rms_after_px = refined.rms_after_px};
 }
 
+/// Of every robot with IMU factors that were held back, how many, and why by the worst of them.
+void remark_on_imu(const std::vector<bundle::ImuRun>& runs, std::vector<RefinementRemark>& out) {
+  struct Held {
+    std::size_t factors = 0, all = 0;
+    bundle::ImuRun worst;
+  };
+  std::map<RobotId, Held> by_robot;
+  for (const bundle::ImuRun& run : runs) {
+    Held& held = by_robot[run.chain.robot];
+    held.all += run.factors;
+    if (!run.is_held_back) continue;
+    held.factors += run.factors;
+    if (run.factors > held.worst.factors) held.worst = run;
+  }
+  for (const auto& [robot, held] : by_robot) {
+    if (held.factors == 0) continue;
+    out.push_back({robot, fmt::format("{} of {} IMU factors are held back: motion tells the accelerometer's bias to "
+                                      "{:.2f} m/s^2, and with them the way is {:.3f} times as long as odometry and "
+                                      "images have it to {:.3f}",
+                                      held.factors, held.all, held.worst.bias_sigma_mps2, held.worst.scale,
+                                      held.worst.scale_sigma)});
+  }
+}
+
+std::vector<RefinementRemark> remarks_on(const bundle::Refinement& refined) {
+  std::vector<RefinementRemark> out;
+  remark_on_imu(refined.imu, out);
+  return out;
+}
+
 }  // namespace
 
 BundleRefiner::BundleRefiner(const bundle::RefinementConfig& config)
@@ -56,6 +89,7 @@ Result<Refinement> BundleRefiner::refine(const RefinementJob& job, const server:
   for (const bundle::BundleKeyframe& keyframe : refined->keyframes)
     out.T_world_body.emplace(keyframe.id, keyframe.T_world_body);
   out.counts = counts_of(*refined);
+  out.remarks = remarks_on(*refined);
   return out;
 }
 

@@ -58,6 +58,7 @@ MissionRecord make_record(const FinishedMission& mission) {
   evaluate_robots(outcomes, server.map(), perfect ? &*perfect : nullptr, config.association, record);
   note_undelivered(mission.undelivered, record);
   note_what_the_map_lacks(server.map(), record);
+  note_remarks(server.state().refinements, record);
   evaluate_server(outcomes, server, config.association, config.closure_check, record);
   evaluate_images(server, record);
   record.server.proxy = broadcast;

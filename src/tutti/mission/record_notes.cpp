@@ -97,6 +97,13 @@ void note_undelivered(const std::map<bus::SimulatedRadio::Topic, std::size_t>& u
   }
 }
 
+void note_remarks(const server::Refinements& refinements, MissionRecord& record) {
+  if (!refinements.has_whole()) return;
+  for (const RefinementRemark& remark : refinements.all().begin()->second->remarks)
+    if (remark.robot.value < record.robots.size())
+      record.notes.push_back(fmt::format("{}: {}", record.robots[remark.robot.value].name, remark.text));
+}
+
 void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record) {
   if (!map.left_out.empty()) {
     const SubmapId first = map.left_out.front();

@@ -100,5 +100,17 @@ TEST(Notes, ClosuresThatSayTooLittleOfTheirErrors) {
       << record.notes[0];
 }
 
+TEST(Notes, WhatTheLastRefinementOfTheWholeRemarks) {
+  MissionRecord record = joined();
+  record.notes.clear();
+  server::Refinements refinements;
+  note_remarks(refinements, record);
+  EXPECT_TRUE(record.notes.empty());
+  refinements.add({.revision = 3, .whole = true, .remarks = {{RobotId{1}, "no motion"}}});
+  refinements.add({.revision = 4, .whole = false, .remarks = {{RobotId{0}, "of a part"}}});
+  note_remarks(refinements, record);
+  EXPECT_EQ(record.notes, std::vector<std::string>{"bravo: no motion"});
+}
+
 }  // namespace record_notes_test
 }  // namespace tutti::mission

@@ -53,6 +53,13 @@ struct RefinementCounts {
   friend bool operator==(const RefinementCounts&, const RefinementCounts&) = default;
 };
 
+/// What a refiner has found out about a robot's sensors, for people.
+struct RefinementRemark {
+  RobotId robot;
+  std::string text;
+  friend bool operator==(const RefinementRemark&, const RefinementRemark&) = default;
+};
+
 /// worker -> server: what became of a job.
 struct Refinement {
   std::string job;
@@ -63,6 +70,7 @@ struct Refinement {
   std::vector<RefinedStep> steps;            ///< Sorted by `from`; none between keyframes that kept their poses.
   std::map<KeyframeId, Pose3> T_world_body;  ///< Of all keyframes of the job, in the world that it gave.
   RefinementCounts counts;
+  std::vector<RefinementRemark> remarks;
   std::string why;      ///< It could not be refined; there are no steps and poses then.
   bool cannot = false;  ///< ... since this worker has not got the job's refiner: another may.
   friend bool operator==(const Refinement&, const Refinement&) = default;

@@ -11,6 +11,7 @@
 #include "tutti/bus/envelope.hpp"
 #include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
+#include "tutti/model/refinement.hpp"
 #include "tutti/robot/agent.hpp"
 
 /// What has happened at a node, for whoever keeps a record. How long it took is not in it: that is the host's to
@@ -38,6 +39,7 @@ struct RefinementTaken {  ///< By the server.
   std::uint64_t revision = 0;  ///< Of the map that was refined.
   bool whole = false;
   std::size_t steps = 0;
+  std::vector<RefinementRemark> remarks;
 };
 struct RefinementFailed {  ///< It is asked for again (ServerNodeConfig::most_tries).
   std::uint64_t revision = 0;

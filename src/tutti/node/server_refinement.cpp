@@ -61,7 +61,8 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
     if (!after.contains(revision)) step.writes.push_back({kMetaTable, refinement_key(revision), std::nullopt});
   for (const std::uint64_t revision : after)
     if (!before.contains(revision)) step.writes.push_back({kMetaTable, refinement_key(revision), *envelope.bytes});
-  step.tell(now, RefinementTaken{refinement->job, refinement->revision, refinement->whole, refinement->steps.size()});
+  step.tell(now, RefinementTaken{refinement->job, refinement->revision, refinement->whole, refinement->steps.size(),
+                                 refinement->remarks});
 }
 
 /// It has ended every worker that had it (bus::Port::receive()).

@@ -71,13 +71,17 @@ Told tell(const node::VerificationFailed& failed) {
           Level::warning};
 }
 Told tell(const node::RefinementTaken& taken) {
+  std::string remarks;
+  for (const RefinementRemark& remark : taken.remarks)
+    remarks += fmt::format("; robot {}: {}", remark.robot.value, remark.text);
   return {{{"event", "refinement_taken"},
            {"job", taken.job},
            {"revision", taken.revision},
            {"whole", taken.whole},
-           {"steps", taken.steps}},
-          fmt::format("{} of map revision {} was refined: {} steps", taken.whole ? "all" : "a part", taken.revision,
-                      taken.steps)};
+           {"steps", taken.steps},
+           {"remarks", remarks.empty() ? remarks : remarks.substr(2)}},
+          fmt::format("{} of map revision {} was refined: {} steps{}", taken.whole ? "all" : "a part", taken.revision,
+                      taken.steps, remarks)};
 }
 Told tell(const node::RefinementFailed& failed) {
   return {{{"event", "refinement_failed"},

@@ -9,6 +9,7 @@
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/v1/messages.pb.h"
+#include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/job_message.hpp"
 #include "tutti/wire/internal/method_message.hpp"
@@ -19,6 +20,7 @@
 namespace tutti::wire {
 namespace {
 
+constexpr std::size_t kMaxRemarks = 1000;
 constexpr int kStep = kPoseNumbers + kCovarianceNumbers;
 constexpr std::array kCounts = {&RefinementCounts::keyframes,          &RefinementCounts::landmarks,
                                 &RefinementCounts::observations,       &RefinementCounts::joined_by_keyframe,
@@ -116,6 +118,11 @@ Status validate(const Refinement& refinement) {
       if (!std::isfinite(rms)) return fail(ErrorCode::invalid, "an error of {} px", rms);
     if (refinement.why.size() > kMaxReasonBytes)
       return fail(ErrorCode::invalid, "a reason of {} bytes, at most {}", refinement.why.size(), kMaxReasonBytes);
+    if (refinement.remarks.size() > kMaxRemarks)
+      return fail(ErrorCode::invalid, "{} remarks, at most {}", refinement.remarks.size(), kMaxRemarks);
+    for (const RefinementRemark& remark : refinement.remarks)
+      if (remark.text != plain_text(remark.text))
+        return fail(ErrorCode::invalid, "a remark that is no plain text of at most {} bytes", kMaxReasonBytes);
     return check_steps(refinement);
   };
   if (auto ok = check(); !ok) return in_context("refinement", ok.error());
@@ -194,6 +201,10 @@ std::string encode(const Refinement& refinement) {
   out.add_rms_px(refinement.counts.rms_after_px);
   out.set_why(refinement.why);
   out.set_cannot(refinement.cannot);
+  for (const RefinementRemark& remark : refinement.remarks) {
+    out.add_remark_robot(remark.robot.value);
+    out.add_remark(remark.text);
+  }
   return pack_frame(MessageKind::refinement, out.SerializeAsString());
 }
 
@@ -219,6 +230,9 @@ Result<Refinement> decode_refinement(std::string_view bytes) {
   for (std::size_t i = 0; i < kCounts.size(); ++i) out.counts.*kCounts[i] = in.count(static_cast<int>(i));
   out.counts.rms_before_px = in.rms_px(0);
   out.counts.rms_after_px = in.rms_px(1);
+  if (in.remark_size() != in.remark_robot_size())
+    return fail(ErrorCode::parse, "refinement: {} remarks on {} robots", in.remark_size(), in.remark_robot_size());
+  for (int i = 0; i < in.remark_size(); ++i) out.remarks.push_back({RobotId{in.remark_robot(i)}, in.remark(i)});
   if (auto ok = validate(out); !ok) return tl::unexpected(ok.error());
   return out;
 }

@@ -308,6 +308,7 @@ inline Refinement any_refinement(Rng& rng) {
   for (const auto& [id, T] : out.T_world_body)
     if (rng.bernoulli(0.7)) out.steps.push_back({id, {any_pose(rng, 5.0), any_covariance(rng)}});
   out.counts = {.keyframes = rng.index(1000), .two_things = rng.index(1000), .rms_before_px = 1.5, .rms_after_px = 0.5};
+  if (rng.bernoulli(0.3)) out.remarks.push_back({RobotId{2}, "its IMU is not believed"});
   if (rng.bernoulli(0.3)) out.why = "no images";
   out.cannot = rng.bernoulli(0.2);
   return out;

@@ -17,6 +17,8 @@ struct BundleConfig {
   double odometry_loss_scale = 5.0;
   double gyro_random_walk = 1e-4;
   double accelerometer_random_walk = 4e-3;
+  double max_bias_sigma = 0.05;
+  double max_imu_scale_sigmas = 3.0;
 
   template <class V>
   void describe(V& v) {
@@ -30,6 +32,12 @@ struct BundleConfig {
     v.field("gyro_random_walk", gyro_random_walk, greater_than(0.0), "Of the gyro's bias, rad/s^2/sqrt(Hz).");
     v.field("accelerometer_random_walk", accelerometer_random_walk, greater_than(0.0),
             "Of the accelerometer's bias, m/s^3/sqrt(Hz).");
+    v.field("max_bias_sigma", max_bias_sigma, greater_than(0.0),
+            "IMU factors are held back where motion does not tell the accelerometer's bias this well, m/s^2 (a tenth "
+            "of what is known beforehand),");
+    v.field("max_imu_scale_sigmas", max_imu_scale_sigmas, greater_than(0.0),
+            "... and where they make the way longer or shorter by more than so many of its standard deviations "
+            "without them.");
   }
 };
 

@@ -38,10 +38,10 @@ Result<Refinement> refine_map(const RefinementInput& input, const RefinementConf
   matches.insert(matches.end(), input.matches.begin(), input.matches.end());
   auto merged = merge_landmarks(input.submaps, matches, config.merge);
   if (!merged) return tl::unexpected(merged.error());
-  auto solution = make_ceres_bundle_adjuster(config.bundle)->adjust(merged->problem);
+  Refinement out;
+  auto solution = adjust_with_believed_imu(merged->problem, config.bundle, out.imu);
   if (!solution) return tl::unexpected(solution.error());
 
-  Refinement out;
   out.rms_before_px = reprojection_rms_px(merged->problem);
   out.factors = factors_of(*merged, *solution, config.bundle);
   for (std::size_t k = 0; k < merged->problem.keyframes.size(); ++k)

@@ -7,6 +7,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/estimation/bundle/bundle_adjuster.hpp"
 #include "tutti/estimation/bundle/guided_matches.hpp"
+#include "tutti/estimation/bundle/imu_trial.hpp"
 #include "tutti/estimation/bundle/landmark_merge.hpp"
 
 namespace tutti::bundle {
@@ -45,6 +46,7 @@ struct Refinement {
   std::vector<CameraResiduals> residuals_after;
   double rms_before_px = 0.0;  ///< Of the adjusted problem's views, without those that no pixel sees.
   double rms_after_px = 0.0;
+  std::vector<ImuRun> imu;
   MergeSummary merge;
   AdjustmentSummary adjustment;
 };

@@ -180,8 +180,26 @@ double view_variance(const BundleProblem& problem, const BundleSolution& solutio
   return *middle / kMedianOfChi2 * equations / left;
 }
 
-std::optional<std::vector<Matrix6d>> odometry_posterior(const BundleProblem& problem, const BundleSolution& solution,
-                                                        const BundleConfig& config) {
+struct Posterior::State {
+  State(const BundleProblem& problem, const BundleSolution& solution, const Blocks& blocks, Nodes n,
+        const std::vector<std::size_t>& anchors)
+      : nodes(std::move(n)), slots(structure_of(blocks, nodes.count, anchors)), hessian(slots, 6) {
+    for (const auto& odometry : problem.odometry) steps.emplace_back(odometry.from, odometry.to);
+    T_world_body = solution.T_world_body;
+  }
+  Nodes nodes;
+  BlockStructure slots;
+  BlockCholesky hessian;
+  std::vector<std::pair<Node, Node>> steps;
+  std::vector<Pose3> T_world_body;
+};
+
+Posterior::Posterior(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Posterior::Posterior(Posterior&&) noexcept = default;
+Posterior::~Posterior() = default;
+
+std::optional<Posterior> Posterior::of(const BundleProblem& problem, const BundleSolution& solution,
+                                       const BundleConfig& config) {
   const auto structure = internal::analyse(problem);
   const Nodes nodes = number_nodes(structure);
   Blocks blocks;
@@ -190,28 +208,33 @@ std::optional<std::vector<Matrix6d>> odometry_posterior(const BundleProblem& pro
   add_imu(problem, solution, config, structure, nodes, blocks);
 
   const SingleThread single_thread;
-  const BlockStructure slots = structure_of(blocks, nodes.count, structure.anchors);
-  BlockCholesky hessian(slots, 6);
+  auto state = std::make_unique<State>(problem, solution, blocks, nodes, structure.anchors);
+  BlockCholesky& hessian = state->hessian;
   hessian.set_zero();
   std::size_t e = 0;
   for (const auto& [pair, block] : blocks.all()) {
-    const auto& slot = slots.edges[e++];
+    const auto& slot = state->slots.edges[e++];
     if (pair.first != pair.second)
       hessian.add_edge(slot, block);
     else if (slot.from >= 0)
       hessian.add_diagonal(slot.from, block);
   }
   if (!hessian.factorise()) return std::nullopt;
-  const auto factor = hessian.factor();
-  if (factor.start.size() != static_cast<std::size_t>(6 * slots.variables + 1)) return std::nullopt;
+  return Posterior(std::move(state));
+}
 
+std::optional<std::vector<Matrix6d>> Posterior::steps() const {
+  const SingleThread single_thread;
+  const BlockStructure& slots = state_->slots;
+  const auto factor = state_->hessian.factor();
+  if (factor.start.size() != static_cast<std::size_t>(6 * slots.variables + 1)) return std::nullopt;
   const estimation::internal::SelectedInverse inverse(factor);
   std::vector<Matrix6d> out;
-  for (const auto& odometry : problem.odometry) {
+  for (const auto& [from, to] : state_->steps) {
     // delta_from_to = delta_to - Ad(T_from_to^-1) delta_from; anchored poses do not move.
-    const int u = slots.variable[odometry.from];
-    const int v = slots.variable[odometry.to];
-    const Matrix6d A = adjoint(solution.T_world_body[odometry.to].inverse() * solution.T_world_body[odometry.from]);
+    const int u = slots.variable[from];
+    const int v = slots.variable[to];
+    const Matrix6d A = adjoint(state_->T_world_body[to].inverse() * state_->T_world_body[from]);
     Matrix6d covariance = Matrix6d::Zero();
     if (v >= 0) covariance += inverse.block(v, v);
     if (u >= 0) covariance += A * inverse.block(u, u) * A.transpose();
@@ -222,6 +245,31 @@ std::optional<std::vector<Matrix6d>> odometry_posterior(const BundleProblem& pro
     out.push_back(0.5 * (covariance + covariance.transpose()));
   }
   return out;
+}
+
+Eigen::Matrix3d Posterior::accelerometer_bias(std::size_t keyframe) const {
+  const SingleThread single_thread;
+  const int v = state_->slots.variable[state_->nodes.motion[keyframe] + 1];
+  Eigen::MatrixXd b = Eigen::MatrixXd::Zero(6 * state_->slots.variables, 3);
+  b.block<3, 3>(6 * v, 0).setIdentity();
+  state_->hessian.solve(b);
+  return b.block<3, 3>(6 * v, 0);
+}
+
+double Posterior::variance_of(const std::vector<std::pair<std::size_t, Vector6d>>& gradient) const {
+  const SingleThread single_thread;
+  Eigen::MatrixXd b = Eigen::MatrixXd::Zero(6 * state_->slots.variables, 1);
+  for (const auto& [keyframe, by_pose] : gradient)
+    if (const int v = state_->slots.variable[keyframe]; v >= 0) b.col(0).segment<6>(6 * v) += by_pose;
+  const Eigen::VectorXd g = b.col(0);
+  state_->hessian.solve(b);
+  return g.dot(b.col(0));
+}
+
+std::optional<std::vector<Matrix6d>> odometry_posterior(const BundleProblem& problem, const BundleSolution& solution,
+                                                        const BundleConfig& config) {
+  const auto posterior = Posterior::of(problem, solution, config);
+  return posterior ? posterior->steps() : std::nullopt;
 }
 
 }  // namespace tutti::bundle

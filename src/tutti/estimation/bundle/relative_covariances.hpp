@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "tutti/estimation/bundle/bundle_adjuster.hpp"
@@ -12,10 +14,31 @@ namespace tutti::bundle {
 /// that of noise of which the landmarks have absorbed their share; 1 where they are as good as they say.
 double view_variance(const BundleProblem& problem, const BundleSolution& solution);
 
-/// Covariance of T_from_to (right tangent) between the ends of every odometry factor, in their order: blocks of the
-/// inverse of the joint Gauss-Newton Hessian at the solution, landmarks eliminated (Schur complement), computed on the
-/// pattern of its sparse Cholesky factor alone. Views weigh as the robust loss left them, and less by view_variance()
-/// where that is above 1. Nothing when the problem does not determine every pose.
+/// The joint Gauss-Newton posterior at the solution, landmarks eliminated (Schur complement). Views weigh as the robust
+/// loss left them, and less by view_variance() where that is above 1.
+class Posterior {
+ public:
+  /// Nothing when the problem does not determine every pose.
+  static std::optional<Posterior> of(const BundleProblem& problem, const BundleSolution& solution,
+                                     const BundleConfig& config);
+  Posterior(Posterior&&) noexcept;
+  ~Posterior();
+  /// Covariance of T_from_to (right tangent) between the ends of every odometry factor, in their order: blocks of the
+  /// inverse, computed on the pattern of its sparse Cholesky factor alone. Nothing when that lost its digits.
+  [[nodiscard]] std::optional<std::vector<Matrix6d>> steps() const;
+  /// Of a number that depends on poses: its derivatives by the tangents of some keyframes.
+  [[nodiscard]] double variance_of(const std::vector<std::pair<std::size_t, Vector6d>>& gradient) const;
+
+  /// Covariance of the bias at a keyframe where an IMU factor ends.
+  [[nodiscard]] Eigen::Matrix3d accelerometer_bias(std::size_t keyframe) const;
+
+ private:
+  struct State;
+  explicit Posterior(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// Posterior::steps(); nothing where there is none.
 std::optional<std::vector<Matrix6d>> odometry_posterior(const BundleProblem& problem, const BundleSolution& solution,
                                                         const BundleConfig& config);
 
