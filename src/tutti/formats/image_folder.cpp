@@ -52,18 +52,22 @@ struct CamerasSettings {
 Result<CameraCalibration> to_calibration(const CameraSettings& settings) {
   const auto kind = static_cast<CameraKind>(std::ranges::find(kModels, settings.model) - kModels.begin());
   const std::size_t coefficients = kind == CameraKind::double_sphere ? 2 : 4;
+  const bool is_long =
+      kind == CameraKind::pinhole && (settings.distortion.size() == 5 || settings.distortion.size() == 8);
   if (settings.intrinsics.size() != 4)
     return fail(ErrorCode::configuration, "intrinsics has {} numbers, expected [fx, fy, cx, cy]",
                 settings.intrinsics.size());
-  if (settings.distortion.size() != coefficients && !settings.distortion.empty())
-    return fail(ErrorCode::configuration, "distortion has {} numbers, expected {} for {}", settings.distortion.size(),
-                coefficients, settings.model);
+  if (settings.distortion.size() != coefficients && !settings.distortion.empty() && !is_long)
+    return fail(ErrorCode::configuration, "distortion has {} numbers, expected {}{} for {}", settings.distortion.size(),
+                coefficients, kind == CameraKind::pinhole ? ", 5 or 8 (OpenCV's k1 k2 p1 p2 k3 k4 k5 k6)" : "",
+                settings.model);
   if (settings.T_body_camera.size() != 16)
     return fail(ErrorCode::configuration, "T_body_camera has {} numbers, expected 16", settings.T_body_camera.size());
   const auto& f = settings.intrinsics;
   CameraCalibration out{{{kind, settings.width_px, settings.height_px, f[0], f[1], f[2], f[3], {}}, {}},
                         settings.time_offset_s};
   std::ranges::copy(settings.distortion, out.camera.model.distortion.begin());
+  if (is_long) out.camera.model.kind = CameraKind::rational;
   if (auto ok = check_camera(out.camera.model); !ok) return tl::unexpected(ok.error());
   const auto T_body_camera = internal::pose_from_matrix(settings.T_body_camera);
   if (!T_body_camera) return in_context("T_body_camera", T_body_camera.error());
@@ -86,7 +90,7 @@ Result<Camera> read_euroc_camera(const std::string& path) {
       internal::to_camera_model(
           yaml, *root,
           {yaml.text(*root, "camera_model"), yaml.text(*root, "distortion_model"), yaml.numbers(*root, "resolution", 2),
-           yaml.numbers(*root, "intrinsics", 4), yaml.numbers(*root, "distortion_coefficients", 4)}),
+           yaml.numbers(*root, "intrinsics", 4), yaml.numbers(*root, "distortion_coefficients")}),
       yaml.pose(*root, "T_BS")};
   if (!yaml.status()) return tl::unexpected(yaml.status().error());
   return camera;

@@ -29,8 +29,9 @@ struct CameraCalibration {
 };
 
 /// Our own calibration file: a list `cameras` of `model` (pinhole, equidistant, double_sphere), `width_px`,
-/// `height_px`, `intrinsics` [fx, fy, cx, cy], `distortion` (four numbers, as geometry/camera.hpp orders them; two for
-/// the double sphere; none for none), `T_body_camera` (4 x 4, row by row) and `time_offset_s`.
+/// `height_px`, `intrinsics` [fx, fy, cx, cy], `distortion` (four numbers, as geometry/camera.hpp orders them, of a
+/// pinhole also OpenCV's five or eight; two for the double sphere; none for none), `T_body_camera` (4 x 4, row by row)
+/// and `time_offset_s`.
 Result<std::vector<CameraCalibration>> parse_cameras(const std::string& text, const std::string& name);
 Result<std::vector<CameraCalibration>> read_cameras(const std::string& path);
 

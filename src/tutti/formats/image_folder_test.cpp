@@ -108,6 +108,42 @@ TEST_F(ImageFolder, NoImuIsFine) {
   EXPECT_TRUE(read->imu.empty());
 }
 
+constexpr const char* kTwoCameras = R"(cameras:
+  - model: double_sphere
+    width_px: 752
+    height_px: 480
+    intrinsics: [349.7, 348.7, 365.9, 249.3]
+    distortion: [-0.24, 0.57]
+    T_body_camera: [0, -1, 0, 0.1, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    time_offset_s: 1.0e-6
+  - width_px: 640
+    height_px: 480
+    intrinsics: [300, 300, 320, 240]
+    T_body_camera: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+)";
+
+TEST_F(ImageFolder, OpenCvsFiveAndEightNumbersAreRead) {
+  const std::string four = "[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]", five = "[0.2, -0.9, 0.1, 0.2, 1.1]",
+                    eight = "[0.5, -2.5, 0.1, 0.2, 1.4, 0.4, -2.3, 1.4]";
+  for (const std::string& numbers : {five, eight}) {
+    write("mav0/cam0/sensor.yaml", replaced(kCamera, four, numbers));
+    const auto read = read_euroc_folder(folder_.string());
+    ASSERT_TRUE(read) << read.error().message;
+    const CameraModel& model = read->cameras[0].camera.model;
+    EXPECT_EQ(model.kind, CameraKind::rational);
+    EXPECT_EQ(model.distortion[4], numbers == five ? 1.1 : 1.4);
+    EXPECT_EQ(model.distortion[7], numbers == five ? 0.0 : 1.4);
+    write("cameras.yaml",
+          replaced(kTwoCameras, "[300, 300, 320, 240]", "[300, 300, 320, 240]\n    distortion: " + numbers));
+    const auto ours = read_cameras(path("cameras.yaml"));
+    ASSERT_TRUE(ours) << ours.error().message;
+    EXPECT_EQ((*ours)[1].camera.model.kind, CameraKind::rational);
+    EXPECT_EQ((*ours)[1].camera.model.distortion, model.distortion);
+  }
+  EXPECT_EQ(error_with("mav0/cam0/sensor.yaml", replaced(kCamera, four, "[0.2, -0.9, 0.1]")),
+            "mav0/cam0/sensor.yaml:2: 3 distortion coefficients, expected 4, 5 or 8");
+}
+
 TEST_F(ImageFolder, ErrorsInEurocsFilesSayWhereAndWhat) {
   const std::string cam = "mav0/cam0/sensor.yaml";
   EXPECT_EQ(error_with(cam, replaced(kCamera, "intrinsics: [458.654, ", "intrinsics: [")),
@@ -136,20 +172,6 @@ TEST_F(ImageFolder, ErrorsInEurocsFilesSayWhereAndWhat) {
   EXPECT_EQ(error_with("mav0/x", ""),
             "mav0: there is no folder cam0, expected EuRoC's mav0/cam0 (docs/data.md says where recordings come from)");
 }
-
-constexpr const char* kTwoCameras = R"(cameras:
-  - model: double_sphere
-    width_px: 752
-    height_px: 480
-    intrinsics: [349.7, 348.7, 365.9, 249.3]
-    distortion: [-0.24, 0.57]
-    T_body_camera: [0, -1, 0, 0.1, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
-    time_offset_s: 1.0e-6
-  - width_px: 640
-    height_px: 480
-    intrinsics: [300, 300, 320, 240]
-    T_body_camera: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
-)";
 
 TEST_F(ImageFolder, ReadsOurCamerasAndAListOfImages) {
   write("cameras.yaml", kTwoCameras);

@@ -145,7 +145,7 @@ TEST_F(MaplabSubmaps, KeypointsAndCalibrationAreAsTheFilesSay) {
   ASSERT_EQ(recording->cameras.size(), 1U);
   const Camera& camera = recording->cameras.front();
   EXPECT_EQ(camera.model.height_px, 480);
-  EXPECT_EQ(camera.model.distortion, (std::array<double, 4>{-0.28, 0.07, 0.0001, 0.00001}));
+  EXPECT_EQ(camera.model.distortion, (std::array<double, 8>{-0.28, 0.07, 0.0001, 0.00001}));
   EXPECT_TRUE(test::matrix_near(camera.T_body_camera.translation, Eigen::Vector3d(0.1, 2.0, 0.0), 1e-15));
   EXPECT_TRUE(
       test::matrix_near(camera.T_body_camera.rotation * Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), 1e-15));

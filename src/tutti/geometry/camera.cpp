@@ -10,16 +10,17 @@ namespace tutti {
 namespace {
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using Bernstein = std::array<double, 5>;
+using Distortion = std::array<double, 8>;
 
 /// A polynomial in Bernstein form lies between its smallest and largest coefficient and starts and ends at the outer
 /// ones; de Casteljau's halves come closer and closer to it. What stays undecided touches zero.
-bool is_positive(const Bernstein& b, int halvings_left) {
+template <std::size_t N>
+bool is_positive(const std::array<double, N>& b, int halvings_left) {
   if (!(b.front() > 0.0) || !(b.back() > 0.0)) return false;
   if (std::ranges::min(b) > 0.0) return true;
   if (halvings_left == 0) return false;
-  Bernstein left{};
-  Bernstein right = b;
+  std::array<double, N> left{};
+  std::array<double, N> right = b;
   for (std::size_t i = 0; i < b.size(); ++i) {
     left[i] = right[0];
     for (std::size_t j = 0; j + 1 < b.size() - i; ++j) right[j] = 0.5 * (right[j] + right[j + 1]);
@@ -27,22 +28,44 @@ bool is_positive(const Bernstein& b, int halvings_left) {
   return is_positive(left, halvings_left - 1) && is_positive(right, halvings_left - 1);
 }
 
-/// Distortion of the plane, v to w = v (1 + k1 s + k2 s^2 + k3 s^3 + k4 s^4) + tangential part, with s = |v|^2.
+/// Is the polynomial of these coefficients positive all the way from 0 to s?
+template <std::size_t N>
+bool is_positive_until(double s, const std::array<double, N>& coefficients) {
+  constexpr int kHalvings = 12;
+  const auto choose = [](std::size_t n, std::size_t k) {
+    double out = 1.0;
+    for (std::size_t i = 0; i < k; ++i) out = out * static_cast<double>(n - i) / static_cast<double>(i + 1);
+    return out;
+  };
+  std::array<double, N> b{};
+  double power = 1.0;
+  for (std::size_t i = 0; i < N; ++i, power *= s)
+    for (std::size_t j = i; j < N; ++j) b[j] += choose(j, i) / choose(N - 1, i) * coefficients[i] * power;
+  return is_positive(b, kHalvings);
+}
+
+/// Distortion of the plane, v to w = v n(s) / d(s) + tangential part, with s = |v|^2, n = 1 + k1 s + k2 s^2 + k3 s^3 +
+/// k4 s^4 and d = 1 + d1 s + d2 s^2 + d3 s^3.
 struct PlaneDistortion {
   std::array<double, 4> k{};
   double p1 = 0.0, p2 = 0.0;
+  std::array<double, 3> d{};
 
-  /// Does |w| still grow with |v| all the way from the centre to s? Its derivative is 1 + 3 k1 s + ... + 9 k4 s^4.
+  /// Does |w| still grow with |v| all the way from the centre to s, where d is positive? Without d its derivative is
+  /// 1 + 3 k1 s + ... + 9 k4 s^4; with d (and no k4), times d^2, the sum of (2i + 1 - 2j) k_i d_j s^(i + j).
   [[nodiscard]] bool grows_until(double s) const {
-    constexpr double kBinomial[5][5] = {{1}, {1, 1}, {1, 2, 1}, {1, 3, 3, 1}, {1, 4, 6, 4, 1}};
-    constexpr int kHalvings = 12;
-    Bernstein b{};
-    double power = 1.0;
-    for (std::size_t i = 0; i < b.size(); ++i, power *= s) {
-      const double coefficient = i == 0 ? 1.0 : static_cast<double>(2 * i + 1) * k[i - 1] * power;
-      for (std::size_t j = i; j < b.size(); ++j) b[j] += kBinomial[j][i] / kBinomial[4][i] * coefficient;
+    const std::array<double, 5> n{1.0, k[0], k[1], k[2], k[3]};
+    if (d == std::array<double, 3>{}) {
+      std::array<double, 5> growth = n;
+      for (std::size_t i = 0; i < n.size(); ++i) growth[i] *= static_cast<double>(2 * i + 1);
+      return is_positive_until(s, growth);
     }
-    return is_positive(b, kHalvings);
+    const std::array<double, 4> below{1.0, d[0], d[1], d[2]};
+    std::array<double, 7> growth{};
+    for (std::size_t i = 0; i < below.size(); ++i)
+      for (std::size_t j = 0; j < below.size(); ++j)
+        growth[i + j] += (2.0 * static_cast<double>(i) + 1.0 - 2.0 * static_cast<double>(j)) * n[i] * below[j];
+    return is_positive_until(s, below) && is_positive_until(s, growth);
   }
 
   /// Nothing where it has folded back: there a second v, nearer to the centre, has the same w.
@@ -50,8 +73,12 @@ struct PlaneDistortion {
     const double s = v.squaredNorm();
     const double x = v.x();
     const double y = v.y();
-    const double scale = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])));
-    const double d_scale_d_s = k[0] + s * (2.0 * k[1] + s * (3.0 * k[2] + s * 4.0 * k[3]));
+    const double above = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])));
+    const double d_above = k[0] + s * (2.0 * k[1] + s * (3.0 * k[2] + s * 4.0 * k[3]));
+    const double below = 1.0 + s * (d[0] + s * (d[1] + s * d[2]));
+    const double d_below = d[0] + s * (2.0 * d[1] + s * 3.0 * d[2]);
+    const double scale = above / below;
+    const double d_scale_d_s = (d_above - scale * d_below) / below;
     const double cross = 2.0 * (p1 * x + p2 * y);
     d_w_d_v << 2.0 * p1 * y + 6.0 * p2 * x, cross, cross, 6.0 * p1 * y + 2.0 * p2 * x;
     d_w_d_v += scale * Eigen::Matrix2d::Identity() + 2.0 * d_scale_d_s * v * v.transpose();
@@ -93,9 +120,13 @@ using Direction = std::optional<Eigen::Vector3d>;
 
 // --- pinhole with radial-tangential distortion (Brown 1966) ---
 
-PlaneDistortion radial_tangential(const std::array<double, 4>& d) { return {{d[0], d[1], 0.0, 0.0}, d[2], d[3]}; }
+/// In OpenCV's order; of the plain one the last four are zero.
+PlaneDistortion radial_tangential(const Distortion& d) {
+  return {{d[0], d[1], d[4], 0.0}, d[2], d[3], {d[5], d[6], d[7]}};
+}
+PlaneDistortion of_angle(const Distortion& d) { return {{d[0], d[1], d[2], d[3]}}; }
 
-Projected project_pinhole(const std::array<double, 4>& distortion, const Eigen::Vector3d& p, Matrix23& jacobian) {
+Projected project_pinhole(const Distortion& distortion, const Eigen::Vector3d& p, Matrix23& jacobian) {
   if (!(p.z() > 0.0)) return std::nullopt;
   const Eigen::Vector2d v = p.head<2>() / p.z();
   Eigen::Matrix2d d_w_d_v;
@@ -105,7 +136,7 @@ Projected project_pinhole(const std::array<double, 4>& distortion, const Eigen::
   return w;
 }
 
-Direction unproject_pinhole(const std::array<double, 4>& distortion, const Eigen::Vector2d& w) {
+Direction unproject_pinhole(const Distortion& distortion, const Eigen::Vector2d& w) {
   const auto v = radial_tangential(distortion).inverse(w);
   if (!v) return std::nullopt;
   return Eigen::Vector3d(v->x(), v->y(), 1.0).normalized();
@@ -113,13 +144,13 @@ Direction unproject_pinhole(const std::array<double, 4>& distortion, const Eigen
 
 // --- equidistant fisheye: the angle from the axis is distorted (Kannala and Brandt 2006, eq. 6) ---
 
-Projected project_equidistant(const std::array<double, 4>& distortion, const Eigen::Vector3d& p, Matrix23& jacobian) {
+Projected project_equidistant(const Distortion& distortion, const Eigen::Vector3d& p, Matrix23& jacobian) {
   const double r = p.head<2>().norm();
   if (r == 0.0 && !(p.z() > 0.0)) return std::nullopt;  // straight behind: seen in every direction
   const double angle = std::atan2(r, p.z());
   const Eigen::Vector2d outwards = r > 0.0 ? Eigen::Vector2d(p.head<2>() / r) : Eigen::Vector2d::UnitX();
   Eigen::Matrix2d d_w_d_v;
-  const auto w = PlaneDistortion{distortion}(angle * outwards, d_w_d_v);
+  const auto w = of_angle(distortion)(angle * outwards, d_w_d_v);
   const double angle_by_r = r > 0.0 ? angle / r : 1.0 / p.z();
   const double d_angle_d_r = p.z() / p.squaredNorm();
   Matrix23 d_v_d_p;
@@ -129,8 +160,8 @@ Projected project_equidistant(const std::array<double, 4>& distortion, const Eig
   return w;
 }
 
-Direction unproject_equidistant(const std::array<double, 4>& distortion, const Eigen::Vector2d& w) {
-  const auto v = PlaneDistortion{distortion}.inverse(w);
+Direction unproject_equidistant(const Distortion& distortion, const Eigen::Vector2d& w) {
+  const auto v = of_angle(distortion).inverse(w);
   if (!v || !(v->norm() < std::numbers::pi)) return std::nullopt;
   const double angle = v->norm();
   const Eigen::Vector2d xy = (angle > 0.0 ? std::sin(angle) / angle : 1.0) * *v;
@@ -146,8 +177,8 @@ double double_sphere_limit(double alpha) {
   return -(alpha <= 0.5 ? alpha / (1.0 - alpha) : (1.0 - alpha) / alpha);  // eq. 44
 }
 
-Projected project_double_sphere(const std::array<double, 4>& distortion, const Eigen::Vector3d& p, Matrix23& jacobian) {
-  const auto [xi, alpha, unused_1, unused_2] = distortion;
+Projected project_double_sphere(const Distortion& distortion, const Eigen::Vector3d& p, Matrix23& jacobian) {
+  const double xi = distortion[0], alpha = distortion[1];
   const double d1 = p.norm();
   const double z1 = xi * d1 + p.z();
   const double d2 = std::sqrt(p.head<2>().squaredNorm() + z1 * z1);
@@ -160,8 +191,8 @@ Projected project_double_sphere(const std::array<double, 4>& distortion, const E
   return w;
 }
 
-Direction unproject_double_sphere(const std::array<double, 4>& distortion, const Eigen::Vector2d& w) {
-  const auto [xi, alpha, unused_1, unused_2] = distortion;
+Direction unproject_double_sphere(const Distortion& distortion, const Eigen::Vector2d& w) {
+  const double xi = distortion[0], alpha = distortion[1];
   const double s = w.squaredNorm();
   const double under_root = 1.0 - (2.0 * alpha - 1.0) * s;  // eqs. 46 to 51
   if (!(under_root >= 0.0)) return std::nullopt;
@@ -175,19 +206,22 @@ Direction unproject_double_sphere(const std::array<double, 4>& distortion, const
 
 /// What a kind does at unit focal length. The Jacobian is by the point.
 struct Formula {
-  Projected (*project)(const std::array<double, 4>&, const Eigen::Vector3d&, Matrix23&);
-  Direction (*unproject)(const std::array<double, 4>&, const Eigen::Vector2d&);
+  Projected (*project)(const Distortion&, const Eigen::Vector3d&, Matrix23&);
+  Direction (*unproject)(const Distortion&, const Eigen::Vector2d&);
 };
 
-constexpr std::array<Formula, 3> kFormulas{{
+constexpr std::array<Formula, 4> kFormulas{{
     {project_pinhole, unproject_pinhole},              // CameraKind::pinhole
     {project_equidistant, unproject_equidistant},      // CameraKind::equidistant
     {project_double_sphere, unproject_double_sphere},  // CameraKind::double_sphere
+    {project_pinhole, unproject_pinhole},              // CameraKind::rational
 }};
 
 const Formula& formula(const CameraModel& camera) { return kFormulas.at(static_cast<std::size_t>(camera.kind)); }
 
 }  // namespace
+
+std::size_t distortion_numbers(CameraKind kind) { return kind == CameraKind::rational ? 8 : 4; }
 
 Status check_camera(const CameraModel& camera) {
   const auto kind = static_cast<std::size_t>(camera.kind);
@@ -203,8 +237,10 @@ Status check_camera(const CameraModel& camera) {
   for (std::size_t i = 0; i < camera.distortion.size(); ++i)
     if (!std::isfinite(camera.distortion[i]))
       return fail(ErrorCode::invalid, "distortion coefficient {} is {}", i + 1, camera.distortion[i]);
+  const auto [xi, alpha, third, fourth, k3, k4, k5, k6] = camera.distortion;
+  if (camera.kind != CameraKind::rational && (k3 != 0.0 || k4 != 0.0 || k5 != 0.0 || k6 != 0.0))
+    return fail(ErrorCode::invalid, "more than four coefficients of distortion: only a rational camera has them");
   if (camera.kind != CameraKind::double_sphere) return {};
-  const auto [xi, alpha, third, fourth] = camera.distortion;
   if (!(std::abs(xi) < 1.0) || alpha < 0.0 || alpha > 1.0)
     return fail(ErrorCode::invalid, "double sphere with xi {} and alpha {}; expected -1 < xi < 1 and 0 <= alpha <= 1",
                 xi, alpha);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -14,7 +15,8 @@ namespace tutti {
 enum class CameraKind : std::uint8_t {
   pinhole = 0,        ///< Radial-tangential distortion k1 k2 p1 p2 (Brown 1966; what OpenCV and EuRoC call radtan).
   equidistant = 1,    ///< Fisheye, k1 k2 k3 k4 (Kannala and Brandt 2006).
-  double_sphere = 2,  ///< xi alpha, the other two are zero (Usenko et al. 2018).
+  double_sphere = 2,  ///< xi alpha (Usenko et al. 2018).
+  rational = 3,       ///< Pinhole with OpenCV's k1 k2 p1 p2 k3 k4 k5 k6; its five numbers leave k4 k5 k6 zero.
 };
 
 /// Intrinsics of one camera: z looks forward, x right, y down. Pixels are counted from the centre of the first one.
@@ -23,9 +25,12 @@ struct CameraModel {
   int width_px = 0;
   int height_px = 0;
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< px
-  std::array<double, 4> distortion{};             ///< As its kind says.
+  std::array<double, 8> distortion{};             ///< As its kind says; the others are zero.
   friend bool operator==(const CameraModel&, const CameraModel&) = default;
 };
+
+/// How many numbers of distortion a camera of this kind has where it is stored: four, but for the rational one, eight.
+std::size_t distortion_numbers(CameraKind kind);
 
 /// Size and focal lengths are positive, everything is finite and in the range that its formula allows.
 Status check_camera(const CameraModel& camera);

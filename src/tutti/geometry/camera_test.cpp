@@ -33,17 +33,28 @@ std::vector<CameraModel> cameras() {
       {double_sphere, 752, 480, 349.726, 348.694, 365.894, 249.330, {-0.24102305, 0.56697041, 0.0, 0.0}},
       {double_sphere, 512, 512, 158.0, 158.0, 254.0, 256.0, {-0.18, 0.59, 0.0, 0.0}},
       {double_sphere, 640, 480, 313.2, 313.1, 638.7 / 2, 236.0, {0.7, 0.4, 0.0, 0.0}},
+      // TUM's fr1, five numbers; an Azure Kinect's colour camera, eight, of which most cancels.
+      {rational, 640, 480, 517.306, 516.469, 318.643, 255.314, {0.262383, -0.953104, -0.005358, 0.002628, 1.163314}},
+      {rational,
+       1280,
+       720,
+       607.8,
+       607.5,
+       637.8,
+       366.9,
+       {0.5437, -2.5634, 5.2e-4, -1.4e-4, 1.4863, 0.4196, -2.3956, 1.4166}},
   };
 }
 
 /// Any lens at all, most of them no good ones: what they do give must still be true.
 CameraModel wild_camera(Rng& rng) {
-  CameraModel camera{static_cast<CameraKind>(rng.index(3)), 640, 480, 300.0, 310.0, 320.0, 240.0, {}};
+  CameraModel camera{static_cast<CameraKind>(rng.index(4)), 640, 480, 300.0, 310.0, 320.0, 240.0, {}};
   const bool sphere = camera.kind == CameraKind::double_sphere;
   if (sphere) camera.distortion = {rng.uniform(-0.99, 0.99), rng.uniform(0.0, 1.0), 0.0, 0.0};
   if (!sphere)
     for (double& d : camera.distortion) d = rng.normal(0.2);
-  if (camera.kind == CameraKind::pinhole)
+  if (camera.kind != CameraKind::rational) std::fill(camera.distortion.begin() + 4, camera.distortion.end(), 0.0);
+  if (camera.kind == CameraKind::pinhole || camera.kind == CameraKind::rational)
     for (const std::size_t i : {2, 3}) camera.distortion[i] = 0.0;  // real lenses are nearly centred
   return camera;
 }
@@ -130,7 +141,7 @@ RC_GTEST_PROP(Camera, JacobianIsTheDerivative, (std::uint64_t seed)) {
 TEST(Camera, KindsAreWhatTheirNamesSay) {
   const double angle = 0.8;
   const Eigen::Vector3d direction(std::sin(angle), 0.0, std::cos(angle));
-  const auto u = [&](CameraKind kind, std::array<double, 4> distortion) {
+  const auto u = [&](CameraKind kind, std::array<double, 8> distortion) {
     return project({kind, 10, 10, 1.0, 1.0, 0.0, 0.0, distortion}, direction).value().x();
   };
   EXPECT_NEAR(u(CameraKind::pinhole, {}), std::tan(angle), 1e-15);
@@ -144,7 +155,7 @@ TEST(Camera, KindsAreWhatTheirNamesSay) {
 }
 
 TEST(Camera, RadialTangentialFollowsBrown) {
-  const std::array<double, 4> d{-0.2, 0.05, 0.003, -0.002};
+  const std::array<double, 8> d{-0.2, 0.05, 0.003, -0.002};
   const double x = 0.3;
   const double y = -0.4;
   const double s = x * x + y * y;
@@ -154,6 +165,33 @@ TEST(Camera, RadialTangentialFollowsBrown) {
   const auto pixel = project({CameraKind::pinhole, 10, 10, 1.0, 1.0, 0.0, 0.0, d}, {2.0 * x, 2.0 * y, 2.0});
   ASSERT_TRUE(pixel.has_value());
   EXPECT_TRUE(matrix_near(*pixel, expected, 1e-15));
+}
+
+TEST(Camera, TheRationalOneFollowsOpenCv) {
+  const std::array<double, 8> d{0.5437, -2.5634, 5.2e-4, -1.4e-4, 1.4863, 0.4196, -2.3956, 1.4166};
+  const double x = 0.3, y = -0.2, s = x * x + y * y;
+  const double radial =
+      (1.0 + d[0] * s + d[1] * s * s + d[4] * s * s * s) / (1.0 + d[5] * s + d[6] * s * s + d[7] * s * s * s);
+  const Eigen::Vector2d expected(radial * x + 2.0 * d[2] * x * y + d[3] * (s + 2.0 * x * x),
+                                 radial * y + d[2] * (s + 2.0 * y * y) + 2.0 * d[3] * x * y);
+  const auto pixel = project({CameraKind::rational, 10, 10, 1.0, 1.0, 0.0, 0.0, d}, {2.0 * x, 2.0 * y, 2.0});
+  ASSERT_TRUE(pixel.has_value());
+  EXPECT_TRUE(matrix_near(*pixel, expected, 1e-15));
+}
+
+TEST(Camera, ARationalOneEndsAtItsPoleAndWhereItFolds) {
+  const auto sees = [](const std::array<double, 8>& d, double x) {
+    return project({CameraKind::rational, 640, 480, 300.0, 300.0, 320.0, 240.0, d}, {x, 0.0, 1.0}).has_value();
+  };
+  const std::array<double, 8> pole{0.0, 0.0, 0.0, 0.0, 0.0, -0.25, 0.0, 0.0};  // 1 / (1 - s / 4): endless at 2
+  EXPECT_TRUE(sees(pole, 1.99));
+  for (const double x : {2.01, 3.0, 10.0}) EXPECT_FALSE(sees(pole, x)) << x;
+  const std::array<double, 8> folds{0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0};  // x / (1 + x^2) grows until 1
+  EXPECT_TRUE(sees(folds, 0.99));
+  for (const double x : {1.01, 3.0}) EXPECT_FALSE(sees(folds, x)) << x;
+  const std::array<double, 8> fifth{0.0, 0.0, 0.0, 0.0, -1.0 / 7.0, 0.0, 0.0, 0.0};  // x - x^7 / 7 grows until 1
+  EXPECT_TRUE(sees(fifth, 0.99));
+  for (const double x : {1.01, 3.0}) EXPECT_FALSE(sees(fifth, x)) << x;
 }
 
 TEST(Camera, NothingIsSeenBehindAPinhole) {
@@ -221,6 +259,7 @@ TEST(Camera, BadCalibrationsAreRefusedByName) {
   EXPECT_TRUE(has(refusal(pinhole, [](auto& c) { c.fy = kNan; }), "nan"));
   EXPECT_TRUE(has(refusal(pinhole, [](auto& c) { c.cx = kInfinity; }), "principal point inf"));
   EXPECT_TRUE(has(refusal(pinhole, [](auto& c) { c.distortion[2] = kNan; }), "coefficient 3"));
+  EXPECT_TRUE(has(refusal(pinhole, [](auto& c) { c.distortion[4] = 0.1; }), "more than four coefficients"));
   EXPECT_TRUE(has(refusal(sphere, [](auto& c) { c.distortion[0] = 1.0; }), "xi 1"));
   EXPECT_TRUE(has(refusal(sphere, [](auto& c) { c.distortion[1] = 1.1; }), "alpha 1.1"));
   EXPECT_TRUE(has(refusal(sphere, [](auto& c) { c.distortion[3] = 0.1; }), "two coefficients"));

@@ -72,6 +72,8 @@ TEST(VisualCodec, CamerasAloneAndNothingAtAllComeBack) {
   EXPECT_EQ(decode_submap(encode(message))->submap.visual, nullptr);
   auto blind = std::make_shared<VisualPayload>();
   blind->cameras = test::any_visual(rng, message.submap).cameras;
+  blind->cameras.back().model.kind = CameraKind::rational;
+  blind->cameras.back().model.distortion = {0.26, -0.95, -0.005, 0.003, 1.16, 0.1, 0.2, 0.3};
   message.submap.visual = blind;
   const auto decoded = decode_submap(encode(message));
   ASSERT_TRUE(decoded.has_value()) << decoded.error().message;

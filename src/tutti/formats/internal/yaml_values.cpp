@@ -41,12 +41,18 @@ double YamlValues::positive(const ConfigNode& map, std::string_view key) {
 }
 
 std::vector<double> YamlValues::numbers(const ConfigNode& map, std::string_view key, std::size_t count) {
+  auto out = numbers(map, key);
+  if (out.size() != count)
+    complain(at(map, key), ErrorCode::parse, "{} has {} numbers, expected {}", key, out.size(), count);
+  if (!status_) out.assign(count, 0.0);
+  return out;
+}
+
+std::vector<double> YamlValues::numbers(const ConfigNode& map, std::string_view key) {
   const ConfigNode& node = at(map, key);
   const ConfigNode& data = node.kind == ConfigNode::Kind::map ? at(node, "data") : node;
   std::vector<const ConfigNode*> scalars;
   collect_scalars(data, scalars);
-  if (scalars.size() != count)
-    complain(data, ErrorCode::parse, "{} has {} numbers, expected {}", key, scalars.size(), count);
   std::vector<double> out;
   for (const ConfigNode* scalar : scalars) {
     const auto value = parse_number(scalar->scalar);
@@ -54,7 +60,6 @@ std::vector<double> YamlValues::numbers(const ConfigNode& map, std::string_view 
       complain(*scalar, ErrorCode::parse, "{}: {} stands there, expected a finite number", key, shown(scalar->scalar));
     out.push_back(value.value_or(0.0));
   }
-  if (!status_) out.assign(count, 0.0);
   return out;
 }
 
@@ -87,6 +92,14 @@ CameraModel to_camera_model(YamlValues& yaml, const ConfigNode& where, const For
   out.fy = camera.intrinsics[1];
   out.cx = camera.intrinsics[2];
   out.cy = camera.intrinsics[3];
+  const std::size_t coefficients = camera.coefficients.size();
+  const bool is_long = out.kind == CameraKind::pinhole && (coefficients == 5 || coefficients == 8);
+  if (coefficients != 4 && !is_long) {
+    yaml.complain(where, ErrorCode::parse, "{} distortion coefficients, expected 4{}", coefficients,
+                  out.kind == CameraKind::pinhole ? ", 5 or 8" : "");
+    return {};
+  }
+  if (is_long) out.kind = CameraKind::rational;
   std::ranges::copy(camera.coefficients, out.distortion.begin());
   if (auto ok = check_camera(out); !ok) yaml.complain(where, ok.error().code, "{}", ok.error().message);
   return out;

@@ -24,6 +24,8 @@ class YamlValues {
   double positive(const ConfigNode& map, std::string_view key);
   /// A list, or a list of rows, or a matrix with rows, cols and data: row by row. All are finite.
   std::vector<double> numbers(const ConfigNode& map, std::string_view key, std::size_t count);
+  /// The same, as many as there are.
+  std::vector<double> numbers(const ConfigNode& map, std::string_view key);
   /// A homogeneous 4 x 4 matrix.
   Pose3 pose(const ConfigNode& map, std::string_view key);
 
@@ -42,7 +44,7 @@ struct ForeignCamera {
   std::string model, distortion_model;
   std::vector<double> size_px;       ///< Width, height.
   std::vector<double> intrinsics;    ///< fx, fy, cx, cy
-  std::vector<double> coefficients;  ///< Four.
+  std::vector<double> coefficients;  ///< Four; of radial-tangential also OpenCV's five or eight.
 };
 
 /// EuRoC and maplab call the same things by these names: pinhole with radial-tangential or equidistant. What cannot be

@@ -167,7 +167,7 @@ void pass(A& a, Camera& camera) {
   pass(a, model.width_px);
   pass(a, model.height_px);
   for (double* x : {&model.fx, &model.fy, &model.cx, &model.cy}) a.number(*x);
-  for (double& x : model.distortion) a.number(x);
+  for (std::size_t i = 0; i < distortion_numbers(model.kind); ++i) a.number(model.distortion[i]);
   pass(a, camera.T_body_camera);
 }
 template <class A>

@@ -221,11 +221,11 @@ Status decode_body(const v1::Visual& in, std::uint32_t first_keyframe, VisualPay
 template <class Number>
 void for_each_number(Camera& camera, Number number) {
   for (double* x : {&camera.model.fx, &camera.model.fy, &camera.model.cx, &camera.model.cy}) number(*x);
-  for (double& x : camera.model.distortion) number(x);
+  for (std::size_t i = 0; i < distortion_numbers(camera.model.kind); ++i) number(camera.model.distortion[i]);
   for (double& x : camera.T_body_camera.rotation.coeffs()) number(x);
   for (double& x : camera.T_body_camera.translation) number(x);
 }
-constexpr int kCameraNumbers = 15;
+int camera_numbers(CameraKind kind) { return 11 + static_cast<int>(distortion_numbers(kind)); }
 
 /// Of the covariance the lower triangle, so whatever arrives is symmetric.
 template <class Number>
@@ -244,13 +244,13 @@ void for_each_number(ImuPreintegration& imu, Number number) {
 constexpr int kImuNumbers = 1 + 4 + 12 + 45 + 54;
 
 Result<Camera> decode_camera(const v1::VisualCamera& in) {
-  if (in.number_size() != kCameraNumbers)
-    return fail(ErrorCode::parse, "a camera of {} numbers, expected {}", in.number_size(), kCameraNumbers);
   if (in.kind() > 0xff || in.width_px() > kMaxImageSide_px || in.height_px() > kMaxImageSide_px)
     return fail(ErrorCode::invalid, "a camera of kind {} with {} x {} pixels", in.kind(), in.width_px(),
                 in.height_px());
   Camera camera;
   camera.model.kind = static_cast<CameraKind>(in.kind());
+  if (const int expected = camera_numbers(camera.model.kind); in.number_size() != expected)
+    return fail(ErrorCode::parse, "a camera of {} numbers, expected {}", in.number_size(), expected);
   camera.model.width_px = static_cast<int>(in.width_px());
   camera.model.height_px = static_cast<int>(in.height_px());
   int next = 0;
