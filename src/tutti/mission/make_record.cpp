@@ -71,6 +71,9 @@ MissionRecord make_record(const FinishedMission& mission) {
     robot.explanation = finished.explanation;
     robot.proxy_nodes = static_cast<std::size_t>(
         std::ranges::count_if(broadcast.nodes, [&](const ProxyNode& node) { return node.chain.robot == robot.id; }));
+    if (finished.outcome.recording->recording.visual != nullptr && !robot.images)
+      robot.unused_images =
+          finished.refused_images.empty() ? "the notes below say what is known" : finished.refused_images;
     for (const auto& [id, submap] : server.state().submaps) robot.submaps += id.chain.robot == robot.id ? 1 : 0;
   }
   record.warnings = warnings_of(record);

@@ -23,6 +23,7 @@ struct FinishedRobot {
   std::vector<UpdateRecord> updates;
   std::optional<consistency::Explanation> explanation;  ///< Of the last update.
   std::vector<std::string> troubles;
+  std::string refused_images;          ///< Why images were refused, the first time.
   std::vector<TrafficRecord> traffic;  ///< Without bytes_per_s.
 };
 

@@ -156,6 +156,7 @@ struct RobotRecord {
   std::vector<WhereaboutsRecord> whereabouts;
   std::vector<DriftOrigin> drift_origins;  ///< Where its odometry really went wrong; empty when unknown.
   std::optional<ImagesRecord> images;      ///< Nothing when no submap has any.
+  std::string unused_images;               ///< Of a robot with a camera and no such submap: why, if it is known.
   /// What it saw, put together by raw odometry and laid rigidly on the reference (without one: on the server's
   /// estimate); thinned. Empty without a range sensor.
   PointCloud onboard_cloud;

@@ -73,6 +73,9 @@ void note_inconsistent_closures(const server::MapEstimate& map, MissionRecord& r
 std::vector<std::string> warnings_of(const MissionRecord& record) {
   std::vector<std::string> out;
   std::size_t submaps = 0;
+  for (const RobotRecord& robot : record.robots)
+    if (!robot.unused_images.empty())
+      out.push_back(fmt::format("{}: none of its images are used: {}", robot.name, robot.unused_images));
   for (const RobotRecord& robot : record.robots) {
     submaps += robot.submaps;
     if (robot.submaps == 0 && robot.keyframes > 0)

@@ -23,6 +23,13 @@ MissionRecord joined() {
 
 TEST(Warnings, NoneForAMapThatIsTied) { EXPECT_TRUE(warnings_of(joined()).empty()); }
 
+TEST(Warnings, ImagesThatNobodyUsesComeFirst) {
+  MissionRecord record = joined();
+  record.robots[1].unused_images = "stamps of another clock";
+  record.robots[0].submaps = 0;
+  EXPECT_EQ(warnings_of(record).at(0), "bravo: none of its images are used: stamps of another clock");
+}
+
 TEST(Warnings, EveryPairRefusedByOneGate) {
   MissionRecord record = joined();
   record.server.closures.clear();

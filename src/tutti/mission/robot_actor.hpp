@@ -77,6 +77,8 @@ class RobotActor {
   [[nodiscard]] std::vector<std::string> troubles() const;
   /// Fails when scans were asked for and all of them failed.
   [[nodiscard]] Status check_scans() const;
+  /// Why images were refused, the first time; empty when none were.
+  [[nodiscard]] const std::string& refused_images() const { return refused_images_.first; }
 
  private:
   struct Member {

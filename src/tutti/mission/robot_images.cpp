@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -56,6 +57,32 @@ double typical_gap_s(const std::vector<Timestamp>& stamps) {
   const auto middle = gaps.begin() + std::ssize(gaps) / 2;
   std::ranges::nth_element(gaps, middle);
   return *middle;
+}
+
+/// A recording none of whose first images can be read has none.
+Status check_first_images(const std::vector<formats::ImageFile>& files) {
+  constexpr std::size_t kTried = 5;
+  Status first;
+  for (std::size_t i = 0; i < std::min(kTried, files.size()); ++i) {
+    const auto image = formats::read_image(files[i].path);
+    if (image) return {};
+    if (first) first = in_context("images: none of the first can be read", image.error());
+  }
+  return first;
+}
+
+/// At the rate of most of them, how many images are not there.
+std::string note_gaps(const std::vector<Timestamp>& stamps) {
+  constexpr double kUsualShare = 0.1;  // gaps are rather too long than too short
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < stamps.size(); ++i) gaps.push_back(stamps[i] - stamps[i - 1]);
+  if (gaps.empty()) return {};
+  std::ranges::sort(gaps);
+  const double usual_s = gaps[static_cast<std::size_t>(kUsualShare * static_cast<double>(gaps.size() - 1))];
+  double missing = 0.0;
+  for (const double gap_s : gaps) missing += std::max(0.0, std::round(gap_s / usual_s) - 1.0);
+  if (usual_s <= 0.0 || missing < 0.05 * static_cast<double>(stamps.size())) return {};
+  return fmt::format("; at {:.1f} Hz {:.0f} more would have been taken", 1.0 / usual_s, missing);
 }
 
 Result<std::vector<ImuSample>> read_imu(const ImagesConfig& config, const fs::path& data) {
@@ -115,11 +142,13 @@ Result<RobotImages> open_images(const ImagesConfig& config, const fs::path& data
     folder->cameras.erase(folder->cameras.begin() + config.most_cameras, folder->cameras.end());
   for (formats::CameraImages& camera : folder->cameras)
     for (formats::ImageFile& image : camera.images) image.stamp = image.stamp + config.time_offset_s;
+  if (auto ok = check_first_images(folder->cameras.front().images); !ok) return tl::unexpected(ok.error());
   ImageStream stream = formats::stream_images(std::move(folder->cameras), tracking.max_stamp_difference_s);
   RobotImages out{.visual = nullptr, .imu = std::move(folder->imu), .imu_noise = folder->imu_noise, .note = {}};
   out.note = fmt::format("{} images of {}, {}", stream.stamps.size(),
                          stream.cameras.size() == 1 ? "one camera" : "each of two cameras",
                          out.imu.empty() ? "no IMU" : "and an IMU");
+  out.note += note_gaps(stream.stamps);
   Trajectory moments;
   if (config.own_stamps || typical_gap_s(stamps_of(odometry)) < kFaster * typical_gap_s(stream.stamps))
     for (const Timestamp stamp : stream.stamps)

@@ -32,7 +32,8 @@ Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const 
 /// Images of config.euroc_folder or .list, which points are followed through; those of the odometry's samples are
 /// served, or all of them where odometry is faster than they are, and with config.own_stamps. Files that are not there
 /// or say nothing sensible are an error that names them; images whose stamps are not the odometry's are not: then the
-/// source has none and says why, and the robot goes on with odometry alone.
+/// source has none and says why, and the robot goes on with odometry alone. A recording whose first five images cannot
+/// be read is an error, too.
 Result<RobotImages> open_images(const ImagesConfig& config, const std::filesystem::path& data,
                                 const Trajectory& odometry, const visual::TrackingConfig& tracking);
 

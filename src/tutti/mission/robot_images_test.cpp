@@ -117,7 +117,7 @@ TEST_F(RobotImages, AListWithACamerasFileIsTheSame) {
 
 TEST_F(RobotImages, StampsOfAnotherClockAreSaidAndTheOffsetIsASetting) {
   config_.robots[0].images.time_offset_s = 0.03;
-  EXPECT_NE(first_error().find("add -0.0300 s"), std::string::npos) << first_error();
+  EXPECT_NE(first_error().find("add -0.0300 "), std::string::npos) << first_error();
   EXPECT_NE(first_error().find("images.time_offset_s is 0.03"), std::string::npos) << first_error();
   config_.robots[0].images.time_offset_s = -1'403'636'000.0;
   EXPECT_NE(first_error().find("begin 1403636000.000 s before"), std::string::npos) << first_error();
@@ -125,6 +125,8 @@ TEST_F(RobotImages, StampsOfAnotherClockAreSaidAndTheOffsetIsASetting) {
   EXPECT_TRUE(has_note(record, "a: 1 times images refused, the first because: images from")) << all_notes(record);
   EXPECT_EQ(record.robots[0].submaps, 2U);
   EXPECT_FALSE(record.robots[0].images.has_value());
+  ASSERT_FALSE(record.warnings.empty());
+  EXPECT_EQ(record.warnings[0].find("a: none of its images are used: images from"), 0U) << record.warnings[0];
   // Images of a camera that counts from another second.
   auto& images = config_.robots[0].images;
   images = {.list = "late.csv", .cameras = "cameras.yaml", .time_offset_s = -0.03};
@@ -150,6 +152,39 @@ TEST_F(RobotImages, LostImagesAreLostAloneAndNamed) {
   EXPECT_TRUE(has_note(record, "hall/mav0/cam0/data/0.png")) << all_notes(record);
   ASSERT_TRUE(record.robots[0].images.has_value());
   EXPECT_GT(record.robots[0].images->landmarks_per_keyframe, 20.0);
+}
+
+TEST_F(RobotImages, ARecordingWithoutAReadableImageIsRefused) {
+  std::ofstream list(folder() / "nowhere.csv");
+  for (int i = 0; i <= 3 * kRate_hz; ++i) list << fmt::format("{},nowhere/{}.png\n", (kStart + i / kRate_hz).ns, i);
+  list.close();
+  config_.robots[0].images = {.list = "nowhere.csv", .cameras = "cameras.yaml"};
+  EXPECT_NE(first_error().find("robot a: images: none of the first can be read: "), std::string::npos) << first_error();
+  EXPECT_NE(first_error().find("nowhere/0.png"), std::string::npos) << first_error();
+}
+
+TEST_F(RobotImages, MissingRowsAndACameraOnItsSideAreSaidOfEveryRobot) {
+  std::ifstream good(folder() / "cameras.yaml");
+  std::string text((std::istreambuf_iterator<char>(good)), {});
+  const Eigen::Quaterniond ahead((Eigen::Matrix3d() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished());
+  const Eigen::Quaterniond lying(ahead * Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitZ()));
+  text = text.substr(0, text.find("T_body_camera")) + "T_body_camera: " + test::matrix_of({lying, {0.0, 0.055, 0.0}}) +
+         "}\n";
+  std::ofstream(folder() / "lying.yaml") << text;
+  std::ofstream list(folder() / "half.csv");
+  for (int i = 0; i <= 4 * kRate_hz; ++i)
+    if (i % 4 < 2) list << fmt::format("{0},hall/mav0/cam0/data/{0}.png\n", (kStart + i / kRate_hz).ns);
+  list.close();
+  config_.robots[0].images = {.list = "list.csv", .cameras = "lying.yaml"};
+  config_.robots.push_back(config_.robots[0]);
+  config_.robots[1].name = "b";
+  for (const MissionRecord record = run(); const char* name : {"a", "b"})
+    EXPECT_TRUE(has_note(record, fmt::format("{}: 1 times images refused", name))) << all_notes(record);
+  for (RobotConfig& robot : config_.robots) robot.images.list = "half.csv", robot.images.cameras = "cameras.yaml";
+  for (const MissionRecord record = run(); const char* name : {"a", "b"}) {
+    EXPECT_TRUE(has_note(record, fmt::format("{}: 17 images of one camera, no IMU; at 8.0 Hz", name)))
+        << all_notes(record);
+  }
 }
 
 TEST_F(RobotImages, AWrongCalibrationIsSaidBeforeAnythingIsMerged) {

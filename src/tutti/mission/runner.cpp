@@ -313,6 +313,7 @@ MissionRecord MissionRun::record() const {
                               .updates = actor.updates(),
                               .explanation = actor.explanation(),
                               .troubles = actor.troubles(),
+                              .refused_images = actor.refused_images(),
                               .traffic = traffic_of(actor.recording())});
   }
   MissionRecord record = make_record(mission);

@@ -5,9 +5,15 @@
 #include <cmath>
 #include <utility>
 
+#include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 
 namespace tutti::visual {
+namespace {
+
+constexpr std::size_t kFew = 10;  // pairs, of which nothing is said
+
+}  // namespace
 
 double epipolar_error_rad(const Pose3& T_first_second, const Eigen::Vector3d& ray_first,
                           const Eigen::Vector3d& ray_second) {
@@ -33,15 +39,17 @@ void ClockCheck::add(Timestamp stamp, const TrackedImage& image) {
   seen_ = std::move(now);
 }
 
-std::optional<double> ClockCheck::error_rad(const Trajectory& odometry, double offset_s) const {
+std::optional<double> ClockCheck::error_rad(const Trajectory& odometry, double offset_s, double roll_rad) const {
   constexpr double kWrongTrack_rad = 0.05;
   double sum = 0.0;
   std::size_t rays = 0, pairs = 0;
+  Pose3 T_body_camera = camera_.T_body_camera;
+  T_body_camera.rotation = T_body_camera.rotation * so3_exp(roll_rad * Eigen::Vector3d::UnitZ());
   for (const Pair& pair : pairs_) {
     const auto first = pose_at(odometry, pair.first + offset_s), second = pose_at(odometry, pair.second + offset_s);
     if (!first || !second) continue;
     ++pairs;
-    const Pose3 T = (*first * camera_.T_body_camera).inverse() * *second * camera_.T_body_camera;
+    const Pose3 T = (*first * T_body_camera).inverse() * *second * T_body_camera;
     for (const auto& [a, b] : pair.rays) sum += std::min(epipolar_error_rad(T, a, b), kWrongTrack_rad);
     rays += pair.rays.size();
   }
@@ -49,14 +57,26 @@ std::optional<double> ClockCheck::error_rad(const Trajectory& odometry, double o
   return sum / static_cast<double>(rays);
 }
 
+std::optional<int> ClockCheck::roll_deg(const Trajectory& odometry) const {
+  const auto as_stated = error_rad(odometry, 0.0, 0.0);
+  if (!as_stated || pairs_.size() < kFew) return std::nullopt;
+  std::optional<int> best;
+  double least = kConvincing * *as_stated;
+  for (const int degrees : {90, 180, 270})
+    if (const auto error = error_rad(odometry, 0.0, degrees * kRadPerDeg); error && *error < least) {
+      least = *error;
+      best = degrees;
+    }
+  return best;
+}
+
 std::optional<double> ClockCheck::offset_s(const Trajectory& odometry) const {
-  constexpr std::size_t kFew = 10;
-  const auto as_stamped = error_rad(odometry, 0.0);
+  const auto as_stamped = error_rad(odometry, 0.0, 0.0);
   if (!as_stamped || pairs_.size() < kFew) return std::nullopt;
   double best_s = 0.0, least = kConvincing * *as_stamped;
   const int steps = static_cast<int>(std::lround(kLargest_s / kStep_s));
   for (int i = -steps; i <= steps; ++i) {
-    const auto error = error_rad(odometry, i * kStep_s);
+    const auto error = error_rad(odometry, i * kStep_s, 0.0);
     if (!error || *error >= least) continue;
     least = *error;
     best_s = i * kStep_s;

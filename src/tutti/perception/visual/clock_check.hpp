@@ -34,14 +34,19 @@ class ClockCheck {
   /// What to add to the images' stamps, s, where that makes them fit the odometry far better than they do; nothing
   /// where they fit, or cannot tell.
   [[nodiscard]] std::optional<double> offset_s(const Trajectory& odometry) const;
+  /// By how much the camera seems to be turned about its optical axis against Camera::T_body_camera, 90, 180 or 270
+  /// degrees, where that fits the odometry far better than none; nothing where it fits, or cannot tell: straight ahead
+  /// along the axis all turns are alike.
+  [[nodiscard]] std::optional<int> roll_deg(const Trajectory& odometry) const;
 
  private:
   struct Pair {
     Timestamp first, second;
     std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> rays;  ///< Unit, camera frame.
   };
-  /// Mean error with the stamps so much later; nothing when hardly a pair lies within the odometry.
-  [[nodiscard]] std::optional<double> error_rad(const Trajectory& odometry, double offset_s) const;
+  /// Mean error with the stamps so much later and the camera so turned about its axis; nothing when hardly a pair lies
+  /// within the odometry.
+  [[nodiscard]] std::optional<double> error_rad(const Trajectory& odometry, double offset_s, double roll_rad) const;
 
   Camera camera_;
   Timestamp last_;

@@ -20,8 +20,8 @@ Pose3 pose(double time_s, bool turns) {
 }
 
 /// Of images taken `late_s` after their stamps, every 0.2 s for 16 s.
-ClockCheck watched(double late_s, bool turns = true) {
-  ClockCheck check(kCamera);
+ClockCheck watched(double late_s, bool turns = true, const Camera& stated = kCamera) {
+  ClockCheck check(stated);
   Rng rng(2);
   for (int i = 0; i <= 80; ++i) {
     const double stamp_s = 1.0 + 0.2 * i;
@@ -30,17 +30,29 @@ ClockCheck watched(double late_s, bool turns = true) {
   return check;
 }
 
-Trajectory odometry(bool turns = true) {
+Trajectory odometry(bool turns = true, double rate_hz = 20.0) {
   Trajectory out;
-  for (int i = 0; i <= 360; ++i) out.push_back({Timestamp{} + 0.05 * i, pose(0.05 * i, turns)});
+  for (int i = 0; i <= static_cast<int>(18.0 * rate_hz); ++i)
+    out.push_back({Timestamp{} + i / rate_hz, pose(i / rate_hz, turns)});
   return out;
 }
 
 TEST(ClockCheck, FindsTheOffset) {
-  for (const double late_s : {-0.2, 0.06, 0.3}) {
-    const auto offset_s = watched(late_s).offset_s(odometry());
-    ASSERT_TRUE(offset_s.has_value()) << late_s;
-    EXPECT_NEAR(*offset_s, late_s, 0.021);
+  for (const double late_s : {-0.2, -0.1, 0.1, 0.3}) {
+    for (const double rate_hz : {10.0, 20.0, 200.0}) {
+      const auto offset_s = watched(late_s).offset_s(odometry(true, rate_hz));
+      ASSERT_TRUE(offset_s.has_value()) << late_s << " s at " << rate_hz << " Hz";
+      EXPECT_NEAR(*offset_s, late_s, 0.021) << rate_hz;
+    }
+  }
+}
+
+TEST(ClockCheck, FindsACameraTurnedAboutItsAxis) {
+  for (const int degrees : {0, 90, 180, 270}) {
+    Camera stated = kCamera;  // the images are kCamera's
+    stated.T_body_camera.rotation =
+        stated.T_body_camera.rotation * so3_exp(-degrees * kRadPerDeg * Eigen::Vector3d::UnitZ());
+    EXPECT_EQ(watched(0.0, true, stated).roll_deg(odometry()), degrees == 0 ? std::nullopt : std::optional(degrees));
   }
 }
 

@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -21,8 +25,20 @@ std::size_t nearest(const std::vector<Timestamp>& stamps, Timestamp stamp) {
   return i > 0 && stamp - stamps[i - 1] <= stamps[i] - stamp ? i - 1 : i;
 }
 
+/// The median; 0 of fewer than two.
+double typical_gap_s(const std::vector<Timestamp>& stamps) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < stamps.size(); ++i) gaps.push_back(stamps[i] - stamps[i - 1]);
+  if (gaps.empty()) return 0.0;
+  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
+  std::ranges::nth_element(gaps, middle);
+  return *middle;
+}
+
 /// Are most samples within the stream images' stamps, or most images within the odometry samples'?
-Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odometry, double tolerance_s) {
+/// Where not, what the motion in the images says of their clock (ClockCheck::offset_s) is asked for.
+Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odometry, double tolerance_s,
+                    const std::function<std::optional<double>()>& by_motion) {
   if (stamps.empty() || odometry.empty())
     return fail(ErrorCode::invalid, "{} images and {} odometry samples, expected some of each", stamps.size(),
                 odometry.size());
@@ -48,11 +64,41 @@ Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odom
     std::ranges::nth_element(offsets, at);
     return *at;
   };
+  const double nearest_s = quantile(0.5), gap_s = typical_gap_s(stamps);
+  const std::string found = fmt::format("of {} odometry samples that could have an image {} have one within {} s",
+                                        possible, matched, tolerance_s);
+  if (const auto moved_s = by_motion()) {
+    // Whole gaps between images more bring them to samples, too: those that the motion asks for.
+    const double whole_s = nearest_s + gap_s * std::round((*moved_s - nearest_s) / std::max(gap_s, 1e-6));
+    const double advice_s = std::abs(whole_s - *moved_s) <= ClockCheck::kStep_s ? whole_s : *moved_s;
+    return fail(ErrorCode::invalid,
+                "{}; points move through the images as if these were taken {:.2f} s {} their stamps: to come to the "
+                "odometry's clock, add {:.4f} s to them?",
+                found, std::abs(*moved_s), *moved_s > 0.0 ? "after" : "before", advice_s);
+  }
   return fail(ErrorCode::invalid,
-              "of {} odometry samples that could have an image {} have one within {} s: to come to the nearest sample, "
-              "add {:.4f} s to the images' stamps (median; {:.4f} to {:.4f} for the middle half); is that the offset "
-              "of their clocks?",
-              possible, matched, tolerance_s, quantile(0.5), quantile(0.25), quantile(0.75));
+              "{}: to come to the nearest sample, add {:.4f} or {:.4f} s to the images' stamps (medians; {:.4f} to "
+              "{:.4f} for the middle half of the former), which is the offset of their clocks or none; the stamps do "
+              "not tell, nor does what moves in the images",
+              found, nearest_s, nearest_s + (nearest_s > 0.0 ? -gap_s : gap_s), quantile(0.25), quantile(0.75));
+}
+
+/// Follows the images at their own stamps as far as it takes to see by how much their clock is off; images that cannot
+/// be read are passed over.
+std::optional<double> watched_offset_s(const ImageStream& stream, const Trajectory& odometry,
+                                       const TrackerConfig& config) {
+  const std::vector<Camera> first(1, stream.cameras.front());
+  VisualTracker tracker(first, config);
+  ClockCheck clock(first.front());
+  for (std::size_t moment = 0; moment < stream.stamps.size() && clock.pairs() < ClockCheck::kPairs; ++moment) {
+    const Timestamp stamp = stream.stamps[moment];
+    if (stamp < odometry.front().stamp || stamp > odometry.back().stamp) continue;
+    const auto image = stream.load(moment, 0);
+    if (!image || !check_sizes({&*image, 1}, first)) continue;
+    const auto tracked = tracker.track({&*image, 1}, false);
+    if (!tracked.empty()) clock.add(stamp, tracked.front());
+  }
+  return clock.offset_s(odometry);
 }
 
 }  // namespace
@@ -63,7 +109,8 @@ Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream stream,
     return fail(ErrorCode::unsupported, "{} cameras, expected one or two", stream.cameras.size());
   for (const Camera& camera : stream.cameras)
     if (auto ok = check_camera(camera.model); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_stamps(stream.stamps, odometry, config.max_stamp_difference_s); !ok)
+  const auto by_motion = [&] { return watched_offset_s(stream, odometry, config.tracker); };
+  if (auto ok = check_stamps(stream.stamps, odometry, config.max_stamp_difference_s, by_motion); !ok)
     return tl::unexpected(ok.error());
   return std::shared_ptr<TrackingSource>(new TrackingSource(std::move(stream), std::move(odometry), config));
 }
@@ -106,6 +153,11 @@ void TrackingSource::check_clock() {
                                          "{:.2f} s {} their stamps: to come to the odometry's clock, "
                                          "add {:.2f} s to them?",
                                          std::abs(*offset_s), *offset_s > 0.0 ? "after" : "before", *offset_s)});
+  else if (const auto roll_deg = clock_.roll_deg(odometry_))
+    errors_.push_back({ErrorCode::invalid,
+                       fmt::format("points move through the images as if the camera was turned by {} degrees about its "
+                                   "optical axis against T_body_camera",
+                                   *roll_deg)});
 }
 
 std::vector<TrackedImage> TrackingSource::track(std::size_t moment, bool keyframe) {

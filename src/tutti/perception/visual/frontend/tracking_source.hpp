@@ -28,10 +28,11 @@ struct TrackingConfig {
 
 /// Follows points through all images of a stream and serves those of the odometry's samples. Samples are asked for one
 /// after the other; after a jump forward (a restart) tracks begin anew, a sample asked for again has no images. Among
-/// the errors is, once, a clock of the images that is not the odometry's.
+/// the errors is, once, a clock of the images that is not the odometry's, or a camera turned about its optical axis.
 class TrackingSource : public VisualSource {
  public:
-  /// Fails when the stream's stamps are not those of the odometry, saying by how much they differ.
+  /// Fails when the stream's stamps are not those of the odometry, saying by how much they differ: by the motion in the
+  /// images where that tells, as stamps alone know it up to whole gaps between images.
   static Result<std::shared_ptr<TrackingSource>> open(ImageStream stream, Trajectory odometry,
                                                       const TrackingConfig& config);
 

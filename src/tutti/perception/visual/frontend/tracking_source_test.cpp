@@ -119,8 +119,9 @@ TEST(TrackingSource, StampsOfAnotherClockAreRefusedWithTheOffset) {
   EXPECT_EQ(
       shifted.error().message,
       "of 10 odometry samples that could have an image 0 have one within 0.005 s: to come to the nearest sample, add "
-      "-0.0200 s to the images' stamps (median; -0.0200 to -0.0200 for the middle half); is that the offset of their "
-      "clocks?");
+      "-0.0200 or 0.0300 s to the images' stamps (medians; -0.0200 to -0.0200 for the middle half of the former), "
+      "which "
+      "is the offset of their clocks or none; the stamps do not tell, nor does what moves in the images");
   const auto elsewhere = TrackingSource::open(wall(41, -3600.0), straight(11, 0.2), {});
   ASSERT_FALSE(elsewhere.has_value());
   EXPECT_NE(elsewhere.error().message.find("the images begin 3600.000 s before the odometry"), std::string::npos);
