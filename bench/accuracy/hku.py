@@ -16,7 +16,7 @@ def run(arguments, mission, seed, *assignments):
     command = [arguments.tutti, "run", mission_file(mission), "--data", arguments.data, "--seed", seed]
     for assignment in assignments:
         command += ["--set", assignment]
-    return report_of(*command)
+    return report_of(*command, keep=arguments.keep)
 
 
 def corrected(report, robot):
@@ -87,6 +87,7 @@ def main():
     parser.add_argument("tutti")
     parser.add_argument("--data", required=True)
     parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--keep", help="folder for finished runs, which are not repeated")
     arguments = parser.parse_args()
     text = [
         "# HKU: two real LiDAR recordings of one place",

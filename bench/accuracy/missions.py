@@ -3,7 +3,7 @@
 """Runs the missions once (and the demo) with all policies side by side and writes docs/results/missions.md; tunnel and
 terrace are in paper.py.
 
-Usage: bench/accuracy/missions.py TUTTI_PROGRAM --data FOLDER [--seed 1]
+Usage: bench/accuracy/missions.py TUTTI_PROGRAM --data FOLDER [--seed 1] [--keep FOLDER]
 docs/data.md says what FOLDER holds.
 """
 import argparse
@@ -43,6 +43,7 @@ def main():
     parser.add_argument("tutti")
     parser.add_argument("--data", required=True)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--keep", help="folder for finished runs, which are not repeated")
     arguments = parser.parse_args()
     text = [
         "# All missions, all policies", "",
@@ -53,10 +54,11 @@ def main():
         f"`paper.md`. Every run: `--set {compare(*COMPETITORS)}`.", "",
     ]
     options = ["--seed", arguments.seed, "--set", compare(*COMPETITORS)]
-    text += section(report_of(arguments.tutti, "demo", *options))
+    text += section(report_of(arguments.tutti, "demo", *options, keep=arguments.keep))
     for name in sorted(file.stem for file in (SOURCE / "missions").glob("*.yaml")
                        if file.stem not in ("demo", "tunnel", "terrace")):
-        text += section(report_of(arguments.tutti, "run", mission_file(name), "--data", arguments.data, *options))
+        text += section(report_of(arguments.tutti, "run", mission_file(name), "--data", arguments.data, *options,
+                                  keep=arguments.keep))
     write_results("missions.md", text)
 
 

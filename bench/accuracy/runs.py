@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the accuracy scripts share: one run of tutti as JSON, and rows of Markdown tables."""
+import hashlib
 import json
 import pathlib
 import subprocess
@@ -27,11 +28,22 @@ def without_partial(report):
     return report
 
 
-def report_of(*command):
-    """report.json of one call of the program, without partial figures; its output folder is thrown away."""
+def report_of(*command, keep=None):
+    """report.json of one call of the program, without partial figures. Its output folder is thrown away; the report stays in
+    the folder `keep`, if there is one, and then the same call is not made again (use a new folder for a new program)."""
+    words = [str(part) for part in command]
+    kept = pathlib.Path(keep) / (hashlib.sha256(json.dumps(words).encode()).hexdigest()[:16] + ".json") if keep else None
+    if kept and kept.exists():
+        return without_partial(json.loads(kept.read_text()))
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([str(part) for part in command] + ["--out", out], check=True, capture_output=True)
-        return without_partial(json.loads((pathlib.Path(out) / "report.json").read_text()))
+        subprocess.run(words + ["--out", out], check=True, capture_output=True)
+        text = (pathlib.Path(out) / "report.json").read_text()
+    if kept:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = kept.with_suffix(".unfinished")
+        unfinished.write_text(text)
+        unfinished.rename(kept)
+    return without_partial(json.loads(text))
 
 
 def outcome_of(out, *command):
