@@ -22,6 +22,15 @@ constexpr double kNothing = 1e-9;
 /// refused by this share of all votes. Otherwise refused closures are strewn about, as wrong ones are.
 constexpr double kStrained = 1.0;
 constexpr double kManyRefused = 0.1;
+/// Where solutions begin is solved to this share of the cost: with wrong closures in it the rest takes most of the
+/// steps, and says nothing.
+constexpr double kBeginning = 1e-3;
+
+/// With nothing let go or refused.
+PoseGraphSolution beginning(const PoseGraph& graph, GncConfig gnc) {
+  gnc.solver.relative_cost_tolerance = std::max(kBeginning, gnc.solver.relative_cost_tolerance);
+  return internal::least_squares(graph, gnc);
+}
 
 }  // namespace
 
@@ -40,7 +49,7 @@ HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryWays& o
     if (reduced_.roles[e] == EdgeRole::trusted) runs_.push_back(e);
   std::ranges::sort(runs_, {}, [&](std::size_t e) { return reduced_.graph.edges[e].from; });
   count_votes();
-  all_held_ = internal::least_squares(reduced_.graph, gnc_);
+  all_held_ = beginning(reduced_.graph, gnc_);
   work_.factorisations += static_cast<std::size_t>(all_held_.summary.factorisations);
 }
 
@@ -103,9 +112,8 @@ Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
   PoseGraph graph = reduced_.graph;
   for (const auto& group : hypothesis.wrong)
     for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
-  return judge(
-      std::move(hypothesis),
-      counted(internal::truncated_least_squares(graph, gnc_, truncation, internal::least_squares(graph, gnc_)), 0));
+  return judge(std::move(hypothesis),
+               counted(internal::truncated_least_squares(graph, gnc_, truncation, beginning(graph, gnc_)), 0));
 }
 
 Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const {
