@@ -4,6 +4,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <optional>
+#include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/chain_uncertainty.hpp"
@@ -23,6 +26,7 @@ constexpr double kLeastSpacing_m = 0.1;
 constexpr double kArm_m = 5.0;
 constexpr double kPartedSpacings = 2.0;    // nearer than that, the next node shows it
 constexpr double kWholeStep = 1.0 - 1e-6;  // poses that are just the spacing apart, but for rounding
+constexpr double kMargin = 0.9;            // of the tolerance: with the links B is nearer to A than that
 constexpr double kLeastStep_m = 0.01;      // of way, for the covariance of a motion: standing still is not exact
 
 /// A moment that both sides know.
@@ -131,6 +135,36 @@ evaluation::AteResult lay_on(const Trajectory& judge, Trajectory& trajectory) {
   return *fit;
 }
 
+using Choose = std::function<std::vector<consistency::Constraint>(double error_share)>;
+
+/// Bends B by the fewest links with which its nodes are as near A as A is sure of itself (RMSE), with a margin: what it
+/// takes to be nearer than that is wasted. `choose` lets each node be off by a share of that: the largest is looked for
+/// that does; with the least one where that does not, either.
+void fix(const std::vector<consistency::RobotNode>& nodes, const CompareTrajectoriesConfig& config,
+         const Choose& choose, TrajectoryComparison& out) {
+  constexpr double kLeastShare = 0.25, kMostShare = 6.0;
+  constexpr int kHalvings = 5;
+  const Trajectory judged = out.judged;
+  const auto bend = [&](std::vector<consistency::Constraint> links) {
+    out.constraints = std::move(links);
+    out.corrected = judged;
+    if (!out.constraints.empty()) correct(nodes, out);
+    out.kink = evaluation::kink(judged, out.corrected).value_or(evaluation::Kink{});
+    out.after = lay_on(out.judge, out.corrected);
+    return out.after.rmse_m <= kMargin * config.tolerance_m;
+  };
+  if (!bend(choose(kLeastShare)) || out.constraints.empty()) return;
+  auto fewest = out.constraints;
+  double reaches = kLeastShare, fails = kMostShare;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double share = std::sqrt(reaches * fails);
+    const bool is_near = bend(choose(share));
+    (is_near ? reaches : fails) = share;
+    if (is_near && out.constraints.size() < fewest.size()) fewest = out.constraints;
+  }
+  bend(std::move(fewest));
+}
+
 Status check_covariances(const NamedTrajectory& b) {
   TUTTI_CHECK(b.step_covariance.empty() || b.step_covariance.size() + 1 == b.poses.size());
   for (std::size_t k = 0; k < b.step_covariance.size(); ++k)
@@ -173,19 +207,18 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
   const consistency::DisagreementTest test(graph, kRobot, comparison.pairs, 1,
                                            {.false_alarm_rate = config.false_alarm_rate});
   const consistency::Disagreement found = test(consistency::odometry_at(robot, comparison.pairs));
-  const auto chooser = consistency::make_policy("adaptive", {});
-  TUTTI_CHECK(chooser.has_value());
   const consistency::Ledger nothing_held;
-  out.constraints = (*chooser)
-                        ->choose({graph, kRobot, robot, comparison, std::nullopt, Rng(0), nothing_held, &test, &found})
-                        .constraints;
+  const auto choose = [&](double error_share) {
+    const auto policy = consistency::make_policy("adaptive", {.adaptive_error_share = error_share});
+    TUTTI_CHECK(policy.has_value());
+    return (*policy)
+        ->choose({graph, kRobot, robot, comparison, std::nullopt, Rng(0), nothing_held, &test, &found})
+        .constraints;
+  };
+  fix(robot, config, choose, out);
   out.explanation = consistency::explain(graph, kRobot, robot, comparison.pairs, test, found, config.false_alarm_rate);
 
-  out.corrected = out.judged;
-  if (!out.constraints.empty()) correct(robot, out);
-  if (const auto kink = evaluation::kink(out.judged, out.corrected)) out.kink = *kink;
   out.before = lay_on(out.judge, out.judged);
-  out.after = lay_on(out.judge, out.corrected);
   return out;
 }
 

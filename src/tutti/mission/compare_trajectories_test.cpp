@@ -165,10 +165,13 @@ TEST(CompareTrajectories, RealOdometryAgainstGroundTruth) {
     return formats::read_trajectory(test::shared_path(std::string("data/euroc/MH_03/") + name)).value();
   };
   const auto c = compare_trajectories({"", read("groundtruth.tum"), {}}, {"", read("rpg_vio_mono.tum"), {}},
-                                      {.tolerance_m = 0.01, .tolerance_deg = 0.2});
+                                      {.tolerance_m = 0.02, .tolerance_deg = std::atan(0.02 / 5.0) / kRadPerDeg});
   ASSERT_TRUE(c) << c.error().message;
   EXPECT_TRUE(c->explanation.disagrees());
-  EXPECT_LT(c->after.rmse_m, 0.3 * c->before.rmse_m);
+  // docs/compare.md: as near as was asked, not nearer, and with as few links as that takes.
+  EXPECT_LE(c->after.rmse_m, 0.9 * 0.02);
+  EXPECT_GE(c->after.rmse_m, 0.5 * 0.02);
+  EXPECT_NEAR(static_cast<double>(c->constraints.size()), 67.0, 5.0);
 }
 
 }  // namespace compare_trajectories_test
