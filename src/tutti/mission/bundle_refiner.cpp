@@ -67,9 +67,22 @@ void remark_on_imu(const std::vector<bundle::ImuRun>& runs, std::vector<Refineme
   }
 }
 
+void remark_on_stereo(const std::vector<bundle::StereoScale>& scales, std::vector<RefinementRemark>& out) {
+  for (const bundle::StereoScale& scale : scales) {
+    if (!scale.is_refused) continue;
+    out.push_back(
+        {scale.robot,
+         fmt::format("its cameras together have its way {:.3f} times as long as its odometry, +-{:.3f}: check the "
+                     "baseline, the rotation between the cameras and the focal lengths, or the odometry's "
+                     "scale; the adjustment believes its first camera alone",
+                     scale.ratio, scale.sigma)});
+  }
+}
+
 std::vector<RefinementRemark> remarks_on(const bundle::Refinement& refined) {
   std::vector<RefinementRemark> out;
   remark_on_imu(refined.imu, out);
+  remark_on_stereo(refined.stereo, out);
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "support/mission/asl_folder.hpp"
 #include "tutti/formats/trajectory_file.hpp"
@@ -99,6 +100,23 @@ TEST_F(RobotImages, AnEurocFolderBecomesSubmapsWithLandmarks) {
     EXPECT_GT(images->reprojection_rms_px, 0.05);
     EXPECT_LT(images->reprojection_rms_px, 0.6);
   }
+}
+
+/// The odometry is the true way; the calibration has the second camera 40 % too far from the first.
+TEST_F(RobotImages, ABaselineThatOdometryContradictsIsTold) {
+  const fs::path wrong = folder() / "wrong";
+  fs::copy(folder() / "hall", wrong, fs::copy_options::recursive);
+  const fs::path sensor = wrong / "mav0/cam1/sensor.yaml";
+  std::stringstream text;
+  text << std::ifstream(sensor).rdbuf();
+  std::string told = text.str();
+  const std::size_t at = told.find("-0.055");
+  ASSERT_NE(at, std::string::npos) << told;
+  std::ofstream(sensor) << told.replace(at, 6, "-0.099");
+  EXPECT_FALSE(has_note(run(), "its cameras together"));
+  config_.robots[0].images.euroc_folder = "wrong";
+  const MissionRecord record = run();
+  EXPECT_TRUE(has_note(record, "a: its cameras together have its way 1.")) << all_notes(record);
 }
 
 TEST_F(RobotImages, AListWithACamerasFileIsTheSame) {

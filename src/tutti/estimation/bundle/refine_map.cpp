@@ -39,6 +39,9 @@ Result<Refinement> refine_map(const RefinementInput& input, const RefinementConf
   auto merged = merge_landmarks(input.submaps, matches, config.merge);
   if (!merged) return tl::unexpected(merged.error());
   Refinement out;
+  auto stereo = judge_stereo(merged->problem, merged->odometry, config.bundle, config.stereo);
+  if (!stereo) return tl::unexpected(stereo.error());
+  out.stereo = std::move(*stereo);
   auto solution = adjust_with_believed_imu(merged->problem, config.bundle, out.imu);
   if (!solution) return tl::unexpected(solution.error());
 

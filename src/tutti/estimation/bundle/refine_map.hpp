@@ -9,6 +9,7 @@
 #include "tutti/estimation/bundle/guided_matches.hpp"
 #include "tutti/estimation/bundle/imu_trial.hpp"
 #include "tutti/estimation/bundle/landmark_merge.hpp"
+#include "tutti/estimation/bundle/stereo_scale.hpp"
 
 namespace tutti::bundle {
 
@@ -16,11 +17,13 @@ struct RefinementConfig {
   GuidedMatchConfig matching;
   MergeConfig merge;
   BundleConfig bundle;
+  StereoConfig stereo;
   template <class V>
   void describe(V& v) {
     v.field("matching", matching);
     v.field("merge", merge);
     v.field("bundle", bundle);
+    v.field("stereo", stereo);
   }
 };
 
@@ -47,6 +50,7 @@ struct Refinement {
   double rms_before_px = 0.0;  ///< Of the adjusted problem's views, without those that no pixel sees.
   double rms_after_px = 0.0;
   std::vector<ImuRun> imu;
+  std::vector<StereoScale> stereo;
   MergeSummary merge;
   AdjustmentSummary adjustment;
 };

@@ -10,10 +10,10 @@ WayScale way_scale(const std::vector<ComparedStep>& steps, const BundleSolution&
   std::vector<std::pair<std::size_t, Vector6d>> gradient;
   for (const ComparedStep& step : steps) {
     const Pose3 T_from_to = solution.T_world_body[step.from].inverse() * solution.T_world_body[step.to];
-    square_m2 += step.expected.squaredNorm();
-    product_m2 += step.expected.dot(T_from_to.translation);
+    square_m2 += step.weight * step.expected.squaredNorm();
+    product_m2 += step.weight * step.expected.dot(T_from_to.translation);
     Vector6d by_step = Vector6d::Zero();  // a step's translation moves by R_from_to rho
-    by_step.head<3>() = T_from_to.rotation.conjugate() * step.expected;
+    by_step.head<3>() = step.weight * (T_from_to.rotation.conjugate() * step.expected);
     gradient.emplace_back(step.to, by_step);  // delta_from_to = delta_to - Ad(T_from_to^-1) delta_from
     gradient.emplace_back(step.from, -adjoint(T_from_to.inverse()).transpose() * by_step);
   }

@@ -14,6 +14,7 @@ struct ComparedStep {
   std::size_t from = 0;
   std::size_t to = 0;
   Eigen::Vector3d expected = Eigen::Vector3d::Zero();  ///< Translation of T_from_to by somebody else, m.
+  double weight = 1.0;
 };
 
 /// By how much a solution makes steps longer than expected: the least-squares factor between the two, long steps first,

@@ -27,6 +27,8 @@ struct SceneOptions {
   ImuNoise imu_noise;
   ImuBias imu_bias{{0.02, -0.05, 0.08}, {0.1, -0.2, 0.05}};
   bool imu = false;
+  int cameras = 1;      ///< The second one 0.2 m to the right of the first,
+  Pose3 T_second_told;  ///< ... and where the calibration has it: by this from there, in its frame.
 };
 
 inline constexpr double kKeyframePeriod_s = 1.0;
@@ -50,7 +52,7 @@ inline ImuSample scene_imu(double t, int keyframes_per_circle) {
           now.rotation.conjugate() * (a - kSceneGravity)};
 }
 
-inline Camera scene_camera() {
+inline Camera scene_camera(int number = 0) {
   Eigen::Matrix3d R;  // camera z is the body's x, camera x its -y
   R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   return {{.kind = CameraKind::pinhole,
@@ -61,7 +63,7 @@ inline Camera scene_camera() {
            .cx = 375.5,
            .cy = 239.5,
            .distortion = {-0.2, 0.05, 1e-4, -1e-4}},
-          {Eigen::Quaterniond(R), {0.05, -0.02, 0.03}}};
+          {Eigen::Quaterniond(R), {0.05, -0.02 - 0.2 * number, 0.03}}};
 }
 
 struct Scene {
@@ -136,10 +138,10 @@ class SceneMaker {
   }
 
   /// What keyframe k sees: the same pixels whoever asks.
-  const std::map<std::size_t, Eigen::Vector2f>& views(int k) {
-    const auto [it, is_new] = views_.try_emplace(k);
+  const std::map<std::size_t, Eigen::Vector2f>& views(int k, int number) {
+    const auto [it, is_new] = views_.try_emplace({k, number});
     if (!is_new) return it->second;
-    const Camera camera = scene_camera();
+    const Camera camera = scene_camera(number);
     const Pose3 T_camera_world = (scene_.truth[static_cast<std::size_t>(k)] * camera.T_body_camera).inverse();
     for (std::size_t i = 0; i < scene_.points.size(); ++i) {
       const Eigen::Vector3d p = T_camera_world * scene_.points[i];
@@ -157,7 +159,11 @@ class SceneMaker {
     auto submap = std::make_shared<Submap>();
     auto visual = std::make_shared<VisualPayload>();
     submap->id = {RobotId{0}, index};
-    visual->cameras = {scene_camera()};
+    for (int c = 0; c < options_.cameras; ++c) visual->cameras.push_back(scene_camera(c));
+    if (options_.cameras > 1) {
+      Pose3& told = visual->cameras[1].T_body_camera;
+      told = told * options_.T_second_told;
+    }
     visual->descriptors = {.kind = DescriptorKind::orb, .words = 2, .bits = {}};
     std::map<std::size_t, std::uint32_t> landmarks;
     PosedSubmap posed;
@@ -168,28 +174,34 @@ class SceneMaker {
                                    .T_odom_body = T_odom_body_[at]});
       if (k > first) submap->odometry.push_back(odometry_[at - 1]);
       posed.T_world_body.push_back(start_[at]);
-      VisualFrame frame{.keyframe = static_cast<std::uint32_t>(k), .camera = 0, .observations = {}};
-      for (const auto& [point, pixel] : views(k)) {
-        const auto [it, is_new] = landmarks.try_emplace(point, static_cast<std::uint32_t>(landmarks.size()));
-        if (is_new) {
-          const Pose3 T_submap_world = scene_.truth[static_cast<std::size_t>(first)].inverse();
-          visual->landmarks.push_back(
-              {(T_submap_world * scene_.points[point] + test::random_vector(rng_, 0.05)).cast<float>(), 0.05F});
-          scene_.point_of[{submap->id, it->second}] = point;
-        }
-        frame.observations.push_back({.pixel = pixel,
-                                      .sigma_px = static_cast<float>(std::max(options_.pixel_sigma, 0.1)),
-                                      .landmark = it->second,
-                                      .descriptor = static_cast<std::uint32_t>(visual->descriptors.size())});
-        for (const std::uint64_t word : descriptors_[point])  // a few bits differ from image to image
-          visual->descriptors.bits.push_back(word ^ (1ULL << rng_.index(64)) ^ (1ULL << rng_.index(64)));
-      }
-      visual->frames.push_back(std::move(frame));
+      for (int c = 0; c < options_.cameras; ++c) add_frame(k, c, first, *submap, landmarks, *visual);
     }
     add_imu(*submap, *visual);
     submap->visual = std::move(visual);
     posed.submap = std::move(submap);
     scene_.input.submaps.push_back(std::move(posed));
+  }
+
+  void add_frame(int k, int number, int first, const Submap& submap, std::map<std::size_t, std::uint32_t>& landmarks,
+                 VisualPayload& visual) {
+    VisualFrame frame{
+        .keyframe = static_cast<std::uint32_t>(k), .camera = static_cast<std::uint32_t>(number), .observations = {}};
+    for (const auto& [point, pixel] : views(k, number)) {
+      const auto [it, is_new] = landmarks.try_emplace(point, static_cast<std::uint32_t>(landmarks.size()));
+      if (is_new) {
+        const Pose3 T_submap_world = scene_.truth[static_cast<std::size_t>(first)].inverse();
+        visual.landmarks.push_back(
+            {(T_submap_world * scene_.points[point] + test::random_vector(rng_, 0.05)).cast<float>(), 0.05F});
+        scene_.point_of[{submap.id, it->second}] = point;
+      }
+      frame.observations.push_back({.pixel = pixel,
+                                    .sigma_px = static_cast<float>(std::max(options_.pixel_sigma, 0.1)),
+                                    .landmark = it->second,
+                                    .descriptor = static_cast<std::uint32_t>(visual.descriptors.size())});
+      for (const std::uint64_t word : descriptors_[point])  // a few bits differ from image to image
+        visual.descriptors.bits.push_back(word ^ (1ULL << rng_.index(64)) ^ (1ULL << rng_.index(64)));
+    }
+    visual.frames.push_back(std::move(frame));
   }
 
   void add_imu(const Submap& submap, VisualPayload& visual) {
@@ -208,7 +220,7 @@ class SceneMaker {
   std::vector<std::array<std::uint64_t, 2>> descriptors_;  ///< Per point.
   std::vector<RelativePose> odometry_;
   std::vector<ImuSample> samples_;
-  std::map<int, std::map<std::size_t, Eigen::Vector2f>> views_;
+  std::map<std::pair<int, int>, std::map<std::size_t, Eigen::Vector2f>> views_;
 };
 
 inline Scene make_scene(const SceneOptions& options, std::uint64_t seed) { return SceneMaker(options, seed).make(); }

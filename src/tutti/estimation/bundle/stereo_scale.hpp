@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "tutti/base/config.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/estimation/bundle/bundle_adjuster.hpp"
+
+namespace tutti::bundle {
+
+struct StereoConfig {
+  double odometry_scale_sigma = 0.02;
+  double max_sigmas = 3.0;
+  template <class V>
+  void describe(V& v) {
+    v.field("odometry_scale_sigma", odometry_scale_sigma, at_least(0.0),
+            "By how much odometry may be wrong in scale all along its way, beside its covariance.");
+    v.field(
+        "max_sigmas", max_sigmas, greater_than(0.0),
+        "Where a robot's cameras together make its way longer or shorter than its odometry by more than so many "
+        "standard deviations, only one of them is believed: its calibration may be wrong, and its odometry gives the "
+        "scale.");
+  }
+};
+
+/// A robot's way by what several cameras see at once, over that by its odometry.
+struct StereoScale {
+  RobotId robot;
+  double ratio = 1.0;
+  double sigma = 0.0;  ///< Of the ratio: pixels, the odometry's covariance and odometry_scale_sigma.
+  bool is_refused = false;
+};
+
+/// Measures that of every robot with several cameras, by its own images alone: its odometry says how it turned, and
+/// nothing of how far it went. Where the two contradict each other, the views of all but the robot's first camera are
+/// dropped from the problem. `odometry`: as the robots gave it, in the order of problem.odometry.
+Result<std::vector<StereoScale>> judge_stereo(BundleProblem& problem, const std::vector<RelativePose>& odometry,
+                                              const BundleConfig& config, const StereoConfig& stereo);
+
+}  // namespace tutti::bundle
