@@ -74,9 +74,9 @@ TEST(RealMissions, ADivergedRobotHarmsNobody) {
   config.robots.pop_back();  // the diverged one
   const MissionRecord without = run(config, 1);
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_NEAR(*with.robots[i].server.rmse_m, *without.robots[i].server.rmse_m, 0.01);
-    EXPECT_NEAR(*corrected(with, with.robots[i]).accuracy.rmse_m,
-                *corrected(without, without.robots[i]).accuracy.rmse_m, 0.01);
+    EXPECT_LT(*with.robots[i].server.rmse_m, *without.robots[i].server.rmse_m + 0.01);
+    EXPECT_LT(*corrected(with, with.robots[i]).accuracy.rmse_m,
+              *corrected(without, without.robots[i]).accuracy.rmse_m + 0.01);
   }
 }
 

@@ -50,7 +50,9 @@ class Optimiser {
   explain() const {
     PoseGraph graph = map_.graph;
     graph.edges.insert(graph.edges.end(), closure_edges_.begin(), closure_edges_.end());
-    const estimation::OdometryWays odometry(graph.poses.size(), map_.graph.edges);
+    std::vector<double> seconds;
+    for (const MapNode& node : map_.nodes) seconds.push_back(node.stamp - map_.nodes.front().stamp);
+    const estimation::OdometryWays odometry(seconds, map_.graph.edges);
     std::vector<std::size_t> all(closures_.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
     const auto groups = closure_groups(map_.nodes, closure_edges_, all,

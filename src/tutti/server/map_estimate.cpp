@@ -123,7 +123,7 @@ constexpr double kRightAfterAll = 0.999;
 
 /// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A stretch that
 /// turns out to have been right, nearly or within its own doubt, is no failure.
-void record_failure(const estimation::FailedStretch& failed, double min_jump_m, MapEstimate& map) {
+void record_failure(const estimation::FailedStretch& failed, MapEstimate& map) {
   const MapNode &a = map.nodes[failed.from], &b = map.nodes[failed.to];
   Matrix6d covariance = Matrix6d::Zero();
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
@@ -134,7 +134,6 @@ void record_failure(const estimation::FailedStretch& failed, double min_jump_m, 
   }
   const Vector6d jump = local(a.T_odom_body.inverse() * b.T_odom_body, a.T_world_body.inverse() * b.T_world_body);
   const double jump_m = jump.head<3>().norm(), jump_rad = jump.tail<3>().norm();
-  if (estimation::failure_size(jump_m, jump_rad) < 0.5 * min_jump_m) return;
   if (jump.dot(covariance.llt().solve(jump)) < chi_square_quantile(kRightAfterAll, 6)) return;
   map.failed_odometry.push_back({a.id.chain, a.id.index, b.id.index, jump_m, jump_rad});
   weaken(map.graph, map, failed.from, failed.to, jump_m, jump_rad);
@@ -148,7 +147,7 @@ void label_components(MapEstimate& map) {
   map.components = static_cast<std::uint32_t>(count);
 }
 
-void adopt(const Optimum& optimum, double min_jump_m, MapEstimate& map) {
+void adopt(const Optimum& optimum, MapEstimate& map) {
   for (const std::size_t edge : optimum.fitting) {
     map.graph.edges.push_back(optimum.graph.edges[edge]);
     map.closures[optimum.closure_of_edge[edge - map.odometry_edges]].accepted = true;
@@ -156,7 +155,7 @@ void adopt(const Optimum& optimum, double min_jump_m, MapEstimate& map) {
   for (std::size_t c = 0; c < map.closures.size(); ++c) map.closures[c].objection = optimum.objections[c];
   map.graph.poses = optimum.robust.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
-  for (const estimation::FailedStretch& failed : optimum.failed) record_failure(failed, min_jump_m, map);
+  for (const estimation::FailedStretch& failed : optimum.failed) record_failure(failed, map);
 }
 
 }  // namespace
@@ -233,7 +232,7 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   for (std::size_t c = 0; c < closures.judged.size(); ++c)
     map.closures.push_back({stated[c], false, closures.certain[c], Objection::no_map});
   map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
-  if (map.converged) adopt(optimum, config.who_is_wrong.min_jump_m, map);
+  if (map.converged) adopt(optimum, map);
   for (const LoopClosure& closure : closures.rejected)
     map.closures.push_back({closure, false, true, Objection::operators});
   std::ranges::stable_sort(

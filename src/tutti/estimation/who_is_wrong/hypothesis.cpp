@@ -22,6 +22,8 @@ constexpr double kNothing = 1e-9;
 /// refused by this share of all votes. Otherwise refused closures are strewn about, as wrong ones are.
 constexpr double kStrained = 1.0;
 constexpr double kManyRefused = 0.1;
+/// Odometry fails by no more than a body would get to at this many times the usual speed.
+constexpr double kReach = 10.0;
 /// Where solutions begin is solved to this share of the cost: with wrong closures in it the rest takes most of the
 /// steps, and says nothing.
 constexpr double kBeginning = 1e-3;
@@ -85,8 +87,8 @@ Window HypothesisSolver::around(std::size_t run) const {
   Window out{run, run};
   const auto is_near = [&](std::size_t other) {
     return odometry_.piece(begin_of(other)) == odometry_.piece(begin_of(run)) &&
-           std::max(odometry_.way_m(begin_of(run)) - odometry_.way_m(end_of(other)),
-                    odometry_.way_m(begin_of(other)) - odometry_.way_m(end_of(run))) < config_.search_m;
+           std::max(odometry_.seconds(begin_of(run)) - odometry_.seconds(end_of(other)),
+                    odometry_.seconds(begin_of(other)) - odometry_.seconds(end_of(run))) < config_.search_s;
   };
   while (out.first > 0 && is_near(out.first - 1)) --out.first;
   while (out.last + 1 < runs_.size() && is_near(out.last + 1)) ++out.last;
@@ -157,7 +159,18 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const
   return out;
 }
 
+/// What a stretch pays for how far it failed, in truncations. An error is as likely to be of any size, to a factor,
+/// along each of its six axes, up to what a body can do: the logarithm of that density over that of odometry's own
+/// errors.
+double HypothesisSolver::votes_for(const FailedStretch& failed) const {
+  const double duration_s = odometry_.seconds(failed.to) - odometry_.seconds(failed.from);
+  if (failed.missed.head<3>().norm() > kReach * odometry_.usual_speed() * duration_s) return kInfinite;
+  const double distance = std::sqrt(squared_distance(odometry_, failed));
+  return std::max(0.0, 2.0 * 6.0 / limit_ * std::log(distance / std::sqrt(limit_)));
+}
+
 void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& out) const {
+  std::vector<Window> paying;
   for (const Window& window : out.hypothesis.windows) {
     const std::size_t known = out.failed.size();
     for (std::size_t run = window.first; run <= window.last; ++run) {
@@ -172,17 +185,12 @@ void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& ou
       failed.missed = local(odometry_.T(failed.from, failed.to), at(failed.from).inverse() * at(failed.to));
     }
     if (out.failed.size() == known) continue;
-    double size = 0.0;
-    for (std::size_t f = known; f < out.failed.size(); ++f) size += least_size(out.failed[f]);
-    out.price += size < config_.min_jump_m ? kInfinite : config_.least_votes + size / config_.jump_per_vote_m;
+    paying.push_back(window);
+    double& price = out.prices.emplace_back(config_.least_votes);
+    for (std::size_t f = known; f < out.failed.size(); ++f) price += votes_for(out.failed[f]);
+    out.misfit += price;
   }
-  out.misfit += out.price;
-}
-
-double HypothesisSolver::least_size(const FailedStretch& failed) const {
-  double least = kInfinite;
-  for (std::size_t k = failed.from; k <= failed.to; ++k) least = std::min(least, failure_size_at(odometry_, failed, k));
-  return least;
+  out.hypothesis.windows = std::move(paying);
 }
 
 }  // namespace tutti::estimation

@@ -17,7 +17,7 @@ struct Window {
 };
 
 struct Hypothesis {
-  std::vector<Window> windows;                  ///< In order; none overlap.
+  std::vector<Window> windows;                  ///< In order; none overlap. Of a solution: that let something go.
   std::vector<std::vector<std::size_t>> wrong;  ///< Groups of closures.
 };
 
@@ -30,9 +30,9 @@ struct Solution {
   std::vector<FailedStretch> failed;  ///< Runs let go, neighbours together; nodes of the graph.
   GncResult optimum;                  ///< On the graph of the closures' ends.
   double misfit = 0.0;  ///< In votes, with what failed stretches and wrong groups pay; infinite when one is too small.
-  double price = 0.0;   ///< What of it failed stretches pay.
-  bool suspicious = false;   ///< More than wrong closures strewn about may be behind what is unexplained.
-  double unexplained = 0.0;  ///< Votes of refused closures, and what strains one window of odometry beyond chance.
+  std::vector<double> prices;  ///< What of it each window pays.
+  bool suspicious = false;     ///< More than wrong closures strewn about may be behind what is unexplained.
+  double unexplained = 0.0;    ///< Votes of refused closures, and what strains one window of odometry beyond chance.
 };
 
 /// Solves a pose graph under hypotheses, on the graph of the closures' ends.
@@ -58,8 +58,7 @@ class HypothesisSolver {
   [[nodiscard]] std::size_t end_of(std::size_t run) const;
   void count_votes();
   void find_failed(const std::vector<Pose3>& poses, Solution& out) const;
-  /// How large a failure was, at the node of its stretch from which it looks least.
-  [[nodiscard]] double least_size(const FailedStretch& failed) const;
+  [[nodiscard]] double votes_for(const FailedStretch& failed) const;
 
   const OdometryWays& odometry_;
   const WhoIsWrongConfig& config_;

@@ -4,13 +4,30 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace tutti::estimation {
+namespace {
 
-OdometryWays::OdometryWays(std::size_t nodes, std::span<const PoseGraphEdge> odometry) : at_(nodes) {
+/// The middle one, or the least above 0 that a number can be.
+double median(std::vector<double> values) {
+  constexpr double kLeast = std::numeric_limits<double>::min();
+  if (values.empty()) return kLeast;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return std::max(*middle, kLeast);
+}
+
+}  // namespace
+
+OdometryWays::OdometryWays(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry)
+    : at_(seconds.size()) {
+  const std::size_t nodes = seconds.size();
   std::vector<std::vector<Pose3>> poses(nodes, {Pose3{}});
   std::vector<std::vector<Matrix6d>> steps(nodes, {Matrix6d::Zero()});
-  for (std::size_t i = 0; i < nodes; ++i) at_[i].piece = i;
+  for (std::size_t i = 0; i < nodes; ++i) at_[i] = {.piece = i, .seconds = seconds[i]};
+  std::vector<double> speeds;
   std::vector<const PoseGraphEdge*> step_to(nodes, nullptr);
   for (const PoseGraphEdge& edge : odometry) step_to[edge.to] = &edge;
   for (std::size_t i = 0; i < nodes; ++i) {
@@ -18,11 +35,14 @@ OdometryWays::OdometryWays(std::size_t nodes, std::span<const PoseGraphEdge> odo
     const PoseGraphEdge& step = *step_to[i];
     const At& before = at_[step.from];
     const Matrix6d covariance = step.information.llt().solve(Matrix6d::Identity());
-    at_[i] = {before.piece, before.position + 1, before.way_m + step.T_from_to.translation.norm(),
+    at_[i] = {before.piece, before.position + 1, seconds[i],
               before.turn_variance + covariance.bottomRightCorner<3, 3>().trace(), before.pose * step.T_from_to};
     poses[before.piece].push_back(at_[i].pose);
     steps[before.piece].push_back(covariance);
+    if (const double duration_s = seconds[i] - seconds[step.from]; duration_s > 0.0)
+      speeds.push_back(step.T_from_to.translation.norm() / duration_s);
   }
+  usual_speed_ = median(std::move(speeds));
   for (std::size_t i = 0; i < nodes; ++i)
     covariance_.push_back(at_[i].piece == i ? StretchCovariance(poses[i], steps[i]) : StretchCovariance());
 }

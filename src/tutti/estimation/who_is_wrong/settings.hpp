@@ -11,9 +11,7 @@ struct WhoIsWrongConfig {
   double confidence = 0.999;
   int least_support = 2;
   double least_votes = 2.0;
-  double jump_per_vote_m = 4.0;
-  double min_jump_m = 0.3;
-  double search_m = 20.0;
+  double search_s = 20.0;
   int candidate_groups = 3;
   int most_refused_groups = 5;
   int min_joining_closures = 2;
@@ -26,13 +24,11 @@ struct WhoIsWrongConfig {
     v.field("least_support", least_support, at_least(0),
             "A closure with which fewer others agree, and odometry neither, is not considered.");
     v.field("least_votes", least_votes, at_least(0.0),
-            "A failed stretch must explain more votes than this (and one more for every run that is let go),");
-    v.field("jump_per_vote_m", jump_per_vote_m, greater_than(0.0),
-            "... and one more for every so many metres (0.2 rad each) that its odometry would have missed.");
-    v.field("min_jump_m", min_jump_m, at_least(0.0),
-            "Smaller failures are left to the optimisation. 0.2 rad count as a metre.");
-    v.field("search_m", search_m, at_least(0.0),
-            "Odometry so far around a candidate may have failed, too, before the candidate must pay for itself.");
+            "Failed odometry must explain more votes than this, one more for every run that is let go, and more for "
+            "what is far from the errors that odometry says it has.");
+    v.field("search_s", search_s, at_least(0.0),
+            "Odometry so long before and after a candidate may have failed, too, before the candidate must pay for "
+            "itself.");
     v.field("candidate_groups", candidate_groups, at_least(0),
             "Groups of neighbouring closures, the largest, that are tried as wrong all together; each must "
             "explain more than least_votes.");

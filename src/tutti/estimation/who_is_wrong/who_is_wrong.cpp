@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <optional>
+#include <numeric>
+#include <set>
 #include <utility>
 
 #include "tutti/base/check.hpp"
@@ -15,19 +17,28 @@
 namespace tutti::estimation {
 namespace {
 
-/// Where in a stretch the jump is at most this many times the least, and this many metres more, odometry may have
-/// failed.
+/// Where in a stretch a failure seems at most this many times as large as where it seems least, and so many seconds of
+/// usual motion more, odometry may have failed. A radian counts as much as so many seconds of motion.
 constexpr double kAboutLeast = 1.5;
-constexpr double kAboutLeast_m = 1.0;
+constexpr double kAboutLeast_s = 1.0;
+constexpr double kRadian_s = 5.0;
 /// A group of closures is at least so many.
 constexpr std::size_t kLeastGroup = 2;
 
-/// Far from where odometry turned wrongly, the jump would have to be larger: it failed about here.
+/// How large a failure was, seen from a node of its stretch, in seconds of usual motion: a wrong turn
+/// shifts everything the more the farther away it was.
+double size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
+  const Pose3 T_to_node = odometry.T(failed.to, node);
+  const Pose3 seen = T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
+  return seen.translation.norm() / odometry.usual_speed() + kRadian_s * rotation_angle(seen);
+}
+
+/// Far from where odometry turned wrongly, the failure would have to be larger: it failed about here.
 FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed) {
   std::vector<double> sizes;
-  for (std::size_t k = failed.from; k <= failed.to; ++k) sizes.push_back(failure_size_at(odometry, failed, k));
+  for (std::size_t k = failed.from; k <= failed.to; ++k) sizes.push_back(size_at(odometry, failed, k));
   const auto least = std::ranges::min_element(sizes);
-  const auto is_larger = [about = kAboutLeast * *least + kAboutLeast_m](double size) { return size > about; };
+  const auto is_larger = [about = kAboutLeast * *least + kAboutLeast_s](double size) { return size > about; };
   const auto begin = std::find_if(std::make_reverse_iterator(least), sizes.rend(), is_larger).base();
   const auto end = std::find_if(least, sizes.end(), is_larger);
   const std::size_t from = failed.from;
@@ -74,28 +85,36 @@ class Search {
     return solver_.judge({std::move(windows), {}}, std::move(all.optimum));
   }
 
-  /// Takes back the windows that do not pay for themselves, the one that costs most first.
+  /// Takes back the windows that do not pay for themselves, the cheapest first and as many at once as together fit no
+  /// worse than by what the cheapest of them pays: each alone would then fit no worse either.
   [[nodiscard]] Solution without_idle(Solution best) const {
-    std::vector<char> needed(best.hypothesis.windows.size(), 0);
-    while (best.solved) {
-      std::optional<Solution> better;
-      std::size_t idle = 0;
-      for (std::size_t k = 0; k < best.hypothesis.windows.size(); ++k) {
-        if (needed[k]) continue;
-        Hypothesis less = best.hypothesis;
-        less.windows.erase(less.windows.begin() + static_cast<std::ptrdiff_t>(k));
-        Solution other = solver_.solve(std::move(less));
-        // Fewer windows fit no better, and save at most what they pay.
-        needed[k] = other.solved && other.misfit - other.price > best.misfit ? 1 : 0;
-        if (!other.solved || other.misfit > (better ? better->misfit : best.misfit)) continue;
-        better = std::move(other);
-        idle = k;
+    std::set<std::size_t> needed;  // windows, by their first run
+    for (std::size_t batch = best.hypothesis.windows.size(); best.solved;) {
+      std::vector<std::size_t> open;
+      for (std::size_t k = 0; k < best.hypothesis.windows.size(); ++k)
+        if (!needed.contains(best.hypothesis.windows[k].first)) open.push_back(k);
+      if (open.empty()) break;
+      std::ranges::stable_sort(open, {}, [&](std::size_t k) { return best.prices[k]; });
+      open.resize(std::min(batch, open.size()));
+      Solution other = solver_.solve(without(best.hypothesis, open));
+      if (other.solved && fit(other) - fit(best) <= best.prices[open.front()]) {
+        best = std::move(other);
+        batch = 2 * open.size();
+        continue;
       }
-      if (!better) break;
-      best = std::move(*better);
-      needed.erase(needed.begin() + static_cast<std::ptrdiff_t>(idle));
+      if (open.size() == 1) needed.insert(best.hypothesis.windows[open.front()].first);
+      batch = std::max<std::size_t>(open.size() / 2, 1);
     }
     return best;
+  }
+
+  static double fit(const Solution& of) { return of.misfit - std::accumulate(of.prices.begin(), of.prices.end(), 0.0); }
+
+  static Hypothesis without(const Hypothesis& hypothesis, std::span<const std::size_t> windows) {
+    Hypothesis out{.windows = {}, .wrong = hypothesis.wrong};
+    for (std::size_t k = 0; k < hypothesis.windows.size(); ++k)
+      if (std::ranges::find(windows, k) == windows.end()) out.windows.push_back(hypothesis.windows[k]);
+    return out;
   }
 
   /// As long as the misfit falls enough when all closures of a group are wrong. True if any are refused.
@@ -125,10 +144,9 @@ class Search {
 
 }  // namespace
 
-double failure_size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
-  const Pose3 T_to_node = odometry.T(failed.to, node);
-  const Pose3 seen = T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
-  return failure_size(seen.translation.norm(), rotation_angle(seen));
+double squared_distance(const OdometryWays& odometry, const FailedStretch& failed) {
+  const Matrix6d covariance = odometry.between(failed.from, failed.to).covariance;
+  return failed.missed.dot(covariance.llt().solve(failed.missed));
 }
 
 Explanation explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,

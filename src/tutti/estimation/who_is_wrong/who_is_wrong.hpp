@@ -11,9 +11,6 @@
 
 namespace tutti::estimation {
 
-/// Size of a failure in metres: 0.2 rad count as one.
-inline double failure_size(double translation_m, double rotation_rad) { return translation_m + 5.0 * rotation_rad; }
-
 /// Odometry between two nodes of one piece that is not to be believed.
 struct FailedStretch {
   std::size_t from = 0;
@@ -21,8 +18,8 @@ struct FailedStretch {
   Vector6d missed = Vector6d::Zero();  ///< local(odometry, what the closures say), where the stretch was let go.
 };
 
-/// The size of a failure as seen from a node of its stretch: a wrong turn shifts more the farther away it was.
-double failure_size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node);
+/// Of what the stretch missed, from the errors that its odometry says it has (Mahalanobis).
+double squared_distance(const OdometryWays& odometry, const FailedStretch& failed);
 
 /// What a search took.
 struct SearchWork {

@@ -55,7 +55,12 @@ struct Laps {
   void close_laps(std::size_t every) {
     for (std::size_t k = 1; k < kLap; k += every) close(k, k + kLap);
   }
-  [[nodiscard]] OdometryWays ways() const { return {kNodes, std::span(graph.edges).first(odometry_edges)}; }
+  [[nodiscard]] OdometryWays ways() const { return {seconds(), std::span(graph.edges).first(odometry_edges)}; }
+  static std::vector<double> seconds() {  // a step takes two
+    std::vector<double> out;
+    for (std::size_t k = 0; k < kNodes; ++k) out.push_back(2.0 * static_cast<double>(k));
+    return out;
+  }
   [[nodiscard]] Explanation explain(const std::vector<std::vector<std::size_t>>& groups = {},
                                     const WhoIsWrongConfig& config = {}) const {
     return explain_closures(graph, ways(), odometry_edges, groups, config, {});
@@ -67,10 +72,11 @@ Pose3 off(Rng& rng) { return retract(Pose3{}, noise(rng, 5.0, 0.5)); }
 TEST(OdometryWays, KnowsThePiecesAndWhatLiesBetween) {
   Laps laps;
   laps.graph.edges.erase(laps.graph.edges.begin() + 60);  // a gap after node 60
-  const OdometryWays ways(kNodes, laps.graph.edges);
+  const OdometryWays ways(Laps::seconds(), laps.graph.edges);
   EXPECT_EQ(ways.piece(60), 0U);
   EXPECT_EQ(ways.piece(200), 61U);
-  EXPECT_NEAR(ways.way_m(30), 30 * kStep_m, 0.5);
+  EXPECT_DOUBLE_EQ(ways.seconds(30), 60.0);
+  EXPECT_NEAR(ways.usual_speed(), kStep_m / 2.0, 0.05);
   RelativePose sum{.T_a_b = {}, .covariance = Matrix6d::Zero()};
   for (std::size_t e = 10; e < 14; ++e)
     sum = compound(sum, {laps.graph.edges[e].T_from_to, laps.graph.edges[e].information.inverse()});
@@ -152,6 +158,53 @@ TEST(WhoIsWrong, DoesNotDependOnTheOrderOfTheClosures) {
   EXPECT_EQ(forth.failed[0].to, back.failed[0].to);
 }
 
+// Nothing in the judgement is a length: a place twenty times as large, with errors twenty times as large, is judged
+// alike.
+TEST(WhoIsWrong, ScalingLengthsAndTheirErrorsChangesNothing) {
+  Laps laps(130, 0.3);
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Explanation found = laps.explain();
+  for (const double scale : {0.05, 20.0}) {
+    Laps scaled = laps;
+    for (Pose3& pose : scaled.graph.poses) pose.translation *= scale;
+    Vector6d units = Vector6d::Ones();
+    units.head<3>() /= scale;
+    for (PoseGraphEdge& edge : scaled.graph.edges) {
+      edge.T_from_to.translation *= scale;
+      edge.information = units.asDiagonal() * edge.information * units.asDiagonal();
+    }
+    const Explanation other = scaled.explain();
+    EXPECT_EQ(found.accepted, other.accepted) << scale;
+    ASSERT_EQ(found.failed.size(), other.failed.size()) << scale;
+    EXPECT_EQ(found.failed[0].from, other.failed[0].from) << scale;
+    EXPECT_EQ(found.failed[0].to, other.failed[0].to) << scale;
+    EXPECT_NEAR(found.failed[0].missed.head<3>().norm() * scale, other.failed[0].missed.head<3>().norm(), 0.01 * scale);
+  }
+}
+
+// Five stretches that would have to have missed everything, to please a few wrong closures, pay each for itself.
+TEST(HypothesisSolver, EveryStretchOfAWindowPaysForHowFarItIsFromItsErrors) {
+  Laps one(50, 0.1), two(50, 0.1);
+  for (Laps* laps : {&one, &two}) {
+    if (laps == &two)
+      laps->graph.edges[54].T_from_to =
+          laps->graph.edges[54].T_from_to * Pose3{so3_exp({0, 0, 0.1}), Eigen::Vector3d::Zero()};
+    laps->close_laps(2);
+  }
+  const auto price = [](const Laps& laps) {
+    const OdometryWays ways = laps.ways();
+    const WhoIsWrongConfig config;
+    const GncConfig gnc;
+    const std::vector<bool> certain(laps.graph.edges.size() - laps.odometry_edges, false);
+    const HypothesisSolver solver(laps.graph, ways, laps.odometry_edges, config, gnc, certain);
+    const Solution all = solver.solve({{{0, solver.runs() - 1}}, {}});
+    return all.prices.size() == 1 ? all.prices[0] - config.least_votes : 0.0;
+  };
+  EXPECT_GT(price(one), 1.0);
+  EXPECT_GT(price(two), 1.8 * price(one));
+}
+
 // What is let go when all odometry may be is, around it, worth as much as what is found when only that may be.
 TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
   for (const double missed_rad : {0.1, 0.4}) {
@@ -170,7 +223,8 @@ TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
     EXPECT_NEAR(judged.misfit, solved.misfit, 0.01);
     EXPECT_EQ(judged.let_go, solved.let_go);
     EXPECT_EQ(judged.accepted, solved.accepted);
-    EXPECT_GT(judged.price, config.least_votes);
+    ASSERT_EQ(judged.prices.size(), 1U);
+    EXPECT_GT(judged.prices[0], config.least_votes);
     EXPECT_LT(judged.misfit, solver.solve({}).misfit);
   }
 }
