@@ -155,6 +155,7 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const
   for (const double votes : votes_) all += votes;
   out.suspicious = strain >= kStrained || out.unexplained >= kManyRefused * all;
   out.unexplained += strain;
+  out.fit = out.misfit;
   find_failed(poses, out);
   return out;
 }

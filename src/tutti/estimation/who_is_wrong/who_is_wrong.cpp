@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -97,7 +96,7 @@ class Search {
       std::ranges::stable_sort(open, {}, [&](std::size_t k) { return best.prices[k]; });
       open.resize(std::min(batch, open.size()));
       Solution other = solver_.solve(without(best.hypothesis, open));
-      if (other.solved && fit(other) - fit(best) <= best.prices[open.front()]) {
+      if (other.solved && other.fit - best.fit <= best.prices[open.front()]) {
         best = std::move(other);
         batch = 2 * open.size();
         continue;
@@ -107,8 +106,6 @@ class Search {
     }
     return best;
   }
-
-  static double fit(const Solution& of) { return of.misfit - std::accumulate(of.prices.begin(), of.prices.end(), 0.0); }
 
   static Hypothesis without(const Hypothesis& hypothesis, std::span<const std::size_t> windows) {
     Hypothesis out{.windows = {}, .wrong = hypothesis.wrong};
