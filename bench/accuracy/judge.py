@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Who is wrong, on simulated places of every scale. Writes docs/results/judge.md.
 
-Usage: bench/accuracy/judge.py JUDGE_PROGRAM [--seeds N] [--out FOLDER]
+Usage: bench/accuracy/judge.py JUDGE_PROGRAM [--seeds N] [--places NAME...] [--out FOLDER]
 JUDGE_PROGRAM is build/bench/bench/accuracy/tutti_judge. A place that is finished in --out is not made again.
 """
 import argparse
@@ -50,12 +50,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("judge")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--places", nargs="+", default=PLACES, choices=PLACES)
     parser.add_argument("--out", default="out/judge")
     arguments = parser.parse_args()
-    maps = {place: maps_of(arguments, place) for place in PLACES}
+    maps = {place: maps_of(arguments, place) for place in arguments.places}
     everything = [m for of in maps.values() for m in of]
     text = ["# Who is wrong, in places of every scale", "",
-            f"Written by `bench/accuracy/judge.py JUDGE_PROGRAM --seeds {arguments.seeds}`.",
+            f"Written by `bench/accuracy/judge.py JUDGE_PROGRAM --seeds {arguments.seeds} --places {' '.join(arguments.places)}`.",
             "Simulated: two robots walk or drive through a network of ways (room: 2.5 m between junctions, 0.7 m/s; hall: 8 m, 1 m/s;",
             "tunnel: 60 m, 2 m/s; street: 120 m, 12 m/s), closures from the truth with noise. Every place with odometry that is honest,",
             "three times too sure and three times too unsure of itself, holds or fails once (over up to 20 s, by as far as the robot",
