@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <span>
 
 namespace tutti {
 
@@ -42,6 +43,9 @@ inline Timestamp operator+(Timestamp a, double seconds) {
   return sum;
 }
 inline Timestamp operator-(Timestamp a, double seconds) { return a + -seconds; }
+
+/// Median time from one to the next, s; 0 of fewer than two.
+double typical_gap_s(std::span<const Timestamp> stamps);
 
 }  // namespace tutti
 

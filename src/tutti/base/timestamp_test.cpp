@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <unordered_set>
+#include <vector>
 
 namespace tutti {
 namespace timestamp_test {
@@ -54,6 +55,12 @@ TEST(Timestamp, StaysAtTheFirstAndTheLastThereIs) {
 TEST(Timestamp, OrdersAndHashesByNanosecond) {
   EXPECT_LT(kEpoch, Timestamp{kEpoch.ns + 1});
   EXPECT_EQ((std::unordered_set<Timestamp>{kEpoch, kEpoch, Timestamp{kEpoch.ns + 1}}.size()), 2U);
+}
+
+TEST(Timestamp, TheTypicalGapIsTheMedian) {
+  EXPECT_EQ(typical_gap_s({}), 0.0);
+  EXPECT_EQ(typical_gap_s(std::vector{kEpoch}), 0.0);
+  EXPECT_NEAR(typical_gap_s(std::vector{kEpoch, kEpoch + 0.1, kEpoch + 0.2, kEpoch + 9.0}), 0.1, 1e-9);
 }
 
 }  // namespace timestamp_test

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 #include "tutti/formats/image_file.hpp"
@@ -47,16 +46,6 @@ std::vector<Timestamp> stamps_of(const Trajectory& trajectory) {
   std::vector<Timestamp> out;
   for (const StampedPose& sample : trajectory) out.push_back(sample.stamp);
   return out;
-}
-
-/// The median; 0 of fewer than two.
-double typical_gap_s(const std::vector<Timestamp>& stamps) {
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < stamps.size(); ++i) gaps.push_back(stamps[i] - stamps[i - 1]);
-  if (gaps.empty()) return 0.0;
-  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
-  std::ranges::nth_element(gaps, middle);
-  return *middle;
 }
 
 /// A recording none of whose first images can be read has none.

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,16 +22,6 @@ std::size_t nearest(const std::vector<Timestamp>& stamps, Timestamp stamp) {
   const auto i = static_cast<std::size_t>(after);
   if (i == stamps.size()) return i - 1;
   return i > 0 && stamp - stamps[i - 1] <= stamps[i] - stamp ? i - 1 : i;
-}
-
-/// The median; 0 of fewer than two.
-double typical_gap_s(const std::vector<Timestamp>& stamps) {
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < stamps.size(); ++i) gaps.push_back(stamps[i] - stamps[i - 1]);
-  if (gaps.empty()) return 0.0;
-  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
-  std::ranges::nth_element(gaps, middle);
-  return *middle;
 }
 
 /// Are most samples within the stream images' stamps, or most images within the odometry samples'?
