@@ -52,8 +52,7 @@ struct CamerasSettings {
 Result<CameraCalibration> to_calibration(const CameraSettings& settings) {
   const auto kind = static_cast<CameraKind>(std::ranges::find(kModels, settings.model) - kModels.begin());
   const std::size_t coefficients = kind == CameraKind::double_sphere ? 2 : 4;
-  const bool is_long =
-      kind == CameraKind::pinhole && (settings.distortion.size() == 5 || settings.distortion.size() == 8);
+  const bool is_long = internal::is_rational(kind, settings.distortion.size());
   if (settings.intrinsics.size() != 4)
     return fail(ErrorCode::configuration, "intrinsics has {} numbers, expected [fx, fy, cx, cy]",
                 settings.intrinsics.size());

@@ -72,6 +72,10 @@ Pose3 YamlValues::pose(const ConfigNode& map, std::string_view key) {
   return {};
 }
 
+bool is_rational(CameraKind kind, std::size_t coefficients) {
+  return kind == CameraKind::pinhole && (coefficients == 5 || coefficients == 8);
+}
+
 CameraModel to_camera_model(YamlValues& yaml, const ConfigNode& where, const ForeignCamera& camera) {
   constexpr double kMaxSize_px = 1e5;
   if (!yaml.status()) return {};
@@ -93,7 +97,7 @@ CameraModel to_camera_model(YamlValues& yaml, const ConfigNode& where, const For
   out.cx = camera.intrinsics[2];
   out.cy = camera.intrinsics[3];
   const std::size_t coefficients = camera.coefficients.size();
-  const bool is_long = out.kind == CameraKind::pinhole && (coefficients == 5 || coefficients == 8);
+  const bool is_long = is_rational(out.kind, coefficients);
   if (coefficients != 4 && !is_long) {
     yaml.complain(where, ErrorCode::parse, "{} distortion coefficients, expected 4{}", coefficients,
                   out.kind == CameraKind::pinhole ? ", 5 or 8" : "");

@@ -51,6 +51,9 @@ struct ForeignCamera {
 /// is complained of, at `where`.
 CameraModel to_camera_model(YamlValues& yaml, const ConfigNode& where, const ForeignCamera& camera);
 
+/// Five or eight numbers of a pinhole are OpenCV's, and those of a rational camera.
+bool is_rational(CameraKind kind, std::size_t coefficients);
+
 /// Row by row; error when it is no rigid transform within 1e-3.
 Result<Pose3> pose_from_matrix(const std::vector<double>& row_major_4x4);
 
