@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/who_is_wrong/hypothesis.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -166,8 +167,9 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, GncResult optimum) const
 double HypothesisSolver::votes_for(const FailedStretch& failed) const {
   const double duration_s = odometry_.seconds(failed.to) - odometry_.seconds(failed.from);
   if (failed.missed.head<3>().norm() > kReach * odometry_.usual_speed() * duration_s) return kInfinite;
-  const double distance = std::sqrt(squared_distance(odometry_, failed));
-  return std::max(0.0, 2.0 * 6.0 / limit_ * std::log(distance / std::sqrt(limit_)));
+  const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;
+  const double squared_distance = failed.missed.dot(covariance.llt().solve(failed.missed));
+  return std::max(0.0, 6.0 / limit_ * std::log(squared_distance / limit_));
 }
 
 void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& out) const {

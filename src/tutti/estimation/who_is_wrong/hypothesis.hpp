@@ -29,11 +29,11 @@ struct Solution {
   std::vector<char> accepted;         ///< Per closure.
   std::vector<FailedStretch> failed;  ///< Runs let go, neighbours together; nodes of the graph.
   GncResult optimum;                  ///< On the graph of the closures' ends.
-  double misfit = 0.0;  ///< In votes, with what failed stretches and wrong groups pay; infinite when one is too small.
-  double fit = 0.0;     ///< The misfit without what windows pay.
-  std::vector<double> prices;  ///< What of the misfit each window pays; infinite where one failed too far.
-  bool suspicious = false;     ///< More than wrong closures strewn about may be behind what is unexplained.
-  double unexplained = 0.0;    ///< Votes of refused closures, and what strains one window of odometry beyond chance.
+  double misfit = 0.0;                ///< In votes, with what windows and wrong groups pay.
+  double fit = 0.0;                   ///< The misfit without what windows pay.
+  std::vector<double> prices;         ///< What of the misfit each window pays; infinite where one failed too far.
+  bool suspicious = false;            ///< More than wrong closures strewn about may be behind what is unexplained.
+  double unexplained = 0.0;  ///< Votes of refused closures, and what strains one window of odometry beyond chance.
 };
 
 /// Solves a pose graph under hypotheses, on the graph of the closures' ends.

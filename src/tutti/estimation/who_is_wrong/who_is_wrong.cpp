@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -24,8 +23,8 @@ constexpr double kRadian_s = 5.0;
 /// A group of closures is at least so many.
 constexpr std::size_t kLeastGroup = 2;
 
-/// How large a failure was, seen from a node of its stretch, in seconds of usual motion: a wrong turn
-/// shifts everything the more the farther away it was.
+/// How large a failure was, seen from a node of its stretch, in seconds of usual motion: a wrong turn shifts everything
+/// the more the farther away it was.
 double size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
   const Pose3 T_to_node = odometry.T(failed.to, node);
   const Pose3 seen = T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
@@ -140,11 +139,6 @@ class Search {
 };
 
 }  // namespace
-
-double squared_distance(const OdometryWays& odometry, const FailedStretch& failed) {
-  const Matrix6d covariance = odometry.between(failed.from, failed.to).covariance;
-  return failed.missed.dot(covariance.llt().solve(failed.missed));
-}
 
 Explanation explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
                              std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,

@@ -18,9 +18,6 @@ struct FailedStretch {
   Vector6d missed = Vector6d::Zero();  ///< local(odometry, what the closures say), where the stretch was let go.
 };
 
-/// Of what the stretch missed, from the errors that its odometry says it has (Mahalanobis).
-double squared_distance(const OdometryWays& odometry, const FailedStretch& failed);
-
 /// What a search took.
 struct SearchWork {
   std::size_t hypotheses = 0;      ///< Tried.
