@@ -5,6 +5,8 @@
 #include <turbojpeg.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -57,7 +59,68 @@ Result<Image> decode_jpeg(std::string_view bytes, const std::string& name) {
   return image;
 }
 
+/// Its pixels and nothing about colour: libpng would turn depths by a gamma that some programs write beside them.
+std::string without_colour(std::string_view png) {
+  constexpr std::size_t kSignature = 8, kAround = 12;  // of a chunk: length, type and checksum
+  std::string out(png.substr(0, kSignature));
+  for (png.remove_prefix(std::min(kSignature, png.size())); png.size() >= kAround;) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = length << 8U | static_cast<unsigned char>(png[i]);
+    const std::string_view chunk = png.substr(0, kAround + length);
+    const std::string_view type = chunk.substr(4, 4);
+    if (type == "IHDR" || type == "IDAT" || type == "IEND") out += chunk;
+    png.remove_prefix(chunk.size());
+  }
+  return out;
+}
+
+std::string encode(int width_px, int height_px, png_uint_32 format, const void* pixels) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(width_px);
+  header.height = static_cast<png_uint_32>(height_px);
+  header.format = format;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(header);
+  std::string bytes(size, '\0');
+  const int ok = png_image_write_to_memory(&header, bytes.data(), &size, 0, pixels, 0, nullptr);
+  TUTTI_CHECK(ok != 0, "libpng: {}", header.message);
+  bytes.resize(size);
+  return bytes;
+}
+
 }  // namespace
+
+Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  const auto freed = [](png_image* it) { png_image_free(it); };
+  const std::unique_ptr<png_image, decltype(freed)> guard(&header, freed);
+  const auto failed = [&] {
+    return fail(ErrorCode::parse, "{}: no PNG image, or a damaged one: {}", name, header.message);
+  };
+  const std::string plain = without_colour(bytes);
+  if (png_image_begin_read_from_memory(&header, plain.data(), plain.size()) == 0) return failed();
+  if (auto ok = check_size(header.width, header.height, name); !ok) return tl::unexpected(ok.error());
+  if (header.format != PNG_FORMAT_LINEAR_Y)
+    return fail(ErrorCode::unsupported, "{}: {} {}, expected a grey PNG image of 16 bits a pixel, as depth is", name,
+                (header.format & PNG_FORMAT_FLAG_LINEAR) != 0 ? "16 bits of" : "8 bits of",
+                (header.format & PNG_FORMAT_FLAG_COLOR) != 0 ? "colour" : "grey");
+  DepthImage out{static_cast<int>(header.width), static_cast<int>(header.height), {}};
+  out.value.resize(std::size_t{header.width} * header.height);
+  if (png_image_finish_read(&header, nullptr, out.value.data(), 0, nullptr) == 0) return failed();
+  return out;
+}
+
+Result<DepthImage> read_depth(const std::string& path) {
+  const auto bytes = read_file(path);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return decode_depth(*bytes, path);
+}
+
+std::string encode_depth(const DepthImage& image) {
+  TUTTI_CHECK(!image.empty());
+  return encode(image.width_px, image.height_px, PNG_FORMAT_LINEAR_Y, image.value.data());
+}
 
 Result<Image> decode_image(std::string_view bytes, const std::string& name) {
   if (bytes.starts_with("\x89PNG")) return decode_png(bytes, name);
@@ -73,17 +136,7 @@ Result<Image> read_image(const std::string& path) {
 
 std::string encode_png(const Image& image) {
   TUTTI_CHECK(!image.empty());
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
-  header.width = static_cast<png_uint_32>(image.width_px);
-  header.height = static_cast<png_uint_32>(image.height_px);
-  header.format = PNG_FORMAT_GRAY;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(header);
-  std::string bytes(size, '\0');
-  const int ok = png_image_write_to_memory(&header, bytes.data(), &size, 0, image.grey.data(), 0, nullptr);
-  TUTTI_CHECK(ok != 0, "libpng: {}", header.message);
-  bytes.resize(size);
-  return bytes;
+  return encode(image.width_px, image.height_px, PNG_FORMAT_GRAY, image.grey.data());
 }
 
 Status write_image(const std::string& path, const Image& image) { return write_file(path, encode_png(image)); }
@@ -101,6 +154,26 @@ ImageStream stream_images(std::vector<CameraImages> cameras, double max_differen
     return read_image(file->path);
   };
   return out;
+}
+
+std::size_t add_depth(ImageStream& stream, const std::vector<ImageFile>& files, const DepthSensor& sensor,
+                      double max_difference_s) {
+  std::map<std::size_t, std::string> path;  // by moment
+  for (std::size_t moment = 0; moment < stream.stamps.size(); ++moment) {
+    const Timestamp stamp = stream.stamps[moment];
+    const auto away_s = [&](const ImageFile& file) { return std::abs(file.stamp - stamp); };
+    const auto after = std::ranges::lower_bound(files, stamp, {}, &ImageFile::stamp);
+    auto nearest = after == files.end() && after != files.begin() ? after - 1 : after;
+    if (after != files.begin() && away_s(*(after - 1)) < away_s(*nearest)) nearest = after - 1;
+    if (nearest != files.end() && away_s(*nearest) <= max_difference_s) path.emplace(moment, nearest->path);
+  }
+  stream.depth = sensor;
+  const std::size_t found = path.size();
+  stream.load_depth = [path = std::move(path)](std::size_t moment) -> Result<DepthImage> {
+    const auto at = path.find(moment);
+    return at == path.end() ? DepthImage() : read_depth(at->second);
+  };
+  return found;
 }
 
 }  // namespace tutti::formats

@@ -34,6 +34,21 @@ RC_GTEST_PROP(ImageFile, PngReadsBackBitForBit, ()) {
   RC_ASSERT(cut.error().message.starts_with("cut.png: "));
 }
 
+TEST(ImageFile, DepthReadsBackWhateverIsSaidOfItsColour) {
+  DepthImage all{256, 256, std::vector<std::uint16_t>(std::size_t{1} << 16U)};
+  std::iota(all.value.begin(), all.value.end(), std::uint16_t{0});
+  const std::string bytes = encode_depth(all);
+  EXPECT_EQ(decode_depth(bytes, "depth.png").value(), all);
+  const std::string gamma("\0\0\0\4gAMA\0\0\xB1\x8F\x0B\xFC\x61\x05", 16);  // 0.45455, as many programs write
+  const std::size_t header = 8 + 25;
+  std::string with = bytes;
+  ASSERT_EQ(with.compare(header + 4, 4, "gAMA"), 0);  // libpng's own: 1
+  EXPECT_EQ(decode_depth(with.replace(header, gamma.size(), gamma), "depth.png").value(), all);
+  for (std::size_t left = 0; left < bytes.size() - 17; left += 97)
+    EXPECT_FALSE(decode_depth(std::string_view(bytes).substr(0, left), "cut.png")) << left;
+  EXPECT_FALSE(decode_depth(encode_png(Image(4, 4)), "grey.png"));
+}
+
 TEST(ImageFile, ARealJpegAndWhatIsLeftOfIt) {
   TUTTI_REQUIRE_SHARED(kReal);
   const std::string bytes = read_file(test::shared_path(kReal).string()).value();

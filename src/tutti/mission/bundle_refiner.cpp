@@ -73,8 +73,8 @@ void remark_on_stereo(const std::vector<bundle::StereoScale>& scales, std::vecto
     out.push_back(
         {scale.robot,
          fmt::format("its cameras together have its way {:.3f} times as long as its odometry, +-{:.3f}: check the "
-                     "baseline, the rotation between the cameras and the focal lengths, or the odometry's "
-                     "scale; the adjustment believes its first camera alone",
+                     "baseline, the rotation between the cameras and the focal lengths, the scale of depth images, or "
+                     "the odometry's scale; the adjustment believes its first camera alone",
                      scale.ratio, scale.sigma)});
   }
 }

@@ -53,6 +53,8 @@ void check_images(const RobotConfig& robot, const std::string& path, const Probl
                         images.list.empty() ? "cameras" : "list"));
   if (images.time_offset_s != 0.0 && !images.has_files())
     problem(path + ".images.time_offset_s: given, but there is no images.euroc_folder or images.list");
+  if (!images.depth.list.empty() && images.list.empty())
+    problem(path + ".images.depth.list: given, but there is no images.list");
   if (!images.imu.empty() && !images.euroc_folder.empty())
     problem(path + ".images.imu: given, but images.euroc_folder has its own in imu0");
 }

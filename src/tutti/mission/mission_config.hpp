@@ -55,6 +55,28 @@ struct LidarPoseConfig {
 /// The pose, or what is wrong with it.
 Result<Pose3> to_pose(const LidarPoseConfig& config);
 
+/// Depth images beside those of one camera.
+struct DepthConfig {
+  std::string list;  ///< Empty: there are none.
+  double scale = 5000.0;
+  double max_difference_s = 0.02;
+  DepthSensor sensor;
+  template <class V>
+  void describe(V& v) {
+    v.field("list", list, any(),
+            "A csv `stamp[ns],file` of grey PNG images of 16 bits, files relative to it: the depth along the optical "
+            "axis at every pixel of the camera (registered); 0: not known.");
+    v.field("scale", scale, greater_than(0.0),
+            "Numbers of a depth image to a metre: 5000 in TUM's recordings, 1000 of most drivers.");
+    v.field("max_difference_s", max_difference_s, at_least(0.0), "An image has the nearest depth image within this.");
+    v.field("sigma_m", sensor.sigma_m, at_least(0.0), "Standard deviation of a depth: this, and beside it");
+    v.field("sigma_per_m2", sensor.sigma_per_m2, at_least(0.0),
+            "this at 1 m, growing with the square of the depth (0.0014: a structured-light camera's).");
+    v.field("least_m", sensor.least_m, greater_than(0.0), "Nearer and");
+    v.field("most_m", sensor.most_m, greater_than(0.0), "farther depths are not used.");
+  }
+};
+
 /// Where a robot's images, or what a tracker made of them, come from: a folder, a list or submaps, or nothing. Paths
 /// are below the --data folder.
 struct ImagesConfig {
@@ -66,6 +88,7 @@ struct ImagesConfig {
   double time_offset_s = 0.0;
   bool own_stamps = false;
   std::string imu;  ///< Empty: none, or that of `euroc_folder`.
+  DepthConfig depth;
   template <class V>
   void describe(V& v) {
     constexpr double kMostOffset_s = 1e10;  // clocks that count from 1970, and clocks that count from their start
@@ -85,6 +108,7 @@ struct ImagesConfig {
             "Added to the images' stamps gives the odometry's time.");
     v.field("own_stamps", own_stamps, any(),
             "Images are between the odometry's samples. Found by itself where odometry is faster than they are.");
+    v.field("depth", depth, any(), "Depth images of an RGB-D camera, with list.");
     v.field("imu", imu, any(), "EuRoC's csv of raw IMU samples, with list or maplab_submaps.");
   }
   /// Are there images to follow points through?

@@ -98,6 +98,31 @@ Result<formats::EurocFolder> read_folder(const ImagesConfig& config, const fs::p
   return out;
 }
 
+/// Of an RGB-D camera.
+Status read_depth(const ImagesConfig& images, const fs::path& data, ImageStream& stream) {
+  const DepthConfig& config = images.depth;
+  if (config.list.empty()) return {};
+  if (!(config.sensor.least_m < config.sensor.most_m))
+    return fail(ErrorCode::configuration, "images.depth: least_m is {}, expected less than most_m, {}",
+                config.sensor.least_m, config.sensor.most_m);
+  const auto cameras = formats::read_cameras((data / images.cameras).string());
+  if (!cameras) return in_context("images.cameras", cameras.error());
+  const fs::path list = data / config.list;
+  auto depth = formats::read_image_list(list.string(), list.parent_path().string(), {cameras->front()});
+  if (!depth) return in_context("images.depth.list", depth.error());
+  auto& files = depth->front().images;
+  for (formats::ImageFile& file : files) file.stamp = file.stamp + images.time_offset_s;
+  DepthSensor sensor = config.sensor;
+  sensor.unit_m = 1.0 / config.scale;
+  const std::size_t found = formats::add_depth(stream, files, sensor, config.max_difference_s);
+  if (2 * found >= std::min(stream.stamps.size(), files.size())) return {};
+  return fail(ErrorCode::invalid,
+              "images.depth: of {} images and {} depth images {} are within {} s of each other, expected most "
+              "(max_difference_s); the first are of {} and {} ns",
+              stream.stamps.size(), files.size(), found, config.max_difference_s, stream.stamps.front().ns,
+              files.front().stamp.ns);
+}
+
 }  // namespace
 
 Result<formats::MaplabRecording> read_maplab(const ImagesConfig& config, const fs::path& data) {
@@ -133,9 +158,12 @@ Result<RobotImages> open_images(const ImagesConfig& config, const fs::path& data
     for (formats::ImageFile& image : camera.images) image.stamp = image.stamp + config.time_offset_s;
   if (auto ok = check_first_images(folder->cameras.front().images); !ok) return tl::unexpected(ok.error());
   ImageStream stream = formats::stream_images(std::move(folder->cameras), tracking.max_stamp_difference_s);
+  if (auto ok = read_depth(config, data, stream); !ok) return tl::unexpected(ok.error());
   RobotImages out{.visual = nullptr, .imu = std::move(folder->imu), .imu_noise = folder->imu_noise, .note = {}};
   out.note = fmt::format("{} images of {}, {}", stream.stamps.size(),
-                         stream.cameras.size() == 1 ? "one camera" : "each of two cameras",
+                         stream.load_depth            ? "one camera with depth"
+                         : stream.cameras.size() == 1 ? "one camera"
+                                                      : "each of two cameras",
                          out.imu.empty() ? "no IMU" : "and an IMU");
   out.note += note_gaps(stream.stamps);
   Trajectory moments;

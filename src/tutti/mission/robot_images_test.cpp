@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "support/mission/asl_folder.hpp"
+#include "tutti/base/file.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/runner.hpp"
@@ -131,6 +132,66 @@ TEST_F(RobotImages, AListWithACamerasFileIsTheSame) {
   EXPECT_EQ(images(folder), images(list));
   EXPECT_EQ(folder->robots[0].recording.imu, list->robots[0].recording.imu);
   EXPECT_FALSE(list->robots[0].recording.imu.empty());
+}
+
+/// Of the same flight, beside list.csv.
+void write_depth(const fs::path& folder, double units_per_m) {
+  const Trajectory truth = simulation::simulate_flight({.duration_s = 4.0, .rate_hz = kRate_hz}, kStart);
+  const auto scene = std::make_shared<const simulation::HallScene>(simulation::make_hall({}, Rng(1)));
+  const ImageStream stream = simulation::simulate_images(scene, {small_stereo()[0]}, truth, {}, Rng(3),
+                                                         DepthSensor{.unit_m = 1.0 / units_per_m});
+  std::ofstream list(folder / "depth.csv");
+  for (std::size_t i = 0; i < stream.stamps.size(); ++i) {
+    const std::string file = fmt::format("depth_{}.png", i);
+    ASSERT_TRUE(write_file((folder / file).string(), formats::encode_depth(stream.load_depth(i).value())));
+    list << fmt::format("{},{}\n", (stream.stamps[i] + 0.01).ns, file);
+  }
+}
+
+TEST_F(RobotImages, AnRgbdCameraTellsDepthWithoutMoving) {
+  write_depth(folder(), 5000.0);
+  auto& images = config_.robots[0].images;
+  images = {.list = "list.csv", .cameras = "cameras.yaml"};
+  const MissionRecord without = run();
+  images.depth.list = "depth.csv";
+  const MissionRecord record = run();
+  EXPECT_TRUE(has_note(record, "33 images of one camera with depth")) << all_notes(record);
+  EXPECT_FALSE(has_note(record, "refused") || has_note(record, "its cameras together")) << all_notes(record);
+  ASSERT_TRUE(record.robots[0].images && without.robots[0].images) << all_notes(record);
+  EXPECT_GT(record.robots[0].images->landmarks_per_keyframe, 1.5 * without.robots[0].images->landmarks_per_keyframe);
+  EXPECT_LT(record.robots[0].images->reprojection_rms_px, 2.0);
+}
+
+TEST_F(RobotImages, DepthImagesThatAreNoneAreTold) {
+  auto& images = config_.robots[0].images;
+  images = {.list = "list.csv", .cameras = "cameras.yaml", .depth = {.list = "depth.csv"}};
+  const auto told = [&] { return all_notes(run()); };
+  const auto expect = [](const std::string& notes, const std::string& words) {
+    EXPECT_NE(notes.find(words), std::string::npos) << "'" << words << "' in:\n" << notes;
+  };
+  write_depth(folder(), 5000.0);
+  images.depth.scale = 1000.0;
+  expect(told(), "are there 1000 of their numbers to a metre?");
+  write_depth(folder(), 1000.0);
+  images.depth.scale = 1100.0;
+  expect(told(), "its cameras together have its way 0.9");
+  images.depth.scale = 1000.0;
+  const auto replace = [&](const DepthImage& depth) {
+    for (std::size_t i = 0; i <= 32; ++i)
+      ASSERT_TRUE(write_file((folder() / fmt::format("depth_{}.png", i)).string(), formats::encode_depth(depth)));
+  };
+  replace({188, 120, std::vector<std::uint16_t>(188U * 120U)});
+  expect(told(), "depth is not known (0) at 100 %");
+  replace({94, 60, std::vector<std::uint16_t>(94U * 60U, 1000)});
+  expect(told(), "a depth image of 94 x 60 pixels, its camera has 188 x 120");
+  ASSERT_TRUE(formats::write_image((folder() / "depth_0.png").string(), Image(188, 120)));
+  expect(first_error(), "depth_0.png: 8 bits of grey, expected a grey PNG image of 16 bits");
+  fs::remove(folder() / "depth_0.png");
+  expect(first_error(), "depth_0.png");
+  std::ofstream(folder() / "depth.csv") << fmt::format("{},depth_1.png\n", (kStart + 3600.0).ns);
+  const auto late = load_input(config_, folder(), 1);
+  ASSERT_FALSE(late);
+  expect(late.error().message, "of 33 images and 1 depth images 0 are within 0.02 s");
 }
 
 TEST_F(RobotImages, StampsOfAnotherClockAreSaidAndTheOffsetIsASetting) {

@@ -20,4 +20,13 @@ struct Image {
   friend bool operator==(const Image&, const Image&) = default;
 };
 
+/// How far away what a camera's pixels see is, row by row from the top, in units of a DepthSensor; 0: not known.
+struct DepthImage {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<std::uint16_t> value;  ///< width_px * height_px
+  [[nodiscard]] bool empty() const { return value.empty(); }
+  friend bool operator==(const DepthImage&, const DepthImage&) = default;
+};
+
 }  // namespace tutti

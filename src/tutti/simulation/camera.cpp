@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -69,12 +70,35 @@ Image SimulatedCamera::image(const Pose3& T_world_camera, double time_s, Rng rng
   return out;
 }
 
+DepthImage SimulatedCamera::depth(const Pose3& T_world_camera, const DepthSensor& sensor, Rng rng) const {
+  DepthImage out{model_.width_px, model_.height_px, std::vector<std::uint16_t>(rays_.size())};
+  const std::uint64_t noise = rng.index(std::uint64_t{1} << 62U);
+  const std::vector<SeenFace> seen = view_of(scene_->hall, rays_, model_.width_px, T_world_camera);
+  for (std::size_t i = 0; i < rays_.size(); ++i) {
+    if (seen[i].face == kNoFace) continue;
+    const double z_m = seen[i].distance_m * rays_[i].z();
+    const double sigma_m = std::hypot(sensor.sigma_m, sensor.sigma_per_m2 * z_m * z_m);
+    const double measured = (z_m + sigma_m * normal_from(mixed(noise + i))) / sensor.unit_m;
+    if (measured < std::numeric_limits<std::uint16_t>::max())
+      out.value[i] = static_cast<std::uint16_t>(std::max(measured + 0.5, 0.0));
+  }
+  return out;
+}
+
 ImageStream simulate_images(std::shared_ptr<const HallScene> scene, const std::vector<Camera>& cameras,
-                            Trajectory truth, const ImageConfig& config, Rng rng) {
+                            Trajectory truth, const ImageConfig& config, Rng rng,
+                            const std::optional<DepthSensor>& depth) {
   std::vector<SimulatedCamera> simulated;
   for (const Camera& camera : cameras) simulated.emplace_back(scene, camera.model, config);
   ImageStream out{.cameras = cameras, .stamps = {}, .load = {}};
   for (const StampedPose& at : truth) out.stamps.push_back(at.stamp);
+  if (depth) {
+    out.depth = *depth;
+    out.load_depth = [first = simulated.front(), truth, T_body_camera = cameras.front().T_body_camera, sensor = *depth,
+                      rng](std::size_t moment) -> Result<DepthImage> {
+      return first.depth(truth.at(moment).pose * T_body_camera, sensor, rng.fork("depth").fork(moment));
+    };
+  }
   out.load = [simulated = std::move(simulated), truth = std::move(truth), cameras, rng](
                  std::size_t moment, std::size_t camera) -> Result<Image> {
     const Pose3 T_world_camera = truth.at(moment).pose * cameras.at(camera).T_body_camera;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "tutti/base/config.hpp"
@@ -47,6 +48,8 @@ class SimulatedCamera {
   /// What is seen from T_world_camera; `time_s` tells the exposure, `rng` the noise. One ray a pixel, through its
   /// centre; pixels that see nothing (no direction, or out of the hall) are black.
   [[nodiscard]] Image image(const Pose3& T_world_camera, double time_s, Rng rng) const;
+  /// What a depth sensor with the same pixels would measure from there, with its noise.
+  [[nodiscard]] DepthImage depth(const Pose3& T_world_camera, const DepthSensor& sensor, Rng rng) const;
 
  private:
   std::shared_ptr<const HallScene> scene_;
@@ -55,8 +58,10 @@ class SimulatedCamera {
   std::vector<Eigen::Vector3f> rays_;  ///< Unit, camera frame, by pixel; zero where there is none.
 };
 
-/// The images of a robot that moves along `truth` (T_world_body), one per camera and pose, made when asked for.
+/// The images of a robot that moves along `truth` (T_world_body), one per camera and pose, made when asked for; with
+/// `depth`, depth images of the first camera, too.
 ImageStream simulate_images(std::shared_ptr<const HallScene> scene, const std::vector<Camera>& cameras,
-                            Trajectory truth, const ImageConfig& config, Rng rng);
+                            Trajectory truth, const ImageConfig& config, Rng rng,
+                            const std::optional<DepthSensor>& depth = {});
 
 }  // namespace tutti::simulation

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/simulation/hall_recordings.hpp"
 
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -59,7 +60,8 @@ Result<SimulatedHall> simulate_hall(const HallMissionConfig& config, Timestamp s
       recording.scans = std::make_shared<SimulatedLidar>(walls, recording.reference, config.lidar, own.fork("lidar"));
     if (robot.sensors != "lidar") {
       flown.images = simulate_images(scene, make_cameras(config.cameras, config.half_resolution), recording.reference,
-                                     config.images, own.fork("images"));
+                                     config.images, own.fork("images"),
+                                     config.depth ? std::optional(DepthSensor{}) : std::nullopt);
       if (config.imu) {
         recording.imu = simulate_imu([&](double time_s) { return flight_motion(robot.flight, time_s); },
                                      start + robot.start_s, robot.flight.duration_s, config.imu_noise, own.fork("imu"));

@@ -72,6 +72,13 @@ Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odom
               found, nearest_s, nearest_s + (nearest_s > 0.0 ? -gap_s : gap_s), quantile(0.25), quantile(0.75));
 }
 
+/// With depth, the camera by which its views are.
+std::vector<Camera> cameras_of(const ImageStream& stream, const TrackerConfig& config) {
+  auto out = stream.cameras;
+  if (stream.load_depth) out.push_back(depth_camera(out.front(), stream.depth, config.sigma_px));
+  return out;
+}
+
 /// Follows the images at their own stamps as far as it takes to see by how much their clock is off; images that cannot
 /// be read are passed over.
 std::optional<double> watched_offset_s(const ImageStream& stream, const Trajectory& odometry,
@@ -96,6 +103,8 @@ Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream stream,
                                                              const TrackingConfig& config) {
   if (stream.cameras.empty() || stream.cameras.size() > 2)
     return fail(ErrorCode::unsupported, "{} cameras, expected one or two", stream.cameras.size());
+  if (stream.load_depth && stream.cameras.size() != 1)
+    return fail(ErrorCode::unsupported, "{} cameras with depth, expected one", stream.cameras.size());
   for (const Camera& camera : stream.cameras)
     if (auto ok = check_camera(camera.model); !ok) return tl::unexpected(ok.error());
   const auto by_motion = [&] { return watched_offset_s(stream, odometry, config.tracker); };
@@ -106,7 +115,7 @@ Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream stream,
 
 TrackingSource::TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config)
     : stream_(std::move(stream)),
-      cameras_(std::make_shared<const std::vector<Camera>>(stream_.cameras)),
+      cameras_(std::make_shared<const std::vector<Camera>>(cameras_of(stream_, config.tracker))),
       odometry_(std::move(odometry)),
       config_(config),
       tracker_(stream_.cameras, config.tracker),
@@ -149,6 +158,22 @@ void TrackingSource::check_clock() {
                                    *roll_deg)});
 }
 
+void TrackingSource::add_depth(std::size_t moment, std::vector<TrackedImage>& tracked) {
+  constexpr std::uint64_t kOfOneImage = std::uint64_t{1} << 62U;  // numbers of tracks to which no tracker counts
+  auto depth = stream_.load_depth(moment);
+  if (depth && depth->empty()) return;
+  if (depth)
+    if (const auto ok = check_depth_size(*depth, stream_.cameras.front()); !ok)
+      depth = in_context(fmt::format("depth at {} ns", stream_.stamps[moment].ns), ok.error());
+  if (!depth) {
+    errors_.push_back(depth.error());
+    return;
+  }
+  if (auto amiss = depth_watch_.add(*depth, stream_.depth)) errors_.push_back({ErrorCode::invalid, *std::move(amiss)});
+  tracked.push_back(view_by_depth(tracked.front(), *depth, stream_.depth, stream_.cameras.front(), cameras_->at(1),
+                                  kOfOneImage + (moment << kNumberBits)));
+}
+
 std::vector<TrackedImage> TrackingSource::track(std::size_t moment, bool keyframe) {
   std::vector<Image> images;
   for (std::size_t camera = 0; camera < stream_.cameras.size(); ++camera) {
@@ -162,6 +187,7 @@ std::vector<TrackedImage> TrackingSource::track(std::size_t moment, bool keyfram
     images.push_back(image ? *std::move(image) : Image());
   }
   auto tracked = tracker_.track(images, keyframe);
+  if (keyframe && stream_.load_depth && !tracked.empty()) add_depth(moment, tracked);
   if (!tracked.empty()) clock_.add(stream_.stamps[moment], tracked.front());
   return tracked;
 }

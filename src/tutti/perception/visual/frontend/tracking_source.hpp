@@ -11,6 +11,7 @@
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/perception/visual/clock_check.hpp"
+#include "tutti/perception/visual/depth_view.hpp"
 #include "tutti/perception/visual/frontend/visual_tracker.hpp"
 
 namespace tutti::visual {
@@ -42,6 +43,8 @@ class TrackingSource : public VisualSource {
  private:
   TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config);
   void check_clock();
+  /// Of what the first camera saw, the view by depth.
+  void add_depth(std::size_t moment, std::vector<TrackedImage>& tracked);
   [[nodiscard]] std::vector<TrackedImage> track(std::size_t moment, bool keyframe);
 
   ImageStream stream_;
@@ -50,6 +53,7 @@ class TrackingSource : public VisualSource {
   TrackingConfig config_;
   VisualTracker tracker_;
   ClockCheck clock_;
+  DepthWatch depth_watch_;
   bool clock_checked_ = false;
   std::size_t next_moment_ = 0, next_sample_ = 0;
   std::vector<Error> errors_;
