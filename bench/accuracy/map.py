@@ -60,6 +60,12 @@ def median_of_robots(reports, of):
     return ", ".join("-" if None in values else f"{statistics.median(values):.3f}" for values in per_robot)
 
 
+def changes_of_mind(reports):
+    """All seeds and robots: how often the map changed its mind, and how often it changed it back."""
+    changes = [change["outcome"] for report in reports for change in report["server"].get("changes_of_mind", [])]
+    return f"{len(changes)} ({changes.count('gone')})"
+
+
 def counts(reports):
     server = [report["server"] for report in reports]
     accepted = [s["closures_accepted"] for s in server]
@@ -102,11 +108,13 @@ def main():
             "Trajectories only, closures from the truth with noise, one in ten wrong unless said (`*`: instead of LiDAR's). Odometry",
             "of EuRoC and KITTI is real and replayed, the rest simulated. RMSE of each robot's part of the server's map, m,",
             "aligned alone, median of the seeds; *perfect*: of the map of a judge who is told by the reference which closures are",
-            "wrong (docs/report.md). Over perfect: all robots and seeds at the end. Worst moment: by how many metres the broadcast,",
+            "wrong (docs/report.md). Over perfect: all robots and seeds at the end. Changes of mind: updates in which the map differed",
+            "from the one a robot followed by more than three of its own standard deviations, in brackets those that the next map took",
+            "back: robots never followed them. Worst moment: by how many metres the map,",
             "and the robot corrected by it, were worse than raw odometry at most while the mission ran (below 0: never).", "",
             row("mission", "seeds", *(f"{label}: accepted (wrong)" for label, _ in programs),
-                "odometry", *(label for label, _ in programs), "perfect", "over perfect", "worst moment: broadcast", "corrected"),
-            row(*["---"] * (8 + 2 * (len(programs) - 1) + 1))]
+                "odometry", *(label for label, _ in programs), "perfect", "over perfect", "changes of mind (gone)", "worst moment: broadcast", "corrected"),
+            row(*["---"] * (9 + 2 * (len(programs) - 1) + 1))]
     everything = {label: [] for label, _ in programs}
     for name in CASES:
         after = of("after", name)
@@ -119,7 +127,7 @@ def main():
         text.append(row(name, len(list(seeds)), *(counts(of(label, name)) for label, _ in programs),
                         median_of_robots(after, lambda r: [robot["onboard_rmse_m"] for robot in r["robots"]]),
                         *(median_of_robots(of(label, name), errors) for label, _ in programs),
-                        median_of_robots(after, perfect), spread(ratios(after, errors, perfect)),
+                        median_of_robots(after, perfect), spread(ratios(after, errors, perfect)), changes_of_mind(after),
                         *("-" if value is None else f"{value:.3f}" for value in harm)))
     text.append("")
     for label, values in everything.items():

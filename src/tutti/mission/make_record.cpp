@@ -63,6 +63,8 @@ MissionRecord make_record(const FinishedMission& mission) {
   evaluate_images(server, record);
   record.server.proxy = broadcast;
   record.server.updates = mission.events.updates();
+  record.server.changes_of_mind = mission.events.changes_of_mind();
+  note_changes_of_mind(record);
   for (RobotRecord& robot : record.robots) {
     const FinishedRobot& finished = mission.robots[robot.id.value];
     record_traffic(finished.traffic, robot);

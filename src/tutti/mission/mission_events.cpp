@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <variant>
 
 namespace tutti::mission {
@@ -15,6 +16,22 @@ void MissionEvents::take(const node::Event& event) {
   if (const auto* failed = std::get_if<node::RefinementFailed>(&event.what)) refusals_.push_back(failed->why);
   if (const auto* update = std::get_if<node::MapUpdated>(&event.what))
     updates_.push_back({static_cast<double>(event.time.ns) / 1e9, update->accepted, std::nullopt});
+  if (const auto* told = std::get_if<node::ChangeOfMind>(&event.what))
+    take(ChangeOfMindRecord{told->robot,
+                            static_cast<double>(event.time.ns) / 1e9,
+                            {},
+                            node::to_string(told->outcome),
+                            told->change,
+                            server::to_string(told->reason)});
+}
+
+void MissionEvents::take(const ChangeOfMindRecord& change) {
+  if (change.outcome == node::to_string(node::ChangeOutcome::waits)) return changes_of_mind_.push_back(change);
+  const auto same = [&](const ChangeOfMindRecord& known) { return known.robot == change.robot && !known.settled_s; };
+  const auto waiting = std::ranges::find_if(changes_of_mind_, same);
+  if (waiting == changes_of_mind_.end()) return;  // the lines before it are lost
+  waiting->settled_s = change.since_s;
+  waiting->outcome = change.outcome;
 }
 
 void MissionEvents::note_refusals(MissionRecord& record) const {

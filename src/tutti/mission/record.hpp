@@ -10,6 +10,7 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
+#include "tutti/consistency/change_of_mind.hpp"
 #include "tutti/consistency/constraint.hpp"
 #include "tutti/consistency/explanation.hpp"
 #include "tutti/evaluation/association.hpp"
@@ -216,8 +217,19 @@ struct MapUpdateRecord {
   std::optional<std::size_t> wrong;  ///< Of these, as ClosureCheckRecord; nothing where none can be checked.
 };
 
+/// The map differed from the one that a robot followed by more than it had allowed for (node/change_watch.hpp).
+struct ChangeOfMindRecord {
+  RobotId robot;
+  double since_s = 0.0;             ///< Mission time of the update that differed: the robot was not sent it.
+  std::optional<double> settled_s;  ///< Of the update that decided; nothing: none did.
+  std::string outcome;              ///< waits, stands, gone
+  consistency::MapChange change;
+  std::string reason;  ///< In words.
+};
+
 struct ServerRecord {
   std::vector<MapUpdateRecord> updates;
+  std::vector<ChangeOfMindRecord> changes_of_mind;
   std::size_t components = 0;               ///< Groups of robots that share a frame.
   std::vector<ClosureRecord> closures;      ///< Accepted.
   std::vector<RejectionRecord> rejections;  ///< By reason.

@@ -107,6 +107,23 @@ void note_remarks(const server::Refinements& refinements, MissionRecord& record)
       record.notes.push_back(fmt::format("{}: {}", record.robots[remark.robot.value].name, remark.text));
 }
 
+void note_changes_of_mind(MissionRecord& record) {
+  for (const RobotRecord& robot : record.robots) {
+    std::vector<ChangeOfMindRecord> changes;
+    std::ranges::copy_if(record.server.changes_of_mind, std::back_inserter(changes),
+                         [&](const ChangeOfMindRecord& change) { return change.robot == robot.id; });
+    if (changes.empty()) continue;
+    const auto gone = std::ranges::count(changes, "gone", &ChangeOfMindRecord::outcome);
+    const auto greatest = std::ranges::max_element(
+        changes, {}, [](const ChangeOfMindRecord& change) { return change.change.translation_m; });
+    record.notes.push_back(fmt::format(
+        "{}: the map changed its mind {} times, and changed it back {} of these; {} waits for a change to stand before "
+        "it follows. The greatest was {:.2f} m at {:.0f} s ({}): {}",
+        robot.name, changes.size(), gone, robot.name, greatest->change.translation_m, greatest->since_s,
+        greatest->outcome, greatest->reason));
+  }
+}
+
 void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record) {
   if (!map.left_out.empty()) {
     const SubmapId first = map.left_out.front();

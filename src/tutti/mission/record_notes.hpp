@@ -19,6 +19,8 @@ namespace tutti::mission {
 void note_undelivered(const std::map<bus::SimulatedRadio::Topic, std::size_t>& undelivered, MissionRecord& record);
 /// What refiners found out about robots' sensors, as the last refinement of the whole map has it.
 void note_remarks(const server::Refinements& refinements, MissionRecord& record);
+/// How often the map changed its mind about each robot, and the greatest change.
+void note_changes_of_mind(MissionRecord& record);
 /// Submaps that are not in the map, and closures that were not judged.
 void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record);
 

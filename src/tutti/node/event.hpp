@@ -12,6 +12,7 @@
 #include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/refinement.hpp"
+#include "tutti/node/change_watch.hpp"
 #include "tutti/robot/agent.hpp"
 
 /// What has happened at a node, for whoever keeps a record. How long it took is not in it: that is the host's to
@@ -109,8 +110,8 @@ struct SensorMissing {
 struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
-               MapUpdated, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost, SubmapsForgotten,
-               SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing>
+               MapUpdated, ChangeOfMind, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost,
+               SubmapsForgotten, SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing>
       what;
 };
 

@@ -313,17 +313,44 @@ void ServerNode::send_receipt(Receipt receipt, Step& step) const {
       to_robot(receipt.robot, bus::MessageKind::receipt, std::make_shared<const std::string>(wire::encode(receipt))));
 }
 
-void ServerNode::send_graph(ProxyGraphMessage message, Step& step) {
+/// What waits (ChangeWatch) is sent at the next update, whether or not there is news by then.
+void ServerNode::send_graph(ProxyGraphMessage message, Timestamp now, Step& step) {
   message.graph.incarnation = config_.incarnation;
   for (const RobotId robot : robots_)
     if (const auto owner = registry_.owner(robot)) consistency::see_last_in(message.graph, *owner);
   broadcast_ = message.graph;
+  const bool wait = config_.server.change_of_mind == "wait" && !std::exchange(operator_spoke_, false);
+  const auto beliefs = std::make_shared<const server::Beliefs>(server::beliefs_of(server_.map()));
+  std::vector<RobotId> heard;
+  for (const RobotId robot : robots_) {
+    ChangeWatch::Decision decision =
+        change_watch_.take(robot, consistency::own_part(message.graph, robot), beliefs, wait);
+    if (decision.send) heard.push_back(robot);
+    for (ChangeOfMind& told : decision.told) step.tell(now, std::move(told));
+  }
+  if (change_watch_.anything_waits()) timer_ = now + config_.server.update_period_s;
+  send_graph(message, heard, step);
+}
+
+void ServerNode::send_graph(const ProxyGraphMessage& message, std::span<const RobotId> robots, Step& step) {
   if (config_.server.broadcast == "own") {
-    for (const RobotId robot : robots_) step.messages.push_back(own_graph(robot, message));
+    for (const RobotId robot : robots) step.messages.push_back(own_graph(robot, message));
     return;
   }
   const auto whole = std::make_shared<const std::string>(wire::encode(message));
-  for (const RobotId robot : robots_) step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, whole));
+  for (const RobotId robot : robots) step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, whole));
+}
+
+void ServerNode::send_waiting(Timestamp now, Step& step) {
+  std::vector<RobotId> robots;
+  for (const RobotId robot : robots_)
+    if (auto told = change_watch_.follow(robot)) {
+      robots.push_back(robot);
+      step.tell(now, std::move(*told));
+    }
+  send_graph(
+      {.header = {.robot = {}, .session = broadcast_.epoch, .sequence = broadcast_.revision}, .graph = broadcast_},
+      robots, step);
 }
 
 /// Deltas grow as the map leaves the base behind. The mean of what is sent is smallest when the full graph is sent
@@ -355,7 +382,7 @@ void ServerNode::send_map(ProxyGraphMessage message, Timestamp now, Step& step) 
   has_map_ = true;
   compute_at_.reset();
   ++changes_;
-  send_graph(std::move(message), step);
+  send_graph(std::move(message), now, step);
   if (const MapCounts now_there = counts(); stored_counts_ != now_there) {
     stored_counts_ = now_there;
     step.writes.push_back(to_row(now_there));
@@ -370,6 +397,10 @@ Step ServerNode::on_timer(Timestamp now) {
   settle(now, step);
   if (timer_ && *timer_ <= now) {
     timer_.reset();
+    if (!server_.has_news() && change_watch_.anything_waits()) {
+      send_waiting(now, step);
+      return step;
+    }
     send_map(server_.optimise(), now, step);
     step.writes.push_back(meta());
     step.tell(now, MapUpdated{server_.state().revision, server_.state().submaps.size(),

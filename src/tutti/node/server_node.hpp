@@ -6,10 +6,12 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "tutti/node/change_watch.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/step.hpp"
@@ -167,7 +169,10 @@ class ServerNode {
   [[nodiscard]] MapCounts counts() const;
   /// The map has been computed.
   void send_map(ProxyGraphMessage message, Timestamp now, Step& step);
-  void send_graph(ProxyGraphMessage message, Step& step);
+  void send_graph(ProxyGraphMessage message, Timestamp now, Step& step);
+  void send_graph(const ProxyGraphMessage& message, std::span<const RobotId> robots, Step& step);
+  /// The last map to the robots that wait for it.
+  void send_waiting(Timestamp now, Step& step);
   /// In full, or in terms of the last one that was, whichever makes fewer bytes in the long run.
   [[nodiscard]] bus::Envelope own_graph(RobotId robot, const ProxyGraphMessage& message);
   /// Sets the timer when something new has come, and remembers in the store whether it has.
@@ -215,6 +220,8 @@ class ServerNode {
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;
   ProxyGraph broadcast_;
+  ChangeWatch change_watch_;
+  bool operator_spoke_ = false;  // since the last map
   /// What a robot was sent in full, as it knows it, and what has come in terms of it since.
   struct Base {
     ProxyGraph graph;

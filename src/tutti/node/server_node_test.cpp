@@ -427,5 +427,86 @@ TEST_F(ServerNodeTest, AStoreThatIsDamagedIsNoMap) {
   }
 }
 
+/// Says that odometry lost a metre in the middle.
+class LostMetreFinder final : public server::ClosureFinder {
+ public:
+  [[nodiscard]] MethodId id() const override { return even_.id(); }
+  [[nodiscard]] std::string settings() const override { return even_.settings(); }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return even_.can_compare(first, second);
+  }
+  [[nodiscard]] bool is_candidate(const Submap&, const Submap&) const override { return true; }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::PayloadStore& payloads) const override {
+    auto verdict = even_.verify(first, second, payloads);
+    for (LoopClosure& closure : verdict->closures)
+      if (first.id.index < kMiddle && second.id.index >= kMiddle) closure.measurement.T_a_b.translation.x() += 1.0;
+    return verdict;
+  }
+
+ private:
+  static constexpr std::uint32_t kMiddle = 8;
+  test::EvenFinder even_;
+};
+
+class ChangedMap : public ServerNodeTest {
+ protected:
+  /// The next update changes its mind.
+  void reach(const std::string& setting) {
+    finder_ = std::make_shared<LostMetreFinder>();
+    ServerNodeConfig config{.pairs_per_job = 1000};
+    config.server.change_of_mind = setting;
+    start({RobotId{0}}, config);
+    std::vector<Step> jobs;
+    for (std::uint32_t i = 0; i < 18; ++i) jobs.push_back(receive(test::submap(kAlpha, i)));
+    now_ = *node_->next_timer();
+    EXPECT_EQ(of_kind(done(node_->on_timer(now_)), MessageKind::proxy_graph).size(), 1U);
+    for (const Step& step : jobs) answer(step);
+    now_ = *node_->next_timer();
+  }
+  static std::vector<ChangeOutcome> outcomes(const Step& step) {
+    std::vector<ChangeOutcome> out;
+    for (const Event& event : step.events)
+      if (const auto* change = std::get_if<ChangeOfMind>(&event.what)) out.push_back(change->outcome);
+    return out;
+  }
+};
+
+TEST_F(ChangedMap, IsSentOnceItHasStoodForAnotherUpdate) {
+  reach("wait");
+  const Step changed = done(node_->on_timer(now_));
+  EXPECT_TRUE(of_kind(changed, MessageKind::proxy_graph).empty());
+  EXPECT_EQ(outcomes(changed), std::vector{ChangeOutcome::waits});
+  ASSERT_EQ(node_->next_timer(), now_ + 10.0);  // with or without news
+  const std::size_t updates = node_->map_server().work().updates;
+  now_ = *node_->next_timer();
+  const Step stands = done(node_->on_timer(now_));
+  EXPECT_EQ(outcomes(stands), std::vector{ChangeOutcome::stands});
+  const auto graphs = of_kind(stands, MessageKind::proxy_graph);
+  ASSERT_EQ(graphs.size(), 1U);
+  EXPECT_EQ(wire::decode_proxy_graph(*graphs[0].bytes)->graph.nodes.size(), node_->broadcast().nodes.size());
+  EXPECT_EQ(node_->map_server().work().updates, updates);  // nothing is computed again
+  EXPECT_EQ(node_->next_timer(), std::nullopt);
+}
+
+TEST_F(ChangedMap, IsSentAtOnceToRobotsThatDoNotWait) {
+  reach("follow");
+  const Step changed = done(node_->on_timer(now_));
+  EXPECT_EQ(of_kind(changed, MessageKind::proxy_graph).size(), 1U);
+  EXPECT_EQ(outcomes(changed), std::vector<ChangeOutcome>{});
+}
+
+TEST_F(ChangedMap, IsSentAtOnceAfterAnOperatorsWord) {
+  reach("wait");
+  const auto& verdicts = node_->map_server().state().verdicts;
+  ASSERT_FALSE(verdicts.empty());
+  const std::string name = server::ClosureNames({}, {kAlpha}).of(verdicts.begin()->first);
+  const Step heard = receive(envelope({name, Wish::accept, "ada", 5}));
+  EXPECT_EQ(told<WordTaken>(heard), 1U);
+  const Step changed = done(node_->on_timer(now_));
+  EXPECT_EQ(of_kind(changed, MessageKind::proxy_graph).size(), 1U);
+  EXPECT_EQ(outcomes(changed), std::vector<ChangeOutcome>{});
+}
+
 }  // namespace server_node_test
 }  // namespace tutti::node

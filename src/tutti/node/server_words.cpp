@@ -46,6 +46,7 @@ Result<bool> ServerNode::take_word(const bus::Envelope& envelope, const ClosureW
   if (before == words.at(*pair)) return before != word;
   step.writes.push_back({"words", key_of(*pair), *envelope.bytes});
   step.tell(now, WordTaken{*pair, word.wish});
+  operator_spoke_ = true;
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   return false;
 }

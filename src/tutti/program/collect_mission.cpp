@@ -107,6 +107,17 @@ Result<mission::MissionEvents> read_course(const fs::path& folder) {
       course.take(
           {time, node::MapUpdated{event.value("revision", std::uint64_t{0}), event.value("submaps", std::size_t{0}),
                                   event.value("accepted", std::size_t{0})}});
+    if (what == "change_of_mind")
+      course.take(mission::ChangeOfMindRecord{RobotId{event.value("robot", std::uint32_t{0})},
+                                              event.value("time_s", 0.0),
+                                              {},
+                                              event.value("outcome", ""),
+                                              {.significance = event.value("significance", 0.0),
+                                               .translation_m = event.value("translation_m", 0.0),
+                                               .rotation_rad = event.value("rotation_rad", 0.0),
+                                               .from = {event.value("from_ns", std::int64_t{0})},
+                                               .until = {event.value("until_ns", std::int64_t{0})}},
+                                              event.value("reason", "")});
     const bool is_new_failure = what == "verification_failed" &&
                                 failed.insert(event.value("first", "") + " " + event.value("second", "")).second;
     if (what == "message_refused" || is_new_failure)

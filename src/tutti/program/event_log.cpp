@@ -9,6 +9,7 @@
 
 #include <array>
 #include <chrono>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -95,6 +96,28 @@ Told tell(const node::RefinementFailed& failed) {
 Told tell(const node::MapUpdated& map) {
   return {{{"event", "map_updated"}, {"revision", map.revision}, {"submaps", map.submaps}, {"accepted", map.accepted}},
           fmt::format("map revision {}: {} submaps, {} closures", map.revision, map.submaps, map.accepted)};
+}
+Told tell(const node::ChangeOfMind& told) {
+  const consistency::MapChange& change = told.change;
+  const std::string reason = server::to_string(told.reason);
+  const std::string what = fmt::format(
+      "the map's change of mind about robot {} ({:.2f} m, {:.1f} degrees, {:.1f} times what it allowed for)",
+      told.robot.value, change.translation_m, change.rotation_rad * 180.0 / std::numbers::pi, change.significance);
+  const bool waits = told.outcome == node::ChangeOutcome::waits;
+  return {{{"event", "change_of_mind"},
+           {"robot", told.robot.value},
+           {"outcome", to_string(told.outcome)},
+           {"significance", change.significance},
+           {"translation_m", change.translation_m},
+           {"rotation_rad", change.rotation_rad},
+           {"from_ns", change.from.ns},
+           {"until_ns", change.until.ns},
+           {"reason", reason}},
+          waits
+              ? fmt::format("{} waits for another update: {}", what, reason)
+              : fmt::format("{} {}", what,
+                            told.outcome == node::ChangeOutcome::stands ? "stands, and is followed" : "is gone again"),
+          waits ? Level::warning : Level::info};
 }
 Told tell(const node::RobotUpdated& robot) {
   const robot::UpdateSummary& update = robot.summary;

@@ -30,6 +30,7 @@ struct ServerConfig {
   int refine_every = 5;
   double update_period_s = 10.0;  ///< Mission time between two optimisations when something new has come.
   std::string broadcast = "own";
+  std::string change_of_mind = "wait";
   template <class V>
   void describe(V& v) {
     v.field("map", map);
@@ -43,6 +44,10 @@ struct ServerConfig {
     v.field("broadcast", broadcast, one_of({"own", "all"}),
             "What a robot is sent of the map: 'own' = the proxy nodes of its newest session, how sure the map is of "
             "them, and where the others were last seen; 'all' = everybody's (the paper). It does the same with both.");
+    v.field("change_of_mind", change_of_mind, one_of({"wait", "follow"}),
+            "A map that differs from the one a robot follows by more than three of that map's own standard deviations: "
+            "'wait' = the robot is sent it once it has stood for another update, or an operator has spoken since; "
+            "'follow' = at once.");
   }
 };
 

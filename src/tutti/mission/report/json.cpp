@@ -30,6 +30,18 @@ Json stretch_json(const RobotRecord& robot, const Stretch& stretch, const Json& 
   return out;
 }
 
+Json change_of_mind_json(const RobotRecord& robot, const ChangeOfMindRecord& change) {
+  return stretch_json(robot, change.change,
+                      {{"robot", robot.name},
+                       {"since_s", number(change.since_s)},
+                       {"settled_s", number(change.settled_s)},
+                       {"outcome", change.outcome},
+                       {"significance", number(change.change.significance)},
+                       {"translation_m", number(change.change.translation_m)},
+                       {"rotation_rad", number(change.change.rotation_rad)},
+                       {"reason", change.reason}});
+}
+
 Json drift_json(const RobotRecord& robot) {
   Json out = Json::array();
   for (const DriftOrigin& drift : robot.drift_origins)
@@ -241,6 +253,10 @@ Json server_json(const MissionRecord& record) {
         failed.push_back(stretch_json(
             robot, stretch,
             {{"robot", robot.name}, {"error_m", number(stretch.error_m)}, {"error_rad", number(stretch.error_rad)}}));
+  Json changes = Json::array();
+  for (const ChangeOfMindRecord& change : server.changes_of_mind)
+    for (const RobotRecord& robot : record.robots)
+      if (robot.id == change.robot) changes.push_back(change_of_mind_json(robot, change));
   Json course = Json::array();
   for (const MapUpdateRecord& update : server.updates)
     course.push_back({{"time_s", number(update.time_s)},
@@ -260,6 +276,7 @@ Json server_json(const MissionRecord& record) {
            {"map_error", map_error_json(server.map_error)},
            {"survey_covered", number(server.survey_covered)},
            {"failed_odometry", std::move(failed)},
+           {"changes_of_mind", std::move(changes)},
            {"refinement", refinement_json(server.refinement)},
            {"course", std::move(course)}};
   add_scored(out, "", server.joint.scored_share);

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/change_watch.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tutti::node {
+
+const char* to_string(ChangeOutcome outcome) {
+  switch (outcome) {
+    case ChangeOutcome::waits:
+      return "waits";
+    case ChangeOutcome::stands:
+      return "stands";
+    case ChangeOutcome::gone:
+      return "gone";
+  }
+  return "";
+}
+
+ChangeWatch::Decision ChangeWatch::take(RobotId robot, const ProxyGraph& own,
+                                        std::shared_ptr<const server::Beliefs> beliefs, bool wait) {
+  Decision out;
+  Robot& known = robots_[robot];
+  Map map{own, std::move(beliefs)};
+  const auto end_waiting = [&](ChangeOutcome outcome) {
+    if (known.waiting) out.told.push_back({robot, outcome, known.waiting->change, known.waiting->reason});
+    known.waiting.reset();
+  };
+  const auto follow = [&] { known.followed = std::move(map); };
+  if (own.nodes.empty() || !wait) {
+    end_waiting(ChangeOutcome::stands);
+    follow();
+    return out;
+  }
+  const ChainId& chain = own.nodes.front().chain;
+  const consistency::MapChange change = consistency::map_change(known.followed.own, own, chain);
+  if (!change.is_change_of_mind()) {
+    end_waiting(ChangeOutcome::gone);
+    follow();
+    return out;
+  }
+  if (known.waiting &&
+      consistency::map_change(known.waiting->map.own, own, chain).translation_m < change.translation_m) {
+    end_waiting(ChangeOutcome::stands);
+    follow();
+    return out;
+  }
+  end_waiting(ChangeOutcome::gone);
+  const server::ChangeReason reason = server::reason_of_change(*known.followed.beliefs, *map.beliefs, chain);
+  out.send = false;
+  out.told.push_back({robot, ChangeOutcome::waits, change, reason});
+  known.waiting = {std::move(map), change, reason};
+  return out;
+}
+
+std::optional<ChangeOfMind> ChangeWatch::follow(RobotId robot) {
+  const auto known = robots_.find(robot);
+  if (known == robots_.end() || !known->second.waiting) return std::nullopt;
+  Waiting waiting = *std::exchange(known->second.waiting, std::nullopt);
+  known->second.followed = std::move(waiting.map);
+  return ChangeOfMind{robot, ChangeOutcome::stands, waiting.change, waiting.reason};
+}
+
+bool ChangeWatch::waits(RobotId robot) const {
+  const auto known = robots_.find(robot);
+  return known != robots_.end() && known->second.waiting.has_value();
+}
+
+bool ChangeWatch::anything_waits() const {
+  return std::ranges::any_of(robots_, [](const auto& known) { return known.second.waiting.has_value(); });
+}
+
+}  // namespace tutti::node

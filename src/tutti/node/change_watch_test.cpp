@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/node/change_watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "support/consistency/uncertainty.hpp"
+
+namespace tutti::node {
+namespace change_watch_test {
+
+using namespace consistency;  // NOLINT: its test support
+using consistency::test::kBravo;
+
+constexpr std::size_t kNodes = 160;  // round a corner: along a line, what lies aside of it may be turned about it
+
+/// The map, in which the second half of the robot's way lies `aside` of where odometry has it.
+ProxyGraph map_with(double aside_m, const ChainId& chain = {kBravo, 1}) {
+  static const consistency::test::WalkWithClosures errors{kNodes, 20, {0.01, 5e-4}, {0.02, 2e-3}};
+  std::vector<Pose3> poses = consistency::test::corridor(kNodes);
+  for (std::size_t n = kNodes / 2; n < kNodes; ++n) poses[n].translation.y() += aside_m;
+  auto nodes = consistency::test::server_nodes(chain.robot, poses);
+  for (consistency::ServerNode& node : nodes) node.chain = chain;
+  ProxyGraph graph = consistency::build_proxy_graph(1, std::move(nodes), {}, {});
+  graph.uncertainties = {errors.uncertainty(graph, chain)};
+  return graph;
+}
+
+class ChangeWatchTest : public testing::Test {
+ protected:
+  ChangeWatch::Decision take(const ProxyGraph& map, bool wait = true) {
+    return watch_.take(kBravo, map, std::make_shared<const server::Beliefs>(), wait);
+  }
+  /// What is told, one outcome at most.
+  static std::optional<ChangeOutcome> told(const ChangeWatch::Decision& decision) {
+    EXPECT_LE(decision.told.size(), 1U);
+    return decision.told.empty() ? std::nullopt : std::optional(decision.told.front().outcome);
+  }
+  ChangeWatch watch_;
+};
+
+TEST_F(ChangeWatchTest, TheFirstMapAndThoseLikeItAreSent) {
+  for (const double aside_m : {0.0, 0.01, 0.02}) {
+    const auto decision = take(map_with(aside_m));
+    EXPECT_TRUE(decision.send);
+    EXPECT_EQ(told(decision), std::nullopt);
+  }
+  EXPECT_FALSE(watch_.anything_waits());
+}
+
+TEST_F(ChangeWatchTest, AChangeThatStandsIsSentOneUpdateLater) {
+  take(map_with(0.0));
+  const auto first = take(map_with(2.0));
+  EXPECT_FALSE(first.send);
+  EXPECT_EQ(told(first), ChangeOutcome::waits);
+  EXPECT_GT(first.told[0].change.significance, 1.0);
+  EXPECT_TRUE(watch_.waits(kBravo));
+  const auto second = take(map_with(2.1));
+  EXPECT_TRUE(second.send);
+  EXPECT_EQ(told(second), ChangeOutcome::stands);
+  EXPECT_EQ(told(take(map_with(2.1))), std::nullopt);
+}
+
+TEST_F(ChangeWatchTest, AChangeThatIsTakenBackIsNeverSent) {
+  take(map_with(0.0));
+  for (int flip = 0; flip < 5; ++flip) {
+    EXPECT_FALSE(take(map_with(2.0)).send);
+    const auto back = take(map_with(0.0));
+    EXPECT_TRUE(back.send);
+    EXPECT_EQ(told(back), ChangeOutcome::gone);
+  }
+}
+
+// Even where it goes on changing, as odometry that is far too sure makes it: what came nearer stands.
+TEST_F(ChangeWatchTest, AMapThatGoesOnTheSameWayIsFollowed) {
+  take(map_with(0.0));
+  EXPECT_FALSE(take(map_with(2.0)).send);
+  EXPECT_TRUE(take(map_with(3.5)).send);
+}
+
+TEST_F(ChangeWatchTest, AThirdOpinionWaitsAnew) {
+  take(map_with(0.0));
+  EXPECT_FALSE(take(map_with(2.0)).send);
+  const auto other = take(map_with(-1.5));
+  EXPECT_FALSE(other.send);
+  ASSERT_EQ(other.told.size(), 2U);
+  EXPECT_EQ(other.told[0].outcome, ChangeOutcome::gone);
+  EXPECT_EQ(other.told[1].outcome, ChangeOutcome::waits);
+  EXPECT_TRUE(take(map_with(-1.5)).send);
+}
+
+TEST_F(ChangeWatchTest, AnUpdateWithoutNewsLetsItStand) {
+  take(map_with(0.0));
+  EXPECT_FALSE(watch_.follow(kBravo).has_value());
+  EXPECT_FALSE(take(map_with(2.0)).send);
+  EXPECT_EQ(watch_.follow(kBravo)->outcome, ChangeOutcome::stands);
+  EXPECT_FALSE(watch_.anything_waits());
+  EXPECT_TRUE(take(map_with(2.0)).send);
+}
+
+TEST_F(ChangeWatchTest, WhoeverDoesNotWaitIsSentItAtOnce) {
+  take(map_with(0.0));
+  EXPECT_TRUE(take(map_with(2.0), false).send);
+  EXPECT_TRUE(take(map_with(2.0)).send);
+}
+
+TEST_F(ChangeWatchTest, ANewSessionIsAnotherTrajectory) {
+  take(map_with(0.0));
+  EXPECT_TRUE(take(map_with(2.0, {kBravo, 2})).send);
+}
+
+}  // namespace change_watch_test
+}  // namespace tutti::node
