@@ -15,6 +15,7 @@ struct BundleConfig {
   std::string loss = "cauchy";
   double loss_scale = 2.0;
   double odometry_loss_scale = 5.0;
+  double odometry_scale_sigma = 0.02;
   double gyro_random_walk = 1e-4;
   double accelerometer_random_walk = 4e-3;
   double max_bias_sigma = 0.05;
@@ -29,6 +30,8 @@ struct BundleConfig {
     v.field("loss_scale", loss_scale, greater_than(0.0), "Its scale, in standard deviations.");
     v.field("odometry_loss_scale", odometry_loss_scale, greater_than(0.0),
             "Scale of the Cauchy loss on odometry, in standard deviations.");
+    v.field("odometry_scale_sigma", odometry_scale_sigma, greater_than(0.0),
+            "By how much odometry may be wrong in scale all along its way, beside its covariance.");
     v.field("gyro_random_walk", gyro_random_walk, greater_than(0.0), "Of the gyro's bias, rad/s^2/sqrt(Hz).");
     v.field("accelerometer_random_walk", accelerometer_random_walk, greater_than(0.0),
             "Of the accelerometer's bias, m/s^3/sqrt(Hz).");

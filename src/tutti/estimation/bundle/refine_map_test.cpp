@@ -62,6 +62,16 @@ TEST(RefineMap, CovarianceIsConsistent) {
   EXPECT_NEAR(average_nees({.points = 120}, exact_config(), 12), 6.0, 0.7);
 }
 
+/// The steps of a map by one camera are all too long or all too short together, as its odometry is.
+TEST(RefineMap, CovarianceKnowsThatOdometryErrsInScale) {
+  TUTTI_STATISTIC();
+  const SceneOptions options{.points = 120, .odometry_sigma_m = 0.005, .odometry_scale_sigma = 0.02};
+  auto config = exact_config();
+  EXPECT_GT(average_nees(options, config, 20), 20.0);
+  config.bundle.odometry_scale_sigma = 0.02;
+  EXPECT_NEAR(average_nees(options, config, 20), 6.0, 1.5);
+}
+
 TEST(RefineMap, CovarianceIsConsistentWithImu) {
   TUTTI_STATISTIC();
   auto config = exact_config();

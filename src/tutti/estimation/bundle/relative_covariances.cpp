@@ -25,15 +25,17 @@ using Matrix63d = Eigen::Matrix<double, 6, 3>;
 using Node = std::size_t;
 
 /// Nodes of the reduced system, all of six numbers (the solver's block size): every keyframe's pose; where there is an
-/// IMU, [velocity; gyro bias] and [accelerometer bias; nothing] of the keyframe, and [gravity; nothing].
+/// IMU, [velocity; gyro bias] and [accelerometer bias; nothing] of the keyframe, and [gravity; nothing]; of every robot
+/// [the scale of its odometry; nothing].
 struct Nodes {
   std::vector<Node> motion;   ///< Per keyframe the first of its two.
   std::vector<Node> gravity;  ///< Per component.
   std::vector<Node> padded;   ///< Whose last three numbers are nothing.
+  std::map<RobotId, Node> scale;
   Node count = 0;
 };
 
-Nodes number_nodes(const internal::ProblemStructure& structure) {
+Nodes number_nodes(const BundleProblem& problem, const internal::ProblemStructure& structure) {
   Nodes out{.motion = std::vector<Node>(structure.has_motion.size()),
             .gravity = std::vector<Node>(structure.has_gravity.size()),
             .count = structure.has_motion.size()};
@@ -48,6 +50,8 @@ Nodes number_nodes(const internal::ProblemStructure& structure) {
     out.padded.push_back(out.count);
     out.gravity[c] = out.count++;
   }
+  for (const auto& odometry : problem.odometry)
+    if (out.scale.try_emplace(problem.keyframes[odometry.from].id.chain.robot, out.count).second) ++out.count;
   return out;
 }
 
@@ -104,16 +108,25 @@ void add_views(const BundleProblem& problem, const BundleSolution& solution, con
   for (const auto& of_landmark : views) add_landmark(of_landmark, problem, solution, loss, variance, blocks);
 }
 
+/// The lengths of a robot's steps err by one share beside what each errs by itself.
 void add_odometry(const BundleProblem& problem, const BundleSolution& solution, const BundleConfig& config,
-                  Blocks& blocks) {
+                  const Nodes& nodes, Blocks& blocks) {
   const estimation::RobustLoss loss{estimation::LossKind::cauchy, config.odometry_loss_scale};
   for (const auto& odometry : problem.odometry) {
     const auto at = estimation::linearise_between(solution.T_world_body[odometry.from],
                                                   solution.T_world_body[odometry.to], odometry.measurement.T_a_b);
     const Matrix6d root = odometry.measurement.covariance.llt().matrixL().solve(Matrix6d::Identity());
     const double weight = std::sqrt(loss.weight((root * at.residual).squaredNorm()));
-    blocks.add<2, 6>({{{odometry.from, weight * root * at.J_i}, {odometry.to, weight * root * at.J_j}}});
+    const Pose3& T_from_to = odometry.measurement.T_a_b;
+    Matrix6d J_scale = Matrix6d::Zero();  // the residual's translation is in the frame of the step's end
+    J_scale.col(0).head<3>() = -(T_from_to.rotation.conjugate() * T_from_to.translation);
+    blocks.add<3, 6>({{{odometry.from, weight * root * at.J_i},
+                       {odometry.to, weight * root * at.J_j},
+                       {nodes.scale.at(problem.keyframes[odometry.from].id.chain.robot), weight * root * J_scale}}});
   }
+  Vector6d prior = Vector6d::Ones();
+  prior[0] = 1.0 / (config.odometry_scale_sigma * config.odometry_scale_sigma);
+  for (const auto& [robot, node] : nodes.scale) blocks.at(node, node).diagonal() += prior;
 }
 
 void add_imu(const BundleProblem& problem, const BundleSolution& solution, const BundleConfig& config,
@@ -201,10 +214,10 @@ Posterior::~Posterior() = default;
 std::optional<Posterior> Posterior::of(const BundleProblem& problem, const BundleSolution& solution,
                                        const BundleConfig& config) {
   const auto structure = internal::analyse(problem);
-  const Nodes nodes = number_nodes(structure);
+  const Nodes nodes = number_nodes(problem, structure);
   Blocks blocks;
   add_views(problem, solution, config, blocks);
-  add_odometry(problem, solution, config, blocks);
+  add_odometry(problem, solution, config, nodes, blocks);
   add_imu(problem, solution, config, structure, nodes, blocks);
 
   const SingleThread single_thread;

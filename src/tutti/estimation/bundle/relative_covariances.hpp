@@ -15,7 +15,9 @@ namespace tutti::bundle {
 double view_variance(const BundleProblem& problem, const BundleSolution& solution);
 
 /// The joint Gauss-Newton posterior at the solution, landmarks eliminated (Schur complement). Views weigh as the robust
-/// loss left them, and less by view_variance() where that is above 1.
+/// loss left them, and less by view_variance() where that is above 1. A robot's odometry has one scale, known to
+/// odometry_scale_sigma and to what the rest of the problem says of it: without a second camera, depth or an IMU its
+/// steps are as unsure of their lengths as that.
 class Posterior {
  public:
   /// Nothing when the problem does not determine every pose.

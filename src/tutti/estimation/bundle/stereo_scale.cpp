@@ -41,7 +41,7 @@ BundleProblem alone(const BundleProblem& problem, RobotId robot) {
 /// Steps weigh by how well the images know their length: those that no image spans say nothing.
 std::optional<StereoScale> compared(const BundleProblem& own, const std::vector<RelativePose>& odometry,
                                     const BundleSolution& solution, const Posterior& posterior,
-                                    const StereoConfig& config) {
+                                    const BundleConfig& bundle, const StereoConfig& config) {
   const auto covariances = posterior.steps();
   if (!covariances) return std::nullopt;
   std::vector<ComparedStep> steps;
@@ -60,7 +60,7 @@ std::optional<StereoScale> compared(const BundleProblem& own, const std::vector<
   const WayScale way = way_scale(steps, solution, posterior);
   if (!(way.way_m > 0.0)) return std::nullopt;
   StereoScale out{.robot = own.keyframes[own.odometry.front().from].id.chain.robot, .ratio = way.scale};
-  const double odometry_sigma = config.odometry_scale_sigma * way.scale;
+  const double odometry_sigma = bundle.odometry_scale_sigma * way.scale;
   out.sigma = std::sqrt(way.variance + variance_m2 / (weights_m2 * weights_m2) + odometry_sigma * odometry_sigma);
   out.is_refused = std::abs(out.ratio - 1.0) > config.max_sigmas * out.sigma;
   return out;
@@ -97,7 +97,7 @@ Result<std::vector<StereoScale>> judge_stereo(BundleProblem& problem, const std:
     if (!estimation::is_usable(solution->summary.termination)) continue;
     const auto posterior = Posterior::of(own, *solution, config);
     if (!posterior) continue;
-    if (const auto scale = compared(own, its, *solution, *posterior, stereo)) out.push_back(*scale);
+    if (const auto scale = compared(own, its, *solution, *posterior, config, stereo)) out.push_back(*scale);
   }
   for (const StereoScale& scale : out)
     if (scale.is_refused) keep_first_camera(scale.robot, problem);

@@ -10,12 +10,9 @@
 namespace tutti::bundle {
 
 struct StereoConfig {
-  double odometry_scale_sigma = 0.02;
   double max_sigmas = 3.0;
   template <class V>
   void describe(V& v) {
-    v.field("odometry_scale_sigma", odometry_scale_sigma, at_least(0.0),
-            "By how much odometry may be wrong in scale all along its way, beside its covariance.");
     v.field(
         "max_sigmas", max_sigmas, greater_than(0.0),
         "Where a robot's cameras together make its way longer or shorter than its odometry by more than so many "
@@ -28,7 +25,7 @@ struct StereoConfig {
 struct StereoScale {
   RobotId robot;
   double ratio = 1.0;
-  double sigma = 0.0;  ///< Of the ratio: pixels, the odometry's covariance and odometry_scale_sigma.
+  double sigma = 0.0;  ///< Of the ratio: pixels, the odometry's covariance and BundleConfig::odometry_scale_sigma.
   bool is_refused = false;
 };
 

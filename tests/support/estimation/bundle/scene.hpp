@@ -23,6 +23,7 @@ struct SceneOptions {
   int points = 300;
   double pixel_sigma = 1.0;
   double odometry_sigma_m = 0.02, odometry_sigma_rad = 0.005;  ///< Per step.
+  double odometry_scale_sigma = 0.0;                           ///< Of all its steps together, beside that.
   double start_sigma_m = 0.03, start_sigma_rad = 0.005;        ///< Of the poses that a refinement starts from.
   ImuNoise imu_noise;
   ImuBias imu_bias{{0.02, -0.05, 0.08}, {0.1, -0.2, 0.05}};
@@ -114,9 +115,11 @@ class SceneMaker {
 
   void make_odometry() {
     const double m = options_.odometry_sigma_m, rad = options_.odometry_sigma_rad;
+    const double scale = 1.0 + (options_.odometry_scale_sigma > 0.0 ? rng_.normal(options_.odometry_scale_sigma) : 0.0);
     T_odom_body_.push_back(scene_.truth.front());
     for (std::size_t k = 0; k + 1 < scene_.truth.size(); ++k) {
       RelativePose step{moved(scene_.truth[k].inverse() * scene_.truth[k + 1], m, rad), Matrix6d::Identity()};
+      step.T_a_b.translation *= scale;
       step.covariance.diagonal() << m * m, m * m, m * m, rad * rad, rad * rad, rad * rad;
       T_odom_body_.push_back(T_odom_body_.back() * step.T_a_b);
       odometry_.push_back(step);
@@ -234,6 +237,7 @@ inline RefinementConfig exact_config() {
   config.merge.max_reprojection_px = 40.0;
   config.bundle.loss = "none";
   config.bundle.odometry_loss_scale = 1e3;
+  config.bundle.odometry_scale_sigma = 1e-6;
   config.bundle.relative_cost_tolerance = 1e-9;
   return config;
 }
