@@ -144,6 +144,10 @@ std::map<std::string, std::vector<std::string>> seeds() {
       "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n"
       "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\nFIX 0\n",
       "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.5\nEDGE_SE2 0 1 1 0 0.5 9 0 0 9 0 9\n"};
+  out["pyfg"] = {
+      "VERTEX_SE3:QUAT 0.5 A0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1.5 B12 1 0 0 0 0 0 1\n"
+      "VERTEX_SE3:QUAT:PRIOR 0.5 A0 0 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"
+      "EDGE_SE3:QUAT 1.5 A0 B12 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"};
   out["graph_stamps"] = {"id,robot,keyframe,stamp_ns\n0,1,0,1700000000000000000\n1,1:77,1,1700000000500000000\n"};
   out["pcd"] = {joined({kPcd, "ascii\n1 2 3 0.5\n4 5 6 0.25\n"}),
                 joined({kPcd, "binary\n", little({1.0F, 2.0F, 3.0F, 0.5F, 4.0F, 5.0F, 6.0F, 0.25F})}),

@@ -14,6 +14,7 @@
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/pcd.hpp"
 #include "tutti/formats/ply.hpp"
+#include "tutti/formats/pyfg.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
@@ -120,6 +121,11 @@ void g2o(std::string_view bytes) {
   const auto graph = formats::parse_g2o(bytes, "fuzz");
   if (graph) TUTTI_CHECK(formats::parse_g2o(formats::to_g2o(*graph), "again").has_value(), "what was read is refused");
 }
+void pyfg(std::string_view bytes) {
+  const auto graph = formats::parse_pyfg(bytes, "fuzz");
+  if (graph)
+    TUTTI_CHECK(formats::parse_pyfg(formats::to_pyfg(*graph), "again").has_value(), "what was read is refused");
+}
 void kitti_poses(std::string_view bytes) {
   static_cast<void>(formats::parse_kitti_poses(bytes, "fuzz", 10.0, Timestamp{0}));
 }
@@ -173,6 +179,7 @@ const std::map<std::string, Target>& targets() {
       {"ply", file<formats::parse_ply>},
       {"proxy_graph", proxy_graph},
       {"proxy_graph_delta", proxy_graph_delta},
+      {"pyfg", pyfg},
       {"receipt", receipt},
       {"refinement", refinement},
       {"refinement_job", refinement_job},
