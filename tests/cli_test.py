@@ -373,6 +373,85 @@ class CommandLine(unittest.TestCase):
             graph.write_text("EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 %s\n" % bad)
             self.expect(tutti("optimise", graph, "-o", better), 1, "published.g2o:1", "expected a")
 
+    def write_fleet(self, wrong=True):
+        """Two robots go twice round a circle of 60 steps of 1 m, the second 20 steps ahead of the first; every 4th pose
+        has a closure to the same place one lap later, or of the other robot, and three closures are wrong."""
+        def turned(steps):  # the pose `steps` on
+            angle, radius = math.radians(6 * steps), 1 / (2 * math.sin(math.radians(3)))
+            start = math.radians(-3) + math.pi / 2
+            x = radius * (math.cos(start - math.pi + angle) - math.cos(start - math.pi))
+            y = radius * (math.sin(start - math.pi + angle) - math.sin(start - math.pi))
+            return "%.9f %.9f 0 0 0 %.9f %.9f" % (x, y, math.sin(angle / 2), math.cos(angle / 2))
+        vertices = ["VERTEX_SE3:QUAT %s %s" % ((robot, k), turned(k + 20 * (robot == "B")))
+                    for robot in "AB" for k in range(120)]
+        edges = [(robot, k, robot, k + 1, turned(1)) for robot in "AB" for k in range(119)]
+        edges += [(robot, k, robot, k + 60, turned(60)) for robot in "AB" for k in range(0, 60, 4)]
+        edges += [("A", k + 20, "B", k, turned(0)) for k in range(0, 100, 4)]
+        right = len(edges)
+        if wrong:
+            edges += [("A", 7, "B", 50, turned(0)), ("A", 90, "A", 15, turned(2)), ("B", 33, "A", 2, turned(-3))]
+        variances = (0.0025,) * 3 + (0.0004,) * 3
+        return vertices, edges, right, variances
+
+    def write_pyfg(self, name, wrong=True):
+        vertices, edges, _, variances = self.write_fleet(wrong)
+        covariance = " ".join("%.9f" % (variances[i] if i == j else 0) for i in range(6) for j in range(i, 6))
+        lines = [v.replace("('A', ", "0.0 A").replace("('B', ", "0.0 B").replace(")", "") for v in vertices]
+        lines += ["EDGE_SE3:QUAT %.1f %s%d %s%d %s %s" % (1.5 * b[1], *a, *b, T, covariance)
+                  for a, b, T in ((e[:2], e[2:4], e[4]) for e in edges)]
+        (self.path / name).write_text("\n".join(lines) + "\n")
+        return self.path / name
+
+    def write_fleet_g2o(self, name, key):
+        """`key`: the id of a robot's k-th vertex."""
+        vertices, edges, _, variances = self.write_fleet()
+        information = " ".join("%g" % (1 / variances[i] if i == j else 0) for i in range(6) for j in range(i, 6))
+        lines = ["EDGE_SE3:QUAT %d %d %s %s" % (key(*e[:2]), key(*e[2:4]), e[4], information) for e in edges]
+        (self.path / name).write_text("\n".join(lines) + "\n")
+        return self.path / name
+
+    def test_optimise_robust_judges_a_pyfg(self):
+        graph, out = self.write_pyfg("fleet.pyfg"), self.path / "out.g2o"
+        self.expect(tutti("optimise", "--robust", graph, "-o", out, "--trajectories", self.path / "ways"), 0,
+                    "robots       2 (A B)", "55 accepted, 3 refused", "of the odometry edges", "ATE          0.000 m")
+        closures = (self.path / "out_closures.csv").read_text().splitlines()
+        self.assertEqual(closures[0], "from,to,accepted,reason")
+        self.assertEqual([line.split(",")[:3] for line in closures[-3:]],
+                         [["A7", "B50", "0"], ["A90", "A15", "0"], ["B33", "A2", "0"]])
+        self.assertTrue(all(line.split(",")[3] for line in closures[-3:]))
+        self.assertEqual(len((self.path / "ways" / "B.tum").read_text().splitlines()), 121)
+        self.assertEqual(out.read_text().split()[1], str((65 << 56)))  # A0 as GTSAM's symbol key
+        self.write_pyfg("fleet_no_outliers.pyfg", wrong=False)
+        report = json.loads(tutti("optimise", "--robust", graph, "-o", self.path / "out.pyfg", "--json").stdout)
+        self.assertEqual(report["closures"], {"right": 55, "right_accepted": 55, "wrong_accepted": 0, "precision": 1.0,
+                                              "recall": 1.0})
+        self.assertEqual((report["accepted"], report["refused"], report["failed_odometry"]), (55, 3, []))
+        again = json.loads(tutti("optimise", "--robust", self.path / "out.pyfg", "-o", out, "--json").stdout)
+        self.assertEqual((again["accepted"], again["refused"]), (55, 0))
+        unscored = json.loads(tutti("optimise", "--robust", graph, "-o", out, "--json", "--truth", "none").stdout)
+        self.assertNotIn("ate_m", unscored)
+
+    def test_optimise_robust_tells_the_robots_of_a_g2o(self):
+        symbols = self.write_fleet_g2o("symbols.g2o", lambda robot, k: (ord(robot.lower()) << 56) + k)
+        ranges = self.write_fleet_g2o("ranges.g2o", lambda robot, k: k + 120 * (robot == "B"))
+        out = self.path / "out.g2o"
+        self.expect(tutti("optimise", "--robust", symbols, "-o", out), 0, "2 (a b), by symbol keys",
+                    "55 accepted, 3 refused", "counts as at n seconds")
+        self.expect(tutti("optimise", "--robust", ranges, "-o", out, "--robots", "0,120"), 0, "2 (0 1), by --robots",
+                    "55 accepted, 3 refused")
+        self.expect(tutti("optimise", "--robust", ranges, "-o", out), 0, "2 (0 1), by gaps", "55 accepted, 3 refused")
+        self.expect(tutti("optimise", "--robust", out, "-o", self.path / "again.g2o", "--truth", out), 0,
+                    "2 (0 1), by %s" % (self.path / "out_stamps.csv"), "55 accepted, 0 refused", "ATE          0.000 m")
+        graph = self.write_pyfg("fleet.pyfg")
+        for arguments, code, words in (((ranges, "--robots", "120,0"), 2, ["--robots", "increase"]),
+                                       ((ranges, "--robots", "5,120"), 2, ["vertex 0", "first robot's 5"]),
+                                       ((graph, "--robots", "0"), 2, ["by letters"]),
+                                       ((ranges, "--truth", graph), 1, ["none of the vertices"]),
+                                       ((ranges, "--loss", "gnc"), 2, ["--robust"])):
+            self.expect(tutti("optimise", "--robust", *arguments, "-o", out), code, *words)
+        self.expect(tutti("optimise", "--robust", ranges, "-o", self.path / "out.pyfg"), 2, "expected OUT.g2o")
+        self.expect(tutti("optimise", ranges, "-o", out, "--robots", "0,120"), 2, "--robust")
+
     def test_compare_says_what_is_wrong(self):
         truth = self.write_way("truth.tum")
         self.expect(tutti("compare", truth, self.path / "none.tum"), 1, "none.tum")

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "commands.hpp"
+#include "optimise_robust.hpp"
 #include "options.hpp"
 #include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/formats/g2o.hpp"
@@ -27,6 +28,8 @@ struct OptimiseOptions {
   std::string loss = "none";
   int max_iterations = SolverConfig{}.max_iterations;
   bool json = false;
+  bool robust = false;
+  RobustOptions robustly;
 };
 
 struct Outcome {
@@ -102,7 +105,13 @@ Status copy_stamps(const OptimiseOptions& options) {
   return {};
 }
 
-int run(const OptimiseOptions& options) {
+int run(OptimiseOptions options) {
+  if (options.robust) {
+    options.robustly.source.path = options.input;
+    options.robustly.output = options.output;
+    options.robustly.json = options.json;
+    return optimise_robust(options.robustly);
+  }
   auto file = formats::read_g2o(options.input);
   if (!file) return complain("optimise", file.error().message);
   const Outcome outcome = optimise(*file, options);
@@ -123,7 +132,7 @@ int run(const OptimiseOptions& options) {
 
 void add_optimise_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<OptimiseOptions>();
-  auto* command = app.add_subcommand("optimise", "Optimise one pose graph, from g2o file to g2o file.");
+  auto* command = app.add_subcommand("optimise", "Optimise one pose graph: of one robot, or with --robust of several.");
   command->footer(
       "Gauss-Newton on sparse Cholesky. Vertices of FIX lines stay where they are, or else the first of a connected\n"
       "component. Information matrices that are not positive semidefinite give way to the nearest ones that are, and "
@@ -131,26 +140,56 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "summary counts them; numbers that are not finite, or no positive eigenvalue, are an error.\n"
       "SE(2) graphs are optimised lifted to SE(3). With a robust loss or gnc, edges between vertices that follow each\n"
       "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
-      "IN_stamps.csv, if it is there, is copied beside the output.\n"
-      "Example: tutti optimise sphere2500.g2o -o out.g2o\n");
-  command->add_option("input", options->input, "Graph to read (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional).")
+      "IN_stamps.csv, if it is there, is copied beside the output.\n\n"
+      "--robust decides as the mapping server does which closures, and which stretches of odometry, are wrong: of g2o\n"
+      "files, and of PyFG as COSMO-Bench writes it (names are a letter per robot and a number). Edges between "
+      "vertices\n"
+      "that follow each other in one robot are odometry. OUT holds odometry and the accepted closures, each with the\n"
+      "information that it was found to be worth; OUT_closures.csv all closures and why they were refused;\n"
+      "OUT_stamps.csv the times. Robots of a g2o file are told by --robots, by IN_stamps.csv, by GTSAM's symbol keys\n"
+      "(letter << 56 | number), or begin where no edge joins a vertex to the one before. The search for failed "
+      "odometry\n"
+      "needs times: where the file has none, the n-th pose of a robot counts as at n seconds. Priors tell where a map\n"
+      "lies, not how robots do to each other.\n"
+      "Examples: tutti optimise sphere2500.g2o -o out.g2o\n"
+      "          tutti optimise --robust fleet.pyfg -o out.g2o\n"
+      "          tutti optimise --robust fleet.g2o --robots 0,1000,2000 --truth truth.g2o -o out.g2o\n");
+  command
+      ->add_option("input", options->input,
+                   "Graph to read: g2o (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional); PyFG with --robust.")
       ->required()
-      ->type_name("IN.g2o");
+      ->type_name("IN");
   command->add_option("-o,--output", options->output, "Where to write the optimised graph.")
       ->required()
       ->type_name("OUT.g2o");
-  command
-      ->add_option("--init", options->initialisation,
-                   "Start from the measurements alone (chordal) or from the file's vertices (given).")
-      ->check(CLI::IsMember({"chordal", "given"}))
-      ->capture_default_str();
-  command->add_option("--loss", options->loss, "Against wrong edges; huber and cauchy at 3 standard deviations.")
-      ->check(CLI::IsMember({"none", "huber", "cauchy", "gnc"}))
-      ->capture_default_str();
-  command->add_option("--max-iterations", options->max_iterations, "Gauss-Newton steps at most.")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  auto* initialisation =
+      command
+          ->add_option("--init", options->initialisation,
+                       "Start from the measurements alone (chordal) or from the file's vertices (given).")
+          ->check(CLI::IsMember({"chordal", "given"}))
+          ->capture_default_str();
+  auto* loss =
+      command->add_option("--loss", options->loss, "Against wrong edges; huber and cauchy at 3 standard deviations.")
+          ->check(CLI::IsMember({"none", "huber", "cauchy", "gnc"}))
+          ->capture_default_str();
+  auto* iterations = command->add_option("--max-iterations", options->max_iterations, "Gauss-Newton steps at most.")
+                         ->check(CLI::NonNegativeNumber)
+                         ->capture_default_str();
   command->add_flag("--json", options->json, "Print the summary as JSON.");
+  auto* robust = command->add_flag("--robust", options->robust, "Which closures and which odometry are wrong?");
+  robust->excludes(initialisation, loss, iterations);
+  const auto with_robust = [&](const char* name, auto& value, const char* help, const char* type) {
+    return command->add_option(name, value, help)->needs(robust)->type_name(type);
+  };
+  with_robust("--robots", options->robustly.source.robots, "First vertex of each robot in a g2o file.", "ID,ID,...")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  with_robust("--truth", options->robustly.source.truth,
+              "Its vertices are the truth, for a score (none: without; default: PyFG's own vertices).", "FILE");
+  with_robust("--right", options->robustly.source.right,
+              "The graph without its wrong closures, for a score (default: IN_no_outliers beside it, if it is there).",
+              "FILE");
+  with_robust("--trajectories", options->robustly.trajectories, "Write ROBOT.tum of every robot there.", "FOLDER");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 

@@ -166,6 +166,11 @@ Result<PyfgFile> read_pyfg(const std::string& path) {
   return read_file(path).and_then([&](const std::string& text) { return parse_pyfg(text, path); });
 }
 
+bool looks_like_pyfg(std::string_view text) {
+  LineReader line(text, {});
+  return line.next() && line.columns().size() > 2 && !line.columns()[2].empty() && is_letter(line.columns()[2].front());
+}
+
 std::string to_pyfg(const PyfgFile& file) {
   std::string out;
   const auto begin = [&](std::string_view tag, Timestamp stamp, const PyfgName& name) {

@@ -57,6 +57,8 @@ struct PyfgFile {
 /// there, values that are not finite, no unit quaternion, no covariance.
 Result<PyfgFile> parse_pyfg(std::string_view text, const std::string& name);
 Result<PyfgFile> read_pyfg(const std::string& path);
+/// True if the first line that is no comment is of PyFG: a name stands where g2o has a number.
+bool looks_like_pyfg(std::string_view text);
 
 /// Reads back bit for bit, but for the covariance of priors, which is written as 1e-6 (m2, rad2).
 std::string to_pyfg(const PyfgFile& file);

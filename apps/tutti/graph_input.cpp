@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "graph_input.hpp"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+#include "tutti/base/file.hpp"
+#include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/pyfg.hpp"
+#include "tutti/geometry/covariance.hpp"
+
+namespace tutti::app {
+namespace {
+
+constexpr int kSymbolShift = 56;
+/// Times closer than this are no times of keyframes.
+constexpr double kLeastGap_s = 1e-3;
+
+/// A vertex before it has its place: by robot, then by `order`.
+struct Loose {
+  std::uint32_t robot = 0;
+  std::int64_t order = 0;
+  std::size_t position = 0;  ///< In the file's graph.
+};
+
+bool is_a_file(const std::string& path) {
+  std::error_code unreadable;
+  return std::filesystem::exists(path, unreadable);
+}
+
+/// PyFG's lines have a stamp and a name where g2o's have a number.
+Result<bool> is_pyfg(const std::string& path) {
+  if (const auto ending = std::filesystem::path(path).extension(); ending == ".g2o") return false;
+  const auto text = read_file(path);
+  if (!text) return tl::unexpected(text.error());
+  return formats::looks_like_pyfg(*text);
+}
+
+/// Puts vertices and edges of `graph` in their order; robots are numbered in the order of `loose`.
+void place(const PoseGraph& graph, std::vector<Loose> loose, NamedGraph& out) {
+  std::ranges::sort(loose, {}, [](const Loose& v) { return std::tuple(v.robot, v.order, v.position); });
+  std::vector<std::size_t> place_of(loose.size());
+  std::uint32_t index = 0;
+  for (std::size_t v = 0; v < loose.size(); ++v) {
+    index = v > 0 && loose[v].robot == loose[v - 1].robot ? index + 1 : 0;
+    out.robots.vertices.push_back({RobotId{loose[v].robot}, index});
+    out.robots.graph.poses.push_back(graph.poses[loose[v].position]);
+    place_of[loose[v].position] = v;
+  }
+  out.robots.graph.edges = graph.edges;
+  for (PoseGraphEdge& edge : out.robots.graph.edges) {
+    edge.from = place_of[edge.from];
+    edge.to = place_of[edge.to];
+  }
+}
+
+/// Per vertex; true if they increase along every robot, in steps that keyframes may have.
+bool are_times(const std::vector<KeyframeId>& vertices, const std::vector<Timestamp>& stamps) {
+  std::vector<double> gaps;
+  for (std::size_t v = 1; v < vertices.size(); ++v) {
+    if (vertices[v].chain != vertices[v - 1].chain) continue;
+    if (stamps[v] <= stamps[v - 1]) return false;
+    gaps.push_back(stamps[v] - stamps[v - 1]);
+  }
+  if (gaps.empty()) return true;
+  std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
+  return gaps[gaps.size() / 2] >= kLeastGap_s;
+}
+
+void count_seconds(NamedGraph& graph) {
+  graph.robots.stamps.clear();
+  for (const KeyframeId& id : graph.robots.vertices) graph.robots.stamps.push_back(Timestamp{} + id.index);
+  graph.stamps_from = "none in the file: the n-th pose of a robot counts as at n seconds";
+}
+
+/// Of PyFG: the vertices' own stamps; or those of the odometry that ends at them, which benchmarks give instead.
+void find_times(const formats::PyfgFile& file, NamedGraph& graph) {
+  const auto& vertices = graph.robots.vertices;
+  for (const auto& vertex : file.vertices) graph.robots.stamps.push_back(vertex.stamp);
+  graph.stamps_from = "of the vertices";
+  if (are_times(vertices, graph.robots.stamps)) return;
+  std::vector<std::optional<Timestamp>> ends(vertices.size());
+  for (const auto& edge : file.edges) {
+    const auto [a, b] = std::minmax(edge.from, edge.to);
+    if (b == a + 1 && vertices[a].chain == vertices[b].chain && !ends[b]) ends[b] = edge.stamp;
+  }
+  std::vector<Timestamp> known;
+  for (const auto& end : ends)
+    if (end) known.push_back(*end);
+  const double gap_s = typical_gap_s(known);
+  for (std::size_t v = 0; v < vertices.size(); ++v)
+    if (vertices[v].index == 0 && v + 1 < vertices.size() && ends[v + 1]) ends[v] = *ends[v + 1] - gap_s;
+  graph.stamps_from = "of the odometry edges, as of their later poses";
+  const bool all_known = std::ranges::all_of(ends, [](const auto& end) { return end.has_value(); });
+  for (std::size_t v = 0; all_known && v < vertices.size(); ++v) graph.robots.stamps[v] = *ends[v];
+  if (!all_known || !are_times(vertices, graph.robots.stamps)) count_seconds(graph);
+}
+
+Result<NamedGraph> from_pyfg(const GraphSource& source) {
+  if (!source.robots.empty())
+    return fail(ErrorCode::configuration, "--robots: {} names its robots by letters", source.path);
+  const auto file = formats::read_pyfg(source.path);
+  if (!file) return tl::unexpected(file.error());
+  NamedGraph out{.is_pyfg = true, .replaced = file->indefinite, .robots_from = "letters of the names"};
+  PoseGraph graph;
+  std::vector<Loose> loose;
+  for (const auto& vertex : file->vertices) {
+    if (loose.empty() || out.robot_names.back().front() != vertex.name.robot)
+      out.robot_names.emplace_back(1, vertex.name.robot);
+    loose.push_back({static_cast<std::uint32_t>(out.robot_names.size() - 1),
+                     static_cast<std::int64_t>(vertex.name.number), loose.size()});
+    graph.poses.push_back(vertex.pose);
+    out.names.push_back(to_string(vertex.name));
+    out.ids.push_back((std::int64_t{vertex.name.robot} << kSymbolShift) |
+                      static_cast<std::int64_t>(vertex.name.number));
+    out.held.push_back(vertex.prior);
+  }
+  for (const auto& edge : file->edges)
+    graph.edges.push_back(
+        {edge.from, edge.to, edge.measurement.T_a_b, invertible_covariance(edge.measurement.covariance).inverse()});
+  place(graph, std::move(loose), out);
+  find_times(*file, out);
+  return out;
+}
+
+std::optional<char> letter_of(std::int64_t id) {
+  const auto letter = static_cast<char>(id >> kSymbolShift);
+  const bool is_letter = (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z');
+  return id > 0 && is_letter ? std::optional(letter) : std::nullopt;
+}
+
+std::string name_of(std::int64_t id) {
+  const auto letter = letter_of(id);
+  return letter ? fmt::format("{}{}", *letter, id & ((std::int64_t{1} << kSymbolShift) - 1)) : fmt::format("{}", id);
+}
+
+/// The robots of ascending ids: which robot each vertex is of, and what they are called.
+struct Robots {
+  std::vector<std::uint32_t> of;
+  std::vector<std::string> names;
+};
+
+Result<Robots> told_by_ranges(const GraphSource& source, const formats::G2oFile& file) {
+  if (!std::ranges::is_sorted(source.robots, std::less_equal<>()))
+    return fail(ErrorCode::configuration, "--robots: {} do not increase, expected each robot's first vertex",
+                fmt::join(source.robots, ","));
+  if (file.vertex_ids.front() < source.robots.front())
+    return fail(ErrorCode::configuration, "--robots: vertex {} comes before the first robot's {}",
+                file.vertex_ids.front(), source.robots.front());
+  Robots out;
+  for (const std::int64_t id : file.vertex_ids)
+    out.of.push_back(
+        static_cast<std::uint32_t>(std::ranges::upper_bound(source.robots, id) - source.robots.begin() - 1));
+  for (std::size_t r = 0; r < source.robots.size(); ++r) out.names.push_back(fmt::format("{}", r));
+  return out;
+}
+
+Robots told_by_letters(const formats::G2oFile& file) {
+  Robots out;
+  for (const std::int64_t id : file.vertex_ids) {
+    const std::string name(1, *letter_of(id));
+    if (out.names.empty() || out.names.back() != name) out.names.push_back(name);
+    out.of.push_back(static_cast<std::uint32_t>(out.names.size() - 1));
+  }
+  return out;
+}
+
+Result<Robots> told_by_gaps(const GraphSource& source, const formats::G2oFile& file) {
+  std::vector<bool> joined(file.vertex_ids.size(), false);
+  for (const PoseGraphEdge& edge : file.graph.edges)
+    if (const auto [a, b] = std::minmax(edge.from, edge.to); b == a + 1) joined[b] = true;
+  Robots out;
+  for (std::size_t v = 0; v < joined.size(); ++v) {
+    if (!joined[v]) out.names.push_back(fmt::format("{}", out.names.size()));
+    out.of.push_back(static_cast<std::uint32_t>(out.names.size() - 1));
+  }
+  if (2 * out.names.size() > joined.size() + 1)
+    return fail(ErrorCode::unsupported,
+                "{}: of {} vertices, {} have no edge to the one before: expected odometry along increasing ids",
+                source.path, joined.size(), out.names.size());
+  return out;
+}
+
+Result<NamedGraph> from_g2o(const GraphSource& source) {
+  const auto file = formats::read_g2o(source.path);
+  if (!file) return tl::unexpected(file.error());
+  NamedGraph out{.is_2d = file->is_2d, .replaced = file->indefinite_edges};
+  std::map<std::int64_t, formats::VertexStamp> stamps;
+  if (const std::string beside = formats::stamps_beside(source.path); is_a_file(beside)) {
+    const auto read = formats::read_graph_stamps(beside);
+    if (!read) return tl::unexpected(read.error());
+    for (const auto& stamp : *read) stamps[stamp.vertex_id] = stamp;
+    for (const std::int64_t id : file->vertex_ids)
+      if (!stamps.contains(id))
+        return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", beside, id, source.path);
+  }
+  const bool has_letters = std::ranges::all_of(file->vertex_ids, [](auto id) { return letter_of(id).has_value(); });
+  Robots robots;
+  if (!source.robots.empty()) {
+    auto told = told_by_ranges(source, *file);
+    if (!told) return tl::unexpected(told.error());
+    robots = std::move(*told);
+    out.robots_from = "--robots";
+  } else if (!stamps.empty()) {
+    std::map<RobotId, std::uint32_t> number;
+    for (const auto& [id, stamp] : stamps) number.try_emplace(stamp.keyframe.chain.robot, 0);
+    for (auto& [robot, n] : number) {
+      n = static_cast<std::uint32_t>(robots.names.size());
+      robots.names.push_back(fmt::format("{}", robot.value));
+    }
+    for (const std::int64_t id : file->vertex_ids) robots.of.push_back(number.at(stamps.at(id).keyframe.chain.robot));
+    out.robots_from = formats::stamps_beside(source.path);
+  } else if (has_letters) {
+    robots = told_by_letters(*file);
+    out.robots_from = "symbol keys of the vertices";
+  } else {
+    auto told = told_by_gaps(source, *file);
+    if (!told) return tl::unexpected(told.error());
+    robots = std::move(*told);
+    out.robots_from = "gaps in odometry";
+  }
+  out.robot_names = std::move(robots.names);
+  std::vector<Loose> loose;
+  for (std::size_t v = 0; v < file->vertex_ids.size(); ++v)
+    loose.push_back({robots.of[v], stamps.empty() ? 0 : stamps.at(file->vertex_ids[v]).stamp.ns, v});
+  std::vector<Loose> ordered = loose;
+  std::ranges::sort(ordered, {}, [](const Loose& v) { return std::tuple(v.robot, v.order, v.position); });
+  for (const Loose& v : ordered) {
+    const std::int64_t id = file->vertex_ids[v.position];
+    out.ids.push_back(id);
+    out.names.push_back(name_of(id));
+    const bool is_fixed = std::ranges::binary_search(file->fixed, v.position);
+    out.held.push_back(is_fixed ? std::optional(file->graph.poses[v.position]) : std::nullopt);
+    if (!stamps.empty()) out.robots.stamps.push_back(stamps.at(id).stamp);
+  }
+  place(file->graph, std::move(loose), out);
+  out.stamps_from = formats::stamps_beside(source.path);
+  if (stamps.empty() || !are_times(out.robots.vertices, out.robots.stamps)) count_seconds(out);
+  return out;
+}
+
+std::string beside(const std::string& path, const char* ending) {
+  std::filesystem::path out(path);
+  out.replace_filename(out.stem().string() + ending + out.extension().string());
+  return out.string();
+}
+
+/// A file's vertices and edges alone.
+struct Plain {
+  PoseGraph graph;
+  std::vector<std::string> names;
+};
+
+Result<Plain> read_plain(const std::string& path) {
+  const auto pyfg = is_pyfg(path);
+  if (!pyfg) return tl::unexpected(pyfg.error());
+  Plain out;
+  if (!*pyfg) {
+    auto file = formats::read_g2o(path);
+    if (!file) return tl::unexpected(file.error());
+    for (const std::int64_t id : file->vertex_ids) out.names.push_back(name_of(id));
+    out.graph = std::move(file->graph);
+    return out;
+  }
+  const auto file = formats::read_pyfg(path);
+  if (!file) return tl::unexpected(file.error());
+  for (const auto& vertex : file->vertices) {
+    out.names.push_back(to_string(vertex.name));
+    out.graph.poses.push_back(vertex.pose);
+  }
+  for (const auto& edge : file->edges) out.graph.edges.push_back({edge.from, edge.to, edge.measurement.T_a_b, {}});
+  return out;
+}
+
+/// An edge by the names of its ends and where it says that the second one is, to the millimetre.
+using EdgeKey = std::tuple<std::string, std::string, long, long, long>;
+EdgeKey key_of(const std::vector<std::string>& names, const PoseGraphEdge& edge) {
+  const Eigen::Vector3d mm = 1e3 * edge.T_from_to.translation;
+  return {names[edge.from], names[edge.to], std::lround(mm.x()), std::lround(mm.y()), std::lround(mm.z())};
+}
+
+}  // namespace
+
+Result<NamedGraph> read_graph(const GraphSource& source) {
+  const auto pyfg = is_pyfg(source.path);
+  if (!pyfg) return tl::unexpected(pyfg.error());
+  return *pyfg ? from_pyfg(source) : from_g2o(source);
+}
+
+Result<GraphTruth> read_truth(const GraphSource& source, const NamedGraph& graph) {
+  GraphTruth out;
+  if (source.truth.empty() && graph.is_pyfg) {
+    out.poses.assign(graph.robots.graph.poses.begin(), graph.robots.graph.poses.end());
+  } else if (!source.truth.empty() && source.truth != "none") {
+    const auto truth = read_plain(source.truth);
+    if (!truth) return tl::unexpected(truth.error());
+    std::map<std::string, Pose3> poses;
+    for (std::size_t v = 0; v < truth->names.size(); ++v) poses[truth->names[v]] = truth->graph.poses[v];
+    for (const std::string& name : graph.names) {
+      const auto found = poses.find(name);
+      out.poses.push_back(found == poses.end() ? std::nullopt : std::optional(found->second));
+    }
+    if (std::ranges::none_of(out.poses, [](const auto& pose) { return pose.has_value(); }))
+      return fail(ErrorCode::invalid, "{}: has none of the vertices of {}", source.truth, source.path);
+  }
+  const std::string clean = beside(source.path, "_no_outliers");
+  const std::string path = !source.right.empty() ? source.right : is_a_file(clean) ? clean : std::string();
+  if (path.empty()) return out;
+  const auto right = read_plain(path);
+  if (!right) return tl::unexpected(right.error());
+  std::map<EdgeKey, int> left;
+  for (const PoseGraphEdge& edge : right->graph.edges) ++left[key_of(right->names, edge)];
+  for (const PoseGraphEdge& edge : graph.robots.graph.edges) {
+    const auto found = left.find(key_of(graph.names, edge));
+    out.right.push_back(found != left.end() && found->second > 0);
+    if (out.right.back()) --found->second;
+  }
+  return out;
+}
+
+}  // namespace tutti::app
