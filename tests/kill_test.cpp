@@ -101,11 +101,13 @@ struct Program {
 
 class Mission {
  public:
-  /// `refiner`: null for a map that is its pose graph's.
+  /// `refiner`: null for a map that is its pose graph's. `change_of_mind`: the server's setting. What waits is sent at
+  /// once by a server that starts again: with "wait" robots hear other maps on their way than without a kill.
   Mission(const World& world, const bus::LinkConfig& link, Killer& killer,
-          std::shared_ptr<const server::MapRefiner> refiner = nullptr)
+          std::shared_ptr<const server::MapRefiner> refiner = nullptr, std::string change_of_mind = "follow")
       : world_(world),
         refiner_(std::move(refiner)),
+        change_of_mind_(std::move(change_of_mind)),
         network_(bus::SimulatedRadio(Timestamp{}, link, 1), Timestamp{}),
         killer_(killer) {
     server_.self = Endpoint::server();
@@ -174,6 +176,7 @@ class Mission {
     program.store = std::make_unique<storage::MemoryStore>(storage::map_schema(), std::move(program.saved));
     node::ServerNodeConfig config{.pairs_per_job = 3, .job_timeout_s = 30.0};
     config.server.update_period_s = kUpdatePeriod_s;
+    config.server.change_of_mind = change_of_mind_;
     config.refiner = refiner_;
     return std::move(node::ServerNode::open(world_.robots, world_.finder, config, kEpoch, *program.store).value());
   }
@@ -312,6 +315,7 @@ class Mission {
 
   const World& world_;
   const std::shared_ptr<const server::MapRefiner> refiner_;
+  std::string change_of_mind_;
   bus::SimulatedNetwork network_;
   Killer& killer_;
   Timestamp now_;
@@ -401,6 +405,27 @@ TEST_F(Kill, TwoHundredKillsLeaveTheSameMapAndTheSameTrajectories) {
   RecordProperty("kills", static_cast<int>(kills));
   EXPECT_GE(kills, tutti::seeds(4U) * 50);
   EXPECT_EQ(killed.size(), nobody.seen.size());  // every node, at every input, before every part of a step
+}
+
+// On the way robots hear other maps than without kills: they end in the same place, by another history.
+TEST_F(Kill, WhereMapsWaitTrajectoriesEndTheSame) {
+  const bus::LinkConfig at_once{.latency_s = 0.0};
+  const auto refiner = std::make_shared<const server::test::Shrinker>();
+  Killer nobody;
+  Mission undisturbed(world_, at_once, nobody, refiner, "wait");
+  undisturbed.run();
+  Killer killer = planned(nobody, Rng(100), 1);
+  Mission mission(world_, at_once, killer, refiner, "wait");
+  mission.run();
+  mission.expect_settled();
+  EXPECT_GT(count(killer), 50U);
+  expect_same_map(undisturbed.server(), mission.server());
+  for (std::size_t r = 0; r < mission.robots(); ++r) {
+    const Trajectory mine = mission.agent(r).corrected(), other = undisturbed.agent(r).corrected();
+    ASSERT_EQ(mine.size(), other.size());
+    for (std::size_t k = 0; k < mine.size(); ++k)
+      ASSERT_LT(local(mine[k].pose, other[k].pose).norm(), 1e-4) << "robot " << r << ", keyframe " << k;
+  }
 }
 
 // A jump of the front end is told, the joint map is as good as without (closures decide where the robots are), and so
