@@ -69,13 +69,15 @@ void remark_on_imu(const std::vector<bundle::ImuRun>& runs, std::vector<Refineme
 
 void remark_on_stereo(const std::vector<bundle::StereoScale>& scales, std::vector<RefinementRemark>& out) {
   for (const bundle::StereoScale& scale : scales) {
-    if (!scale.is_refused) continue;
+    if (!scale.is_refused && !scale.is_corrected) continue;
     out.push_back(
         {scale.robot,
          fmt::format("its cameras together have its way {:.3f} times as long as its odometry, +-{:.3f}: check the "
                      "baseline, the rotation between the cameras and the focal lengths, the scale of depth images, or "
-                     "the odometry's scale; the adjustment believes its first camera alone",
-                     scale.ratio, scale.sigma)});
+                     "the odometry's scale; the adjustment {}",
+                     scale.ratio, scale.sigma,
+                     scale.is_refused ? "believes its first camera alone"
+                                      : fmt::format("divides the baseline by {:.3f}", scale.ratio))});
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/estimation/bundle/refine_map.hpp"
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -13,7 +14,7 @@ namespace {
 /// The odometry factors' successors, in their order. Between two keyframes that see nothing it stays as it was, as it
 /// does everywhere when the adjustment failed.
 std::vector<RelativeFactor> factors_of(const MergedMap& merged, const BundleSolution& solution,
-                                       const BundleConfig& config) {
+                                       const BundleConfig& config, const std::vector<StereoScale>& stereo) {
   const BundleProblem& problem = merged.problem;
   std::vector<bool> sees(problem.keyframes.size(), false);
   for (const auto& view : problem.observations) sees[view.keyframe] = true;
@@ -26,6 +27,13 @@ std::vector<RelativeFactor> factors_of(const MergedMap& merged, const BundleSolu
     RelativePose refined = merged.odometry[e];
     if (covariances && (sees[from] || sees[to]))
       refined = {solution.T_world_body[from].inverse() * solution.T_world_body[to], (*covariances)[e]};
+    // A baseline by the odometry's scale is as unsure as that, all along.
+    const RobotId robot = problem.keyframes[from].id.chain.robot;
+    for (const StereoScale& scale : stereo) {
+      if (!scale.is_corrected || scale.robot != robot) continue;
+      const Eigen::Vector3d t = refined.T_a_b.rotation.conjugate() * refined.T_a_b.translation;
+      refined.covariance.topLeftCorner<3, 3>() += std::pow(scale.sigma / scale.ratio, 2) * t * t.transpose();
+    }
     out.push_back({problem.keyframes[from].id, problem.keyframes[to].id, refined});
   }
   return out;
@@ -46,7 +54,7 @@ Result<Refinement> refine_map(const RefinementInput& input, const RefinementConf
   if (!solution) return tl::unexpected(solution.error());
 
   out.rms_before_px = reprojection_rms_px(merged->problem);
-  out.factors = factors_of(*merged, *solution, config.bundle);
+  out.factors = factors_of(*merged, *solution, config.bundle, out.stereo);
   for (std::size_t k = 0; k < merged->problem.keyframes.size(); ++k)
     merged->problem.keyframes[k].T_world_body = solution->T_world_body[k];
   merged->problem.landmarks = std::move(solution->landmarks);

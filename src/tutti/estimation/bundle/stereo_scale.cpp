@@ -62,14 +62,21 @@ std::optional<StereoScale> compared(const BundleProblem& own, const std::vector<
   StereoScale out{.robot = own.keyframes[own.odometry.front().from].id.chain.robot, .ratio = way.scale};
   const double odometry_sigma = bundle.odometry_scale_sigma * way.scale;
   out.sigma = std::sqrt(way.variance + variance_m2 / (weights_m2 * weights_m2) + odometry_sigma * odometry_sigma);
-  out.is_refused = std::abs(out.ratio - 1.0) > config.max_sigmas * out.sigma;
+  const bool is_contradicted = std::abs(out.ratio - 1.0) > config.max_sigmas * out.sigma;
+  out.is_corrected = is_contradicted && config.contradicted == "correct" && out.ratio > 0.0;
+  out.is_refused = is_contradicted && !out.is_corrected;
   return out;
 }
 
-void keep_first_camera(RobotId robot, BundleProblem& problem) {
+std::uint32_t first_camera(RobotId robot, const BundleProblem& problem) {
   std::uint32_t first = ~std::uint32_t{0};
   for (const BundleCamera& camera : problem.cameras)
     if (camera.robot == robot) first = std::min(first, camera.index);
+  return first;
+}
+
+void keep_first_camera(RobotId robot, BundleProblem& problem) {
+  const std::uint32_t first = first_camera(robot, problem);
   std::erase_if(problem.observations, [&](const BundleObservation& view) {
     const BundleCamera& camera = problem.cameras[view.camera];
     return camera.robot == robot && camera.index != first;
@@ -78,6 +85,18 @@ void keep_first_camera(RobotId robot, BundleProblem& problem) {
   std::vector<std::set<std::size_t>> seen_from(problem.landmarks.size());
   for (const BundleObservation& view : problem.observations) seen_from[view.landmark].insert(view.keyframe);
   std::erase_if(problem.observations, [&](const auto& view) { return seen_from[view.landmark].size() < 2; });
+}
+
+void divide_baselines(RobotId robot, double ratio, BundleProblem& problem) {
+  const std::uint32_t first = first_camera(robot, problem);
+  const auto of_first = std::ranges::find_if(
+      problem.cameras, [&](const BundleCamera& camera) { return camera.robot == robot && camera.index == first; });
+  const Eigen::Vector3d origin = of_first->camera.T_body_camera.translation;
+  for (BundleCamera& camera : problem.cameras)
+    if (camera.robot == robot) {
+      Eigen::Vector3d& t = camera.camera.T_body_camera.translation;
+      t = origin + (t - origin) / ratio;
+    }
 }
 
 }  // namespace
@@ -99,8 +118,10 @@ Result<std::vector<StereoScale>> judge_stereo(BundleProblem& problem, const std:
     if (!posterior) continue;
     if (const auto scale = compared(own, its, *solution, *posterior, config, stereo)) out.push_back(*scale);
   }
-  for (const StereoScale& scale : out)
+  for (const StereoScale& scale : out) {
     if (scale.is_refused) keep_first_camera(scale.robot, problem);
+    if (scale.is_corrected) divide_baselines(scale.robot, scale.ratio, problem);
+  }
   return out;
 }
 

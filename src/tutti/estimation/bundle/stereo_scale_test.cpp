@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 #include "support/estimation/bundle/scene.hpp"
 
@@ -15,12 +16,14 @@ struct Outcome {
   double rmse_m;
 };
 
-Outcome flight(const Pose3& T_second_told, std::uint64_t seed = 5, double max_sigmas = 3.0) {
+Outcome flight(const Pose3& T_second_told, std::uint64_t seed = 5, double max_sigmas = 3.0,
+               const std::string& contradicted = "one_camera") {
   SceneOptions options{.points = 120, .pixel_sigma = 0.5, .odometry_sigma_m = 0.01, .cameras = 2};
   options.T_second_told = T_second_told;
   const Scene scene = make_scene(options, seed);
   RefinementConfig config;
   config.stereo.max_sigmas = max_sigmas;
+  config.stereo.contradicted = contradicted;
   Refinement refined = refine_map(scene.input, config).value();
   const double rmse_m = position_rmse(refined.keyframes, scene.truth);
   return {std::move(refined), rmse_m};
@@ -52,6 +55,24 @@ TEST(StereoScale, ABaselineTenPerCentTooLongIsRefused) {
   EXPECT_TRUE(scale.is_refused);
   EXPECT_NEAR(scale.ratio, 1.1, 3.0 * scale.sigma);
   EXPECT_LT(out.rmse_m, 0.5 * believed.rmse_m) << out.rmse_m << " m, believed " << believed.rmse_m;
+}
+
+/// By as much as odometry says, which has errors of its own; in one scale all along, as two cameras see it.
+TEST(StereoScale, ABaselineIsCorrectedWhereThatIsAskedFor) {
+  double corrected_m = 0.0, one_camera_m = 0.0;
+  for (std::uint64_t seed = 0; seed < seeds(4U); ++seed) {
+    const Outcome out = flight(longer_m(0.02), seed, 3.0, "correct");
+    const StereoScale& scale = out.refined.stereo.front();
+    EXPECT_TRUE(scale.is_corrected && !scale.is_refused);
+    corrected_m += out.rmse_m;
+    one_camera_m += flight(longer_m(0.02), seed).rmse_m;
+    const RelativeFactor& step = out.refined.factors.at(5);
+    const Eigen::Vector3d t = step.measurement.T_a_b.rotation.conjugate() * step.measurement.T_a_b.translation;
+    const Eigen::Vector3d ahead = t.normalized();
+    EXPECT_GE(ahead.dot(step.measurement.covariance.topLeftCorner<3, 3>() * ahead),
+              std::pow(scale.sigma / scale.ratio * t.norm(), 2));
+  }
+  EXPECT_LT(corrected_m, one_camera_m);
 }
 
 TEST(StereoScale, CamerasTurnedAgainstEachOtherAreRefused) {
