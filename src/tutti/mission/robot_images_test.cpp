@@ -11,6 +11,7 @@
 #include "support/mission/asl_folder.hpp"
 #include "tutti/base/file.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/geometry/so3.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/simulation/camera.hpp"
@@ -118,6 +119,30 @@ TEST_F(RobotImages, ABaselineThatOdometryContradictsIsTold) {
   config_.robots[0].images.euroc_folder = "wrong";
   const MissionRecord record = run();
   EXPECT_TRUE(has_note(record, "a: its cameras together have its way 1.")) << all_notes(record);
+}
+
+/// The calibration has the second camera turned by 0.9 degrees about the upright axis, which bends depths.
+TEST_F(RobotImages, ASecondCameraThatIsTurnedIsTold) {
+  const fs::path wrong = folder() / "turned";
+  fs::copy(folder() / "hall", wrong, fs::copy_options::recursive);
+  const Camera second = small_stereo()[1];
+  const Pose3 told{second.T_body_camera.rotation * so3_exp({0.0, 0.9 * kRadPerDeg, 0.0}),
+                   second.T_body_camera.translation};
+  const fs::path sensor = wrong / "mav0/cam1/sensor.yaml";
+  std::stringstream text;
+  text << std::ifstream(sensor).rdbuf();
+  std::string yaml = text.str();
+  const std::size_t begin = yaml.find('['), end = yaml.find(']') + 1;
+  std::ofstream(sensor) << yaml.replace(begin, end - begin, test::matrix_of(told));
+  EXPECT_FALSE(has_note(run(), "the second camera is turned"));
+  config_.robots[0].images.euroc_folder = "turned";
+  const MissionRecord without = run();
+  EXPECT_TRUE(has_note(without, "the second camera is turned against its T_body_camera by [")) << all_notes(without);
+  config_.tracking.turned_stereo = "correct";
+  const MissionRecord corrected = run();
+  EXPECT_TRUE(has_note(corrected, "once it is turned; it is turned so")) << all_notes(corrected);
+  EXPECT_GT(corrected.robots[0].images->landmarks_per_keyframe, 1.3 * without.robots[0].images->landmarks_per_keyframe);
+  EXPECT_FALSE(has_note(corrected, "its cameras together")) << all_notes(corrected);
 }
 
 TEST_F(RobotImages, AListWithACamerasFileIsTheSame) {

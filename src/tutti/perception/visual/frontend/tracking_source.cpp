@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/perception/visual/stereo_check.hpp"
 
 namespace tutti::visual {
 namespace {
@@ -97,6 +99,56 @@ std::optional<double> watched_offset_s(const ImageStream& stream, const Trajecto
   return clock.offset_s(odometry);
 }
 
+/// What both cameras see at a few moments spread over the recording, wherever the calibration expects it.
+std::optional<StereoTurn> watched_turn(const ImageStream& stream, const Trajectory& odometry, TrackerConfig config) {
+  constexpr std::size_t kMoments = 12;
+  constexpr double kWide_rad = 0.06;  // a turn of more is no slip, and points are not found where they are looked for
+  config.epipolar_px = kWide_rad * stream.cameras[1].model.fx;
+  VisualTracker tracker(stream.cameras, config);
+  StereoCheck check(stream.cameras[0], stream.cameras[1]);
+  const auto begin = nearest(stream.stamps, odometry.front().stamp),
+             end = nearest(stream.stamps, odometry.back().stamp);
+  for (std::size_t i = 0; i < kMoments; ++i) {
+    const std::size_t moment = begin + i * (end - begin) / (kMoments - 1);
+    const auto first = stream.load(moment, 0), second = stream.load(moment, 1);
+    if (!first || !second || first->empty() || second->empty()) continue;
+    const std::vector<Image> images{*first, *second};
+    if (!check_sizes(images, stream.cameras)) continue;
+    tracker.restart(0);
+    const auto tracked = tracker.track(images, false);
+    check.add(tracked[0], tracked[1]);
+    if (end - begin < kMoments && moment == end) break;
+  }
+  return check.turn();
+}
+
+/// Takes the second camera away, or turns it, where the images contradict its calibration: what to say then.
+std::optional<Error> judge_turn(ImageStream& stream, const Trajectory& odometry, const TrackingConfig& config) {
+  const auto turn = watched_turn(stream, odometry, config.tracker);
+  if (!turn || !turn->is_wrong) return std::nullopt;
+  const bool correct = turn->is_turned && config.turned_stereo == "correct";
+  const Eigen::Vector3d deg = turn->turn_rad / kRadPerDeg,
+                        sigma_deg = turn->covariance.diagonal().cwiseSqrt() / kRadPerDeg;
+  if (correct) {
+    Eigen::Quaterniond& rotation = stream.cameras[1].T_body_camera.rotation;
+    rotation = (rotation * so3_exp(turn->turn_rad)).normalized();
+  } else {
+    stream.cameras.resize(1);
+  }
+  const std::string what =
+      fmt::format("what both cameras see is {:.2f} px off its epipolar lines (median)", turn->told_px);
+  const std::string then = correct ? "it is turned so" : "it is not used (tracking.turned_stereo)";
+  if (!turn->is_turned)
+    return Error{ErrorCode::invalid, fmt::format("{}, {:.2f} however the second one is turned: check focal lengths, "
+                                                 "distortion and T_body_camera of both; {}",
+                                                 what, turn->turned_px, then)};
+  return Error{
+      ErrorCode::invalid,
+      fmt::format("the second camera is turned against its T_body_camera by [{:.2f} {:.2f} {:.2f}] degrees, "
+                  "+-[{:.2f} {:.2f} {:.2f}]: {}, {:.2f} once it is turned; {}",
+                  deg.x(), deg.y(), deg.z(), sigma_deg.x(), sigma_deg.y(), sigma_deg.z(), what, turn->turned_px, then)};
+}
+
 }  // namespace
 
 Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream stream, Trajectory odometry,
@@ -110,7 +162,11 @@ Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream stream,
   const auto by_motion = [&] { return watched_offset_s(stream, odometry, config.tracker); };
   if (auto ok = check_stamps(stream.stamps, odometry, config.max_stamp_difference_s, by_motion); !ok)
     return tl::unexpected(ok.error());
-  return std::shared_ptr<TrackingSource>(new TrackingSource(std::move(stream), std::move(odometry), config));
+  std::optional<Error> turned;
+  if (stream.cameras.size() == 2 && config.turned_stereo != "believe") turned = judge_turn(stream, odometry, config);
+  std::shared_ptr<TrackingSource> out(new TrackingSource(std::move(stream), std::move(odometry), config));
+  if (turned) out->errors_.push_back(*std::move(turned));
+  return out;
 }
 
 TrackingSource::TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config)

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -19,17 +20,22 @@ namespace tutti::visual {
 struct TrackingConfig {
   TrackerConfig tracker;
   double max_stamp_difference_s = 0.005;
+  std::string turned_stereo = "one_camera";
   template <class V>
   void describe(V& v) {
     v.field("tracker", tracker, any(), "What is followed from image to image.");
     v.field("max_stamp_difference_s", max_stamp_difference_s, between(0.0, 1.0),
             "An odometry sample and an image of one moment are at most this far apart.");
+    v.field("turned_stereo", turned_stereo, one_of({"one_camera", "correct", "believe"}),
+            "Where what two cameras see at once says that they are turned against each other otherwise than their "
+            "calibration has it: the second one is not used, is turned by as much, or nothing is done.");
   }
 };
 
 /// Follows points through all images of a stream and serves those of the odometry's samples. Samples are asked for one
 /// after the other; after a jump forward (a restart) tracks begin anew, a sample asked for again has no images. Among
-/// the errors is, once, a clock of the images that is not the odometry's, or a camera turned about its optical axis.
+/// the errors is, once, a clock of the images that is not the odometry's, a camera turned about its optical axis, or a
+/// second one that is turned against the first (StereoCheck).
 class TrackingSource : public VisualSource {
  public:
   /// Fails when the stream's stamps are not those of the odometry, saying by how much they differ: by the motion in the

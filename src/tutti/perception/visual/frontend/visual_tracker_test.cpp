@@ -9,6 +9,8 @@
 #include "support/perception/visual/frontend/blocks.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/formats/image_file.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/perception/visual/stereo_check.hpp"
 
 namespace tutti::visual {
 namespace visual_tracker_test {
@@ -187,6 +189,32 @@ TEST(VisualTracker, FindsTheSamePointsInRealStereoPairs) {
         tilted[1].T_body_camera.rotation * Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX());
     EXPECT_LE(8 * VisualTracker(tilted, {}).track(images, true)[1].keypoints.size(), out[1].keypoints.size());
   }
+}
+
+/// The turn between them is 0.85 degrees: transposed, it is twice as far off.
+TEST(VisualTracker, RealCamerasTellHowTheyAreTurned) {
+  const std::string folder = "data/images/euroc_V1_01_visnav/data/";
+  TUTTI_REQUIRE_SHARED(folder);
+  const auto turn = [&](const std::vector<Camera>& cameras) {
+    StereoCheck check(cameras[0], cameras[1]);
+    for (const char* stamp : {"1403715273262142976", "1403715282962142976", "1403715290912143104"}) {
+      std::vector<Image> images;
+      for (const char* side : {"_0.jpg", "_1.jpg"})
+        images.push_back(formats::read_image(test::shared_path(folder + stamp + side).string()).value());
+      const auto out = VisualTracker(cameras, {.epipolar_px = 20.0}).track(images, false);
+      check.add(out[0], out[1]);
+    }
+    return check.turn().value();
+  };
+  std::vector<Camera> cameras = visnav_cameras();
+  const StereoTurn right = turn(cameras);
+  EXPECT_FALSE(right.is_wrong) << right.turn_rad.transpose();
+  EXPECT_LT(right.told_px, 0.3);
+  const Eigen::Quaterniond between = cameras[0].T_body_camera.rotation.conjugate() * cameras[1].T_body_camera.rotation;
+  cameras[1].T_body_camera.rotation = cameras[0].T_body_camera.rotation * between.conjugate();
+  const StereoTurn wrong = turn(cameras);
+  EXPECT_TRUE(wrong.is_turned);
+  EXPECT_LT((wrong.turn_rad - so3_log(between * between)).norm(), 0.002) << wrong.turn_rad.transpose();
 }
 
 }  // namespace visual_tracker_test
