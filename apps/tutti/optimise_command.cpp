@@ -128,6 +128,23 @@ int run(OptimiseOptions options) {
   return written ? 0 : complain("optimise", written.error().message);
 }
 
+CLI::Option* add_robust_options(CLI::App& command, OptimiseOptions& options) {
+  auto* robust = command.add_flag("--robust", options.robust, "Which closures and which odometry are wrong?");
+  const auto with_robust = [&](const char* name, auto& value, const char* help, const char* type) {
+    return command.add_option(name, value, help)->needs(robust)->type_name(type);
+  };
+  with_robust("--robots", options.robustly.source.robots, "First vertex of each robot in a g2o file.", "ID,ID,...")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  with_robust("--truth", options.robustly.source.truth,
+              "Its vertices are the truth, for a score (none: without; default: PyFG's own vertices).", "FILE");
+  with_robust("--right", options.robustly.source.right,
+              "The graph without its wrong closures, for a score (default: IN_no_outliers beside it, if it is there).",
+              "FILE");
+  with_robust("--trajectories", options.robustly.trajectories, "Write ROBOT.tum of every robot there.", "FOLDER");
+  return robust;
+}
+
 }  // namespace
 
 void add_optimise_command(CLI::App& app, int& exit_code) {
@@ -176,20 +193,7 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
                          ->check(CLI::NonNegativeNumber)
                          ->capture_default_str();
   command->add_flag("--json", options->json, "Print the summary as JSON.");
-  auto* robust = command->add_flag("--robust", options->robust, "Which closures and which odometry are wrong?");
-  robust->excludes(initialisation, loss, iterations);
-  const auto with_robust = [&](const char* name, auto& value, const char* help, const char* type) {
-    return command->add_option(name, value, help)->needs(robust)->type_name(type);
-  };
-  with_robust("--robots", options->robustly.source.robots, "First vertex of each robot in a g2o file.", "ID,ID,...")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  with_robust("--truth", options->robustly.source.truth,
-              "Its vertices are the truth, for a score (none: without; default: PyFG's own vertices).", "FILE");
-  with_robust("--right", options->robustly.source.right,
-              "The graph without its wrong closures, for a score (default: IN_no_outliers beside it, if it is there).",
-              "FILE");
-  with_robust("--trajectories", options->robustly.trajectories, "Write ROBOT.tum of every robot there.", "FOLDER");
+  add_robust_options(*command, *options)->excludes(initialisation, loss, iterations);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 
