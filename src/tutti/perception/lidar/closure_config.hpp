@@ -36,18 +36,11 @@ struct RegistrationLevel {
 struct RegistrationConfig {
   std::vector<RegistrationLevel> levels{{1.5, 500, 8}, {0.6, 1000, 8}, {0.3, 4000, 12}};  ///< Coarse to fine.
   double overlap_distance_m = 0.3;  ///< A point overlaps when a target point with a like normal is this close.
-  double covariance_scale = 30.0;   ///< Neighbouring residuals are not independent: divides the information.
-  double min_translation_sigma_m = 0.004;
-  double min_rotation_sigma_rad = 0.001;
   template <class V>
   void describe(V& v) {
     v.field("levels", levels, any(), "Stages of the registration, coarse to fine.");
     v.field("overlap_distance_m", overlap_distance_m, greater_than(0.0),
             "A point overlaps when a target point with a like normal is this close.");
-    v.field("covariance_scale", covariance_scale, at_least(1.0),
-            "How many neighbouring residuals count as one independent one.");
-    v.field("min_translation_sigma_m", min_translation_sigma_m, greater_than(0.0), "Floor of the standard deviation.");
-    v.field("min_rotation_sigma_rad", min_rotation_sigma_rad, greater_than(0.0), "Floor of the standard deviation.");
   }
 };
 

@@ -33,87 +33,122 @@ std::vector<std::size_t> sample_surface(const OrientedCloud& cloud, std::size_t 
   return sample;
 }
 
-/// Sums over the correspondences of one pose.
+/// A point of the source and the target point that it lies on.
+struct Match {
+  std::uint32_t target = 0, source = 0;
+};
+
+/// The nearest target points, where the normals are alike.
+std::vector<Match> find_matches(const OrientedCloud& target, const OrientedCloud& source,
+                                std::span<const std::size_t> sample, const Pose3& T, double max_distance) {
+  const auto min_cosine = static_cast<float>(std::cos(kMaxNormalAngle_deg * kRadPerDeg));
+  std::vector<Match> matches;
+  matches.reserve(sample.size());
+  const Eigen::Matrix3f R = T.rotation.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f t = T.translation.cast<float>();
+  for (const std::size_t i : sample) {
+    const std::int32_t nearest = target.index->nearest(R * source.point(i) + t, static_cast<float>(max_distance));
+    if (nearest == NeighbourIndex::kNone) continue;
+    const Eigen::Vector3f& n = target.normal(static_cast<std::size_t>(nearest));
+    if (n.dot(R * source.normal(i)) < min_cosine) continue;  // also when n is zero
+    matches.push_back({static_cast<std::uint32_t>(nearest), static_cast<std::uint32_t>(i)});
+  }
+  return matches;
+}
+
+/// r = n_t . (T p_s - q_t); with the right perturbation and m = R^T n_t its gradient is [m; p_s x m]. Loss:
+/// Geman-McClure of the given scale.
+struct Residual {
+  double r = 0.0, weight = 1.0;
+  Vector6d gradient;
+};
+
+Residual residual_of(const OrientedCloud& target, const OrientedCloud& source, const Match& match,
+                     const Eigen::Matrix3d& R, const Eigen::Vector3d& t, double scale) {
+  const Eigen::Vector3d p = source.point(match.source).cast<double>(), n = target.normal(match.target).cast<double>();
+  Residual out;
+  out.r = n.dot(R * p + t - target.point(match.target).cast<double>());
+  const double robust = 1.0 / (1.0 + out.r * out.r / (scale * scale));
+  out.weight = robust * robust;
+  const Eigen::Vector3d m = R.transpose() * n;
+  out.gradient << m, p.cross(m);
+  return out;
+}
+
+/// Sums over the matches at one pose.
 struct NormalEquations {
   Matrix6d H = Matrix6d::Zero();  // sum w J^T J
   Vector6d g = Vector6d::Zero();  // sum w J^T r
-  double weighted_squares = 0.0;  // sum w r^2
   double weights = 0.0;
-  double squares = 0.0;                                         // sum r^2
-  Eigen::Matrix3d normal_scatter = Eigen::Matrix3d::Zero();     // sum m m^T, source frame
-  Eigen::Matrix3d residual_scatter = Eigen::Matrix3d::Zero();   // sum r^2 m m^T, where the roughness is known
-  Eigen::Matrix3d roughness_scatter = Eigen::Matrix3d::Zero();  // sum s^2 m m^T, s the roughness
-  Eigen::Vector3d point_sum = Eigen::Vector3d::Zero();          // source frame
-  std::size_t count = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // of the matched points, source frame
+
+  /// Damping far below one point's weight: keeps directions that nothing constrains where they are.
+  [[nodiscard]] Matrix6d damped() const { return H + 1e-6 * weights * Matrix6d::Identity(); }
 };
 
-/// Mean over the two points of a correspondence, as far as known; negative when neither is.
-double squared_roughness(const OrientedCloud& target, std::size_t j, const OrientedCloud& source, std::size_t i) {
-  if (!target.roughness || !source.roughness) return -1.0;
-  const double a = (*target.roughness)[j], b = (*source.roughness)[i];
-  if (std::isnan(a)) return std::isnan(b) ? -1.0 : b * b;
-  return std::isnan(b) ? a * a : 0.5 * (a * a + b * b);
-}
-
-/// Residual of a correspondence: r = n_t . (T p_s - q_t); with the right perturbation and m = R^T n_t its Jacobian is
-/// J = [m^T, (p_s x m)^T]. Loss: Geman-McClure of the given scale.
-NormalEquations linearise(const OrientedCloud& target, const OrientedCloud& source, std::span<const std::size_t> sample,
-                          const Pose3& T, double max_distance, double scale, double min_cosine) {
+NormalEquations linearise(const OrientedCloud& target, const OrientedCloud& source, std::span<const Match> matches,
+                          const Pose3& T, double scale) {
   NormalEquations sums;
   const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
-  const Eigen::Matrix3f R_f = R.cast<float>();
-  const Eigen::Vector3f t_f = T.translation.cast<float>();
-  for (const std::size_t i : sample) {
-    const Eigen::Vector3f moved = R_f * source.point(i) + t_f;
-    const std::int32_t nearest = target.index->nearest(moved, static_cast<float>(max_distance));
-    if (nearest == NeighbourIndex::kNone) continue;
-    const auto j = static_cast<std::size_t>(nearest);
-    const Eigen::Vector3f& n = target.normal(j);
-    if (n.dot(R_f * source.normal(i)) < static_cast<float>(min_cosine)) continue;  // also when n is zero
-    const Eigen::Vector3d p = source.point(i).cast<double>();
-    const double r = n.cast<double>().dot(R * p + T.translation - target.point(j).cast<double>());
-    const double robust = 1.0 / (1.0 + r * r / (scale * scale));
-    const double w = robust * robust;
-    const Eigen::Vector3d m = R.transpose() * n.cast<double>();
-    Vector6d J;
-    J << m, p.cross(m);
-    sums.H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
-    sums.g += w * r * J;
-    sums.weighted_squares += w * r * r;
-    sums.weights += w;
-    sums.squares += r * r;
-    const Eigen::Matrix3d mm = m * m.transpose();
-    sums.normal_scatter += mm;
-    if (const double rough = squared_roughness(target, j, source, i); rough >= 0.0) {
-      sums.residual_scatter += r * r * mm;
-      sums.roughness_scatter += rough * mm;
-    }
-    sums.point_sum += p;
-    ++sums.count;
+  for (const Match& match : matches) {
+    const Residual residual = residual_of(target, source, match, R, T.translation, scale);
+    sums.H.selfadjointView<Eigen::Lower>().rankUpdate(residual.gradient, residual.weight);
+    sums.g += residual.weight * residual.r * residual.gradient;
+    sums.weights += residual.weight;
+    sums.centre += source.point(match.source).cast<double>();
   }
   sums.H = sums.H.selfadjointView<Eigen::Lower>();
+  sums.centre /= std::max(1.0, static_cast<double>(matches.size()));
   return sums;
 }
 
 /// Gauss-Newton at one level; true when the step became small.
 bool run_level(const OrientedCloud& target, const OrientedCloud& source, const RegistrationLevel& level,
-               const RegistrationConfig& config, double min_cosine, RegistrationResult& result) {
+               const RegistrationConfig& config, RegistrationResult& result) {
   const auto sample = sample_surface(source, static_cast<std::size_t>(level.max_points));
   const double scale = kResidualScale_m * std::max(1.0, level.max_distance_m / config.overlap_distance_m);
   for (int k = 0; k < level.max_iterations; ++k) {
-    const auto sums =
-        linearise(target, source, sample, result.T_target_source, level.max_distance_m, scale, min_cosine);
-    if (sums.count < kMinCorrespondences) return false;
-    // Damping far below one point's weight: keeps directions that nothing constrains where they are.
-    const Vector6d step = (sums.H + 1e-6 * sums.weights * Matrix6d::Identity()).ldlt().solve(-sums.g);
+    const auto matches = find_matches(target, source, sample, result.T_target_source, level.max_distance_m);
+    if (matches.size() < kMinCorrespondences) return false;
+    const auto sums = linearise(target, source, matches, result.T_target_source, scale);
+    const Vector6d step = sums.damped().ldlt().solve(-sums.g);
     if (!step.allFinite()) return false;
     result.T_target_source = retract(result.T_target_source, step);
     ++result.iterations;
-    const Eigen::Vector3d centre = sums.point_sum / static_cast<double>(sums.count);
-    const Eigen::Vector3d moved = step.head<3>() + step.tail<3>().cross(centre);
+    const Eigen::Vector3d moved = step.head<3>() + step.tail<3>().cross(sums.centre);
     if (moved.norm() + step.tail<3>().norm() < kStepTolerance * level.max_distance_m) return true;
   }
   return false;
+}
+
+/// Mean over the two points of a match, as far as known; negative when neither is.
+double squared_roughness(const OrientedCloud& target, const OrientedCloud& source, const Match& match) {
+  if (!target.roughness || !source.roughness) return -1.0;
+  const double a = (*target.roughness)[match.target], b = (*source.roughness)[match.source];
+  if (std::isnan(a)) return std::isnan(b) ? -1.0 : b * b;
+  return std::isnan(b) ? a * a : 0.5 * (a * a + b * b);
+}
+
+/// Covariance of least squares whose residuals are correlated: H^-1 times the variance of one independent residual, as
+/// the sums of the terms w r J over batches of neighbours show it. Terms follow each other as points do in storage,
+/// near in space; batches are doubled as long as enough of them are left, and the size that shows most counts [batch
+/// means: Law & Carson 1979].
+Matrix6d residual_covariance(const Matrix6d& H, std::span<const Vector6d> terms) {
+  constexpr std::size_t kFewestBatches = 12;
+  const Eigen::LLT<Matrix6d> cholesky(H);
+  std::vector<Vector6d> sums(terms.begin(), terms.end());
+  for (Vector6d& sum : sums) cholesky.matrixL().solveInPlace(sum);
+  double variance = 0.0;
+  for (std::size_t n = sums.size();;) {
+    double squares = 0.0;
+    for (std::size_t i = 0; i < n; ++i) squares += sums[i].squaredNorm();
+    const auto count = static_cast<double>(n);
+    variance = std::max(variance, squares / 6.0 * count / std::max(1.0, count - 6.0));  // six degrees are fitted
+    if (n / 2 < kFewestBatches) break;
+    n /= 2;
+    for (std::size_t i = 0; i < n; ++i) sums[i] = sums[2 * i] + sums[2 * i + 1];
+  }
+  return variance * cholesky.solve(Matrix6d::Identity());
 }
 
 /// Root of the largest ratio u^T R u / u^T S u over all directions u. Directions with hardly any surface say nothing.
@@ -125,35 +160,49 @@ double worst_ratio(const Eigen::Matrix3d& R, const Eigen::Matrix3d& S, std::size
   return std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
 }
 
+/// Where the clouds lie on each other, sums of outer products of normals (source frame).
+struct Scatter {
+  Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();    // sum m m^T
+  Eigen::Matrix3d residuals = Eigen::Matrix3d::Zero();  // sum r^2 m m^T, where the roughness is known
+  Eigen::Matrix3d roughness = Eigen::Matrix3d::Zero();  // sum s^2 m m^T, s the roughness
+  double squares = 0.0;                                 // sum r^2
+};
+
 void assess(const OrientedCloud& target, const OrientedCloud& source, const RegistrationConfig& config,
-            double min_cosine, RegistrationResult& result) {
+            RegistrationResult& result) {
   const auto sample = sample_surface(source, static_cast<std::size_t>(config.levels.back().max_points));
-  const auto sums = linearise(target, source, sample, result.T_target_source, config.overlap_distance_m,
-                              kResidualScale_m, min_cosine);
-  if (sums.count < kMinCorrespondences) {
+  const Pose3& T = result.T_target_source;
+  const auto matches = find_matches(target, source, sample, T, config.overlap_distance_m);
+  if (matches.size() < kMinCorrespondences) {
     result.converged = false;
     return;
   }
-  const auto count = static_cast<double>(sums.count);
+  const auto sums = linearise(target, source, matches, T, kResidualScale_m);
+  const Eigen::Matrix3d R = T.rotation.toRotationMatrix();
+  std::vector<Vector6d> terms;
+  terms.reserve(matches.size());
+  Scatter scatter;
+  for (const Match& match : matches) {
+    const Residual residual = residual_of(target, source, match, R, T.translation, kResidualScale_m);
+    terms.emplace_back(residual.weight * residual.r * residual.gradient);
+    const double square = residual.r * residual.r;
+    const Eigen::Matrix3d mm = residual.gradient.head<3>() * residual.gradient.head<3>().transpose();
+    scatter.squares += square;
+    scatter.normals += mm;
+    if (const double rough = squared_roughness(target, source, match); rough >= 0.0) {
+      scatter.residuals += square * mm;
+      scatter.roughness += rough * mm;
+    }
+  }
+  const auto count = static_cast<double>(matches.size());
   result.overlap = count / static_cast<double>(sample.size());
-  result.plane_rmse_m = std::sqrt(sums.squares / count);
-  result.overlap_centre_source = sums.point_sum / count;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> facing(sums.normal_scatter / count);
+  result.plane_rmse_m = std::sqrt(scatter.squares / count);
+  result.overlap_centre_source = sums.centre;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> facing(scatter.normals / count);
   result.min_translation_eigenvalue = facing.eigenvalues()[0];
   result.weakest_source = facing.eigenvectors().col(0);
-  result.misfit = worst_ratio(sums.residual_scatter, sums.roughness_scatter, sums.count);
-  // Information of the whole overlap, however few of its points were sampled.
-  const auto& normals = *source.normals;
-  const auto without = std::count(normals.begin(), normals.end(), Eigen::Vector3f(Eigen::Vector3f::Zero()));
-  const double sampled_share =
-      static_cast<double>(sample.size()) / static_cast<double>(normals.size() - static_cast<std::size_t>(without));
-  const double variance = sums.weighted_squares / sums.weights;
-  Vector6d floor;
-  floor << Eigen::Vector3d::Constant(config.min_translation_sigma_m),
-      Eigen::Vector3d::Constant(config.min_rotation_sigma_rad);
-  result.covariance = config.covariance_scale * sampled_share * variance *
-                      (sums.H + 1e-6 * sums.weights * Matrix6d::Identity()).inverse();
-  result.covariance += Matrix6d(floor.cwiseAbs2().asDiagonal());
+  result.misfit = worst_ratio(scatter.residuals, scatter.roughness, matches.size());
+  result.covariance = residual_covariance(sums.damped(), terms);
 }
 
 }  // namespace
@@ -163,11 +212,22 @@ RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCl
   TUTTI_CHECK(!config.levels.empty(), "a registration needs at least one level");
   RegistrationResult result{.T_target_source = T_init};
   if (target.size() == 0 || source.size() == 0) return result;
-  const double min_cosine = std::cos(kMaxNormalAngle_deg * kRadPerDeg);
-  for (const auto& level : config.levels)
-    result.converged = run_level(target, source, level, config, min_cosine, result);
-  assess(target, source, config, min_cosine, result);
+  for (const auto& level : config.levels) result.converged = run_level(target, source, level, config, result);
+  assess(target, source, config, result);
   return result;
+}
+
+std::vector<Contact> find_contacts(const OrientedCloud& target, const OrientedCloud& source,
+                                   const Pose3& T_target_source, std::size_t count, const RegistrationConfig& config) {
+  const auto sample = sample_surface(source, count);
+  const Eigen::Matrix3d R = T_target_source.rotation.toRotationMatrix();
+  std::vector<Contact> contacts;
+  for (const Match& match : find_matches(target, source, sample, T_target_source, config.overlap_distance_m)) {
+    const Residual residual = residual_of(target, source, match, R, T_target_source.translation, kResidualScale_m);
+    contacts.push_back({target.point(match.target).cast<double>(), source.point(match.source).cast<double>(),
+                        residual.gradient, residual.weight});
+  }
+  return contacts;
 }
 
 std::vector<float> self_residuals(const OrientedCloud& cloud, const RegistrationConfig& config) {

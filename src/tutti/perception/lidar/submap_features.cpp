@@ -90,6 +90,7 @@ SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& 
   for (const auto& pose : poses) viewpoints.push_back(pose.translation.cast<float>());
   const Middle middle = find_middle(submap);
   features.middle = middle.T_submap_keyframe.translation;
+  features.bend = std::make_shared<const Bend>(find_bend(submap));
   features.cloud = orient(std::move(points), viewpoints, config.normals);
   features.cloud.roughness =
       std::make_shared<const std::vector<float>>(expected_residuals(features.cloud, middle, config.registration));
@@ -108,6 +109,7 @@ std::size_t bytes_of(const SubmapFeatures& features) {
   if (features.cloud.index) bytes += features.cloud.index->bytes();
   if (features.cloud.normals) bytes += of_elements(*features.cloud.normals);
   if (features.cloud.roughness) bytes += of_elements(*features.cloud.roughness);
+  if (features.bend) bytes += of_elements(features.bend->viewpoints) + of_elements(features.bend->steps);
   if (features.turned_views)
     for (const TurnedView& view : *features.turned_views)
       bytes += sizeof view + static_cast<std::size_t>(view.spectrum.size()) * sizeof(view.spectrum(0));

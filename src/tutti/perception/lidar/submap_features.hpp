@@ -8,6 +8,7 @@
 
 #include "tutti/model/refusal.hpp"
 #include "tutti/model/submap.hpp"
+#include "tutti/perception/lidar/bend.hpp"
 #include "tutti/perception/lidar/birds_eye_view.hpp"
 #include "tutti/perception/lidar/closure_config.hpp"
 #include "tutti/perception/lidar/oriented_cloud.hpp"
@@ -24,6 +25,7 @@ struct SubmapFeatures {
   /// Turns the submap frame so that z points up, yaw left alone (a rotation about a horizontal axis).
   Eigen::Quaterniond R_level_submap = Eigen::Quaterniond::Identity();
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Where the robot was half way, submap frame.
+  std::shared_ptr<const Bend> bend;
   BirdsEyeView view;
   std::shared_ptr<const std::vector<TurnedView>> turned_views;
   std::shared_ptr<const std::vector<DepthPanorama>> panoramas;  ///< Submap frame, from viewpoints along the way.

@@ -10,14 +10,11 @@ ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerificati
   ClosureVerdict verdict{.pair = {a.id, b.id}, .refusal = verification.refusal};
   if (!verification.accepted) return verdict;
   const Middle from = find_middle(a), to = find_middle(b);
-  // T_from_to = T_a_from^-1 T_a_b T_b_to: the errors of all three, in the frame of `to`.
-  const Matrix6d Ad_b = adjoint(to.T_submap_keyframe.inverse());
   LoopClosure closure{.from = {a.id.chain, a.keyframes[from.index].index},
                       .to = {b.id.chain, b.keyframes[to.index].index}};
   closure.measurement.T_a_b = from.T_submap_keyframe.inverse() * verification.T_a_b * to.T_submap_keyframe;
-  const Matrix6d Ad_from = adjoint(closure.measurement.T_a_b.inverse());
-  closure.measurement.covariance = Ad_b * verification.covariance * Ad_b.transpose() +
-                                   Ad_from * from.covariance * Ad_from.transpose() + to.covariance;
+  const Matrix6d Ad = adjoint(to.T_submap_keyframe.inverse());
+  closure.measurement.covariance = Ad * verification.covariance * Ad.transpose();
   verdict.closures.push_back(closure);
   verdict.evidence = verification.evidence;
   return verdict;

@@ -21,6 +21,7 @@ constexpr double kScreeningMisfit = 2.0;        // of max_misfit: with more afte
 constexpr double kCoarseMisfit = 1.5;           // of max_misfit: with more after the coarse levels, given up
 constexpr double kVisibilityMargin_m = 0.5;     // a point this much nearer than the surface seen behind it contradicts
 constexpr int kVisibilityPoints = 2000;         // of each submap, evenly spread
+constexpr std::size_t kBendPoints = 500;        // of b, evenly spread, to see from where the overlap was seen
 constexpr double kMaxSlidRatio = 0.65;          // of an alignment slid along the direction constrained least
 constexpr double kMaxForwardBackward_m = 0.05;  // between a-to-b and b-to-a, at the centre of the overlap
 constexpr double kMaxForwardBackward_deg = 0.5;
@@ -200,7 +201,10 @@ PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, c
     out.refusal = why_refused(out, config);
   }
   out.accepted = !out.refusal;
-  if (out.accepted) out.evidence = gates(out, config);
+  if (!out.accepted) return out;
+  const auto contacts = find_contacts(a.cloud, b.cloud, out.T_a_b, kBendPoints, config.registration);
+  out.covariance += bend_covariance(*a.bend, *b.bend, out.T_a_b, contacts);
+  out.evidence = gates(out, config);
   return out;
 }
 

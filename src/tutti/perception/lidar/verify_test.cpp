@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <array>
+#include <map>
 
 #include "support/perception/lidar/rooms.hpp"
 
@@ -128,6 +131,56 @@ TEST(VerifyPair, refusesUnusableSubmapsWithTheirReason) {
             (Refusal{RefusalReason::too_few_keyframes, 3.0, 6.0}));
 }
 
+TEST(VerifyPair, odometryNoiseInsideTheSubmapsEnlargesTheCovariance) {
+  Walk walk_a = kWalkA, walk_b = kWalkB;
+  Matrix6d last = Matrix6d::Zero();
+  for (const double sigma : {1e-4, 1e-3, 1e-2}) {
+    walk_a.odometry_sigma = walk_b.odometry_sigma = sigma;
+    const auto v = verify_pair(see({RobotId{0}, 0}, furnished_room(), walk_a, 1).features,
+                               see({RobotId{1}, 0}, furnished_room(), walk_b, 2).features, kConfig);
+    ASSERT_TRUE(v.accepted) << to_string(*v.refusal);
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(v.covariance - last).eigenvalues()[0], 0.0) << sigma;
+    last = v.covariance;
+  }
+}
+
+/// As a sensor sees the room that errs alike on whole patches of this edge, from exact odometry.
+SubmapFeatures see_with_patches(SubmapId id, Walk walk, double edge_m, std::uint64_t seed) {
+  walk.odometry_sigma = 1e-6;
+  Submap submap = make_submap(id, furnished_room(), walk, Rng(seed));
+  PointCloud cloud = *submap.cloud;
+  Rng rng = Rng(seed).fork("patches");
+  std::map<std::array<int, 3>, Eigen::Vector3d> errors;
+  for (Eigen::Vector3f& p : cloud.points) {
+    const Eigen::Array3i patch = (p.cast<double>().array() / edge_m).floor().cast<int>();
+    const auto [error, is_new] = errors.try_emplace({patch[0], patch[1], patch[2]});
+    if (is_new) error->second = 0.02 * Eigen::Vector3d(rng.normal(), rng.normal(), rng.normal());
+    p += error->second.cast<float>();
+  }
+  submap.cloud = std::make_shared<PointCloud>(std::move(cloud));
+  return extract_features(submap, kConfig);
+}
+
+// However many neighbours err alike, their residuals tell how sure the closure is: normalised squared errors between 3
+// and 9, where 6 is exact.
+TEST(VerifyPair, covarianceIsHonestHoweverManyNeighboursErrAlike) {
+  LidarClosureConfig config;
+  config.max_rival_ratio = 1.0;  // how sure, not whether
+  for (const double edge_m : {0.01, 0.6}) {
+    double nees = 0.0;
+    constexpr int kRuns = 12;
+    for (std::uint64_t run = 0; run < kRuns; ++run) {
+      const auto v = verify_pair(see_with_patches({RobotId{0}, 0}, kWalkA, edge_m, 1000 + run),
+                                 see_with_patches({RobotId{1}, 0}, kWalkB, edge_m, 2000 + run), config);
+      ASSERT_TRUE(v.accepted) << to_string(*v.refusal);
+      const Vector6d error = local(true_relative(kWalkA, kWalkB), v.T_a_b);
+      nees += error.dot(v.covariance.inverse() * error) / kRuns;
+    }
+    EXPECT_GT(nees, 3.0) << edge_m;
+    EXPECT_LT(nees, 9.0) << edge_m;
+  }
+}
+
 TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {
   const Side a = see({RobotId{0}, 2}, furnished_room(), kWalkA, 1),
              b = see({RobotId{1}, 1}, furnished_room(), kWalkB, 2);
@@ -140,19 +193,6 @@ TEST(ToVerdict, closureJoinsTheMiddleKeyframesWhicheverWayThePairIsGiven) {
     EXPECT_EQ(verdict.closures[0].to, (KeyframeId{RobotId{1}, 105}));
     const Pose3 truth = pose_on(kWalkA, 5).inverse() * pose_on(kWalkB, 5);
     EXPECT_LT(local(truth, verdict.closures[0].measurement.T_a_b).norm(), 0.03);
-  }
-}
-
-TEST(ToVerdict, odometryNoiseInsideTheSubmapsEnlargesTheCovariance) {
-  const PairVerification v{.accepted = true, .covariance = 1e-6 * Matrix6d::Identity()};
-  Walk walk = kWalkA;
-  Matrix6d last = Matrix6d::Zero();
-  for (const double sigma : {0.0, 1e-3, 1e-2}) {
-    walk.odometry_sigma = sigma;
-    const Submap a = make_submap({RobotId{0}, 0}, {}, walk, Rng(1)), b = make_submap({RobotId{1}, 0}, {}, walk, Rng(1));
-    const Matrix6d C = to_verdict(a, b, v).closures.at(0).measurement.covariance;
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(C - last).eigenvalues()[0], 0.0) << sigma;
-    last = C;
   }
 }
 
