@@ -112,11 +112,12 @@ BirdsEyeView make_view(const OrientedCloud& cloud, const Eigen::Quaterniond& R_l
   view.centre = centre.cast<double>();
   for (const auto& [key, sum] : walls)
     view.walls.push_back({sum.point.head<2>() / sum.count - centre, sum.normal / std::sqrt(sum.count)});
-  for (const auto& [key, sum] : floors)
-    view.floors.push_back(
-        {sum.point.head<2>() / sum.count - centre, sum.point.z() / sum.count, (std::get<2>(key) & 1) != 0});
-  std::ranges::stable_sort(view.floors, {},
-                           [&](const FloorCell& f) { return floor_patch(f.position, f.faces_up, cell_m); });
+  for (const auto& [key, sum] : floors) {
+    const Eigen::Vector2f position = sum.point.head<2>() / sum.count - centre;
+    const bool faces_up = (std::get<2>(key) & 1) != 0;
+    view.floors.push_back({position, sum.point.z() / sum.count, floor_patch(position, faces_up, cell_m)});
+  }
+  std::ranges::stable_sort(view.floors, {}, &FloorCell::patch);
   return view;
 }
 

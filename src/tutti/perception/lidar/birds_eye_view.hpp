@@ -18,16 +18,17 @@ struct WallCell {
   Eigen::Vector2f normal;    ///< Mean horizontal normal of its points times the root of their number.
 };
 
+/// Where floors are looked up: patches of two by two cells, floors and ceilings apart.
+using FloorPatch = std::tuple<int, int, bool>;
+FloorPatch floor_patch(const Eigen::Vector2f& position, bool faces_up, double cell_m);
+
 /// A piece of floor (its normal points up) or ceiling.
 struct FloorCell {
   Eigen::Vector2f position;  ///< m, level frame, relative to BirdsEyeView::centre.
   float height;              ///< m, level frame.
-  bool faces_up;
+  FloorPatch patch;
+  [[nodiscard]] bool faces_up() const { return std::get<2>(patch); }
 };
-
-/// Where floors are looked up: patches of two by two cells, floors and ceilings apart.
-using FloorPatch = std::tuple<int, int, bool>;
-FloorPatch floor_patch(const Eigen::Vector2f& position, bool faces_up, double cell_m);
 
 /// A submap from above.
 struct BirdsEyeView {

@@ -97,10 +97,9 @@ double find_height(const BirdsEyeView& a, const BirdsEyeView& b, const Peak& pea
   std::array<float, 2 * kZero> votes{};
   const Eigen::Matrix2f R = Eigen::Rotation2Df(static_cast<float>(peak.yaw)).toRotationMatrix();
   const Eigen::Vector2f shift = peak.shift.cast<float>();
-  const auto patch = [&](const FloorCell& f) { return floor_patch(f.position, f.faces_up, cell_m); };
   for (const FloorCell& floor : b.floors) {
-    const auto wanted = floor_patch(R * floor.position + shift, floor.faces_up, cell_m);
-    for (const FloorCell& other : std::ranges::equal_range(a.floors, wanted, {}, patch)) {
+    const auto wanted = floor_patch(R * floor.position + shift, floor.faces_up(), cell_m);
+    for (const FloorCell& other : std::ranges::equal_range(a.floors, wanted, {}, &FloorCell::patch)) {
       const float at = (other.height - floor.height) / kBin + kZero;
       const int bin = static_cast<int>(at);
       if (bin < 1 || bin + 2 >= 2 * kZero) continue;

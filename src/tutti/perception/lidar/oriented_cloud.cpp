@@ -19,7 +19,7 @@ using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<
 class NearestWithin {
  public:
   using DistanceType = float;
-  explicit NearestWithin(float squared_distance) : squared_distance_(squared_distance) {}
+  NearestWithin(float squared_distance, std::int32_t index) : squared_distance_(squared_distance), index_(index) {}
   bool addPoint(float squared_distance, std::int32_t index) {
     if (squared_distance < squared_distance_) {
       squared_distance_ = squared_distance;
@@ -34,7 +34,7 @@ class NearestWithin {
 
  private:
   float squared_distance_;
-  std::int32_t index_ = NeighbourIndex::kNone;
+  std::int32_t index_;
 };
 
 /// Unit normal of the plane through the neighbours, of either sign; zero when they are not flat.
@@ -79,9 +79,13 @@ std::size_t NeighbourIndex::bytes() const {
   return sizeof(Tree) + points().capacity() * sizeof(Eigen::Vector3f) + tree_->kd_tree.usedMemory(tree_->kd_tree);
 }
 
-std::int32_t NeighbourIndex::nearest(const Eigen::Vector3f& query, float max_distance) const {
+std::int32_t NeighbourIndex::nearest(const Eigen::Vector3f& query, float max_distance, std::int32_t guess) const {
   if (points().empty()) return kNone;
-  NearestWithin result(max_distance * max_distance);
+  const float most = max_distance * max_distance;
+  const float guessed = guess == kNone ? most : (points()[static_cast<std::size_t>(guess)] - query).squaredNorm();
+  const float squared_m = std::min(most, guessed);
+  const std::int32_t otherwise = guessed < most ? guess : kNone;
+  NearestWithin result(squared_m, otherwise);
   tree_->kd_tree.findNeighbors(result, query.data(), {});
   return result.index();
 }
@@ -109,7 +113,10 @@ OrientedCloud orient(std::vector<Eigen::Vector3f> points, std::span<const Eigen:
     if (normal.dot(nearest_viewpoint(viewpoints, stored[i]) - stored[i]) < 0.0F) normal = -normal;
     (*normals)[i] = normal;
   }
-  return {std::move(index), std::move(normals), nullptr};
+  auto surface = std::make_shared<std::vector<std::uint32_t>>();
+  for (std::size_t i = 0; i < normals->size(); ++i)
+    if ((*normals)[i] != Eigen::Vector3f::Zero()) surface->push_back(static_cast<std::uint32_t>(i));
+  return {std::move(index), std::move(normals), std::move(surface), nullptr};
 }
 
 }  // namespace tutti::lidar

@@ -23,8 +23,10 @@ class NeighbourIndex {
   NeighbourIndex& operator=(const NeighbourIndex&) = delete;
 
   [[nodiscard]] const std::vector<Eigen::Vector3f>& points() const;
-  /// Index of the point nearest to `query` and closer than `max_distance`, or kNone.
-  [[nodiscard]] std::int32_t nearest(const Eigen::Vector3f& query, float max_distance) const;
+  /// Index of the point nearest to `query` and closer than `max_distance`, or kNone. `guess`: a point that may be it,
+  /// which makes the search shorter and changes nothing else.
+  [[nodiscard]] std::int32_t nearest(const Eigen::Vector3f& query, float max_distance,
+                                     std::int32_t guess = kNone) const;
   /// The (at most) out.size() nearest points, nearest first; returns how many there are.
   std::size_t nearest_k(const Eigen::Vector3f& query, std::span<std::int32_t> out) const;
   [[nodiscard]] std::size_t bytes() const;  ///< Of memory held.
@@ -39,6 +41,7 @@ class NeighbourIndex {
 struct OrientedCloud {
   std::shared_ptr<const NeighbourIndex> index;
   std::shared_ptr<const std::vector<Eigen::Vector3f>> normals;
+  std::shared_ptr<const std::vector<std::uint32_t>> surface;  ///< The points that have a normal, in storage order.
   /// How far each point may be off the plane of a point of another cloud of the same place, m; NaN where unknown. Null
   /// when it was not computed.
   std::shared_ptr<const std::vector<float>> roughness;

@@ -28,6 +28,8 @@ RC_GTEST_PROP(NeighbourIndex, agreesWithTryingAllPoints, (std::uint64_t seed)) {
     const auto best = std::min_element(points.begin(), points.end(),
                                        [&](const auto& p, const auto& q) { return distance(p) < distance(q); });
     const float radius = static_cast<float>(rng.uniform(0.05, 2.0));
+    const auto guess = static_cast<std::int32_t>(rng.index(points.size()));
+    RC_ASSERT(index.nearest(query, radius, guess) == index.nearest(query, radius));
     const auto found = index.nearest(query, radius);
     if (distance(*best) < radius)
       RC_ASSERT(found == static_cast<std::int32_t>(best - points.begin()));

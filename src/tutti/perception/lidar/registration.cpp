@@ -17,18 +17,16 @@ namespace tutti::lidar {
 namespace {
 
 constexpr std::size_t kMinCorrespondences = 20;
-constexpr double kStepTolerance = 1e-3;       // of the level's distance
+constexpr double kStepTolerance = 1e-3;       // of the finest level's distance,
+constexpr double kCoarseTolerance = 1e-2;     // of that of levels behind which a finer one comes
 constexpr double kMaxNormalAngle_deg = 45.0;  // between the normals of two corresponding points
 constexpr double kResidualScale_m = 0.1;      // of the robust loss at the finest level; grows with the level's distance
 
-/// At most `count` indices of points with a normal, evenly spread in storage (= Morton) order, hence in space.
-std::vector<std::size_t> sample_surface(const OrientedCloud& cloud, std::size_t count) {
-  std::vector<std::size_t> surface;
-  surface.reserve(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i)
-    if (cloud.normal(i) != Eigen::Vector3f::Zero()) surface.push_back(i);
+/// At most `count` points with a normal, evenly spread in storage (= Morton) order, hence in space.
+std::vector<std::uint32_t> sample_surface(const OrientedCloud& cloud, std::size_t count) {
+  const std::vector<std::uint32_t>& surface = *cloud.surface;
   if (surface.size() <= count) return surface;
-  std::vector<std::size_t> sample(count);
+  std::vector<std::uint32_t> sample(count);
   for (std::size_t k = 0; k < count; ++k) sample[k] = surface[k * surface.size() / count];
   return sample;
 }
@@ -38,23 +36,41 @@ struct Match {
   std::uint32_t target = 0, source = 0;
 };
 
-/// The nearest target points, where the normals are alike.
-std::vector<Match> find_matches(const OrientedCloud& target, const OrientedCloud& source,
-                                std::span<const std::size_t> sample, const Pose3& T, double max_distance) {
-  const auto min_cosine = static_cast<float>(std::cos(kMaxNormalAngle_deg * kRadPerDeg));
-  std::vector<Match> matches;
-  matches.reserve(sample.size());
-  const Eigen::Matrix3f R = T.rotation.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f t = T.translation.cast<float>();
-  for (const std::size_t i : sample) {
-    const std::int32_t nearest = target.index->nearest(R * source.point(i) + t, static_cast<float>(max_distance));
-    if (nearest == NeighbourIndex::kNone) continue;
-    const Eigen::Vector3f& n = target.normal(static_cast<std::size_t>(nearest));
-    if (n.dot(R * source.normal(i)) < min_cosine) continue;  // also when n is zero
-    matches.push_back({static_cast<std::uint32_t>(nearest), static_cast<std::uint32_t>(i)});
+/// The target points nearest to a sample of the source, from one pose to the next: what was nearest before, nearly is.
+class Matcher {
+ public:
+  Matcher(const OrientedCloud& target, const OrientedCloud& source, std::size_t count)
+      : target_(target),
+        source_(source),
+        sample_(sample_surface(source, count)),
+        nearest_(sample_.size(), NeighbourIndex::kNone) {}
+  [[nodiscard]] std::size_t size() const { return sample_.size(); }
+
+  /// Where points are closer than this and their normals alike.
+  std::span<const Match> at(const Pose3& T_target_source, double max_distance) {
+    const auto min_cosine = static_cast<float>(std::cos(kMaxNormalAngle_deg * kRadPerDeg));
+    const Eigen::Matrix3f R = T_target_source.rotation.toRotationMatrix().cast<float>();
+    const Eigen::Vector3f t = T_target_source.translation.cast<float>();
+    matches_.clear();
+    for (std::size_t k = 0; k < sample_.size(); ++k) {
+      const std::uint32_t i = sample_[k];
+      std::int32_t& j = nearest_[k];
+      j = target_.index->nearest(R * source_.point(i) + t, static_cast<float>(max_distance), j);
+      if (j == NeighbourIndex::kNone) continue;
+      const Eigen::Vector3f& n = target_.normal(static_cast<std::size_t>(j));
+      if (n.dot(R * source_.normal(i)) < min_cosine) continue;  // also when n is zero
+      matches_.push_back({static_cast<std::uint32_t>(j), i});
+    }
+    return matches_;
   }
-  return matches;
-}
+
+ private:
+  const OrientedCloud& target_;
+  const OrientedCloud& source_;
+  std::vector<std::uint32_t> sample_;
+  std::vector<std::int32_t> nearest_;
+  std::vector<Match> matches_;
+};
 
 /// r = n_t . (T p_s - q_t); with the right perturbation and m = R^T n_t its gradient is [m; p_s x m]. Loss:
 /// Geman-McClure of the given scale.
@@ -105,10 +121,11 @@ NormalEquations linearise(const OrientedCloud& target, const OrientedCloud& sour
 /// Gauss-Newton at one level; true when the step became small.
 bool run_level(const OrientedCloud& target, const OrientedCloud& source, const RegistrationLevel& level,
                const RegistrationConfig& config, RegistrationResult& result) {
-  const auto sample = sample_surface(source, static_cast<std::size_t>(level.max_points));
+  Matcher matcher(target, source, static_cast<std::size_t>(level.max_points));
   const double scale = kResidualScale_m * std::max(1.0, level.max_distance_m / config.overlap_distance_m);
+  const double tolerance = level.max_distance_m > config.overlap_distance_m ? kCoarseTolerance : kStepTolerance;
   for (int k = 0; k < level.max_iterations; ++k) {
-    const auto matches = find_matches(target, source, sample, result.T_target_source, level.max_distance_m);
+    const auto matches = matcher.at(result.T_target_source, level.max_distance_m);
     if (matches.size() < kMinCorrespondences) return false;
     const auto sums = linearise(target, source, matches, result.T_target_source, scale);
     const Vector6d step = sums.damped().ldlt().solve(-sums.g);
@@ -116,7 +133,7 @@ bool run_level(const OrientedCloud& target, const OrientedCloud& source, const R
     result.T_target_source = retract(result.T_target_source, step);
     ++result.iterations;
     const Eigen::Vector3d moved = step.head<3>() + step.tail<3>().cross(sums.centre);
-    if (moved.norm() + step.tail<3>().norm() < kStepTolerance * level.max_distance_m) return true;
+    if (moved.norm() + step.tail<3>().norm() < tolerance * level.max_distance_m) return true;
   }
   return false;
 }
@@ -170,9 +187,9 @@ struct Scatter {
 
 void assess(const OrientedCloud& target, const OrientedCloud& source, const RegistrationConfig& config,
             RegistrationResult& result) {
-  const auto sample = sample_surface(source, static_cast<std::size_t>(config.levels.back().max_points));
+  Matcher matcher(target, source, static_cast<std::size_t>(config.levels.back().max_points));
   const Pose3& T = result.T_target_source;
-  const auto matches = find_matches(target, source, sample, T, config.overlap_distance_m);
+  const auto matches = matcher.at(T, config.overlap_distance_m);
   if (matches.size() < kMinCorrespondences) {
     result.converged = false;
     return;
@@ -195,7 +212,7 @@ void assess(const OrientedCloud& target, const OrientedCloud& source, const Regi
     }
   }
   const auto count = static_cast<double>(matches.size());
-  result.overlap = count / static_cast<double>(sample.size());
+  result.overlap = count / static_cast<double>(matcher.size());
   result.plane_rmse_m = std::sqrt(scatter.squares / count);
   result.overlap_centre_source = sums.centre;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> facing(scatter.normals / count);
@@ -219,10 +236,10 @@ RegistrationResult register_clouds(const OrientedCloud& target, const OrientedCl
 
 std::vector<Contact> find_contacts(const OrientedCloud& target, const OrientedCloud& source,
                                    const Pose3& T_target_source, std::size_t count, const RegistrationConfig& config) {
-  const auto sample = sample_surface(source, count);
+  Matcher matcher(target, source, count);
   const Eigen::Matrix3d R = T_target_source.rotation.toRotationMatrix();
   std::vector<Contact> contacts;
-  for (const Match& match : find_matches(target, source, sample, T_target_source, config.overlap_distance_m)) {
+  for (const Match& match : matcher.at(T_target_source, config.overlap_distance_m)) {
     const Residual residual = residual_of(target, source, match, R, T_target_source.translation, kResidualScale_m);
     contacts.push_back({target.point(match.target).cast<double>(), source.point(match.source).cast<double>(),
                         residual.gradient, residual.weight});

@@ -108,6 +108,7 @@ std::size_t bytes_of(const SubmapFeatures& features) {
   std::size_t bytes = sizeof features + of_elements(features.view.walls) + of_elements(features.view.floors);
   if (features.cloud.index) bytes += features.cloud.index->bytes();
   if (features.cloud.normals) bytes += of_elements(*features.cloud.normals);
+  if (features.cloud.surface) bytes += of_elements(*features.cloud.surface);
   if (features.cloud.roughness) bytes += of_elements(*features.cloud.roughness);
   if (features.bend) bytes += of_elements(features.bend->viewpoints) + of_elements(features.bend->steps);
   if (features.turned_views)

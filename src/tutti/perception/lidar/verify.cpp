@@ -64,12 +64,15 @@ std::optional<Pose3> screen(const SubmapFeatures& a, const SubmapFeatures& b, co
   return result.T_target_source;
 }
 
+RegistrationConfig coarse_levels(RegistrationConfig config) {
+  if (config.levels.size() > 1) config.levels.pop_back();
+  return config;
+}
+
 /// The coarse registration of a start, if anything comes of it.
 std::optional<Contender> contend(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, double score,
                                  const LidarClosureConfig& config) {
-  RegistrationConfig coarse = config.registration;
-  if (coarse.levels.size() > 1) coarse.levels.pop_back();
-  const auto result = register_clouds(a.cloud, b.cloud, T_init, coarse);
+  const auto result = register_clouds(a.cloud, b.cloud, T_init, coarse_levels(config.registration));
   if (is_hopeless(result, kCoarseMisfit, config)) return std::nullopt;
   const double clear = 1.0 - contradiction(a, b, result.T_target_source);
   return Contender{result.T_target_source, result.overlap * clear / std::max(1.0, result.misfit), score};
@@ -107,21 +110,28 @@ std::vector<Contender> contenders(const SubmapFeatures& a, const SubmapFeatures&
 /// from a few metres off in the direction that is constrained least, and that stays off.
 double best_slid_quality(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_a_b,
                          const Eigen::Vector3d& weakest_b, const LidarClosureConfig& config) {
+  const auto is_back = [&](const Pose3& T) { return is_same(T, T_a_b, b, 0.5 * kDistinct_m); };
+  const RegistrationConfig coarsest = with_levels(config.registration, {config.registration.levels.front()});
   double best = 0.0;
   for (const double steps : {-2.0, -1.0, 1.0, 2.0}) {
     const Pose3 slid{Eigen::Quaterniond::Identity(), steps * kDistinct_m * weakest_b};
+    if (is_back(register_clouds(a.cloud, b.cloud, T_a_b * slid, coarsest).T_target_source)) continue;
     const auto rival = contend(a, b, T_a_b * slid, 0.0, config);
-    if (rival && !is_same(rival->T_a_b, T_a_b, b, 0.5 * kDistinct_m)) best = std::max(best, rival->quality);
+    if (rival && !is_back(rival->T_a_b)) best = std::max(best, rival->quality);
   }
   return best;
 }
 
-/// Registers both ways from one start and takes the middle.
+/// Registers one way, then the other way from where that ended, and takes the middle.
 void refine(const SubmapFeatures& a, const SubmapFeatures& b, const Pose3& T_init, const LidarClosureConfig& config,
             PairVerification& out, Eigen::Vector3d& weakest_b) {
-  const RegistrationConfig fine = with_levels(config.registration, {config.registration.levels.back()});
-  const RegistrationResult forward = register_clouds(a.cloud, b.cloud, T_init, fine);
-  const RegistrationResult backward = register_clouds(b.cloud, a.cloud, T_init.inverse(), fine);
+  const RegistrationLevel finest = config.registration.levels.back();
+  RegistrationLevel first = finest;
+  first.max_points = std::max(first.max_points / 4, 10);  // most of the way is as good with fewer points
+  const RegistrationConfig fine = with_levels(config.registration, {finest});
+  const RegistrationResult forward =
+      register_clouds(a.cloud, b.cloud, T_init, with_levels(config.registration, {first, finest}));
+  const RegistrationResult backward = register_clouds(b.cloud, a.cloud, forward.T_target_source.inverse(), fine);
   const RelativePose turned = inverse(RelativePose{backward.T_target_source, backward.covariance});
   const Vector6d gap = local(forward.T_target_source, turned.T_a_b);
   weakest_b = forward.weakest_source;
