@@ -45,7 +45,8 @@ SmallMission make_mission() {
     for (const SubmapMessage& message : agent.take_outgoing()) out.uploads.push_back(wire::encode(message));
     out.recordings.push_back({.recording = std::move(recording)});
   }
-  mission::ClosureConfig closures{.finder = "reference"};
+  mission::ClosureConfig closures;
+  closures.finder = "reference";
   closures.reference.wrong_share = 0.2;
   closures.reference.min_time_gap_s = 20.0;
   out.finder = mission::make_closure_finder(closures, out.recordings, 5);

@@ -7,7 +7,7 @@ import tempfile
 import unittest
 
 SCRIPT = pathlib.Path(__file__).parents[1] / "scripts/check_layers.py"
-CMAKE = "foreach(module IN ITEMS base geometry estimation perception/lidar robot server wire wire/replay program)\nendforeach()\n"
+CMAKE = "foreach(module IN ITEMS base geometry estimation simulation perception/lidar robot server wire wire/replay program lab)\nendforeach()\n"
 
 
 def check(files):
@@ -30,6 +30,8 @@ class CheckLayers(unittest.TestCase):
             "perception/lidar/a.cpp": '#include "tutti/geometry/a.hpp"\n#include <nanoflann.hpp>\n',
             "wire/replay/internal/a.hpp": '#include "tutti/wire/a.hpp"\n#include "tutti/wire/replay/a.hpp"\n',
             "../../tests/support/robot/a.hpp": '#include "tutti/robot/a.hpp"\n#include "support/geometry/a.hpp"\n',
+            "robot/b_test.cpp": '#include "tutti/simulation/a.hpp"\n',
+            "lab/a.cpp": '#include "tutti/program/a.hpp"\n#include "tutti/simulation/a.hpp"\n',
             "robot/a_test.cpp": '#include "support/robot/a.hpp"\n#include "support/paths.hpp"\n',
             "program/a.cpp": "#include <spdlog/spdlog.h>\nauto now = std::chrono::system_clock::now();\n",
             "wire/a.cpp": '#include "tutti/v1/a.pb.h"\n#include <google/protobuf/message.h>\n',
@@ -41,6 +43,8 @@ class CheckLayers(unittest.TestCase):
             ("base/a.hpp", '#include "tutti/geometry/a.hpp"'),
             ("geometry/a_test.cpp", '#include "tutti/perception/lidar/a.hpp"'),
             ("robot/a.hpp", '#include "tutti/server/a.hpp"'),
+            ("robot/b.hpp", '#include "tutti/simulation/a.hpp"'),
+            ("program/a.cpp", '#include "tutti/lab/a.hpp"'),
             ("server/a.hpp", '#include "tutti/robot/a.hpp"'),
             ("server/b.hpp", '#include "tutti/wire/a.hpp"'),
             ("wire/a.hpp", '#include "tutti/wire/replay/a.hpp"'),

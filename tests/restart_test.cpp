@@ -60,7 +60,8 @@ class Restart : public testing::Test {
       ids_.insert(recording.robot);
       recordings_.push_back({.recording = std::move(recording)});
     }
-    mission::ClosureConfig closures{.finder = "reference"};
+    mission::ClosureConfig closures;
+    closures.finder = "reference";
     closures.reference.min_time_gap_s = 20.0;
     finder_ = mission::make_closure_finder(closures, recordings_, 5);
     for (const mission::MissionRecording& robot : recordings_)

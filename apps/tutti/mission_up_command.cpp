@@ -9,19 +9,19 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "program_options.hpp"
+#include "tutti/lab/mission_up.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/program/mission_up.hpp"
 
 namespace tutti::app {
 namespace {
 
 namespace fs = std::filesystem;
 
-Status run_and_report(program::MissionUpOptions& options, program::Level console) {
+Status run_and_report(lab::MissionUpOptions& options, program::Level console) {
   if (options.out.empty()) options.out = fs::path("out") / fs::path(options.mission.file).stem();
   const auto log = program::EventLog::on_console("mission", console);
   options.progress = [&](const std::string& line) { log->show(line); };
-  const auto record = program::mission_up(options, program::stop_asked());
+  const auto record = lab::mission_up(options, program::stop_asked());
   log->show("");
   if (!record) return tl::unexpected(record.error());
   if (auto ok = mission::write_report(*record, options.out.string()); !ok) return ok;
@@ -34,7 +34,7 @@ Status run_and_report(program::MissionUpOptions& options, program::Level console
 void add_mission_command(CLI::App& app, int& exit_code) {
   CLI::App* group = app.add_subcommand("mission", "A mission as separate programs: see tutti mission up --help");
   group->require_subcommand(1);
-  const auto options = std::make_shared<program::MissionUpOptions>();
+  const auto options = std::make_shared<lab::MissionUpOptions>();
   const auto common = std::make_shared<ProgramArguments>();
   CLI::App* command = group->add_subcommand(
       "up",

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "commands.hpp"
 #include "options.hpp"
@@ -68,9 +69,12 @@ void add_server_command(CLI::App& app, int& exit_code) {
     std::fflush(stdout);
   };
   command->callback([options, common, &exit_code] {
-    options->mission = common->mission;
-    exit_code = run_program("server", *common, options->console,
-                            [&] { return program::run_server(*options, program::stop_asked()); });
+    exit_code = run_program("server", *common, options->console, [&]() -> Status {
+      auto settings = lab::server_settings(common->mission);
+      if (!settings) return tl::unexpected(settings.error());
+      options->settings = std::move(*settings);
+      return program::run_server(*options, program::stop_asked());
+    });
   });
 }
 
@@ -132,13 +136,14 @@ void add_robot_command(CLI::App& app, int& exit_code) {
       ->group("");
   add_program_options(*command, *common);
   command->callback([options, common, &exit_code] {
-    options->mission = common->mission;
-    if (options->feed.empty() && options->mission.file.empty()) {
+    if (options->feed.empty() && common->mission.file.empty()) {
       exit_code = complain("robot", "expected a mission, whose recording is replayed, or --feed SOCKET", 2);
       return;
     }
-    exit_code = run_program("robot", *common, options->console,
-                            [&] { return program::run_robot(*options, program::stop_asked()); });
+    exit_code = run_program("robot", *common, options->console, [&]() -> Status {
+      if (Status told = lab::tell_robot(common->mission, *options); !told) return told;
+      return program::run_robot(*options, program::stop_asked());
+    });
   });
 }
 
@@ -162,9 +167,12 @@ void add_worker_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   add_program_options(*command, *common);
   command->callback([options, common, &exit_code] {
-    options->mission = common->mission;
-    exit_code = run_program("worker", *common, options->console,
-                            [&] { return program::run_worker(*options, program::stop_asked()); });
+    exit_code = run_program("worker", *common, options->console, [&]() -> Status {
+      auto settings = lab::worker_settings(common->mission);
+      if (!settings) return tl::unexpected(settings.error());
+      options->settings = std::move(*settings);
+      return program::run_worker(*options, program::stop_asked());
+    });
   });
 }
 

@@ -7,15 +7,15 @@
 #include <string>
 
 #include "options.hpp"
+#include "tutti/lab/mission_source.hpp"
 #include "tutti/program/event_log.hpp"
-#include "tutti/program/mission_source.hpp"
 #include "tutti/program/stop.hpp"
 
 namespace tutti::app {
 
 /// What all programs that run until they are stopped share.
 struct ProgramArguments {
-  program::MissionSource mission;
+  lab::MissionSource mission;
   std::string log_level = "warning";
   int parent = 0;  ///< That it ends with; 0: none.
 };

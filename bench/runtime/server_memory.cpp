@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
-#include "tutti/mission/bundle_refiner.hpp"
+#include "tutti/finders/sensor_finder_maker.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
@@ -163,7 +163,7 @@ void run(const Arguments& arguments) {
   auto store = storage::open_sqlite_store(path, storage::map_schema(), {.min_free_bytes = 0}).value();
   malloc_trim(0);
   const double heap_before = heap_mb(), resident_before = resident_mb("VmRSS:");
-  const auto refiner = mission::make_refiner(*config);
+  const auto refiner = finders::make_refiner(config->closures, config->refinement);
   auto node = node::ServerNode::open(ids, finder, {.server = config->server, .refiner = refiner}, 1, *store).value();
   const auto frames = node::SubmapFrames::of(*store);
   node::WorkerNode worker(bus::Endpoint::worker(0), finder, frames);

@@ -23,6 +23,7 @@
 #include "support/bus/tcp_relay.hpp"
 #include "support/paths.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/lab/mission_source.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
@@ -43,8 +44,8 @@ constexpr double kPatience_s = 120.0;  // a busy machine
 const std::vector<std::string> kNames{"alpha", "bravo"};
 
 /// Submaps of `submap_s`: few of them keep the map small, and the test fast.
-program::MissionSource mission_of(int duration_s, int submap_s) {
-  program::MissionSource source{.file = test::source_path("tests/system/small_mission.yaml").string()};
+lab::MissionSource mission_of(int duration_s, int submap_s) {
+  lab::MissionSource source{.file = test::source_path("tests/system/small_mission.yaml").string()};
   source.assignments = {"server.update_period_s=50", fmt::format("agent.submap.duration_s={}", submap_s),
                         fmt::format("agent.submap.distance_m={}", submap_s)};
   for (const char* robot : {"0", "1"})
@@ -84,11 +85,11 @@ Rows rows_of(const storage::TableStore& map, const char* table) {
 }
 
 struct World {
-  explicit World(const program::MissionSource& source) : config(program::load(source).value()) {
+  explicit World(const lab::MissionSource& source) : config(lab::load(source).value()) {
     auto input = mission::load_input(config, {}, source.seed);
     EXPECT_TRUE(input.has_value());
     recordings = std::move(input->robots);
-    finder = program::make_finder(config, source).value();
+    finder = lab::make_finder(config, source).value();
   }
   [[nodiscard]] std::unique_ptr<node::ServerNode> open(const storage::TableStore& map) const {
     auto node = node::ServerNode::open({RobotId{0}, RobotId{1}}, finder, {.server = config.server}, 1, map);
@@ -118,7 +119,7 @@ std::unique_ptr<storage::MemoryStore> undisturbed(const World& world) {
     config.uplink.max_under_way_bytes = 0;
     auto robot =
         std::move(mission::RobotActor::open(recording, config, world.config.association,
-                                            program::agent_randomness(1, recording.recording.name), kSession, store)
+                                            lab::agent_randomness(1, recording.recording.name), kSession, store)
                       .value());
     robot->resume({});
     while (robot->next_time() < 1e9) {
@@ -140,9 +141,10 @@ class Field : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  void start_server(const program::MissionSource& source, double rate) {
+  void start_server(const lab::MissionSource& source, double rate) {
     server_.emplace([this, source, rate](const std::atomic<bool>& stop) {
-      program::ServerOptions options{.state = folder_ / "server", .mission = source, .rate = rate};
+      program::ServerOptions options{
+          .state = folder_ / "server", .settings = lab::server_settings(source).value(), .rate = rate};
       options.announce = [this](const std::string& command) {
         const std::string url = command.substr(command.find("nats://"));
         bus_port_ = std::atoi(url.substr(url.rfind(':') + 1).c_str());
@@ -152,15 +154,15 @@ class Field : public ::testing::Test {
     ASSERT_TRUE(within(kPatience_s, [&] { return bus_port_ > 0 || server_->over(); }));
     ASSERT_FALSE(server_->over()) << server_->ended().error().message;
   }
-  void start_robot(const program::MissionSource& source, double rate, const std::string& name, int port) {
+  void start_robot(const lab::MissionSource& source, double rate, const std::string& name, int port) {
     robots_.push_back(std::make_unique<Running>([=, this](const std::atomic<bool>& stop) {
-      return program::run_robot({.name = name,
-                                 .bus = fmt::format("nats://127.0.0.1:{}", port),
-                                 .state = folder_ / name,
-                                 .mission = source,
-                                 .rate = rate,
-                                 .session = kSession},
-                                stop);
+      program::RobotOptions options{.name = name,
+                                    .bus = fmt::format("nats://127.0.0.1:{}", port),
+                                    .state = folder_ / name,
+                                    .rate = rate,
+                                    .session = kSession};
+      if (Status told = lab::tell_robot(source, options); !told) return told;
+      return program::run_robot(options, stop);
     }));
   }
   [[nodiscard]] bool robots_end(double seconds) const {

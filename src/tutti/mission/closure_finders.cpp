@@ -5,54 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <string>
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/config_io.hpp"
+#include "tutti/finders/sensor_finder_maker.hpp"
+#include "tutti/finders/sensor_finders.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/finder_maker.hpp"
-#include "tutti/perception/lidar/candidates.hpp"
-#include "tutti/perception/lidar/verify.hpp"
-#include "tutti/perception/visual/verify.hpp"
 
 namespace tutti::mission {
-
-LidarClosureFinder::LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap,
-                                       std::size_t cache_bytes)
-    : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
-
-bool LidarClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  return first.id.chain != second.id.chain || second.id.index - first.id.index >= min_submap_gap_;  // first < second
-}
-
-Result<ClosureVerdict> LidarClosureFinder::verify(const Submap& first, const Submap& second,
-                                                  const server::PayloadStore& payloads) const {
-  const auto features_a = features_of(first, payloads);
-  if (!features_a) return tl::unexpected(features_a.error());
-  const auto features_b = features_of(second, payloads);
-  if (!features_b) return tl::unexpected(features_b.error());
-  const auto& a = *features_a;
-  const auto& b = *features_b;
-  const auto refuse = [&](const std::optional<Refusal>& refusal) {
-    return ClosureVerdict{{first.id, second.id}, {}, refusal, id()};
-  };
-  if (!a->usable || !b->usable) return refuse(a->usable ? b->refusal : a->refusal);
-  if (!lidar::plausible_pair(*a, *b)) return refuse(Refusal{RefusalReason::unlike_from_above});
-  ClosureVerdict verdict = lidar::to_verdict(first, second, lidar::verify_pair(*a, *b, config_));
-  verdict.finder = id();
-  return verdict;
-}
-
-Result<std::shared_ptr<const lidar::SubmapFeatures>> LidarClosureFinder::features_of(
-    const Submap& submap, const server::PayloadStore& payloads) const {
-  return cache_.get(submap.id, [&]() -> Result<FeatureCache<lidar::SubmapFeatures>::Features> {
-    auto cloud = payloads.cloud(submap.id);
-    if (!cloud) return tl::unexpected(cloud.error());
-    Submap seen = submap;
-    seen.cloud = std::move(*cloud);
-    return std::make_shared<const lidar::SubmapFeatures>(lidar::extract_features(seen, config_));
-  });
-}
 
 namespace {
 
@@ -136,92 +98,30 @@ std::string extent_of(const ClosureConfig& config, const std::vector<MissionReco
   return out;
 }
 
-}  // namespace
-
-VisualClosureFinder::VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap,
-                                         std::size_t cache_bytes)
-    : config_(config), min_submap_gap_(static_cast<std::uint32_t>(min_submap_gap)), cache_(cache_bytes) {}
-
-bool VisualClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  return visual::is_candidate(first, second, min_submap_gap_, config_);
-}
-
-Result<ClosureVerdict> VisualClosureFinder::verify(const Submap& first, const Submap& second,
-                                                   const server::PayloadStore& payloads) const {
-  const auto a = features_of(first, payloads);
-  if (!a) return tl::unexpected(a.error());
-  const auto b = features_of(second, payloads);
-  if (!b) return tl::unexpected(b.error());
-  ClosureVerdict verdict = visual::verify_pair(**a, **b, config_);
-  verdict.finder = id();
-  return verdict;
-}
-
-Result<VisualClosureFinder::Features> VisualClosureFinder::features_of(const Submap& submap,
-                                                                       const server::PayloadStore& payloads) const {
-  return cache_.get(submap.id, [&]() -> Result<Features> {
-    auto payload = payloads.visual(submap.id);
-    if (!payload) return tl::unexpected(payload.error());
-    Submap seen = submap;
-    seen.visual = std::move(*payload);
-    return std::make_shared<const visual::SubmapFeatures>(visual::extract_features(seen, config_));
-  });
-}
-
-JointClosureFinder::JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders)
-    : finders_(std::move(finders)) {}
-
-bool JointClosureFinder::can_compare(const PayloadSize& first, const PayloadSize& second) const {
-  return std::ranges::any_of(finders_, [&](const auto& finder) { return finder->can_compare(first, second); });
-}
-
-bool JointClosureFinder::is_candidate(const Submap& first, const Submap& second) const {
-  return std::ranges::any_of(finders_, [&](const auto& finder) { return finder->is_candidate(first, second); });
-}
-
-Result<ClosureVerdict> JointClosureFinder::verify(const Submap& first, const Submap& second,
-                                                  const server::PayloadStore& payloads) const {
-  ClosureVerdict out{.pair = {first.id, second.id}, .finder = id()};
-  for (const auto& finder : finders_) {
-    if (!finder->is_candidate(first, second)) continue;
-    auto verdict = finder->verify(first, second, payloads);
-    if (!verdict) return verdict;
-    std::ranges::move(verdict->closures, std::back_inserter(out.closures));
-    std::ranges::move(verdict->evidence, std::back_inserter(out.evidence));
-    // Of a submap without a payload of the kind it says no more than that.
-    if (!out.refusal || out.refusal->reason == RefusalReason::too_small) out.refusal = verdict->refusal;
+/// All that the answers of a finder which draws depend on.
+struct DrawnSettings {
+  ClosureConfig closures;
+  std::uint64_t seed = 1;
+  template <class V>
+  void describe(V& v) {
+    v.field("closures", closures);
+    v.field("seed", seed, any(), "Of what is drawn.");
   }
-  if (!out.closures.empty()) out.refusal.reset();
-  return out;
-}
+};
+
+}  // namespace
 
 std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
                                                                  const std::vector<MissionRecording>& recordings,
                                                                  std::uint64_t seed) {
-  std::shared_ptr<const server::ClosureFinder> finder;
-  const auto cache_bytes = static_cast<std::size_t>(config.feature_cache_mb * 1e6);
-  const auto lidar = [&] {
-    return std::make_shared<LidarClosureFinder>(config.lidar, config.min_submap_gap, cache_bytes);
-  };
-  const auto visual = [&] {
-    return std::make_shared<VisualClosureFinder>(config.visual, config.min_submap_gap, cache_bytes);
-  };
-  if (config.finder == "lidar")
-    finder = lidar();
-  else if (config.finder == "visual")
-    finder = visual();
-  else if (config.finder == "sensors")
-    finder = std::make_shared<JointClosureFinder>(
-        std::vector<std::shared_ptr<const server::ClosureFinder>>{lidar(), visual()});
-  else
-    finder = make_reference_finder(config, recordings, seed);
+  const bool is_reference = config.finder == "reference";
+  if (!is_reference && config.wrong_share == 0.0) return finders::make_finder(config);
+  auto finder = is_reference ? make_reference_finder(config, recordings, seed) : finders::make_unnamed_finder(config);
   MethodId id = finder->id();
   if (config.wrong_share > 0.0)
     finder = std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
-  std::string settings = settings_of(config, seed);
-  id.settings = settings_hash(settings + extent_of(config, recordings));
-  if (config.finder == "reference") settings.clear();
-  return std::make_shared<NamedFinder>(std::move(finder), std::move(id), std::move(settings));
+  id.settings = settings_hash(to_yaml(dump_config(DrawnSettings{config, seed})) + extent_of(config, recordings));
+  return std::make_shared<finders::NamedFinder>(std::move(finder), std::move(id), "");
 }
 
 }  // namespace tutti::mission

@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "tutti/base/config_io.hpp"
-#include "tutti/mission/follow_alerts.hpp"
 #include "tutti/mission/perfect_judge.hpp"
 #include "tutti/mission/record_notes.hpp"
 
@@ -69,7 +68,7 @@ MissionRecord make_record(const FinishedMission& mission) {
     const FinishedRobot& finished = mission.robots[robot.id.value];
     record_traffic(finished.traffic, robot);
     robot.updates = finished.updates;
-    robot.alerts = follow_alerts(robot.updates);
+    robot.alerts = alerts_of(robot.updates);
     robot.explanation = finished.explanation;
     robot.proxy_nodes = static_cast<std::size_t>(
         std::ranges::count_if(broadcast.nodes, [&](const ProxyNode& node) { return node.chain.robot == robot.id; }));

@@ -11,9 +11,8 @@
 #include "tutti/bus/simulated_radio.hpp"
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/evaluation/association.hpp"
+#include "tutti/finders/finder_config.hpp"
 #include "tutti/mission/spoiled_closures.hpp"
-#include "tutti/perception/lidar/closure_config.hpp"
-#include "tutti/perception/visual/closure_config.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
@@ -170,13 +169,8 @@ struct RobotConfig {
   }
 };
 
-struct ClosureConfig {
-  std::string finder = "lidar";
-  int min_submap_gap =
-      2;  ///< lidar, visual: submaps of one robot nearer than this are not compared; neighbours overlap anyway.
-  double feature_cache_mb = 1000.0;  ///< lidar: about 2,400 submaps of 5,000 points.
-  lidar::LidarClosureConfig lidar;
-  visual::VisualClosureConfig visual;
+/// Who finds closures, or makes them up.
+struct ClosureConfig : finders::FinderConfig {
   simulation::ReferenceClosureConfig reference;
   double wrong_share = 0.0;
   SpoiledClosureConfig wrong;
@@ -186,14 +180,7 @@ struct ClosureConfig {
     v.field("finder", finder, one_of({"lidar", "visual", "sensors", "reference"}),
             "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry; "
             "reference: true relative poses plus noise and a share of wrong ones.");
-    v.field("min_submap_gap", min_submap_gap, at_least(1.0),
-            "lidar, visual: submaps of one robot nearer than this are not compared.");
-    v.field(
-        "feature_cache_mb", feature_cache_mb, between(16.0, 1e6),
-        "lidar: memory for what was computed of the newest submaps, about 0.4 MB each; where it is full, every pair "
-        "with an older one takes tens of milliseconds instead of less than one.");
-    v.field("lidar", lidar);
-    v.field("visual", visual);
+    describe_sensors(v);
     v.field("reference", reference);
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the closures found that are made wrong on purpose.");

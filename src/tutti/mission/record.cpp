@@ -5,6 +5,12 @@
 
 namespace tutti::mission {
 
+std::vector<consistency::Alert> alerts_of(std::span<const UpdateRecord> updates) {
+  std::vector<consistency::Suspicion> suspicions;
+  for (const UpdateRecord& update : updates) suspicions.push_back({update.time_s, update.revision, update.origins});
+  return consistency::follow_alerts(suspicions);
+}
+
 bool is_partial(std::optional<double> scored_share) { return scored_share && *scored_share < kPartialBelow; }
 
 bool is_tied(const MissionRecord& record, RobotId robot) {

@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/timestamp.hpp"
+#include "tutti/consistency/alerts.hpp"
 #include "tutti/consistency/change_of_mind.hpp"
 #include "tutti/consistency/constraint.hpp"
 #include "tutti/consistency/explanation.hpp"
@@ -81,15 +83,6 @@ struct UpdateRecord {
   std::vector<consistency::SuspectedOrigin> origins;  ///< Where the raw odometry was then thought to part from the map.
 };
 
-/// A suspected localisation failure, followed over the updates: what two updates suspect is one when they overlap.
-struct AlertRecord {
-  consistency::SuspectedOrigin origin;  ///< As last seen.
-  double known_since_s = 0.0;           ///< Mission time of the first update that raised it.
-  std::uint64_t known_since_revision = 0;
-  /// Mission time of the first update that no longer raised it; none = it stands.
-  std::optional<double> withdrawn_s;
-};
-
 /// Where a robot believes another one to be at the end of the mission.
 struct WhereaboutsRecord {
   RobotId other;
@@ -152,7 +145,7 @@ struct RobotRecord {
   double mapped_share = 0.0;    ///< Share of its way, 0 to 1, that `server_estimate` covers.
   Trajectory reference;         ///< T_reference_body, one frame for all robots; empty when there is none.
   std::vector<UpdateRecord> updates;
-  std::vector<AlertRecord> alerts;                      ///< By start; see follow_alerts().
+  std::vector<consistency::Alert> alerts;               ///< By start.
   std::optional<consistency::Explanation> explanation;  ///< Raw odometry against the map, at the last update.
   std::vector<WhereaboutsRecord> whereabouts;
   std::vector<DriftOrigin> drift_origins;  ///< Where its odometry really went wrong; empty when unknown.
@@ -338,6 +331,8 @@ struct MissionRecord {
   TimingRecord timing;
 };
 
+/// consistency::follow_alerts() of these.
+std::vector<consistency::Alert> alerts_of(std::span<const UpdateRecord> updates);
 bool is_partial(std::optional<double> scored_share);
 /// Whether an accepted closure ties one of the robot's keyframes to anything: otherwise the map of it is its odometry.
 bool is_tied(const MissionRecord& record, RobotId robot);

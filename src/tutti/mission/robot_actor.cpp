@@ -86,12 +86,6 @@ void RobotActor::resume(Timestamp now) {
   if (next_ == recording_.recording.odometry.size()) take(node_->finish(now));
 }
 
-bool RobotActor::is_whole_in_map() const {
-  const auto& keyframes = node_->agent().keyframes();
-  const auto last = std::ranges::find_if(keyframes.rbegin(), keyframes.rend(), &Keyframe::representative);
-  return last == keyframes.rend() || last->stamp <= mapped_until_;
-}
-
 double RobotActor::next_time() const {
   const Trajectory& odometry = recording_.recording.odometry;
   if (next_ >= odometry.size()) return std::numeric_limits<double>::infinity();
@@ -219,11 +213,6 @@ void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
   const auto graph = node_->graph_in(envelope);
   if (!graph || !*graph) return take(node_->receive(envelope, now));  // which refuses it, or keeps it
   const ProxyGraphMessage& message = **graph;
-  if (message.graph.age() >= heard_) {
-    heard_ = message.graph.age();
-    const auto own = nodes_of(message.graph, node_->agent().chain());
-    mapped_until_ = own.empty() ? kFirstTimestamp : own.back().stamp;
-  }
   std::optional<std::size_t> budget;
   const std::size_t updates = updates_.size();
   for (Member& member : members_) {

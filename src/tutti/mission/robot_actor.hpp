@@ -47,10 +47,6 @@ class RobotActor {
   [[nodiscard]] bool has_sensors() const { return recording_.recording.scans || recording_.recording.visual; }
   /// Replays one odometry sample and its scan; after the last one the node closes its last submap.
   void replay_next(Timestamp now);
-  /// Of a robot whose recording is empty, because its samples come from elsewhere; RobotNode's functions of these
-  /// names.
-  void add_odometry(const node::OdometrySample& sample, Timestamp now) { take(node_->add_odometry(sample, now)); }
-  void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
   void store_all() { take(node_->store_all()); }
   /// Closes the last submap before the recording ends.
   void finish(Timestamp now) { take(node_->finish(now)); }
@@ -61,10 +57,6 @@ class RobotActor {
 
   [[nodiscard]] const MissionRecording& recording() const { return recording_; }
   [[nodiscard]] const node::RobotNode& node() const { return *node_; }
-  /// (epoch, revision) of the newest proxy graph that has come since the start; zeros before.
-  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> heard() const { return heard_; }
-  /// That graph speaks of all that the robot can be told of: of its last representative keyframe.
-  [[nodiscard]] bool is_whole_in_map() const;
   [[nodiscard]] RobotId id() const { return recording_.recording.robot; }
   [[nodiscard]] RobotOutcome outcome() const;
   [[nodiscard]] const std::vector<UpdateRecord>& updates() const { return updates_; }
@@ -125,8 +117,6 @@ class RobotActor {
   std::vector<Member> members_;  // `spectral` first, if it is there: it sets the budget
   std::size_t next_ = 0;         // odometry sample
   std::size_t next_scan_ = 0, next_images_ = 0;
-  std::pair<std::uint64_t, std::uint64_t> heard_;
-  Timestamp mapped_until_ = kFirstTimestamp;  // the last own node in that graph
   std::vector<UpdateRecord> updates_;
   std::optional<consistency::Explanation> explanation_;
   double cpu_s_ = 0.0;

@@ -10,13 +10,13 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/bus/simulated_network.hpp"
-#include "tutti/mission/bundle_refiner.hpp"
+#include "tutti/finders/parallel.hpp"
+#include "tutti/finders/sensor_finder_maker.hpp"
 #include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/make_record.hpp"
 #include "tutti/mission/mission_events.hpp"
-#include "tutti/mission/parallel.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/server_meter.hpp"
@@ -63,7 +63,8 @@ class MissionRun {
         survey_(std::move(input.survey)),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                      : std::max(1U, std::thread::hardware_concurrency())),
-        meter_(make_closure_finder(config.closures, recordings_, options.seed), make_refiner(config)),
+        meter_(make_closure_finder(config.closures, recordings_, options.seed),
+               finders::make_refiner(config.closures, config.refinement)),
         network_(radio(), kMissionStart),
         store_(storage::map_schema()),
         server_(node::ServerNode::open(robot_ids(recordings_), meter_.finder(),
@@ -74,7 +75,7 @@ class MissionRun {
                                        kEpoch, store_)
                     .value()),
         worker_(kWorker, meter_.finder(), node::SubmapFrames::of(store_),
-                [this](std::size_t count, const auto& call) { for_each_parallel(count, threads_, call); }),
+                [this](std::size_t count, const auto& call) { finders::for_each_parallel(count, threads_, call); }),
         server_port_(network_.connect(bus::Endpoint::server())),
         worker_port_(network_.connect(kWorker)),
         pace_(options.rate) {
@@ -181,7 +182,8 @@ class MissionRun {
       if (robot.actor->next_time() <= time_s_) due.push_back(&robot);
     // A simulated scan or image is much work, an odometry sample hardly any.
     const bool heavy = std::ranges::any_of(due, [](const Robot* robot) { return robot->actor->has_sensors(); });
-    for_each_parallel(due.size(), heavy ? threads_ : 1, [&](std::size_t i) { due[i]->actor->replay_next(now()); });
+    finders::for_each_parallel(due.size(), heavy ? threads_ : 1,
+                               [&](std::size_t i) { due[i]->actor->replay_next(now()); });
     for (Robot* robot : due) carry_out(*robot->port, robot->actor->take_step());
   }
 

@@ -29,7 +29,7 @@ class SpoiledClosureFinder final : public server::ClosureFinder {
  public:
   SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                        const SpoiledClosureConfig& config, std::uint64_t seed);
-  /// The other's: whoever makes it gives it a name of its own (NamedFinder).
+  /// The other's: whoever makes it gives it a name of its own (finders::NamedFinder).
   [[nodiscard]] MethodId id() const override { return inner_->id(); }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return inner_->can_compare(first, second);

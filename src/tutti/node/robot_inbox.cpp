@@ -55,6 +55,12 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std:
     graph_incarnation_ = heard.incarnation;
     remember_incarnations(step);
     if (heard.age() < agent_.newest_heard()) agent_.forget_map_age();
+    mapped_age_ = {};
+  }
+  if (heard.age() >= mapped_age_) {
+    mapped_age_ = heard.age();
+    const auto own = nodes_of(heard, agent_.chain());
+    mapped_until_ = own.empty() ? kFirstTimestamp : own.back().stamp;
   }
   if (!agent_.is_news(heard)) return;
   if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph), budget}, now, step);
@@ -62,6 +68,12 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std:
   step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, budget, observer_)});
   note(std::get<RobotUpdated>(step.events.back().what).summary);
   updated_ = now;
+}
+
+bool RobotNode::is_whole_in_map() const {
+  const auto& keyframes = agent_.keyframes();
+  const auto last = std::ranges::find_if(keyframes.rbegin(), keyframes.rend(), &Keyframe::representative);
+  return last == keyframes.rend() || last->stamp <= mapped_until_;
 }
 
 void RobotNode::note(const robot::UpdateSummary& summary) {

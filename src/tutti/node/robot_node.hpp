@@ -80,6 +80,9 @@ class RobotNode {
   [[nodiscard]] std::optional<std::uint64_t> owner_session() const { return owner_session_; }
 
   [[nodiscard]] const robot::RobotAgent& agent() const { return agent_; }
+  /// The newest graph that has come since the start speaks of all that the robot can be told of: of its last
+  /// representative keyframe.
+  [[nodiscard]] bool is_whole_in_map() const;
   /// Submaps that the server is known to have stored or refused, as many as may be kept, with the bytes of each.
   [[nodiscard]] const std::map<SubmapId, std::size_t>& archive() const { return archive_; }
   /// Submaps that the server is not known to have stored, with the bytes of each.
@@ -148,7 +151,9 @@ class RobotNode {
   std::uint64_t start_ = 1;  // of all on this store
   bool finished_ = false;
   std::optional<Timestamp> updated_;
-  std::uint64_t alerts_ = 0;  // after the last update
+  std::pair<std::uint64_t, std::uint64_t> mapped_age_;  // of the newest graph since the start,
+  Timestamp mapped_until_ = kFirstTimestamp;            // and the last own node in it
+  std::uint64_t alerts_ = 0;                            // after the last update
   std::optional<std::string> conflict_;
   std::optional<std::uint64_t> owner_session_;
 };

@@ -6,16 +6,16 @@
 namespace tutti::program {
 
 void FedRobot::note(const node::Step& step) {
-  for (const node::Event& event : step.events) view_.note(event, actor_.node());
+  for (const node::Event& event : step.events) view_.note(event, robot_.node());
 }
 
 void FedRobot::publish() {
-  front_.publish(view_.state(actor_.node()));
+  front_.publish(view_.state(robot_.node()));
   publish_s_ = clock_.wall_s() + kPublish_s;
 }
 
 void FedRobot::wait(double wall_s) {
-  if (actor_.node().is_stored()) front_.note_stored();  // by what was carried out since the last input
+  if (robot_.node().is_stored()) front_.note_stored();  // by what was carried out since the last input
   publish();
   const double begin_s = clock_.wall_s(), until_s = begin_s + std::max(wall_s, kLongest_s);
   do {
@@ -35,22 +35,22 @@ bool FedRobot::take(const FeedInput& input) {
   Timestamp stamp;
   if (const auto* sample = std::get_if<node::OdometrySample>(&input)) {
     stamp = sample->stamp;
-    actor_.add_odometry(*sample, now);
+    robot_.add_odometry(*sample, now);
   } else if (const auto* scan = std::get_if<Scan>(&input)) {
     stamp = scan->stamp;
     // It was received before anybody knew whether it shows anything new.
-    const robot::RobotAgent& agent = actor_.node().agent();
-    if (agent.newest_sample() != stamp || agent.wants_scan()) actor_.add_scan(*scan, now);
+    const robot::RobotAgent& agent = robot_.node().agent();
+    if (agent.newest_sample() != stamp || agent.wants_scan()) robot_.add_scan(*scan, now);
   } else {
-    actor_.finish(now);
+    robot_.finish(now);
   }
   front_.note_heard();
-  node::Step step = actor_.take_step();
+  node::Step step = robot_.take_step();
   note(step);
   if (const Status ok = taken(step); !ok) front_.refuse(stamp, ok.error().message);
   const bool is_said = !step.writes.empty() || !step.messages.empty() || !step.events.empty();
   if (is_said && !host_.carry_out(std::move(step))) return false;
-  if (actor_.node().is_stored()) front_.note_stored();
+  if (robot_.node().is_stored()) front_.note_stored();
   if (front_.is_drained() || clock_.wall_s() >= publish_s_) publish();
   return true;
 }

@@ -3,11 +3,11 @@
 
 #include <utility>
 
-#include "tutti/mission/robot_actor.hpp"
 #include "tutti/program/clock.hpp"
 #include "tutti/program/feed/feed_front.hpp"
 #include "tutti/program/feed/robot_view.hpp"
 #include "tutti/program/host.hpp"
+#include "tutti/program/robot_driver.hpp"
 
 namespace tutti::program {
 
@@ -20,9 +20,9 @@ class FedRobot {
   static constexpr double kPublish_s = 0.05;  ///< At least so often, while it is behind.
 
   /// All that it is given outlives it.
-  FedRobot(FeedFront& front, mission::RobotActor& actor, Host& host, const Clock& clock, RobotView view)
-      : front_(front), actor_(actor), host_(host), clock_(clock), view_(std::move(view)) {
-    front_.begin_again(actor_.node().agent().newest_sample());
+  FedRobot(FeedFront& front, LiveRobot& robot, Host& host, const Clock& clock, RobotView view)
+      : front_(front), robot_(robot), host_(host), clock_(clock), view_(std::move(view)) {
+    front_.begin_again(robot_.node().agent().newest_sample());
   }
 
   /// Of the robot's steps that come from elsewhere.
@@ -38,7 +38,7 @@ class FedRobot {
   void publish();
 
   FeedFront& front_;
-  mission::RobotActor& actor_;
+  LiveRobot& robot_;
   Host& host_;
   const Clock& clock_;
   RobotView view_;

@@ -38,54 +38,52 @@ class NoPort final : public bus::Port {
 /// What of HostedRobot is about being fed.
 class Hosting final : public Hosted {
  public:
-  Hosting(std::unique_ptr<mission::RobotActor> actor, FeedFront& front, Host& host, const Clock& clock)
-      : actor_(std::move(actor)), fed_(front, *actor_, host, clock, RobotView("alpha")) {}
+  Hosting(std::unique_ptr<LiveRobot> robot, FeedFront& front, Host& host, const Clock& clock)
+      : robot_(std::move(robot)), fed_(front, *robot_, host, clock, RobotView("alpha")) {}
   Answer start(Timestamp now) override {
-    actor_->resume(now);
+    robot_->resume(now);
     return said();
   }
   Answer receive(const bus::Received&, Timestamp) override { return {}; }
-  [[nodiscard]] std::optional<Timestamp> next_work() const override { return actor_->node().next_timer(); }
+  [[nodiscard]] std::optional<Timestamp> next_work() const override { return robot_->node().next_timer(); }
   Answer work(Timestamp now) override {
-    actor_->on_timer(now);
+    robot_->on_timer(now);
     return said();
   }
   void wait(double) override { fed_.wait(0.0); }
   Answer end() override {
     fed_.end();
-    actor_->store_all();
+    robot_->store_all();
     return said();
   }
   [[nodiscard]] Json status(Timestamp) const override { return {}; }
-  [[nodiscard]] const robot::RobotAgent& agent() const { return actor_->node().agent(); }
+  [[nodiscard]] const robot::RobotAgent& agent() const { return robot_->node().agent(); }
 
  private:
   Answer said() {
-    Answer out{actor_->take_step(), {}};
+    Answer out{robot_->take_step(), {}};
     fed_.note(out.step);
     return out;
   }
-  std::unique_ptr<mission::RobotActor> actor_;
+  std::unique_ptr<LiveRobot> robot_;
   FedRobot fed_;
 };
 
 class FedRobotTest : public testing::Test {
  protected:
   FedRobotTest() {
-    recording_.recording.robot = kRobot;
-    recording_.recording.name = "alpha";
-    recording_.score_against_reference = false;
-    front_ = std::make_unique<FeedFront>(RobotView("alpha").state(open_actor()->node()), FeedFront::Limits{});
+    front_ = std::make_unique<FeedFront>(RobotView("alpha").state(open_robot()->node()), FeedFront::Limits{});
     Host::Parts parts;
     parts.store = &disk_;
     parts.open_port = []() -> Result<std::unique_ptr<bus::Port>> { return std::make_unique<NoPort>(); };
     parts.open_node = [this](bus::Port&) -> Result<std::unique_ptr<Hosted>> {
-      return std::make_unique<Hosting>(open_actor(), *front_, *host_, clock_);
+      return std::make_unique<Hosting>(open_robot(), *front_, *host_, clock_);
     };
     host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
   }
-  std::unique_ptr<mission::RobotActor> open_actor() {
-    return std::move(mission::RobotActor::open(recording_, {}, {}, Rng(1), 7, disk_).value());
+  std::unique_ptr<LiveRobot> open_robot() {
+    return std::make_unique<LiveRobot>(
+        std::move(node::RobotNode::open(kRobot, 7, {}, Rng(1).fork(robot::AgentConfig{}.policy.name), disk_).value()));
   }
   void feed(std::size_t from, std::size_t until) {
     for (std::size_t i = from; i < until; ++i) {
@@ -118,7 +116,6 @@ class FedRobotTest : public testing::Test {
   double wall_s_ = 0.0;
   Clock clock_{1.0, 0.0, [this] { return wall_s_; }};
   std::unique_ptr<EventLog> log_ = EventLog::on_console("test", Level::error);
-  mission::MissionRecording recording_;
   test::FullDisk disk_{storage::robot_schema()};
   std::unique_ptr<FeedFront> front_;
   std::unique_ptr<Host> host_;
@@ -133,7 +130,7 @@ TEST_F(FedRobotTest, TakesWhatIsFedAndSaysHowFarItIsStored) {
   turns(100);  // the journal is written every half second
   EXPECT_EQ(front_->state().stored, kOdometry[199].stamp);
   EXPECT_EQ(agent().newest_sample(), kOdometry[199].stamp);
-  EXPECT_EQ(open_actor()->node().agent().newest_sample(), kOdometry[199].stamp);  // after a kill
+  EXPECT_EQ(open_robot()->node().agent().newest_sample(), kOdometry[199].stamp);  // after a kill
   feed(200, kOdometry.size());
   turns(100);
   expect_the_robot_of_all_that_was_fed();
@@ -187,7 +184,7 @@ TEST_F(FedRobotTest, WhatHasComeIsStoredBeforeItEnds) {
   const std::atomic<bool> stop = true;
   host_->run(stop);
   EXPECT_FALSE(front_->add_odometry({kOdometry.back().stamp + 1.0, {}, Matrix6d::Identity()}));
-  EXPECT_EQ(open_actor()->node().agent().newest_sample(), kOdometry.back().stamp);
+  EXPECT_EQ(open_robot()->node().agent().newest_sample(), kOdometry.back().stamp);
 }
 
 }  // namespace fed_robot_test

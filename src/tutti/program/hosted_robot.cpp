@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "tutti/node/status_envelope.hpp"
-#include "tutti/program/update_json.hpp"
 
 namespace tutti::program {
 namespace {
@@ -18,16 +17,15 @@ constexpr double kStarts_s = 15.0;       // so long a second program of this rob
 }  // namespace
 
 Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
-  const std::size_t before = actor_->updates().size();
-  actor_->receive(message.envelope, now);
-  for (std::size_t i = before; i < actor_->updates().size(); ++i) log_.write(to_json(actor_->updates()[i]));
+  driver_->receive(message.envelope, now);
+  for (const Json& note : driver_->take_notes()) log_.write(note);
   note_conflict();
   return said({message.ticket});
 }
 
 /// Who has just started ends; who maps goes on, whatever others say.
 void HostedRobot::note_conflict() {
-  const auto& conflict = actor_->node().conflict();
+  const auto& conflict = driver_->node().conflict();
   if (!conflict || warned_) return;
   warned_ = true;
   if (clock_.wall_s() - begin_s_ < kStarts_s)
@@ -37,9 +35,9 @@ void HostedRobot::note_conflict() {
 }
 
 std::optional<Timestamp> HostedRobot::next_work() const {
-  std::optional<Timestamp> next = actor_->node().next_timer();
+  std::optional<Timestamp> next = driver_->node().next_timer();
   if (feed_ || ended_) return next;
-  const double next_s = actor_->next_time();
+  const double next_s = driver_->next_time();
   const Timestamp sample = next_s > duration_s_ ? Timestamp{} : Timestamp{} + next_s;  // at its end: at once
   return next ? std::min(*next, sample) : sample;
 }
@@ -47,16 +45,16 @@ std::optional<Timestamp> HostedRobot::next_work() const {
 /// All samples that are due, as far as they get in a while and within one submap: what the node sends later it reads
 /// from its store.
 Answer HostedRobot::work(Timestamp now) {
-  if (const auto timer = actor_->node().next_timer(); timer && *timer <= now) actor_->on_timer(now);
+  if (const auto timer = driver_->node().next_timer(); timer && *timer <= now) driver_->on_timer(now);
   const double until_s = clock_.wall_s() + kLongestWork_s;
-  const std::size_t backlog = actor_->node().backlog().size();
-  while (!feed_ && !ended_ && clock_.wall_s() < until_s && actor_->node().backlog().size() == backlog) {
-    const double next_s = actor_->next_time();
+  const std::size_t backlog = driver_->node().backlog().size();
+  while (!feed_ && !ended_ && clock_.wall_s() < until_s && driver_->node().backlog().size() == backlog) {
+    const double next_s = driver_->next_time();
     if (next_s > duration_s_) {
-      actor_->finish(now);
+      driver_->finish(now);
       ended_ = true;
     } else if (Timestamp{} + next_s <= now) {
-      actor_->replay_next(now);
+      driver_->replay_next(now);
     } else {
       break;
     }
@@ -65,19 +63,19 @@ Answer HostedRobot::work(Timestamp now) {
 }
 
 Answer HostedRobot::report(Timestamp now) {
-  NodeStatus status = actor_->node().status(now);
+  NodeStatus status = driver_->node().status(now);
   status.version = options_.version;
-  return {{.messages = {node::to_server(bus::Endpoint::of(actor_->id()), std::move(status))}}, {}};
+  return {{.messages = {node::to_server(bus::Endpoint::of(driver_->node().agent().robot()), std::move(status))}}, {}};
 }
 
 bool HostedRobot::finished() const {
   if (refused_) return true;
-  if (options_.stay || !has_ended() || !actor_->node().backlog().empty()) {
+  if (options_.stay || !has_ended() || !driver_->node().backlog().empty()) {
     settled_s_.reset();
     return false;
   }
   if (!settled_s_) settled_s_ = clock_.wall_s();
-  return actor_->is_whole_in_map() || clock_.wall_s() > *settled_s_ + kWaitsForMap_s;
+  return is_whole_in_map() || clock_.wall_s() > *settled_s_ + kWaitsForMap_s;
 }
 
 std::string HostedRobot::progress(double time_s) const {
@@ -87,7 +85,7 @@ std::string HostedRobot::progress(double time_s) const {
 }
 
 Json HostedRobot::status(Timestamp now) const {
-  const NodeStatus status = actor_->node().status(now);
+  const NodeStatus status = driver_->node().status(now);
   const bus::NatsState link = port_.state();
   const double time_s = now - Timestamp{};
   return {{"program", "robot"},
@@ -99,7 +97,7 @@ Json HostedRobot::status(Timestamp now) const {
           {"revision", status.heard_revision},
           {"connected", link.connected},
           {"alone", alone_},
-          {"refused", actor_->node().conflict().value_or("")},
+          {"refused", driver_->node().conflict().value_or("")},
           {"line",
            fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
                        status.keyframes, status.backlog_submaps, status.heard_revision,

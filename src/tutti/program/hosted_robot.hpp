@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "tutti/bus/nats_port.hpp"
-#include "tutti/mission/robot_actor.hpp"
 #include "tutti/program/fed_robot.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/host.hpp"
@@ -22,9 +21,9 @@ class HostedRobot final : public Hosted {
  public:
   static constexpr double kWaitsForMap_s = 60.0;  ///< After the server has stored everything.
 
-  HostedRobot(std::unique_ptr<mission::RobotActor> actor, double duration_s, const RobotOptions& options,
-              const Clock& clock, const bus::NatsPort& port, EventLog& log, const std::string& alone)
-      : actor_(std::move(actor)),
+  HostedRobot(std::unique_ptr<RobotDriver> driver, double duration_s, const RobotOptions& options, const Clock& clock,
+              const bus::NatsPort& port, EventLog& log, const std::string& alone)
+      : driver_(std::move(driver)),
         duration_s_(duration_s),
         options_(options),
         clock_(clock),
@@ -32,14 +31,14 @@ class HostedRobot final : public Hosted {
         log_(log),
         alone_(alone),
         begin_s_(clock.wall_s()) {}
-  /// Its samples come from clients, not from a recording.
-  void feed_live(LiveFeed& feed, Host& host, RobotView view) {
+  /// Its samples come from clients; `robot` is its driver.
+  void feed_live(LiveFeed& feed, LiveRobot& robot, Host& host, RobotView view) {
     feed_ = &feed;
-    fed_.emplace(feed.front(), *actor_, host, clock_, std::move(view));
+    fed_.emplace(feed.front(), robot, host, clock_, std::move(view));
   }
 
   Answer start(Timestamp now) override {
-    actor_->resume(now);
+    driver_->resume(now);
     return said();
   }
   Answer receive(const bus::Received& message, Timestamp now) override;
@@ -48,20 +47,20 @@ class HostedRobot final : public Hosted {
   void wait(double wall_s) override { fed_ ? fed_->wait(wall_s) : Hosted::wait(wall_s); }
   Answer end() override {
     if (fed_) fed_->end();
-    actor_->store_all();
+    driver_->store_all();
     return said();
   }
   Answer report(Timestamp now) override;
   [[nodiscard]] bool finished() const override;
   [[nodiscard]] Json status(Timestamp now) const override;
-  [[nodiscard]] bool is_whole_in_map() const { return actor_->is_whole_in_map(); }
-  [[nodiscard]] const mission::RobotActor& actor() const { return *actor_; }
+  [[nodiscard]] bool is_whole_in_map() const { return driver_->node().is_whole_in_map(); }
+  [[nodiscard]] const RobotDriver& driver() const { return *driver_; }
   /// Why this program is not to be: another one is this robot.
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
 
  private:
   Answer said(std::vector<std::uint64_t> done = {}) {
-    Answer out{actor_->take_step(), std::move(done)};
+    Answer out{driver_->take_step(), std::move(done)};
     if (fed_) fed_->note(out.step);
     return out;
   }
@@ -69,7 +68,7 @@ class HostedRobot final : public Hosted {
   [[nodiscard]] bool has_ended() const { return feed_ ? feed_->front().has_ended() : ended_; }
   [[nodiscard]] std::string progress(double time_s) const;
 
-  std::unique_ptr<mission::RobotActor> actor_;
+  std::unique_ptr<RobotDriver> driver_;
   double duration_s_;
   const RobotOptions& options_;
   const Clock& clock_;

@@ -10,7 +10,6 @@
 
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
-#include "tutti/mission/robot_actor.hpp"
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/host.hpp"
 #include "tutti/program/hosted_robot.hpp"
@@ -34,11 +33,7 @@ Json last_words(const Host::TrafficTable& table, const HostedRobot* robot) {
                     {"largest", traffic.largest}});
   Json event{{"event", kEnded}, {"traffic", std::move(rows)}};
   if (robot == nullptr) return event;
-  const mission::PolicyTiming timing = robot->actor().timing().front();
-  event.update({{"troubles", robot->actor().troubles()},
-                {"update_ms", timing.update_ms},
-                {"comparison_ms", timing.comparison_ms},
-                {"optimisation_ms", timing.optimisation_ms}});
+  event.update(robot->driver().last_words());
   return event;
 }
 
@@ -57,14 +52,11 @@ Status check_robot_name(const std::string& name) {
               kLongest);
 }
 
-/// Only a robot that is not replayed may be in no mission.
-Result<RobotId> number_of(const std::string& name, const std::vector<std::string>& names, bool is_live) {
-  if (Status ok = check_robot_name(name); !ok) return tl::unexpected(ok.error());
-  const auto found = std::ranges::find(names, name);
-  if (found != names.end()) return RobotId{static_cast<std::uint32_t>(found - names.begin())};
-  if (is_live) return robot_id_of(name);
-  return fail(ErrorCode::configuration, "--name {}: no robot of the mission is called so; there are: {}", name,
-              fmt::join(names, ", "));
+/// FNV-1a of 32 bits, with the highest set.
+RobotId robot_id_of(const std::string& name) {
+  std::uint32_t hash = 2'166'136'261U;
+  for (const char letter : name) hash = (hash ^ static_cast<unsigned char>(letter)) * 16'777'619U;
+  return RobotId{hash | 0x8000'0000U};
 }
 
 class RobotProgram {
@@ -74,10 +66,8 @@ class RobotProgram {
   Status run(const std::atomic<bool>& stop);
 
  private:
-  Status read_mission();
-  Status read_recording();
-  [[nodiscard]] double begin_s(const mission::RobotActor& actor) const;
-  Result<std::unique_ptr<mission::RobotActor>> open_actor();
+  [[nodiscard]] double begin_s(const RobotDriver& driver) const;
+  Result<std::unique_ptr<RobotDriver>> open_driver();
   Result<std::unique_ptr<Hosted>> open_node(bus::Port& port);
   [[nodiscard]] RobotView view() const;
   Status open_feed(const node::RobotNode& node);
@@ -85,11 +75,7 @@ class RobotProgram {
   void tell_feed();
 
   const RobotOptions& options_;
-  mission::MissionConfig config_;
-  std::vector<std::string> names_;  // of the mission's robots, by their number
   RobotId robot_;
-  mission::MissionRecording recording_;  // empty when the robot is fed
-  double duration_s_ = 0.0;
   std::optional<StateFolder> folder_;
   std::unique_ptr<EventLog> log_;
   std::unique_ptr<storage::TableStore> store_;
@@ -109,52 +95,33 @@ void RobotProgram::tell_alone() {
   alone_ = why;
 }
 
-Status RobotProgram::read_mission() {
-  auto config = load(options_.mission);
-  if (!config) return tl::unexpected(config.error());
-  config_ = std::move(*config);
-  names_ = robot_names(config_);
-  const bool is_live = !options_.feed.empty();
-  const auto number = number_of(options_.name, names_, is_live);
-  if (!number) return tl::unexpected(number.error());
-  robot_ = *number;
-  if (!is_live) return read_recording();
-  recording_.recording.robot = robot_;
-  recording_.recording.name = options_.name;
-  recording_.score_against_reference = false;
-  return {};
-}
-
-Status RobotProgram::read_recording() {
-  auto input = mission::load_input(config_, options_.mission.data, options_.mission.seed);
-  if (!input) return tl::unexpected(input.error());
-  duration_s_ = duration_of(config_, input->robots);
-  recording_ = std::move(input->robots.at(robot_.value));
-  return {};
-}
-
-Result<std::unique_ptr<mission::RobotActor>> RobotProgram::open_actor() {
-  const node::RobotNodeConfig config{.agent = config_.agent,
+Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
+  const node::RobotNodeConfig config{.agent = options_.settings.agent,
                                      .name = options_.name,
                                      .uplink = {.bytes_per_s = options_.uplink_bytes_per_s},
                                      .max_archive_bytes = options_.max_archive_bytes};
-  return mission::RobotActor::open(recording_, config, config_.association,
-                                   agent_randomness(options_.mission.seed, options_.name),
-                                   options_.session.value_or(folder_->made_ns()), *store_);
+  const std::uint64_t session = options_.session.value_or(folder_->made_ns());
+  if (options_.feed.empty()) return options_.replay(config, session, *store_);
+  const std::string& policy = config.agent.policy.name;
+  auto node = node::RobotNode::open(robot_, session, config, Rng(options_.settings.randomness).fork(policy), *store_);
+  if (!node) return tl::unexpected(node.error());
+  return std::make_unique<LiveRobot>(std::move(*node));
 }
 
 Result<std::unique_ptr<Hosted>> RobotProgram::open_node(bus::Port& port) {
-  auto actor = open_actor();
-  if (!actor) return in_context((folder_->path() / kRobotFile).string(), actor.error());
-  auto robot = std::make_unique<HostedRobot>(std::move(*actor), duration_s_, options_, *clock_,
+  auto driver = open_driver();
+  if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
+  auto* const live = dynamic_cast<LiveRobot*>(driver->get());
+  auto robot = std::make_unique<HostedRobot>(std::move(*driver), options_.duration_s, options_, *clock_,
                                              dynamic_cast<const bus::NatsPort&>(port), *log_, alone_);
-  if (feed_) robot->feed_live(*feed_, *host_, view());
+  if (feed_) robot->feed_live(*feed_, *live, *host_, view());
   return robot;
 }
 
 RobotView RobotProgram::view() const {
   std::map<RobotId, std::string> names;
-  for (std::size_t i = 0; i < names_.size(); ++i) names[RobotId{static_cast<std::uint32_t>(i)}] = names_[i];
+  const std::vector<std::string>& robots = options_.settings.robots;
+  for (std::size_t i = 0; i < robots.size(); ++i) names[RobotId{static_cast<std::uint32_t>(i)}] = robots[i];
   return RobotView(options_.name, std::move(names));
 }
 
@@ -188,13 +155,15 @@ void RobotProgram::tell_feed() {
 }
 
 /// A recording is replayed from where it stood; for a robot that is fed, time has passed.
-double RobotProgram::begin_s(const mission::RobotActor& actor) const {
+double RobotProgram::begin_s(const RobotDriver& driver) const {
   if (!options_.feed.empty()) return options_.rate * folder_->age_s();
-  return folder_->is_new() ? 0.0 : std::min(actor.next_time(), duration_s_);
+  return folder_->is_new() ? 0.0 : std::min(driver.next_time(), options_.duration_s);
 }
 
 Status RobotProgram::start() {
-  if (Status read = read_mission(); !read) return read;
+  const auto number = number_of(options_.name, options_.settings.robots, !options_.feed.empty());
+  if (!number) return tl::unexpected(number.error());
+  robot_ = *number;
   auto folder = StateFolder::open(options_.state, "robot " + options_.name);
   if (!folder) return tl::unexpected(folder.error());
   folder_.emplace(std::move(*folder));
@@ -204,12 +173,11 @@ Status RobotProgram::start() {
   auto store = storage::open_sqlite_store(folder_->path() / kRobotFile, storage::robot_schema());
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);
-  const auto actor = open_actor();  // where the recording stood
-  if (!actor) return in_context((folder_->path() / kRobotFile).string(), actor.error());
-  clock_.emplace(options_.rate, begin_s(**actor));
-  const auto mission = name_on_bus(options_.mission, config_);
-  if (!mission) return tl::unexpected(mission.error());
-  const bus::NatsPortOptions where{.url = options_.bus, .mission = *mission, .allow_insecure = options_.insecure};
+  const auto driver = open_driver();  // where the recording stood
+  if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
+  clock_.emplace(options_.rate, begin_s(**driver));
+  const bus::NatsPortOptions where{
+      .url = options_.bus, .mission = options_.settings.mission, .allow_insecure = options_.insecure};
   auto lease = bus::MissionLease::open(where, std::nullopt);
   if (!lease) return tl::unexpected(lease.error());
   lease_ = std::move(*lease);
@@ -227,7 +195,7 @@ Status RobotProgram::start() {
                             .table_aside = "meta",
                             .version = options_.version},
                 *clock_, *log_);
-  if (Status opened = open_feed((*actor)->node()); !opened) return opened;
+  if (Status opened = open_feed((*driver)->node()); !opened) return opened;
   // On a full disk there is no map, but clients are told where they are.
   if (Status opened = host_->open(); !opened && !(feed_ && host_->tries_again())) return opened;
   log_->say(Level::info, fmt::format("robot {} runs in {}, bus {}, {}, {}", robot_.value, folder_->path().string(),
@@ -259,6 +227,15 @@ Status RobotProgram::run(const std::atomic<bool>& stop) {
 }
 
 }  // namespace
+
+Result<RobotId> number_of(const std::string& name, const std::vector<std::string>& names, bool is_fed) {
+  if (Status ok = check_robot_name(name); !ok) return tl::unexpected(ok.error());
+  const auto found = std::ranges::find(names, name);
+  if (found != names.end()) return RobotId{static_cast<std::uint32_t>(found - names.begin())};
+  if (is_fed) return robot_id_of(name);
+  return fail(ErrorCode::configuration, "--name {}: no robot of the mission is called so; there are: {}", name,
+              fmt::join(names, ", "));
+}
 
 Status run_robot(const RobotOptions& options, const std::atomic<bool>& stop) {
   RobotProgram program(options);

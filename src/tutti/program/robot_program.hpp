@@ -6,23 +6,37 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/feed_server.hpp"
-#include "tutti/program/mission_source.hpp"
+#include "tutti/program/robot_driver.hpp"
+#include "tutti/robot/agent.hpp"
 
 namespace tutti::program {
 
 inline constexpr const char* kRobotFile = "robot.tutti";  ///< In a robot's state folder.
+inline constexpr const char* kEnded = "ended";            ///< Its last event, with its traffic.
+
+/// What a robot is told of its mission.
+struct RobotSettings {
+  std::string mission;              ///< Its name on the bus (bus::check_mission_name).
+  std::vector<std::string> robots;  ///< By their number; empty: nobody has told.
+  robot::AgentConfig agent;
+  Rng randomness{1};  ///< Of its agent.
+};
 
 struct RobotOptions {
   std::string name;  ///< One of the mission's; any, when it is fed.
   std::string bus;   ///< "nats://HOST:PORT"
   bool insecure = false;
   std::filesystem::path state;
-  MissionSource mission;  ///< Its recording is replayed,
-  std::string feed;       ///< unless samples come on this Unix socket; then it may be empty.
+  RobotSettings settings;
+  std::string feed;         ///< Samples come on this Unix socket; empty: from a recording.
+  ReplayMaker replay;       ///< Of that.
+  double duration_s = 0.0;  ///< Of its mission; not of one that is fed.
   FeedAccess feed_access;
   double rate = 1.0;                                          ///< Times real time.
   double uplink_bytes_per_s = 0.0;                            ///< Of mission time, for submaps; 0: no limit.
@@ -32,6 +46,10 @@ struct RobotOptions {
   Level console = Level::warning;
   std::string version;
 };
+
+/// Its number: the place of its name among the mission's, or, of one that is fed and is in no mission, of its name
+/// alone, the same everywhere and none that a mission gives. An error: no name for a robot, or none of the mission's.
+Result<RobotId> number_of(const std::string& name, const std::vector<std::string>& names, bool is_fed);
 
 /// Replays the robot's recording, or takes what clients feed, from where an earlier program of this state folder
 /// stopped. Ends at `stop`; or, unless it is to stay, when the recording has ended, the server has stored all its

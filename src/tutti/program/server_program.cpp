@@ -21,7 +21,6 @@
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/nats_port.hpp"
-#include "tutti/mission/bundle_refiner.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
@@ -208,8 +207,7 @@ class ServerProgram {
   [[nodiscard]] std::string robot_command() const;
 
   const ServerOptions& options_;
-  mission::MissionConfig config_;
-  std::vector<std::string> names_;
+  const ServerSettings& settings_ = options_.settings;
   std::optional<StateFolder> folder_;
   std::unique_ptr<EventLog> log_;
   std::unique_ptr<bus::NatsChild> child_;
@@ -225,13 +223,12 @@ class ServerProgram {
 };
 
 Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
-  node::ServerNodeConfig config{.server = config_.server,
-                                .refiner = mission::make_refiner(config_),
-                                .accepts_others = config_.closures.finder != "reference"};
+  node::ServerNodeConfig config{
+      .server = settings_.server, .refiner = settings_.finders.refiner(), .accepts_others = settings_.accepts_others};
   config.incarnation = any_incarnation();
   config.job_timeout_s *= std::max(1.0, options_.rate);  // a bus waits in wall time
   std::set<RobotId> robots;
-  for (std::uint32_t i = 0; i < names_.size(); ++i) robots.insert(RobotId{i});
+  for (std::uint32_t i = 0; i < settings_.robots.size(); ++i) robots.insert(RobotId{i});
   auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
@@ -278,29 +275,21 @@ void ServerProgram::tend_bus() {
 
 std::string ServerProgram::robot_command() const {
   return fmt::format("tutti robot --name NAME --bus {} --mission {} --state DIR {}", bus_.url, bus_.mission,
-                     options_.mission.file.empty() ? "--feed SOCKET" : options_.mission.file);
+                     settings_.robot_arguments);
 }
 
 Status ServerProgram::start() {
   const auto address = address_of(options_.listen);
   if (!address) return tl::unexpected(address.error());
   if (Status ok = check_addresses(options_, *address); !ok) return ok;
-  auto config = load(options_.mission);
-  if (!config) return tl::unexpected(config.error());
-  config_ = std::move(*config);
-  if (!options_.mission.file.empty()) names_ = robot_names(config_);
-  const auto name = name_on_bus(options_.mission, config_);
-  if (!name) return tl::unexpected(name.error());
-  bus_ = {.url = options_.bus, .mission = *name, .allow_insecure = options_.insecure};
+  bus_ = {.url = options_.bus, .mission = settings_.mission, .allow_insecure = options_.insecure};
   auto folder = StateFolder::open(options_.state, "server", kMapFile);
   if (!folder) return tl::unexpected(folder.error());
   folder_.emplace(std::move(*folder));
   auto log = EventLog::open(folder_->path(), "server", options_.console);
   if (!log) return tl::unexpected(log.error());
   log_ = std::move(*log);
-  auto finder = make_finder(config_, options_.mission);
-  if (!finder) return tl::unexpected(finder.error());
-  finder_ = std::move(*finder);
+  finder_ = settings_.finders.finder();
   auto store = storage::open_sqlite_store(folder_->path() / kMapFile, storage::map_schema());
   if (!store) return tl::unexpected(store.error());
   store_ = std::move(*store);
@@ -324,7 +313,7 @@ Status ServerProgram::start() {
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
   if (options_.threads == 0) return {};
-  worker_.emplace(bus_, finder_, mission::make_refiner(config_), *store_, options_.version,
+  worker_.emplace(bus_, finder_, settings_.finders.refiner(), *store_, options_.version,
                   static_cast<std::size_t>(options_.threads), *clock_, *log_);
   return worker_->start();
 }

@@ -15,9 +15,7 @@
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_port.hpp"
-#include "tutti/mission/bundle_refiner.hpp"
-#include "tutti/mission/finder_maker.hpp"
-#include "tutti/mission/parallel.hpp"
+#include "tutti/finders/parallel.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/stop.hpp"
 
@@ -39,8 +37,8 @@ std::uint32_t any_number() {
 constexpr double kLooksForServer_s = 10.0;
 
 /// Who was told no mission works for the one that is there.
-Result<std::string> mission_of(const WorkerOptions& options, const mission::MissionConfig& config) {
-  if (is_named(options.mission)) return name_on_bus(options.mission, config);
+Result<std::string> mission_of(const WorkerOptions& options) {
+  if (!options.settings.mission.empty()) return options.settings.mission;
   return bus::served_mission({.url = options.bus, .allow_insecure = options.insecure}, kLooksForServer_s);
 }
 
@@ -60,7 +58,7 @@ HostedWorker::HostedWorker(bus::Endpoint self, std::string version, const Make& 
 /// The port is this thread's: it says that work goes on while others do it.
 void HostedWorker::for_each(std::size_t count, const std::function<void(std::size_t)>& call) {
   auto done = std::async(std::launch::async, [&] {
-    mission::for_each_parallel(count, threads_, [&](std::size_t i) {
+    finders::for_each_parallel(count, threads_, [&](std::size_t i) {
       if (stop_) throw Stopped();
       call(i);
     });
@@ -104,13 +102,11 @@ Json HostedWorker::status(Timestamp /*now*/) const {
 }
 
 Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
-  const auto config = load(options.mission);
-  if (!config) return tl::unexpected(config.error());
-  const auto finder = make_finder(*config, options.mission);
-  if (!finder) return tl::unexpected(finder.error());
+  const FinderSettings& settings = options.settings.finders;
+  const auto finder = settings.finder();
   const auto log = EventLog::on_console("worker", options.console);
   const bus::Endpoint self = bus::Endpoint::worker(any_number());
-  const auto mission = mission_of(options, *config);
+  const auto mission = mission_of(options);
   if (!mission) return tl::unexpected(mission.error());
   const bus::NatsPortOptions where{.url = options.bus, .mission = *mission, .allow_insecure = options.insecure};
   const auto lease = bus::MissionLease::open(where, std::nullopt);
@@ -125,9 +121,9 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
                                                   : std::max(1U, std::thread::hardware_concurrency());
   const auto cache = std::make_shared<node::FrameCache>(kCacheBytes);
   const auto make = [&](node::WorkerNode::ForEach for_each) {
-    node::WorkerNode node(self, *finder, cache, std::move(for_each));
-    node.refine_with(mission::make_refiner(*config));
-    node.make_others_with(std::make_shared<const mission::SensorFinderMaker>(config->closures.feature_cache_mb));
+    node::WorkerNode node(self, finder, cache, std::move(for_each));
+    node.refine_with(settings.refiner());
+    node.make_others_with(std::make_shared<const finders::SensorFinderMaker>(settings.closures.feature_cache_mb));
     return node;
   };
   const Clock clock;

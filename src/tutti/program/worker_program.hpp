@@ -8,15 +8,21 @@
 #include <string>
 
 #include "tutti/node/worker_node.hpp"
+#include "tutti/program/finder_settings.hpp"
 #include "tutti/program/host.hpp"
-#include "tutti/program/mission_source.hpp"
 
 namespace tutti::program {
+
+/// What a worker is told of its mission.
+struct WorkerSettings {
+  std::string mission;  ///< Its name on the bus; empty: the one that has a server there.
+  FinderSettings finders;
+};
 
 struct WorkerOptions {
   std::string bus;  ///< "nats://HOST:PORT"
   bool insecure = false;
-  MissionSource mission;
+  WorkerSettings settings;
   int threads = 1;  ///< 0: as many as the machine has.
   Level console = Level::warning;
   std::string version;

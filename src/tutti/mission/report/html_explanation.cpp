@@ -95,7 +95,7 @@ std::string explanation_html(const MissionRecord& record) {
 std::string alerts_html(const MissionRecord& record) {
   std::string list;
   for (const RobotRecord& robot : record.robots)
-    for (const AlertRecord& alert : robot.alerts)
+    for (const consistency::Alert& alert : robot.alerts)
       list += fmt::format("<li{}><b>Localisation failure {}:</b> {}, {}, noticed by the robot at {}{}</li>\n",
                           alert.withdrawn_s ? " class=\"withdrawn\"" : "",
                           alert.withdrawn_s ? "no longer suspected" : "suspected", escape_xml(robot.name),

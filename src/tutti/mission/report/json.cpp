@@ -117,7 +117,7 @@ Json explanation_json(const RobotRecord& robot) {
 
 Json alerts_json(const RobotRecord& robot) {
   Json out = Json::array();
-  for (const AlertRecord& alert : robot.alerts) {
+  for (const consistency::Alert& alert : robot.alerts) {
     Json row = origin_json(robot, alert.origin);
     row["known_since_s"] = number(alert.known_since_s);
     row["known_since_broadcast"] = alert.known_since_revision;

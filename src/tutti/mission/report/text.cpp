@@ -167,7 +167,7 @@ std::string worst_lines(const RobotRecord& robot, const std::string& policy) {
 std::string explanation_lines(const MissionRecord& record) {
   std::string out;
   for (const RobotRecord& robot : record.robots) {
-    for (const AlertRecord& alert : robot.alerts)
+    for (const consistency::Alert& alert : robot.alerts)
       out += wrap(fmt::format("{}: localisation failure {}, {}; noticed at {}.", robot.name,
                               alert.withdrawn_s ? "no longer suspected" : "suspected",
                               format_origin(alert.origin, mission_clock(robot), robot.explanation),

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "tutti/consistency/alerts.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/follow_alerts.hpp"
 
 namespace tutti::program {
 namespace {
@@ -28,13 +28,13 @@ void RobotView::note(const node::Event& event, const node::RobotNode& node) {
              jumped->jump.from, jumped->jump.to};
   if (update == nullptr || update->summary.synchronised == 0 || !newest) return;
   if (!first_) first_ = *newest;
-  mission::UpdateRecord record{.time_s = *newest - *first_, .revision = update->summary.revision};
+  consistency::Suspicion record{.time_s = *newest - *first_, .revision = update->summary.revision};
   for (const auto& origin : update->summary.explanation.origins)
     if (origin.alert) record.origins.push_back(origin);
   if (updates_.empty() && record.origins.empty()) return;  // before the first alert there is nothing to follow
   updates_.push_back(std::move(record));
   alerts_.clear();
-  for (const mission::AlertRecord& alert : mission::follow_alerts(updates_)) {
+  for (const consistency::Alert& alert : consistency::follow_alerts(updates_)) {
     if (alert.withdrawn_s) continue;
     const consistency::SuspectedOrigin& origin = alert.origin;
     alerts_.push_back({fmt::format("odometry and map part by {:.2f} m and {:.1f} degrees within {:.1f} m of way, more "

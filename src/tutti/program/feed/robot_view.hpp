@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tutti/mission/record.hpp"
+#include "tutti/consistency/alerts.hpp"
 #include "tutti/node/robot_node.hpp"
 #include "tutti/program/feed/feed_target.hpp"
 
@@ -19,7 +19,6 @@ class RobotView {
   explicit RobotView(std::string name, std::map<RobotId, std::string> names = {})
       : name_(std::move(name)), names_(std::move(names)) {}
 
-  void set_name(RobotId robot, std::string name) { names_[robot] = std::move(name); }
   /// Every event of the node's steps.
   void note(const node::Event& event, const node::RobotNode& node);
   [[nodiscard]] FeedState state(const node::RobotNode& node) const;
@@ -28,7 +27,7 @@ class RobotView {
   std::string name_;
   std::map<RobotId, std::string> names_;
   std::optional<Timestamp> first_;  ///< The newest sample at the first update; times of updates_ count from it.
-  std::vector<mission::UpdateRecord> updates_;
+  std::vector<consistency::Suspicion> updates_;
   std::vector<FeedAlert> alerts_;
   std::map<std::string, FeedAlert> missing_;  ///< By sensor.
   std::optional<FeedAlert> jump_;             ///< The newest of odometry.

@@ -10,7 +10,6 @@
 #include "support/mission/report/explanation_example.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/follow_alerts.hpp"
 #include "tutti/mission/record.hpp"
 
 /// For tests of the report only: a made-up mission record with plausible shapes. Its figures mean nothing.
@@ -263,7 +262,7 @@ inline MissionRecord example_record(ExampleOptions options = {}) {
     for (auto& update : robot.updates)
       for (const auto& origin : robot.explanation->origins)
         if (mission_time_of(robot, origin.until) + 30.0 < update.time_s) update.origins.push_back(origin);
-    robot.alerts = follow_alerts(robot.updates);
+    robot.alerts = alerts_of(robot.updates);
   }
   record.server = example_server(record.robots, options, rng.fork("cloud"));
   if (options.survey) add_example_survey(record);

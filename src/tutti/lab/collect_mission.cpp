@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/collect_mission.hpp"
+#include "tutti/lab/collect_mission.hpp"
 
 #include <memory>
 #include <set>
@@ -7,17 +7,19 @@
 #include <vector>
 
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/lab/update_json.hpp"
 #include "tutti/mission/make_record.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
-#include "tutti/program/update_json.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
 
-namespace tutti::program {
+namespace tutti::lab {
 namespace {
+
+using program::Json, program::kEnded;
 
 namespace fs = std::filesystem;
 
@@ -79,16 +81,16 @@ Result<Robot> read_robot(const mission::MissionConfig& config, const MissionSour
                          const mission::MissionRecording& recording, const fs::path& folder) {
   const std::string& name = recording.recording.name;
   Robot robot;
-  auto store = storage::open_sqlite_store(folder / kRobotFile, storage::robot_schema());
+  auto store = storage::open_sqlite_store(folder / program::kRobotFile, storage::robot_schema());
   if (!store) return tl::unexpected(store.error());
   robot.store = std::move(*store);
   auto actor = mission::RobotActor::open(recording, {.agent = config.agent, .name = name}, config.association,
                                          agent_randomness(source.seed, name), 0, *robot.store);
-  if (!actor) return in_context((folder / kRobotFile).string(), actor.error());
+  if (!actor) return in_context((folder / program::kRobotFile).string(), actor.error());
   robot.actor = std::move(*actor);
   robot.timing = {.robot = name, .policy = config.agent.policy.name};
   Status taken;
-  const Status read = read_events(folder, [&](const Json& event) {
+  const Status read = program::read_events(folder, [&](const Json& event) {
     if (taken) taken = take(event, name, robot);
   });
   if (!read || !taken) return in_context(folder.string(), (read ? taken : read).error());
@@ -123,7 +125,7 @@ Result<mission::MissionEvents> read_course(const fs::path& folder) {
     if (what == "message_refused" || is_new_failure)
       course.take({time, node::MessageRefused{{}, bus::MessageKind::verdicts, event.value("why", "")}});
   };
-  if (const Status read = read_events(folder, take); !read) return tl::unexpected(read.error());
+  if (const Status read = program::read_events(folder, take); !read) return tl::unexpected(read.error());
   return course;
 }
 
@@ -143,7 +145,7 @@ Result<mission::MissionRecord> collect_mission(const mission::MissionConfig& con
   }
   auto finder = make_finder(config, source);
   if (!finder) return tl::unexpected(finder.error());
-  const fs::path map = state / "server" / kMapFile;
+  const fs::path map = state / "server" / program::kMapFile;
   const auto store = storage::open_sqlite_store(map, storage::map_schema());
   if (!store) return tl::unexpected(store.error());
   const auto server = node::ServerNode::open(ids, *finder, {.server = config.server}, 1, **store);
@@ -171,4 +173,4 @@ Result<mission::MissionRecord> collect_mission(const mission::MissionConfig& con
   return record;
 }
 
-}  // namespace tutti::program
+}  // namespace tutti::lab

@@ -16,7 +16,7 @@
 #include "tutti/program/feed/feed_session.hpp"
 #include "tutti/simulation/recordings.hpp"
 
-namespace tutti::program {
+namespace tutti::program {  // whose feeds these are
 namespace feed_mission_test {
 
 constexpr double kMission_s = 240.0;
@@ -60,7 +60,8 @@ class Mission {
       recordings_.push_back({.recording = std::move(recording)});
       fed_.emplace_back(recordings_.back().recording.robot, settings_);
     }
-    mission::ClosureConfig closures{.finder = "reference"};
+    mission::ClosureConfig closures;
+    closures.finder = "reference";
     closures.reference.wrong_share = 0.0;
     finder_ = mission::make_closure_finder(closures, recordings_, 5);
     node::ServerNodeConfig of_server;

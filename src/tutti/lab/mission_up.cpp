@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/mission_up.hpp"
+#include "tutti/lab/mission_up.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -12,12 +12,12 @@
 
 #include "tutti/base/file.hpp"
 #include "tutti/bus/nats_port.hpp"
+#include "tutti/lab/children.hpp"
+#include "tutti/lab/collect_mission.hpp"
 #include "tutti/mission/load_meter.hpp"
-#include "tutti/program/children.hpp"
-#include "tutti/program/collect_mission.hpp"
 #include "tutti/wire/codec.hpp"
 
-namespace tutti::program {
+namespace tutti::lab {
 namespace {
 
 namespace fs = std::filesystem;
@@ -187,4 +187,4 @@ Result<mission::MissionRecord> mission_up(const MissionUpOptions& options, const
   return mission.collect();
 }
 
-}  // namespace tutti::program
+}  // namespace tutti::lab

@@ -12,9 +12,12 @@
 #include "tutti/base/result.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
+#include "tutti/program/robot_program.hpp"
+#include "tutti/program/server_program.hpp"
+#include "tutti/program/worker_program.hpp"
 #include "tutti/server/closure_finder.hpp"
 
-namespace tutti::program {
+namespace tutti::lab {
 
 /// What a program is told of its mission.
 struct MissionSource {
@@ -35,15 +38,18 @@ bool is_named(const MissionSource& source);
 
 /// The robots of the mission by their place in it, which is their number; empty when there is no mission.
 std::vector<std::string> robot_names(const mission::MissionConfig& config);
-/// Of a name that is in no mission: the same everywhere, and none that a mission gives.
-RobotId robot_id_of(const std::string& name);
-
 /// Reads the recordings only if the finder needs them.
 Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const mission::MissionConfig& config,
                                                                  const MissionSource& source);
+/// What the programs of the mission are told of it.
+Result<program::ServerSettings> server_settings(const MissionSource& source);
+Result<program::WorkerSettings> worker_settings(const MissionSource& source);
+/// And, unless it is fed (RobotOptions::feed), its recording, read here: sets settings, replay and duration_s.
+Status tell_robot(const MissionSource& source, program::RobotOptions& options);
+
 /// What a robot's agent draws from: as in `tutti run`.
 Rng agent_randomness(std::uint64_t seed, const std::string& robot);
 /// When the mission ends, in mission seconds.
 double duration_of(const mission::MissionConfig& config, const std::vector<mission::MissionRecording>& recordings);
 
-}  // namespace tutti::program
+}  // namespace tutti::lab

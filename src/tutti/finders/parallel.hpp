@@ -8,7 +8,7 @@
 #include <future>
 #include <vector>
 
-namespace tutti::mission {
+namespace tutti::finders {
 
 /// Calls task(0) ... task(count - 1), each once, on up to `threads` threads (this one among them), and returns when all
 /// are done; the first exception of a task is thrown here. Standard threads and no pool: batches are few and heavy, and
@@ -24,4 +24,4 @@ inline void for_each_parallel(std::size_t count, std::size_t threads, const std:
   for (std::future<void>& helper : helpers) helper.get();
 }
 
-}  // namespace tutti::mission
+}  // namespace tutti::finders

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/children.hpp"
+#include "tutti/lab/children.hpp"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -14,7 +14,7 @@
 
 #include "tutti/base/file.hpp"
 
-namespace tutti::program {
+namespace tutti::lab {
 namespace {
 
 constexpr auto kPolitely = std::chrono::seconds(30);
@@ -84,4 +84,4 @@ void Children::stop_all() {
   stop(names);
 }
 
-}  // namespace tutti::program
+}  // namespace tutti::lab

@@ -13,7 +13,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
 
-namespace tutti::mission {
+namespace tutti::finders {
 
 /// Features of the newest submaps, as many as fit into a budget of bytes. Every new submap meets all others in turn: by
 /// the time an old one is wanted again all the others were, so that of those used last hardly any would be there. Those
@@ -93,4 +93,4 @@ std::size_t FeatureCache<F>::held_bytes() const {
   return held_bytes_;
 }
 
-}  // namespace tutti::mission
+}  // namespace tutti::finders

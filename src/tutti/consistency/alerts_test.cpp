@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/follow_alerts.hpp"
+#include "tutti/consistency/alerts.hpp"
 
 #include <gtest/gtest.h>
 
-namespace tutti::mission {
-namespace follow_alerts_test {
+namespace tutti::consistency {
+namespace alerts_test {
 
-consistency::SuspectedOrigin at(double from_s, double until_s, bool alert = true) {
+SuspectedOrigin at(double from_s, double until_s, bool alert = true) {
   return {.from = Timestamp{} + from_s, .until = Timestamp{} + until_s, .alert = alert};
 }
 
-UpdateRecord update(std::uint64_t revision, std::vector<consistency::SuspectedOrigin> origins) {
+Suspicion update(std::uint64_t revision, std::vector<SuspectedOrigin> origins) {
   return {.time_s = 100.0 * static_cast<double>(revision), .revision = revision, .origins = std::move(origins)};
 }
 
 TEST(FollowAlerts, KnowsSinceWhenAndShowsTheLatest) {
-  const std::vector<UpdateRecord> updates{update(1, {}), update(2, {at(150, 190)}), update(3, {at(160, 185)}),
-                                          update(4, {at(20, 30), at(161, 184)})};
+  const std::vector<Suspicion> updates{update(1, {}), update(2, {at(150, 190)}), update(3, {at(160, 185)}),
+                                       update(4, {at(20, 30), at(161, 184)})};
   const auto alerts = follow_alerts(updates);
   ASSERT_EQ(alerts.size(), 2U);
   EXPECT_EQ(alerts[0].known_since_revision, 4U);  // by start, not by when it was known
@@ -32,7 +32,7 @@ TEST(FollowAlerts, DriftWithoutAlertIsNone) {
 }
 
 TEST(FollowAlerts, WithdrawnOnceAndRaisedAgain) {
-  std::vector<UpdateRecord> updates{update(1, {at(10, 20)}), update(2, {at(10, 20, false)}), update(3, {})};
+  std::vector<Suspicion> updates{update(1, {at(10, 20)}), update(2, {at(10, 20, false)}), update(3, {})};
   auto alerts = follow_alerts(updates);
   ASSERT_EQ(alerts.size(), 1U);
   EXPECT_EQ(alerts[0].withdrawn_s, 200.0);  // drift that the odometry allows for is no alert any more
@@ -44,7 +44,7 @@ TEST(FollowAlerts, WithdrawnOnceAndRaisedAgain) {
 }
 
 TEST(FollowAlerts, SplitsAndMerges) {
-  std::vector<UpdateRecord> updates{update(1, {at(10, 50)}), update(2, {at(10, 20), at(40, 50)})};
+  std::vector<Suspicion> updates{update(1, {at(10, 50)}), update(2, {at(10, 20), at(40, 50)})};
   auto alerts = follow_alerts(updates);
   ASSERT_EQ(alerts.size(), 2U);
   EXPECT_EQ(alerts[0].known_since_revision, 1U);
@@ -55,5 +55,5 @@ TEST(FollowAlerts, SplitsAndMerges) {
   EXPECT_EQ(alerts[0].known_since_revision, 1U);
 }
 
-}  // namespace follow_alerts_test
-}  // namespace tutti::mission
+}  // namespace alerts_test
+}  // namespace tutti::consistency

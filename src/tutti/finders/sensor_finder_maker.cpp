@@ -1,34 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/finder_maker.hpp"
+#include "tutti/finders/sensor_finder_maker.hpp"
 
 #include <algorithm>
 #include <string_view>
 #include <utility>
 
 #include "tutti/base/config_io.hpp"
-#include "tutti/mission/bundle_refiner.hpp"
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/finders/bundle_refiner.hpp"
+#include "tutti/finders/sensor_finders.hpp"
 
-namespace tutti::mission {
+namespace tutti::finders {
 namespace {
 
 struct FinderSettings {
-  ClosureConfig closures;
-  std::uint64_t seed = 1;
+  FinderConfig closures;
   template <class V>
   void describe(V& v) {
     v.field("closures", closures);
-    v.field("seed", seed, any(), "Of what is drawn.");
   }
 };
 
 /// What the finder that is configured does not look at.
-bool is_idle(const ClosureConfig& config, std::string_view key) {
-  const auto used_by = [&](std::string_view finder) { return config.finder == finder || config.finder == "sensors"; };
+bool is_idle(const FinderConfig& config, std::string_view key) {
   if (key == "feature_cache_mb") return true;  // memory for time
-  if (key == "lidar" || key == "visual") return !used_by(key);
-  if (key == "reference" || key == "planted") return config.finder != "reference";
-  return key == "wrong" && config.wrong_share == 0.0;
+  return (key == "lidar" || key == "visual") && config.finder != key && config.finder != "sensors";
 }
 
 bool is_of(const MethodId& can, const MethodId& id) { return can.name == id.name && can.version == id.version; }
@@ -49,12 +44,24 @@ tl::unexpected<Error> other_settings(const MethodId& id, const MethodId& made) {
 
 }  // namespace
 
-std::string settings_of(const ClosureConfig& config, std::uint64_t seed) {
-  const bool draws = config.finder == "reference" || config.wrong_share > 0.0;
-  ConfigNode node = dump_config(FinderSettings{config, seed});
-  std::erase_if(node.map, [&](const auto& entry) { return entry.first == "seed" && !draws; });
+std::string settings_of(const FinderConfig& config) {
+  ConfigNode node = dump_config(FinderSettings{config});
   std::erase_if(node.map.front().second.map, [&](const auto& entry) { return is_idle(config, entry.first); });
   return to_yaml(node);
+}
+
+std::shared_ptr<const server::ClosureFinder> make_finder(const FinderConfig& config) {
+  auto finder = make_unnamed_finder(config);
+  std::string settings = settings_of(config);
+  MethodId id = finder->id();
+  id.settings = settings_hash(settings);
+  return std::make_shared<NamedFinder>(std::move(finder), std::move(id), std::move(settings));
+}
+
+std::shared_ptr<const server::MapRefiner> make_refiner(const FinderConfig& finder,
+                                                       const bundle::RefinementConfig& config) {
+  if (finder.finder != "visual" && finder.finder != "sensors") return nullptr;
+  return std::make_shared<const BundleRefiner>(config);
 }
 
 std::string settings_of(const bundle::RefinementConfig& config) { return to_yaml(dump_config(config)); }
@@ -77,7 +84,7 @@ Result<std::shared_ptr<const server::ClosureFinder>> SensorFinderMaker::finder(c
     return fail(ErrorCode::invalid, "the job's settings are of finder '{}', expected {}", read.closures.finder,
                 to_string(id));
   read.closures.feature_cache_mb = feature_cache_mb_;
-  auto made = make_closure_finder(read.closures, {}, read.seed);
+  auto made = make_finder(read.closures);
   if (made->id() != id) return other_settings(id, made->id());
   return made;
 }
@@ -94,4 +101,4 @@ Result<std::shared_ptr<const server::MapRefiner>> SensorFinderMaker::refiner(con
   return made;
 }
 
-}  // namespace tutti::mission
+}  // namespace tutti::finders

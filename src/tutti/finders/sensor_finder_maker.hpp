@@ -6,20 +6,28 @@
 #include <string>
 #include <vector>
 
-#include "tutti/mission/mission_config.hpp"
+#include "tutti/estimation/bundle/refine_map.hpp"
+#include "tutti/finders/finder_config.hpp"
 #include "tutti/server/closure_finder.hpp"
 
-namespace tutti::mission {
+namespace tutti::finders {
+
+/// The configured finder, under a name that says all that its answers depend on: `settings()`, of which any worker
+/// makes it again.
+std::shared_ptr<const server::ClosureFinder> make_finder(const FinderConfig& config);
+/// Null where no cameras find closures.
+std::shared_ptr<const server::MapRefiner> make_refiner(const FinderConfig& finder,
+                                                       const bundle::RefinementConfig& config);
 
 /// All of the settings that the configured finder's answers depend on, as YAML, and nothing else.
-std::string settings_of(const ClosureConfig& config, std::uint64_t seed);
+std::string settings_of(const FinderConfig& config);
 std::string settings_of(const bundle::RefinementConfig& config);
 
-/// Makes every finder and refiner of sensor data of these texts. What a reference finder needs is in no text: only who
-/// has the mission has it.
+/// Makes every finder and refiner of sensor data of these texts. What other finders need (a reference, a mission) is in
+/// no text: only who has the mission has it.
 class SensorFinderMaker final : public server::FinderMaker {
  public:
-  /// `feature_cache_mb`: of each finder (ClosureConfig).
+  /// `feature_cache_mb`: of each finder (FinderConfig).
   explicit SensorFinderMaker(double feature_cache_mb) : feature_cache_mb_(feature_cache_mb) {}
   [[nodiscard]] std::vector<MethodId> can() const override;
   [[nodiscard]] Result<std::shared_ptr<const server::ClosureFinder>> finder(const MethodId& id,
@@ -31,4 +39,4 @@ class SensorFinderMaker final : public server::FinderMaker {
   double feature_cache_mb_;
 };
 
-}  // namespace tutti::mission
+}  // namespace tutti::finders

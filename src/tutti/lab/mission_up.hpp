@@ -7,10 +7,10 @@
 #include <string>
 
 #include "tutti/base/result.hpp"
+#include "tutti/lab/mission_source.hpp"
 #include "tutti/mission/record.hpp"
-#include "tutti/program/mission_source.hpp"
 
-namespace tutti::program {
+namespace tutti::lab {
 
 struct MissionUpOptions {
   std::filesystem::path program;  ///< tutti itself.
@@ -28,4 +28,4 @@ struct MissionUpOptions {
 /// heard the last map. An error: a program has ended before, with what it said; or `stop`.
 Result<mission::MissionRecord> mission_up(const MissionUpOptions& options, const std::atomic<bool>& stop);
 
-}  // namespace tutti::program
+}  // namespace tutti::lab

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/update_json.hpp"
+#include "tutti/lab/update_json.hpp"
 
 #include <gtest/gtest.h>
 
-#include "tutti/program/mission_source.hpp"
-
-namespace tutti::program {
+namespace tutti::lab {
 namespace update_json_test {
+
+using program::Json;
 
 TEST(UpdateJson, ComesBackExactlyThroughText) {
   mission::UpdateRecord update{.time_s = 12.3,
@@ -49,27 +49,5 @@ TEST(UpdateJson, WhatIsMissingIsAnError) {
   EXPECT_FALSE(update_of(event).has_value());
 }
 
-TEST(MissionSource, RobotsAreNumberedByTheirPlaceOrByTheirName) {
-  const auto demo = load({.file = "demo"});
-  ASSERT_TRUE(demo.has_value()) << demo.error().message;
-  EXPECT_EQ(robot_names(*demo), (std::vector<std::string>{"alpha", "bravo"}));
-  const auto copies = load({.file = "demo", .assignments = {"simulation.robots=[{name: r, copies: 2}, {}]"}});
-  ASSERT_TRUE(copies.has_value()) << copies.error().message;
-  EXPECT_EQ(robot_names(*copies), (std::vector<std::string>{"r1", "r2", "charlie"}));
-  EXPECT_EQ(robot_id_of("").value, 0x811c9dc5U);  // FNV-1a's own
-  EXPECT_EQ(robot_id_of("a").value, 0xe40c292cU);
-  EXPECT_GE(robot_id_of("foobar").value, 0x80000000U);
-}
-
-TEST(MissionSource, WithoutAMissionClosuresAreFoundFromScans) {
-  const auto defaults = load({.assignments = {"server.update_period_s=3"}});
-  ASSERT_TRUE(defaults.has_value()) << defaults.error().message;
-  EXPECT_EQ(defaults->server.update_period_s, 3.0);
-  EXPECT_EQ(defaults->closures.finder, "lidar");
-  EXPECT_FALSE(load({.assignments = {"closures.finder=reference"}}).has_value());
-  EXPECT_FALSE(load({.assignments = {"closures.colour=red"}}).has_value());
-  EXPECT_FALSE(load({.file = "nowhere.yaml"}).has_value());
-}
-
 }  // namespace update_json_test
-}  // namespace tutti::program
+}  // namespace tutti::lab

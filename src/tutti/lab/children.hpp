@@ -10,7 +10,7 @@
 
 #include "tutti/base/result.hpp"
 
-namespace tutti::program {
+namespace tutti::lab {
 
 /// Programs started by this one. They are asked to end when it ends, however that is (end_with_parent()).
 class Children {
@@ -36,4 +36,4 @@ class Children {
   std::map<std::string, Child> running_;
 };
 
-}  // namespace tutti::program
+}  // namespace tutti::lab

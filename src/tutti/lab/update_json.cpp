@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/program/update_json.hpp"
+#include "tutti/lab/update_json.hpp"
 
-namespace tutti::program {
+namespace tutti::lab {
+
+using program::Json;
+
 namespace {
 
 Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
@@ -73,4 +76,4 @@ Result<mission::UpdateRecord> update_of(const Json& event) {
   }
 }
 
-}  // namespace tutti::program
+}  // namespace tutti::lab

@@ -6,10 +6,9 @@
 #include <string>
 
 #include "tutti/estimation/bundle/refine_map.hpp"
-#include "tutti/mission/mission_config.hpp"
 #include "tutti/server/map_refiner.hpp"
 
-namespace tutti::mission {
+namespace tutti::finders {
 
 /// Bundle adjustment over all that cameras saw of a job's submaps: their landmarks, joined where neighbours share a
 /// keyframe and where an accepted visual closure found them to be the same.
@@ -29,7 +28,4 @@ class BundleRefiner final : public server::MapRefiner {
   std::string settings_;
 };
 
-/// Null for a mission whose closures do not come from cameras.
-std::shared_ptr<const BundleRefiner> make_refiner(const MissionConfig& config);
-
-}  // namespace tutti::mission
+}  // namespace tutti::finders

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/bundle_refiner.hpp"
+#include "tutti/finders/bundle_refiner.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/mission/finder_maker.hpp"
+#include "tutti/finders/sensor_finder_maker.hpp"
 
-namespace tutti::mission {
+namespace tutti::finders {
 namespace {
 
 /// The job's submaps where it has them, with what their cameras saw.
@@ -108,9 +108,4 @@ Result<Refinement> BundleRefiner::refine(const RefinementJob& job, const server:
   return out;
 }
 
-std::shared_ptr<const BundleRefiner> make_refiner(const MissionConfig& config) {
-  if (config.closures.finder != "visual" && config.closures.finder != "sensors") return nullptr;
-  return std::make_shared<const BundleRefiner>(config.refinement);
-}
-
-}  // namespace tutti::mission
+}  // namespace tutti::finders

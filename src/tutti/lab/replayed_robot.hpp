@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "tutti/mission/robot_actor.hpp"
+#include "tutti/program/robot_driver.hpp"
+
+namespace tutti::lab {
+
+/// A robot of a mission in a program of its own: its samples come from its recording, and what it makes of each map is
+/// scored.
+class ReplayedRobot final : public program::RobotDriver {
+ public:
+  explicit ReplayedRobot(std::unique_ptr<mission::RobotActor> actor) : actor_(std::move(actor)) {}
+  [[nodiscard]] const node::RobotNode& node() const override { return actor_->node(); }
+  void resume(Timestamp now) override { actor_->resume(now); }
+  void on_timer(Timestamp now) override { actor_->on_timer(now); }
+  void receive(const bus::Envelope& envelope, Timestamp now) override { actor_->receive(envelope, now); }
+  void finish(Timestamp now) override { actor_->finish(now); }
+  void store_all() override { actor_->store_all(); }
+  node::Step take_step() override { return actor_->take_step(); }
+  [[nodiscard]] double next_time() const override { return actor_->next_time(); }
+  void replay_next(Timestamp now) override { actor_->replay_next(now); }
+  std::vector<program::Json> take_notes() override;
+  [[nodiscard]] program::Json last_words() const override;
+
+ private:
+  std::unique_ptr<mission::RobotActor> actor_;
+  std::size_t noted_ = 0;  // updates
+};
+
+}  // namespace tutti::lab

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+
+#include "tutti/estimation/bundle/refine_map.hpp"
+#include "tutti/finders/finder_config.hpp"
+#include "tutti/finders/sensor_finder_maker.hpp"
+#include "tutti/server/closure_finder.hpp"
+
+namespace tutti::program {
+
+/// Who finds closures and refines maps for a program, and by which settings.
+struct FinderSettings {
+  finders::FinderConfig closures;
+  bundle::RefinementConfig refinement;
+  std::shared_ptr<const server::ClosureFinder> other;  ///< Instead of that of `closures`; null: there is none.
+
+  [[nodiscard]] std::shared_ptr<const server::ClosureFinder> finder() const {
+    return other != nullptr ? other : finders::make_finder(closures);
+  }
+  /// Null: none is needed.
+  [[nodiscard]] std::shared_ptr<const server::MapRefiner> refiner() const {
+    return finders::make_refiner(closures, refinement);
+  }
+};
+
+}  // namespace tutti::program

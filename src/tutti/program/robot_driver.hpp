@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "tutti/base/random.hpp"
+#include "tutti/node/robot_node.hpp"
+#include "tutti/program/event_log.hpp"
+#include "tutti/storage/table_store.hpp"
+
+namespace tutti::program {
+
+/// The robot of a robot program: its node, and, where it replays, what comes next.
+class RobotDriver {
+ public:
+  virtual ~RobotDriver() = default;
+  [[nodiscard]] virtual const node::RobotNode& node() const = 0;
+  // RobotNode's functions of these names. What they make waits for take_step().
+  virtual void resume(Timestamp now) = 0;
+  virtual void on_timer(Timestamp now) = 0;
+  virtual void receive(const bus::Envelope& envelope, Timestamp now) = 0;
+  virtual void finish(Timestamp now) = 0;
+  virtual void store_all() = 0;
+  virtual node::Step take_step() = 0;
+  /// Mission time of its next sample, s; infinity when it has none, or its samples come from elsewhere.
+  [[nodiscard]] virtual double next_time() const { return std::numeric_limits<double>::infinity(); }
+  virtual void replay_next(Timestamp /*now*/) {}
+  /// Events beside those of the steps, since the last call.
+  virtual std::vector<Json> take_notes() { return {}; }
+  /// What the last event of the program says beside its traffic.
+  [[nodiscard]] virtual Json last_words() const { return Json::object(); }
+};
+
+/// Makes the driver of a robot that replays, on its store; called again when the store could not be written.
+using ReplayMaker = std::function<Result<std::unique_ptr<RobotDriver>>(
+    const node::RobotNodeConfig& config, std::uint64_t session, const storage::TableStore& store)>;
+
+/// One whose samples are fed.
+class LiveRobot final : public RobotDriver {
+ public:
+  explicit LiveRobot(std::unique_ptr<node::RobotNode> node) : node_(std::move(node)) {}
+  [[nodiscard]] const node::RobotNode& node() const override { return *node_; }
+  void resume(Timestamp now) override { take(node_->resume(now)); }
+  void on_timer(Timestamp now) override { take(node_->on_timer(now)); }
+  void receive(const bus::Envelope& envelope, Timestamp now) override { take(node_->receive(envelope, now)); }
+  void finish(Timestamp now) override { take(node_->finish(now)); }
+  void store_all() override { take(node_->store_all()); }
+  node::Step take_step() override { return std::exchange(step_, {}); }
+  void add_odometry(const node::OdometrySample& sample, Timestamp now) { take(node_->add_odometry(sample, now)); }
+  void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
+
+ private:
+  void take(node::Step step) {
+    std::ranges::move(step.writes, std::back_inserter(step_.writes));
+    std::ranges::move(step.messages, std::back_inserter(step_.messages));
+    std::ranges::move(step.events, std::back_inserter(step_.events));
+  }
+
+  std::unique_ptr<node::RobotNode> node_;
+  node::Step step_;
+};
+
+}  // namespace tutti::program
