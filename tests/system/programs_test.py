@@ -221,7 +221,7 @@ class Programs(unittest.TestCase):
             code, said = program.end()
             self.assertEqual(code, 0, said)
         info = run("map", "info", self.path / "server/map.tutti").stdout
-        self.assertRegex(info, r"finder +lidar 1 \(settings [0-9a-f]{16}\): closures between 0 pairs, [1-9]")
+        self.assertRegex(info, r"finder +lidar [0-9]+ \(settings [0-9a-f]{16}\): closures between 0 pairs, [1-9]")
 
     def test_a_mission_has_one_server_and_others_are_told(self):
         server, bus = self.start_server("--mission", "alps")
