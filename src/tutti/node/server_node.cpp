@@ -25,10 +25,6 @@ constexpr std::size_t kMostUnreadStretches = 500;  // in each of these
 constexpr std::size_t kMostRefused = 256;          // of a robot; the last ones
 constexpr std::size_t kMostStrangers = 1000;       // who are told something
 
-bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<const std::string> bytes) {
-  return {bus::Endpoint::server(), bus::Endpoint::of(robot), kind, {}, std::move(bytes)};
-}
-
 /// The first multiple of the period that is not before `now`.
 Timestamp next_update(Timestamp now, double period_s) {
   return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
@@ -313,64 +309,6 @@ void ServerNode::send_receipt(Receipt receipt, Step& step) const {
       to_robot(receipt.robot, bus::MessageKind::receipt, std::make_shared<const std::string>(wire::encode(receipt))));
 }
 
-/// What waits (ChangeWatch) is sent at the next update, whether or not there is news by then.
-void ServerNode::send_graph(ProxyGraphMessage message, Timestamp now, Step& step) {
-  message.graph.incarnation = config_.incarnation;
-  for (const RobotId robot : robots_)
-    if (const auto owner = registry_.owner(robot)) consistency::see_last_in(message.graph, *owner);
-  broadcast_ = message.graph;
-  const bool wait = config_.server.change_of_mind == "wait" && !std::exchange(operator_spoke_, false);
-  const auto beliefs = std::make_shared<const server::Beliefs>(server::beliefs_of(server_.map()));
-  std::vector<RobotId> heard;
-  for (const RobotId robot : robots_) {
-    ChangeWatch::Decision decision =
-        change_watch_.take(robot, consistency::own_part(message.graph, robot), beliefs, wait);
-    if (decision.send) heard.push_back(robot);
-    for (ChangeOfMind& told : decision.told) step.tell(now, std::move(told));
-  }
-  if (change_watch_.anything_waits()) timer_ = now + config_.server.update_period_s;
-  send_graph(message, heard, step);
-}
-
-void ServerNode::send_graph(const ProxyGraphMessage& message, std::span<const RobotId> robots, Step& step) {
-  if (config_.server.broadcast == "own") {
-    for (const RobotId robot : robots) step.messages.push_back(own_graph(robot, message));
-    return;
-  }
-  const auto whole = std::make_shared<const std::string>(wire::encode(message));
-  for (const RobotId robot : robots) step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, whole));
-}
-
-void ServerNode::send_waiting(Timestamp now, Step& step) {
-  std::vector<RobotId> robots;
-  for (const RobotId robot : robots_)
-    if (auto told = change_watch_.follow(robot)) {
-      robots.push_back(robot);
-      step.tell(now, std::move(*told));
-    }
-  send_graph(
-      {.header = {.robot = {}, .session = broadcast_.epoch, .sequence = broadcast_.revision}, .graph = broadcast_},
-      robots, step);
-}
-
-/// Deltas grow as the map leaves the base behind. The mean of what is sent is smallest when the full graph is sent
-/// again as soon as a delta is larger than that mean.
-bus::Envelope ServerNode::own_graph(RobotId robot, const ProxyGraphMessage& message) {
-  const ProxyGraphMessage part{message.header, consistency::own_part(message.graph, robot)};
-  Base& base = bases_[robot];
-  if (base.messages > 0) {
-    auto delta = std::make_shared<const std::string>(wire::encode_delta(part, base.graph));
-    if (base.messages * delta->size() <= base.bytes) {
-      ++base.messages;
-      base.bytes += delta->size();
-      return to_robot(robot, bus::MessageKind::proxy_graph_delta, std::move(delta));
-    }
-  }
-  auto full = std::make_shared<const std::string>(wire::encode(part));
-  base = {wire::decode_proxy_graph(*full).value().graph, 1, full->size()};
-  return to_robot(robot, bus::MessageKind::proxy_graph, std::move(full));
-}
-
 MapCounts ServerNode::counts() const {
   if (!has_map_ && stored_counts_) return *stored_counts_;
   const server::MapEstimate& map = server_.map();
@@ -382,7 +320,14 @@ void ServerNode::send_map(ProxyGraphMessage message, Timestamp now, Step& step) 
   has_map_ = true;
   compute_at_.reset();
   ++changes_;
-  send_graph(std::move(message), now, step);
+  message.graph.incarnation = config_.incarnation;
+  for (const RobotId robot : robots_)
+    if (const auto owner = registry_.owner(robot)) consistency::see_last_in(message.graph, *owner);
+  const bool wait = config_.server.change_of_mind == "wait" && !std::exchange(operator_spoke_, false);
+  broadcast_.send(std::move(message), std::make_shared<const server::Beliefs>(server::beliefs_of(server_.map())),
+                  robots_, wait, now, step);
+  // What waits is sent at the next update, whether or not there is news by then.
+  if (broadcast_.anything_waits()) timer_ = now + config_.server.update_period_s;
   if (const MapCounts now_there = counts(); stored_counts_ != now_there) {
     stored_counts_ = now_there;
     step.writes.push_back(to_row(now_there));
@@ -397,8 +342,8 @@ Step ServerNode::on_timer(Timestamp now) {
   settle(now, step);
   if (timer_ && *timer_ <= now) {
     timer_.reset();
-    if (!server_.has_news() && change_watch_.anything_waits()) {
-      send_waiting(now, step);
+    if (!server_.has_news() && broadcast_.anything_waits()) {
+      broadcast_.send_waiting(robots_, now, step);
       return step;
     }
     send_map(server_.optimise(), now, step);

@@ -6,12 +6,11 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "tutti/node/change_watch.hpp"
+#include "tutti/node/broadcast.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/step.hpp"
@@ -75,7 +74,7 @@ class ServerNode {
   [[nodiscard]] const server::MapServer& map_server() const { return server_; }
   /// False after a start, until the first update: mission_status() says what the last one before it made.
   [[nodiscard]] bool has_map() const { return has_map_; }
-  [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_; }  ///< The last one; empty before.
+  [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_.last(); }  ///< The last one; empty before.
 
  private:
   static constexpr double kWorkerIsThere_s = 10.0;   // five of its statuses
@@ -169,12 +168,6 @@ class ServerNode {
   [[nodiscard]] MapCounts counts() const;
   /// The map has been computed.
   void send_map(ProxyGraphMessage message, Timestamp now, Step& step);
-  void send_graph(ProxyGraphMessage message, Timestamp now, Step& step);
-  void send_graph(const ProxyGraphMessage& message, std::span<const RobotId> robots, Step& step);
-  /// The last map to the robots that wait for it.
-  void send_waiting(Timestamp now, Step& step);
-  /// In full, or in terms of the last one that was, whichever makes fewer bytes in the long run.
-  [[nodiscard]] bus::Envelope own_graph(RobotId robot, const ProxyGraphMessage& message);
   /// Sets the timer when something new has come, and remembers in the store whether it has.
   void note_news(Timestamp now, bool before, Step& step);
   [[nodiscard]] storage::Write meta() const;
@@ -219,15 +212,8 @@ class ServerNode {
   std::optional<Timestamp> compute_at_;  // the map that was there when the store was opened
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;
-  ProxyGraph broadcast_;
-  ChangeWatch change_watch_;
+  Broadcast broadcast_{config_.server.broadcast == "all"};
   bool operator_spoke_ = false;  // since the last map
-  /// What a robot was sent in full, as it knows it, and what has come in terms of it since.
-  struct Base {
-    ProxyGraph graph;
-    std::size_t messages = 0, bytes = 0;  // the full one among them
-  };
-  std::map<RobotId, Base> bases_;
 };
 
 }  // namespace tutti::node
