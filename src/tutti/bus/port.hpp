@@ -20,23 +20,24 @@ struct Received {
 /// implementation to this contract.
 class Port {
  public:
-  /// What was received and not acknowledged comes again, to the next port of this endpoint at once (a job: to any
-  /// worker). What was sent and has not left yet may be lost: whoever needs it sends it again when it starts again.
+  /// A message that was received and not acknowledged comes again at once to the next port of this endpoint, a job to
+  /// any worker. A message that was sent and has not left yet may be lost; whoever needs it sends it again after a
+  /// start.
   virtual ~Port() = default;
-  /// Never waits for the network: the message leaves when it can. `envelope.from` is this endpoint. A retained message
-  /// takes the place of the last one to the same receiver; another one with the kind and id of one that has not left
-  /// yet changes nothing. An error: it was not taken (as when too many wait), and is
-  /// to be sent again later.
+  /// Takes a message, which leaves when it can; never waits for the network. `envelope.from` is this endpoint. A
+  /// retained message takes the place of the last one to the same receiver. Any other message with the kind and id of
+  /// one that has not left yet changes nothing. An error: the message was not taken, because too many wait, and is to
+  /// be sent again later.
   [[nodiscard]] virtual Status send(Envelope envelope) = 0;
-  /// What has come, without waiting, each once for every time that it is owed. Of jobs one at a time: the next when the
-  /// last one is acknowledged. A job that has ended every worker that had it may come back to the server, from
-  /// any_worker(): nobody gets it any more.
+  /// Returns what has come, without waiting. A worker gets one job at a time: the next one comes when the last is
+  /// acknowledged. A job that has ended every worker that had it may come back to the server, from any_worker(), and
+  /// then nobody gets it any more.
   [[nodiscard]] virtual std::vector<Received> receive() = 0;
-  /// The receiver has done, and stored, all that the message asks for: it need not come again. Needless, and allowed,
-  /// for what is retained or best effort. Of a worker, which stores nothing, it holds when what it has sent before has
-  /// left.
+  /// Says that the receiver has done, and stored, all that the message asks for, so that it does not come again. Not
+  /// needed, but allowed, for messages that are retained or best effort. A worker stores nothing: its acknowledgement
+  /// leaves after all that it has sent before.
   virtual void acknowledge(std::uint64_t ticket) = 0;
-  /// Work on this message goes on: to be said every few seconds of a long job, or another worker gets it too.
+  /// Says that work on this message goes on. Unless a long job says so every few seconds, another worker gets it, too.
   virtual void still_busy(std::uint64_t ticket) = 0;
 };
 

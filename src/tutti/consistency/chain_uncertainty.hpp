@@ -25,12 +25,14 @@ struct ChainKnowledge {
 /// Fewer samples than these say nothing of scales.
 inline constexpr Eigen::Index kLeastSamples = 16;
 
-/// Passes the samples through the same alignment and filters as the robot passes what it differs by. The sigma of a
-/// coefficient is that of the worst direction, from the samples' covariance shrunk towards its mean (OAS). Directions:
-/// v with the smallest v^T P v / v^T O v below a quarter, at most four, P the map's covariance of the spread nodes seen
-/// from the first, O odometry's; what is doubted is one shift, the more of it the less likely odometry finds it
-/// (docs/math.md). `products`, unless null, counts up by the columns that were filtered, times the products with the
-/// graph's Laplacian that each took.
+/// How sure the map is of one chain, in the terms in which a robot compares itself with it (docs/math.md).
+///
+/// Scales: the samples pass through the same alignment and filters as a robot's difference does; the sigma of a
+/// coefficient is that of its worst direction, from the samples' covariance shrunk towards its mean (OAS).
+/// Directions: at most four vectors v with the smallest v^T P v / v^T O v below a quarter, where P is the map's
+/// covariance of the spread nodes as seen from the first, and O odometry's. What is doubted is one shift, and the
+/// larger, the less likely odometry finds it. `products`, unless null, is increased by the number of filtered columns
+/// times the products with the graph's Laplacian that each took.
 ChainUncertainty chain_uncertainty(const ProxyGraph& graph, const ChainId& chain, const ChainKnowledge& known,
                                    std::size_t* products = nullptr);
 

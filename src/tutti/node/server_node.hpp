@@ -26,16 +26,19 @@ struct OpenedMap;
 struct ServerNodeConfig {
   server::ServerConfig server;
   std::size_t pairs_per_job = 256;  ///< At most: what one worker does before others can help.
-  /// Mission time without any answer after which the pairs of a job are asked again, as a new job; a job that waits
-  /// behind others has its time from the last answer to one of these. Every further time twice as long. 0: never.
+  /// When no answer has come for so long, in mission seconds, the pairs of a job are asked again, as a new job; every
+  /// further time the wait is twice as long. A job that waits behind others begins to count when the last of those
+  /// was answered. 0: pairs are never asked again.
   double job_timeout_s = 600.0;
-  /// A pair that a worker says it cannot verify is asked again after a tenth of job_timeout_s, then after twice as long
-  /// (without a timeout: with the next submap), so often in all; then it is refused.
+  /// A pair that no worker can verify is refused after so many tries. The second try comes after a tenth of
+  /// job_timeout_s, every further one after twice as long; without a timeout it comes with the next submap.
   unsigned most_tries = 4;
   std::shared_ptr<const server::MapRefiner> refiner;  ///< Null: the map is its pose graph's.
-  /// Of this start, at random (ProxyGraph::incarnation); robots send again what is not in the map of a new one.
+  /// A random number of this start (ProxyGraph::incarnation), by which robots see that the map may be another one: they
+  /// send again what it lacks.
   std::uint32_t incarnation = 0;
-  /// Robots that it was not told of, from their first submap on, up to ProxyGraph::kMostChains in all.
+  /// Robots that the server was not told of become the mission's with their first submap, up to
+  /// ProxyGraph::kMostChains.
   bool accepts_others = false;
 };
 
@@ -101,7 +104,7 @@ class ServerNode {
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// For good: the robot need not send it again.
   void note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
-  /// Of a robot that is none of the mission's, or not yet: nothing when too many of these have one.
+  /// The receipt of any robot, made where there is none yet. Null: it is a stranger's, and too many strangers have one.
   [[nodiscard]] Receipt* receipt_of(RobotId robot, Timestamp now);
   [[nodiscard]] const Receipt* told_to(RobotId robot) const;
   void send_receipt(Receipt receipt, Step& step) const;

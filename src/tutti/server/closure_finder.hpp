@@ -18,10 +18,9 @@ namespace tutti::server {
 class ClosureFinder {
  public:
   virtual ~ClosureFinder() = default;
-  /// Who this is: every verdict carries it. The version is raised by hand in the commit that changes gates, methods or
-  /// which pairs are candidates; the settings are a hash of what it was given. A server whose finder is another one
-  /// than before asks every pair again, and keeps the old closures until they are answered. With a name, and of version
-  /// 1 at least.
+  /// Names the finder; every verdict carries this id. The name is not empty, the version is at least 1 and is raised by
+  /// hand in the commit that changes gates, methods or candidates, and `settings` is a hash of the finder's settings. A
+  /// server that starts with another finder than before asks every pair again, and keeps the old closures until then.
   [[nodiscard]] virtual MethodId id() const = 0;
   /// All that a worker of the same program needs to make it (FinderMaker); empty: it cannot be made of this alone.
   [[nodiscard]] virtual std::string settings() const { return {}; }

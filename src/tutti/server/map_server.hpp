@@ -108,25 +108,27 @@ class MapServer {
   /// One without submaps in the map.
   void remove_robot(RobotId robot) { robots_.erase(robot); }
 
-  /// A submap, in any order, any number of times, of any session of a known robot. Unknown robots, malformed submaps
-  /// and sessions beyond a robot's share of ProxyGraph::kMostChains are refused; what is already mapped stays. So is
-  /// one whose cloud the store cannot keep; it may be sent again. One that comes again puts its cloud back if the store
-  /// has lost it.
+  /// Takes a submap of any session of a known robot. Submaps may come in any order and any number of times; a repeated
+  /// one only puts its cloud back where the store has lost it. An error, and the map is as it was: the robot is
+  /// unknown, the submap is malformed, the robot has no room for another session (ProxyGraph::kMostChains), or the
+  /// store cannot keep the cloud, and then the submap may be sent again.
   Status receive(const SubmapMessage& message);
-  /// The answer to a job, in any order, any number of times. Closures join a keyframe of pair.first to one of
-  /// pair.second, and the finder would ask for the pair; anything else is an error and changes nothing, and so is one
-  /// of another finder than the server's. Of two verdicts on one pair a refusal holds, then the closures with the
-  /// smaller numbers: the map is the same whatever came first. A verdict that comes before its submaps waits for them
-  /// and is judged then; it is an error when kMostWaiting wait already, and costs only that the pair is asked again.
+  /// Takes the answer to a job; answers may come in any order and any number of times. Of two verdicts on one pair a
+  /// refusal holds, then the closures with the smaller numbers, so that the map is the same whichever came first. A
+  /// verdict that comes before its submaps waits for them and is judged then. An error, and nothing changes: the
+  /// verdict is of another finder than the server's, a closure joins anything else than a keyframe of pair.first to one
+  /// of pair.second, the finder would not ask for the pair, or kMostWaiting verdicts wait already; then the pair is
+  /// asked again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
-  /// What an operator says of the closures of a pair, any number of times; the map follows at the next optimise(). An
-  /// error, and nothing changes: its submaps are not there, or there are no closures to accept. Of two words on one
-  /// pair the later one holds. A verdict whose closures are accepted stays as it is, whatever other finders say.
+  /// Takes what an operator says of the closures of a pair, any number of times; the map follows at the next
+  /// optimise(). Of two words on one pair the later one holds. A verdict whose closures an operator accepts stays as it
+  /// is, whatever other finders say. An error, and nothing changes: the pair's submaps are not in the map, or there are
+  /// no closures to accept.
   Status receive(const SubmapPair& pair, const ClosureWord& word);
-  /// The answer to a refinement job, in any order, any number of times, however late; the map follows at the next
-  /// optimise(). Of two on one step the newer map's holds (Refinements). One that failed, and what is no refinement of
-  /// this map, is an error; the map stays as good as it was.
+  /// Takes the answer to a refinement job, in any order, any number of times, however late; the map follows at the next
+  /// optimise(). Of two refinements of one step that of the newer map holds (Refinements). An error, and the map stays
+  /// as it was: the refinement failed, or is of another map.
   Status receive(const Refinement& refinement);
   /// Why verdicts that had waited were no good when their submaps came, since the last call.
   std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }

@@ -38,12 +38,13 @@ class Refinements {
   ByRevision all_;
 };
 
-/// The map with the refined steps, of each the newest, in the place of its odometry's, solved again from where it
-/// stands. Its closures stay as sure as they were, but say what the newest refinement that they tied their submaps in
-/// says: a chain of steps is looser than all of the refinement, and would be drawn back to where the closures had it
-/// before. A closure that a refinement did not know says what it measured: what that refinement has between its ends
-/// may be two maps in unrelated frames. Odometry that failed is no step's place. The map as it was when that cannot be
-/// solved.
+/// Puts the newest refined step in the place of each step of odometry, and solves the map again from where it stands.
+/// Returns the map as it was when the refined one cannot be solved.
+///
+/// Closures that the newest refinement knew keep their covariance, but take the relative pose that the refinement found
+/// between their ends. Refined steps, taken one by one, hold less than the refinement as a whole, and what the closures
+/// measured before would draw the map back to where it was. A closure that no refinement knew keeps its measurement,
+/// because its ends may lie in two unrelated frames of the refinement. Odometry that failed takes no refined step.
 MapEstimate refined(const MapEstimate& map, const SubmapSet& submaps, const Refinements& refinements);
 
 /// The submaps that the refiner can use and that are in the map, and the pairs of them with accepted closures.

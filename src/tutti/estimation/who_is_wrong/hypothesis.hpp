@@ -44,8 +44,9 @@ class HypothesisSolver {
                    const WhoIsWrongConfig& config, const GncConfig& gnc, std::vector<bool> certain);
 
   [[nodiscard]] Solution solve(Hypothesis hypothesis) const;
-  /// What the optimum of another hypothesis with the same wrong groups is worth under this one, if that lets nothing go
-  /// outside this one's windows: then it is this one's, too, as it may let go no more.
+  /// Prices a hypothesis at an optimum that was found for another one, without solving again. This is exact where both
+  /// hypotheses refuse the same groups and the optimum lets odometry go within `hypothesis`'s windows only: the optimum
+  /// is then this hypothesis's own, because it may let nothing else go.
   [[nodiscard]] Solution judge(Hypothesis hypothesis, GncResult optimum) const;
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
   /// The runs around one, within the search distance on its piece.
