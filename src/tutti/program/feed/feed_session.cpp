@@ -141,7 +141,6 @@ void FeedSession::make_room(Connection& connection) {
     connection.queued -= connection.queue[at].bytes.size();
     connection.queue.erase(connection.queue.begin() + static_cast<std::ptrdiff_t>(at));
     ++connection.dropped;
-    ++dropped_;
   }
   if (connection.queued <= most) return;
   connection.queue.clear();

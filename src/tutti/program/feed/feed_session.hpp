@@ -43,7 +43,6 @@ class FeedSession {
   /// It has said all, and the answer to that is still to come.
   [[nodiscard]] bool waits_for_end(Client client) const { return clients_.at(client).waits_for_end; }
   [[nodiscard]] bool has_feeder() const { return feeder_.has_value(); }
-  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }  ///< Corrections, for all clients.
 
  private:
   struct Frame {
@@ -53,9 +52,9 @@ class FeedSession {
   struct Connection {
     FrameReader reader;
     std::deque<Frame> queue;
-    std::size_t queued = 0;  ///< Bytes, those of the first frame that were sent among them.
-    std::size_t sent = 0;    ///< Of the first frame.
-    std::uint64_t dropped = 0;
+    std::size_t queued = 0;     ///< Bytes, those of the first frame that were sent among them.
+    std::size_t sent = 0;       ///< Of the first frame.
+    std::uint64_t dropped = 0;  ///< Corrections.
     bool greeted = false;
     bool over = false;
     bool ended = false;          ///< It said that the recording has,
@@ -81,7 +80,6 @@ class FeedSession {
   std::string situation_;  ///< The frame that was last told.
   std::map<Client, Connection> clients_;
   std::optional<Client> feeder_;
-  std::uint64_t dropped_ = 0;
 };
 
 }  // namespace tutti::program
