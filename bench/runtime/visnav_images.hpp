@@ -65,23 +65,28 @@ inline std::vector<std::vector<std::string>> read_csv(const std::string& path) {
   return out;
 }
 
+/// Of every query the row nearest to it, of equal ones that of smaller index; kNoIndex without rows.
+inline std::vector<std::uint32_t> nearest_rows(const Descriptors& queries, const Descriptors& rows) {
+  std::vector<std::uint32_t> out(queries.size(), kNoIndex);
+  for (std::size_t q = 0; q < queries.size(); ++q) {
+    std::uint32_t least = kNoDistance;
+    for (std::uint32_t i = 0; i < rows.size(); ++i)
+      if (const std::uint32_t distance = hamming_distance(queries.row(q), rows.row(i)); distance < least) {
+        least = distance;
+        out[q] = i;
+      }
+  }
+  return out;
+}
+
 /// Keypoints of both images that are each other's nearest get the same track; what does not meet in a point is not
 /// triangulated. Tracks are numbered from the first one given.
 inline void match_stereo(TrackedImage& left, TrackedImage& right, std::uint64_t first_track = 1) {
-  std::vector<TwoNearest> forth, back;
-  std::vector<std::uint16_t> distances(right.descriptors.size());
-  for (std::size_t i = 0; i < left.descriptors.size(); ++i) {
-    hamming_distances(left.descriptors.row(i), right.descriptors, distances);
-    forth.push_back(two_nearest(distances));
-  }
-  distances.resize(left.descriptors.size());
-  for (std::size_t i = 0; i < right.descriptors.size(); ++i) {
-    hamming_distances(right.descriptors.row(i), left.descriptors, distances);
-    back.push_back(two_nearest(distances));
-  }
+  const auto forth = nearest_rows(left.descriptors, right.descriptors);
+  const auto back = nearest_rows(right.descriptors, left.descriptors);
   for (std::uint32_t i = 0; i < forth.size(); ++i)
-    if (forth[i].nearest != kNoIndex && back[forth[i].nearest].nearest == i)
-      left.keypoints[i].track = right.keypoints[forth[i].nearest].track = first_track + i;
+    if (forth[i] != kNoIndex && back[forth[i]] == i)
+      left.keypoints[i].track = right.keypoints[forth[i]].track = first_track + i;
 }
 
 }  // namespace tutti::visual::bench

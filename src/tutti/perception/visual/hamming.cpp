@@ -10,18 +10,6 @@
 namespace tutti::visual {
 namespace {
 
-/// Words is the number of words where it is known when this is compiled, otherwise 0.
-template <std::uint32_t Words>
-[[gnu::always_inline]] inline void distances_to_rows(const std::uint64_t* query, const std::uint64_t* rows,
-                                                     std::uint32_t words, std::span<std::uint16_t> out) {
-  const std::uint32_t n = Words == 0 ? words : Words;
-  for (std::size_t i = 0; i < out.size(); ++i, rows += n) {
-    int bits = 0;
-    for (std::uint32_t w = 0; w < n; ++w) bits += std::popcount(query[w] ^ rows[w]);
-    out[i] = static_cast<std::uint16_t>(bits);
-  }
-}
-
 [[gnu::always_inline]] inline std::uint32_t distance(std::span<const std::uint64_t> a,
                                                      std::span<const std::uint64_t> b) {
   int bits = 0;
@@ -29,20 +17,7 @@ template <std::uint32_t Words>
   return static_cast<std::uint32_t>(bits);
 }
 
-[[gnu::always_inline]] inline void distances_to_all(const std::uint64_t* query, const Descriptors& rows,
-                                                    std::span<std::uint16_t> out) {
-  switch (rows.words) {
-    case 4:
-      return distances_to_rows<4>(query, rows.bits.data(), 4, out);
-    case 6:
-      return distances_to_rows<6>(query, rows.bits.data(), 6, out);
-    case 8:
-      return distances_to_rows<8>(query, rows.bits.data(), 8, out);
-    default:
-      return distances_to_rows<0>(query, rows.bits.data(), rows.words, out);
-  }
-}
-
+/// Words is the number of words where it is known when this is compiled, otherwise 0.
 template <std::uint32_t Words>
 [[gnu::always_inline]] inline void near_rows(const std::uint64_t* query, const Descriptors& rows, std::uint32_t most,
                                              std::vector<NearRow>& out) {
@@ -88,10 +63,6 @@ template <std::uint32_t Words>
                                                     std::span<const std::uint32_t> which) {
   return distance_to_nearest(query, rows, which);
 }
-[[gnu::target("popcnt")]] void with_popcnt(const std::uint64_t* query, const Descriptors& rows,
-                                           std::span<std::uint16_t> out) {
-  distances_to_all(query, rows, out);
-}
 [[gnu::target("popcnt")]] void with_popcnt(const std::uint64_t* query, const Descriptors& rows, std::uint32_t most,
                                            std::vector<NearRow>& out) {
   all_near_rows(query, rows, most, out);
@@ -121,17 +92,6 @@ std::uint32_t least_distance(std::span<const std::uint64_t> query, const Descrip
   return distance_to_nearest(query, rows, which);
 }
 
-void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& rows,
-                       std::span<std::uint16_t> distances) {
-  TUTTI_CHECK(query.size() == rows.words && distances.size() == rows.size(),
-              "{} words against rows of {}, {} distances of {} rows", query.size(), rows.words, distances.size(),
-              rows.size());
-#ifdef __x86_64__
-  if (has_popcnt()) return with_popcnt(query.data(), rows, distances);
-#endif
-  distances_to_all(query.data(), rows, distances);
-}
-
 void rows_within(std::span<const std::uint64_t> query, const Descriptors& rows, std::uint32_t most,
                  std::vector<NearRow>& out) {
   TUTTI_CHECK(query.size() == rows.words || rows.size() == 0, "{} words against rows of {}", query.size(), rows.words);
@@ -140,30 +100,6 @@ void rows_within(std::span<const std::uint64_t> query, const Descriptors& rows, 
   if (has_popcnt()) return with_popcnt(query.data(), rows, most, out);
 #endif
   all_near_rows(query.data(), rows, most, out);
-}
-
-TwoNearest two_nearest(std::span<const std::uint16_t> distances, std::span<const std::uint32_t> groups) {
-  TUTTI_CHECK(groups.empty() || groups.size() == distances.size());
-  const auto same_group = [&](std::uint32_t i, std::uint32_t j) {
-    return j != kNoIndex && !groups.empty() && groups[i] == groups[j];
-  };
-  TwoNearest out;
-  for (std::uint32_t i = 0; i < distances.size(); ++i) {
-    const std::uint32_t d = distances[i];
-    if (d >= out.second_distance) continue;
-    if (d < out.distance) {
-      if (!same_group(i, out.nearest)) {
-        out.second = out.nearest;
-        out.second_distance = out.distance;
-      }
-      out.nearest = i;
-      out.distance = d;
-    } else if (!same_group(i, out.nearest)) {
-      out.second = i;
-      out.second_distance = d;
-    }
-  }
-  return out;
 }
 
 }  // namespace tutti::visual

@@ -13,10 +13,6 @@ namespace tutti::visual {
 /// it has one, which is decided when the program runs.
 std::uint32_t hamming_distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b);
 
-/// The same from one descriptor to every row; `distances` has rows.size() elements, the query rows.words (checked).
-void hamming_distances(std::span<const std::uint64_t> query, const Descriptors& rows,
-                       std::span<std::uint16_t> distances);
-
 inline constexpr std::uint32_t kNoDistance = 0xFFFF;  ///< More than any descriptor has bits.
 
 /// The least of these over rows by their index, which exist; kNoDistance of none.
@@ -32,17 +28,5 @@ struct NearRow {
 /// The rows within `most` bits of the query, by their index, in place of what is in `out`.
 void rows_within(std::span<const std::uint64_t> query, const Descriptors& rows, std::uint32_t most,
                  std::vector<NearRow>& out);
-
-/// The two rows nearest to a descriptor; of equal ones those of smaller index.
-struct TwoNearest {
-  std::uint32_t nearest = kNoIndex;
-  std::uint32_t distance = kNoDistance;
-  std::uint32_t second = kNoIndex;
-  std::uint32_t second_distance = kNoDistance;
-};
-
-/// Brute force over distances as above. With groups (one per distance, or none at all), the second is of another group
-/// than the nearest: several views of one thing are no rivals of each other.
-TwoNearest two_nearest(std::span<const std::uint16_t> distances, std::span<const std::uint32_t> groups = {});
 
 }  // namespace tutti::visual
