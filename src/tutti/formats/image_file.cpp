@@ -139,8 +139,6 @@ std::string encode_png(const Image& image) {
   return encode(image.width_px, image.height_px, PNG_FORMAT_GRAY, image.grey.data());
 }
 
-Status write_image(const std::string& path, const Image& image) { return write_file(path, encode_png(image)); }
-
 ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s) {
   TUTTI_CHECK(!cameras.empty());
   ImageStream out;

@@ -19,7 +19,6 @@ Result<Image> decode_image(std::string_view bytes, const std::string& name);
 
 /// As PNG; not an empty one.
 std::string encode_png(const Image& image);
-Status write_image(const std::string& path, const Image& image);
 
 /// A depth image: a grey PNG file of 16 bits a pixel; its numbers as they stand there.
 Result<DepthImage> read_depth(const std::string& path);

@@ -209,7 +209,7 @@ TEST_F(RobotImages, DepthImagesThatAreNoneAreTold) {
   expect(told(), "depth is not known (0) at 100 %");
   replace({94, 60, std::vector<std::uint16_t>(94U * 60U, 1000)});
   expect(told(), "a depth image of 94 x 60 pixels, its camera has 188 x 120");
-  ASSERT_TRUE(formats::write_image((folder() / "depth_0.png").string(), Image(188, 120)));
+  ASSERT_TRUE(write_file((folder() / "depth_0.png").string(), formats::encode_png(Image(188, 120))));
   expect(first_error(), "depth_0.png: 8 bits of grey, expected a grey PNG image of 16 bits");
   fs::remove(folder() / "depth_0.png");
   expect(first_error(), "depth_0.png");

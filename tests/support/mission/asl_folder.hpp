@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tutti/base/file.hpp"
 #include "tutti/formats/image_file.hpp"
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/visual.hpp"
@@ -40,7 +41,8 @@ inline void write_asl_folder(const std::filesystem::path& folder, const ImageStr
     for (std::size_t i = 0; i < stream.stamps.size(); ++i) {
       const std::string file = fmt::format("{}.png", stream.stamps[i].ns);
       list << fmt::format("{},{}\n", stream.stamps[i].ns, file);
-      const Status written = formats::write_image((camera / "data" / file).string(), stream.load(i, c).value());
+      const Status written =
+          write_file((camera / "data" / file).string(), formats::encode_png(stream.load(i, c).value()));
       if (!written) throw std::runtime_error(written.error().message);
     }
   }
