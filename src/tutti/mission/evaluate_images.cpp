@@ -51,8 +51,10 @@ void evaluate_images(const server::MapServer& server, MissionRecord& record) {
     submap.visual = *payload;
     if (submap.visual) add(submap, sums[id.chain.robot]);
   }
-  for (const auto& [id, sum] : sums) {
-    RobotRecord& robot = record.robots[id.value];
+  for (RobotRecord& robot : record.robots) {
+    const auto its = sums.find(robot.id);
+    if (its == sums.end()) continue;
+    const Sum& sum = its->second;
     ImagesRecord& images = robot.images.emplace();
     images.keyframes = sum.keyframes.size();
     images.landmarks = sum.landmarks;

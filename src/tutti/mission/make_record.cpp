@@ -64,8 +64,9 @@ MissionRecord make_record(const FinishedMission& mission) {
   record.server.updates = mission.events.updates();
   record.server.changes_of_mind = mission.events.changes_of_mind();
   note_changes_of_mind(record);
-  for (RobotRecord& robot : record.robots) {
-    const FinishedRobot& finished = mission.robots[robot.id.value];
+  for (std::size_t i = 0; i < record.robots.size(); ++i) {
+    RobotRecord& robot = record.robots[i];
+    const FinishedRobot& finished = mission.robots[i];
     record_traffic(finished.traffic, robot);
     robot.updates = finished.updates;
     robot.alerts = alerts_of(robot.updates);

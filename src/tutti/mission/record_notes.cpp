@@ -27,10 +27,16 @@ std::string why_odometry_alone(const std::vector<RejectionRecord>& rejections) {
                      pairs(most) == refused ? "all" : std::to_string(pairs(most)), to_string(most.nearest));
 }
 
+/// By its id, which need not be its place in the record.
+std::string name_of(RobotId id, const MissionRecord& record) {
+  const auto robot = std::ranges::find(record.robots, id, &RobotRecord::id);
+  return robot == record.robots.end() ? fmt::format("robot {}", id.value) : robot->name;
+}
+
 std::string names_of(const std::pair<RobotId, RobotId>& robots, const MissionRecord& record) {
-  const std::string& one = record.robots[robots.first.value].name;
+  const std::string one = name_of(robots.first, record);
   return robots.first == robots.second ? one + " with itself"
-                                       : fmt::format("{} with {}", one, record.robots[robots.second.value].name);
+                                       : fmt::format("{} with {}", one, name_of(robots.second, record));
 }
 
 /// Of closures between two robots, or of one with itself, this share and this many are more than wrong ones would be.
@@ -92,7 +98,7 @@ std::vector<std::string> warnings_of(const MissionRecord& record) {
 }
 
 void note_undelivered(const std::map<bus::SimulatedRadio::Topic, std::size_t>& undelivered, MissionRecord& record) {
-  const auto name = [&](const bus::Endpoint& end) { return end.robot() ? record.robots[end.number].name : "server"; };
+  const auto name = [&](const bus::Endpoint& end) { return end.robot() ? name_of(*end.robot(), record) : "server"; };
   for (const auto& [topic, messages] : undelivered) {
     const auto& [from, to, kind] = topic;
     record.notes.push_back(fmt::format("{} to {}: {} x {} never delivered; the link would have taken more than a day",
@@ -103,8 +109,7 @@ void note_undelivered(const std::map<bus::SimulatedRadio::Topic, std::size_t>& u
 void note_remarks(const server::Refinements& refinements, MissionRecord& record) {
   if (!refinements.has_whole()) return;
   for (const RefinementRemark& remark : refinements.all().begin()->second->remarks)
-    if (remark.robot.value < record.robots.size())
-      record.notes.push_back(fmt::format("{}: {}", record.robots[remark.robot.value].name, remark.text));
+    record.notes.push_back(fmt::format("{}: {}", name_of(remark.robot, record), remark.text));
 }
 
 void note_changes_of_mind(MissionRecord& record) {
@@ -130,13 +135,13 @@ void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& reco
     record.notes.push_back(fmt::format(
         "{} submaps are not in the map, because they contradict earlier ones of their robot or keep the map from being "
         "solved; the first is {} of {}",
-        map.left_out.size(), first.index, record.robots[first.chain.robot.value].name));
+        map.left_out.size(), first.index, name_of(first.chain.robot, record)));
   }
   for (const auto& [chain, factor] : map.understated)
     record.notes.push_back(
         fmt::format("{}: its odometry errs {:.1f} times as much as its covariance says, by the loops it makes; the map "
                     "counts it so",
-                    record.robots[chain.robot.value].name, std::sqrt(factor)));
+                    name_of(chain.robot, record), std::sqrt(factor)));
   note_understated_closures(map, record);
   note_inconsistent_closures(map, record);
   if (map.spare_pairs > 0)

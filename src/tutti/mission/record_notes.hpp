@@ -12,7 +12,7 @@
 #include "tutti/server/refinements.hpp"
 
 /// What a mission's reader has to know beside its figures, in plain words: appended to the record's notes. Its robots
-/// are there already, in the order of their ids.
+/// are there already.
 namespace tutti::mission {
 
 /// Messages that the links still hold.

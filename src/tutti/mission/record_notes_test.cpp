@@ -119,5 +119,20 @@ TEST(Notes, WhatTheLastRefinementOfTheWholeRemarks) {
   EXPECT_EQ(record.notes, std::vector<std::string>{"bravo: no motion"});
 }
 
+TEST(Notes, RobotsAreKnownByTheirIdsNotByTheirPlaces) {
+  MissionRecord record = joined();
+  record.robots[0].id = RobotId{7};
+  record.robots[1].id = RobotId{0};
+  server::Refinements refinements;
+  refinements.add({.revision = 1, .whole = true, .remarks = {{RobotId{7}, "no motion"}}});
+  note_remarks(refinements, record);
+  server::MapEstimate map;
+  map.understated[{RobotId{0}}] = 36.0;
+  note_what_the_map_lacks(map, record);
+  ASSERT_EQ(record.notes.size(), 2U);
+  EXPECT_EQ(record.notes[0], "alpha: no motion");
+  EXPECT_TRUE(record.notes[1].starts_with("bravo: its odometry errs")) << record.notes[1];
+}
+
 }  // namespace record_notes_test
 }  // namespace tutti::mission
