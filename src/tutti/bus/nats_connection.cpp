@@ -339,10 +339,4 @@ Status NatsConnection::remove_stream(const std::string& stream) const {
   return failure(status, "removing " + stream, code);
 }
 
-Status prepare_nats(const NatsPortOptions& options) {
-  if (const Status checked = check(options); !checked) return checked;
-  const auto connection = NatsConnection::open(options, "prepare");
-  return connection ? (*connection)->prepare(options) : Status(tl::unexpected(connection.error()));
-}
-
 }  // namespace tutti::bus

@@ -40,10 +40,6 @@ struct NatsPortOptions {
   }
 };
 
-/// Makes what the mission needs on the bus, and leaves what is there; whoever starts the bus calls it, and the
-/// server's port does.
-Status prepare_nats(const NatsPortOptions& options);
-
 /// How a port stands with its bus.
 struct NatsState {
   std::string url;
@@ -60,10 +56,11 @@ struct NatsState {
   std::string last_error;
 };
 
-/// A port over NATS JetStream. A thread of its own connects, sends and acknowledges, and sends again what the bus has
-/// not confirmed, with the same id: the bus stores each once. What is sent first: status, retained, then the rest in
-/// the order of send(), of submaps the newest. Without a bus it waits for one. Ends within seconds, after what was
-/// acknowledged is so on the bus, if that can be reached.
+/// A port over NATS JetStream. The server's makes what the mission needs on the bus, and leaves what is there. A thread
+/// of its own connects, sends and acknowledges, and sends again what the bus has not confirmed, with the same id: the
+/// bus stores each once. What is sent first: status, retained, then the rest in the order of send(), of submaps the
+/// newest. Without a bus it waits for one. Ends within seconds, after what was acknowledged is so on the bus, if that
+/// can be reached.
 class NatsPort : public Port {
  public:
   [[nodiscard]] virtual NatsState state() const = 0;

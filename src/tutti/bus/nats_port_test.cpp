@@ -151,7 +151,7 @@ TEST_F(NatsPortTest, ABusThatIsFullTakesTheRestWhenThereIsRoom) {
   NatsNetwork network;
   NatsPortOptions options = network.options(kServer);
   options.max_stream_bytes = 1U << 20U;
-  ASSERT_TRUE(prepare_nats(options));
+  test::prepare(options);
   const auto robot = network.open(kRobot);
   for (int i = 0; i < 30; ++i) ASSERT_TRUE(send_submap(*robot, std::to_string(i), bytes_of(i, 200'000)));
   EXPECT_TRUE(within(10.0, [&] { return robot->state().last_error.find("maximum bytes") != std::string::npos; }))
@@ -168,13 +168,17 @@ TEST_F(NatsPortTest, AMissionForWhichTheBusHasNoRoomIsToldWhatToDo) {
   NatsNetwork network;  // 256 MB, of which mission "test" has set 176 aside
   NatsPortOptions options = network.options(kServer);
   options.mission = "other";
-  const Status refused = prepare_nats(options);
-  ASSERT_FALSE(refused.has_value());
-  for (const char* word : {"SUBMAPS_other", "128 MB", "max_file", "nats stream rm"})
-    EXPECT_NE(refused.error().message.find(word), std::string::npos) << word << " in " << refused.error().message;
+  {
+    const auto refused = open_nats_port(kServer, options);
+    ASSERT_TRUE(refused.has_value());
+    EXPECT_TRUE(within(10.0, [&] { return !(*refused)->state().last_error.empty(); }));
+    for (const char* word : {"SUBMAPS_other", "128 MB", "max_file", "nats stream rm"})
+      EXPECT_NE((*refused)->state().last_error.find(word), std::string::npos)
+          << word << " in " << (*refused)->state().last_error;
+    EXPECT_FALSE((*refused)->state().connected);
+  }
   options.max_stream_bytes = 32U << 20U;
-  const Status fits = prepare_nats(options);
-  EXPECT_TRUE(fits.has_value()) << fits.error().message;
+  test::prepare(options);
   EXPECT_GE(NatsChildOptions{}.max_store_bytes, 5 * 11 * NatsPortOptions{}.max_stream_bytes / 8);  // five missions
 }
 

@@ -21,6 +21,22 @@
 
 namespace tutti::test {
 
+/// Whether `condition` becomes true within `seconds`.
+template <class Condition>
+bool within(double seconds, Condition&& condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  for (; std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(std::chrono::milliseconds(5)))
+    if (condition()) return true;
+  return condition();
+}
+
+/// Makes what the mission needs on the bus as programs do: by a server's port, which ends again.
+inline void prepare(const bus::NatsPortOptions& options) {
+  const auto server = bus::open_nats_port(bus::Endpoint::server(), options);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  EXPECT_TRUE(within(10.0, [&] { return (*server)->state().connected; })) << (*server)->state().last_error;
+}
+
 /// A nats-server in a folder of its own, with a link in front of it for the robots.
 class NatsNetwork {
  public:
@@ -31,8 +47,7 @@ class NatsNetwork {
     auto started = bus::NatsChild::start(folder_, {.max_store_bytes = 256U << 20U, .min_free_bytes = 0});
     EXPECT_TRUE(started.has_value()) << started.error().message;
     child_ = std::move(*started);
-    const Status prepared = bus::prepare_nats(options(bus::Endpoint::server()));
-    EXPECT_TRUE(prepared.has_value()) << prepared.error().message;
+    prepare(options(bus::Endpoint::server()));
     relay_ = std::make_unique<TcpRelay>(std::atoi(child_->url().substr(child_->url().rfind(':') + 1).c_str()), link);
   }
   ~NatsNetwork() {
@@ -61,14 +76,5 @@ class NatsNetwork {
   std::unique_ptr<bus::NatsChild> child_;
   std::unique_ptr<TcpRelay> relay_;
 };
-
-/// Whether `condition` becomes true within `seconds`.
-template <class Condition>
-bool within(double seconds, Condition&& condition) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  for (; std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(std::chrono::milliseconds(5)))
-    if (condition()) return true;
-  return condition();
-}
 
 }  // namespace tutti::test
