@@ -192,6 +192,12 @@ class CommandLine(unittest.TestCase):
         self.expect(one, 0, "agent.disagreement.false_alarm_rate = 0.01   (a number, ")
         self.assertEqual(len(one.stdout.splitlines()), 2, one.stdout)
         self.expect(tutti("settings", "transmissions", "lost"), 0, "link.loss = 0")  # words of its meaning
+        for program, key, other in (("server", "server.update_period_s = ", "agent."), ("robot", "agent.policy.name = ", "server."),
+                                    ("worker", "closures.lidar.", "server.")):
+            its = tutti("settings", "--of", program)
+            self.expect(its, 0, key)
+            for line in its.stdout.splitlines():
+                self.assertFalse(line.startswith((other, "simulation.", "hall.", "closures.wrong")), line)
         self.expect(tutti("settings", "dance"), 1, "no key or meaning contains 'dance'")
 
     def write_empty_map(self, name):

@@ -14,6 +14,9 @@
 #include "tutti/base/config_io.hpp"
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/mission/operator_settings.hpp"
+#include "tutti/program/robot_program.hpp"
+#include "tutti/program/server_program.hpp"
+#include "tutti/program/worker_program.hpp"
 
 namespace tutti::app {
 namespace {
@@ -37,9 +40,17 @@ void list_operators(const std::vector<FieldDoc>& fields) {
       fields.size());
 }
 
-int run(const std::vector<std::string>& parts, bool all) {
-  const auto fields = document_config(*std::make_unique<const mission::MissionConfig>());
-  if (parts.empty() && !all) {
+/// Of a program, or, without one, of a whole mission with all that is simulated and measured in it.
+std::vector<FieldDoc> settings_of(const std::string& program) {
+  if (program == "server") return document_config(program::ServerSettings());
+  if (program == "robot") return document_config(program::RobotSettings());
+  if (program == "worker") return document_config(program::WorkerSettings());
+  return document_config(*std::make_unique<const mission::MissionConfig>());
+}
+
+int run(const std::vector<std::string>& parts, bool all, const std::string& program) {
+  const auto fields = settings_of(program);
+  if (parts.empty() && !all && program.empty()) {
     list_operators(fields);
     return 0;
   }
@@ -72,7 +83,11 @@ void add_settings_command(CLI::App& app, int& exit_code) {
   command->add_option("word", *parts, "Only what has this in its key or meaning; of several words, all of them.")
       ->type_name("WORD");
   command->add_flag("--all", *all, "Not only what an operator sets.");
-  command->callback([parts, all, &exit_code] { exit_code = run(*parts, *all); });
+  const auto program = std::make_shared<std::string>();
+  command->add_option("--of", *program, "All that a server, a robot or a worker knows of a mission file")
+      ->type_name("PROGRAM")
+      ->check(CLI::IsMember({"server", "robot", "worker"}));
+  command->callback([parts, all, program, &exit_code] { exit_code = run(*parts, *all, *program); });
 }
 
 }  // namespace tutti::app

@@ -19,6 +19,11 @@ struct FinderSettings {
   [[nodiscard]] std::shared_ptr<const server::ClosureFinder> finder() const {
     return other != nullptr ? other : finders::make_finder(closures);
   }
+  template <class V>
+  void describe(V& v) {
+    v.field("refinement", refinement);
+    v.field("closures", closures);
+  }
   /// Null: none is needed.
   [[nodiscard]] std::shared_ptr<const server::MapRefiner> refiner() const {
     return finders::make_refiner(closures, refinement);

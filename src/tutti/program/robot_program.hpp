@@ -26,6 +26,11 @@ struct RobotSettings {
   std::vector<std::string> robots;  ///< By their number; empty: nobody has told.
   robot::AgentConfig agent;
   Rng randomness{1};  ///< Of its agent.
+  /// Of these, what a mission file may say.
+  template <class V>
+  void describe(V& v) {
+    v.field("agent", agent);
+  }
 };
 
 struct RobotOptions {

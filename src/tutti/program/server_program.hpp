@@ -25,6 +25,12 @@ struct ServerSettings {
   std::string robot_arguments = "--feed SOCKET";  ///< The last ones of the command that starts a robot.
   server::ServerConfig server;
   FinderSettings finders;
+  /// Of these, what a mission file may say.
+  template <class V>
+  void describe(V& v) {
+    v.field("server", server);
+    finders.describe(v);
+  }
 };
 
 struct ServerOptions {

@@ -17,6 +17,11 @@ namespace tutti::program {
 struct WorkerSettings {
   std::string mission;  ///< Its name on the bus; empty: the one that has a server there.
   FinderSettings finders;
+  /// Of these, what a mission file may say: needed only where closures are made up.
+  template <class V>
+  void describe(V& v) {
+    finders.describe(v);
+  }
 };
 
 struct WorkerOptions {
