@@ -153,7 +153,6 @@ class SubmapBuilder {
   static constexpr double kPatience_s = 1.0;     ///< Slower sensors make their keyframes no more.
   static constexpr double kLongestGap_s = 1.0;   ///< Between samples nobody knows how the robot moved.
 
-  [[nodiscard]] std::uint32_t current_submap() const { return state_.next_submap; }
   [[nodiscard]] const SubmapBuilderState& state() const { return state_; }
 
  private:
