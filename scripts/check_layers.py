@@ -20,6 +20,7 @@ CONFINED = [
     (r"(spdlog|systemd)/", r"program/.*\.cpp$", "program/*.cpp"),
     (r"sqlite3", r"storage/(sqlite_.*\.cpp|internal/sqlite\.hpp)$", "storage/sqlite_*.cpp and internal/sqlite.hpp"),
     (r"opencv2/", r"perception/visual/frontend/.*\.cpp$", "perception/visual/frontend/*.cpp"),
+    (r"lz4", r"(tests/support/)?bags/", "bags/"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "fuzz/fuzz_target.hpp"
+#include "support/bags/bag_writer.hpp"
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
 #include "support/wire/visual.hpp"
@@ -85,6 +86,26 @@ void add_images(std::map<std::string, std::vector<std::string>>& out) {
   out["image"] = {formats::encode_png(image)};
 }
 
+/// Chunks without CRC: few mutations would pass one.
+void add_bags(std::map<std::string, std::vector<std::string>>& out) {
+  using namespace bags::test;
+  const std::string definitions = joined({schema(1, "nav_msgs/msg/Odometry"), channel(1, 1, "/odom")});
+  const std::string records = joined({definitions, message(1, 5, odometry()), message(1, 7, odometry())});
+  const std::string begin = joined({kMagic, header()});
+  out["mcap"] = {closed(joined({begin, records}), definitions, 2)};
+  for (const char* const compression : {"", "zstd", "lz4"})
+    out["mcap"].push_back(closed(joined({begin, chunk(records, compression, records.size(), 0)}), definitions, 2, 1));
+  for (const bool big : {false, true}) {
+    char type = '\0';
+    for (const std::string& bytes :
+         {odometry("odom", "base_link", big), transforms(big), point_cloud(big), imu(big), image(big),
+          compressed_image(big), camera_info(big), nav_sat_fix(big), pose_stamped(big)}) {
+      out["cdr"].push_back(joined({std::string_view(&type, 1), bytes}));
+      ++type;
+    }
+  }
+}
+
 }  // namespace
 
 std::map<std::string, std::vector<std::string>> seeds() {
@@ -157,6 +178,7 @@ std::map<std::string, std::vector<std::string>> seeds() {
                 "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n4 5 6\n3 0 1 0\n"};
   add_images(out);
+  add_bags(out);
   return out;
 }
 

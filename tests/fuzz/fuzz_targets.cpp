@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <memory>
+#include <sstream>
 #include <utility>
 
 #include "fuzz/fuzz_target.hpp"
 #include "support/wire/messages.hpp"
+#include "tutti/bags/bag_info.hpp"
+#include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/check.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
@@ -130,6 +134,42 @@ void kitti_poses(std::string_view bytes) {
   static_cast<void>(formats::parse_kitti_poses(bytes, "fuzz", 10.0, Timestamp{0}));
 }
 
+/// What is counted adds up, whatever is in the file.
+void mcap(std::string_view bytes) {
+  auto bag = bags::McapReader::open(std::make_unique<std::istringstream>(std::string(bytes)), "fuzz");
+  if (!bag) return;
+  const bags::BagInfo info = bags::inspect(*bag);
+  std::uint64_t messages = 0;
+  for (const bags::TopicInfo& topic : info.topics) messages += topic.count;
+  TUTTI_CHECK(messages == info.messages, "{} messages of topics, {} in all", messages, info.messages);
+  static_cast<void>(bags::uses(info));
+}
+/// The first byte says which type.
+void cdr(std::string_view bytes) {
+  if (bytes.empty()) return;
+  const std::string_view rest = bytes.substr(1);
+  switch (static_cast<unsigned char>(bytes.front()) % 9) {
+    case 0:
+      return static_cast<void>(bags::decode_odometry(rest));
+    case 1:
+      return static_cast<void>(bags::decode_tf(rest));
+    case 2:
+      return static_cast<void>(bags::decode_point_cloud(rest));
+    case 3:
+      return static_cast<void>(bags::decode_imu(rest));
+    case 4:
+      return static_cast<void>(bags::decode_image(rest));
+    case 5:
+      return static_cast<void>(bags::decode_compressed_image(rest));
+    case 6:
+      return static_cast<void>(bags::decode_camera_info(rest));
+    case 7:
+      return static_cast<void>(bags::decode_nav_sat_fix(rest));
+    default:
+      return static_cast<void>(bags::decode_pose_stamped(rest));
+  }
+}
+
 void cameras(std::string_view bytes) { static_cast<void>(formats::parse_cameras(std::string(bytes), "fuzz")); }
 void image_list(std::string_view bytes) {
   static_cast<void>(formats::parse_image_list(bytes, "fuzz", "folder", std::vector<formats::CameraCalibration>(2)));
@@ -160,6 +200,7 @@ const std::map<std::string, Target>& targets() {
   static const std::map<std::string, Target> all{
       {"agent_state", agent_state},
       {"cameras", cameras},
+      {"cdr", cdr},
       {"cloud", cloud},
       {"euroc_csv", file<formats::parse_euroc_csv>},
       {"feed", feed},
@@ -174,6 +215,7 @@ const std::map<std::string, Target>& targets() {
       {"kitti_poses", kitti_poses},
       {"kitti_scan", file<formats::parse_kitti_scan>},
       {"maplab", maplab},
+      {"mcap", mcap},
       {"mission_status", mission_status},
       {"pcd", file<formats::parse_timed_pcd>},
       {"ply", file<formats::parse_ply>},

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/bag_info.hpp"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+
+#include "tutti/bags/ros_messages.hpp"
+
+namespace tutti::bags {
+namespace {
+
+constexpr std::size_t kMostSaid = 10;
+constexpr std::size_t kMostFrames = 4;
+
+constexpr std::array<std::pair<std::string_view, Use>, 9> kTypes{{
+    {"nav_msgs/msg/Odometry", Use::odometry},
+    {"sensor_msgs/msg/PointCloud2", Use::scans},
+    {"sensor_msgs/msg/Image", Use::images},
+    {"sensor_msgs/msg/CompressedImage", Use::images},
+    {"sensor_msgs/msg/CameraInfo", Use::calibration},
+    {"sensor_msgs/msg/Imu", Use::imu},
+    {"sensor_msgs/msg/NavSatFix", Use::fixes},
+    {"geometry_msgs/msg/PoseStamped", Use::poses},
+    {"tf2_msgs/msg/TFMessage", Use::transforms},
+}};
+
+template <class Message>
+Result<std::string> frame_of(const Result<Message>& message) {
+  if (!message) return tl::unexpected(message.error());
+  return message->header.frame_id;
+}
+
+Result<std::string> frames_of_tf(std::string_view cdr) {
+  const auto transforms = decode_tf(cdr);
+  if (!transforms) return tl::unexpected(transforms.error());
+  std::string out;
+  for (std::size_t i = 0; i < std::min(transforms->size(), kMostFrames); ++i)
+    out +=
+        fmt::format("{}{} -> {}", i > 0 ? ", " : "", (*transforms)[i].header.frame_id, (*transforms)[i].child_frame_id);
+  if (transforms->size() > kMostFrames) out += fmt::format(" and {} more", transforms->size() - kMostFrames);
+  return out;
+}
+
+Result<std::string> frames_of(std::string_view type, std::string_view cdr) {
+  switch (use_of(type)) {
+    case Use::odometry: {
+      const auto message = decode_odometry(cdr);
+      if (!message) return tl::unexpected(message.error());
+      return fmt::format("{} -> {}", message->header.frame_id, message->child_frame_id);
+    }
+    case Use::scans:
+      return frame_of(decode_point_cloud(cdr));
+    case Use::images:
+      return type == "sensor_msgs/msg/Image" ? frame_of(decode_image(cdr)) : frame_of(decode_compressed_image(cdr));
+    case Use::calibration:
+      return frame_of(decode_camera_info(cdr));
+    case Use::imu:
+      return frame_of(decode_imu(cdr));
+    case Use::fixes:
+      return frame_of(decode_nav_sat_fix(cdr));
+    case Use::poses:
+      return frame_of(decode_pose_stamped(cdr));
+    case Use::transforms:
+      return frames_of_tf(cdr);
+    case Use::nothing:
+      break;
+  }
+  return std::string();
+}
+
+void look_at(TopicInfo& topic, const McapMessage& message) {
+  if (topic.count++ == 0 && topic.use != Use::nothing) {
+    const auto frames =
+        message.channel->message_encoding == "cdr"
+            ? frames_of(topic.type, message.data)
+            : fail(ErrorCode::unsupported, "encoding '{:.40}', expected cdr", message.channel->message_encoding);
+    (frames ? topic.frames : topic.problem) = frames ? *frames : frames.error().message;
+  }
+  topic.first = std::min(topic.first, message.log_time);
+  topic.last = std::max(topic.last, message.log_time);
+}
+
+std::string list_of(const BagInfo& info, Use use) {
+  std::string out;
+  for (const TopicInfo& topic : info.topics)
+    if (topic.use == use && topic.count > 0 && topic.problem.empty())
+      out += fmt::format("{}{}{}", out.empty() ? "" : "; ", topic.topic,
+                         topic.frames.empty() ? "" : " (" + topic.frames + ")");
+  return out;
+}
+
+}  // namespace
+
+Use use_of(std::string_view type) {
+  const auto at = std::ranges::find(kTypes, type, [](const auto& entry) { return entry.first; });
+  return at == kTypes.end() ? Use::nothing : at->second;
+}
+
+double TopicInfo::rate_hz() const {
+  const double seconds = count < 2 ? 0.0 : last - first;
+  return seconds > 0.0 ? static_cast<double>(count - 1) / seconds : 0.0;
+}
+
+BagInfo inspect(McapReader& bag) {
+  BagInfo out;
+  // One topic may have several channels, as in bags that were joined: of one type they are one.
+  std::map<std::pair<std::string, std::string>, TopicInfo> topics;
+  const auto topic_of = [&topics](const McapChannel& channel) -> TopicInfo& {
+    TopicInfo& topic = topics[{channel.topic, channel.type}];
+    topic.topic = channel.topic;
+    topic.type = channel.type;
+    topic.use = use_of(channel.type);
+    return topic;
+  };
+  std::map<std::uint16_t, TopicInfo*> of_channel;
+  while (true) {
+    const auto message = bag.next();
+    if (!message) {
+      if (++out.errors <= kMostSaid) out.said.push_back(message.error().message);
+      continue;
+    }
+    if (!*message) break;
+    TopicInfo*& topic = of_channel[(*message)->channel_id];
+    if (!topic) topic = &topic_of(*(*message)->channel);
+    look_at(*topic, **message);
+    ++out.messages;
+  }
+  for (const auto& [id, channel] : bag.channels()) topic_of(channel);
+  out.notes = bag.notes();
+  if (const auto& summary = bag.summary(); summary && summary->messages != out.messages)
+    out.notes.push_back(
+        fmt::format("its statistics say {} messages, {} could be read", summary->messages, out.messages));
+  for (auto& [name, topic] : topics) out.topics.push_back(std::move(topic));
+  return out;
+}
+
+std::vector<std::string> uses(const BagInfo& info) {
+  struct Row {
+    const char* name;
+    Use use;
+    const char* without;
+  };
+  constexpr std::array kRows{
+      Row{"scans", Use::scans, "none (no sensor_msgs/msg/PointCloud2): no closures by LiDAR"},
+      Row{"images", Use::images, "none (no sensor_msgs/msg/Image or CompressedImage): no closures by camera"},
+      Row{"calibration", Use::calibration, nullptr},
+      Row{"imu", Use::imu, nullptr},
+      Row{"fixes", Use::fixes, nullptr},
+      Row{"tf", Use::transforms, "none: where the sensors are on the robot has to be said elsewhere"},
+  };
+  std::vector<std::string> out;
+  const auto add = [&out](const char* name, const std::string& what) {
+    out.push_back(fmt::format("{:<12} {}", name, what));
+  };
+  if (const std::string odometry = list_of(info, Use::odometry); !odometry.empty())
+    add("odometry", odometry);
+  else if (const std::string poses = list_of(info, Use::poses); !poses.empty())
+    add("odometry", "no nav_msgs/msg/Odometry; poses of " + poses + ", if they are odometry's");
+  else if (!list_of(info, Use::transforms).empty())
+    add("odometry", "no nav_msgs/msg/Odometry; transforms, if odometry's is among them");
+  else
+    add("odometry", "missing: without odometry nothing can be made of this bag");
+  for (const Row& row : kRows)
+    if (const std::string list = list_of(info, row.use); !list.empty())
+      add(row.name, list);
+    else if (row.without)
+      add(row.name, row.without);
+  return out;
+}
+
+}  // namespace tutti::bags

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/bag_info.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <sstream>
+
+#include "support/bags/bag_writer.hpp"
+#include "support/shared_data.hpp"
+#include "tutti/bags/ros_messages.hpp"
+
+namespace tutti::bags {
+namespace bag_info_test {
+
+using namespace test;
+
+BagInfo info_of(std::string bytes) {
+  auto reader = McapReader::open(std::make_unique<std::istringstream>(std::move(bytes)), "bag");
+  return inspect(reader.value());
+}
+
+TEST(BagInfo, SaysWhatIsThere) {
+  const std::string definitions = schema(1, "nav_msgs/msg/Odometry") + channel(1, 1, "/odom") +
+                                  schema(2, "std_msgs/msg/String") + channel(2, 2, "/talk") + channel(3, 1, "/silent");
+  std::string data = kMagic + header() + definitions;
+  for (std::uint64_t i = 0; i < 5; ++i) data += message(1, i * 500'000'000, odometry());
+  data += message(2, 100, "hello");
+  const BagInfo info = info_of(closed(data, definitions, 6));
+  ASSERT_EQ(info.topics.size(), 3U);
+  const TopicInfo& odom = info.topics[0];
+  EXPECT_EQ(odom.topic, "/odom");
+  EXPECT_EQ(odom.count, 5U);
+  EXPECT_DOUBLE_EQ(odom.rate_hz(), 2.0);
+  EXPECT_EQ(odom.frames, "odom -> base_link");
+  EXPECT_EQ(info.topics[1].topic, "/silent");
+  EXPECT_EQ(info.topics[1].count, 0U);
+  EXPECT_EQ(info.topics[1].rate_hz(), 0.0);
+  EXPECT_EQ(info.topics[2].frames, "");
+  EXPECT_TRUE(info.notes.empty());
+  const auto lines = uses(info);
+  EXPECT_EQ(lines.at(0), "odometry     /odom (odom -> base_link)");
+  EXPECT_TRUE(lines.at(1).starts_with("scans        none")) << lines.at(1);
+}
+
+TEST(BagInfo, EveryKnownTypeSaysItsFrame) {
+  const std::map<std::string, std::pair<std::string, std::string>> of_type{
+      {"nav_msgs/msg/Odometry", {odometry(), "odom -> base_link"}},
+      {"sensor_msgs/msg/PointCloud2", {point_cloud(), "lidar"}},
+      {"sensor_msgs/msg/Image", {image(), "camera"}},
+      {"sensor_msgs/msg/CompressedImage", {compressed_image(), "camera"}},
+      {"sensor_msgs/msg/CameraInfo", {camera_info(), "camera"}},
+      {"sensor_msgs/msg/Imu", {imu(), "imu"}},
+      {"sensor_msgs/msg/NavSatFix", {nav_sat_fix(), "gps"}},
+      {"geometry_msgs/msg/PoseStamped", {pose_stamped(), "map"}},
+      {"tf2_msgs/msg/TFMessage", {transforms(), "base -> lidar, base -> camera_left"}},
+  };
+  for (const auto& [type, expected] : of_type) {
+    const auto& [bytes, frames] = expected;
+    const BagInfo info = info_of(kMagic + schema(1, type) + channel(1, 1, "/a") + message(1, 1, bytes));
+    EXPECT_EQ(info.topics.at(0).frames, frames) << info.topics.at(0).problem;
+    const BagInfo cut = info_of(kMagic + schema(1, type) + channel(1, 1, "/a") + message(1, 1, bytes.substr(0, 9)));
+    EXPECT_NE(cut.topics.at(0).problem.find(type), std::string::npos);
+    EXPECT_EQ(cut.topics.at(0).count, 1U);
+  }
+}
+
+TEST(BagInfo, StatisticsThatDisagreeAreNoted) {
+  const std::string definitions = schema(1, "a/msg/B") + channel(1, 1, "/a");
+  const BagInfo info = info_of(closed(kMagic + definitions + message(1, 1, ""), definitions, 9));
+  EXPECT_EQ(info.notes, std::vector<std::string>{"its statistics say 9 messages, 1 could be read"});
+}
+
+TEST(BagInfo, WithoutOdometryThatIsSaid) {
+  EXPECT_EQ(uses(info_of(kMagic)).at(0), "odometry     missing: without odometry nothing can be made of this bag");
+}
+
+/// Of shared/data/mcap, what its SOURCES file says.
+TEST(BagInfo, RealBagsHaveTheCountsOfTheirSources) {
+  TUTTI_REQUIRE_SHARED("data/mcap");
+  const std::map<std::string, std::uint64_t> of_file{
+      {"nav2_turtlebot.mcap", 8197},           {"rosbag2/talker.mcap", 20},       {"rosbag2/wbag_0.mcap", 1246},
+      {"rosbag2/multiple_files_0.mcap", 1324}, {"rosbag2/rewriter_b_0.mcap", 75}, {"rosbag2/cdr_test_0.mcap", 7}};
+  for (const auto& [file, count] : of_file) {
+    auto reader = McapReader::open(::tutti::test::shared_path("data/mcap/" + file).string());
+    ASSERT_TRUE(reader) << reader.error().message;
+    const BagInfo info = inspect(*reader);
+    EXPECT_EQ(info.messages, count) << file;
+    EXPECT_EQ(info.errors, 0U) << file << ": " << (info.said.empty() ? "" : info.said[0]);
+    for (const TopicInfo& topic : info.topics) EXPECT_EQ(topic.problem, "") << file << " " << topic.topic;
+  }
+}
+
+TEST(BagInfo, EveryMessageOfARealBagIsDecoded) {
+  TUTTI_REQUIRE_SHARED("data/mcap");
+  auto reader = McapReader::open(::tutti::test::shared_path("data/mcap/nav2_turtlebot.mcap").string()).value();
+  std::map<std::string, std::uint64_t> counts;
+  for (auto message = reader.next(); message && *message; message = reader.next()) {
+    const McapMessage& one = **message;
+    ++counts[one.channel->topic];
+    if (use_of(one.channel->type) == Use::odometry) {
+      const auto sample = decode_odometry(one.data);
+      ASSERT_TRUE(sample) << sample.error().message;
+      EXPECT_NEAR(sample->pose.orientation.norm(), 1.0, 1e-6);
+    } else if (use_of(one.channel->type) == Use::transforms) {
+      const auto transforms = decode_tf(one.data);
+      ASSERT_TRUE(transforms) << transforms.error().message;
+      for (const RosTransform& transform : *transforms) EXPECT_NEAR(transform.rotation.norm(), 1.0, 1e-6);
+    }
+  }
+  EXPECT_EQ(counts, (std::map<std::string, std::uint64_t>{
+                        {"/odom", 2639}, {"/tf", 5422}, {"/tf_static", 1}, {"/amcl_pose", 135}}));
+}
+
+/// Another writer's: 94 types, two messages of each; those that are known are decoded.
+TEST(BagInfo, ABagOfAllTypesIsDecoded) {
+  TUTTI_REQUIRE_SHARED("data/bags/all_types");
+  std::string path;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(::tutti::test::shared_path("data/bags/all_types")))
+    if (entry.path().extension() == ".mcap") path = entry.path().string();
+  auto reader = McapReader::open(path);
+  ASSERT_TRUE(reader) << reader.error().message;
+  const BagInfo info = inspect(*reader);
+  EXPECT_EQ(info.topics.size(), 94U);
+  EXPECT_EQ(info.messages, 188U);
+  std::size_t known = 0;
+  for (const TopicInfo& topic : info.topics) {
+    EXPECT_EQ(topic.problem, "") << topic.topic;
+    known += topic.use != Use::nothing ? 1 : 0;
+  }
+  EXPECT_EQ(known, 9U);
+}
+
+}  // namespace bag_info_test
+}  // namespace tutti::bags

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/internal/chunk.hpp"
+
+#include <lz4frame.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <memory>
+
+namespace tutti::bags::internal {
+namespace {
+
+constexpr std::size_t kFirstBytes = std::size_t{1} << 16;
+
+struct Progress {
+  std::size_t taken = 0, written = 0;
+  bool ended = false;           ///< The compressed frame is complete.
+  const char* error = nullptr;  ///< As the library says it.
+};
+
+/// `step(in, out, room)` unpacks some of `in`.
+template <class Step>
+Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut, const char* name, const Step& step) {
+  std::string out;
+  std::size_t filled = 0;
+  bool ended = false;
+  while (true) {
+    // One byte more than expected, so that a frame that holds more is seen.
+    if (filled == out.size()) out.resize(std::min<std::uint64_t>(size + 1, std::max(kFirstBytes, 2 * out.size())));
+    const Progress now = step(packed, out.data() + filled, out.size() - filled);
+    if (now.error && !cut) return fail(ErrorCode::parse, "{}: {}, after {} of {} bytes", name, now.error, filled, size);
+    packed.remove_prefix(std::min(now.taken, packed.size()));
+    filled += now.written;
+    ended = now.ended;
+    const bool stuck = now.taken == 0 && now.written == 0;
+    if (now.error || filled > size || stuck || (ended && packed.empty())) break;
+  }
+  out.resize(filled);
+  if (filled > size) return fail(ErrorCode::parse, "{}: unpacks to more than the {} bytes it says", name, size);
+  if (!cut && (filled != size || (!ended && size > 0)))
+    return fail(ErrorCode::parse, "{}: unpacks to {} bytes, expected {}", name, filled, size);
+  return out;
+}
+
+Result<std::string> unpack_zstd(std::string_view packed, std::uint64_t size, bool cut) {
+  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), ZSTD_freeDCtx);
+  return unpack(packed, size, cut, "zstd", [&](std::string_view in, char* out, std::size_t room) {
+    ZSTD_inBuffer from{in.data(), in.size(), 0};
+    ZSTD_outBuffer to{out, room, 0};
+    const std::size_t hint = ZSTD_decompressStream(context.get(), &to, &from);
+    return Progress{from.pos, to.pos, hint == 0, ZSTD_isError(hint) ? ZSTD_getErrorName(hint) : nullptr};
+  });
+}
+
+Result<std::string> unpack_lz4(std::string_view packed, std::uint64_t size, bool cut) {
+  LZ4F_dctx* made = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)))
+    return fail(ErrorCode::io, "lz4: no memory for a decoder");
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(made,
+                                                                                     LZ4F_freeDecompressionContext);
+  return unpack(packed, size, cut, "lz4", [&](std::string_view in, char* out, std::size_t room) {
+    std::size_t taken = in.size(), written = room;
+    const std::size_t hint = LZ4F_decompress(context.get(), out, &written, in.data(), &taken, nullptr);
+    if (LZ4F_isError(hint)) return Progress{0, 0, false, LZ4F_getErrorName(hint)};
+    return Progress{taken, written, hint == 0, nullptr};
+  });
+}
+
+}  // namespace
+
+std::uint32_t crc32(std::string_view bytes) {
+  static constexpr auto kTable = [] {
+    std::array<std::uint32_t, 256> table{};
+    for (std::uint32_t i = 0; i < table.size(); ++i) {
+      std::uint32_t value = i;
+      for (int bit = 0; bit < 8; ++bit) value = (value >> 1U) ^ ((value & 1U) != 0 ? 0xedb88320U : 0U);
+      table[i] = value;
+    }
+    return table;
+  }();
+  std::uint32_t crc = ~std::uint32_t{0};
+  for (const char c : bytes) crc = kTable[(crc ^ static_cast<unsigned char>(c)) & 0xffU] ^ (crc >> 8U);
+  return ~crc;
+}
+
+Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut) {
+  if (size > kMaxChunkBytes)
+    return fail(ErrorCode::unsupported, "unpacks to {} bytes, expected at most {}", size, kMaxChunkBytes);
+  if (compression.empty()) {
+    if (!cut && packed.size() != size) return fail(ErrorCode::parse, "has {} bytes, expected {}", packed.size(), size);
+    return std::string(packed);
+  }
+  if (compression == "zstd") return unpack_zstd(packed, size, cut);
+  if (compression == "lz4") return unpack_lz4(packed, size, cut);
+  return fail(ErrorCode::unsupported, "compression '{:.40}', expected none, zstd or lz4", compression);
+}
+
+}  // namespace tutti::bags::internal

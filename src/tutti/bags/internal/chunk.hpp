@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "tutti/base/result.hpp"
+
+namespace tutti::bags::internal {
+
+/// How much of a chunk or record is taken into memory at most, by its own word.
+inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
+
+/// What MCAP calls CRC32: that of zlib and PNG, polynomial 0xedb88320.
+std::uint32_t crc32(std::string_view bytes);
+
+/// Unpacks the records of an MCAP chunk: compression "" (none), "zstd" or "lz4" (its frame format), `size` bytes
+/// unpacked. Memory grows with what really comes out, so that a length that lies costs nothing. Of a chunk that is
+/// `cut` off, what comes out before the cut. The error says what was expected.
+Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut);
+
+}  // namespace tutti::bags::internal

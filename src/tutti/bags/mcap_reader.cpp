@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/mcap_reader.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <limits>
+#include <utility>
+
+#include "tutti/bags/internal/chunk.hpp"
+#include "tutti/bags/internal/cursor.hpp"
+
+namespace tutti::bags {
+namespace {
+
+using internal::Cursor;
+
+constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
+constexpr std::uint64_t kRecordHeadBytes = 9;  // opcode, length
+constexpr std::uint64_t kFooterBytes = 20;
+enum Opcode : std::uint8_t {
+  kHeader = 1,
+  kFooter,
+  kSchema,
+  kChannel,
+  kMessage,
+  kChunk,
+  kMessageIndex,
+  kChunkIndex,
+  kAttachment,
+  kAttachmentIndex,
+  kStatistics,
+  kMetadata,
+  kMetadataIndex,
+  kSummaryOffset,
+  kDataEnd,
+};
+constexpr std::array kNames{"nothing",  "Header",        "Footer",        "Schema",     "Channel",         "Message",
+                            "Chunk",    "MessageIndex",  "ChunkIndex",    "Attachment", "AttachmentIndex", "Statistics",
+                            "Metadata", "MetadataIndex", "SummaryOffset", "DataEnd"};
+
+std::string name_of(std::uint8_t opcode) {
+  return opcode < kNames.size() ? kNames[opcode] : fmt::format("of unknown kind {}", opcode);
+}
+
+/// Stamps up to the year 2262; MCAP's own would go on to 2554.
+Timestamp stamp(Cursor& cursor, std::string_view what) {
+  const auto ns = cursor.number<std::uint64_t>(what);
+  if (ns > static_cast<std::uint64_t>(kLastTimestamp.ns))
+    cursor.complain(fmt::format("{} is {} ns, expected at most {}", what, ns, kLastTimestamp.ns));
+  return Timestamp{static_cast<std::int64_t>(ns & static_cast<std::uint64_t>(kLastTimestamp.ns))};
+}
+
+std::string what_else(std::string_view magic) {
+  if (magic.starts_with("SQLite")) return " (an SQLite file: rosbag2's .db3 is not read)";
+  if (magic.starts_with("#ROSBAG")) return " (a ROS 1 bag, which is not read)";
+  return "";
+}
+
+}  // namespace
+
+template <class... Args>
+tl::unexpected<Error> McapReader::fail_at(const Record& record, ErrorCode code, fmt::format_string<Args...> format,
+                                          Args&&... args) const {
+  return fail(code, "{}: byte {}: record {}{}: {}", name_, record.offset, name_of(record.opcode),
+              chunk_.empty() ? "" : " in this chunk", fmt::format(format, std::forward<Args>(args)...));
+}
+
+Result<McapReader> McapReader::open(const std::string& path) {
+  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
+  if (!*file) return fail(ErrorCode::io, "{}: cannot be opened", path);
+  return open(std::move(file), path);
+}
+
+Result<McapReader> McapReader::open(std::unique_ptr<std::istream> stream, std::string name) {
+  McapReader reader(std::move(stream), std::move(name));
+  if (auto ok = reader.start(); !ok) return tl::unexpected(ok.error());
+  return reader;
+}
+
+Status McapReader::start() {
+  stream_->seekg(0, std::ios::end);
+  const auto end = stream_->tellg();
+  if (!*stream_ || end < 0 || end == std::numeric_limits<std::streamoff>::max())
+    return fail(ErrorCode::io, "{}: its size is not known: expected a file", name_);
+  size_ = stream_at_ = static_cast<std::uint64_t>(end);
+  std::string magic;
+  if (auto ok = read_bytes(0, std::min<std::uint64_t>(size_, kMagic.size()), magic); !ok) return ok;
+  if (magic != kMagic)
+    return fail(ErrorCode::parse, "{}: byte 0: is no MCAP file, expected 89 'MCAP0' 0d 0a{}", name_, what_else(magic));
+  offset_ = kMagic.size();
+  look_at_summary();
+  return {};
+}
+
+Status McapReader::read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out) {
+  if (stream_at_ != offset) {
+    stream_->clear();
+    stream_->seekg(static_cast<std::streamoff>(offset));
+  }
+  out.resize(size);
+  stream_->read(out.data(), static_cast<std::streamsize>(size));
+  if (!*stream_) {
+    stream_at_ = size_ + 1;
+    return fail(ErrorCode::io, "{}: byte {}: {} bytes cannot be read", name_, offset, size);
+  }
+  stream_at_ = offset + size;
+  return {};
+}
+
+/// There must be so many bytes as a record's head has.
+Result<McapReader::Record> McapReader::record_at(std::uint64_t offset) {
+  std::string head;
+  if (auto ok = read_bytes(offset, kRecordHeadBytes, head); !ok) return tl::unexpected(ok.error());
+  Cursor cursor(head);
+  Record record{.offset = offset};
+  record.opcode = cursor.number<std::uint8_t>("opcode");
+  record.size = cursor.number<std::uint64_t>("length");
+  return record;
+}
+
+void McapReader::end(std::string note) {
+  ended_ = true;
+  if (!note.empty()) notes_.push_back(std::move(note));
+}
+
+/// Messages do not need the summary: one that is not there, or broken, is only noted.
+void McapReader::look_at_summary() {
+  const std::uint64_t tail = kRecordHeadBytes + kFooterBytes + kMagic.size();
+  if (size_ < kMagic.size() + tail) return;
+  std::string magic, footer;
+  if (!read_bytes(size_ - kMagic.size(), kMagic.size(), magic) || magic != kMagic) return;
+  const auto record = record_at(size_ - tail);
+  if (!record || record->opcode != kFooter || record->size != kFooterBytes) return;
+  if (!read_bytes(record->offset + kRecordHeadBytes, kFooterBytes, footer)) return;
+  const auto begin = Cursor(footer).number<std::uint64_t>("summary_start");
+  if (begin == 0) return;
+  Status ok;
+  if (begin < kMagic.size() || begin > record->offset)
+    ok = fail_at(*record, ErrorCode::parse, "summary begins at byte {}, expected {} to {}", begin, kMagic.size(),
+                 record->offset);
+  else
+    ok = read_summary(begin, record->offset);
+  if (ok) return;
+  summary_.reset();
+  notes_.push_back(ok.error().message + "; the summary is not used");
+}
+
+Status McapReader::read_summary(std::uint64_t begin, std::uint64_t end) {
+  McapSummary summary;
+  std::string content;
+  for (std::uint64_t at = begin; at < end;) {
+    const auto record = end - at < kRecordHeadBytes ? Result<Record>(Record{.offset = at}) : record_at(at);
+    if (!record) return tl::unexpected(record.error());
+    if (end - at < kRecordHeadBytes || record->size > end - at - kRecordHeadBytes)
+      return fail_at(*record, ErrorCode::parse, "length {}, expected an end before byte {}", record->size, end);
+    at += kRecordHeadBytes + record->size;
+    summary.chunk_indexes += record->opcode == kChunkIndex ? 1 : 0;
+    if (record->opcode != kSchema && record->opcode != kChannel && record->opcode != kStatistics) continue;
+    if (record->size > internal::kMaxChunkBytes)
+      return fail_at(*record, ErrorCode::unsupported, "length {}, expected at most {}", record->size,
+                     internal::kMaxChunkBytes);
+    if (auto ok = read_bytes(record->offset + kRecordHeadBytes, record->size, content); !ok) return ok;
+    const Status ok = record->opcode == kSchema    ? define_schema(*record, content)
+                      : record->opcode == kChannel ? define_channel(*record, content)
+                                                   : take_statistics(*record, content);
+    if (!ok) return ok;
+  }
+  if (summary_) summary_->chunk_indexes = summary.chunk_indexes;
+  return {};
+}
+
+Status McapReader::take_statistics(const Record& record, std::string_view content) {
+  Cursor cursor(content);
+  McapSummary summary;
+  summary.messages = cursor.number<std::uint64_t>("message_count");
+  cursor.take(2 + 4 + 4 + 4, "counts of schemas, channels, attachments and metadata");
+  summary.chunks = cursor.number<std::uint32_t>("chunk_count");
+  cursor.take(8 + 8, "first and last time");
+  Cursor counts(cursor.counted("channel_message_counts"));
+  while (counts.ok() && counts.left() > 0) {
+    const auto channel = counts.number<std::uint16_t>("channel");
+    summary.messages_of_channel[channel] = counts.number<std::uint64_t>("count");
+  }
+  if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
+  if (!counts.ok()) return fail_at(record, ErrorCode::parse, "channel_message_counts: {}", *counts.error());
+  summary_ = summary;
+  return {};
+}
+
+Status McapReader::define_schema(const Record& record, std::string_view content) {
+  Cursor cursor(content);
+  const auto id = cursor.number<std::uint16_t>("id");
+  const std::string name(cursor.counted("name"));
+  cursor.counted("encoding");
+  cursor.counted("data");
+  if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
+  if (id == 0) return fail_at(record, ErrorCode::parse, "id 0, expected 1 or more");
+  const auto [at, is_new] = schemas_.try_emplace(id, name);
+  if (!is_new && at->second != name)
+    return fail_at(record, ErrorCode::invalid, "schema {} is '{:.80}', expected '{:.80}' as before", id, name,
+                   at->second);
+  return {};
+}
+
+Status McapReader::define_channel(const Record& record, std::string_view content) {
+  Cursor cursor(content);
+  const auto id = cursor.number<std::uint16_t>("id");
+  const auto schema = cursor.number<std::uint16_t>("schema_id");
+  McapChannel channel;
+  channel.topic = cursor.counted("topic");
+  channel.message_encoding = cursor.counted("message_encoding");
+  cursor.counted("metadata");
+  if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
+  if (schema != 0) {
+    const auto type = schemas_.find(schema);
+    if (type == schemas_.end())
+      return fail_at(record, ErrorCode::invalid,
+                     "channel {} ('{:.80}') has schema {}, expected one that is defined before", id, channel.topic,
+                     schema);
+    channel.type = type->second;
+  }
+  const auto [at, is_new] = channels_.try_emplace(id, channel);
+  if (!is_new && (at->second.topic != channel.topic || at->second.type != channel.type))
+    return fail_at(record, ErrorCode::invalid, "channel {} is '{:.80}', expected '{:.80}' as before", id, channel.topic,
+                   at->second.topic);
+  return {};
+}
+
+Result<McapMessage> McapReader::to_message(const Record& record, std::string_view content) const {
+  Cursor cursor(content);
+  McapMessage message{.offset = record.offset};
+  message.channel_id = cursor.number<std::uint16_t>("channel_id");
+  cursor.number<std::uint32_t>("sequence");
+  message.log_time = stamp(cursor, "log_time");
+  message.publish_time = stamp(cursor, "publish_time");
+  if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
+  message.data = cursor.take(cursor.left(), "data");
+  const auto channel = channels_.find(message.channel_id);
+  if (channel == channels_.end())
+    return fail_at(record, ErrorCode::invalid, "channel {}, expected one that is defined before", message.channel_id);
+  message.channel = &channel->second;
+  return message;
+}
+
+Result<std::optional<McapMessage>> McapReader::take(const Record& record, std::string_view content) {
+  Status ok;
+  if (record.opcode == kMessage) {
+    const auto message = to_message(record, content);
+    if (message) return *message;
+    ok = tl::unexpected(message.error());
+  } else if (record.opcode == kSchema) {
+    ok = define_schema(record, content);
+  } else if (record.opcode == kChannel) {
+    ok = define_channel(record, content);
+  } else if (record.opcode == 0) {
+    ok = fail_at(record, ErrorCode::parse, "opcode 0, which no record has");
+  }
+  if (!ok) return tl::unexpected(ok.error());
+  return std::nullopt;
+}
+
+/// What the file has of the record is in record_.
+Status McapReader::enter_chunk(const Record& record, bool cut) {
+  Cursor cursor(record_);
+  cursor.take(8 + 8, "first and last time");
+  const auto size = cursor.number<std::uint64_t>("uncompressed_size");
+  const auto crc = cursor.number<std::uint32_t>("uncompressed_crc");
+  const std::string_view compression = cursor.counted("compression");
+  const auto packed_size = cursor.number<std::uint64_t>("length of the records");
+  const std::string_view packed = cursor.take(cut ? cursor.left() : packed_size, "records");
+  if (!cursor.ok()) return cut ? Status{} : fail_at(record, ErrorCode::parse, "{}", *cursor.error());
+  auto chunk = internal::unpack_chunk(packed, compression, size, cut);
+  if (!chunk) return fail_at(record, chunk.error().code, "{}", chunk.error().message);
+  if (const auto found = internal::crc32(*chunk); !cut && crc != 0 && found != crc)
+    return fail_at(record, ErrorCode::parse, "CRC {:08x}, expected {:08x}: its bytes have changed", found, crc);
+  chunk_ = std::move(*chunk);
+  chunk_at_ = 0;
+  chunk_offset_ = record.offset;
+  chunk_cut_ = cut;
+  ++chunks_read_;
+  return {};
+}
+
+Result<std::optional<McapMessage>> McapReader::next() {
+  while (true) {
+    auto message = chunk_.empty() ? next_of_file() : next_of_chunk();
+    if (!message || *message || (ended_ && chunk_.empty())) return message;
+  }
+}
+
+/// Nothing if the record was none of a message; then the chunk may have come to its end.
+Result<std::optional<McapMessage>> McapReader::next_of_chunk() {
+  const std::size_t left = chunk_.size() - chunk_at_;
+  Cursor cursor(std::string_view(chunk_).substr(chunk_at_));
+  Record record{.offset = chunk_offset_};
+  record.opcode = left > 0 ? cursor.number<std::uint8_t>("opcode") : std::uint8_t{0};
+  record.size = left > 0 ? cursor.number<std::uint64_t>("length") : 0;
+  if (left == 0 || !cursor.ok() || record.size > cursor.left()) {
+    Result<std::optional<McapMessage>> out = std::nullopt;
+    if (left > 0 && !chunk_cut_)
+      out = fail_at(record, ErrorCode::parse, "at byte {} of its {}: wants {} bytes, {} are left", chunk_at_,
+                    chunk_.size(), record.size, cursor.left());
+    chunk_.clear();
+    return out;
+  }
+  chunk_at_ += kRecordHeadBytes + record.size;
+  return take(record, cursor.take(record.size, "content"));
+}
+
+Result<std::optional<McapMessage>> McapReader::next_of_file() {
+  const std::uint64_t left = size_ - offset_;
+  if (ended_) return std::nullopt;
+  if (left < kRecordHeadBytes) {
+    end(fmt::format("{}: byte {}: ends without a footer: cut off, or never closed", name_, size_));
+    return std::nullopt;
+  }
+  auto record = record_at(offset_);
+  if (!record) {
+    end("");
+    return tl::unexpected(record.error());
+  }
+  const std::uint64_t begin = offset_ + kRecordHeadBytes, there = left - kRecordHeadBytes;
+  const bool cut = record->size > there;
+  if (cut) {
+    end(fmt::format("{}: byte {}: cut off: record {} wants {} bytes, {} are left", name_, offset_,
+                    name_of(record->opcode), record->size, there));
+    record->size = there;
+  } else {
+    offset_ = begin + record->size;
+    if (record->opcode == kFooter) end("");
+  }
+  const bool wanted = record->opcode == kChunk || (!cut && (record->opcode == kSchema || record->opcode == kChannel ||
+                                                            record->opcode == kMessage || record->opcode == 0));
+  if (!wanted) return std::nullopt;
+  if (record->size > internal::kMaxChunkBytes)
+    return fail_at(*record, ErrorCode::unsupported, "length {}, expected at most {}", record->size,
+                   internal::kMaxChunkBytes);
+  if (auto ok = read_bytes(begin, record->size, record_); !ok) {
+    end("");
+    return tl::unexpected(ok.error());
+  }
+  if (record->opcode != kChunk) return take(*record, record_);
+  if (auto ok = enter_chunk(*record, cut); !ok) return tl::unexpected(ok.error());
+  record_.clear();
+  record_.shrink_to_fit();  // the packed chunk is not held beside the unpacked one
+  return std::nullopt;
+}
+
+}  // namespace tutti::bags

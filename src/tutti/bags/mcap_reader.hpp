@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <istream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/base/timestamp.hpp"
+
+/// MCAP files (https://mcap.dev/spec): what rosbag2 records since ROS 2 Iron.
+namespace tutti::bags {
+
+struct McapChannel {
+  std::string topic;
+  std::string type;              ///< "nav_msgs/msg/Odometry"; empty of a channel without schema.
+  std::string message_encoding;  ///< "cdr"
+};
+
+struct McapMessage {
+  std::uint16_t channel_id = 0;
+  const McapChannel* channel = nullptr;  ///< The reader's.
+  Timestamp log_time, publish_time;
+  std::string_view data;     ///< Valid until the reader is asked for the next one.
+  std::uint64_t offset = 0;  ///< Of its record in the file, bytes; of its chunk if it is in one.
+};
+
+/// What the file's own statistics say.
+struct McapSummary {
+  std::uint64_t messages = 0;
+  std::map<std::uint16_t, std::uint64_t> messages_of_channel;
+  std::uint64_t chunks = 0;         ///< By the statistics,
+  std::uint64_t chunk_indexes = 0;  ///< and how many of them are indexed.
+};
+
+/// Reads messages in the order of the file, chunked or not, with or without summary, and never holds more than one
+/// chunk. Chunks whose CRC is not theirs are refused. A file that is cut off is read up to the last whole message, also
+/// within its last chunk, and a note says so. An error names file, byte, record and what was expected, and costs one
+/// record or chunk: whoever asks again gets what comes behind it.
+class McapReader {
+ public:
+  static Result<McapReader> open(const std::string& path);
+  /// `name` is for the errors.
+  static Result<McapReader> open(std::unique_ptr<std::istream> stream, std::string name);
+
+  /// Nothing at the end of the file.
+  Result<std::optional<McapMessage>> next();
+
+  /// Those that were met so far, and at once those of the summary.
+  [[nodiscard]] const std::map<std::uint16_t, McapChannel>& channels() const { return channels_; }
+  [[nodiscard]] const std::optional<McapSummary>& summary() const { return summary_; }
+  /// What is odd about the file without being in the way, such as where it is cut off.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  [[nodiscard]] std::uint64_t chunks_read() const { return chunks_read_; }
+
+ private:
+  struct Record {
+    std::uint8_t opcode = 0;
+    std::uint64_t size = 0;
+    std::uint64_t offset = 0;
+  };
+
+  McapReader(std::unique_ptr<std::istream> stream, std::string name)
+      : stream_(std::move(stream)), name_(std::move(name)) {}
+  Status start();
+  void look_at_summary();
+  Status read_summary(std::uint64_t begin, std::uint64_t end);
+  Status read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out);
+  Result<Record> record_at(std::uint64_t offset);
+  Result<std::optional<McapMessage>> next_of_file();
+  Result<std::optional<McapMessage>> next_of_chunk();
+  Result<std::optional<McapMessage>> take(const Record& record, std::string_view content);
+  Status enter_chunk(const Record& record, bool cut);
+  Status define_schema(const Record& record, std::string_view content);
+  Status define_channel(const Record& record, std::string_view content);
+  Status take_statistics(const Record& record, std::string_view content);
+  Result<McapMessage> to_message(const Record& record, std::string_view content) const;
+  void end(std::string note);
+  template <class... Args>
+  [[nodiscard]] tl::unexpected<Error> fail_at(const Record& record, ErrorCode code, fmt::format_string<Args...> format,
+                                              Args&&... args) const;
+
+  std::unique_ptr<std::istream> stream_;
+  std::string name_;
+  std::uint64_t size_ = 0;       ///< Of the file.
+  std::uint64_t offset_ = 0;     ///< Of the next record.
+  std::uint64_t stream_at_ = 0;  ///< Seeking costs what is buffered: it is done only where the stream is not there yet.
+  bool ended_ = false;
+  std::string record_;              ///< Content of the record of the file that was read last.
+  std::string chunk_;               ///< Unpacked records of the chunk that is read,
+  std::size_t chunk_at_ = 0;        ///< how far,
+  std::uint64_t chunk_offset_ = 0;  ///< where it stands in the file,
+  bool chunk_cut_ = false;          ///< and whether the file ends in it.
+  std::uint64_t chunks_read_ = 0;
+  std::map<std::uint16_t, std::string> schemas_;  ///< Names.
+  std::map<std::uint16_t, McapChannel> channels_;
+  std::optional<McapSummary> summary_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace tutti::bags

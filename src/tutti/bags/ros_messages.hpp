@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/base/timestamp.hpp"
+
+/// Messages of ROS 2 as they stand in bags and on the wire: CDR, the first version (XCDR1), of either byte order.
+/// Fields have the names, units and frames of ROS's own definitions (common_interfaces). Lengths are checked, values
+/// are not: quaternions may be no rotations, covariances zero, -1 or nonsense, numbers not finite. What is a view is
+/// one into the bytes that were decoded.
+namespace tutti::bags {
+
+struct RosHeader {
+  Timestamp stamp;
+  std::string frame_id;
+};
+
+struct RosPose {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+};
+
+struct RosOdometry {
+  RosHeader header;            ///< The pose is one in header.frame_id,
+  std::string child_frame_id;  ///< of this, and the twist one in it.
+  RosPose pose;
+  std::array<double, 36> pose_covariance{};  ///< Row by row, translation before rotation about fixed axes.
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();  ///< m/s, rad/s
+  std::array<double, 36> twist_covariance{};
+};
+
+struct RosTransform {
+  RosHeader header;            ///< T_parent_child: from child_frame_id
+  std::string child_frame_id;  ///< to header.frame_id.
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+};
+
+struct RosPointField {
+  std::string name;
+  std::uint32_t offset = 0;   ///< Bytes within a point.
+  std::uint8_t datatype = 0;  ///< 1 to 8: int8, uint8, int16, uint16, int32, uint32, float32, float64.
+  std::uint32_t count = 0;
+};
+
+struct RosPointCloud {
+  RosHeader header;
+  std::uint32_t height = 0, width = 0;
+  std::vector<RosPointField> fields;
+  bool is_bigendian = false;
+  std::uint32_t point_step = 0, row_step = 0;  ///< Bytes.
+  std::string_view data;                       ///< As many bytes as it has; height * row_step are promised.
+  bool is_dense = false;
+};
+
+struct RosImu {
+  RosHeader header;
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  std::array<double, 9> orientation_covariance{};
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s
+  std::array<double, 9> angular_velocity_covariance{};
+  Eigen::Vector3d linear_acceleration = Eigen::Vector3d::Zero();  ///< m/s^2
+  std::array<double, 9> linear_acceleration_covariance{};
+};
+
+struct RosImage {
+  RosHeader header;
+  std::uint32_t height = 0, width = 0;
+  std::string encoding;  ///< "mono8", "bgr8", "16UC1", ...
+  bool is_bigendian = false;
+  std::uint32_t step = 0;  ///< Bytes a row.
+  std::string_view data;
+};
+
+struct RosCompressedImage {
+  RosHeader header;
+  std::string format;  ///< "jpeg", "png", ...
+  std::string_view data;
+};
+
+struct RosCameraInfo {
+  RosHeader header;
+  std::uint32_t height = 0, width = 0;
+  std::string distortion_model;
+  std::vector<double> d;
+  std::array<double, 9> k{}, r{};  ///< Row by row.
+  std::array<double, 12> p{};
+  std::uint32_t binning_x = 0, binning_y = 0;
+};
+
+struct RosNavSatFix {
+  RosHeader header;
+  std::int8_t status = 0;  ///< -1: no fix.
+  std::uint16_t service = 0;
+  double latitude_deg = 0.0, longitude_deg = 0.0, altitude_m = 0.0;  ///< WGS 84, above the ellipsoid.
+  std::array<double, 9> position_covariance{};                       ///< m^2; east, north, up.
+  std::uint8_t position_covariance_type = 0;                         ///< 0: unknown.
+};
+
+struct RosPoseStamped {
+  RosHeader header;
+  RosPose pose;
+};
+
+/// Each of all bytes of a message, its 4-byte encapsulation header with them. The error says type, byte (behind that
+/// header) and what was expected; more than the three bytes that fill up to a multiple of four may not be left.
+Result<RosOdometry> decode_odometry(std::string_view cdr);
+Result<std::vector<RosTransform>> decode_tf(std::string_view cdr);
+Result<RosPointCloud> decode_point_cloud(std::string_view cdr);
+Result<RosImu> decode_imu(std::string_view cdr);
+Result<RosImage> decode_image(std::string_view cdr);
+Result<RosCompressedImage> decode_compressed_image(std::string_view cdr);
+Result<RosCameraInfo> decode_camera_info(std::string_view cdr);
+Result<RosNavSatFix> decode_nav_sat_fix(std::string_view cdr);
+Result<RosPoseStamped> decode_pose_stamped(std::string_view cdr);
+
+}  // namespace tutti::bags
