@@ -55,6 +55,28 @@ class CommandLine(unittest.TestCase):
         for command in ("list", "show", "accept", "reject", "withdraw"):
             self.expect(tutti("map", "closure", command, "--help"), 0, "--help")
 
+        self.expect(tutti("bag", "info", "--help"), 0, "BAG")
+
+    def test_bag_info_says_what_is_there_and_what_is_missing(self):
+        def counted(data, size=4):
+            return len(data).to_bytes(size, "little") + data
+
+        def record(opcode, content):
+            return bytes([opcode]) + counted(content, 8)
+
+        one, time = (1).to_bytes(2, "little"), (1_700_000_000_250_000_000).to_bytes(8, "little")
+        bag = self.path / "cut.mcap"
+        bag.write_bytes(b"\x89MCAP0\r\n" + record(3, one + counted(b"std_msgs/msg/String") + counted(b"ros2msg") + counted(b""))
+                        + record(4, one + one + counted(b"/talk\x1b[2J") + counted(b"cdr") + counted(b""))
+                        + record(5, one + bytes(4) + time + time + b"hello") + b"\x05cut")
+        self.expect(tutti("bag", "info", bag), 0, "/talk?[2J", "std_msgs/msg/String", "2023-11-14 22:13:20.250",
+                    "odometry     missing", "scans        none", "cut off")
+        self.expect(tutti("bag", "info", self.path), 1, "is a folder")
+        self.expect(tutti("bag", "info", self.path / "none.mcap"), 1, "none.mcap: cannot be opened")
+        other = self.path / "other.mcap"
+        other.write_bytes(b"SQLite format 3")
+        self.expect(tutti("bag", "info", other), 1, "byte 0", "no MCAP file", ".db3")
+
     def test_status_without_a_bus(self):
         self.expect(tutti("status"), 2, "--bus")
         self.expect(tutti("status", "--bus", "nats://192.0.2.1:4222"), 2, "another machine", "TLS")

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// tutti bag: what robots have recorded.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "commands.hpp"
+#include "options.hpp"
+#include "tutti/bags/bag_info.hpp"
+
+namespace tutti::app {
+namespace {
+
+/// "2026-03-01 12:00:00.250"
+std::string utc(Timestamp stamp) {
+  const std::chrono::sys_time<std::chrono::nanoseconds> time{std::chrono::nanoseconds(stamp.ns)};
+  const auto second = std::chrono::floor<std::chrono::seconds>(time);
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(time - second).count();
+  return fmt::format("{:%F %T}.{:03}", fmt::gmtime(std::chrono::system_clock::to_time_t(second)), ms);
+}
+
+/// Names in a bag are anybody's: none may speak to the terminal.
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+void print_topics(const bags::BagInfo& info) {
+  std::size_t topic_width = 5, type_width = 4;
+  for (const bags::TopicInfo& topic : info.topics) {
+    topic_width = std::max(topic_width, topic.topic.size());
+    type_width = std::max(type_width, topic.type.size());
+  }
+  const auto print = [&](const auto&... columns) {
+    const std::string line = fmt::format("{:<{}}  {:<{}}  {:>8}  {:>8}  {:<23}  {:<23}  {}", columns...);
+    fmt::print("{}\n", printable(line.substr(0, line.find_last_not_of(' ') + 1)));
+  };
+  print("topic", topic_width, "type", type_width, "messages", "Hz", "first (UTC)", "last (UTC)", "frames");
+  for (const bags::TopicInfo& topic : info.topics) {
+    const bool any = topic.count > 0;
+    print(topic.topic, topic_width, topic.type, type_width, topic.count,
+          topic.rate_hz() > 0.0 ? fmt::format("{:.2f}", topic.rate_hz()) : "-", any ? utc(topic.first) : "-",
+          any ? utc(topic.last) : "-",
+          topic.problem.empty() ? topic.frames : "first message not understood: " + topic.problem);
+  }
+}
+
+int show_bag(const std::string& path) {
+  if (std::error_code failure; std::filesystem::is_directory(path, failure))
+    return complain("bag info", path + ": is a folder, expected an .mcap file: name the one in it");
+  auto bag = bags::McapReader::open(path);
+  if (!bag) return complain("bag info", bag.error().message);
+  const bags::BagInfo info = bags::inspect(*bag);
+  fmt::print("bag        {}\nmessages   {} of {} topics, in {} chunks\n\n", path, info.messages, info.topics.size(),
+             bag->chunks_read());
+  if (!info.topics.empty()) print_topics(info);
+  fmt::print("\n");
+  for (const std::string& line : bags::uses(info)) fmt::print("{}\n", printable(line));
+  for (const std::string& note : info.notes) fmt::print("note: {}\n", printable(note));
+  std::fflush(stdout);
+  for (const std::string& error : info.said) fmt::print(stderr, "{}\n", printable(error));
+  if (info.errors == 0) return 0;
+  return complain("bag info", fmt::format("{}: {} records or chunks could not be read", path, info.errors));
+}
+
+}  // namespace
+
+void add_bag_command(CLI::App& app, int& exit_code) {
+  auto* bag = app.add_subcommand("bag", "What robots have recorded: MCAP files, as rosbag2 writes them.");
+  bag->require_subcommand(1);
+  const auto path = std::make_shared<std::string>();
+  auto* info = bag->add_subcommand(
+      "info", "Topics with type, count, rate, times and frames; what Tutti would use of them, and what is missing.");
+  info->footer(
+      "All of the file is read, one chunk at a time. One that is cut off is read up to the cut.\n"
+      "No mission runs from a bag yet: this only says what is in it.\n"
+      "Example: tutti bag info recording_0.mcap\n");
+  info->add_option("bag", *path, "An MCAP file; its chunks may be packed by zstd or lz4.")
+      ->required()
+      ->type_name("BAG");
+  info->callback([path, &exit_code] { exit_code = show_bag(*path); });
+}
+
+}  // namespace tutti::app
