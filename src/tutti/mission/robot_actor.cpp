@@ -111,9 +111,7 @@ void RobotActor::replay_next(Timestamp now) {
 
 void RobotActor::take(node::Step step) {
   for (const node::Event& event : step.events) note_event(event);
-  std::ranges::move(step.writes, std::back_inserter(step_.writes));
-  std::ranges::move(step.messages, std::back_inserter(step_.messages));
-  std::ranges::move(step.events, std::back_inserter(step_.events));
+  step_.add(std::move(step));
 }
 
 void RobotActor::note_event(const node::Event& event) {

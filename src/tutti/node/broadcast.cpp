@@ -16,39 +16,37 @@ bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<con
 void Broadcast::send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs,
                      const std::set<RobotId>& robots, bool wait, Timestamp now, Step& step) {
   last_ = std::move(map);
-  std::set<RobotId> heard;
+  std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots) {
-    ChangeWatch::Decision decision = watch_.take(robot, consistency::own_part(last_.graph, robot), beliefs, wait);
-    if (decision.send) heard.insert(robot);
+    ProxyGraph own = consistency::own_part(last_.graph, robot);
+    ChangeWatch::Decision decision = watch_.take(robot, own, beliefs, wait);
+    if (decision.send) send_last(robot, std::move(own), whole, step);
     for (ChangeOfMind& told : decision.told) step.tell(now, std::move(told));
   }
-  send_last(heard, step);
 }
 
 void Broadcast::send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step) {
-  std::set<RobotId> heard;
+  std::shared_ptr<const std::string> whole;
   for (const RobotId robot : robots)
     if (auto told = watch_.follow(robot)) {
-      heard.insert(robot);
+      send_last(robot, consistency::own_part(last_.graph, robot), whole, step);
       step.tell(now, std::move(*told));
     }
-  send_last(heard, step);
 }
 
-void Broadcast::send_last(const std::set<RobotId>& robots, Step& step) {
-  if (robots.empty()) return;
+void Broadcast::send_last(RobotId robot, ProxyGraph own, std::shared_ptr<const std::string>& whole, Step& step) {
   if (!to_all_) {
-    for (const RobotId robot : robots) step.messages.push_back(own_graph(robot));
+    step.messages.push_back(own_graph(robot, std::move(own)));
     return;
   }
-  const auto whole = std::make_shared<const std::string>(wire::encode(last_));
-  for (const RobotId robot : robots) step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, whole));
+  if (whole == nullptr) whole = std::make_shared<const std::string>(wire::encode(last_));
+  step.messages.push_back(to_robot(robot, bus::MessageKind::proxy_graph, whole));
 }
 
 /// Deltas grow as the map leaves the base behind. The mean of what is sent is smallest when the full graph is sent
 /// again as soon as a delta is larger than that mean.
-bus::Envelope Broadcast::own_graph(RobotId robot) {
-  const ProxyGraphMessage part{last_.header, consistency::own_part(last_.graph, robot)};
+bus::Envelope Broadcast::own_graph(RobotId robot, ProxyGraph own) {
+  const ProxyGraphMessage part{last_.header, std::move(own)};
   Base& base = bases_[robot];
   if (base.messages > 0) {
     auto delta = std::make_shared<const std::string>(wire::encode_delta(part, base.graph));

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <string>
 
 #include "tutti/bus/envelope.hpp"
 #include "tutti/model/messages.hpp"
@@ -33,9 +34,10 @@ class Broadcast {
   [[nodiscard]] const ProxyGraph& last() const { return last_.graph; }
 
  private:
-  void send_last(const std::set<RobotId>& robots, Step& step);
+  /// The last map, of which `own` is the robot's part. `whole`: all of it, encoded when it is first needed.
+  void send_last(RobotId robot, ProxyGraph own, std::shared_ptr<const std::string>& whole, Step& step);
   /// In full, or in terms of the last one that was, whichever makes fewer bytes in the long run.
-  [[nodiscard]] bus::Envelope own_graph(RobotId robot);
+  [[nodiscard]] bus::Envelope own_graph(RobotId robot, ProxyGraph own);
 
   bool to_all_;
   ProxyGraphMessage last_;

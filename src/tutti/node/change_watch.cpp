@@ -62,11 +62,6 @@ std::optional<ChangeOfMind> ChangeWatch::follow(RobotId robot) {
   return ChangeOfMind{robot, ChangeOutcome::stands, waiting.change, waiting.reason};
 }
 
-bool ChangeWatch::waits(RobotId robot) const {
-  const auto known = robots_.find(robot);
-  return known != robots_.end() && known->second.waiting.has_value();
-}
-
 bool ChangeWatch::anything_waits() const {
   return std::ranges::any_of(robots_, [](const auto& known) { return known.second.waiting.has_value(); });
 }

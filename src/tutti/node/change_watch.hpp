@@ -42,7 +42,6 @@ class ChangeWatch {
   Decision take(RobotId robot, const ProxyGraph& own, std::shared_ptr<const server::Beliefs> beliefs, bool wait);
   /// An update without news: what waits has stood. Nothing when nothing waits for this robot.
   std::optional<ChangeOfMind> follow(RobotId robot);
-  [[nodiscard]] bool waits(RobotId robot) const;
   [[nodiscard]] bool anything_waits() const;
 
  private:

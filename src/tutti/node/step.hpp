@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <iterator>
 #include <utility>
 #include <vector>
@@ -20,6 +21,12 @@ struct Step {
   std::vector<bus::Envelope> messages;  ///< 2. Sent.
   std::vector<Event> events;            ///< 3. Told.
 
+  /// What another input makes, after this.
+  void add(Step other) {
+    std::ranges::move(other.writes, std::back_inserter(writes));
+    std::ranges::move(other.messages, std::back_inserter(messages));
+    std::ranges::move(other.events, std::back_inserter(events));
+  }
   template <class What>
   void tell(Timestamp time, What&& what) {
     events.push_back({time, std::forward<What>(what)});

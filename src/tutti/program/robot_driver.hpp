@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -55,11 +54,7 @@ class LiveRobot final : public RobotDriver {
   void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
 
  private:
-  void take(node::Step step) {
-    std::ranges::move(step.writes, std::back_inserter(step_.writes));
-    std::ranges::move(step.messages, std::back_inserter(step_.messages));
-    std::ranges::move(step.events, std::back_inserter(step_.events));
-  }
+  void take(node::Step step) { step_.add(std::move(step)); }
 
   std::unique_ptr<node::RobotNode> node_;
   node::Step step_;
