@@ -14,6 +14,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/pyfg.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/geometry/so3.hpp"
@@ -138,11 +139,10 @@ Status write_graph(const std::string& path, const NamedGraph& graph, const serve
 
 /// The times that `tutti compare` looks for beside a graph.
 Status write_stamps(const std::string& path, const NamedGraph& graph, const server::MapEstimate& map) {
-  std::string csv = "id,robot,keyframe,stamp_ns\n";
+  std::vector<formats::VertexStamp> stamps;
   for (std::size_t v = 0; v < map.nodes.size(); ++v)
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{}\n", graph.ids[v], robot_of(map.nodes[v]),
-                   map.nodes[v].id.index, map.nodes[v].stamp.ns);
-  return write_file(path, csv);
+    stamps.push_back({graph.ids[v], map.nodes[v].id, map.nodes[v].stamp});
+  return formats::write_graph_stamps(formats::stamps_beside(path), stamps);
 }
 
 Status write_trajectories(const std::string& folder, const NamedGraph& graph, const server::MapEstimate& map) {
@@ -247,9 +247,7 @@ void print(const NamedGraph& graph, const server::JudgedGraph& judged, const Sco
 Status write_all(const RobustOptions& options, const NamedGraph& graph, const server::JudgedGraph& judged,
                  const GraphTruth& truth) {
   if (auto ok = write_graph(options.output, graph, judged.map); !ok) return ok;
-  std::filesystem::path stamps(options.output);
-  stamps.replace_filename(stamps.stem().string() + "_stamps.csv");
-  if (auto ok = write_stamps(stamps.string(), graph, judged.map); !ok) return ok;
+  if (auto ok = write_stamps(options.output, graph, judged.map); !ok) return ok;
   if (auto ok = write_file(closures_beside(options.output), closures_csv(graph, judged, truth)); !ok) return ok;
   return options.trajectories.empty() ? Status{} : write_trajectories(options.trajectories, graph, judged.map);
 }

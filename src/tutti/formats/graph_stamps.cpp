@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/graph_stamps.hpp"
 
+#include <fmt/format.h>
+
 #include <filesystem>
+#include <iterator>
 #include <limits>
 
+#include "tutti/base/file.hpp"
 #include "tutti/formats/internal/text.hpp"
 
 namespace tutti::formats {
@@ -50,6 +54,15 @@ Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const
 
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path) {
   return read_file(path).and_then([&](const std::string& text) { return parse_graph_stamps(text, path); });
+}
+
+Status write_graph_stamps(const std::string& path, std::span<const VertexStamp> stamps) {
+  std::string csv(kLayout);
+  csv += '\n';
+  for (const VertexStamp& stamp : stamps)
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{}\n", stamp.vertex_id, stamp.keyframe.chain.robot.value,
+                   stamp.keyframe.index, stamp.stamp.ns);
+  return write_file(path, csv);
 }
 
 }  // namespace tutti::formats

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,5 +28,6 @@ std::string stamps_beside(const std::string& graph_path);
 /// In file order. Errors name file and line.
 Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name);
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path);
+Status write_graph_stamps(const std::string& path, std::span<const VertexStamp> stamps);
 
 }  // namespace tutti::formats

@@ -15,6 +15,13 @@ TEST(GraphStamps, ReadsWhatAMissionWrites) {
   EXPECT_TRUE(parse_graph_stamps("", "x")->empty());
 }
 
+TEST(GraphStamps, WhatIsWrittenIsRead) {
+  const std::vector<VertexStamp> stamps{{0, {RobotId{1}, 0}, {1'700'000'000'123'456'789}}, {7, {RobotId{2}, 3}, {-5}}};
+  const std::string path = testing::TempDir() + "tutti_graph_stamps.csv";
+  ASSERT_TRUE(write_graph_stamps(path, stamps));
+  EXPECT_EQ(read_graph_stamps(path), stamps);
+}
+
 TEST(GraphStamps, SaysWhatIsWrongAndWhere) {
   for (const char* bad : {"0,1,2\n", "0,1,2,3,4\n", "0,one,2,3\n", "0,-1,2,3\n", "0,4294967296,2,3\n", "0,1,2.5,3\n",
                           "0,1,2,9223372036854775807\n", "0,1,2,nan\n"}) {

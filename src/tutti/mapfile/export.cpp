@@ -50,12 +50,11 @@ std::uint32_t component_to_show(const Content& content, const server::MapEstimat
 }  // namespace
 
 Status export_g2o(const server::MapEstimate& map, const std::filesystem::path& file) {
-  std::string csv = "id,robot,keyframe,stamp_ns\n";
-  for (std::size_t i = 0; i < map.nodes.size(); ++i)
-    csv += fmt::format("{},{},{},{}\n", i, map.nodes[i].id.chain.robot.value, map.nodes[i].id.index,
-                       map.nodes[i].stamp.ns);
+  std::vector<formats::VertexStamp> stamps;
+  for (const server::MapNode& node : map.nodes)
+    stamps.push_back({static_cast<std::int64_t>(stamps.size()), node.id, node.stamp});
   if (auto status = formats::write_g2o(file.string(), map.graph); !status) return status;
-  return write_file(formats::stamps_beside(file.string()), csv);
+  return formats::write_graph_stamps(formats::stamps_beside(file.string()), stamps);
 }
 
 Result<std::vector<std::string>> export_tum(const Content& content, const server::MapEstimate& map,

@@ -6,6 +6,7 @@
 
 #include "tutti/base/file.hpp"
 #include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/report/colours.hpp"
@@ -54,11 +55,10 @@ Status write_trajectories(const MissionRecord& record, const fs::path& out_dir) 
 /// Vertex ids are positions in the graph; the side file says which robot and moment each one is.
 Status write_graph(const ServerRecord& server, const fs::path& out_dir) {
   if (auto status = formats::write_g2o((out_dir / "graph.g2o").string(), server.graph); !status) return status;
-  std::string csv = "id,robot,keyframe,stamp_ns\n";
-  for (std::size_t i = 0; i < server.nodes.size(); ++i)
-    csv += fmt::format("{},{},{},{}\n", i, server.nodes[i].id.chain.robot.value, server.nodes[i].id.index,
-                       server.nodes[i].stamp.ns);
-  return write_file((out_dir / "graph_stamps.csv").string(), csv);
+  std::vector<formats::VertexStamp> stamps;
+  for (const NodeRecord& node : server.nodes)
+    stamps.push_back({static_cast<std::int64_t>(stamps.size()), node.id, node.stamp});
+  return formats::write_graph_stamps((out_dir / "graph_stamps.csv").string(), stamps);
 }
 
 Status write_map(const MissionRecord& record, const fs::path& out_dir) {
