@@ -28,7 +28,6 @@ namespace {
 
 constexpr const char* kCommand = "map closure";
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-constexpr double kLook_s = 2.0;  // for leases
 
 struct ClosureOptions {
   std::string map, closure, by, bus, mission;
@@ -123,7 +122,8 @@ std::optional<std::string> heard_answer(bus::Port& port, const node::WordSender&
 Status send(const ClosureOptions& options, const ClosureWord& word) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
   bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
-  auto mission = options.mission.empty() ? bus::served_mission(where, kLook_s) : options.mission;
+  auto mission = options.mission.empty() ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s))
+                                         : options.mission;
   if (!mission) return tl::unexpected(mission.error());
   where.mission = std::move(*mission);
   auto port = bus::open_nats_port(self, where);
@@ -136,8 +136,8 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
       return answer->empty() ? Status() : fail(ErrorCode::invalid, "the server does not take it: {}", *answer);
     const bus::NatsState state = (*port)->state();
     if (now_s > options.wait_s && state.waiting_messages > 0)
-      return fail(ErrorCode::io, "{}: the bus has not taken the word within {} s: {}", options.bus, options.wait_s,
-                  state.last_error);
+      return fail(ErrorCode::io, "{}: the bus has not taken the word for mission '{}' within {} s: {}", options.bus,
+                  where.mission, options.wait_s, state.last_error);
     if (now_s > options.wait_s)
       return fail(ErrorCode::io,
                   "{}: the bus has the word, but the server has not said within {} s that it has it; say it again if "

@@ -25,8 +25,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kLookForLeases_s = 2.0;  // for leases
-constexpr double kFresh_s = 6.0;          // three of the server's periods: it is there
+constexpr double kFresh_s = 6.0;  // three of the server's periods: it is there
 
 struct StatusOptions {
   std::string bus;
@@ -185,8 +184,9 @@ int watch(bus::NatsPort& port, View& view, const StatusOptions& options) {
 
 int run(const StatusOptions& options) {
   bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
-  const auto mission = options.mission.empty() ? bus::served_mission(where, std::min(kLookForLeases_s, options.wait_s))
-                                               : options.mission;
+  const auto mission = options.mission.empty()
+                           ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s))
+                           : options.mission;
   if (!mission) return complain("status", mission.error().message, 2);
   where.mission = *mission;
   auto port = bus::open_nats_port(bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid())), where);

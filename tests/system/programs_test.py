@@ -332,6 +332,7 @@ class Programs(unittest.TestCase):
 
         first = start_bus(self.path / "bus")
         server, bus = self.start_server("--bus", f"nats://127.0.0.1:{port}")
+        self.wait_for(lambda: run("status", "--bus", bus).returncode == 0, "the server on the bus")
         server.process.send_signal(signal.SIGSTOP)
         word = self.start("map", "closure", "reject", closure, "--bus", bus)
         stream = self.path / "bus/jetstream/$G/streams"

@@ -83,6 +83,10 @@ class MissionLease {
   std::thread thread_;
 };
 
+/// A bus that has lost its disk has no leases until servers have renewed theirs (MissionLease::kRenew_s, after they
+/// have connected again).
+inline constexpr double kLookForServer_s = 10.0;
+
 /// The one mission that is served on a bus, as soon as there is one: for who was told none. After so long it is what
 /// programs call theirs that are told no other (NatsPortOptions): an older server has no lease. An error: there are
 /// several.

@@ -34,12 +34,10 @@ std::uint32_t any_number() {
   return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
 }
 
-constexpr double kLooksForServer_s = 10.0;
-
 /// Who was told no mission works for the one that is there.
 Result<std::string> mission_of(const WorkerOptions& options) {
   if (!options.settings.mission.empty()) return options.settings.mission;
-  return bus::served_mission({.url = options.bus, .allow_insecure = options.insecure}, kLooksForServer_s);
+  return bus::served_mission({.url = options.bus, .allow_insecure = options.insecure}, bus::kLookForServer_s);
 }
 
 }  // namespace
