@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -54,13 +53,11 @@ void print_topics(const bags::BagInfo& info) {
 }
 
 int show_bag(const std::string& path) {
-  if (std::error_code failure; std::filesystem::is_directory(path, failure))
-    return complain("bag info", path + ": is a folder, expected an .mcap file: name the one in it");
-  auto bag = bags::McapReader::open(path);
+  const auto bag = bags::open_bag(path);
   if (!bag) return complain("bag info", bag.error().message);
-  const bags::BagInfo info = bags::inspect(*bag);
-  fmt::print("bag        {}\nmessages   {} of {} topics, in {} chunks\n\n", path, info.messages, info.topics.size(),
-             bag->chunks_read());
+  const bags::BagInfo info = bags::inspect(**bag);
+  fmt::print("bag        {}\nmessages   {} of {} topics\nstorage    {}\n\n", path, info.messages, info.topics.size(),
+             (*bag)->storage());
   if (!info.topics.empty()) print_topics(info);
   fmt::print("\n");
   for (const std::string& line : bags::uses(info)) fmt::print("{}\n", printable(line));
@@ -74,16 +71,16 @@ int show_bag(const std::string& path) {
 }  // namespace
 
 void add_bag_command(CLI::App& app, int& exit_code) {
-  auto* bag = app.add_subcommand("bag", "What robots have recorded: MCAP files, as rosbag2 writes them.");
+  auto* bag = app.add_subcommand("bag", "What robots have recorded: rosbag2's folders, .mcap and .db3 files.");
   bag->require_subcommand(1);
   const auto path = std::make_shared<std::string>();
   auto* info = bag->add_subcommand(
       "info", "Topics with type, count, rate, times and frames; what Tutti would use of them, and what is missing.");
   info->footer(
-      "All of the file is read, one chunk at a time. One that is cut off is read up to the cut.\n"
+      "All of the bag is read, one chunk at a time. One that is cut off is read up to the cut.\n"
       "No mission runs from a bag yet: this only says what is in it.\n"
-      "Example: tutti bag info recording_0.mcap\n");
-  info->add_option("bag", *path, "An MCAP file; its chunks may be packed by zstd or lz4.")
+      "Example: tutti bag info recording/\n");
+  info->add_option("bag", *path, "A folder that rosbag2 wrote, or an .mcap or .db3 file; packed by zstd or lz4 or not.")
       ->required()
       ->type_name("BAG");
   info->callback([path, &exit_code] { exit_code = show_bag(*path); });

@@ -7,6 +7,7 @@
 #include "fuzz/fuzz_target.hpp"
 #include "support/wire/messages.hpp"
 #include "tutti/bags/bag_info.hpp"
+#include "tutti/bags/mcap_reader.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/check.hpp"
 #include "tutti/formats/g2o.hpp"

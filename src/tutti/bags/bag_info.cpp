@@ -70,7 +70,7 @@ Result<std::string> frames_of(std::string_view type, std::string_view cdr) {
   return std::string();
 }
 
-void look_at(TopicInfo& topic, const McapMessage& message) {
+void look_at(TopicInfo& topic, const BagMessage& message) {
   if (topic.count++ == 0 && topic.use != Use::nothing) {
     const auto frames =
         message.channel->message_encoding == "cdr"
@@ -103,18 +103,18 @@ double TopicInfo::rate_hz() const {
   return seconds > 0.0 ? static_cast<double>(count - 1) / seconds : 0.0;
 }
 
-BagInfo inspect(McapReader& bag) {
+BagInfo inspect(BagReader& bag) {
   BagInfo out;
   // One topic may have several channels, as in bags that were joined: of one type they are one.
   std::map<std::pair<std::string, std::string>, TopicInfo> topics;
-  const auto topic_of = [&topics](const McapChannel& channel) -> TopicInfo& {
+  const auto topic_of = [&topics](const BagChannel& channel) -> TopicInfo& {
     TopicInfo& topic = topics[{channel.topic, channel.type}];
     topic.topic = channel.topic;
     topic.type = channel.type;
     topic.use = use_of(channel.type);
     return topic;
   };
-  std::map<std::uint16_t, TopicInfo*> of_channel;
+  std::map<const BagChannel*, TopicInfo*> of_channel;
   while (true) {
     const auto message = bag.next();
     if (!message) {
@@ -122,16 +122,15 @@ BagInfo inspect(McapReader& bag) {
       continue;
     }
     if (!*message) break;
-    TopicInfo*& topic = of_channel[(*message)->channel_id];
+    TopicInfo*& topic = of_channel[(*message)->channel];
     if (!topic) topic = &topic_of(*(*message)->channel);
     look_at(*topic, **message);
     ++out.messages;
   }
-  for (const auto& [id, channel] : bag.channels()) topic_of(channel);
+  for (const BagChannel* const channel : bag.channels()) topic_of(*channel);
   out.notes = bag.notes();
-  if (const auto& summary = bag.summary(); summary && summary->messages != out.messages)
-    out.notes.push_back(
-        fmt::format("its statistics say {} messages, {} could be read", summary->messages, out.messages));
+  if (const auto stated = bag.stated_messages(); stated && *stated != out.messages)
+    out.notes.push_back(fmt::format("its statistics say {} messages, {} could be read", *stated, out.messages));
   for (auto& [name, topic] : topics) out.topics.push_back(std::move(topic));
   return out;
 }

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tutti/bags/mcap_reader.hpp"
+#include "tutti/bags/bag_reader.hpp"
 
 namespace tutti::bags {
 
@@ -34,7 +34,7 @@ struct BagInfo {
 };
 
 /// Reads all of the bag once, one chunk at a time.
-BagInfo inspect(McapReader& bag);
+BagInfo inspect(BagReader& bag);
 
 /// What Tutti would take from it, a line each: "odometry     /odom (27.1 Hz), odom -> base_link". Several of a kind are
 /// all named, and of what is missing it says what that means.

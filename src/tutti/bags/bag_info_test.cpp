@@ -8,6 +8,7 @@
 
 #include "support/bags/bag_writer.hpp"
 #include "support/shared_data.hpp"
+#include "tutti/bags/mcap_reader.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
 namespace tutti::bags {
@@ -96,7 +97,7 @@ TEST(BagInfo, EveryMessageOfARealBagIsDecoded) {
   auto reader = McapReader::open(::tutti::test::shared_path("data/mcap/nav2_turtlebot.mcap").string()).value();
   std::map<std::string, std::uint64_t> counts;
   for (auto message = reader.next(); message && *message; message = reader.next()) {
-    const McapMessage& one = **message;
+    const BagMessage& one = **message;
     ++counts[one.channel->topic];
     if (use_of(one.channel->type) == Use::odometry) {
       const auto sample = decode_odometry(one.data);

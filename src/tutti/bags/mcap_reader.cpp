@@ -51,12 +51,6 @@ Timestamp stamp(Cursor& cursor, std::string_view what) {
   return Timestamp{static_cast<std::int64_t>(ns & static_cast<std::uint64_t>(kLastTimestamp.ns))};
 }
 
-std::string what_else(std::string_view magic) {
-  if (magic.starts_with("SQLite")) return " (an SQLite file: rosbag2's .db3 is not read)";
-  if (magic.starts_with("#ROSBAG")) return " (a ROS 1 bag, which is not read)";
-  return "";
-}
-
 }  // namespace
 
 template <class... Args>
@@ -86,8 +80,7 @@ Status McapReader::start() {
   size_ = stream_at_ = static_cast<std::uint64_t>(end);
   std::string magic;
   if (auto ok = read_bytes(0, std::min<std::uint64_t>(size_, kMagic.size()), magic); !ok) return ok;
-  if (magic != kMagic)
-    return fail(ErrorCode::parse, "{}: byte 0: is no MCAP file, expected 89 'MCAP0' 0d 0a{}", name_, what_else(magic));
+  if (magic != kMagic) return fail(ErrorCode::parse, "{}: byte 0: is no MCAP file, expected 89 'MCAP0' 0d 0a", name_);
   offset_ = kMagic.size();
   look_at_summary();
   return {};
@@ -121,7 +114,7 @@ Result<McapReader::Record> McapReader::record_at(std::uint64_t offset) {
 
 void McapReader::end(std::string note) {
   ended_ = true;
-  if (!note.empty()) notes_.push_back(std::move(note));
+  if (!note.empty() && std::ranges::find(notes_, note) == notes_.end()) notes_.push_back(std::move(note));
 }
 
 /// Messages do not need the summary: one that is not there, or broken, is only noted.
@@ -207,7 +200,7 @@ Status McapReader::define_channel(const Record& record, std::string_view content
   Cursor cursor(content);
   const auto id = cursor.number<std::uint16_t>("id");
   const auto schema = cursor.number<std::uint16_t>("schema_id");
-  McapChannel channel;
+  BagChannel channel;
   channel.topic = cursor.counted("topic");
   channel.message_encoding = cursor.counted("message_encoding");
   cursor.counted("metadata");
@@ -227,23 +220,23 @@ Status McapReader::define_channel(const Record& record, std::string_view content
   return {};
 }
 
-Result<McapMessage> McapReader::to_message(const Record& record, std::string_view content) const {
+Result<BagMessage> McapReader::to_message(const Record& record, std::string_view content) const {
   Cursor cursor(content);
-  McapMessage message{.offset = record.offset};
-  message.channel_id = cursor.number<std::uint16_t>("channel_id");
+  BagMessage message{.position = {.at = record.offset, .inside = record.inside}};
+  const auto id = cursor.number<std::uint16_t>("channel_id");
   cursor.number<std::uint32_t>("sequence");
   message.log_time = stamp(cursor, "log_time");
   message.publish_time = stamp(cursor, "publish_time");
   if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
   message.data = cursor.take(cursor.left(), "data");
-  const auto channel = channels_.find(message.channel_id);
+  const auto channel = channels_.find(id);
   if (channel == channels_.end())
-    return fail_at(record, ErrorCode::invalid, "channel {}, expected one that is defined before", message.channel_id);
+    return fail_at(record, ErrorCode::invalid, "channel {}, expected one that is defined before", id);
   message.channel = &channel->second;
   return message;
 }
 
-Result<std::optional<McapMessage>> McapReader::take(const Record& record, std::string_view content) {
+Result<std::optional<BagMessage>> McapReader::take(const Record& record, std::string_view content) {
   Status ok;
   if (record.opcode == kMessage) {
     const auto message = to_message(record, content);
@@ -282,22 +275,51 @@ Status McapReader::enter_chunk(const Record& record, bool cut) {
   return {};
 }
 
-Result<std::optional<McapMessage>> McapReader::next() {
+Result<std::optional<BagMessage>> McapReader::next() {
   while (true) {
     auto message = chunk_.empty() ? next_of_file() : next_of_chunk();
     if (!message || *message || (ended_ && chunk_.empty())) return message;
   }
 }
 
+Status McapReader::seek(const BagPosition& position) {
+  if (chunk_.empty() || chunk_offset_ != position.at) {
+    chunk_.clear();
+    ended_ = false;
+    offset_ = position.at;
+    const auto record = record_at(offset_);
+    if (!record) return tl::unexpected(record.error());
+    if (record->opcode != kChunk) return {};
+    if (const auto entered = next_of_file(); !entered) return tl::unexpected(entered.error());
+  }
+  if (position.inside > chunk_.size())
+    return fail(ErrorCode::parse, "{}: byte {}: chunk of {} bytes, expected more than {}: has the file changed?", name_,
+                position.at, chunk_.size(), position.inside);
+  chunk_at_ = position.inside;
+  return {};
+}
+
+std::vector<const BagChannel*> McapReader::channels() const {
+  std::vector<const BagChannel*> out;
+  for (const auto& [id, channel] : channels_) out.push_back(&channel);
+  return out;
+}
+
+std::optional<std::uint64_t> McapReader::stated_messages() const {
+  return summary_ ? std::optional(summary_->messages) : std::nullopt;
+}
+
+std::string McapReader::storage() const { return fmt::format("MCAP, {} chunks", chunks_read_); }
+
 /// Nothing if the record was none of a message; then the chunk may have come to its end.
-Result<std::optional<McapMessage>> McapReader::next_of_chunk() {
+Result<std::optional<BagMessage>> McapReader::next_of_chunk() {
   const std::size_t left = chunk_.size() - chunk_at_;
   Cursor cursor(std::string_view(chunk_).substr(chunk_at_));
-  Record record{.offset = chunk_offset_};
+  Record record{.offset = chunk_offset_, .inside = chunk_at_};
   record.opcode = left > 0 ? cursor.number<std::uint8_t>("opcode") : std::uint8_t{0};
   record.size = left > 0 ? cursor.number<std::uint64_t>("length") : 0;
   if (left == 0 || !cursor.ok() || record.size > cursor.left()) {
-    Result<std::optional<McapMessage>> out = std::nullopt;
+    Result<std::optional<BagMessage>> out = std::nullopt;
     if (left > 0 && !chunk_cut_)
       out = fail_at(record, ErrorCode::parse, "at byte {} of its {}: wants {} bytes, {} are left", chunk_at_,
                     chunk_.size(), record.size, cursor.left());
@@ -308,7 +330,7 @@ Result<std::optional<McapMessage>> McapReader::next_of_chunk() {
   return take(record, cursor.take(record.size, "content"));
 }
 
-Result<std::optional<McapMessage>> McapReader::next_of_file() {
+Result<std::optional<BagMessage>> McapReader::next_of_file() {
   const std::uint64_t left = size_ - offset_;
   if (ended_) return std::nullopt;
   if (left < kRecordHeadBytes) {

@@ -11,25 +11,11 @@
 #include <string_view>
 #include <vector>
 
+#include "tutti/bags/bag_reader.hpp"
 #include "tutti/base/result.hpp"
-#include "tutti/base/timestamp.hpp"
 
 /// MCAP files (https://mcap.dev/spec): what rosbag2 records since ROS 2 Iron.
 namespace tutti::bags {
-
-struct McapChannel {
-  std::string topic;
-  std::string type;              ///< "nav_msgs/msg/Odometry"; empty of a channel without schema.
-  std::string message_encoding;  ///< "cdr"
-};
-
-struct McapMessage {
-  std::uint16_t channel_id = 0;
-  const McapChannel* channel = nullptr;  ///< The reader's.
-  Timestamp log_time, publish_time;
-  std::string_view data;     ///< Valid until the reader is asked for the next one.
-  std::uint64_t offset = 0;  ///< Of its record in the file, bytes; of its chunk if it is in one.
-};
 
 /// What the file's own statistics say.
 struct McapSummary {
@@ -39,31 +25,30 @@ struct McapSummary {
   std::uint64_t chunk_indexes = 0;  ///< and how many of them are indexed.
 };
 
-/// Reads messages in the order of the file, chunked or not, with or without summary, and never holds more than one
-/// chunk. Chunks whose CRC is not theirs are refused. A file that is cut off is read up to the last whole message, also
-/// within its last chunk, and a note says so. An error names file, byte, record and what was expected, and costs one
-/// record or chunk: whoever asks again gets what comes behind it.
-class McapReader {
+/// Reads files chunked or not, with or without summary. Chunks whose CRC is not theirs are refused. A file that is cut
+/// off is read up to the last whole message, also within its last chunk, and a note says so. An error names byte and
+/// record.
+class McapReader final : public BagReader {
  public:
   static Result<McapReader> open(const std::string& path);
   /// `name` is for the errors.
   static Result<McapReader> open(std::unique_ptr<std::istream> stream, std::string name);
 
-  /// Nothing at the end of the file.
-  Result<std::optional<McapMessage>> next();
-
-  /// Those that were met so far, and at once those of the summary.
-  [[nodiscard]] const std::map<std::uint16_t, McapChannel>& channels() const { return channels_; }
+  Result<std::optional<BagMessage>> next() override;
+  Status seek(const BagPosition& position) override;
+  /// Of the summary at once.
+  [[nodiscard]] std::vector<const BagChannel*> channels() const override;
+  [[nodiscard]] std::optional<std::uint64_t> stated_messages() const override;
+  [[nodiscard]] std::vector<std::string> notes() const override { return notes_; }
+  [[nodiscard]] std::string storage() const override;
   [[nodiscard]] const std::optional<McapSummary>& summary() const { return summary_; }
-  /// What is odd about the file without being in the way, such as where it is cut off.
-  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
-  [[nodiscard]] std::uint64_t chunks_read() const { return chunks_read_; }
 
  private:
   struct Record {
     std::uint8_t opcode = 0;
     std::uint64_t size = 0;
-    std::uint64_t offset = 0;
+    std::uint64_t offset = 0;  ///< Of it in the file, or of its chunk,
+    std::uint64_t inside = 0;  ///< and of it in that.
   };
 
   McapReader(std::unique_ptr<std::istream> stream, std::string name)
@@ -73,14 +58,14 @@ class McapReader {
   Status read_summary(std::uint64_t begin, std::uint64_t end);
   Status read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out);
   Result<Record> record_at(std::uint64_t offset);
-  Result<std::optional<McapMessage>> next_of_file();
-  Result<std::optional<McapMessage>> next_of_chunk();
-  Result<std::optional<McapMessage>> take(const Record& record, std::string_view content);
+  Result<std::optional<BagMessage>> next_of_file();
+  Result<std::optional<BagMessage>> next_of_chunk();
+  Result<std::optional<BagMessage>> take(const Record& record, std::string_view content);
   Status enter_chunk(const Record& record, bool cut);
   Status define_schema(const Record& record, std::string_view content);
   Status define_channel(const Record& record, std::string_view content);
   Status take_statistics(const Record& record, std::string_view content);
-  Result<McapMessage> to_message(const Record& record, std::string_view content) const;
+  Result<BagMessage> to_message(const Record& record, std::string_view content) const;
   void end(std::string note);
   template <class... Args>
   [[nodiscard]] tl::unexpected<Error> fail_at(const Record& record, ErrorCode code, fmt::format_string<Args...> format,
@@ -99,7 +84,7 @@ class McapReader {
   bool chunk_cut_ = false;          ///< and whether the file ends in it.
   std::uint64_t chunks_read_ = 0;
   std::map<std::uint16_t, std::string> schemas_;  ///< Names.
-  std::map<std::uint16_t, McapChannel> channels_;
+  std::map<std::uint16_t, BagChannel> channels_;
   std::optional<McapSummary> summary_;
   std::vector<std::string> notes_;
 };

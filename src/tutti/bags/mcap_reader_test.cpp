@@ -66,7 +66,7 @@ TEST_P(McapFiles, AreReadInOrder) {
   auto reader = reader_of(bag(GetParam())).value();
   ASSERT_TRUE(reader.summary());
   EXPECT_EQ(reader.summary()->messages, 6U);
-  EXPECT_EQ(reader.channels().at(1).type, "pkg/msg/Type");  // before any message was read
+  EXPECT_EQ(reader.channels().at(0)->type, "pkg/msg/Type");  // before any message was read
   const Read read = read_all(reader);
   EXPECT_EQ(read.messages, (std::vector<std::string>{"/a 0 data0", "/a 1 data1", "/a 2 data2", "/a 3 data3",
                                                      "/a 4 data4", "/a 5 data5"}));
@@ -181,8 +181,6 @@ TEST(Mcap, ABrokenSummaryIsOnlyNoted) {
 }
 
 TEST(Mcap, OtherFilesAreNamed) {
-  EXPECT_NE(reader_of("SQLite format 3").error().message.find(".db3"), std::string::npos);
-  EXPECT_NE(reader_of("#ROSBAG V2.0\n").error().message.find("ROS 1"), std::string::npos);
   EXPECT_NE(reader_of("").error().message.find("no MCAP file"), std::string::npos);
   EXPECT_EQ(McapReader::open("/no/such/file").error().code, ErrorCode::io);
 }

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/db3_reader.hpp"
+
+#include <sqlite3.h>
+
+#include <cctype>
+#include <cstddef>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+
+namespace tutti::bags {
+namespace {
+
+/// A "file:" URI, in which '?', '#' and '%' mean something.
+std::string uri_of(const std::string& path, const char* parameters) {
+  std::error_code failure;
+  std::string out = "file:";
+  for (const char c : std::filesystem::absolute(path, failure).string())
+    out += std::isalnum(static_cast<unsigned char>(c)) != 0 || std::string_view("/._-").find(c) != std::string::npos
+               ? std::string(1, c)
+               : fmt::format("%{:02x}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+  return out + parameters;
+}
+
+std::string text(sqlite3_stmt* row, int column) {
+  const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+  return bytes == nullptr ? std::string()
+                          : std::string(bytes, static_cast<std::size_t>(sqlite3_column_bytes(row, column)));
+}
+
+}  // namespace
+
+void Db3Reader::Close::operator()(sqlite3* database) const { sqlite3_close(database); }
+void Db3Reader::Close::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+tl::unexpected<Error> Db3Reader::fail_sqlite() const {
+  return fail(ErrorCode::parse, "{}: SQLite: {}", name_, sqlite3_errmsg(database_.get()));
+}
+
+Result<Db3Reader> Db3Reader::open(const std::string& path) {
+  std::error_code failure;
+  if (!std::filesystem::exists(path, failure)) return fail(ErrorCode::io, "{}: cannot be opened", path);
+  // A file that was left with a write-ahead log wants its shared memory beside it, where nothing may be written: then
+  // it is taken as it stands.
+  for (const char* const how : {"?mode=ro", "?immutable=1"}) {
+    Db3Reader reader(path);
+    const Status ok = reader.start(uri_of(path, how));
+    if (ok) return reader;
+    if (std::string_view(how) == "?immutable=1") return tl::unexpected(ok.error());
+  }
+  return fail(ErrorCode::io, "{}: cannot be opened", path);
+}
+
+Status Db3Reader::start(const std::string& uri) {
+  sqlite3* opened = nullptr;
+  const int code =
+      sqlite3_open_v2(uri.c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
+  database_.reset(opened);
+  if (code != SQLITE_OK) return fail_sqlite();
+  // The file is anybody's: its schema may run nothing.
+  sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(opened, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  if (auto ok = read_topics(); !ok) return ok;
+  auto messages = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id >= ? ORDER BY id");
+  if (!messages) return tl::unexpected(messages.error());
+  messages_ = std::move(*messages);
+  return seek({.at = 0});
+}
+
+Result<Db3Reader::Statement> Db3Reader::prepare(const char* sql) const {
+  sqlite3_stmt* made = nullptr;
+  if (sqlite3_prepare_v2(database_.get(), sql, -1, &made, nullptr) != SQLITE_OK)
+    return fail(ErrorCode::parse, "{}: SQLite: {}, expected rosbag2's tables topics and messages", name_,
+                sqlite3_errmsg(database_.get()));
+  return Statement(made);
+}
+
+Status Db3Reader::read_topics() {
+  const auto topics = prepare("SELECT id, name, type, serialization_format FROM topics");
+  if (!topics) return tl::unexpected(topics.error());
+  int code = SQLITE_OK;
+  while ((code = sqlite3_step(topics->get())) == SQLITE_ROW)
+    channels_[sqlite3_column_int64(topics->get(), 0)] = {text(topics->get(), 1), text(topics->get(), 2),
+                                                         text(topics->get(), 3)};
+  return code == SQLITE_DONE ? Status{} : fail_sqlite();
+}
+
+Status Db3Reader::seek(const BagPosition& position) {
+  ended_ = false;
+  sqlite3_reset(messages_.get());
+  const auto first = position.at == 0 ? INT64_MIN : static_cast<std::int64_t>(position.at);
+  if (sqlite3_bind_int64(messages_.get(), 1, first) != SQLITE_OK) return fail_sqlite();
+  return {};
+}
+
+Result<std::optional<BagMessage>> Db3Reader::next() {
+  if (ended_) return std::nullopt;
+  sqlite3_stmt* const row = messages_.get();
+  const int code = sqlite3_step(row);
+  if (code != SQLITE_ROW) {
+    ended_ = true;
+    if (code != SQLITE_DONE) return fail_sqlite();
+    return std::nullopt;
+  }
+  const std::int64_t id = sqlite3_column_int64(row, 0), topic = sqlite3_column_int64(row, 1);
+  const auto channel = channels_.find(topic);
+  if (channel == channels_.end())
+    return fail(ErrorCode::invalid, "{}: message {}: topic {}, expected one of the table of topics", name_, id, topic);
+  BagMessage message{.channel = &channel->second, .position = {.at = static_cast<std::uint64_t>(id)}};
+  message.log_time = message.publish_time = Timestamp{sqlite3_column_int64(row, 2)};
+  const auto* const data = static_cast<const char*>(sqlite3_column_blob(row, 3));
+  if (data != nullptr) message.data = {data, static_cast<std::size_t>(sqlite3_column_bytes(row, 3))};
+  return message;
+}
+
+std::vector<const BagChannel*> Db3Reader::channels() const {
+  std::vector<const BagChannel*> out;
+  for (const auto& [id, channel] : channels_) out.push_back(&channel);
+  return out;
+}
+
+}  // namespace tutti::bags

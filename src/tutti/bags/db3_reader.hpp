@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tutti/bags/bag_reader.hpp"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace tutti::bags {
+
+/// rosbag2's SQLite files (.db3): one row a message, CDR as in MCAP. The file is never written, nor is anything beside
+/// it. An error of SQLite's (a damaged page) ends the reading; rows before it came out.
+class Db3Reader final : public BagReader {
+ public:
+  static Result<Db3Reader> open(const std::string& path);
+
+  Result<std::optional<BagMessage>> next() override;
+  Status seek(const BagPosition& position) override;
+  [[nodiscard]] std::vector<const BagChannel*> channels() const override;
+  [[nodiscard]] std::string storage() const override { return "SQLite"; }
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const;
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  using Statement = std::unique_ptr<sqlite3_stmt, Close>;
+
+  explicit Db3Reader(std::string name) : name_(std::move(name)) {}
+  Status start(const std::string& uri);
+  Status read_topics();
+  [[nodiscard]] Result<Statement> prepare(const char* sql) const;
+  [[nodiscard]] tl::unexpected<Error> fail_sqlite() const;
+
+  std::string name_;
+  std::unique_ptr<sqlite3, Close> database_;
+  Statement messages_;
+  bool ended_ = false;
+  std::map<std::int64_t, BagChannel> channels_;
+};
+
+}  // namespace tutti::bags

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "tutti/base/result.hpp"
+
+namespace tutti::bags::internal {
+
+inline constexpr std::string_view kZstdMagic = "\x28\xb5\x2f\xfd";
+
+/// What a file that is packed by zstd holds, in a file among the system's temporary ones, which is gone with this.
+class PackedFile {
+ public:
+  /// Piece by piece. What comes out of a file that is cut off before the cut is kept.
+  static Result<PackedFile> unpack(const std::string& path);
+  ~PackedFile();
+  PackedFile(PackedFile&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+  PackedFile& operator=(PackedFile&&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  explicit PackedFile(std::string path) : path_(std::move(path)) {}
+  std::string path_;
+};
+
+/// A message that rosbag2 packed by itself: one frame of zstd's that says its size.
+Result<std::string> unpack_message(std::string_view packed);
+
+}  // namespace tutti::bags::internal
