@@ -328,25 +328,31 @@ std::string describe_bound(const Bound& bound) {
   return "";
 }
 
-void Loader::finish() {
-  if (node_.kind != ConfigNode::Kind::map && node_.kind != ConfigNode::Kind::null)
-    complain(node_, path_, "expected a map of settings");
-  for (const auto& [key, value] : node_.map) {
-    if (std::ranges::find(known_, key) != known_.end()) continue;
-    const auto nearest = std::ranges::min_element(known_, {}, [&key](const auto& k) { return edit_distance(key, k); });
+namespace {
+
+/// Keys of a place that no struct knows.
+void complain_of_unknown(Findings& findings, const std::string& path, const Findings::Place& place) {
+  const auto& [node, known] = place;
+  if (node->kind != ConfigNode::Kind::map && node->kind != ConfigNode::Kind::null)
+    complain(findings, *node, path, "expected a map of settings");
+  for (const auto& [key, value] : node->map) {
+    if (std::ranges::find(known, key) != known.end()) continue;
+    const auto nearest = std::ranges::min_element(known, {}, [&key](const auto& k) { return edit_distance(key, k); });
     const bool close =
-        nearest != known_.end() && edit_distance(key, *nearest) <= std::max<std::size_t>(2, key.size() / 2);
-    complain(value, path_.empty() ? key : path_ + "." + key,
+        nearest != known.end() && edit_distance(key, *nearest) <= std::max<std::size_t>(2, key.size() / 2);
+    complain(findings, value, path.empty() ? key : path + "." + key,
              close ? fmt::format("unknown key, did you mean '{}'?", *nearest)
-                   : fmt::format("unknown key, known here: {}", fmt::join(known_, ", ")));
+                   : fmt::format("unknown key, known here: {}", fmt::join(known, ", ")));
   }
 }
 
+}  // namespace
+
 /// Kept as ":12: path: text"; to_status() puts the document's name in front.
-void Loader::complain(const ConfigNode& node, const std::string& path, const std::string& text) {
+void complain(Findings& findings, const ConfigNode& node, const std::string& path, const std::string& text) {
   const std::string where = path.empty() ? "" : path + ": ";
-  problems_.push_back(node.line > 0 ? fmt::format(":{}: {}{}", node.line, where, text)
-                                    : fmt::format(": {}{}", where, text));
+  findings.problems.push_back(node.line > 0 ? fmt::format(":{}: {}{}", node.line, where, text)
+                                            : fmt::format(": {}{}", where, text));
 }
 
 Status to_status(const std::string& name, const std::vector<std::string>& problems) {
@@ -357,4 +363,29 @@ Status to_status(const std::string& name, const std::vector<std::string>& proble
 }
 
 }  // namespace config_internal
+
+Status ConfigLoader::finish(const std::string& name) {
+  for (const auto& [path, place] : findings_.places) config_internal::complain_of_unknown(findings_, path, place);
+  return config_internal::to_status(name, findings_.problems);
+}
+
+void merge_config(ConfigNode& into, const ConfigNode& more) {
+  if (into.kind != more.kind || into.kind == ConfigNode::Kind::scalar) {
+    into = more;
+    return;
+  }
+  for (const auto& [key, value] : more.map) {
+    const auto found = std::ranges::find(into.map, key, &std::pair<std::string, ConfigNode>::first);
+    if (found == into.map.end())
+      into.map.emplace_back(key, value);
+    else
+      merge_config(found->second, value);
+  }
+  for (std::size_t i = 0; i < more.list.size(); ++i)
+    if (i < into.list.size())
+      merge_config(into.list[i], more.list[i]);
+    else
+      into.list.push_back(more.list[i]);
+}
+
 }  // namespace tutti

@@ -5,6 +5,7 @@
 
 #include <concepts>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -66,6 +67,8 @@ std::string type_name(const int&);
 std::string type_name(const std::uint64_t&);
 std::string type_name(const double&);
 std::string type_name(const std::string&);
+struct Findings;
+void complain(Findings& findings, const ConfigNode& node, const std::string& path, const std::string& text);
 /// What stands there, for messages: "'2.5'", "a list", "a map", "nothing".
 std::string show(const ConfigNode& node);
 /// Empty when the value is inside; otherwise "must be > 0".
@@ -81,40 +84,51 @@ std::string check_bound(const Bound& bound, const T& value) {
     return violation(bound, static_cast<double>(value));
 }
 
+/// What was found while a document was read into one or several structs.
+struct Findings {
+  /// A map of the document, and the keys that some struct knows there.
+  struct Place {
+    const ConfigNode* node = nullptr;
+    std::vector<std::string> known;
+  };
+  std::vector<std::string> problems;
+  std::map<std::string, Place> places;  ///< By path.
+};
+
 /// Reads a node into a struct; collects every problem.
 class Loader {
  public:
-  Loader(const ConfigNode& node, std::string path, std::vector<std::string>& problems)
-      : node_(node), path_(std::move(path)), problems_(problems) {}
+  Loader(const ConfigNode& node, std::string path, Findings& findings)
+      : node_(node), path_(std::move(path)), findings_(findings) {
+    findings_.places[path_].node = &node;
+  }
 
   template <class T>
   void field(std::string_view name, T& value, const Bound& bound = {}, std::string_view = {}) {
-    known_.emplace_back(name);
+    findings_.places[path_].known.emplace_back(name);
     const ConfigNode* child = node_.find(name);
     const std::string path = path_.empty() ? std::string(name) : path_ + "." + std::string(name);
     if (child == nullptr || child->kind == ConfigNode::Kind::null) return;
     read(*child, path, value, bound);
   }
-  /// Call after describe(): reports keys nobody asked for.
-  void finish();
 
  private:
   template <class T>
   void read(const ConfigNode& node, const std::string& path, T& value, const Bound& bound) {
     if constexpr (Scalar<T>) {
       if (node.kind != ConfigNode::Kind::scalar || !parse_scalar(node.scalar, value)) {
-        complain(node, path, fmt::format("expected {}, got {}", type_name(value), show(node)));
+        complain(findings_, node, path, fmt::format("expected {}, got {}", type_name(value), show(node)));
         return;
       }
       if (auto text = check_bound(bound, value); !text.empty())
-        complain(node, path, fmt::format("is {}, {}", node.scalar, text));
+        complain(findings_, node, path, fmt::format("is {}, {}", node.scalar, text));
     } else if constexpr (is_optional<T>::value) {
       typename T::value_type inner{};
       read(node, path, inner, bound);
       value = inner;
     } else if constexpr (is_vector<T>::value) {
       if (node.kind != ConfigNode::Kind::list) {
-        complain(node, path, "expected a list");
+        complain(findings_, node, path, "expected a list");
         return;
       }
       value.clear();
@@ -125,20 +139,16 @@ class Loader {
       }
     } else {
       if (node.kind != ConfigNode::Kind::map) {
-        complain(node, path, "expected a map of settings");
+        complain(findings_, node, path, "expected a map of settings");
         return;
       }
-      Loader nested(node, path, problems_);
+      Loader nested(node, path, findings_);
       value.describe(nested);
-      nested.finish();
     }
   }
-  void complain(const ConfigNode& node, const std::string& path, const std::string& text);
-
   const ConfigNode& node_;
   std::string path_;
-  std::vector<std::string>& problems_;
-  std::vector<std::string> known_;
+  Findings& findings_;
 };
 
 /// Writes a struct into a node.
@@ -207,15 +217,32 @@ Status to_status(const std::string& name, const std::vector<std::string>& proble
 
 }  // namespace config_internal
 
+/// Fills several structs from one document: each takes the keys it knows, and every key must be known to one of them.
+/// The nodes must live until finish().
+class ConfigLoader {
+ public:
+  template <class T>
+  void load(const ConfigNode& node, T& config) {
+    config_internal::Loader loader(node, "", findings_);
+    config.describe(loader);
+  }
+  /// Every violation is in the one message; `name` is the document's.
+  Status finish(const std::string& name);
+
+ private:
+  config_internal::Findings findings_;
+};
+
 /// Fills `config` from a node; every violation is in the one message.
 template <class T>
 Status load_config(const ConfigNode& node, T& config, const std::string& name) {
-  std::vector<std::string> problems;
-  config_internal::Loader loader(node, "", problems);
-  config.describe(loader);
-  loader.finish();
-  return config_internal::to_status(name, problems);
+  ConfigLoader loader;
+  loader.load(node, config);
+  return loader.finish(name);
 }
+
+/// Adds what `more` has to `into`: maps key by key, lists element by element; what both have is as in `more`.
+void merge_config(ConfigNode& into, const ConfigNode& more);
 
 template <class T>
 ConfigNode dump_config(T config) {

@@ -116,9 +116,9 @@ TEST(Config, ReportsEveryProblemWithLinePathValueAndBound) {
             "x.yaml:8: base.name: is charlie, must be one of alpha, bravo\n"
             "x.yaml:9: base.offset_m: expected a list\n"
             "x.yaml:2: robots.0.voxel_m: is -1, must be > 0\n"
-            "x.yaml:3: robots.0.nmae: unknown key, did you mean 'name'?\n"
             "x.yaml:11: completely_different_words: unknown key, known here: enable_feedback, min_inliers, seed, "
-            "limit_s, base, robots");
+            "limit_s, base, robots\n"
+            "x.yaml:3: robots.0.nmae: unknown key, did you mean 'name'?");
 }
 
 TEST(Config, SaysWhatStandsThereInstead) {
@@ -319,6 +319,63 @@ TEST(Config, NotANumberIsOutsideEveryBound) {
   EXPECT_EQ(config_internal::violation(at_least(0.0), 0.0), "");
   EXPECT_EQ(config_internal::violation(between(0.0, 1.0), 1.0), "");
   EXPECT_EQ(config_internal::violation({.high = 1.0}, 1.5), "must be <= 1");
+}
+
+/// What another reader takes from the documents of Settings.
+struct More {
+  struct Robot {
+    double speed_mps = 1.0;
+    template <class V>
+    void describe(V& v) {
+      v.field("speed_mps", speed_mps, greater_than(0.0), "How fast.");
+    }
+  };
+  std::string weather = "dry";
+  std::vector<Robot> robots;
+  template <class V>
+  void describe(V& v) {
+    v.field("weather", weather);
+    v.field("robots", robots);
+  }
+};
+
+TEST(ConfigLoader, EveryKeyIsOfOneOfTheReaders) {
+  const auto load = [](const std::string& text) {
+    const ConfigNode node = parse(text);
+    std::pair<Settings, More> read;
+    ConfigLoader loader;
+    loader.load(node, read.first);
+    loader.load(node, read.second);
+    const Status status = loader.finish("x.yaml");
+    EXPECT_EQ(read.second.weather, "wet");
+    return std::pair(read, status ? "" : status.error().message);
+  };
+  const auto [read, problem] = load("weather: wet\nseed: 5\nrobots: [{name: bravo, speed_mps: 2}, {}]\n");
+  EXPECT_EQ(problem, "");
+  EXPECT_EQ(read.first.seed, 5U);
+  EXPECT_EQ(read.first.robots.at(0).name, "bravo");
+  EXPECT_EQ(read.second.robots.at(0).speed_mps, 2.0);
+  EXPECT_EQ(read.second.robots.at(1).speed_mps, 1.0);
+  EXPECT_EQ(load("weather: wet\nrobots: [{speed_mp: 2}]\nwether: dry").second,
+            "x.yaml:3: wether: unknown key, did you mean 'weather'?\n"
+            "x.yaml:2: robots.0.speed_mp: unknown key, did you mean 'speed_mps'?");
+  EXPECT_EQ(load("weather: wet\nrobots: [{speed_mps: -1, voxel_m: 0}]").second,
+            "x.yaml:2: robots.0.voxel_m: is 0, must be > 0\nx.yaml:2: robots.0.speed_mps: is -1, must be > 0");
+}
+
+TEST(Config, MergedDumpsLoadBackBoth) {
+  Settings settings{.seed = 7, .robots = {{.name = "bravo"}, {}}};
+  ConfigNode both = dump_config(settings);
+  merge_config(both, dump_config(More{.weather = "wet", .robots = {{.speed_mps = 3.0}, {}}}));
+  Settings again;
+  More more;
+  ConfigLoader loader;
+  loader.load(both, again);
+  loader.load(both, more);
+  ASSERT_TRUE(loader.finish("x").has_value());
+  EXPECT_EQ(again, settings);
+  EXPECT_EQ(more.weather, "wet");
+  EXPECT_EQ(more.robots.at(0).speed_mps, 3.0);
 }
 
 TEST(Config, DocumentsEveryField) {
