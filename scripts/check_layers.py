@@ -31,8 +31,10 @@ CONFINED = [
 FORBIDDEN = re.compile(
     r"\bstd::(cout|cerr|clog)\b|\bfmt::print\b|\brandom_device\b|(?<![\w.>])(std::|::)?"
     r"(f?printf|puts|abort|exit|_Exit|quick_exit|terminate|s?rand|getenv)\s*\(")
-# What measures the product, and plays it: nothing that runs on a robot or its server knows of it.
-LABORATORY = {"simulation", "mission", "mission/report", "lab"}
+# What plays robots and spoils what they say, to measure the product: no other room knows of it.
+LABORATORY = {"simulation", "lab"}
+# What replays recordings and scores them: of the product, but nothing that runs on a robot or its server knows of it.
+REPLAY = {"mission", "mission/report"}
 CLOCK = re.compile(r"\bsystem_clock\b")  # of the day: for programs
 SUPPORT = "tests/support/"  # what tests share: a folder a module, held to its layer
 INCLUDE = re.compile(r'\s*#\s*include\s*[<"]([^>"]+)[>"]')
@@ -61,6 +63,8 @@ def include_breach(order, relative, include):
             return f"{layer} may not use {other}, a layer below it"
         if other in LABORATORY and layer not in LABORATORY and not relative.endswith("_test.cpp") and not relative.startswith(SUPPORT):
             return f"{layer} is of the product and may not use {other}, which is of the laboratory"
+        if other in REPLAY and layer not in LABORATORY | REPLAY and not relative.endswith("_test.cpp") and not relative.startswith(SUPPORT):
+            return f"{layer} runs on robots and servers and may not use {other}, which replays missions"
         if (layer, other) == ("server", "robot"):
             return "robot and server never include each other"
     for library, allowed, words in CONFINED:

@@ -10,7 +10,7 @@
 
 #include "support/sanitized.hpp"
 #include "tutti/base/random.hpp"
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/lab/closure_finders.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/simulation/recordings.hpp"
@@ -45,11 +45,11 @@ SmallMission make_mission() {
     for (const SubmapMessage& message : agent.take_outgoing()) out.uploads.push_back(wire::encode(message));
     out.recordings.push_back({.recording = std::move(recording)});
   }
-  mission::ClosureConfig closures;
-  closures.finder = "reference";
-  closures.reference.wrong_share = 0.2;
-  closures.reference.min_time_gap_s = 20.0;
-  out.finder = mission::make_closure_finder(closures, out.recordings, 5);
+  lab::MissionConfig mission;
+  mission.closure_changes.finder = "reference";
+  mission.closure_changes.reference.wrong_share = 0.2;
+  mission.closure_changes.reference.min_time_gap_s = 20.0;
+  out.finder = lab::make_closure_finder(mission, out.recordings, 5);
   return out;
 }
 

@@ -71,7 +71,7 @@ class CommandLine(unittest.TestCase):
                         + record(5, one + bytes(4) + time + time + b"hello") + b"\x05cut")
         self.expect(tutti("bag", "info", bag), 0, "/talk?[2J", "std_msgs/msg/String", "2023-11-14 22:13:20.250",
                     "odometry     missing", "scans        none", "cut off")
-        self.expect(tutti("bag", "info", self.path), 1, "is a folder")
+        self.expect(tutti("bag", "info", self.path), 0, "no metadata.yaml", "cut off")
         self.expect(tutti("bag", "info", self.path / "none.mcap"), 1, "none.mcap: cannot be opened")
         other = self.path / "other.mcap"
         other.write_bytes(b"SQLite format 3")

@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-#include "tutti/mission/runner.hpp"
+#include "tutti/lab/run_mission.hpp"
 
 namespace tutti::mission {
 namespace contact_test {
@@ -14,8 +14,8 @@ namespace contact_test {
 constexpr double kMinute_s = 60.0;
 
 /// An hour in a small network; few samples and few updates, so that it takes seconds.
-MissionConfig an_hour(std::size_t robots) {
-  MissionConfig config;
+lab::MissionConfig an_hour(std::size_t robots) {
+  lab::MissionConfig config;
   config.mission = "contact";
   config.source = "simulation";
   config.simulation.world.network = {
@@ -32,13 +32,13 @@ MissionConfig an_hour(std::size_t robots) {
   config.agent.submap.keyframe_time_s = 6.0;
   config.agent.submap.keyframe_distance_m = 1.5;
   config.server.update_period_s = 2.0 * kMinute_s;
-  config.closures.finder = "reference";
-  config.closures.reference.wrong_share = 0.1;
+  config.closure_changes.finder = "reference";
+  config.closure_changes.reference.wrong_share = 0.1;
   return config;
 }
 
-MissionRecord run(const MissionConfig& config) {
-  auto record = run_mission(config, {.seed = 3, .threads = 1});
+MissionRecord run(const lab::MissionConfig& config) {
+  auto record = lab::run_mission(config, {.seed = 3, .threads = 1});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? *record : MissionRecord{};
 }
@@ -60,7 +60,7 @@ TEST(Contact, ALoneRobotCorrectsItself) {
 }
 
 TEST(Contact, ARobotThatJoinsAtMinuteFortyIsPartOfTheMap) {
-  MissionConfig config = an_hour(2);
+  lab::MissionConfig config = an_hour(2);
   config.simulation.robots[1].start_s = 40.0 * kMinute_s;
   config.simulation.robots[1].walk.duration_s = 20.0 * kMinute_s;
   const MissionRecord record = run(config);
@@ -76,7 +76,7 @@ TEST(Contact, ARobotThatJoinsAtMinuteFortyIsPartOfTheMap) {
 }
 
 TEST(Contact, TenMinutesOutOfRangeLoseNothing) {
-  MissionConfig config = an_hour(2);
+  lab::MissionConfig config = an_hour(2);
   const MissionRecord always = run(config);
   RobotLinkConfig bravo{.robot = std::string("bravo"), .link = {}};
   bravo.link.outages = {{.from_s = 25.0 * kMinute_s, .until_s = 35.0 * kMinute_s}};
@@ -100,7 +100,7 @@ TEST(Contact, TenMinutesOutOfRangeLoseNothing) {
 }
 
 TEST(Contact, AnOutageForEverEndsTheMissionAndIsNoted) {
-  MissionConfig config = an_hour(2);
+  lab::MissionConfig config = an_hour(2);
   for (auto& robot : config.simulation.robots) robot.walk.duration_s = 10.0 * kMinute_s;
   // For ever, and until long after the end.
   for (const double until_s : {std::numeric_limits<double>::infinity(), 1e9}) {
@@ -122,20 +122,20 @@ TEST(Contact, AnOutageForEverEndsTheMissionAndIsNoted) {
 }
 
 TEST(Contact, ALinkOfAnUnknownRobotIsAnError) {
-  MissionConfig config = an_hour(1);
+  lab::MissionConfig config = an_hour(1);
   config.robot_links = {{.robot = std::string("zulu"), .link = {}}};
-  const auto record = run_mission(config, {.seed = 3, .threads = 1});
+  const auto record = lab::run_mission(config, {.seed = 3, .threads = 1});
   ASSERT_FALSE(record.has_value());
   EXPECT_NE(record.error().message.find("zulu"), std::string::npos) << record.error().message;
 }
 
 TEST(Contact, RobotsThatNeverMeetKeepTwoGoodMaps) {
-  MissionConfig config = an_hour(2);
+  lab::MissionConfig config = an_hour(2);
   config.simulation.world.network.columns = 6;
   // Each keeps to its own end of the network.
   config.simulation.robots[0].walk.route = {0, 1, 7, 6};
   config.simulation.robots[1].walk.route = {4, 5, 11, 10};
-  config.closures.reference.wrong_share = 0.0;
+  config.closure_changes.reference.wrong_share = 0.0;
   const MissionRecord record = run(config);
   EXPECT_EQ(record.server.components, 2U);
   EXPECT_TRUE(record.transforms.empty());

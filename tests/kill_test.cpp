@@ -17,7 +17,7 @@
 #include "support/server/refiners.hpp"
 #include "tutti/bus/simulated_network.hpp"
 #include "tutti/evaluation/agreement.hpp"
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/lab/closure_finders.hpp"
 #include "tutti/node/robot_node.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
@@ -53,11 +53,11 @@ World make_world() {
     out.robots.insert(recording.robot);
     out.recordings.push_back({.recording = std::move(recording)});
   }
-  mission::ClosureConfig closures;
-  closures.finder = "reference";
-  closures.reference.wrong_share = 0.2;
-  closures.reference.min_time_gap_s = 20.0;
-  out.finder = mission::make_closure_finder(closures, out.recordings, 5);
+  lab::MissionConfig mission;
+  mission.closure_changes.finder = "reference";
+  mission.closure_changes.reference.wrong_share = 0.2;
+  mission.closure_changes.reference.min_time_gap_s = 20.0;
+  out.finder = lab::make_closure_finder(mission, out.recordings, 5);
   return out;
 }
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tutti/mission/runner.hpp"
+#include "tutti/lab/run_mission.hpp"
 
 namespace tutti::mission {
 namespace lidar_mission_test {
@@ -12,9 +12,9 @@ namespace lidar_mission_test {
 /// Bounds: 1.5 times what was measured with this seed (87 closures, 60 of them between the robots, the worst 0.14 m and
 /// 0.45 degrees off; joint RMSE 0.185 m, map 0.068 m off the survey; RMSE below).
 TEST(LidarMission, HalfOfTheDemoIsMappedFromItsScans) {
-  const auto config = demo_mission({"duration_s=180"});
+  const auto config = lab::demo_mission({"duration_s=180"});
   ASSERT_TRUE(config.has_value()) << config.error().message;
-  const auto run = run_mission(*config, {.seed = 1});
+  const auto run = lab::run_mission(*config, {.seed = 1});
   ASSERT_TRUE(run.has_value()) << run.error().message;
   const ServerRecord& server = run->server;
   EXPECT_EQ(server.components, 1U);

@@ -5,14 +5,14 @@
 #include <algorithm>
 
 #include "support/paths.hpp"
+#include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/mission/runner.hpp"
 
 namespace tutti::mission {
 namespace mission_test {
 
-MissionConfig small_mission() {
-  MissionConfig config;
+lab::MissionConfig small_mission() {
+  lab::MissionConfig config;
   config.mission = "small";
   config.source = "simulation";
   config.simulation.world.network = {.rows = 2, .columns = 3, .block_m = 15.0, .jitter_m = 2.0, .missing_share = 0.0};
@@ -20,13 +20,13 @@ MissionConfig small_mission() {
     robot.walk.duration_s = 200.0;
     robot.odometry.yaw_bias_deg_per_m = 0.05;
   }
-  config.closures.finder = "reference";
-  config.closures.reference.min_time_gap_s = 20.0;
+  config.closure_changes.finder = "reference";
+  config.closure_changes.reference.min_time_gap_s = 20.0;
   return config;
 }
 
-MissionRecord run(const MissionConfig& config, std::uint64_t seed = 1, int threads = 1) {
-  auto record = run_mission(config, {.seed = seed, .threads = threads});
+MissionRecord run(const lab::MissionConfig& config, std::uint64_t seed = 1, int threads = 1) {
+  auto record = lab::run_mission(config, {.seed = seed, .threads = threads});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? *record : MissionRecord{};
 }
@@ -39,7 +39,7 @@ const PolicyRecord& policy(const RobotRecord& robot, const std::string& name) {
 }
 
 TEST(Mission, ARobotDoesTheSameWithItsOwnPartOfTheMap) {
-  MissionConfig config = small_mission();
+  lab::MissionConfig config = small_mission();
   config.compare_policies = {"spectral"};
   ASSERT_EQ(config.server.broadcast, "own");
   const MissionRecord own = run(config);
@@ -58,7 +58,7 @@ TEST(Mission, ARobotDoesTheSameWithItsOwnPartOfTheMap) {
 }
 
 TEST(Mission, ClosesTheLoop) {
-  MissionConfig config = small_mission();
+  lab::MissionConfig config = small_mission();
   config.compare_policies = {"spectral", "uniform"};
   const MissionRecord record = run(config);
   EXPECT_EQ(record.server.components, 1U);
@@ -81,8 +81,8 @@ TEST(Mission, ClosesTheLoop) {
 }
 
 TEST(Mission, AMapAmongWrongClosuresIsAsGoodAsAPerfectJudges) {
-  MissionConfig config = small_mission();
-  config.closures.reference.wrong_share = 0.2;
+  lab::MissionConfig config = small_mission();
+  config.closure_changes.reference.wrong_share = 0.2;
   const MissionRecord record = run(config);
   for (const RobotRecord& robot : record.robots) {
     ASSERT_TRUE(robot.perfect && robot.perfect->rmse_m);
@@ -92,14 +92,14 @@ TEST(Mission, AMapAmongWrongClosuresIsAsGoodAsAPerfectJudges) {
 }
 
 TEST(Mission, TheReportDependsOnTheSeedAndNotOnTheThreads) {
-  const MissionConfig config = small_mission();
+  const lab::MissionConfig config = small_mission();
   const std::string one = report_json(run(config, 3, 1));
   EXPECT_EQ(one, report_json(run(config, 3, 4)));
   EXPECT_NE(one, report_json(run(config, 4, 1)));
 }
 
 TEST(Mission, ABadLinkDelaysTheMapAndTheRobotsAndHarmsNeither) {
-  MissionConfig config = small_mission();
+  lab::MissionConfig config = small_mission();
   const MissionRecord good = run(config);
   config.link.latency_s = 1.0;
   config.link.jitter_s = 30.0;  // submaps overtake each other, and broadcasts
@@ -128,9 +128,9 @@ TEST(Mission, ABadLinkDelaysTheMapAndTheRobotsAndHarmsNeither) {
 }
 
 TEST(Mission, RobotsThatNeverMeetStaySeparateMaps) {
-  MissionConfig config = small_mission();
-  config.closures.reference.radius_m = 0.001;
-  config.closures.reference.wrong_share = 0.0;
+  lab::MissionConfig config = small_mission();
+  config.closure_changes.reference.radius_m = 0.001;
+  config.closure_changes.reference.wrong_share = 0.0;
   const MissionRecord record = run(config);
   EXPECT_EQ(record.server.components, 2U);
   EXPECT_TRUE(record.transforms.empty());
@@ -141,7 +141,7 @@ TEST(Mission, RobotsThatNeverMeetStaySeparateMaps) {
 }
 
 TEST(Mission, ALoneRobotIsAMissionToo) {
-  MissionConfig config = small_mission();
+  lab::MissionConfig config = small_mission();
   config.simulation.robots.resize(1);
   const MissionRecord record = run(config);
   EXPECT_EQ(record.server.components, 1U);
@@ -153,8 +153,8 @@ TEST(Mission, ALoneRobotIsAMissionToo) {
 }
 
 TEST(Mission, TheReportNamesTheStretchWhereOdometryFailed) {
-  const auto config = load_mission(test::source_path("missions/terrace.yaml"),
-                                   {"simulation.sensors=none", "closures.finder=reference"});
+  const auto config = lab::load_mission(test::source_path("missions/terrace.yaml"),
+                                        {"simulation.sensors=none", "closures.finder=reference"});
   ASSERT_TRUE(config.has_value()) << config.error().message;
   const MissionRecord record = run(*config);
   const RobotRecord& alpha = record.robots[0];
@@ -169,10 +169,10 @@ TEST(Mission, TheReportNamesTheStretchWhereOdometryFailed) {
 }
 
 TEST(Mission, AMissingFileIsAClearError) {
-  MissionConfig config = small_mission();
+  lab::MissionConfig config = small_mission();
   config.source = "recordings";
   config.robots = {{.name = "alpha", .odometry = {.file = "nowhere/odometry.tum"}}};
-  const auto record = run_mission(config, {.data = "data"});
+  const auto record = lab::run_mission(config, {.data = "data"});
   ASSERT_FALSE(record.has_value());
   EXPECT_NE(record.error().message.find("alpha"), std::string::npos) << record.error().message;
   EXPECT_NE(record.error().message.find("nowhere/odometry.tum"), std::string::npos) << record.error().message;

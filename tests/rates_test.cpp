@@ -7,15 +7,15 @@
 #include <string>
 
 #include "support/shared_data.hpp"
-#include "tutti/mission/runner.hpp"
+#include "tutti/lab/run_mission.hpp"
 
 namespace tutti::mission {
 namespace rates_test {
 
-MissionRecord run(const Result<MissionConfig>& config, const std::string& data = {}) {
+MissionRecord run(const Result<lab::MissionConfig>& config, const std::string& data = {}) {
   EXPECT_TRUE(config.has_value()) << config.error().message;
   if (!config) return {};
-  auto record = run_mission(*config, {.data = data, .seed = 1});
+  auto record = lab::run_mission(*config, {.data = data, .seed = 1});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? std::move(*record) : MissionRecord{};
 }
@@ -30,8 +30,9 @@ bool has_trouble(const MissionRecord& record, const std::string& words) {
 TEST(Rates, OfOdometryDoNotChangeTheMapOfHku) {
   TUTTI_REQUIRE_SHARED("data/lidar/hku_two_sessions");
   const auto at = [](double hz) {
-    return run(load_mission(test::source_path("missions/hku_two_sessions.yaml"), {fmt::format("odometry_hz={}", hz)}),
-               test::shared_path("data"));
+    return run(
+        lab::load_mission(test::source_path("missions/hku_two_sessions.yaml"), {fmt::format("odometry_hz={}", hz)}),
+        test::shared_path("data"));
   };
   const MissionRecord same = at(0.0);
   for (const double hz : {10.0, 50.0, 200.0, 1000.0}) {

@@ -8,20 +8,20 @@
 #include <string>
 
 #include "support/shared_data.hpp"
-#include "tutti/mission/runner.hpp"
+#include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/worst_moment.hpp"
 
 namespace tutti::mission {
 namespace real_missions_test {
 
-MissionConfig mission_file(const std::string& name) {
-  auto config = load_mission(test::source_path("missions/" + name + ".yaml"), {});
+lab::MissionConfig mission_file(const std::string& name) {
+  auto config = lab::load_mission(test::source_path("missions/" + name + ".yaml"), {});
   EXPECT_TRUE(config.has_value()) << config.error().message;
-  return config ? *config : MissionConfig{};
+  return config ? *config : lab::MissionConfig{};
 }
 
-MissionRecord run(const MissionConfig& config, std::uint64_t seed) {
-  auto record = run_mission(config, {.data = test::shared_path("data"), .seed = seed});
+MissionRecord run(const lab::MissionConfig& config, std::uint64_t seed) {
+  auto record = lab::run_mission(config, {.data = test::shared_path("data"), .seed = seed});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? *record : MissionRecord{};
 }
@@ -71,7 +71,7 @@ TEST(RealMissions, HkuDegradedIsRepaired) {
 
 TEST(RealMissions, ADivergedRobotHarmsNobody) {
   TUTTI_REQUIRE_SHARED("data/excavator_mm");
-  MissionConfig config = mission_file("excavator_diverged");
+  lab::MissionConfig config = mission_file("excavator_diverged");
   const MissionRecord with = run(config, 1);
   config.robots.pop_back();  // the diverged one
   const MissionRecord without = run(config, 1);
@@ -95,7 +95,7 @@ TEST(RealMissions, KittiSequencesOfTwoPlacesBecomeTwoMaps) {
 /// the others and with the odometry, which is loose over 800 m; together they contradict all the rest.
 TEST(RealMissions, NineClosuresAtOnePairOfPlacesAreOneWitness) {
   TUTTI_REQUIRE_SHARED("data/kitti");
-  MissionConfig config = mission_file("kitti_00_halves");
+  lab::MissionConfig config = mission_file("kitti_00_halves");
   config.agent.submap.distance_m = std::numeric_limits<double>::infinity();  // of 10 s: one look-alike, three pairs
   const MissionRecord record = run(config, 9);
   ASSERT_TRUE(record.server.closure_check.has_value());
@@ -119,7 +119,7 @@ TEST(RealMissions, EurocFlightsAgreeWithTheJointMap) {
 /// are one map. When they join, neither map nor robots leave the room.
 TEST(RealMissions, PartsThatJoinLateAreNeverFarOff) {
   TUTTI_REQUIRE_SHARED("data/euroc/V1_01");
-  MissionConfig config = mission_file("euroc_v101_rovio");
+  lab::MissionConfig config = mission_file("euroc_v101_rovio");
   config.server.map.who_is_wrong.min_joining_closures = 12;
   config.duration_s = 45.0;
   const MissionRecord record = run(config, 1);
@@ -134,7 +134,7 @@ TEST(RealMissions, PartsThatJoinLateAreNeverFarOff) {
 
 /// Flights of other people's odometry through one room; closures from the truth, one in ten wrong.
 MissionRecord run_case(const std::string& name, std::uint64_t seed) {
-  auto config = load_mission(test::shared_path("cases/rooms/" + name + ".yaml"), {});
+  auto config = lab::load_mission(test::shared_path("cases/rooms/" + name + ".yaml"), {});
   EXPECT_TRUE(config.has_value()) << config.error().message;
   return config ? run(*config, seed) : MissionRecord{};
 }

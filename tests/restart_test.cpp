@@ -9,7 +9,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/evaluation/agreement.hpp"
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/lab/closure_finders.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/simulation/recordings.hpp"
@@ -60,10 +60,10 @@ class Restart : public testing::Test {
       ids_.insert(recording.robot);
       recordings_.push_back({.recording = std::move(recording)});
     }
-    mission::ClosureConfig closures;
-    closures.finder = "reference";
-    closures.reference.min_time_gap_s = 20.0;
-    finder_ = mission::make_closure_finder(closures, recordings_, 5);
+    lab::MissionConfig mission;
+    mission.closure_changes.finder = "reference";
+    mission.closure_changes.reference.min_time_gap_s = 20.0;
+    finder_ = lab::make_closure_finder(mission, recordings_, 5);
     for (const mission::MissionRecording& robot : recordings_)
       walkers_.push_back({&robot.recording, robot::RobotAgent(robot.recording.robot, kFirstSession, {}, Rng(1))});
     server_ = std::make_unique<server::MapServer>(ids_, finder_, payloads_, server::ServerConfig{}, 1);

@@ -13,27 +13,27 @@
 #include "tutti/evaluation/association.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/recordings.hpp"
-#include "tutti/mission/runner.hpp"
+#include "tutti/lab/mission_input.hpp"
+#include "tutti/lab/run_mission.hpp"
 
 namespace tutti::mission {
 namespace scenarios_test {
 
-MissionConfig scenario(const std::string& name, const std::vector<std::string>& assignments = {}) {
-  auto config = load_mission(test::source_path("missions/" + name + ".yaml"), assignments);
+lab::MissionConfig scenario(const std::string& name, const std::vector<std::string>& assignments = {}) {
+  auto config = lab::load_mission(test::source_path("missions/" + name + ".yaml"), assignments);
   EXPECT_TRUE(config.has_value()) << config.error().message;
-  return config ? *config : MissionConfig{};
+  return config ? *config : lab::MissionConfig{};
 }
 
-MissionRecord run(const MissionConfig& config, std::uint64_t seed = 1) {
-  auto record = run_mission(config, {.data = test::shared_path("data"), .seed = seed, .threads = 1});
+MissionRecord run(const lab::MissionConfig& config, std::uint64_t seed = 1) {
+  auto record = lab::run_mission(config, {.data = test::shared_path("data"), .seed = seed, .threads = 1});
   EXPECT_TRUE(record.has_value()) << record.error().message;
   return record ? *record : MissionRecord{};
 }
 
 /// The robot's recording, as the mission will replay it.
-Recording recording(const MissionConfig& config, std::size_t robot = 0, std::uint64_t seed = 1) {
-  auto input = load_input(config, {}, seed);
+Recording recording(const lab::MissionConfig& config, std::size_t robot = 0, std::uint64_t seed = 1) {
+  auto input = lab::load_input(config, {}, seed);
   EXPECT_TRUE(input.has_value()) << input.error().message;
   return input ? input->robots.at(robot).recording : Recording{};
 }
@@ -93,7 +93,7 @@ TEST(Scenarios, EveryMissionFileLoads) {
   int files = 0;
   for (const auto& file : std::filesystem::directory_iterator(test::source_path("missions"))) {
     if (file.path().extension() != ".yaml") continue;
-    const auto config = load_mission(file.path(), {});
+    const auto config = lab::load_mission(file.path(), {});
     ASSERT_TRUE(config.has_value()) << config.error().message;
     EXPECT_EQ(config->mission, file.path().stem());
     ++files;
@@ -117,7 +117,7 @@ TEST(Scenarios, InAgreeTheServersUncertaintyExplainsTheWholeDifference) {
 }
 
 TEST(Scenarios, SpinTurnsHalfOfTheWayAboutTheStartAndDistancesToItCannotSeeIt) {
-  const MissionConfig config = scenario("spin", {"server.update_period_s=40"});
+  const lab::MissionConfig config = scenario("spin", {"server.update_period_s=40"});
   const Recording alpha = recording(config);
   ASSERT_EQ(alpha.drift_origins.size(), 1U);
   const DriftOrigin& origin = alpha.drift_origins.front();
@@ -138,7 +138,7 @@ TEST(Scenarios, SpinTurnsHalfOfTheWayAboutTheStartAndDistancesToItCannotSeeIt) {
   EXPECT_NEAR(error, 11.8, 1.5);
   EXPECT_LT(seen, 0.06 * error);
   // What distances do see is the ordinary drift: without the spin it is as large.
-  MissionConfig straight = config;
+  lab::MissionConfig straight = config;
   straight.simulation.robots[0].odometry.scripted.clear();
   double ordinary = 0.0;
   for (const FromStart& pose : from_start(recording(straight)))
@@ -176,7 +176,7 @@ TEST(Scenarios, HeightGrowsByThreeMetresWhileTheRobotClimbsTheRamp) {
 }
 
 TEST(Scenarios, DegenerateSlidesAlongOneCorridorForAMinuteAndSaysSo) {
-  const MissionConfig config = scenario("degenerate", {"server.update_period_s=60"});
+  const lab::MissionConfig config = scenario("degenerate", {"server.update_period_s=60"});
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Recording alpha = recording(config, 0, seed);
     ASSERT_EQ(alpha.drift_origins.size(), 1U) << "visited once";
@@ -246,7 +246,7 @@ TEST_F(Revision, AWrongClosureStandsForMinutesAndIsGone) {
 }
 
 TEST_F(Revision, TheRecordFollowsClosuresAndErrorsOverTime) {
-  MissionConfig config = scenario("revision", {"server.update_period_s=60", "duration_s=900"});
+  lab::MissionConfig config = scenario("revision", {"server.update_period_s=60", "duration_s=900"});
   config.compare_policies = {"none"};
   const MissionRecord record = run(config);
   for (const MapUpdateRecord& update : record.server.updates) {
@@ -280,7 +280,7 @@ TEST_F(Revision, TheRecordFollowsClosuresAndErrorsOverTime) {
 }
 
 TEST(Scenarios, LateJoinsLoseContactAndReturn) {
-  const MissionConfig config = scenario("late", {"server.update_period_s=30", "agent.submap.duration_s=20"});
+  const lab::MissionConfig config = scenario("late", {"server.update_period_s=30", "agent.submap.duration_s=20"});
   const MissionRecord record = run(config);
   const RobotRecord& bravo = record.robots[1];
   ASSERT_EQ(bravo.name, "bravo");

@@ -13,10 +13,9 @@
 
 #include "commands.hpp"
 #include "options.hpp"
-#include "tutti/base/config_io.hpp"
 #include "tutti/formats/ply.hpp"
+#include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/report/report.hpp"
-#include "tutti/mission/runner.hpp"
 #include "tutti/simulation/surface.hpp"
 
 namespace tutti::app {
@@ -87,14 +86,14 @@ void add_mission_options(CLI::App& command, MissionArguments& arguments) {
 }
 
 /// Runs, writes the report, prints the table. Returns the exit code.
-int run_and_report(const Result<mission::MissionConfig>& config, MissionArguments& arguments) {
+int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& arguments) {
   const auto failed = [](const std::string& message, int exit_code = 1) {
     std::cerr << "tutti: " << message << '\n';
     return exit_code;
   };
   if (!config) return failed(config.error().message, 2);
   if (arguments.print_config) {
-    std::cout << to_yaml(dump_config(*config));
+    std::cout << to_yaml(*config);
     return 0;
   }
   const std::string out = arguments.out.string();
@@ -103,7 +102,7 @@ int run_and_report(const Result<mission::MissionConfig>& config, MissionArgument
   if (failure) return failed(fmt::format("--out {}: cannot make the folder: {}", out, failure.message()));
   ProgressLine progress;
   arguments.run.progress = std::ref(progress);
-  const auto record = mission::run_mission(*config, arguments.run);
+  const auto record = lab::run_mission(*config, arguments.run);
   progress.close();
   if (!record) {
     const bool wants_data = record.error().code == ErrorCode::io && arguments.run.data.empty();
@@ -126,7 +125,7 @@ struct WorldOptions {
 };
 
 int write_world(const WorldOptions& options) {
-  const auto config = mission::load_mission(options.mission, options.assignments);
+  const auto config = lab::load_mission(options.mission, options.assignments);
   if (!config) return complain("world", config.error().message, 2);
   if (config->source != "simulation")
     return complain("world", fmt::format("{}: source is '{}', expected 'simulation'", options.mission, config->source),
@@ -146,9 +145,8 @@ int write_world(const WorldOptions& options) {
 }  // namespace
 
 void add_demo_command(CLI::App& app, int& exit_code) {
-  const std::map<std::string, mission::DemoSensors> names{{"lidar", mission::DemoSensors::lidar},
-                                                          {"visual", mission::DemoSensors::visual},
-                                                          {"both", mission::DemoSensors::both}};
+  const std::map<std::string, lab::DemoSensors> names{
+      {"lidar", lab::DemoSensors::lidar}, {"visual", lab::DemoSensors::visual}, {"both", lab::DemoSensors::both}};
   auto arguments = std::make_shared<MissionArguments>();
   const auto sensors = std::make_shared<std::string>("lidar");
   CLI::App* command =
@@ -167,7 +165,7 @@ void add_demo_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   add_mission_options(*command, *arguments);
   command->callback([=, &exit_code] {
-    const auto config = mission::demo_mission(arguments->assignments, names.at(*sensors));
+    const auto config = lab::demo_mission(arguments->assignments, names.at(*sensors));
     if (arguments->out.empty() && config) arguments->out = fs::path("out") / config->mission;
     exit_code = run_and_report(config, *arguments);
   });
@@ -186,7 +184,7 @@ void add_run_command(CLI::App& app, int& exit_code) {
   add_mission_options(*command, *arguments);
   command->callback([arguments, &exit_code] {
     if (arguments->out.empty()) arguments->out = fs::path("out") / arguments->mission.stem();
-    exit_code = run_and_report(mission::load_mission(arguments->mission, arguments->assignments), *arguments);
+    exit_code = run_and_report(lab::load_mission(arguments->mission, arguments->assignments), *arguments);
   });
 }
 

@@ -12,7 +12,7 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "tutti/base/config_io.hpp"
-#include "tutti/mission/mission_config.hpp"
+#include "tutti/lab/mission_config.hpp"
 #include "tutti/mission/operator_settings.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
@@ -45,7 +45,7 @@ std::vector<FieldDoc> settings_of(const std::string& program) {
   if (program == "server") return document_config(program::ServerSettings());
   if (program == "robot") return document_config(program::RobotSettings());
   if (program == "worker") return document_config(program::WorkerSettings());
-  return document_config(*std::make_unique<const mission::MissionConfig>());
+  return lab::document_mission();
 }
 
 int run(const std::vector<std::string>& parts, bool all, const std::string& program) {

@@ -14,9 +14,9 @@
 
 #include "tutti/consistency/disagreement.hpp"
 #include "tutti/estimation/marginals.hpp"
-#include "tutti/mission/closure_finders.hpp"
-#include "tutti/mission/mission_config.hpp"
-#include "tutti/mission/recordings.hpp"
+#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/mission_config.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
 #include "tutti/wire/codec.hpp"
@@ -117,7 +117,7 @@ class Speaker {
   std::size_t next_ = 0;
 };
 
-void run(const Options& options, const mission::MissionConfig& config,
+void run(const Options& options, const lab::MissionConfig& config,
          const std::vector<mission::MissionRecording>& robots) {
   std::map<RobotId, std::string> names;
   std::set<RobotId> ids;
@@ -127,7 +127,7 @@ void run(const Options& options, const mission::MissionConfig& config,
     ids.insert(robot.recording.robot);
     speakers.emplace_back(robot, config.agent);
   }
-  const auto finder = mission::make_closure_finder(config.closures, robots, options.seed);
+  const auto finder = lab::make_closure_finder(config, robots, options.seed);
   const auto clouds = std::make_shared<server::MemoryPayloadStore>();
   server::MapServer server(ids, finder, clouds, config.server, 1);
   std::size_t update = 0;
@@ -163,9 +163,9 @@ int main(int argc, char** argv) {
   app.add_option("--alpha", options.alpha, "False-alarm rate of one look");
   CLI11_PARSE(app, argc, argv);
 
-  const auto config = mission::load_mission(options.mission, options.assignments);
+  const auto config = lab::load_mission(options.mission, options.assignments);
   if (!config) return std::fprintf(stderr, "%s\n", config.error().message.c_str()), 1;
-  const auto input = mission::load_input(*config, options.data, options.seed);
+  const auto input = lab::load_input(*config, options.data, options.seed);
   if (!input) return std::fprintf(stderr, "%s\n", input.error().message.c_str()), 1;
   run(options, *config, input->robots);
   return 0;

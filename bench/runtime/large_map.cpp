@@ -22,10 +22,10 @@
 #include <vector>
 
 #include "tutti/base/random.hpp"
+#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/mission_config.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/mapfile/content.hpp"
-#include "tutti/mission/closure_finders.hpp"
-#include "tutti/mission/mission_config.hpp"
-#include "tutti/mission/recordings.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
@@ -111,11 +111,10 @@ Eigen::Vector3d begin_of(const Submap& submap, const mission::MissionInput& inpu
   return (at == reference.end() ? reference.back() : *at).pose.translation;
 }
 
-void make_map(const mission::MissionConfig& config, const std::filesystem::path& file, std::size_t submaps,
-              int points) {
-  const auto input = mission::load_input(config, "", 1);
+void make_map(const lab::MissionConfig& config, const std::filesystem::path& file, std::size_t submaps, int points) {
+  const auto input = lab::load_input(config, "", 1);
   if (!input) throw std::runtime_error(input.error().message);
-  const auto finder = mission::make_closure_finder(config.closures, input->robots, 1);
+  const auto finder = lab::make_closure_finder(config, input->robots, 1);
   auto store = storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0}).value();
   const auto nothing = node::SubmapFrames::of(*store);
   Writer writer(*store);
@@ -167,7 +166,7 @@ auto timed(const char* what, Call&& call) {
   return result;
 }
 
-void measure(const mission::MissionConfig& config, const std::filesystem::path& file) {
+void measure(const lab::MissionConfig& config, const std::filesystem::path& file) {
   fmt::print("{}: {:.1f} MB\n", file.string(), 1e-6 * static_cast<double>(std::filesystem::file_size(file)));
   auto store = timed("the file is open", [&] {
     return storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0}).value();
@@ -198,8 +197,8 @@ int main(int argc, char** argv) {
     const std::size_t submaps = argc > 3 ? static_cast<std::size_t>(std::atoll(argv[3])) : 0;
     const std::size_t per_robot = static_cast<std::size_t>(kWalk_s / 10.0) - 1;
     const auto config =
-        mission::load_mission(argv[1], {fmt::format("simulation.robots.0.copies={}", submaps / per_robot + 1),
-                                        fmt::format("simulation.robots.0.walk.duration_s={}", kWalk_s)});
+        lab::load_mission(argv[1], {fmt::format("simulation.robots.0.copies={}", submaps / per_robot + 1),
+                                    fmt::format("simulation.robots.0.walk.duration_s={}", kWalk_s)});
     if (!config) throw std::runtime_error(config.error().message);
     const std::filesystem::path file = argv[2];
     if (submaps > 0)

@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "lidar_hku_samples.hpp"
-#include "tutti/mission/mission_config.hpp"
-#include "tutti/mission/recordings.hpp"
+#include "tutti/lab/mission_config.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/perception/lidar/candidates.hpp"
 #include "tutti/perception/lidar/verify.hpp"
@@ -115,10 +115,10 @@ void judge(const Seen& a, const Seen& b, const lidar::LidarClosureConfig& config
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 double mean(const std::vector<double>& values) { return sum(values) / static_cast<double>(values.size()); }
 
-std::vector<Seen> walk_all(const mission::MissionConfig& config, std::uint64_t seed) {
+std::vector<Seen> walk_all(const lab::MissionConfig& config, std::uint64_t seed) {
   std::vector<Seen> all;
   double points = 0.0;
-  for (const auto& robot : value_or_exit(mission::load_input(config, "", seed)).robots)
+  for (const auto& robot : value_or_exit(lab::load_input(config, "", seed)).robots)
     for (Seen& seen : walk_one(robot.recording, config.agent.submap, config.duration_s)) {
       points += static_cast<double>(seen.submap.cloud->points.size());
       all.push_back(std::move(seen));
@@ -131,7 +131,7 @@ std::vector<Seen> walk_all(const mission::MissionConfig& config, std::uint64_t s
   return all;
 }
 
-void run(const mission::MissionConfig& config, const WorldOptions& options) {
+void run(const lab::MissionConfig& config, const WorldOptions& options) {
   const auto all = walk_all(config, options.seed);
   const auto gap = static_cast<std::size_t>(config.closures.min_submap_gap);
   Tally tally;
@@ -179,5 +179,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: bench_lidar_world MISSION.yaml [--seed N] [--stride K] [--set key=value ...]\n");
     return 2;
   }
-  run(value_or_exit(mission::load_mission(options->mission, options->assignments)), *options);
+  run(value_or_exit(lab::load_mission(options->mission, options->assignments)), *options);
 }

@@ -23,9 +23,9 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/finders/sensor_finder_maker.hpp"
-#include "tutti/mission/closure_finders.hpp"
-#include "tutti/mission/mission_config.hpp"
-#include "tutti/mission/recordings.hpp"
+#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/mission_config.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/robot/submap_builder.hpp"
@@ -146,14 +146,14 @@ struct Arguments {
 
 void run(const Arguments& arguments) {
   const auto& [file, data, settings, points, keep] = arguments;
-  const auto config = mission::load_mission(file, settings);
+  const auto config = lab::load_mission(file, settings);
   if (!config) throw std::runtime_error(config.error().message);
-  const auto input = mission::load_input(*config, data, 1);
+  const auto input = lab::load_input(*config, data, 1);
   if (!input) throw std::runtime_error(input.error().message);
   double hours = 0.0;
   for (const auto& robot : input->robots)
     hours += (robot.recording.odometry.back().stamp - robot.recording.odometry.front().stamp) / 3600.0;
-  const auto finder = mission::make_closure_finder(config->closures, input->robots, 1);
+  const auto finder = lab::make_closure_finder(*config, input->robots, 1);
   auto arrivals = submaps_of(*input, config->agent.submap, points);
   std::set<RobotId> ids;
   for (const auto& robot : input->robots) ids.insert(robot.recording.robot);

@@ -23,8 +23,10 @@
 #include "support/bus/tcp_relay.hpp"
 #include "support/paths.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/mission_source.hpp"
 #include "tutti/mission/robot_actor.hpp"
+#include "tutti/mission/runner.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/program/robot_program.hpp"
@@ -86,7 +88,7 @@ Rows rows_of(const storage::TableStore& map, const char* table) {
 
 struct World {
   explicit World(const lab::MissionSource& source) : config(lab::load(source).value()) {
-    auto input = mission::load_input(config, {}, source.seed);
+    auto input = lab::load_input(config, {}, source.seed);
     EXPECT_TRUE(input.has_value());
     recordings = std::move(input->robots);
     finder = lab::make_finder(config, source).value();
@@ -96,7 +98,7 @@ struct World {
     EXPECT_TRUE(node.has_value()) << node.error().message;
     return std::move(*node);
   }
-  mission::MissionConfig config;
+  lab::MissionConfig config;
   std::vector<mission::MissionRecording> recordings;
   std::shared_ptr<const server::ClosureFinder> finder;
 };
@@ -119,7 +121,7 @@ std::unique_ptr<storage::MemoryStore> undisturbed(const World& world) {
     config.uplink.max_under_way_bytes = 0;
     auto robot =
         std::move(mission::RobotActor::open(recording, config, world.config.association,
-                                            lab::agent_randomness(1, recording.recording.name), kSession, store)
+                                            mission::agent_randomness(1, recording.recording.name), kSession, store)
                       .value());
     robot->resume({});
     while (robot->next_time() < 1e9) {

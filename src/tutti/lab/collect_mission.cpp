@@ -7,9 +7,11 @@
 #include <vector>
 
 #include "tutti/consistency/proxy_graph_builder.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/update_json.hpp"
 #include "tutti/mission/make_record.hpp"
 #include "tutti/mission/robot_actor.hpp"
+#include "tutti/mission/runner.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
@@ -66,7 +68,7 @@ Status take(const Json& event, const std::string& name, Robot& robot) {
 }
 
 /// What the robot would say of the last map, once more: its own odometry against it, whatever it has corrected.
-consistency::Explanation explain_again(const mission::RobotActor& actor, const mission::MissionConfig& config,
+consistency::Explanation explain_again(const mission::RobotActor& actor, const MissionConfig& config,
                                        const ProxyGraph& map) {
   robot::AgentState state = actor.node().agent().state();
   state.epoch = state.revision = 0;                // as if it had not heard it,
@@ -77,7 +79,7 @@ consistency::Explanation explain_again(const mission::RobotActor& actor, const m
   return again.receive(sent ? *sent : own).explanation;
 }
 
-Result<Robot> read_robot(const mission::MissionConfig& config, const MissionSource& source,
+Result<Robot> read_robot(const MissionConfig& config, const MissionSource& source,
                          const mission::MissionRecording& recording, const fs::path& folder) {
   const std::string& name = recording.recording.name;
   Robot robot;
@@ -85,7 +87,7 @@ Result<Robot> read_robot(const mission::MissionConfig& config, const MissionSour
   if (!store) return tl::unexpected(store.error());
   robot.store = std::move(*store);
   auto actor = mission::RobotActor::open(recording, {.agent = config.agent, .name = name}, config.association,
-                                         agent_randomness(source.seed, name), 0, *robot.store);
+                                         mission::agent_randomness(source.seed, name), 0, *robot.store);
   if (!actor) return in_context((folder / program::kRobotFile).string(), actor.error());
   robot.actor = std::move(*actor);
   robot.timing = {.robot = name, .policy = config.agent.policy.name};
@@ -131,9 +133,9 @@ Result<mission::MissionEvents> read_course(const fs::path& folder) {
 
 }  // namespace
 
-Result<mission::MissionRecord> collect_mission(const mission::MissionConfig& config, const MissionSource& source,
+Result<mission::MissionRecord> collect_mission(const MissionConfig& config, const MissionSource& source,
                                                const fs::path& state, const std::string& version) {
-  auto input = mission::load_input(config, source.data, source.seed);
+  auto input = load_input(config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
   std::vector<Robot> robots;
   std::set<RobotId> ids;
@@ -157,7 +159,8 @@ Result<mission::MissionRecord> collect_mission(const mission::MissionConfig& con
   mission::FinishedMission finished{.config = config,
                                     .seed = source.seed,
                                     .version = version,
-                                    .duration_s = duration_of(config, input->robots),
+                                    .settings_yaml = to_yaml(config),
+                                    .duration_s = mission::duration_of(config, input->robots),
                                     .survey = input->survey,
                                     .robots = {},
                                     .server = **server,

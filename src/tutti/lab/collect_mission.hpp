@@ -12,7 +12,7 @@ namespace tutti::lab {
 
 /// The record of a mission whose programs have ended, from what they left in STATE/server and STATE/robots/NAME: maps
 /// and estimates from their stores, the course of the mission from their events. No timing but the robots' own.
-Result<mission::MissionRecord> collect_mission(const mission::MissionConfig& config, const MissionSource& source,
+Result<mission::MissionRecord> collect_mission(const MissionConfig& config, const MissionSource& source,
                                                const std::filesystem::path& state, const std::string& version);
 
 }  // namespace tutti::lab

@@ -10,7 +10,7 @@
 #include "support/program/feed/client.hpp"
 #include "support/program/feed/node_target.hpp"
 #include "support/sanitized.hpp"
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/lab/closure_finders.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/program/feed/feed_session.hpp"
@@ -60,10 +60,10 @@ class Mission {
       recordings_.push_back({.recording = std::move(recording)});
       fed_.emplace_back(recordings_.back().recording.robot, settings_);
     }
-    mission::ClosureConfig closures;
-    closures.finder = "reference";
-    closures.reference.wrong_share = 0.0;
-    finder_ = mission::make_closure_finder(closures, recordings_, 5);
+    lab::MissionConfig mission;
+    mission.closure_changes.finder = "reference";
+    mission.closure_changes.reference.wrong_share = 0.0;
+    finder_ = lab::make_closure_finder(mission, recordings_, 5);
     node::ServerNodeConfig of_server;
     of_server.server.update_period_s = 20.0;
     server_ = std::move(node::ServerNode::open(robots, finder_, of_server, 1, map_).value());

@@ -6,33 +6,33 @@
 
 #include "tutti/base/config_io.hpp"
 #include "tutti/bus/mission_lease.hpp"
+#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/replayed_robot.hpp"
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/mission/runner.hpp"
 #include "tutti/simulation/recordings.hpp"
 
 namespace tutti::lab {
 
-Result<mission::MissionConfig> load(const MissionSource& source) {
+Result<MissionConfig> load(const MissionSource& source) {
   std::error_code ignored;
-  if (source.file == "demo" && !std::filesystem::exists("demo", ignored))
-    return mission::demo_mission(source.assignments);
-  if (!source.file.empty()) return mission::load_mission(source.file, source.assignments);
+  if (source.file == "demo" && !std::filesystem::exists("demo", ignored)) return demo_mission(source.assignments);
+  if (!source.file.empty()) return load_mission(source.file, source.assignments);
   auto root = parse_yaml("{}", "settings");
   if (!root) return tl::unexpected(root.error());
   for (const std::string& assignment : source.assignments)
     if (const auto ok = apply_override(*root, assignment); !ok) return tl::unexpected(ok.error());
-  mission::MissionConfig config;
-  if (const auto ok = load_config(*root, config, "--set"); !ok) return tl::unexpected(ok.error());
-  if (config.closures.finder == "reference")
+  auto config = read_mission(*root, "--set");
+  if (config && config->closure_changes.are_made_up())
     return fail(ErrorCode::configuration, "closures.finder is 'reference': without a mission there is none");
   return config;
 }
 
 bool is_named(const MissionSource& source) { return !source.name.empty() || !source.file.empty(); }
 
-Result<std::string> name_on_bus(const MissionSource& source, const mission::MissionConfig& config) {
+Result<std::string> name_on_bus(const MissionSource& source, const MissionConfig& config) {
   std::string name = source.name;
-  const bool is_in_file = name.empty() && config.mission != mission::MissionConfig{}.mission;
+  const bool is_in_file = name.empty() && config.mission != MissionConfig{}.mission;
   if (is_in_file) name = config.mission;
   if (name.empty()) return bus::NatsPortOptions{}.mission;
   if (auto ok = bus::check_mission_name(name); !ok)
@@ -41,7 +41,7 @@ Result<std::string> name_on_bus(const MissionSource& source, const mission::Miss
   return name;
 }
 
-std::vector<std::string> robot_names(const mission::MissionConfig& config) {
+std::vector<std::string> robot_names(const MissionConfig& config) {
   std::vector<std::string> names;
   if (config.source == "recordings")
     for (const mission::RobotConfig& robot : config.robots) names.push_back(robot.name);
@@ -52,18 +52,18 @@ std::vector<std::string> robot_names(const mission::MissionConfig& config) {
   return names;
 }
 
-Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const mission::MissionConfig& config,
+Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const MissionConfig& config,
                                                                  const MissionSource& source) {
-  if (config.closures.finder != "reference") return mission::make_closure_finder(config.closures, {}, source.seed);
-  const auto input = mission::load_input(config, source.data, source.seed);
+  if (!config.closure_changes.are_made_up()) return make_closure_finder(config, {}, source.seed);
+  const auto input = load_input(config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
-  return mission::make_closure_finder(config.closures, input->robots, source.seed);
+  return make_closure_finder(config, input->robots, source.seed);
 }
 
 namespace {
 
 /// The finder is made here where it needs the mission.
-Result<program::FinderSettings> finder_settings(const mission::MissionConfig& config, const MissionSource& source) {
+Result<program::FinderSettings> finder_settings(const MissionConfig& config, const MissionSource& source) {
   program::FinderSettings out{.closures = config.closures, .refinement = config.refinement, .other = {}};
   auto finder = make_finder(config, source);
   if (!finder) return tl::unexpected(finder.error());
@@ -82,7 +82,7 @@ Result<program::ServerSettings> server_settings(const MissionSource& source) {
   if (!finders) return tl::unexpected(finders.error());
   program::ServerSettings out{.mission = std::move(*name),
                               .robots = {},
-                              .accepts_others = config->closures.finder != "reference",
+                              .accepts_others = !config->closure_changes.are_made_up(),
                               .server = config->server,
                               .finders = std::move(*finders)};
   if (source.file.empty()) return out;
@@ -112,13 +112,13 @@ Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
   options.settings = {.mission = std::move(*name),
                       .robots = robot_names(*config),
                       .agent = config->agent,
-                      .randomness = agent_randomness(source.seed, options.name)};
+                      .randomness = mission::agent_randomness(source.seed, options.name)};
   if (!options.feed.empty()) return {};
   const auto number = program::number_of(options.name, options.settings.robots, false);
   if (!number) return tl::unexpected(number.error());
-  auto input = mission::load_input(*config, source.data, source.seed);
+  auto input = load_input(*config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
-  options.duration_s = duration_of(*config, input->robots);
+  options.duration_s = mission::duration_of(*config, input->robots);
   const auto recording = std::make_shared<const mission::MissionRecording>(std::move(input->robots.at(number->value)));
   options.replay = [recording, association = std::make_shared<const evaluation::AssociationConfig>(config->association),
                     randomness = options.settings.randomness](
@@ -129,17 +129,6 @@ Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
     return std::make_unique<ReplayedRobot>(std::move(*actor));
   };
   return {};
-}
-
-Rng agent_randomness(std::uint64_t seed, const std::string& robot) { return Rng(seed).fork("agent/" + robot); }
-
-double duration_of(const mission::MissionConfig& config, const std::vector<mission::MissionRecording>& recordings) {
-  double duration_s = 0.0;
-  for (const mission::MissionRecording& recording : recordings) {
-    const Trajectory& odometry = recording.recording.odometry;
-    duration_s = std::max(duration_s, recording.start_s + (odometry.back().stamp - odometry.front().stamp));
-  }
-  return config.duration_s > 0.0 ? std::min(duration_s, config.duration_s) : duration_s;
 }
 
 }  // namespace tutti::lab

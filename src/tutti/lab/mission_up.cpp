@@ -39,7 +39,7 @@ bool is_over(const MissionStatus& status, const std::vector<std::string>& names)
 
 class MissionUp {
  public:
-  MissionUp(const MissionUpOptions& options, mission::MissionConfig config)
+  MissionUp(const MissionUpOptions& options, MissionConfig config)
       : options_(options), config_(std::move(config)), names_(robot_names(config_)), state_(options.out / "state") {}
   Status start(const std::atomic<bool>& stop);
   Status watch(const std::atomic<bool>& stop);
@@ -52,7 +52,7 @@ class MissionUp {
   void tell(const MissionStatus& status) const;
 
   const MissionUpOptions& options_;
-  mission::MissionConfig config_;
+  MissionConfig config_;
   std::vector<std::string> names_;
   std::string name_;  // on the bus
   fs::path state_;

@@ -26,18 +26,19 @@ void record_traffic(const std::vector<TrafficRecord>& traffic, RobotRecord& robo
 
 MissionRecord make_record(const FinishedMission& mission) {
   const MissionConfig& config = mission.config;
-  MissionRecord record{.mission = config.mission,
-                       .description = config.description,
-                       .input = config.input,
-                       .notes = config.notes,
-                       .seed = mission.seed,
-                       .default_policy = config.agent.policy.name,
-                       .duration_s = mission.duration_s,
-                       .association = config.association,
-                       .rpe_interval = fmt::format("{:g} s", kRpeInterval_s),
-                       .version = mission.version,
-                       .effective_config_yaml = to_yaml(dump_config(config)),
-                       .survey = mission.survey};
+  MissionRecord record{
+      .mission = config.mission,
+      .description = config.description,
+      .input = config.input,
+      .notes = config.notes,
+      .seed = mission.seed,
+      .default_policy = config.agent.policy.name,
+      .duration_s = mission.duration_s,
+      .association = config.association,
+      .rpe_interval = fmt::format("{:g} s", kRpeInterval_s),
+      .version = mission.version,
+      .effective_config_yaml = mission.settings_yaml.empty() ? to_yaml(dump_config(config)) : mission.settings_yaml,
+      .survey = mission.survey};
   std::vector<RobotOutcome> outcomes;
   for (const FinishedRobot& robot : mission.robots) {
     outcomes.push_back(robot.outcome);

@@ -32,6 +32,7 @@ struct FinishedMission {
   const MissionConfig& config;
   std::uint64_t seed = 1;
   std::string version;
+  std::string settings_yaml = {};  ///< RunOptions
   double duration_s = 0.0;
   std::shared_ptr<const PointCloud> survey;
   std::vector<FinishedRobot> robots;  ///< By their numbers, from 0.

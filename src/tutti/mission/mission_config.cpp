@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mission/mission_config.hpp"
 
-#include <array>
+#include <fmt/format.h>
+
 #include <cmath>
 #include <functional>
 #include <set>
 
-#include "tutti/base/config_io.hpp"
-#include "tutti/consistency/policy.hpp"
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/demo_missions.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -30,14 +28,6 @@ void check_links(const MissionConfig& config, const Problem& problem) {
   check_outages(config.link, "link", problem);
   for (std::size_t i = 0; i < config.robot_links.size(); ++i)
     check_outages(config.robot_links[i].link, fmt::format("robot_links.{}.link", i), problem);
-}
-
-/// Files are named after robots: no two names may become one file's, nor a longer one than files may have.
-void check_name(const std::string& name, const std::string& path, const Problem& problem) {
-  constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
-  if (name.size() > kLongestName || name.find_first_not_of(kLetters) != std::string::npos)
-    problem(
-        fmt::format("{}.name: is '{}', expected at most {} letters, digits, '_' and '-'", path, name, kLongestName));
 }
 
 void check_images(const RobotConfig& robot, const std::string& path, const Problem& problem) {
@@ -71,7 +61,7 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
     const RobotConfig& robot = config.robots[i];
     const std::string path = fmt::format("robots.{}", i);
     if (robot.name.empty()) problem(path + ".name: missing");
-    check_name(robot.name, path, problem);
+    if (const std::string why = problem_of_name(robot.name); !why.empty()) problem(path + ".name: " + why);
     if (!names.insert(robot.name).second) problem(fmt::format("{}.name: '{}' is there twice", path, robot.name));
     check_images(robot, path, problem);
     if (!robot.reference_offset_m.empty() && robot.reference_offset_m.size() != 3)
@@ -80,50 +70,7 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
       problem(fmt::format("{}.T_body_lidar.{}", path, T_body_lidar.error().message));
     if (robot.from_share >= robot.to_share)
       problem(fmt::format("{}: from_share {} is not below to_share {}", path, robot.from_share, robot.to_share));
-    if (config.closures.finder == "reference" && robot.reference.file.empty())
-      problem(path + ".reference.file: missing, but closures.finder is 'reference'");
-    if (config.closures.finder == "lidar" && robot.scans.empty())
-      problem(path + ".scans: missing, but closures.finder is 'lidar'");
-    if (config.closures.finder == "visual" && !robot.images.is_given())
-      problem(path + ".images: missing, but closures.finder is 'visual'");
   }
-  for (std::size_t i = 0; i < config.simulation.robots.size(); ++i)  // without a name: named by place
-    check_name(config.simulation.robots[i].name, fmt::format("simulation.robots.{}", i), problem);
-  for (std::size_t i = 0; i < config.hall.robots.size(); ++i)
-    check_name(config.hall.robots[i].name, fmt::format("hall.robots.{}", i), problem);
-}
-
-/// What a single field cannot know.
-Status check_mission(const MissionConfig& config, const std::string& name) {
-  std::vector<std::string> problems;
-  const auto problem = [&](std::string text) { problems.push_back(": " + std::move(text)); };
-  if (config.source == "recordings" && config.robots.empty())
-    problem("robots: none given, expected at least one (or source: simulation)");
-  check_robots(config, problem);
-  check_imu(config, problem);
-  if (config.source == "simulation" && config.closures.finder == "lidar" && config.simulation.sensors != "lidar")
-    problem(fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
-                        config.simulation.sensors));
-  if (config.closures.finder != "reference" && !config.closures.planted.empty())
-    problem(fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'",
-                        config.closures.finder));
-  check_links(config, problem);
-  if (config.server.update_period_s < kShortestUpdate_s)  // every one is a step of the mission
-    problem(fmt::format("server.update_period_s: is {}, expected at least {}", config.server.update_period_s,
-                        kShortestUpdate_s));
-  for (const std::string& policy : config.compare_policies)
-    if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
-      problem("compare_policies: " + known.error().message);
-  return config_internal::to_status(name, problems);
-}
-
-Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std::vector<std::string>& assignments) {
-  for (const std::string& assignment : assignments)
-    if (const auto ok = apply_override(root, assignment); !ok) return tl::unexpected(ok.error());
-  MissionConfig config;
-  if (const auto ok = tutti::load_config(root, config, name); !ok) return tl::unexpected(ok.error());
-  if (const auto ok = check_mission(config, name); !ok) return tl::unexpected(ok.error());
-  return config;
 }
 
 /// As many finite numbers as wanted, or none.
@@ -138,6 +85,35 @@ Status check_numbers(const std::vector<double>& numbers, std::size_t count, cons
 }
 
 }  // namespace
+
+std::string problem_of_name(const std::string& name) {
+  constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+  if (name.size() <= kLongestName && name.find_first_not_of(kLetters) == std::string::npos) return {};
+  return fmt::format("is '{}', expected at most {} letters, digits, '_' and '-'", name, kLongestName);
+}
+
+std::vector<std::string> problems_of(const MissionConfig& config) {
+  std::vector<std::string> problems;
+  const auto problem = [&](std::string text) { problems.push_back(std::move(text)); };
+  check_robots(config, problem);
+  check_imu(config, problem);
+  check_links(config, problem);
+  if (config.server.update_period_s < kShortestUpdate_s)  // every one is a step of the mission
+    problem(fmt::format("server.update_period_s: is {}, expected at least {}", config.server.update_period_s,
+                        kShortestUpdate_s));
+  return problems;
+}
+
+std::vector<std::string> problems_of_finder(const MissionConfig& config) {
+  std::vector<std::string> problems;
+  for (std::size_t i = 0; i < config.robots.size(); ++i) {
+    if (config.closures.finder == "lidar" && config.robots[i].scans.empty())
+      problems.push_back(fmt::format("robots.{}.scans: missing, but closures.finder is 'lidar'", i));
+    if (config.closures.finder == "visual" && !config.robots[i].images.is_given())
+      problems.push_back(fmt::format("robots.{}.images: missing, but closures.finder is 'visual'", i));
+  }
+  return problems;
+}
 
 Result<Pose3> to_pose(const LidarPoseConfig& config) {
   const auto& [translation_m, xyzw, rpy_deg] = config;
@@ -160,26 +136,6 @@ Result<Pose3> to_pose(const LidarPoseConfig& config) {
                     so3_exp(rpy_deg[1] * kRadPerDeg * Eigen::Vector3d::UnitY()) *
                     so3_exp(rpy_deg[0] * kRadPerDeg * Eigen::Vector3d::UnitX());
   return pose;
-}
-
-Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments) {
-  auto root = load_yaml(file.string());
-  if (!root) return tl::unexpected(root.error());
-  return finish(std::move(*root), file.string(), assignments);
-}
-
-Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments, DemoSensors sensors) {
-  struct BuiltIn {
-    const char* text;
-    const char* name;
-  };
-  static constexpr std::array kMissions = {BuiltIn{kDemoMission, "missions/demo.yaml"},
-                                           BuiltIn{kHallMission, "missions/hall.yaml"},
-                                           BuiltIn{kHallMixedMission, "missions/hall_mixed.yaml"}};
-  const auto& [text, name] = kMissions.at(static_cast<std::size_t>(sensors));
-  auto root = parse_yaml(text, name);
-  if (!root) return tl::unexpected(root.error());
-  return finish(std::move(*root), name, assignments);
 }
 
 }  // namespace tutti::mission

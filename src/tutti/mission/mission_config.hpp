@@ -12,17 +12,14 @@
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/finders/finder_config.hpp"
-#include "tutti/mission/spoiled_closures.hpp"
+#include "tutti/mission/odometry_covariance.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/robot/agent.hpp"
 #include "tutti/server/map_server.hpp"
-#include "tutti/simulation/bounds.hpp"
-#include "tutti/simulation/degrade.hpp"
-#include "tutti/simulation/hall_recordings.hpp"
-#include "tutti/simulation/recordings.hpp"
-#include "tutti/simulation/reference_closures.hpp"
 
 namespace tutti::mission {
+
+inline constexpr double kLongestMission_s = 7.0 * 86400.0;
 
 /// A trajectory file below the --data folder.
 struct TrajectoryFile {
@@ -133,9 +130,7 @@ struct RobotConfig {
   double start_s = 0.0;     ///< Mission time of its first sample.
   double from_share = 0.0;  ///< Part of the recording to replay.
   double to_share = 1.0;
-  bool random_frame = false;  ///< Draw the odometry frame from the seed: any yaw, tilt, shift.
-  simulation::DegradeConfig degrade;
-  simulation::OdometryCovarianceConfig covariance;
+  OdometryCovarianceConfig covariance;
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name.");
@@ -160,32 +155,10 @@ struct RobotConfig {
     v.field("scan_pose_at", scan_pose_at, one_of({"end", "begin"}),
             "Of which moment of a sweep its odometry pose is, unless points have times of the odometry's clock.");
     v.field("images", images);
-    v.field("start_s", start_s, between(0.0, simulation::kLongest_s), "Mission time of the first sample.");
+    v.field("start_s", start_s, between(0.0, kLongestMission_s), "Mission time of the first sample.");
     v.field("from_share", from_share, between(0.0, 1.0), "First part of the recording to replay.");
     v.field("to_share", to_share, between(0.0, 1.0), "Last part of the recording to replay.");
-    v.field("random_frame", random_frame, any(), "Draw the odometry frame from the seed.");
-    v.field("degrade", degrade);
     v.field("covariance", covariance);
-  }
-};
-
-/// Who finds closures, or makes them up.
-struct ClosureConfig : finders::FinderConfig {
-  simulation::ReferenceClosureConfig reference;
-  double wrong_share = 0.0;
-  SpoiledClosureConfig wrong;
-  std::vector<PlantedClosureConfig> planted;
-  template <class V>
-  void describe(V& v) {
-    v.field("finder", finder, one_of({"lidar", "visual", "sensors", "reference"}),
-            "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry; "
-            "reference: true relative poses plus noise and a share of wrong ones.");
-    describe_sensors(v);
-    v.field("reference", reference);
-    v.field("wrong_share", wrong_share, between(0.0, 0.9),
-            "Share of the closures found that are made wrong on purpose.");
-    v.field("wrong", wrong, any(), "How wrong these are.");
-    v.field("planted", planted, any(), "reference: wrong closures at given places and times.");
   }
 };
 
@@ -211,6 +184,7 @@ struct RobotLinkConfig {
   }
 };
 
+/// Robots whose recordings are replayed, the server that joins their maps, and the radio between them.
 struct MissionConfig {
   std::string mission = "unnamed";
   std::string description;
@@ -220,18 +194,14 @@ struct MissionConfig {
   double odometry_hz = 0.0;                   ///< 0 = as recorded or simulated.
   evaluation::AssociationConfig association;  ///< Of estimates with the reference.
   ClosureCheckConfig closure_check;           ///< Of accepted closures against the reference.
-  std::string source = "recordings";          ///< recordings (`robots`) | simulation | hall
   std::vector<RobotConfig> robots;
-  simulation::SimulationConfig simulation;
-  simulation::HallMissionConfig hall;
   visual::TrackingConfig tracking;
   robot::AgentConfig agent;
   server::ServerConfig server;
   bundle::RefinementConfig refinement;
-  ClosureConfig closures;
+  finders::FinderConfig closures;
   bus::LinkConfig link;
   std::vector<RobotLinkConfig> robot_links;
-  std::vector<std::string> compare_policies;  ///< Beside the one the robots follow.
   template <class V>
   void describe(V& v) {
     v.field("mission", mission, any(), "Name of the mission.");
@@ -244,11 +214,7 @@ struct MissionConfig {
             "their scans and images keep their stamps. 0: as recorded.");
     v.field("association", association);
     v.field("closure_check", closure_check, any(), "Accepted closures against the reference.");
-    v.field("source", source, one_of({"recordings", "simulation", "hall"}),
-            "Replay `robots`, or simulate: walks through a network of corridors, or flights with cameras in a hall.");
     v.field("robots", robots, any(), "The robots whose recordings are replayed.");
-    v.field("simulation", simulation);
-    v.field("hall", hall);
     v.field("tracking", tracking, any(), "How points are followed through images.");
     v.field("agent", agent);
     v.field("server", server);
@@ -256,18 +222,14 @@ struct MissionConfig {
     v.field("closures", closures);
     v.field("link", link);
     v.field("robot_links", robot_links, any(), "Radios of single robots.");
-    v.field("compare_policies", compare_policies, any(),
-            "Further policies, run beside the robots' own on the same broadcasts.");
   }
 };
 
-/// Loads a mission file, then applies --set assignments; checks what a single field cannot (unique names, files given).
-Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments);
-/// What the robots of `tutti demo` carry: two with LiDAR in a tunnel (missions/demo.yaml), three with cameras in a hall
-/// (hall.yaml), or one with a LiDAR, one with a camera and one with both there (hall_mixed.yaml).
-enum class DemoSensors { lidar, visual, both };
-/// The mission of `tutti demo`: nothing needed but the program.
-Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments,
-                                   DemoSensors sensors = DemoSensors::lidar);
+/// What a single field cannot know: unique names, files given. A line each, "path: what is wrong".
+std::vector<std::string> problems_of(const MissionConfig& config);
+/// The same of what config.closures needs of the robots; for missions whose closures it finds.
+std::vector<std::string> problems_of_finder(const MissionConfig& config);
+/// Files are named after robots: why one cannot be called so; empty when it can.
+std::string problem_of_name(const std::string& name);
 
 }  // namespace tutti::mission

@@ -17,14 +17,11 @@
 #include "tutti/mission/resample.hpp"
 #include "tutti/mission/robot_images.hpp"
 #include "tutti/mission/scan_folder.hpp"
-#include "tutti/simulation/surface.hpp"
 
 namespace tutti::mission {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kSurveySpacing_m = 0.1;
 
 Result<Trajectory> read_trajectory(const TrajectoryFile& source, const fs::path& data,
                                    std::vector<Error>* left_out = nullptr) {
@@ -40,10 +37,6 @@ std::pair<std::size_t, std::size_t> part_of(std::size_t count, const RobotConfig
   const auto n = static_cast<double>(count);
   const auto from = static_cast<std::size_t>(std::floor(robot.from_share * n));
   return {from, std::max(from, static_cast<std::size_t>(std::ceil(robot.to_share * n)))};
-}
-
-bool is_degraded(const simulation::DegradeConfig& degrade) {
-  return degrade.yaw_deg_per_m != 0.0 || degrade.scale_percent != 0.0;
 }
 
 /// None: one scan per odometry pose.
@@ -77,7 +70,7 @@ Result<std::pair<Trajectory, Pose3>> read_reference(const RobotConfig& robot, co
 }
 
 Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, const visual::TrackingConfig& tracking,
-                                Rng rng) {
+                                const ChangeOdometry& change) {
   std::optional<formats::MaplabRecording> maplab;
   if (!robot.images.maplab_submaps.empty()) {
     auto read = read_maplab(robot.images, data);
@@ -104,11 +97,11 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   Trajectory raw(odometry->begin() + static_cast<std::ptrdiff_t>(from),
                  odometry->begin() + static_cast<std::ptrdiff_t>(until));
   if (raw.size() < 2) return fail(ErrorCode::invalid, "{} odometry poses to replay, expected at least 2", raw.size());
-  if (is_degraded(robot.degrade)) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
-  raw = simulation::degrade_odometry(raw, robot.degrade);
-  if (robot.random_frame) {
-    out.T_odom_recorded = simulation::random_frame(rng);
-    raw = simulation::move_frame(raw, out.T_odom_recorded);
+  if (change) {
+    ChangedOdometry changed = change(std::move(raw));
+    raw = std::move(changed.odometry);
+    out.T_odom_recorded = changed.T_odom_recorded;
+    if (changed.is_bent) out.T_common_odom.reset();  // a bent trajectory has no one true frame any more
   }
   if (out.T_common_odom) out.T_common_odom = *out.T_common_odom * out.T_odom_recorded.inverse();
   if (!robot.scans.empty()) {
@@ -130,15 +123,17 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     out.recording.imu = std::move(images->imu);
     out.recording.imu_noise = images->imu_noise;
   }
-  out.recording.increment_covariance = simulation::increment_covariances(raw, robot.covariance);
+  out.recording.increment_covariance = increment_covariances(raw, robot.covariance);
   out.recording.odometry = std::move(raw);
   return out;
 }
 
-Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, const fs::path& data, const Rng& rng) {
+Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, const fs::path& data,
+                                                 const std::vector<ChangeOdometry>& changes) {
   std::vector<MissionRecording> out;
   for (const RobotConfig& robot : config.robots) {
-    auto loaded = replay(robot, data, config.tracking, rng.fork("robot/" + robot.name));
+    const ChangeOdometry change = out.size() < changes.size() ? changes[out.size()] : ChangeOdometry();
+    auto loaded = replay(robot, data, config.tracking, change);
     if (!loaded) return in_context("robot " + robot.name, loaded.error());
     loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
     loaded->recording.name = robot.name;
@@ -147,45 +142,6 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
     out.push_back(std::move(*loaded));
   }
   return out;
-}
-
-Result<MissionInput> simulate(const MissionConfig& config, std::uint64_t seed) {
-  auto world = simulation::simulate_recordings(config.simulation, Timestamp{0}, seed);
-  if (!world) return tl::unexpected(world.error());
-  MissionInput input;
-  const auto robots = simulation::single_robots(config.simulation.robots);
-  for (std::size_t i = 0; i < world->recordings.size(); ++i)
-    input.robots.push_back({.recording = std::move(world->recordings[i]), .start_s = robots[i].start_s});
-  if (world->surface)
-    input.survey = std::make_shared<const PointCloud>(
-        simulation::sample_surface(*world->surface, kSurveySpacing_m, Rng(seed).fork("survey")));
-  return input;
-}
-
-Result<MissionInput> fly(const MissionConfig& config, std::uint64_t seed) {
-  auto hall = simulation::simulate_hall(config.hall, Timestamp{0}, seed);
-  if (!hall) return tl::unexpected(hall.error());
-  MissionInput input;
-  for (std::size_t i = 0; i < hall->robots.size(); ++i) {
-    auto& [recording, images] = hall->robots[i];
-    if (!images.stamps.empty()) {
-      auto source = visual::TrackingSource::open(std::move(images), recording.odometry, config.tracking);
-      if (!source) return in_context("robot " + recording.name, source.error());
-      recording.visual = std::move(*source);
-    }
-    input.robots.push_back({.recording = std::move(recording), .start_s = config.hall.robots[i].start_s});
-  }
-  input.survey = std::make_shared<const PointCloud>(
-      simulation::sample_surface(*hall->surface, kSurveySpacing_m, Rng(seed).fork("survey")));
-  return input;
-}
-
-Result<MissionInput> replay_or_simulate(const MissionConfig& config, const fs::path& data, std::uint64_t seed) {
-  if (config.source == "simulation") return simulate(config, seed);
-  if (config.source == "hall") return fly(config, seed);
-  auto robots = replay_all(config, data, Rng(seed));
-  if (!robots) return tl::unexpected(robots.error());
-  return MissionInput{.robots = std::move(*robots), .survey = nullptr};
 }
 
 /// A reference of another clock would silently judge nothing.
@@ -204,29 +160,25 @@ Status check_references(const MissionConfig& config, const std::vector<MissionRe
   return {};
 }
 
-/// A closure planted on a robot that is not there would silently do nothing.
-Status check_planted(const MissionConfig& config, const std::vector<MissionRecording>& robots) {
-  for (const PlantedClosureConfig& planted : config.closures.planted)
-    for (const std::string& name : {planted.robot, planted.other.empty() ? planted.robot : planted.other})
-      if (std::ranges::none_of(robots, [&](const MissionRecording& r) { return r.recording.name == name; }))
-        return fail(ErrorCode::configuration, "closures.planted: no robot is called '{}'", name);
+}  // namespace
+
+Status fit_input(const MissionConfig& config, std::uint64_t seed, std::vector<MissionRecording>& robots) {
+  if (auto ok = check_references(config, robots); !ok) return ok;
+  if (config.odometry_hz <= 0.0) return {};
+  for (MissionRecording& robot : robots) {
+    Rng rng = Rng(seed).fork("odometry/" + robot.recording.name);
+    const auto ok = resample(robot.recording, config.odometry_hz, rng.uniform(0.0, 1.0 / config.odometry_hz));
+    if (!ok) return in_context("robot " + robot.recording.name, ok.error());
+  }
   return {};
 }
 
-}  // namespace
-
-Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed) {
-  auto input = replay_or_simulate(config, data, seed);
-  if (!input) return input;
-  if (auto ok = check_planted(config, input->robots); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_references(config, input->robots); !ok) return tl::unexpected(ok.error());
-  if (config.odometry_hz > 0.0)
-    for (MissionRecording& robot : input->robots) {
-      Rng rng = Rng(seed).fork("odometry/" + robot.recording.name);
-      const auto ok = resample(robot.recording, config.odometry_hz, rng.uniform(0.0, 1.0 / config.odometry_hz));
-      if (!ok) return in_context("robot " + robot.recording.name, ok.error());
-    }
-  return input;
+Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed,
+                                const std::vector<ChangeOdometry>& changes) {
+  auto robots = replay_all(config, data, changes);
+  if (!robots) return tl::unexpected(robots.error());
+  if (auto ok = fit_input(config, seed, *robots); !ok) return tl::unexpected(ok.error());
+  return MissionInput{.robots = std::move(*robots), .survey = nullptr};
 }
 
 }  // namespace tutti::mission

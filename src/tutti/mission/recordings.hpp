@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -32,7 +34,20 @@ struct MissionInput {
   std::shared_ptr<const PointCloud> survey;  ///< What the place really looks like, reference frame; null when unknown.
 };
 
-/// Replays or simulates every robot of the mission. `data` is the --data folder (may be empty for simulated robots).
-Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed);
+/// A recorded odometry, changed before it is replayed.
+struct ChangedOdometry {
+  Trajectory odometry;    ///< Of the same stamps.
+  Pose3 T_odom_recorded;  ///< MissionRecording
+  bool is_bent = false;   ///< Not only moved as a whole.
+};
+using ChangeOdometry = std::function<ChangedOdometry(Trajectory recorded)>;
+
+/// Reads the recording of every robot of the mission; `data` is the folder that their files' names are relative to.
+/// `changes`: to the robots by their places, for tests and experiments; those behind the last are replayed as they are.
+Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed,
+                                const std::vector<ChangeOdometry>& changes = {});
+/// What load_input() does last, and what recordings from elsewhere need, too: checks that references are by the clock
+/// of the odometry, and gives robots odometry at the mission's rate.
+Status fit_input(const MissionConfig& config, std::uint64_t seed, std::vector<MissionRecording>& robots);
 
 }  // namespace tutti::mission

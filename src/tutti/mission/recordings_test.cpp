@@ -36,14 +36,6 @@ class Recordings : public testing::Test {
   MissionConfig config_;
 };
 
-TEST_F(Recordings, AClosurePlantedOnAnUnknownRobotIsAnError) {
-  config_.closures.planted = {{.robot = std::string("a"), .other = std::string("zulu")}};
-  const auto input = load_input(config_, folder_, 1);
-  ASSERT_FALSE(input.has_value());
-  EXPECT_EQ(input.error().code, ErrorCode::configuration);
-  EXPECT_NE(input.error().message.find("zulu"), std::string::npos) << input.error().message;
-}
-
 TEST_F(Recordings, AreReplayedAsTheyAre) {
   const auto input = load_input(config_, folder_, 1);
   ASSERT_TRUE(input.has_value()) << input.error().message;
@@ -77,25 +69,6 @@ TEST_F(Recordings, AReferenceTransformThatIsNoneIsRefused) {
   EXPECT_EQ(input->robots[0].recording.reference[0].pose.translation.x(), 5.0);
   std::ofstream(folder_ / "T.txt") << "2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n";
   EXPECT_NE(problem().find("T.txt:3: "), std::string::npos) << problem();
-}
-
-TEST_F(Recordings, ARandomFrameMovesTheOdometryAndIsKnownToTheJudge) {
-  config_.robots[0].random_frame = true;
-  const auto input = load_input(config_, folder_, 1);
-  const auto again = load_input(config_, folder_, 1);
-  const auto other = load_input(config_, folder_, 2);
-  const MissionRecording& robot = input->robots.front();
-  EXPECT_EQ(robot.recording.odometry, again->robots.front().recording.odometry);
-  EXPECT_NE(robot.recording.odometry, other->robots.front().recording.odometry);
-  for (std::size_t i = 0; i < recorded_.size(); ++i)
-    EXPECT_LT(local(*robot.T_common_odom * robot.recording.odometry[i].pose, recorded_[i].pose).norm(), 1e-9);
-}
-
-TEST_F(Recordings, DegradedOdometryHasNoOneTrueFrame) {
-  config_.robots[0].degrade.yaw_deg_per_m = 1.0;
-  const auto input = load_input(config_, folder_, 1);
-  EXPECT_FALSE(input->robots.front().T_common_odom.has_value());
-  EXPECT_EQ(input->robots.front().recording.reference, recorded_);
 }
 
 constexpr const char* kOnePoint =

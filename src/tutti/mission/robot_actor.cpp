@@ -15,45 +15,39 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::mission {
-namespace {
 
-constexpr const char* kBudgetPolicy = "spectral";
+robot::AgentConfig with_sensors(robot::AgentConfig config, const Recording& recording) {
+  config.submap.has_scans = recording.scans != nullptr;
+  config.submap.has_images = recording.visual != nullptr;
+  return config;
+}
 
-}  // namespace
+void UpdateStopwatch::stage_ended(robot::UpdateStage stage) {
+  const double ms = stage_.lap_ms();
+  if (stage == robot::UpdateStage::compare) timing_.comparison_ms.push_back(ms);
+  if (stage == robot::UpdateStage::optimise) timing_.optimisation_ms.push_back(ms);
+}
 
 RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-                       const std::vector<std::string>& policies, const evaluation::AssociationConfig& association,
-                       Rng rng)
-    : RobotActor(recording, association) {
+                       const evaluation::AssociationConfig& association, const Rng& rng,
+                       std::unique_ptr<Companions> companions)
+    : RobotActor(recording, association, config.policy.name) {
+  companions_ = std::move(companions);
   nothing_ = std::make_unique<const storage::MemoryStore>(storage::robot_schema());
-  std::vector<std::string> ordered = policies;
-  std::stable_partition(ordered.begin(), ordered.end(), [](const std::string& p) { return p == kBudgetPolicy; });
-  for (const std::string& policy : ordered) {
-    robot::AgentConfig own = with_sensors(config);
-    own.policy.name = policy;
-    const bool is_shadow = policy != config.policy.name;
-    if (is_shadow) own.explain = false;  // shadows are not shown
-    members_.push_back({policy, nullptr, {.robot = recording.recording.name, .policy = policy}});
-    if (is_shadow)
-      members_.back().shadow = std::make_unique<robot::RobotAgent>(recording.recording.robot, 0, own, rng.fork(policy));
-    else
-      node_ = node::RobotNode::open(recording.recording.robot, 0, {.agent = own, .keeps_state = false},
-                                    rng.fork(policy), *nothing_)
-                  .value();
-  }
-  TUTTI_CHECK(node_ != nullptr, "default policy {} does not run", config.policy.name);
+  node_ = node::RobotNode::open(recording.recording.robot, 0,
+                                {.agent = with_sensors(config, recording.recording), .keeps_state = false},
+                                rng.fork(policy_), *nothing_)
+              .value();
 }
 
 Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& recording,
                                                      const node::RobotNodeConfig& config,
                                                      const evaluation::AssociationConfig& association, const Rng& rng,
                                                      std::uint64_t session, const storage::TableStore& store) {
-  std::unique_ptr<RobotActor> actor(new RobotActor(recording, association));
-  const std::string& policy = config.agent.policy.name;
-  actor->members_.push_back({policy, nullptr, {.robot = recording.recording.name, .policy = policy}});
+  std::unique_ptr<RobotActor> actor(new RobotActor(recording, association, config.agent.policy.name));
   node::RobotNodeConfig own = config;
-  own.agent = actor->with_sensors(config.agent);
-  auto node = node::RobotNode::open(recording.recording.robot, session, own, rng.fork(policy), store);
+  own.agent = with_sensors(config.agent, recording.recording);
+  auto node = node::RobotNode::open(recording.recording.robot, session, own, rng.fork(actor->policy_), store);
   if (!node) return tl::unexpected(node.error());
   actor->node_ = std::move(*node);
   if (const auto newest = actor->node_->agent().newest_sample()) {
@@ -70,12 +64,6 @@ Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& rec
     skip(from.image_stamps, actor->next_images_);
   }
   return actor;
-}
-
-robot::AgentConfig RobotActor::with_sensors(robot::AgentConfig config) const {
-  config.submap.has_scans = recording_.recording.scans != nullptr;
-  config.submap.has_images = recording_.recording.visual != nullptr;
-  return config;
 }
 
 /// What sensors saw since all was settled, and the end of the recording, may not have been stored.
@@ -96,13 +84,10 @@ void RobotActor::replay_next(Timestamp now) {
   const Recording& recording = recording_.recording;
   const StampedPose& sample = recording.odometry[next_];
   const Matrix6d covariance = next_ == 0 ? Matrix6d(Matrix6d::Zero()) : recording.increment_covariance[next_ - 1];
-  for (const Member& member : members_) {
-    if (!member.shadow) {
-      const CpuScope cpu(cpu_s_);
-      take(node_->add_odometry({sample.stamp, sample.pose, covariance}, now));
-    } else if (member.shadow->add_odometry(sample.stamp, sample.pose, covariance)) {
-      member.shadow->take_outgoing();  // shadows are never heard
-    }
+  if (companions_) companions_->add_odometry(sample, covariance);
+  {
+    const CpuScope cpu(cpu_s_);
+    take(node_->add_odometry({sample.stamp, sample.pose, covariance}, now));
   }
   ++next_;
   feed_sensors(now);
@@ -148,8 +133,7 @@ void RobotActor::feed_moment(Timestamp stamp, bool has_scan, bool has_images, Ti
   if (wants_scan) feed_scan(now);
   if (has_images) feed_images(stamp, wants_images, now);
   if (agent.keyframes().empty() || agent.keyframes().back().stamp != stamp) return;
-  for (const Member& member : members_)
-    if (member.shadow) member.shadow->add_moment(stamp);
+  if (companions_) companions_->add_moment(stamp);
 }
 
 void RobotActor::feed_scan(Timestamp now) {
@@ -211,12 +195,10 @@ void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
   const auto graph = node_->graph_in(envelope);
   if (!graph || !*graph) return take(node_->receive(envelope, now));  // which refuses it, or keeps it
   const ProxyGraphMessage& message = **graph;
-  std::optional<std::size_t> budget;
+  const std::optional<std::size_t> budget = companions_ ? companions_->before(message) : std::nullopt;
   const std::size_t updates = updates_.size();
-  for (Member& member : members_) {
-    update(member, envelope, message, agent_of(member).policy().needs_budget() ? budget : std::nullopt, now);
-    if (member.policy == kBudgetPolicy) budget = agent_of(member).ledger().size();
-  }
+  update(envelope, node_->agent().policy().needs_budget() ? budget : std::nullopt, now);
+  if (companions_) companions_->after(message, node_->agent());
   if (updates_.size() > updates) score(trajectory_of(message.graph, node_->agent().chain()), updates_.back());
 }
 
@@ -234,31 +216,18 @@ void RobotActor::score(const Trajectory& map, UpdateRecord& update) const {
     odometry.push_back({keyframe.stamp, keyframe.T_odom_body});
   update.onboard_rmse_m = rmse(odometry);
   update.server_rmse_m = rmse(map);
-  for (const Member& member : members_)
-    update.answers.push_back({member.policy, agent_of(member).ledger().size(), rmse(agent_of(member).corrected())});
+  for (const auto& [policy, agent] : agents())
+    update.answers.push_back({policy, agent->ledger().size(), rmse(agent->corrected())});
 }
 
-void RobotActor::update(Member& member, const bus::Envelope& envelope, const ProxyGraphMessage& message,
-                        std::optional<std::size_t> budget, Timestamp now) {
-  double unused_s = 0.0;
-  const CpuScope cpu(member.shadow ? unused_s : cpu_s_);
-  Stopwatch whole;
-  Stopwatch stage;
-  const auto stage_ended = [&](robot::UpdateStage ended) {
-    const double ms = stage.lap_ms();
-    if (ended == robot::UpdateStage::compare) member.timing.comparison_ms.push_back(ms);
-    if (ended == robot::UpdateStage::optimise) member.timing.optimisation_ms.push_back(ms);
-  };
-  bool has_compared = false;
-  if (member.shadow) {
-    has_compared = member.shadow->receive(message, budget, stage_ended).synchronised > 0;
-  } else {
-    const std::size_t before = updates_.size();
-    node_->observe(stage_ended);
-    take(node_->receive(envelope, now, budget));
-    has_compared = updates_.size() > before;
-  }
-  if (has_compared) member.timing.update_ms.push_back(whole.lap_ms());
+void RobotActor::update(const bus::Envelope& envelope, std::optional<std::size_t> budget, Timestamp now) {
+  const CpuScope cpu(cpu_s_);
+  UpdateStopwatch stopwatch(timing_);
+  const std::size_t before = updates_.size();
+  node_->observe([&](robot::UpdateStage stage) { stopwatch.stage_ended(stage); });
+  take(node_->receive(envelope, now, budget));
+  node_->observe({});
+  if (updates_.size() > before) stopwatch.update_ended();
 }
 
 void RobotActor::note_update(const node::RobotUpdated& update, Timestamp time) {
@@ -273,18 +242,21 @@ void RobotActor::note_update(const node::RobotUpdated& update, Timestamp time) {
   explanation_ = summary.explanation;
 }
 
-RobotOutcome RobotActor::outcome() const {
-  RobotOutcome out{.recording = &recording_, .default_policy = {}, .agents = {}, .replayed = next_};
-  for (const Member& member : members_) {
-    out.agents.emplace_back(member.policy, &agent_of(member));
-    if (!member.shadow) out.default_policy = member.policy;
-  }
+std::vector<std::pair<std::string, const robot::RobotAgent*>> RobotActor::agents() const {
+  std::vector<std::pair<std::string, const robot::RobotAgent*>> out{{policy_, &node_->agent()}};
+  if (!companions_) return out;
+  for (auto& companion : companions_->agents()) out.push_back(std::move(companion));
   return out;
 }
 
+RobotOutcome RobotActor::outcome() const {
+  return {.recording = &recording_, .default_policy = policy_, .agents = agents(), .replayed = next_};
+}
+
 std::vector<PolicyTiming> RobotActor::timing() const {
-  std::vector<PolicyTiming> out;
-  for (const Member& member : members_) out.push_back(member.timing);
+  std::vector<PolicyTiming> out{timing_};
+  if (!companions_) return out;
+  for (PolicyTiming& companion : companions_->timing()) out.push_back(std::move(companion));
   return out;
 }
 

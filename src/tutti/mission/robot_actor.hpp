@@ -12,6 +12,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/image_tally.hpp"
+#include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/record.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/node/robot_node.hpp"
@@ -22,16 +23,46 @@ namespace tutti::mission {
 /// Virtual time; robots' own stamps are never compared with it.
 inline constexpr Timestamp kMissionStart{0};
 
-/// One robot of a mission: replays its recording into a node with the default policy, which talks to the server, and
-/// into shadow agents with the policies that the mission compares, which hear the same broadcasts but are never heard.
-/// What becomes of the robot is folded from its node's events.
+/// Agents that hear what a robot's node hears, and are never heard: what other policies make of the same.
+class Companions {
+ public:
+  virtual ~Companions() = default;
+  virtual void add_odometry(const StampedPose& sample, const Matrix6d& covariance) = 0;
+  /// The robot's node made a keyframe of a moment between two samples.
+  virtual void add_moment(Timestamp stamp) = 0;
+  /// Before the node hears a broadcast: how many constraints its policy may then hold, if it needs a budget.
+  virtual std::optional<std::size_t> before(const ProxyGraphMessage& message) = 0;
+  /// After it; `own` is the node's agent.
+  virtual void after(const ProxyGraphMessage& message, const robot::RobotAgent& own) = 0;
+  /// By policy.
+  [[nodiscard]] virtual std::vector<std::pair<std::string, const robot::RobotAgent*>> agents() const = 0;
+  [[nodiscard]] virtual std::vector<PolicyTiming> timing() const = 0;
+};
+
+/// The settings of an agent that is fed a recording: with what that is known to have.
+robot::AgentConfig with_sensors(robot::AgentConfig config, const Recording& recording);
+
+/// What of an update takes how long.
+class UpdateStopwatch {
+ public:
+  explicit UpdateStopwatch(PolicyTiming& timing) : timing_(timing) {}
+  void stage_ended(robot::UpdateStage stage);
+  void update_ended() { timing_.update_ms.push_back(whole_.lap_ms()); }
+
+ private:
+  PolicyTiming& timing_;
+  Stopwatch whole_, stage_;
+};
+
+/// One robot of a mission: replays its recording into a node, which talks to the server. What becomes of the robot is
+/// folded from its node's events.
 class RobotActor {
  public:
-  /// `policies`: all that run, the default one (config.policy.name) among them.
+  /// `companions`: may be null.
   RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-             const std::vector<std::string>& policies, const evaluation::AssociationConfig& association, Rng rng);
+             const evaluation::AssociationConfig& association, const Rng& rng, std::unique_ptr<Companions> companions);
   /// A robot that may be killed: its node keeps its state in `store`, which outlives it, and goes on where the
-  /// recording stood. `rng` as above; without shadows.
+  /// recording stood. `rng` as above; alone.
   static Result<std::unique_ptr<RobotActor>> open(const MissionRecording& recording,
                                                   const node::RobotNodeConfig& config,
                                                   const evaluation::AssociationConfig& association, const Rng& rng,
@@ -50,7 +81,6 @@ class RobotActor {
   void store_all() { take(node_->store_all()); }
   /// Closes the last submap before the recording ends.
   void finish(Timestamp now) { take(node_->finish(now)); }
-  /// The budget of policies that need one is what the policy `spectral` holds after the same broadcast.
   void receive(const bus::Envelope& envelope, Timestamp now);
   /// What the node has to send, and what others are to be told, since the last call.
   node::Step take_step() { return std::exchange(step_, {}); }
@@ -73,28 +103,24 @@ class RobotActor {
   [[nodiscard]] const std::string& refused_images() const { return refused_images_.first; }
 
  private:
-  struct Member {
-    std::string policy;
-    std::unique_ptr<robot::RobotAgent> shadow;  ///< Null: the node's own policy.
-    PolicyTiming timing;
-  };
   struct Trouble {
     std::size_t count = 0;
     std::string first;
   };
 
-  RobotActor(const MissionRecording& recording, const evaluation::AssociationConfig& association)
-      : recording_(recording), association_(association) {}
+  RobotActor(const MissionRecording& recording, const evaluation::AssociationConfig& association, std::string policy)
+      : recording_(recording),
+        association_(association),
+        policy_(std::move(policy)),
+        timing_{.robot = recording.recording.name, .policy = policy_} {}
 
-  [[nodiscard]] const robot::RobotAgent& agent_of(const Member& member) const {
-    return member.shadow ? *member.shadow : node_->agent();
-  }
+  /// By policy, the node's own first.
+  [[nodiscard]] std::vector<std::pair<std::string, const robot::RobotAgent*>> agents() const;
   void take(node::Step step);
   void note_event(const node::Event& event);
   void note_update(const node::RobotUpdated& update, Timestamp time);
   /// Times the stages of an update, and the whole if there is anything to compare.
-  void update(Member& member, const bus::Envelope& envelope, const ProxyGraphMessage& message,
-              std::optional<std::size_t> budget, Timestamp now);
+  void update(const bus::Envelope& envelope, std::optional<std::size_t> budget, Timestamp now);
   /// How far every estimate is from the reference at the nodes of the broadcast.
   void score(const Trajectory& map, UpdateRecord& update) const;
   /// What sensors saw until the last sample that was fed.
@@ -104,8 +130,6 @@ class RobotActor {
   void feed_images(Timestamp stamp, bool keyframe, Timestamp now);
   void refuse_images(const std::vector<Error>& errors, Timestamp now);
   void tell_refused(const std::string& why, Timestamp now);
-  /// `config` with what the recording is known to have.
-  [[nodiscard]] robot::AgentConfig with_sensors(robot::AgentConfig config) const;
   [[nodiscard]] std::vector<ImuSample> imu_since_keyframe(Timestamp stamp) const;
   static void note(Trouble& trouble, const std::string& message);
 
@@ -114,8 +138,10 @@ class RobotActor {
   std::unique_ptr<const storage::TableStore> nothing_;  // of one whom nobody kills
   std::unique_ptr<node::RobotNode> node_;
   node::Step step_;
-  std::vector<Member> members_;  // `spectral` first, if it is there: it sets the budget
-  std::size_t next_ = 0;         // odometry sample
+  std::unique_ptr<Companions> companions_;
+  std::string policy_;  // the node's
+  PolicyTiming timing_;
+  std::size_t next_ = 0;  // odometry sample
   std::size_t next_scan_ = 0, next_images_ = 0;
   std::vector<UpdateRecord> updates_;
   std::optional<consistency::Explanation> explanation_;

@@ -12,7 +12,6 @@
 #include "tutti/bus/simulated_network.hpp"
 #include "tutti/finders/parallel.hpp"
 #include "tutti/finders/sensor_finder_maker.hpp"
-#include "tutti/mission/closure_finders.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/load_meter.hpp"
 #include "tutti/mission/make_record.hpp"
@@ -56,15 +55,14 @@ class Pace {
 
 class MissionRun {
  public:
-  MissionRun(const MissionConfig& config, const RunOptions& options, MissionInput input)
+  MissionRun(const MissionConfig& config, const RunOptions& options, MissionParts parts)
       : config_(config),
         options_(options),
-        recordings_(std::move(input.robots)),
-        survey_(std::move(input.survey)),
+        recordings_(std::move(parts.input.robots)),
+        survey_(std::move(parts.input.survey)),
         threads_(options.threads > 0 ? static_cast<std::size_t>(options.threads)
                                      : std::max(1U, std::thread::hardware_concurrency())),
-        meter_(make_closure_finder(config.closures, recordings_, options.seed),
-               finders::make_refiner(config.closures, config.refinement)),
+        meter_(std::move(parts.finder), std::move(parts.refiner)),
         network_(radio(), kMissionStart),
         store_(storage::map_schema()),
         server_(node::ServerNode::open(robot_ids(recordings_), meter_.finder(),
@@ -80,18 +78,14 @@ class MissionRun {
         worker_port_(network_.connect(kWorker)),
         pace_(options.rate) {
     worker_.refine_with(meter_.refiner());
-    std::vector<std::string> policies = config.compare_policies;
-    if (std::find(policies.begin(), policies.end(), config.agent.policy.name) == policies.end())
-      policies.insert(policies.begin(), config.agent.policy.name);
-    const Rng rng(options.seed);
     for (const MissionRecording& recording : recordings_) {
-      robots_.push_back({std::make_unique<RobotActor>(recording, config.agent, policies, config.association,
-                                                      rng.fork("agent/" + recording.recording.name)),
-                         network_.connect(bus::Endpoint::of(recording.recording.robot))});
-      const Trajectory& odometry = recording.recording.odometry;
-      duration_s_ = std::max(duration_s_, recording.start_s + (odometry.back().stamp - odometry.front().stamp));
+      const Rng rng = agent_randomness(options.seed, recording.recording.name);
+      robots_.push_back(
+          {std::make_unique<RobotActor>(recording, config.agent, config.association, rng,
+                                        parts.companions ? parts.companions(recording.recording, rng) : nullptr),
+           network_.connect(bus::Endpoint::of(recording.recording.robot))});
     }
-    if (config.duration_s > 0.0) duration_s_ = std::min(duration_s_, config.duration_s);
+    duration_s_ = duration_of(config, recordings_);
   }
 
   void run() {
@@ -303,6 +297,7 @@ MissionRecord MissionRun::record() const {
   FinishedMission mission{.config = config_,
                           .seed = options_.seed,
                           .version = options_.version,
+                          .settings_yaml = options_.settings_yaml,
                           .duration_s = duration_s_,
                           .survey = survey_,
                           .robots = {},
@@ -333,11 +328,31 @@ Status check_links(const MissionConfig& config, const std::vector<MissionRecordi
 
 }  // namespace
 
+Rng agent_randomness(std::uint64_t seed, const std::string& robot) { return Rng(seed).fork("agent/" + robot); }
+
+double duration_of(const MissionConfig& config, const std::vector<MissionRecording>& recordings) {
+  double duration_s = 0.0;
+  for (const MissionRecording& recording : recordings) {
+    const Trajectory& odometry = recording.recording.odometry;
+    duration_s = std::max(duration_s, recording.start_s + (odometry.back().stamp - odometry.front().stamp));
+  }
+  return config.duration_s > 0.0 ? std::min(duration_s, config.duration_s) : duration_s;
+}
+
 Result<MissionRecord> run_mission(const MissionConfig& config, const RunOptions& options) {
   auto input = load_input(config, options.data, options.seed);
   if (!input) return tl::unexpected(input.error());
-  if (const auto ok = check_links(config, input->robots); !ok) return tl::unexpected(ok.error());
-  MissionRun mission(config, options, std::move(*input));
+  return run_mission(config,
+                     {.input = std::move(*input),
+                      .finder = finders::make_finder(config.closures),
+                      .refiner = finders::make_refiner(config.closures, config.refinement),
+                      .companions = {}},
+                     options);
+}
+
+Result<MissionRecord> run_mission(const MissionConfig& config, MissionParts parts, const RunOptions& options) {
+  if (const auto ok = check_links(config, parts.input.robots); !ok) return tl::unexpected(ok.error());
+  MissionRun mission(config, options, std::move(parts));
   mission.run();
   if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());
   return mission.record();

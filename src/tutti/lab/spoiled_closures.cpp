@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/spoiled_closures.hpp"
+#include "tutti/lab/spoiled_closures.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include "tutti/geometry/so3.hpp"
 #include "tutti/simulation/reference_closures.hpp"
 
-namespace tutti::mission {
+namespace tutti::lab {
 namespace {
 
 constexpr std::uint32_t kBlock = 2;  // submaps of each robot that share one look-alike
@@ -69,4 +69,4 @@ Result<ClosureVerdict> SpoiledClosureFinder::verify(const Submap& first, const S
   return verdict;
 }
 
-}  // namespace tutti::mission
+}  // namespace tutti::lab

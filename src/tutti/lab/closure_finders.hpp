@@ -7,11 +7,11 @@
 #include <optional>
 #include <vector>
 
-#include "tutti/mission/mission_config.hpp"
+#include "tutti/lab/mission_config.hpp"
 #include "tutti/mission/recordings.hpp"
 #include "tutti/server/closure_finder.hpp"
 
-namespace tutti::mission {
+namespace tutti::lab {
 
 /// A planted closure in terms of robots and stamps.
 struct PlantedClosure {
@@ -55,8 +55,7 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
 
 /// What load_input() accepts is complete: planted closures name robots of the mission. A finder that needs the mission,
 /// because it draws or knows the reference, has no settings that a worker could make it of.
-std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
-                                                                 const std::vector<MissionRecording>& recordings,
-                                                                 std::uint64_t seed);
+std::shared_ptr<const server::ClosureFinder> make_closure_finder(
+    const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed);
 
-}  // namespace tutti::mission
+}  // namespace tutti::lab

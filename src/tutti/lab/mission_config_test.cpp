@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/mission_config.hpp"
+#include "tutti/lab/mission_config.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 #include "support/paths.hpp"
 
-namespace tutti::mission {
+namespace tutti::lab {
 namespace mission_config_test {
 
 std::string problem_with(const std::string& yaml, const std::vector<std::string>& assignments = {}) {
@@ -81,7 +81,7 @@ TEST(MissionConfig, EurocsImagesAreAMission) {
   const auto mission = load_mission(test::source_path("missions/euroc_mh_images.yaml"), {});
   ASSERT_TRUE(mission.has_value()) << mission.error().message;
   ASSERT_EQ(mission->robots.size(), 3U);
-  for (const RobotConfig& robot : mission->robots) EXPECT_EQ(robot.images.euroc_folder.find("euroc/MH_0"), 0U);
+  for (const mission::RobotConfig& robot : mission->robots) EXPECT_EQ(robot.images.euroc_folder.find("euroc/MH_0"), 0U);
 }
 
 TEST(MissionConfig, RobotsAreCalledWhatFilesCanBeCalled) {
@@ -120,7 +120,7 @@ TEST(MissionConfig, WhereTheLidarSitsIsAPose) {
   EXPECT_NE(problem("quaternion_xyzw: [0, 0, 0, 1], rpy_deg: [0, 0, 0]").find("expected one of them"),
             std::string::npos);
   // Roll, pitch and yaw about fixed axes: z is turned by the roll, then by the pitch, then by the yaw.
-  const Pose3 T = to_pose({.translation_m = {}, .quaternion_xyzw = {}, .rpy_deg = {90.0, 90.0, 90.0}}).value();
+  const Pose3 T = mission::to_pose({.translation_m = {}, .quaternion_xyzw = {}, .rpy_deg = {90.0, 90.0, 90.0}}).value();
   EXPECT_LT((T.rotation * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
   EXPECT_LT((T.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-12);
 }
@@ -148,4 +148,4 @@ TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
 }
 
 }  // namespace mission_config_test
-}  // namespace tutti::mission
+}  // namespace tutti::lab

@@ -11,7 +11,7 @@
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/simulation/bounds.hpp"
 
-namespace tutti::mission {
+namespace tutti::lab {
 
 /// Wrong closures forced into a mission, to see what the server makes of them.
 struct SpoiledClosureConfig {
@@ -67,4 +67,4 @@ struct PlantedClosureConfig {
   }
 };
 
-}  // namespace tutti::mission
+}  // namespace tutti::lab

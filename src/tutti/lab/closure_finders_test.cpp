@@ -1,31 +1,33 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/lab/closure_finders.hpp"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
-namespace tutti::mission {
+namespace tutti::lab {
 namespace closure_finders_test {
 
-ClosureConfig config_of(const std::string& finder, double wrong_share = 0.0) {
-  ClosureConfig config;
-  config.finder = finder;
-  config.wrong_share = wrong_share;
+MissionConfig config_of(const std::string& finder, double wrong_share = 0.0) {
+  MissionConfig config;
+  config.closure_changes.finder = finder;
+  if (finder != "reference") config.closures.finder = finder;
+  config.closure_changes.wrong_share = wrong_share;
   return config;
 }
 
 TEST(MakeClosureFinder, NamesDifferWithEverythingThatIsDrawn) {
   std::set<MethodId> ids;
-  const auto expect_new = [&](const ClosureConfig& config, std::uint64_t seed) {
-    EXPECT_TRUE(ids.insert(make_closure_finder(config, {}, seed)->id()).second) << config.finder << " " << seed;
+  const auto expect_new = [&](const MissionConfig& config, std::uint64_t seed) {
+    EXPECT_TRUE(ids.insert(make_closure_finder(config, {}, seed)->id()).second)
+        << config.closure_changes.finder << " " << seed;
   };
   for (const std::uint64_t seed : {1, 2})
     for (const double wrong_share : {0.1, 0.2}) expect_new(config_of("lidar", wrong_share), seed);
   for (const std::uint64_t seed : {1, 2}) expect_new(config_of("reference"), seed);
-  ClosureConfig farther = config_of("reference");
-  farther.reference.radius_m += 1.0;
+  MissionConfig farther = config_of("reference");
+  farther.closure_changes.reference.radius_m += 1.0;
   expect_new(farther, 1);
   expect_new(config_of("lidar"), 1);
   EXPECT_EQ(ids.count(make_closure_finder(config_of("lidar"), {}, 2)->id()), 1U);  // nothing is drawn
@@ -39,4 +41,4 @@ TEST(MakeClosureFinder, WhatIsDrawnIsMadeOfNoSettings) {
 }
 
 }  // namespace closure_finders_test
-}  // namespace tutti::mission
+}  // namespace tutti::lab

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/lab/closure_finders.hpp"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "tutti/finders/sensor_finders.hpp"
 #include "tutti/geometry/so3.hpp"
 
-namespace tutti::mission {
+namespace tutti::lab {
 
 namespace {
 
@@ -60,9 +60,10 @@ std::optional<LoopClosure> ReferenceClosureFinder::planted_in(const Submap& firs
 namespace {
 
 std::vector<PlantedClosure> planted_closures(const std::vector<PlantedClosureConfig>& configs,
-                                             const std::vector<MissionRecording>& recordings) {
+                                             const std::vector<mission::MissionRecording>& recordings) {
   const auto moment = [&](const std::string& name, double time_s) {
-    const auto found = std::ranges::find(recordings, name, [](const MissionRecording& r) { return r.recording.name; });
+    const auto found =
+        std::ranges::find(recordings, name, [](const mission::MissionRecording& r) { return r.recording.name; });
     TUTTI_CHECK(found != recordings.end(), "no robot is called '{}'", name);
     return std::pair(found->recording.robot, found->recording.odometry.front().stamp + (time_s - found->start_s));
   };
@@ -77,20 +78,20 @@ std::vector<PlantedClosure> planted_closures(const std::vector<PlantedClosureCon
   return out;
 }
 
-std::shared_ptr<const server::ClosureFinder> make_reference_finder(const ClosureConfig& config,
-                                                                   const std::vector<MissionRecording>& recordings,
-                                                                   std::uint64_t seed) {
+std::shared_ptr<const server::ClosureFinder> make_reference_finder(
+    const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed) {
   std::map<RobotId, Trajectory> reference;
-  for (const MissionRecording& robot : recordings) reference[robot.recording.robot] = robot.recording.reference;
-  return std::make_shared<ReferenceClosureFinder>(std::move(reference), config.reference, seed,
-                                                  planted_closures(config.planted, recordings));
+  for (const mission::MissionRecording& robot : recordings)
+    reference[robot.recording.robot] = robot.recording.reference;
+  return std::make_shared<ReferenceClosureFinder>(std::move(reference), config.closure_changes.reference, seed,
+                                                  planted_closures(config.closure_changes.planted, recordings));
 }
 
 /// Of the recordings that the finder's answers depend on, in short.
-std::string extent_of(const ClosureConfig& config, const std::vector<MissionRecording>& recordings) {
+std::string extent_of(const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings) {
   std::string out;
-  if (config.finder != "reference") return out;
-  for (const MissionRecording& robot : recordings) {
+  if (!config.closure_changes.are_made_up()) return out;
+  for (const mission::MissionRecording& robot : recordings) {
     const Trajectory& reference = robot.recording.reference;
     out += fmt::format("{} {}\n", robot.recording.robot.value, reference.size());
     if (!reference.empty()) out += fmt::format("{} {}\n", reference.front().stamp.ns, reference.back().stamp.ns);
@@ -100,28 +101,31 @@ std::string extent_of(const ClosureConfig& config, const std::vector<MissionReco
 
 /// All that the answers of a finder which draws depend on.
 struct DrawnSettings {
-  ClosureConfig closures;
+  finders::FinderConfig closures;
+  ClosureChanges changes;
   std::uint64_t seed = 1;
   template <class V>
   void describe(V& v) {
     v.field("closures", closures);
+    v.field("changes", changes);
     v.field("seed", seed, any(), "Of what is drawn.");
   }
 };
 
 }  // namespace
 
-std::shared_ptr<const server::ClosureFinder> make_closure_finder(const ClosureConfig& config,
-                                                                 const std::vector<MissionRecording>& recordings,
-                                                                 std::uint64_t seed) {
-  const bool is_reference = config.finder == "reference";
-  if (!is_reference && config.wrong_share == 0.0) return finders::make_finder(config);
-  auto finder = is_reference ? make_reference_finder(config, recordings, seed) : finders::make_unnamed_finder(config);
+std::shared_ptr<const server::ClosureFinder> make_closure_finder(
+    const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed) {
+  const ClosureChanges& changes = config.closure_changes;
+  if (!changes.are_made_up() && changes.wrong_share == 0.0) return finders::make_finder(config.closures);
+  auto finder = changes.are_made_up() ? make_reference_finder(config, recordings, seed)
+                                      : finders::make_unnamed_finder(config.closures);
   MethodId id = finder->id();
-  if (config.wrong_share > 0.0)
-    finder = std::make_shared<SpoiledClosureFinder>(std::move(finder), config.wrong_share, config.wrong, seed);
-  id.settings = settings_hash(to_yaml(dump_config(DrawnSettings{config, seed})) + extent_of(config, recordings));
+  if (changes.wrong_share > 0.0)
+    finder = std::make_shared<SpoiledClosureFinder>(std::move(finder), changes.wrong_share, changes.wrong, seed);
+  id.settings = settings_hash(tutti::to_yaml(dump_config(DrawnSettings{config.closures, changes, seed})) +
+                              extent_of(config, recordings));
   return std::make_shared<finders::NamedFinder>(std::move(finder), std::move(id), "");
 }
 
-}  // namespace tutti::mission
+}  // namespace tutti::lab

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/mission/spoiled_closures.hpp"
+#include "tutti/lab/spoiled_closures.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "tutti/geometry/so3.hpp"
-#include "tutti/mission/closure_finders.hpp"
+#include "tutti/lab/closure_finders.hpp"
 
-namespace tutti::mission {
+namespace tutti::lab {
 namespace spoiled_closures_test {
 
 /// Submaps of three keyframes along a line; two robots side by side.
@@ -137,4 +137,4 @@ TEST_F(Planted, TheOrderOfThePairOnlyInvertsTheClosure) {
 }
 
 }  // namespace spoiled_closures_test
-}  // namespace tutti::mission
+}  // namespace tutti::lab

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/lab/mission_config.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <memory>
+#include <utility>
+
+#include "tutti/consistency/policy.hpp"
+#include "tutti/lab/demo_missions.hpp"
+
+namespace tutti::lab {
+namespace {
+
+mission::MissionConfig& of_recordings(MissionConfig& config) { return config; }
+
+/// Of each of some simulated robots; without a name they are named by place.
+template <class Robots>
+void check_names(const Robots& robots, const char* path, std::vector<std::string>& problems) {
+  for (std::size_t i = 0; i < robots.size(); ++i)
+    if (const std::string why = mission::problem_of_name(robots[i].name); !why.empty())
+      problems.push_back(fmt::format("{}.{}.name: {}", path, i, why));
+}
+
+void check_closures(const MissionConfig& config, std::vector<std::string>& problems) {
+  const ClosureChanges& closures = config.closure_changes;
+  if (!closures.are_made_up()) {
+    std::ranges::move(mission::problems_of_finder(config), std::back_inserter(problems));
+    if (!closures.planted.empty())
+      problems.push_back(
+          fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'", closures.finder));
+  }
+  for (std::size_t i = 0; i < config.robots.size(); ++i)
+    if (closures.are_made_up() && config.robots[i].reference.file.empty())
+      problems.push_back(fmt::format("robots.{}.reference.file: missing, but closures.finder is 'reference'", i));
+  if (config.source == "simulation" && closures.finder == "lidar" && config.simulation.sensors != "lidar")
+    problems.push_back(
+        fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
+                    config.simulation.sensors));
+}
+
+Status check_mission(const MissionConfig& config, const std::string& name) {
+  std::vector<std::string> problems;
+  if (config.source == "recordings" && config.robots.empty())
+    problems.emplace_back("robots: none given, expected at least one (or source: simulation)");
+  std::ranges::move(mission::problems_of(config), std::back_inserter(problems));
+  check_names(config.simulation.robots, "simulation.robots", problems);
+  check_names(config.hall.robots, "hall.robots", problems);
+  check_closures(config, problems);
+  for (const std::string& policy : config.compare_policies)
+    if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
+      problems.push_back("compare_policies: " + known.error().message);
+  for (std::string& problem : problems) problem.insert(0, ": ");
+  return config_internal::to_status(name, problems);
+}
+
+Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std::vector<std::string>& assignments) {
+  for (const std::string& assignment : assignments)
+    if (const auto ok = apply_override(root, assignment); !ok) return tl::unexpected(ok.error());
+  auto config = read_mission(root, name);
+  if (!config) return config;
+  if (const auto ok = check_mission(*config, name); !ok) return tl::unexpected(ok.error());
+  return config;
+}
+
+/// Who finds closures is of the laboratory's settings where they are made up.
+ConfigNode without_finder(ConfigNode root) {
+  for (auto& [key, value] : root.map)
+    if (key == "closures") std::erase_if(value.map, [](const auto& entry) { return entry.first == "finder"; });
+  return root;
+}
+
+}  // namespace
+
+Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& name) {
+  MissionConfig config;
+  ConfigLoader loader;
+  loader.load(root, config);
+  const ConfigNode rest = config.closure_changes.are_made_up() ? without_finder(root) : root;
+  loader.load(rest, of_recordings(config));
+  if (const auto ok = loader.finish(name); !ok) return tl::unexpected(ok.error());
+  return config;
+}
+
+Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments) {
+  auto root = load_yaml(file.string());
+  if (!root) return tl::unexpected(root.error());
+  return finish(std::move(*root), file.string(), assignments);
+}
+
+Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments, DemoSensors sensors) {
+  struct BuiltIn {
+    const char* text;
+    const char* name;
+  };
+  static constexpr std::array kMissions = {BuiltIn{kDemoMission, "missions/demo.yaml"},
+                                           BuiltIn{kHallMission, "missions/hall.yaml"},
+                                           BuiltIn{kHallMixedMission, "missions/hall_mixed.yaml"}};
+  const auto& [text, name] = kMissions.at(static_cast<std::size_t>(sensors));
+  auto root = parse_yaml(text, name);
+  if (!root) return tl::unexpected(root.error());
+  return finish(std::move(*root), name, assignments);
+}
+
+std::string to_yaml(const MissionConfig& config) {
+  ConfigNode all = dump_config<mission::MissionConfig>(config);
+  MissionConfig rest = config;
+  if (!rest.closure_changes.are_made_up()) rest.closure_changes.finder = config.closures.finder;
+  merge_config(all, dump_config(rest));
+  return tutti::to_yaml(all);
+}
+
+std::vector<config_internal::FieldDoc> document_mission() {
+  const auto config = std::make_unique<const MissionConfig>();  // large
+  auto all = document_config<mission::MissionConfig>(*config);
+  for (config_internal::FieldDoc& field : document_config(*config)) {
+    const auto there = std::ranges::find(all, field.path, &config_internal::FieldDoc::path);
+    if (there != all.end())
+      *there = std::move(field);
+    else
+      all.push_back(std::move(field));
+  }
+  return all;
+}
+
+}  // namespace tutti::lab

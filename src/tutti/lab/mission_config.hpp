@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tutti/base/config_io.hpp"
+#include "tutti/lab/spoiled_closures.hpp"
+#include "tutti/mission/mission_config.hpp"
+#include "tutti/simulation/degrade.hpp"
+#include "tutti/simulation/hall_recordings.hpp"
+#include "tutti/simulation/recordings.hpp"
+#include "tutti/simulation/reference_closures.hpp"
+
+namespace tutti::lab {
+
+/// What is done to a recorded odometry before it is replayed.
+struct RobotChanges {
+  bool random_frame = false;  ///< Draw the odometry frame from the seed: any yaw, tilt, shift.
+  simulation::DegradeConfig degrade;
+  template <class V>
+  void describe(V& v) {
+    v.field("random_frame", random_frame, any(), "Draw the odometry frame from the seed.");
+    v.field("degrade", degrade);
+  }
+};
+
+/// Closures that are made up, and those found by sensors that are made wrong.
+struct ClosureChanges {
+  std::string finder = mission::MissionConfig().closures.finder;
+  simulation::ReferenceClosureConfig reference;
+  double wrong_share = 0.0;
+  SpoiledClosureConfig wrong;
+  std::vector<PlantedClosureConfig> planted;
+  template <class V>
+  void describe(V& v) {
+    v.field("finder", finder, one_of({"lidar", "visual", "sensors", "reference"}),
+            "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry; "
+            "reference: true relative poses plus noise and a share of wrong ones.");
+    v.field("reference", reference);
+    v.field("wrong_share", wrong_share, between(0.0, 0.9),
+            "Share of the closures found that are made wrong on purpose.");
+    v.field("wrong", wrong, any(), "How wrong these are.");
+    v.field("planted", planted, any(), "reference: wrong closures at given places and times.");
+  }
+  [[nodiscard]] bool are_made_up() const { return finder == "reference"; }
+};
+
+/// A mission file: robots whose recordings are replayed, or a simulation, and what the laboratory does to either.
+struct MissionConfig : mission::MissionConfig {
+  std::string source = "recordings";  ///< recordings (`robots`) | simulation | hall
+  simulation::SimulationConfig simulation;
+  simulation::HallMissionConfig hall;
+  std::vector<RobotChanges> robot_changes;    ///< To `robots`, by their places; those behind the last have none.
+  ClosureChanges closure_changes;             ///< Unless these are made up, `closures` finds them.
+  std::vector<std::string> compare_policies;  ///< Beside the one the robots follow.
+
+  /// All but what is of mission::MissionConfig.
+  template <class V>
+  void describe(V& v) {
+    v.field("source", source, one_of({"recordings", "simulation", "hall"}),
+            "Replay `robots`, or simulate: walks through a network of corridors, or flights with cameras in a hall.");
+    v.field("simulation", simulation);
+    v.field("hall", hall);
+    v.field("robots", robot_changes, any(), "The robots whose recordings are replayed.");
+    v.field("closures", closure_changes);
+    v.field("compare_policies", compare_policies, any(),
+            "Further policies, run beside the robots' own on the same broadcasts.");
+  }
+};
+
+/// Reads a mission's document; `name` is the document's. Checks nothing that a single field cannot know.
+Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& name);
+/// Loads a mission file, then applies --set assignments; checks what a single field cannot (unique names, files given).
+Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments);
+/// What the robots of `tutti demo` carry: two with LiDAR in a tunnel (missions/demo.yaml), three with cameras in a hall
+/// (hall.yaml), or one with a LiDAR, one with a camera and one with both there (hall_mixed.yaml).
+enum class DemoSensors { lidar, visual, both };
+/// The mission of `tutti demo`: nothing needed but the program.
+Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments,
+                                   DemoSensors sensors = DemoSensors::lidar);
+
+/// A mission file with every setting in it.
+std::string to_yaml(const MissionConfig& config);
+/// Every setting of a mission file.
+std::vector<config_internal::FieldDoc> document_mission();
+
+}  // namespace tutti::lab

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/lab/run_mission.hpp"
+
+#include <utility>
+
+#include "tutti/finders/sensor_finder_maker.hpp"
+#include "tutti/lab/closure_finders.hpp"
+#include "tutti/lab/mission_input.hpp"
+#include "tutti/lab/shadows.hpp"
+
+namespace tutti::lab {
+
+Result<mission::MissionRecord> run_mission(const MissionConfig& config, mission::RunOptions options) {
+  auto input = load_input(config, options.data, options.seed);
+  if (!input) return tl::unexpected(input.error());
+  options.settings_yaml = to_yaml(config);
+  mission::MissionParts parts{.input = std::move(*input),
+                              .finder = nullptr,
+                              .refiner = finders::make_refiner(config.closures, config.refinement),
+                              .companions = [&config](const Recording& recording, const Rng& rng) {
+                                return make_shadows(recording, config.agent, config.compare_policies, rng);
+                              }};
+  parts.finder = make_closure_finder(config, parts.input.robots, options.seed);
+  return mission::run_mission(config, std::move(parts), options);
+}
+
+}  // namespace tutti::lab

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "tutti/base/result.hpp"
+#include "tutti/lab/mission_config.hpp"
+#include "tutti/mission/runner.hpp"
+
+namespace tutti::lab {
+
+/// mission::run_mission() of a mission file: simulates its robots or reads their recordings, and adds what the mission
+/// spoils and compares.
+Result<mission::MissionRecord> run_mission(const MissionConfig& config, mission::RunOptions options);
+
+}  // namespace tutti::lab
