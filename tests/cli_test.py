@@ -75,7 +75,7 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("bag", "info", self.path / "none.mcap"), 1, "none.mcap: cannot be opened")
         other = self.path / "other.mcap"
         other.write_bytes(b"SQLite format 3")
-        self.expect(tutti("bag", "info", other), 1, "byte 0", "no MCAP file", ".db3")
+        self.expect(tutti("bag", "info", other), 1, "other.mcap", "not a database")
 
     def test_status_without_a_bus(self):
         self.expect(tutti("status"), 2, "--bus")
