@@ -9,32 +9,13 @@
 
 #include "tutti/bags/internal/chunk.hpp"
 #include "tutti/bags/internal/cursor.hpp"
+#include "tutti/bags/internal/mcap_format.hpp"
 
 namespace tutti::bags {
 namespace {
 
-using internal::Cursor;
+using namespace internal;  // Cursor and the format
 
-constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
-constexpr std::uint64_t kRecordHeadBytes = 9;  // opcode, length
-constexpr std::uint64_t kFooterBytes = 20;
-enum Opcode : std::uint8_t {
-  kHeader = 1,
-  kFooter,
-  kSchema,
-  kChannel,
-  kMessage,
-  kChunk,
-  kMessageIndex,
-  kChunkIndex,
-  kAttachment,
-  kAttachmentIndex,
-  kStatistics,
-  kMetadata,
-  kMetadataIndex,
-  kSummaryOffset,
-  kDataEnd,
-};
 constexpr std::array kNames{"nothing",  "Header",        "Footer",        "Schema",     "Channel",         "Message",
                             "Chunk",    "MessageIndex",  "ChunkIndex",    "Attachment", "AttachmentIndex", "Statistics",
                             "Metadata", "MetadataIndex", "SummaryOffset", "DataEnd"};

@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <memory>
 
+#include "tutti/base/check.hpp"
+
 namespace tutti::bags::internal {
 namespace {
 
@@ -70,7 +72,7 @@ Result<std::string> unpack_lz4(std::string_view packed, std::uint64_t size, bool
 
 }  // namespace
 
-std::uint32_t crc32(std::string_view bytes) {
+std::uint32_t crc32(std::string_view bytes, std::uint32_t before) {
   static constexpr auto kTable = [] {
     std::array<std::uint32_t, 256> table{};
     for (std::uint32_t i = 0; i < table.size(); ++i) {
@@ -80,9 +82,18 @@ std::uint32_t crc32(std::string_view bytes) {
     }
     return table;
   }();
-  std::uint32_t crc = ~std::uint32_t{0};
+  std::uint32_t crc = ~before;
   for (const char c : bytes) crc = kTable[(crc ^ static_cast<unsigned char>(c)) & 0xffU] ^ (crc >> 8U);
   return ~crc;
+}
+
+std::string pack_zstd(std::string_view bytes) {
+  constexpr int kLevel = 1;  // floats of sensors hardly become smaller for more
+  std::string out(ZSTD_compressBound(bytes.size()), '\0');
+  const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kLevel);
+  TUTTI_CHECK(!ZSTD_isError(size));
+  out.resize(size);
+  return out;
 }
 
 Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut) {

@@ -12,8 +12,11 @@ namespace tutti::bags::internal {
 /// How much of a chunk or record is taken into memory at most, by its own word.
 inline constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
 
-/// What MCAP calls CRC32: that of zlib and PNG, polynomial 0xedb88320.
-std::uint32_t crc32(std::string_view bytes);
+/// What MCAP calls CRC32: that of zlib and PNG, polynomial 0xedb88320. `before`: of the bytes in front of these.
+std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0);
+
+/// One zstd frame that says its size.
+std::string pack_zstd(std::string_view bytes);
 
 /// Unpacks the records of an MCAP chunk: compression "" (none), "zstd" or "lz4" (its frame format), `size` bytes
 /// unpacked. Memory grows with what really comes out, so that a length that lies costs nothing. Of a chunk that is

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/ros_encode.hpp"
+
+#include "tutti/bags/internal/byte_writer.hpp"
+
+namespace tutti::bags {
+namespace {
+
+using internal::ByteWriter;
+
+class Cdr {
+ public:
+  template <class T>
+  Cdr& number(T value) {
+    out_.number(value);
+    return *this;
+  }
+  Cdr& numbers(std::span<const double> values) {
+    out_.numbers(values);
+    return *this;
+  }
+  Cdr& vector(const Eigen::Vector3d& value) { return numbers({value.data(), 3}); }
+  /// ROS and Eigen both store x, y, z, w.
+  Cdr& quaternion(const Eigen::Quaterniond& value) { return numbers({value.coeffs().data(), 4}); }
+  Cdr& pose(const RosPose& value) { return vector(value.position).quaternion(value.orientation); }
+  /// With a NUL, which the length counts.
+  Cdr& text(std::string_view value) {
+    out_.number(static_cast<std::uint32_t>(value.size() + 1)).raw(value).number<std::uint8_t>(0);
+    return *this;
+  }
+  Cdr& bytes(std::string_view value) {
+    out_.counted(value);
+    return *this;
+  }
+  template <class List>
+  Cdr& count(const List& list) {
+    return number(static_cast<std::uint32_t>(list.size()));
+  }
+  /// Before 1970 the seconds are negative and the rest is not.
+  Cdr& header(const RosHeader& value) {
+    constexpr std::int64_t kPerSecond = 1'000'000'000;
+    const std::int64_t rest = ((value.stamp.ns % kPerSecond) + kPerSecond) % kPerSecond;
+    number(static_cast<std::int32_t>((value.stamp.ns - rest) / kPerSecond));
+    return number(static_cast<std::uint32_t>(rest)).text(value.frame_id);
+  }
+  std::string done() { return std::string("\0\1\0\0", 4) + out_.take(); }
+
+ private:
+  ByteWriter out_{ByteWriter::Layout::aligned};
+};
+
+void put(Cdr& out, const RosLines& lines) {
+  constexpr std::int32_t kLineList = 5, kAdd = 0;
+  out.header(lines.header).text(lines.name_space).number(lines.id).number(kLineList).number(kAdd);
+  out.pose({}).vector({lines.width_m, 0.0, 0.0});
+  for (const float channel : lines.rgba) out.number(channel);
+  out.number<std::int32_t>(0).number<std::uint32_t>(0).number<std::uint8_t>(0);  // for ever, not locked to the frame
+  out.count(lines.points);
+  for (const Eigen::Vector3d& point : lines.points) out.vector(point);
+  out.number<std::uint32_t>(0).text("");                       // colours, texture
+  out.header({}).text("").bytes("").number<std::uint32_t>(0);  // which is no image
+  out.text("").text("").text("").bytes("").number<std::uint8_t>(0);
+}
+
+}  // namespace
+
+std::string encode(const RosOdometry& message) {
+  Cdr out;
+  out.header(message.header).text(message.child_frame_id);
+  out.pose(message.pose).numbers(message.pose_covariance);
+  return out.vector(message.linear).vector(message.angular).numbers(message.twist_covariance).done();
+}
+
+std::string encode(std::span<const RosTransform> message) {
+  Cdr out;
+  out.count(message);
+  for (const RosTransform& transform : message)
+    out.header(transform.header)
+        .text(transform.child_frame_id)
+        .vector(transform.translation)
+        .quaternion(transform.rotation);
+  return out.done();
+}
+
+std::string encode(const RosPointCloud& message) {
+  Cdr out;
+  out.header(message.header).number(message.height).number(message.width).count(message.fields);
+  for (const RosPointField& field : message.fields)
+    out.text(field.name).number(field.offset).number(field.datatype).number(field.count);
+  out.number<std::uint8_t>(message.is_bigendian ? 1 : 0).number(message.point_step).number(message.row_step);
+  return out.bytes(message.data).number<std::uint8_t>(message.is_dense ? 1 : 0).done();
+}
+
+std::string encode(const RosImu& message) {
+  Cdr out;
+  out.header(message.header).quaternion(message.orientation).numbers(message.orientation_covariance);
+  out.vector(message.angular_velocity).numbers(message.angular_velocity_covariance);
+  return out.vector(message.linear_acceleration).numbers(message.linear_acceleration_covariance).done();
+}
+
+std::string encode(const RosImage& message) {
+  Cdr out;
+  out.header(message.header).number(message.height).number(message.width).text(message.encoding);
+  return out.number<std::uint8_t>(message.is_bigendian ? 1 : 0).number(message.step).bytes(message.data).done();
+}
+
+std::string encode(const RosCompressedImage& message) {
+  return Cdr().header(message.header).text(message.format).bytes(message.data).done();
+}
+
+std::string encode(const RosCameraInfo& message) {
+  Cdr out;
+  out.header(message.header).number(message.height).number(message.width).text(message.distortion_model);
+  out.count(message.d).numbers(message.d).numbers(message.k).numbers(message.r).numbers(message.p);
+  out.number(message.binning_x).number(message.binning_y);
+  for (int i = 0; i < 4; ++i) out.number<std::uint32_t>(0);  // roi: all of the image
+  return out.number<std::uint8_t>(0).done();
+}
+
+std::string encode(const RosNavSatFix& message) {
+  Cdr out;
+  out.header(message.header).number(message.status).number(message.service);
+  out.number(message.latitude_deg).number(message.longitude_deg).number(message.altitude_m);
+  return out.numbers(message.position_covariance).number(message.position_covariance_type).done();
+}
+
+std::string encode(const RosPoseStamped& message) { return Cdr().header(message.header).pose(message.pose).done(); }
+
+std::string encode(const RosPath& message) {
+  Cdr out;
+  out.header(message.header).count(message.poses);
+  for (const RosPoseStamped& pose : message.poses) out.header(pose.header).pose(pose.pose);
+  return out.done();
+}
+
+std::string encode(std::span<const RosLines> message) {
+  Cdr out;
+  out.count(message);
+  for (const RosLines& lines : message) put(out, lines);
+  return out.done();
+}
+
+std::string encode(const RosHeader& header, std::span<const RosDiagnostic> message) {
+  Cdr out;
+  out.header(header).count(message);
+  for (const RosDiagnostic& status : message) {
+    out.number(status.level).text(status.name).text(status.message).text(status.hardware_id).count(status.values);
+    for (const auto& [key, value] : status.values) out.text(key).text(value);
+  }
+  return out.done();
+}
+
+}  // namespace tutti::bags
