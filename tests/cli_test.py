@@ -47,7 +47,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_of_every_command(self):
         self.expect(tutti("--help"), 0, "run", "demo", "eval", "optimise", "compare")
-        for command in ("run", "demo", "eval", "optimise", "world", "compare", "settings", "status", "map", "server", "robot", "worker"):
+        for command in ("run", "demo", "eval", "optimise", "world", "simulate", "compare", "settings", "status", "map", "server", "robot", "worker"):
             self.expect(tutti(command, "--help"), 0, "--help")
         self.expect(tutti("mission", "up", "--help"), 0, "--workers")
         for command in ("list", "info", "export", "merge", "closure"):
@@ -262,6 +262,15 @@ class CommandLine(unittest.TestCase):
         for word in ("accept", "reject", "withdraw"):
             self.expect(tutti("map", "closure", word, "a/1-b/2", empty), 1, "a/1-b/2", "ROBOT/SUBMAP-ROBOT/SUBMAP")
         self.expect(tutti("map", "closure", "accept", "a/1-b/2", "--bus", "nats://192.0.2.1:4222"), 1, "TLS")
+
+    def test_simulate_writes_a_bag_a_robot(self):
+        mission = self.mission("source: simulation\nclosures: {finder: reference}\n"
+                               "simulation: {robots: [{name: alpha, walk: {duration_s: 5}}]}\n")
+        self.expect(tutti("simulate", mission, "-o", self.path / "bags"), 0, "bags/alpha: ", " messages")
+        self.expect(tutti("bag", "info", self.path / "bags/alpha"), 0, "/alpha/odom (alpha/odom -> alpha/base_link)")
+        self.expect(tutti("simulate", mission, "-o", self.path / "bags"), 1, "expected a folder that is empty")
+        replayed = self.mission("robots: [{name: a, odometry: {file: a}, scans: s}]\n")
+        self.expect(tutti("simulate", replayed, "-o", self.path / "x"), 2, "recordings", "simulation")
 
     def test_world_writes_the_walls_of_a_simulated_mission(self):
         mission = self.mission("source: simulation\nclosures: {finder: reference}\n")

@@ -19,6 +19,7 @@ void add_bag_command(CLI::App& app, int& exit_code);
 void add_settings_command(CLI::App& app, int& exit_code);
 void add_status_command(CLI::App& app, int& exit_code);
 void add_world_command(CLI::App& app, int& exit_code);
+void add_simulate_command(CLI::App& app, int& exit_code);
 void add_server_command(CLI::App& app, int& exit_code);
 void add_robot_command(CLI::App& app, int& exit_code);
 void add_worker_command(CLI::App& app, int& exit_code);

@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   tutti::app::add_settings_command(app, exit_code);
   tutti::app::add_status_command(app, exit_code);
   tutti::app::add_world_command(app, exit_code);
+  tutti::app::add_simulate_command(app, exit_code);
   tutti::app::add_server_command(app, exit_code);
   tutti::app::add_robot_command(app, exit_code);
   tutti::app::add_worker_command(app, exit_code);

@@ -8,6 +8,7 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/model/trajectory.hpp"
@@ -44,6 +45,9 @@ struct LidarConfig {
             "Below this cosine of the angle of incidence, echoes are lost in proportion; at 0 all of them.");
     v.field("mount_height_m", mount_height_m, between(-kLargestRoom_m, kLargestRoom_m), "Sensor above the body frame.");
   }
+  [[nodiscard]] Pose3 pose() const {
+    return {Eigen::Quaterniond::Identity(), {0.0, 0.0, mount_height_m}};
+  }  ///< T_body_lidar
 };
 
 /// One turn that ends at `end` and begins 1 / rate_hz before, clockwise seen from above, starting and ending behind the

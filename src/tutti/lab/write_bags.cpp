@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/lab/write_bags.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "tutti/bags/bag_writer.hpp"
+#include "tutti/bags/ros_encode.hpp"
+#include "tutti/base/random.hpp"
+#include "tutti/mission/resample.hpp"
+#include "tutti/simulation/hall_recordings.hpp"
+
+namespace tutti::lab {
+namespace {
+
+namespace fs = std::filesystem;
+using bags::Durability;
+
+std::array<double, 36> rows_of(const Matrix6d& matrix) {
+  std::array<double, 36> out{};
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = matrix(static_cast<Eigen::Index>(i / 6), static_cast<Eigen::Index>(i % 6));
+  return out;
+}
+
+std::array<double, 9> isotropic(double variance) { return {variance, 0, 0, 0, variance, 0, 0, 0, variance}; }
+
+bags::RosCameraInfo camera_info(const CameraModel& camera) {
+  bags::RosCameraInfo out;
+  out.height = static_cast<std::uint32_t>(camera.height_px);
+  out.width = static_cast<std::uint32_t>(camera.width_px);
+  constexpr std::array kNames{"plumb_bob", "equidistant", "double_sphere", "rational_polynomial"};
+  out.distortion_model = kNames[static_cast<std::size_t>(camera.kind)];
+  const std::size_t numbers = camera.kind == CameraKind::double_sphere ? 2 : distortion_numbers(camera.kind);
+  out.d.assign(camera.distortion.begin(), camera.distortion.begin() + static_cast<std::ptrdiff_t>(numbers));
+  if (camera.kind == CameraKind::pinhole) out.d.push_back(0.0);  // ROS's plumb_bob has k3, too
+  out.k = {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
+  out.r = isotropic(1.0);
+  out.p = {camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0};
+  return out;
+}
+
+class RobotWriter {
+ public:
+  RobotWriter(const RobotToWrite& robot, bags::BagWriter& bag, std::int64_t offset_ns)
+      : robot_(robot), recording_(robot.recording), bag_(bag), offset_ns_(offset_ns) {}
+
+  Status write_all() {
+    if (auto ok = write_static(); !ok) return ok;
+    // In the order of which comes first at one stamp: who has a scan has the odometry up to it.
+    std::array<Stream, 5> streams{{
+        {[&](std::size_t i) { return stamp_of(recording_.odometry, i); }, [&](std::size_t i) { return odometry(i); }},
+        {[&](std::size_t i) { return stamp_of(recording_.imu, i); }, [&](std::size_t i) { return imu(i); }},
+        {[&](std::size_t i) { return image_stamp(i); }, [&](std::size_t i) { return images(i); }},
+        {[&](std::size_t i) { return scan_stamp(i); }, [&](std::size_t i) { return scan(i); }},
+        {[&](std::size_t i) { return stamp_of(recording_.reference, i); }, [&](std::size_t i) { return truth(i); }},
+    }};
+    while (true) {
+      Stream* next = nullptr;
+      std::optional<Timestamp> first;
+      for (Stream& stream : streams)
+        if (const auto stamp = stream.stamp(stream.at); stamp && (!first || *stamp < *first)) {
+          next = &stream;
+          first = stamp;
+        }
+      if (next == nullptr) return {};
+      if (auto ok = next->write(next->at++); !ok) return ok;
+    }
+  }
+
+ private:
+  struct Stream {
+    std::function<std::optional<Timestamp>(std::size_t)> stamp;  ///< Nothing behind the last.
+    std::function<Status(std::size_t)> write;
+    std::size_t at = 0;
+  };
+
+  template <class List>
+  static std::optional<Timestamp> stamp_of(const List& list, std::size_t i) {
+    return i < list.size() ? std::optional(list[i].stamp) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<Timestamp> scan_stamp(std::size_t i) const {
+    return recording_.scans ? moment(recording_, recording_.scan_stamps, i) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<Timestamp> image_stamp(std::size_t i) const {
+    return i < robot_.images.stamps.size() ? std::optional(robot_.images.stamps[i]) : std::nullopt;
+  }
+
+  [[nodiscard]] Timestamp shifted(Timestamp stamp) const { return Timestamp{stamp.ns + offset_ns_}; }
+  [[nodiscard]] std::string frame(const std::string& name) const { return recording_.name + "/" + name; }
+  [[nodiscard]] bags::RosHeader header(Timestamp stamp, const std::string& name) const {
+    return {shifted(stamp), frame(name)};
+  }
+  Status put(const std::string& topic, const std::string& type, Timestamp stamp, const std::string& cdr) {
+    return bag_.write("/" + recording_.name + "/" + topic, type, shifted(stamp), cdr);
+  }
+  [[nodiscard]] bags::RosTransform transform(Timestamp stamp, const std::string& parent, const std::string& child,
+                                             const Pose3& T_parent_child) const {
+    return {header(stamp, parent), frame(child), T_parent_child.translation, T_parent_child.rotation};
+  }
+  static std::string camera_name(std::size_t camera) { return "camera" + std::to_string(camera); }
+
+  Status write_static() {
+    const Timestamp stamp = recording_.odometry.front().stamp;
+    std::vector<bags::RosTransform> still;
+    if (recording_.scans) still.push_back(transform(stamp, "base_link", "lidar", robot_.T_body_lidar));
+    for (std::size_t i = 0; i < robot_.images.cameras.size(); ++i)
+      still.push_back(transform(stamp, "base_link", camera_name(i), robot_.images.cameras[i].T_body_camera));
+    if (still.empty()) return {};
+    return bag_.write("/tf_static", "tf2_msgs/msg/TFMessage", shifted(stamp), encode(still), Durability::latched);
+  }
+
+  Status odometry(std::size_t i) {
+    const StampedPose& sample = recording_.odometry[i];
+    bags::RosOdometry out{.header = header(sample.stamp, "odom"), .child_frame_id = frame("base_link")};
+    out.pose = {sample.pose.translation, sample.pose.rotation};
+    if (i > 0) {
+      const StampedPose& before = recording_.odometry[i - 1];
+      const double seconds = sample.stamp - before.stamp;
+      const Pose3 T_before_now = before.pose.inverse() * sample.pose;
+      const Vector6d twist = local(Pose3{}, T_before_now) / seconds;
+      out.linear = twist.head<3>();
+      out.angular = twist.tail<3>();
+      const Matrix6d& increment = recording_.increment_covariance[i - 1];
+      out.twist_covariance = rows_of(increment / (seconds * seconds));
+      covariance_ = compound_covariance(T_before_now, covariance_, increment);
+    }
+    Matrix6d turn = Matrix6d::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = sample.pose.rotation.toRotationMatrix();
+    out.pose_covariance = rows_of(turn * covariance_ * turn.transpose());
+    if (auto ok = put("odom", "nav_msgs/msg/Odometry", sample.stamp, encode(out)); !ok) return ok;
+    const bags::RosTransform moved = transform(sample.stamp, "odom", "base_link", sample.pose);
+    return bag_.write("/tf", "tf2_msgs/msg/TFMessage", shifted(sample.stamp), encode(std::span(&moved, 1)));
+  }
+
+  Status scan(std::size_t i) {
+    const auto scan = recording_.scans->scan(i);
+    if (!scan) return tl::unexpected(scan.error());
+    if (!*scan) return {};
+    const Scan& sweep = **scan;
+    const std::vector<Eigen::Vector3f>& points = sweep.cloud->points;
+    const Pose3 T_lidar_body = robot_.T_body_lidar.inverse();
+    const bool timed = sweep.age_s != nullptr;
+    const std::size_t step = (timed ? 4 : 3) * sizeof(float);
+    std::string data(step * points.size(), '\0');
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const Eigen::Vector3f point = (T_lidar_body * points[k].cast<double>()).cast<float>();
+      const std::array<float, 4> values{point.x(), point.y(), point.z(), timed ? -(*sweep.age_s)[k] : 0.0F};
+      std::memcpy(data.data() + k * step, values.data(), step);
+    }
+    constexpr std::uint8_t kFloat32 = 7;
+    bags::RosPointCloud out{.header = header(sweep.stamp, "lidar"), .height = 1};
+    out.fields = {{"x", 0, kFloat32, 1}, {"y", 4, kFloat32, 1}, {"z", 8, kFloat32, 1}};
+    if (timed) out.fields.push_back({"time", 12, kFloat32, 1});
+    out.width = static_cast<std::uint32_t>(points.size());
+    out.point_step = static_cast<std::uint32_t>(step);
+    out.row_step = static_cast<std::uint32_t>(data.size());
+    out.data = data;
+    out.is_dense = true;
+    return put("points", "sensor_msgs/msg/PointCloud2", sweep.stamp, encode(out));
+  }
+
+  Status imu(std::size_t i) {
+    const ImuSample& sample = recording_.imu[i];
+    const double rate_hz = recording_.imu.size() < 2 ? 0.0 : 1.0 / (recording_.imu[1].stamp - recording_.imu[0].stamp);
+    const ImuNoise& noise = recording_.imu_noise;
+    bags::RosImu out{.header = header(sample.stamp, "base_link")};
+    out.orientation_covariance[0] = -1.0;  // there is no orientation
+    out.angular_velocity = sample.gyro;
+    out.angular_velocity_covariance = isotropic(std::pow(noise.gyro_noise_density, 2) * rate_hz);
+    out.linear_acceleration = sample.accelerometer;
+    out.linear_acceleration_covariance = isotropic(std::pow(noise.accelerometer_noise_density, 2) * rate_hz);
+    return put("imu", "sensor_msgs/msg/Imu", sample.stamp, encode(out));
+  }
+
+  Status images(std::size_t i) {
+    const ImageStream& stream = robot_.images;
+    const Timestamp stamp = stream.stamps[i];
+    for (std::size_t camera = 0; camera < stream.cameras.size(); ++camera) {
+      const auto image = stream.load(i, camera);
+      if (!image) return tl::unexpected(image.error());
+      if (image->empty()) continue;
+      const std::string_view grey(reinterpret_cast<const char*>(image->grey.data()), image->grey.size());
+      if (auto ok = put_image(stamp, camera_name(camera), stream.cameras[camera].model, "mono8", 1, grey); !ok)
+        return ok;
+    }
+    if (!stream.load_depth) return {};
+    const auto depth = stream.load_depth(i);
+    if (!depth) return tl::unexpected(depth.error());
+    if (depth->empty()) return {};
+    const std::string_view values(reinterpret_cast<const char*>(depth->value.data()), 2 * depth->value.size());
+    return put_image(stamp, "depth", stream.cameras[0].model, "16UC1", 2, values);
+  }
+
+  Status put_image(Timestamp stamp, const std::string& name, const CameraModel& model, const std::string& encoding,
+                   std::uint32_t pixel_bytes, std::string_view data) {
+    const bags::RosHeader head = header(stamp, name == "depth" ? camera_name(0) : name);  // depth is registered to that
+    bags::RosImage out{.header = head};
+    out.height = static_cast<std::uint32_t>(model.height_px);
+    out.width = static_cast<std::uint32_t>(model.width_px);
+    out.encoding = encoding;
+    out.step = pixel_bytes * out.width;
+    out.data = data;
+    if (auto ok = put(name + "/image_raw", "sensor_msgs/msg/Image", stamp, encode(out)); !ok) return ok;
+    bags::RosCameraInfo info = camera_info(model);
+    info.header = head;
+    return put(name + "/camera_info", "sensor_msgs/msg/CameraInfo", stamp, encode(info));
+  }
+
+  Status truth(std::size_t i) {
+    const StampedPose& sample = recording_.reference[i];
+    const bags::RosPoseStamped out{{shifted(sample.stamp), "world"}, {sample.pose.translation, sample.pose.rotation}};
+    return put("truth", "geometry_msgs/msg/PoseStamped", sample.stamp, encode(out));
+  }
+
+  const RobotToWrite& robot_;
+  const Recording& recording_;
+  bags::BagWriter& bag_;
+  std::int64_t offset_ns_;
+  Matrix6d covariance_ = Matrix6d::Zero();  ///< Of T_odom_body, right tangent.
+};
+
+Result<std::vector<RobotToWrite>> walking_robots(const MissionConfig& config, std::uint64_t seed) {
+  auto world = simulation::simulate_recordings(config.simulation, Timestamp{0}, seed);
+  if (!world) return tl::unexpected(world.error());
+  std::vector<RobotToWrite> out;
+  for (Recording& recording : world->recordings)
+    out.push_back({.recording = std::move(recording), .images = {}, .T_body_lidar = config.simulation.lidar.pose()});
+  return out;
+}
+
+Result<std::vector<RobotToWrite>> flying_robots(const MissionConfig& config, std::uint64_t seed) {
+  auto hall = simulation::simulate_hall(config.hall, Timestamp{0}, seed);
+  if (!hall) return tl::unexpected(hall.error());
+  std::vector<RobotToWrite> out;
+  for (auto& [recording, images] : hall->robots)
+    out.push_back(
+        {.recording = std::move(recording), .images = std::move(images), .T_body_lidar = config.hall.lidar.pose()});
+  return out;
+}
+
+/// As mission::load_input() does, but with the images themselves and without a survey.
+Result<std::vector<RobotToWrite>> simulated_robots(const MissionConfig& config, std::uint64_t seed) {
+  auto robots = config.source == "hall" ? flying_robots(config, seed) : walking_robots(config, seed);
+  if (!robots || config.odometry_hz <= 0.0) return robots;
+  for (auto& [recording, images, T_body_lidar] : *robots) {
+    Rng rng = Rng(seed).fork("odometry/" + recording.name);
+    const auto ok = mission::resample(recording, config.odometry_hz, rng.uniform(0.0, 1.0 / config.odometry_hz));
+    if (!ok) return in_context("robot " + recording.name, ok.error());
+  }
+  return robots;
+}
+
+}  // namespace
+
+Result<WrittenBag> write_bag(const RobotToWrite& robot, const std::string& folder, std::int64_t offset_ns) {
+  auto bag = bags::BagWriter::create(folder);
+  if (!bag) return tl::unexpected(bag.error());
+  if (auto ok = RobotWriter(robot, *bag, offset_ns).write_all(); !ok) return tl::unexpected(ok.error());
+  if (auto ok = bag->close(); !ok) return tl::unexpected(ok.error());
+  WrittenBag out{.folder = folder};
+  for (const auto& [name, topic] : bag->written().topics()) out.messages += topic.count;
+  return out;
+}
+
+Result<std::vector<WrittenBag>> write_bags(const MissionConfig& config, std::uint64_t seed, const std::string& folder,
+                                           const std::function<void(const std::string&)>& progress) {
+  if (config.source != "simulation" && config.source != "hall")
+    return fail(ErrorCode::configuration, "{}: source is '{}', expected 'simulation' or 'hall'", config.mission,
+                config.source);
+  const auto robots = simulated_robots(config, seed);
+  if (!robots) return tl::unexpected(robots.error());
+  std::vector<WrittenBag> out;
+  for (const RobotToWrite& robot : *robots) {
+    if (progress) progress(robot.recording.name);
+    auto written = write_bag(robot, (fs::path(folder) / robot.recording.name).string(), kBagsBegin_ns);
+    if (!written) return tl::unexpected(written.error());
+    out.push_back(std::move(*written));
+  }
+  return out;
+}
+
+}  // namespace tutti::lab
