@@ -85,7 +85,11 @@ class CommandLine(unittest.TestCase):
     def test_usage_errors_exit_2(self):
         self.expect(tutti(), 2)
         self.expect(tutti("dance"), 2)
-        self.expect(tutti("run"), 2, "mission")
+        self.expect(tutti("run"), 2, "MISSION.yaml or --bag NAME=BAG")
+        self.expect(tutti("run", "mine.yaml", "--bag", "alpha=bag"), 2, "excludes")
+        self.expect(tutti("run", "--bag", "alpha"), 2, "'alpha': expected --bag NAME=BAG")
+        self.expect(tutti("run", "--bag", "alpha=none", "--topic", "alpha.scan=/a"), 2, "alpha.scan=/a", "NAME.scans=")
+        self.expect(tutti("run", "--bag", "alpha=none.mcap", "--out", self.path / "out"), 1, "none.mcap")
         for rate in ("-1", "nan", "1e-300", "inf"):
             self.expect(tutti("demo", "--rate", rate), 2, "rate", "0.001 to 1e+06")
         for seed in ("-1", "1.5", "18446744073709551616"):

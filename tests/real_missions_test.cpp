@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The missions on real recordings, with the figures they have to hold. Skipped without ../shared.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <limits>
 #include <string>
 
+#include "support/bags/robot_bag.hpp"
 #include "support/shared_data.hpp"
+#include "tutti/formats/kitti.hpp"
+#include "tutti/formats/trajectory_file.hpp"
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mission/worst_moment.hpp"
 
@@ -51,6 +56,42 @@ TEST(RealMissions, HkuTwoSessionsAreJoinedFromTheirScans) {
   for (const RobotRecord& robot : record.robots) {
     EXPECT_LT(*corrected(record, robot).agreement_rmse_m, 0.02);
     EXPECT_FALSE(robot.onboard.rmse_m.has_value());  // no ground truth: nothing is claimed
+  }
+}
+
+/// As bags, in one storage each, the sessions are what they are as files: the same closures and poses, bit by bit.
+TEST(RealMissions, HkuFromBagsIsHkuFromFiles) {
+  TUTTI_REQUIRE_SHARED("data/lidar/hku_two_sessions");
+  const std::filesystem::path data = test::shared_path("data/lidar/hku_two_sessions"),
+                              folder = std::filesystem::path(::testing::TempDir()) / fmt::format("hku_{}", getpid());
+  lab::MissionConfig files, bags;
+  for (const std::string session : {"hku_session1", "hku_session2"}) {
+    const auto poses =
+        formats::with_times(formats::read_trajectory((data / session / "odom_poses.txt").string(), "kitti").value(),
+                            formats::read_times((data / session / "times.txt").string()).value());
+    files.robots.push_back(
+        {.name = session,
+         .odometry = {.file = session + "/odom_poses.txt", .format = "kitti", .times = session + "/times.txt"},
+         .scans = session + "/Scans"});
+    bags.robots.push_back({.name = session, .bag = (folder / session).string()});
+    const bool first = session == "hku_session1";
+    bags::test::write_rosbag2(folder / session, bags::test::samples_of(*poses, data / session / "Scans", 1000),
+                              first ? bags::test::Storage::mcap : bags::test::Storage::db3, bags::test::Packing::none,
+                              150);
+  }
+  const auto of_files = lab::run_mission(files, {.data = data, .seed = 1});
+  const auto of_bags = lab::run_mission(bags, {.seed = 1});
+  std::filesystem::remove_all(folder);
+  ASSERT_TRUE(of_files && of_bags) << of_bags.error().message;
+  ASSERT_EQ(of_files->server.closures.size(), of_bags->server.closures.size());
+  EXPECT_GT(inter_robot(*of_bags), 60U);
+  for (std::size_t i = 0; i < of_files->server.closures.size(); ++i) {
+    EXPECT_EQ(of_files->server.closures[i].from, of_bags->server.closures[i].from);
+    EXPECT_EQ(of_files->server.closures[i].to, of_bags->server.closures[i].to);
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(of_files->robots[i].server_estimate, of_bags->robots[i].server_estimate);
+    EXPECT_EQ(corrected(*of_files, of_files->robots[i]).corrected, corrected(*of_bags, of_bags->robots[i]).corrected);
   }
 }
 

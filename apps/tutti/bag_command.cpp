@@ -78,7 +78,7 @@ void add_bag_command(CLI::App& app, int& exit_code) {
       "info", "Topics with type, count, rate, times and frames; what Tutti would use of them, and what is missing.");
   info->footer(
       "All of the bag is read, one chunk at a time. One that is cut off is read up to the cut.\n"
-      "No mission runs from a bag yet: this only says what is in it.\n"
+      "tutti run --bag NAME=BAG runs a mission from it.\n"
       "Example: tutti bag info recording/\n");
   info->add_option("bag", *path, "A folder that rosbag2 wrote, or an .mcap or .db3 file; packed by zstd or lz4 or not.")
       ->required()

@@ -15,6 +15,7 @@
 #include "options.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/lab/run_mission.hpp"
+#include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/simulation/surface.hpp"
 
@@ -178,11 +179,37 @@ void add_run_command(CLI::App& app, int& exit_code) {
       "Run a mission: replay (or simulate) its robots, join their maps on the server, send proxy graphs back,\n"
       "correct the robots, and write a report (report.html, report.json, trajectories, graph, map).\n"
       "The same mission, data and seed give the same report.json.");
-  command->add_option("mission", arguments->mission, "Mission file")->type_name("MISSION.yaml")->required();
+  const auto bags = std::make_shared<std::vector<std::string>>(), topics = std::make_shared<std::vector<std::string>>();
+  auto* mission = command->add_option("mission", arguments->mission, "Mission file")->type_name("MISSION.yaml");
+  auto* bag = command
+                  ->add_option(
+                      "--bag", *bags,
+                      "Instead of a mission file: a robot and what it recorded, a folder of rosbag2's, .mcap or .db3;\n"
+                      "several times, e.g. --bag alpha=recordings/a --bag bravo=recordings/b. Topics are found by type")
+                  ->type_name("NAME=BAG")
+                  ->expected(1)
+                  ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+                  ->excludes(mission);
+  command
+      ->add_option("--topic", *topics,
+                   "Of a bag where several topics would do: --topic alpha.scans=/points,\n"
+                   "--topic alpha.odometry=/odom, or two frames of /tf: --topic 'alpha.odometry=odom->base_link'")
+      ->type_name("NAME.KIND=TOPIC")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->needs(bag);
   command->add_option("--data", arguments->run.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");
   add_mission_options(*command, *arguments);
-  command->callback([arguments, &exit_code] {
+  command->callback([arguments, bags, topics, &exit_code] {
+    if (!bags->empty()) {
+      if (arguments->out.empty()) arguments->out = fs::path("out") / "bags";
+      const auto text = mission::bag_mission(*bags, *topics);
+      exit_code = run_and_report(
+          text ? lab::parse_mission(*text, "--bag", arguments->assignments) : tl::unexpected(text.error()), *arguments);
+      return;
+    }
+    if (arguments->mission.empty()) throw CLI::RequiredError("MISSION.yaml or --bag NAME=BAG");
     if (arguments->out.empty()) arguments->out = fs::path("out") / arguments->mission.stem();
     exit_code = run_and_report(lab::load_mission(arguments->mission, arguments->assignments), *arguments);
   });

@@ -62,8 +62,9 @@ Status McapReader::start() {
   std::string magic;
   if (auto ok = read_bytes(0, std::min<std::uint64_t>(size_, kMagic.size()), magic); !ok) return ok;
   if (magic != kMagic) return fail(ErrorCode::parse, "{}: byte 0: is no MCAP file, expected 89 'MCAP0' 0d 0a", name_);
-  offset_ = kMagic.size();
+  offset_ = defined_until_ = kMagic.size();
   look_at_summary();
+  all_defined_ = summary_ && channels_.size() >= summary_->channels;
   return {};
 }
 
@@ -148,7 +149,9 @@ Status McapReader::take_statistics(const Record& record, std::string_view conten
   Cursor cursor(content);
   McapSummary summary;
   summary.messages = cursor.number<std::uint64_t>("message_count");
-  cursor.take(2 + 4 + 4 + 4, "counts of schemas, channels, attachments and metadata");
+  cursor.take(2, "schema_count");
+  summary.channels = cursor.number<std::uint32_t>("channel_count");
+  cursor.take(4 + 4, "counts of attachments and metadata");
   summary.chunks = cursor.number<std::uint32_t>("chunk_count");
   cursor.take(8 + 8, "first and last time");
   Cursor counts(cursor.counted("channel_message_counts"));
@@ -263,15 +266,45 @@ Result<std::optional<BagMessage>> McapReader::next() {
   }
 }
 
+/// The schemas and channels of the chunk, wherever in it reading goes on.
+void McapReader::define_in_chunk() {
+  Cursor cursor(chunk_);
+  while (cursor.ok() && cursor.left() > 0) {
+    Record record{.offset = chunk_offset_, .inside = cursor.at()};
+    record.opcode = cursor.number<std::uint8_t>("opcode");
+    record.size = cursor.number<std::uint64_t>("length");
+    const std::string_view content = cursor.take(record.size, "content");
+    if (cursor.ok() && (record.opcode == kSchema || record.opcode == kChannel))
+      static_cast<void>(take(record, content));
+  }
+}
+
+/// What is before a byte that is jumped to may define its channel: of a file without a summary it is read once.
+void McapReader::define_until(std::uint64_t offset) {
+  offset_ = defined_until_;
+  while (offset_ < offset && !ended_) {
+    static_cast<void>(next_of_file());
+    define_in_chunk();
+    chunk_.clear();
+  }
+  defined_until_ = std::max(defined_until_, offset);
+}
+
 Status McapReader::seek(const BagPosition& position) {
   if (chunk_.empty() || chunk_offset_ != position.at) {
     chunk_.clear();
+    ended_ = false;
+    if (!all_defined_) define_until(position.at);
     ended_ = false;
     offset_ = position.at;
     const auto record = record_at(offset_);
     if (!record) return tl::unexpected(record.error());
     if (record->opcode != kChunk) return {};
     if (const auto entered = next_of_file(); !entered) return tl::unexpected(entered.error());
+    if (!all_defined_) {
+      define_in_chunk();
+      defined_until_ = std::max(defined_until_, offset_);
+    }
   }
   if (position.inside > chunk_.size())
     return fail(ErrorCode::parse, "{}: byte {}: chunk of {} bytes, expected more than {}: has the file changed?", name_,
@@ -285,12 +318,6 @@ std::vector<const BagChannel*> McapReader::channels() const {
   for (const auto& [id, channel] : channels_) out.push_back(&channel);
   return out;
 }
-
-std::optional<std::uint64_t> McapReader::stated_messages() const {
-  return summary_ ? std::optional(summary_->messages) : std::nullopt;
-}
-
-std::string McapReader::storage() const { return fmt::format("MCAP, {} chunks", chunks_read_); }
 
 /// Nothing if the record was none of a message; then the chunk may have come to its end.
 Result<std::optional<BagMessage>> McapReader::next_of_chunk() {

@@ -20,6 +20,7 @@ namespace tutti::bags {
 /// What the file's own statistics say.
 struct McapSummary {
   std::uint64_t messages = 0;
+  std::uint32_t channels = 0;
   std::map<std::uint16_t, std::uint64_t> messages_of_channel;
   std::uint64_t chunks = 0;         ///< By the statistics,
   std::uint64_t chunk_indexes = 0;  ///< and how many of them are indexed.
@@ -38,9 +39,11 @@ class McapReader final : public BagReader {
   Status seek(const BagPosition& position) override;
   /// Of the summary at once.
   [[nodiscard]] std::vector<const BagChannel*> channels() const override;
-  [[nodiscard]] std::optional<std::uint64_t> stated_messages() const override;
+  [[nodiscard]] std::optional<std::uint64_t> stated_messages() const override {
+    return summary_ ? std::optional(summary_->messages) : std::nullopt;
+  }
   [[nodiscard]] std::vector<std::string> notes() const override { return notes_; }
-  [[nodiscard]] std::string storage() const override;
+  [[nodiscard]] std::string storage() const override { return fmt::format("MCAP, {} chunks", chunks_read_); }
   [[nodiscard]] const std::optional<McapSummary>& summary() const { return summary_; }
 
  private:
@@ -62,6 +65,8 @@ class McapReader final : public BagReader {
   Result<std::optional<BagMessage>> next_of_chunk();
   Result<std::optional<BagMessage>> take(const Record& record, std::string_view content);
   Status enter_chunk(const Record& record, bool cut);
+  void define_until(std::uint64_t offset);
+  void define_in_chunk();
   Status define_schema(const Record& record, std::string_view content);
   Status define_channel(const Record& record, std::string_view content);
   Status take_statistics(const Record& record, std::string_view content);
@@ -83,6 +88,8 @@ class McapReader final : public BagReader {
   std::uint64_t chunk_offset_ = 0;  ///< where it stands in the file,
   bool chunk_cut_ = false;          ///< and whether the file ends in it.
   std::uint64_t chunks_read_ = 0;
+  bool all_defined_ = false;                      ///< The summary has all channels; else
+  std::uint64_t defined_until_ = 0;               ///< those before this byte are known to whoever jumps.
   std::map<std::uint16_t, std::string> schemas_;  ///< Names.
   std::map<std::uint16_t, BagChannel> channels_;
   std::optional<McapSummary> summary_;

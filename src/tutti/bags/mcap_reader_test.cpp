@@ -92,6 +92,28 @@ TEST_P(McapFiles, CutAnywhereKeepWhatIsBeforeTheCut) {
   EXPECT_EQ(most, all.size());
 }
 
+/// Also where only what stands before them says what they are.
+TEST_P(McapFiles, MessagesAreComeBackTo) {
+  const std::string whole = bag(GetParam());
+  for (const std::size_t size : {whole.size(), whole.size() - 100}) {
+    std::vector<std::pair<BagPosition, std::string>> all;
+    auto reader = reader_of(whole.substr(0, size)).value();
+    for (auto message = reader.next(); message && *message; message = reader.next())
+      all.emplace_back((*message)->position, (*message)->data);
+    ASSERT_EQ(all.size(), 6U);
+    for (const std::size_t i : {5, 1, 2, 0, 4, 3}) {
+      auto other = reader_of(whole.substr(0, size)).value();
+      for (McapReader* const one : {&reader, &other}) {
+        ASSERT_TRUE(one->seek(all[i].first));
+        const auto message = one->next();
+        ASSERT_TRUE(message && *message) << message.error().message;
+        EXPECT_EQ((*message)->data, all[i].second);
+        EXPECT_EQ((*message)->channel->topic, "/a");
+      }
+    }
+  }
+}
+
 TEST(Mcap, CutNamesByteAndRecord) {
   const std::string head = kMagic + header() + kDefinitions;
   const Read read = read_all(head + message(1, 4, "data").substr(0, 20));

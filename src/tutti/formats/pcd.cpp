@@ -103,8 +103,7 @@ Result<internal::RecordLayout> layout_of(const Header& header, const std::string
       layout.xyz[static_cast<std::size_t>(field.name[0] - 'x')] = {true, layout.stride, layout.columns,
                                                                    static_cast<std::size_t>(field.size)};
     }
-    const bool is_time = std::ranges::find(kTimeNames, field.name) != kTimeNames.end();
-    if (is_time && !layout.time.found && field.size >= 4 && field.count == 1) {
+    if (is_time_field(field.name) && !layout.time.found && field.size >= 4 && field.count == 1) {
       layout.time = {true, layout.stride, layout.columns, static_cast<std::size_t>(field.size), field.type[0]};
       layout.time_name = field.name;
     }
@@ -168,6 +167,8 @@ Result<internal::Records> read_records(LineReader& line, std::size_t count, cons
 }
 
 }  // namespace
+
+bool is_time_field(std::string_view name) { return std::ranges::find(kTimeNames, name) != kTimeNames.end(); }
 
 Result<TimedCloud> parse_timed_pcd(std::string_view bytes, const std::string& name) {
   LineReader line(bytes, name);

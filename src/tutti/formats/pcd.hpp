@@ -15,8 +15,12 @@
 /// An empty cloud is a valid one.
 namespace tutti::formats {
 
-/// Points and when each of them was measured: numbers of the first field called t, time, timestamp, time_stamp, stamp,
-/// offset_time, time_offset or relative_time, as they stand there. Unit and zero are for the caller to find out.
+/// Is it a point's time that a field of this name holds: t, time, timestamp, time_stamp, stamp, offset_time,
+/// time_offset or relative_time?
+bool is_time_field(std::string_view name);
+
+/// Points and when each of them was measured: numbers of the first field that is_time_field(), as they stand there.
+/// Unit and zero are for the caller to find out.
 struct TimedCloud {
   PointCloud cloud;
   std::string time_field;     ///< Empty: the file has no times.

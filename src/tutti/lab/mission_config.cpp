@@ -91,6 +91,13 @@ Result<MissionConfig> load_mission(const std::filesystem::path& file, const std:
   return finish(std::move(*root), file.string(), assignments);
 }
 
+Result<MissionConfig> parse_mission(const std::string& text, const std::string& name,
+                                    const std::vector<std::string>& assignments) {
+  auto root = parse_yaml(text, name);
+  if (!root) return tl::unexpected(root.error());
+  return finish(std::move(*root), name, assignments);
+}
+
 Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments, DemoSensors sensors) {
   struct BuiltIn {
     const char* text;
@@ -100,9 +107,7 @@ Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments, 
                                            BuiltIn{kHallMission, "missions/hall.yaml"},
                                            BuiltIn{kHallMixedMission, "missions/hall_mixed.yaml"}};
   const auto& [text, name] = kMissions.at(static_cast<std::size_t>(sensors));
-  auto root = parse_yaml(text, name);
-  if (!root) return tl::unexpected(root.error());
-  return finish(std::move(*root), name, assignments);
+  return parse_mission(text, name, assignments);
 }
 
 std::string to_yaml(const MissionConfig& config) {

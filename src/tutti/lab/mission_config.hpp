@@ -75,6 +75,9 @@ struct MissionConfig : mission::MissionConfig {
 Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& name);
 /// Loads a mission file, then applies --set assignments; checks what a single field cannot (unique names, files given).
 Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments);
+/// The same of text; `name` is for the errors.
+Result<MissionConfig> parse_mission(const std::string& text, const std::string& name,
+                                    const std::vector<std::string>& assignments);
 /// What the robots of `tutti demo` carry: two with LiDAR in a tunnel (missions/demo.yaml), three with cameras in a hall
 /// (hall.yaml), or one with a LiDAR, one with a camera and one with both there (hall_mixed.yaml).
 enum class DemoSensors { lidar, visual, both };

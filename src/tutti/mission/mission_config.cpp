@@ -33,7 +33,11 @@ void check_links(const MissionConfig& config, const Problem& problem) {
 void check_images(const RobotConfig& robot, const std::string& path, const Problem& problem) {
   const ImagesConfig& images = robot.images;
   const bool from_maplab = !images.maplab_submaps.empty();
-  if (robot.odometry.file.empty() && !from_maplab) problem(path + ".odometry.file: missing");
+  if (robot.odometry.file.empty() && robot.bag.empty() && !from_maplab) problem(path + ".odometry.file: missing");
+  if (!robot.bag.empty() && (!robot.odometry.file.empty() || !robot.scans.empty() || from_maplab))
+    problem(path + ".bag: given, and odometry or scans of files too, expected one of them");
+  if (robot.bag.empty() && !(robot.topics.odometry.empty() && robot.topics.scans.empty()))
+    problem(path + ".topics: given, but there is no bag");
   if (!robot.odometry.file.empty() && from_maplab)
     problem(path + ".odometry.file: given, but images.maplab_submaps have the odometry");
   if ((images.euroc_folder.empty() ? 0 : 1) + (images.list.empty() ? 0 : 1) + (from_maplab ? 1 : 0) > 1)
@@ -107,7 +111,7 @@ std::vector<std::string> problems_of(const MissionConfig& config) {
 std::vector<std::string> problems_of_finder(const MissionConfig& config) {
   std::vector<std::string> problems;
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
-    if (config.closures.finder == "lidar" && config.robots[i].scans.empty())
+    if (config.closures.finder == "lidar" && config.robots[i].scans.empty() && config.robots[i].bag.empty())
       problems.push_back(fmt::format("robots.{}.scans: missing, but closures.finder is 'lidar'", i));
     if (config.closures.finder == "visual" && !config.robots[i].images.is_given())
       problems.push_back(fmt::format("robots.{}.images: missing, but closures.finder is 'visual'", i));

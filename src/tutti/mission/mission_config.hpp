@@ -112,9 +112,23 @@ struct ImagesConfig {
   [[nodiscard]] bool is_given() const { return has_files() || !maplab_submaps.empty(); }
 };
 
+/// Which of a bag's topics a robot's recording is of, where their types alone do not tell.
+struct BagTopicsConfig {
+  std::string odometry;
+  std::string scans;
+  template <class V>
+  void describe(V& v) {
+    v.field("odometry", odometry, any(),
+            "A topic of nav_msgs/Odometry or geometry_msgs/PoseStamped, or two frames of /tf: \"odom->base_link\".");
+    v.field("scans", scans, any(), "A topic of sensor_msgs/PointCloud2.");
+  }
+};
+
 /// One robot whose recording is replayed.
 struct RobotConfig {
   std::string name;
+  std::string bag;  ///< Instead of odometry and scans: bags::open_bag(). Empty = none.
+  BagTopicsConfig topics;
   TrajectoryFile odometry;
   TrajectoryFile reference;
   std::string reference_transform;         ///< File with the 4x4 T_common_reference of this robot; empty = identity.
@@ -134,6 +148,9 @@ struct RobotConfig {
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name.");
+    v.field("bag", bag, any(),
+            "Instead of odometry and scans: what rosbag2 recorded, a folder, .mcap or .db3 below the --data folder.");
+    v.field("topics", topics, any(), "Of the bag, where their types do not tell which.");
     v.field("odometry", odometry);
     v.field("reference", reference);
     v.field("reference_transform", reference_transform, any(), "File with 4x4 T_common_reference.");
@@ -146,7 +163,8 @@ struct RobotConfig {
     v.field("scan_times", scan_times, any(),
             "File with one stamp in seconds per scan, by the odometry's clock: the odometry has a rate of its own. "
             "Empty: one scan per odometry pose.");
-    v.field("T_body_lidar", T_body_lidar, any(), "Where the LiDAR sits on the body; the identity by default.");
+    v.field("T_body_lidar", T_body_lidar, any(),
+            "Where the LiDAR sits on the body; by default the identity, of a bag what /tf_static says.");
     v.field("scans_deskewed", scans_deskewed, one_of({"auto", "yes", "no"}),
             "no: points carry the time of their measurement, by which they are deskewed; yes: they need none; auto: as "
             "the files are.");

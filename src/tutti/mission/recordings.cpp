@@ -14,6 +14,7 @@
 #include "tutti/evaluation/association.hpp"
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/mission/bag_recording.hpp"
 #include "tutti/mission/resample.hpp"
 #include "tutti/mission/robot_images.hpp"
 #include "tutti/mission/scan_folder.hpp"
@@ -77,10 +78,17 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     if (!read) return tl::unexpected(read.error());
     maplab = std::move(*read);
   }
+  std::optional<BagRecording> bag;
+  if (!robot.bag.empty()) {
+    auto read = read_bag(data, robot);
+    if (!read) return tl::unexpected(read.error());
+    bag = std::move(*read);
+  }
   // Scans that are numbered as the poses need all of these.
   const bool is_numbered = !robot.scans.empty() && robot.scan_times.empty();
   std::vector<Error> left_out;
   auto odometry = maplab ? Result<Trajectory>(maplab->odometry)
+                  : bag  ? Result<Trajectory>(std::move(bag->odometry))
                          : read_trajectory(robot.odometry, data, is_numbered ? nullptr : &left_out);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
@@ -113,6 +121,17 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     out.notes.push_back(fmt::format("{}: {}", robot.name, (*scans)->note()));
     out.recording.scans = *scans;
   }
+  if (bag) {
+    for (const std::string& note : bag->notes) out.notes.push_back(fmt::format("{}: {}", robot.name, note));
+    if (!bag->scans.empty()) {
+      std::string note;
+      auto scans = open_scans(*bag, raw, robot, note);
+      if (!scans) return tl::unexpected(scans.error());
+      out.recording.scans = std::move(*scans);
+      for (const ScanPlace& place : bag->scans) out.recording.scan_stamps.push_back(place.stamp);
+      out.notes.push_back(fmt::format("{}: {}", robot.name, note));
+    }
+  }
   if (robot.images.is_given()) {
     auto images =
         maplab ? listed_images(*maplab, robot.images, data, raw, from) : open_images(robot.images, data, raw, tracking);
@@ -138,6 +157,9 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
     loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
     loaded->recording.name = robot.name;
     loaded->start_s = robot.start_s;
+    if (!robot.bag.empty() && config.closures.finder == "lidar" && !loaded->recording.scans)
+      return fail(ErrorCode::invalid, "robot {}: {}; but closures.finder is 'lidar'", robot.name,
+                  loaded->notes.front());
     loaded->score_against_reference = robot.score_against_reference && !loaded->recording.reference.empty();
     out.push_back(std::move(*loaded));
   }

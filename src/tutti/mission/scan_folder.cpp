@@ -5,15 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <iterator>
-#include <ranges>
 #include <system_error>
 #include <utility>
 
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/pcd.hpp"
-#include "tutti/perception/lidar/undistort.hpp"
+#include "tutti/mission/deskewed_scan.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -34,26 +31,6 @@ Result<formats::TimedCloud> read(const fs::path& file) {
   return scan;
 }
 
-/// Poses that go on from the first of a trajectory, away from the others, as these went on for a moment: for as long as
-/// a point may be from its pose.
-template <class Samples>
-Trajectory gone_on(const Samples& samples) {
-  constexpr double kMoment_s = 0.01;
-  StampedPose from = *samples.begin();
-  const auto far = [&](const StampedPose& other) { return std::abs(other.stamp - from.stamp) >= kMoment_s; };
-  const auto found = std::find_if(samples.begin(), samples.end(), far);
-  const StampedPose& other = found == samples.end() ? *std::prev(found) : *found;
-  const double step_s =
-      std::copysign(std::max(kMoment_s, std::abs(from.stamp - other.stamp)), from.stamp - other.stamp);
-  const Pose3 step = other.pose.inverse() * from.pose;
-  Trajectory out;
-  for (double reached_s = 0.0; reached_s < kLongestAge_s; reached_s += std::abs(step_s)) {
-    from = {from.stamp + step_s, from.pose * step};
-    out.push_back(from);
-  }
-  return out;
-}
-
 }  // namespace
 
 ScanFolder::ScanFolder(fs::path folder, ScanMoments moments, const Trajectory& odometry)
@@ -65,11 +42,7 @@ ScanFolder::ScanFolder(fs::path folder, ScanMoments moments, const Trajectory& o
     moments_.first = 0;
     moments_.recorded = moments_.stamps.size();
   }
-  odometry_ = gone_on(odometry);  // the first sweep began before the odometry
-  std::ranges::reverse(odometry_);
-  odometry_.insert(odometry_.end(), odometry.begin(), odometry.end());
-  const Trajectory after = gone_on(std::views::reverse(odometry));
-  odometry_.insert(odometry_.end(), after.begin(), after.end());
+  odometry_ = with_ends(odometry);
 }
 
 Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, ScanMoments moments,
@@ -156,19 +129,9 @@ Result<std::optional<Scan>> ScanFolder::scan(std::size_t sample) const {
     return fail(ErrorCode::io, "{}.pcd (or .bin): is not there", (folder_ / stem_of(moments_.first + sample)).string());
   auto read_scan = read(*file);
   if (!read_scan) return tl::unexpected(read_scan.error());
-  Scan scan{.stamp = moments_.stamps.at(sample), .cloud = nullptr, .age_s = nullptr};
-  if (times_) {
-    auto ages = point_ages(*read_scan, scan.stamp, *times_);
-    if (!ages) return in_context(file->string(), ages.error());
-    scan.age_s = std::make_shared<const std::vector<float>>(std::move(*ages));
-  }
-  const Eigen::Matrix3f R_body_lidar = T_body_lidar_.rotation.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f p_body_lidar = T_body_lidar_.translation.cast<float>();
-  for (Eigen::Vector3f& point : read_scan->cloud.points) point = R_body_lidar * point + p_body_lidar;
-  scan.cloud = std::make_shared<const PointCloud>(std::move(read_scan->cloud));
-  auto deskewed = lidar::undistort(scan, odometry_);
-  if (!deskewed) return in_context(file->string(), deskewed.error());
-  return std::optional(std::move(*deskewed));
+  auto scan = deskewed(std::move(*read_scan), moments_.stamps.at(sample), times_, T_body_lidar_, odometry_);
+  if (!scan) return in_context(file->string(), scan.error());
+  return std::optional(std::move(*scan));
 }
 
 std::string ScanFolder::note() const { return in_words(times_); }

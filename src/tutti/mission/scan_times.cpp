@@ -73,6 +73,20 @@ Result<std::optional<PointTimes>> find_point_times(const formats::TimedCloud& sc
   return times;
 }
 
+Result<std::optional<PointTimes>> find_message_times(const formats::TimedCloud& scan, Timestamp stamp,
+                                                     const RobotConfig& robot) {
+  auto times = find_point_times(scan, stamp, robot);
+  if (!times || !*times || (*times)->zero == PointTimes::Zero::odometry_clock) return times;
+  const auto [first, last] = std::ranges::minmax(scan.times);
+  const double farthest_s = (*times)->unit_s * std::max(std::abs(first), std::abs(last));
+  if (farthest_s > kLongestAge_s)
+    return fail(ErrorCode::invalid,
+                "{} goes from {} to {} {}, expected within {} s of 0 or of the stamp {} ns: a clock of its own? {}",
+                (*times)->field, first, last, (*times)->unit, kLongestAge_s, stamp.ns, kStateIt);
+  (*times)->zero = PointTimes::Zero::message;
+  return times;
+}
+
 Result<std::vector<float>> point_ages(const formats::TimedCloud& scan, Timestamp stamp, const PointTimes& times) {
   if (scan.times.empty()) return fail(ErrorCode::invalid, "points carry no time, unlike those of other scans");
   const auto range = range_of(scan);
@@ -84,6 +98,8 @@ Result<std::vector<float>> point_ages(const formats::TimedCloud& scan, Timestamp
   double pose_s = times.unit_s * (times.pose_at_begin ? first : last);
   if (times.zero == PointTimes::Zero::odometry_clock) {
     pose_s = seconds(stamp);
+  } else if (times.zero == PointTimes::Zero::message) {
+    pose_s = 0.0;
   } else if (times.zero == (times.pose_at_begin ? PointTimes::Zero::sweep_begin : PointTimes::Zero::sweep_end)) {
     pose_s = 0.0;  // exact, also when the sweep's first or last points are missing
   }
@@ -107,12 +123,14 @@ std::string in_words(const std::optional<PointTimes>& times) {
         return "until the sweep's end";
       case PointTimes::Zero::odometry_clock:
         return "by the odometry's clock";
+      case PointTimes::Zero::message:
+        return "after the message's stamp";
       case PointTimes::Zero::unknown:
         break;
     }
     return "by a clock of its own";
   };
-  const bool is_stated = times->zero == PointTimes::Zero::odometry_clock;
+  const bool is_stated = times->zero == PointTimes::Zero::odometry_clock || times->zero == PointTimes::Zero::message;
   return fmt::format(
       "scans are deskewed by the robot's odometry: their field '{}' is taken as {} {}{}", times->field, times->unit,
       zero(),

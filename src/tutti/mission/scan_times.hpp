@@ -23,19 +23,23 @@ inline constexpr double kLongestAge_s = 1.0;
 
 /// What the numbers of a file's time field mean.
 struct PointTimes {
-  enum class Zero { sweep_begin, sweep_end, odometry_clock, unknown };
+  enum class Zero { sweep_begin, sweep_end, odometry_clock, message, unknown };
   std::string field;
   std::string unit;  ///< s, ms, us or ns
   double unit_s = 1.0;
   Zero zero = Zero::unknown;
   bool pose_at_begin =
-      false;  ///< The odometry pose is of the sweep's begin, not its end; odometry_clock says it itself.
+      false;  ///< The odometry pose is of the sweep's begin, not its end; odometry_clock and message say it themselves.
 };
 
 /// Judged by one scan, `stamp` being that of its odometry pose. Nothing: the robot's scans are taken as deskewed.
 /// Error: the robot's settings want times that are not there, or the numbers are no sweep's.
 Result<std::optional<PointTimes>> find_point_times(const formats::TimedCloud& scan, Timestamp stamp,
                                                    const RobotConfig& robot);
+/// The same of a message, whose points say when they were measured after (or before) its stamp, or by its clock: so
+/// ROS's drivers have it, and scan_pose_at does not matter.
+Result<std::optional<PointTimes>> find_message_times(const formats::TimedCloud& scan, Timestamp stamp,
+                                                     const RobotConfig& robot);
 
 /// Seconds from each point's measurement to `stamp`, negative after it. Error: the times are not those of one sweep
 /// about that stamp.

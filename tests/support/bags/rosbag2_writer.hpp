@@ -67,7 +67,8 @@ inline void write_db3(const std::filesystem::path& path, const std::vector<Sampl
   std::filesystem::remove(path);
   if (sqlite3_open(path.c_str(), &db) != SQLITE_OK) throw std::runtime_error("no database " + path.string());
   sqlite3_exec(db,
-               "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,serialization_format "
+               "PRAGMA synchronous=OFF;CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT "
+               "NULL,serialization_format "
                "TEXT NOT NULL,offered_qos_profiles TEXT NOT NULL);"
                "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, "
                "data BLOB NOT NULL);CREATE INDEX timestamp_idx ON messages (timestamp ASC);BEGIN",

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/point_cloud.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "support/bags/robot_bag.hpp"
+
+namespace tutti::bags {
+namespace point_cloud_test {
+
+using namespace test;
+
+const std::vector<Eigen::Vector3f> kPoints{{1, 2, 3}, {-4, 5.5F, 6}, {7, 8, -9}, {0, 0.25F, 1}};
+const std::vector<double> kTimes{0.0, 0.01, 0.02, 0.1};
+
+Result<formats::TimedCloud> cloud_in(const CloudShape& shape, std::vector<Eigen::Vector3f> points = kPoints) {
+  const std::string bytes = cloud_of(Timestamp{5}, "lidar", points, kTimes, shape);
+  return to_timed_cloud(decode_point_cloud(bytes).value());
+}
+
+TEST(PointCloud, PointsAndTimesAreReadInEveryShape) {
+  for (const bool big : {false, true})
+    for (const bool doubles : {false, true})
+      for (const std::uint32_t rows : {1U, 2U})
+        for (const std::uint32_t padding : {0U, 5U})
+          for (const std::uint8_t type : {std::uint8_t{6}, std::uint8_t{7}, std::uint8_t{8}})
+            for (const char* const name : {"", "t", "offset_time"}) {
+              const double unit_s = type == 6 ? 1e-9 : 1.0;
+              const auto cloud = cloud_in({big, doubles, name, type, unit_s, rows, padding, ""});
+              ASSERT_TRUE(cloud) << cloud.error().message;
+              EXPECT_EQ(cloud->cloud.points, kPoints);
+              EXPECT_EQ(cloud->time_field, name);
+              ASSERT_EQ(cloud->times.size(), cloud->time_field.empty() ? 0U : 4U);
+              for (std::size_t i = 0; i < cloud->times.size(); ++i)
+                EXPECT_NEAR(cloud->times[i] * unit_s, kTimes[i], 1e-8);
+            }
+}
+
+TEST(PointCloud, PointsThatAreNoneAreLeftOutWithTheirTimes) {
+  auto points = kPoints;
+  points[1].y() = std::numeric_limits<float>::quiet_NaN();
+  const auto cloud = cloud_in({.time_field = "time", .time_type = 8}, points).value();
+  EXPECT_EQ(cloud.cloud.points.size(), 3U);
+  EXPECT_EQ(cloud.times, (std::vector<double>{0.0, 0.02, 0.1}));
+}
+
+TEST(PointCloud, WhatIsWrongIsNamed) {
+  const auto error_of = [](const RosPointCloud& message) { return to_timed_cloud(message).error().message; };
+  EXPECT_EQ(cloud_in({.without = "z"}).error().message, "no field 'z', expected x, y and z among 'x y'");
+  const std::string bytes = cloud_of(Timestamp{5}, "lidar", kPoints);
+  const RosPointCloud good = decode_point_cloud(bytes).value();
+  RosPointCloud bad = good;
+  bad.fields[1].datatype = 4;
+  EXPECT_EQ(error_of(bad), "field 'y' has datatype 4, expected 7 (float32) or 8 (float64)");
+  bad = good;
+  bad.fields[2].offset = 13;
+  EXPECT_EQ(error_of(bad), "field 'z' at byte 13 of points of 16 bytes");
+  bad = good;
+  bad.width = 5;
+  EXPECT_EQ(error_of(bad), "64 bytes of points, expected 80 (1 rows of 5 points of 16 bytes)");
+  bad.width = 2;
+  bad.height = 2;
+  bad.row_step = 31;
+  EXPECT_EQ(error_of(bad), "row_step 31, expected at least 2 x 16");
+  for (const std::uint32_t huge : {0xffff'ffffU, 0x8000'0000U}) {  // no memory is taken for what is not there
+    bad = good;
+    bad.height = bad.width = bad.row_step = bad.point_step = huge;
+    EXPECT_FALSE(to_timed_cloud(bad));
+    bad.height = 1;
+    EXPECT_FALSE(to_timed_cloud(bad));
+  }
+}
+
+}  // namespace point_cloud_test
+}  // namespace tutti::bags

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/transform_tree.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+namespace tutti::bags {
+namespace {
+
+constexpr double kUnitTolerance = 1e-3;  // of a quaternion's norm, as in trajectory files
+constexpr double kExact = 1e-14;
+constexpr double kStill_m = 1e-3, kStill_rad = 1e-3;
+
+bool is_same(const Pose3& a, const Pose3& b) {
+  return (a.translation - b.translation).norm() < kStill_m && a.rotation.angularDistance(b.rotation) < kStill_rad;
+}
+
+}  // namespace
+
+std::string frame_name(const std::string& frame) { return frame.starts_with('/') ? frame.substr(1) : frame; }
+
+Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation) {
+  if (!(translation.cwiseAbs().maxCoeff() <= kMaxCoordinate_m))  // also NaN
+    return fail(ErrorCode::invalid, "position {} {} {}, expected at most {:g} m", translation.x(), translation.y(),
+                translation.z(), kMaxCoordinate_m);
+  if (!(std::abs(rotation.norm() - 1.0) <= kUnitTolerance))
+    return fail(ErrorCode::invalid, "orientation of norm {:.6g}, expected 1 within {}", rotation.norm(),
+                kUnitTolerance);
+  // One that is a rotation stays as it is, bit by bit.
+  const bool is_unit = std::abs(rotation.squaredNorm() - 1.0) < kExact;
+  return Pose3{is_unit ? rotation : rotation.normalized(), translation};
+}
+
+Status TransformTree::add(const RosTransform& transform, bool is_static) {
+  const auto pose = to_pose(transform.translation, transform.rotation);
+  const std::string parent = frame_name(transform.header.frame_id), child = frame_name(transform.child_frame_id);
+  if (!pose) return in_context(fmt::format("transform {:.80} -> {:.80}", parent, child), pose.error());
+  const auto [at, is_new] = joints_.try_emplace(child, Joint{parent, *pose});
+  if (!is_new && !is_static && (at->second.parent != parent || !is_same(at->second.T_parent_child, *pose)))
+    at->second.moves = true;
+  return {};
+}
+
+/// From the frame upwards, with T_ancestor_frame; a ring is gone round once.
+std::vector<std::pair<std::string, Pose3>> TransformTree::ancestors(const std::string& frame) const {
+  std::vector<std::pair<std::string, Pose3>> out{{frame, Pose3{}}};
+  std::set<std::string> seen{frame};
+  for (auto at = joints_.find(frame); at != joints_.end() && !at->second.moves; at = joints_.find(out.back().first)) {
+    if (!seen.insert(at->second.parent).second) break;
+    out.emplace_back(at->second.parent, at->second.T_parent_child * out.back().second);
+  }
+  return out;
+}
+
+std::optional<Pose3> TransformTree::find(const std::string& to, const std::string& from) const {
+  const auto above_from = ancestors(frame_name(from));
+  for (const auto& [frame, T_frame_to] : ancestors(frame_name(to)))
+    for (const auto& [other, T_other_from] : above_from)
+      if (frame == other) return T_frame_to.inverse() * T_other_from;
+  return std::nullopt;
+}
+
+std::string TransformTree::frames() const {
+  std::set<std::string> all;
+  for (const auto& [child, joint] : joints_) {
+    if (joint.moves) continue;
+    all.insert(child);
+    all.insert(joint.parent);
+  }
+  std::string out;
+  for (const std::string& frame : all) out += (out.empty() ? "" : ", ") + frame;
+  return out;
+}
+
+}  // namespace tutti::bags

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/transform_tree.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tutti/base/random.hpp"
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::bags {
+namespace transform_tree_test {
+
+RosTransform transform(const std::string& parent, const std::string& child, const Pose3& pose) {
+  return {{Timestamp{1}, parent}, child, pose.translation, pose.rotation};
+}
+
+TEST(TransformTree, ChainsLeadUpAndDown) {
+  Rng rng(3);
+  const auto any = [&] {
+    return Pose3{so3_exp(Eigen::Vector3d(rng.normal(1.0), rng.normal(1.0), rng.normal(1.0))),
+                 {rng.normal(1.0), rng.normal(1.0), rng.normal(1.0)}};
+  };
+  const Pose3 T_base_mast = any(), T_mast_lidar = any(), T_base_camera = any();
+  TransformTree tree;
+  ASSERT_TRUE(tree.add(transform("/base", "mast", T_base_mast), true));
+  ASSERT_TRUE(tree.add(transform("mast", "/lidar", T_mast_lidar), true));
+  ASSERT_TRUE(tree.add(transform("base", "camera", T_base_camera), true));
+  const auto expect = [&](const char* to, const char* from, const Pose3& expected) {
+    const auto found = tree.find(to, from);
+    ASSERT_TRUE(found);
+    EXPECT_LT(local(expected, *found).norm(), 1e-9);
+  };
+  expect("base", "lidar", T_base_mast * T_mast_lidar);
+  expect("lidar", "base", (T_base_mast * T_mast_lidar).inverse());
+  expect("camera", "lidar", T_base_camera.inverse() * T_base_mast * T_mast_lidar);
+  expect("elsewhere", "elsewhere", Pose3{});
+  EXPECT_FALSE(tree.find("base", "elsewhere"));
+  EXPECT_EQ(tree.frames(), "base, camera, lidar, mast");
+}
+
+TEST(TransformTree, WhatMovesDoesNotLeadAnywhere) {
+  TransformTree tree;
+  const Pose3 here, there{Eigen::Quaterniond::Identity(), {0, 0, 0.1}};
+  for (const Pose3& pose : {here, here, here}) ASSERT_TRUE(tree.add(transform("base", "fixed", pose), false));
+  for (const Pose3& pose : {here, there}) ASSERT_TRUE(tree.add(transform("base", "arm", pose), false));
+  EXPECT_TRUE(tree.find("base", "fixed"));
+  EXPECT_FALSE(tree.find("base", "arm"));
+}
+
+TEST(TransformTree, RingsAndPosesThatAreNoneDoNoHarm) {
+  TransformTree tree;
+  ASSERT_TRUE(tree.add(transform("a", "b", {}), true));
+  ASSERT_TRUE(tree.add(transform("b", "a", {}), true));
+  EXPECT_FALSE(tree.find("a", "c"));
+  EXPECT_TRUE(tree.find("a", "b"));
+  Pose3 bad;
+  bad.rotation.coeffs() *= 2.0;
+  EXPECT_EQ(tree.add(transform("a", "c", bad), true).error().message,
+            "transform a -> c: orientation of norm 2, expected 1 within 0.001");
+  bad = Pose3{};
+  bad.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(tree.add(transform("a", "c", bad), true));
+  EXPECT_FALSE(tree.find("a", "c"));
+}
+
+}  // namespace transform_tree_test
+}  // namespace tutti::bags

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/bag_index.hpp"
+
+#include <fmt/format.h>
+
+#include "tutti/bags/bag_info.hpp"
+#include "tutti/bags/ros_messages.hpp"
+
+namespace tutti::mission {
+namespace {
+
+using bags::BagMessage;
+
+constexpr std::string_view kStatic = "tf_static";
+
+Status check_stamp(Timestamp stamp, Timestamp before) {
+  if (before < stamp) return {};
+  return fail(ErrorCode::invalid, "stamp {} ns, expected after {} ns", stamp.ns, before.ns);
+}
+
+void take_pose(OdometryTrack& track, Timestamp stamp, const Eigen::Vector3d& position, const Eigen::Quaterniond& q) {
+  ++track.messages;
+  const auto pose = bags::to_pose(position, q);
+  const Status ok = !pose                 ? Status(tl::unexpected(pose.error()))
+                    : track.poses.empty() ? Status{}
+                                          : check_stamp(stamp, track.poses.back().stamp);
+  if (ok)
+    track.poses.push_back({stamp, *pose});
+  else
+    track.refused.add(track.messages, ok.error().message);
+}
+
+void refuse(OdometryTrack& track, const Error& error) { track.refused.add(++track.messages, error.message); }
+
+class Indexer {
+ public:
+  explicit Indexer(const std::string& pair) : pair_(pair) {}
+
+  void take(const BagMessage& message) {
+    const std::string& topic = message.channel->topic;
+    switch (bags::use_of(message.channel->type)) {
+      case bags::Use::odometry:
+        return take_odometry(index.odometry[topic], message);
+      case bags::Use::poses:
+        return take_pose_stamped(index.poses[topic], message);
+      case bags::Use::transforms:
+        return take_transforms(message, topic.ends_with(kStatic));
+      case bags::Use::scans:
+        return take_scan(index.scans[topic], message);
+      default:
+        return;
+    }
+  }
+
+  BagIndex index;
+
+ private:
+  static void take_odometry(OdometryTrack& track, const BagMessage& message) {
+    const auto odometry = bags::decode_odometry(message.data);
+    if (!odometry) return refuse(track, odometry.error());
+    if (track.messages == 0) {
+      track.frame = bags::frame_name(odometry->header.frame_id);
+      track.body = bags::frame_name(odometry->child_frame_id);
+    }
+    take_pose(track, odometry->header.stamp, odometry->pose.position, odometry->pose.orientation);
+  }
+
+  static void take_pose_stamped(OdometryTrack& track, const BagMessage& message) {
+    const auto pose = bags::decode_pose_stamped(message.data);
+    if (!pose) return refuse(track, pose.error());
+    if (track.messages == 0) track.frame = bags::frame_name(pose->header.frame_id);
+    take_pose(track, pose->header.stamp, pose->pose.position, pose->pose.orientation);
+  }
+
+  void take_transforms(const BagMessage& message, bool is_static) {
+    ++tf_messages_;
+    const auto transforms = bags::decode_tf(message.data);
+    if (!transforms) return index.bad_transforms.add(tf_messages_, transforms.error().message);
+    for (const bags::RosTransform& transform : *transforms) {
+      if (const auto ok = index.tree.add(transform, is_static); !ok)
+        index.bad_transforms.add(tf_messages_, ok.error().message);
+      const std::string parent = bags::frame_name(transform.header.frame_id),
+                        child = bags::frame_name(transform.child_frame_id), pair = parent + "->" + child;
+      const bool is_odometry = parent == "odom" || parent.ends_with("/odom") || pair == pair_;
+      if (is_static || !is_odometry) continue;
+      OdometryTrack& track = index.transforms[pair];
+      track.frame = parent;
+      track.body = child;
+      take_pose(track, transform.header.stamp, transform.translation, transform.rotation);
+    }
+  }
+
+  static void take_scan(ScanTrack& track, const BagMessage& message) {
+    ++track.messages;
+    const auto cloud = bags::decode_point_cloud(message.data);
+    if (!cloud) return track.refused.add(track.messages, cloud.error().message);
+    const std::string frame = bags::frame_name(cloud->header.frame_id);
+    if (track.scans.empty()) track.frame = frame;
+    const Status ok =
+        frame != track.frame
+            ? fail(ErrorCode::invalid, "frame '{:.80}', expected '{:.80}' as of the first", frame, track.frame)
+        : track.scans.empty() ? Status{}
+                              : check_stamp(cloud->header.stamp, track.scans.back().stamp);
+    if (ok)
+      track.scans.push_back({cloud->header.stamp, message.position, track.messages});
+    else
+      track.refused.add(track.messages, ok.error().message);
+  }
+
+  const std::string& pair_;
+  std::uint64_t tf_messages_ = 0;
+};
+
+}  // namespace
+
+void Refusals::add(std::uint64_t message, const std::string& why) {
+  if (count++ == 0) first = fmt::format("message {}: {}", message, why);
+}
+
+BagIndex index_bag(bags::BagReader& bag, const std::string& pair) {
+  Indexer indexer(pair);
+  BagIndex& index = indexer.index;
+  while (true) {
+    const auto message = bag.next();
+    if (!message) {
+      if (index.bad_records.count++ == 0) index.bad_records.first = message.error().message;
+      continue;
+    }
+    if (!*message) break;
+    indexer.take(**message);
+  }
+  for (const bags::BagChannel* const channel : bag.channels()) {  // those without messages, too
+    const bags::Use use = bags::use_of(channel->type);
+    if (use == bags::Use::odometry) index.odometry[channel->topic];
+    if (use == bags::Use::poses) index.poses[channel->topic];
+    if (use == bags::Use::scans) index.scans[channel->topic];
+  }
+  index.notes = bag.notes();
+  return std::move(index);
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/bag_recording.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "tutti/bags/bag_info.hpp"
+
+namespace tutti::mission {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kOfTransforms = "->";
+
+bool is_given(const LidarPoseConfig& pose) {
+  return !pose.translation_m.empty() || !pose.quaternion_xyzw.empty() || !pose.rpy_deg.empty();
+}
+
+std::string in_words(const OdometryTrack& track) {
+  return fmt::format("{} -> {}, {} poses", track.frame.empty() ? "?" : track.frame,
+                     track.body.empty() ? "?" : track.body, track.poses.size());
+}
+std::string in_words(const ScanTrack& track) { return fmt::format("{}, {} scans", track.frame, track.scans.size()); }
+bool has_any(const OdometryTrack& track) { return track.poses.size() > 1; }
+bool has_any(const ScanTrack& track) { return !track.scans.empty(); }
+
+/// "/a (odom -> base, 12 poses); /b (no messages)"
+template <class Tracks>
+std::string list_of(const Tracks& tracks) {
+  std::string out;
+  for (const auto& [name, track] : tracks) {
+    const std::string refused = track.refused.count == 0
+                                    ? ""
+                                    : fmt::format(", {} of {} messages refused, the first because: {}",
+                                                  track.refused.count, track.messages, track.refused.first);
+    out += fmt::format("{}{} ({}{})", out.empty() ? "" : "; ", name,
+                       track.messages == 0 ? "no messages" : in_words(track), refused);
+  }
+  return out.empty() ? "none" : out;
+}
+
+std::string flag(const RobotConfig& robot, const char* kind, const std::string& topic) {
+  return fmt::format("--topic {}.{}={} (in a mission file: robots[].topics.{})", robot.name, kind, topic, kind);
+}
+
+/// The one that is wanted, or the only one that has something; null when there is none.
+template <class Track>
+Result<const std::pair<const std::string, Track>*> choose(const std::map<std::string, Track>& tracks,
+                                                          const std::string& wanted, const char* kind,
+                                                          const RobotConfig& robot) {
+  if (!wanted.empty()) {
+    const auto at = tracks.find(wanted);
+    if (at == tracks.end())
+      return fail(ErrorCode::invalid, "topics.{}: '{}' is not in the bag, expected one of: {}", kind, wanted,
+                  list_of(tracks));
+    if (!has_any(at->second))
+      return fail(ErrorCode::invalid, "topics.{}: nothing can be made of {}", kind,
+                  list_of(std::map<std::string, Track>{*at}));
+    return &*at;
+  }
+  const std::pair<const std::string, Track>* found = nullptr;
+  for (const auto& entry : tracks) {
+    if (!has_any(entry.second)) continue;
+    if (found != nullptr)
+      return fail(ErrorCode::invalid, "several topics have {}: {}; say which: {}", kind, list_of(tracks),
+                  flag(robot, kind, found->first));
+    found = &entry;
+  }
+  return found;
+}
+
+/// The track with its name, of the three kinds the first that has one.
+Result<const std::pair<const std::string, OdometryTrack>*> choose_odometry(const BagIndex& index,
+                                                                           const RobotConfig& robot) {
+  const std::string& wanted = robot.topics.odometry;
+  if (wanted.find(kOfTransforms) != std::string::npos) return choose(index.transforms, wanted, "odometry", robot);
+  if (index.poses.contains(wanted)) return choose(index.poses, wanted, "odometry", robot);
+  auto found = choose(index.odometry, wanted, "odometry", robot);
+  if (!found || *found != nullptr) return found;
+  found = choose(index.transforms, "", "odometry", robot);
+  if (!found || *found != nullptr) return found;
+  found = choose(index.poses, "", "odometry", robot);
+  if (!found || *found != nullptr) return found;
+  return fail(ErrorCode::invalid,
+              "no odometry: expected a topic of nav_msgs/Odometry (here: {}) or geometry_msgs/PoseStamped ({}), or a "
+              "frame in odom in /tf ({})",
+              list_of(index.odometry), list_of(index.poses), list_of(index.transforms));
+}
+
+Result<Pose3> find_lidar(const BagIndex& index, const std::string& body, const std::string& lidar,
+                         const RobotConfig& robot, std::string& note) {
+  if (is_given(robot.T_body_lidar)) {
+    note = "the LiDAR is where T_body_lidar says";
+    return to_pose(robot.T_body_lidar);
+  }
+  if (body == lidar) {
+    note = "scans are in the odometry's body frame";
+    return Pose3{};
+  }
+  if (body.empty()) {
+    note = fmt::format("nothing says which body the odometry is of: taken as that of the scans, {}", lidar);
+    return Pose3{};
+  }
+  if (const auto found = index.tree.find(body, lidar)) {
+    note = fmt::format("{} is in {} by the bag's transforms", lidar, body);
+    return *found;
+  }
+  const std::string frames = index.tree.frames();
+  return fail(ErrorCode::invalid,
+              "where the LiDAR is on the robot is not known: no transform from '{}' to '{}', frames that do not move "
+              "are: {}; say it: --set robots.0.T_body_lidar.translation_m=[x,y,z] (robots count from 0; in a mission "
+              "file: robots[].T_body_lidar; zeros where both frames are one)",
+              lidar, body, frames.empty() ? "none" : frames);
+}
+
+std::string note_refused(const std::string& topic, const Refusals& refused, std::uint64_t of) {
+  return fmt::format("{}: {} of {} messages refused, the first because: {}", topic, refused.count, of, refused.first);
+}
+
+/// Scans by another clock would silently be none.
+Status check_clock(const BagRecording& bag) {
+  const auto inside = [&](const ScanPlace& scan) {
+    return bag.odometry.front().stamp <= scan.stamp && scan.stamp <= bag.odometry.back().stamp;
+  };
+  if (std::ranges::any_of(bag.scans, inside)) return {};
+  return fail(
+      ErrorCode::invalid,
+      "{}: of its {} stamps, {} to {} ns, none is within the odometry's, {} to {} ns: are they by another clock?",
+      bag.scan_topic, bag.scans.size(), bag.scans.front().stamp.ns, bag.scans.back().stamp.ns,
+      bag.odometry.front().stamp.ns, bag.odometry.back().stamp.ns);
+}
+
+}  // namespace
+
+Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot) {
+  BagRecording out;
+  out.file = (data / robot.bag).string();
+  const auto reader = bags::open_bag(out.file);
+  if (!reader) return tl::unexpected(reader.error());
+  BagIndex index = index_bag(**reader, robot.topics.odometry);
+  out.notes = index.notes;
+  if (const Refusals& bad = index.bad_records; bad.count > 0)
+    out.notes.push_back(
+        fmt::format("{} records, chunks or files could not be read, the first: {}", bad.count, bad.first));
+  if (const Refusals& bad = index.bad_transforms; bad.count > 0)
+    out.notes.push_back(fmt::format("{} transforms refused, the first because: {}", bad.count, bad.first));
+  const auto odometry = choose_odometry(index, robot);
+  if (!odometry) return in_context(out.file, odometry.error());
+  const auto scans = choose(index.scans, robot.topics.scans, "scans", robot);
+  if (!scans) return in_context(out.file, scans.error());
+  const auto& [source, track] = **odometry;
+  out.odometry = track.poses;
+  std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
+  if (track.refused.count > 0) out.notes.push_back(note_refused(source, track.refused, track.messages));
+  if (*scans == nullptr) {
+    if (robot.topics.scans.empty() && index.scans.empty()) what += ", no scans (sensor_msgs/PointCloud2)";
+    if (!index.scans.empty()) what += fmt::format(", no scans: {}", list_of(index.scans));
+    out.notes.insert(out.notes.begin(), what);
+    return out;
+  }
+  out.scan_topic = (*scans)->first;
+  const ScanTrack& seen = (*scans)->second;
+  out.scans = seen.scans;
+  if (seen.refused.count > 0) out.notes.push_back(note_refused(out.scan_topic, seen.refused, seen.messages));
+  std::string where;
+  const auto T_body_lidar = find_lidar(index, track.body, seen.frame, robot, where);
+  if (!T_body_lidar) return in_context(out.file, T_body_lidar.error());
+  out.T_body_lidar = *T_body_lidar;
+  if (auto ok = check_clock(out); !ok) return in_context(out.file, ok.error());
+  out.notes.insert(out.notes.begin(),
+                   fmt::format("{}, scans of {} ({}); {}", what, out.scan_topic, in_words(seen), where));
+  return out;
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Scans of a bag, read when they are asked for.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "tutti/bags/point_cloud.hpp"
+#include "tutti/mission/bag_recording.hpp"
+#include "tutti/mission/deskewed_scan.hpp"
+
+namespace tutti::mission {
+namespace {
+
+constexpr std::size_t kTried = 5;  // scans that may be no good before the bag is refused
+
+class BagScans final : public ScanSource {
+ public:
+  BagScans(std::unique_ptr<bags::BagReader> reader, const BagRecording& bag, const Trajectory& odometry)
+      : reader_(std::move(reader)),
+        file_(bag.file),
+        topic_(bag.scan_topic),
+        places_(bag.scans),
+        T_body_lidar_(bag.T_body_lidar),
+        odometry_(with_ends(odometry)) {}
+
+  Result<std::string> look_into(const RobotConfig& robot, const Trajectory& odometry) {
+    const auto from = [&](Timestamp stamp) {
+      return static_cast<std::size_t>(std::ranges::lower_bound(places_, stamp, {}, &ScanPlace::stamp) -
+                                      places_.begin());
+    };
+    const std::size_t first = std::min(from(odometry.front().stamp), places_.size() - 1);
+    const std::size_t last = std::max(first + 1, from(odometry.back().stamp));
+    Result<std::optional<PointTimes>> found;
+    for (std::size_t i = first; i < std::min(first + kTried, last); ++i) {
+      auto times = times_of(i, robot);
+      if (times || i == first) found = std::move(times);
+      if (found) break;
+    }
+    if (!found) return in_context("not one of the first scans can be used, the first because", found.error());
+    // Half way a clock that starts with the odometry at 0 can be told from the time after the stamp.
+    const auto later = times_of(first + (last - first) / 2, robot);
+    times_ = later ? *later : *found;
+    return in_words(times_);
+  }
+
+  [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
+    auto measured = read(places_.at(sample));
+    if (!measured) return tl::unexpected(measured.error());
+    auto scan = deskewed(std::move(*measured), places_[sample].stamp, times_, T_body_lidar_, odometry_);
+    if (!scan) return in_context(name_of(places_[sample]), scan.error());
+    return std::optional(std::move(*scan));
+  }
+
+ private:
+  [[nodiscard]] std::string name_of(const ScanPlace& place) const {
+    return fmt::format("{}: {}: message {}", file_, topic_, place.message);
+  }
+
+  [[nodiscard]] Result<formats::TimedCloud> read(const ScanPlace& place) const {
+    const std::scoped_lock lock(mutex_);
+    if (auto ok = reader_->seek(place.position); !ok) return in_context(name_of(place), ok.error());
+    const auto message = reader_->next();
+    if (!message) return in_context(name_of(place), message.error());
+    if (!*message || (*message)->channel->topic != topic_)
+      return fail(ErrorCode::io, "{}: is not there any more: has the bag changed?", name_of(place));
+    const auto decoded = bags::decode_point_cloud((*message)->data);
+    if (!decoded) return in_context(name_of(place), decoded.error());
+    auto cloud = bags::to_timed_cloud(*decoded);
+    if (!cloud) return in_context(name_of(place), cloud.error());
+    if (cloud->cloud.points.empty()) return fail(ErrorCode::invalid, "{}: holds no points", name_of(place));
+    return cloud;
+  }
+
+  [[nodiscard]] Result<std::optional<PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const {
+    const auto cloud = read(places_.at(sample));
+    if (!cloud) return tl::unexpected(cloud.error());
+    auto times = find_message_times(*cloud, places_[sample].stamp, robot);
+    if (!times) return in_context(name_of(places_[sample]), times.error());
+    return times;
+  }
+
+  mutable std::mutex mutex_;  // the reader stands somewhere
+  std::unique_ptr<bags::BagReader> reader_;
+  std::string file_, topic_;
+  std::vector<ScanPlace> places_;
+  Pose3 T_body_lidar_;
+  Trajectory odometry_;
+  std::optional<PointTimes> times_;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<const ScanSource>> open_scans(const BagRecording& bag, const Trajectory& odometry,
+                                                     const RobotConfig& robot, std::string& note) {
+  auto reader = bags::open_bag(bag.file);
+  if (!reader) return tl::unexpected(reader.error());
+  auto scans = std::make_shared<BagScans>(std::move(*reader), bag, odometry);
+  auto words = scans->look_into(robot, odometry);
+  if (!words) return tl::unexpected(words.error());
+  note = std::move(*words);
+  return scans;
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <vector>
+
+#include "support/bags/rosbag2_writer.hpp"
+#include "tutti/base/timestamp.hpp"
+#include "tutti/formats/pcd.hpp"
+#include "tutti/geometry/pose3.hpp"
+#include "tutti/model/trajectory.hpp"
+
+/// Messages of a robot with a LiDAR, for tests.
+namespace tutti::bags::test {
+
+inline void write_header(CdrWriter& out, Timestamp stamp, std::string_view frame) {
+  out.number(static_cast<std::int32_t>(stamp.ns / 1'000'000'000))
+      .number(static_cast<std::uint32_t>(stamp.ns % 1'000'000'000))
+      .text(frame);
+}
+inline void write_pose(CdrWriter& out, const Pose3& pose) {
+  for (const double value : pose.translation) out.number(value);
+  for (const double value : pose.rotation.coeffs()) out.number(value);
+}
+
+/// `covariance`: of every element.
+inline std::string odometry_of(Timestamp stamp, const Pose3& pose, std::string_view frame = "odom",
+                               std::string_view child = "base_link", double covariance = 0.0) {
+  CdrWriter out;
+  write_header(out, stamp, frame);
+  out.text(child);
+  write_pose(out, pose);
+  for (int i = 0; i < 36 + 6 + 36; ++i) out.number(covariance);
+  return out.done();
+}
+inline std::string pose_stamped_of(Timestamp stamp, const Pose3& pose, std::string_view frame = "odom") {
+  CdrWriter out;
+  write_header(out, stamp, frame);
+  write_pose(out, pose);
+  return out.done();
+}
+/// {parent, child, T_parent_child}
+inline std::string tf_of(Timestamp stamp, const std::vector<std::tuple<std::string, std::string, Pose3>>& transforms) {
+  CdrWriter out;
+  out.number(static_cast<std::uint32_t>(transforms.size()));
+  for (const auto& [parent, child, pose] : transforms) {
+    write_header(out, stamp, parent);
+    out.text(child);
+    write_pose(out, pose);
+  }
+  return out.done();
+}
+
+struct CloudShape {
+  bool big = false;            ///< Points only: is_bigendian.
+  bool doubles = false;        ///< x, y, z are float64.
+  std::string time_field;      ///< Empty: none.
+  std::uint8_t time_type = 7;  ///< 6: uint32, 7: float32, 8: float64.
+  double time_unit_s = 1.0;
+  std::uint32_t rows = 1;
+  std::uint32_t padding = 0;  ///< Bytes behind each row.
+  std::string without;        ///< This coordinate is missing.
+};
+
+/// `times`: seconds of each point, after the stamp or by its clock, written in the shape's unit.
+inline std::string cloud_of(Timestamp stamp, std::string_view frame, const std::vector<Eigen::Vector3f>& points,
+                            const std::vector<double>& times = {}, const CloudShape& shape = {}) {
+  const auto put = [&](std::string& to, auto value) {
+    std::string bytes = little(value);
+    if (shape.big) std::ranges::reverse(bytes);
+    to += bytes;
+  };
+  std::vector<std::tuple<std::string, std::uint32_t, std::uint8_t>> fields;
+  std::uint32_t step = 4;  // something else comes first
+  for (const char* const name : {"x", "y", "z"}) {
+    if (shape.without != name) fields.emplace_back(name, step, shape.doubles ? 8 : 7);
+    step += shape.doubles ? 8 : 4;
+  }
+  if (!shape.time_field.empty()) {
+    fields.emplace_back(shape.time_field, step, shape.time_type);
+    step += shape.time_type == 8 ? 8 : 4;
+  }
+  const auto width = static_cast<std::uint32_t>(points.size() / shape.rows);
+  std::string data;
+  for (std::size_t i = 0; i < std::size_t{width} * shape.rows; ++i) {
+    put(data, 7.5F);
+    for (const float value : points[i])
+      if (shape.doubles)
+        put(data, double{value});
+      else
+        put(data, value);
+    if (!shape.time_field.empty()) {
+      const double time = times[i] / shape.time_unit_s;
+      if (shape.time_type == 6)
+        put(data, static_cast<std::uint32_t>(std::llround(time)));
+      else if (shape.time_type == 7)
+        put(data, static_cast<float>(time));
+      else
+        put(data, time);
+    }
+    if ((i + 1) % width == 0) data.append(shape.padding, '\xaa');
+  }
+  CdrWriter out;
+  write_header(out, stamp, frame);
+  out.number(shape.rows).number(width).number(static_cast<std::uint32_t>(fields.size()));
+  for (const auto& [name, offset, type] : fields) out.text(name).number(offset).number(type).number(std::uint32_t{1});
+  out.number(static_cast<std::uint8_t>(shape.big ? 1 : 0)).number(step).number(step * width + shape.padding);
+  return out.bytes(data).number(std::uint8_t{1}).done();
+}
+
+inline Sample sample_of(std::string topic, std::string type, Timestamp stamp, std::string data) {
+  return {std::move(topic), std::move(type), static_cast<std::uint64_t>(stamp.ns), std::move(data)};
+}
+inline const std::string kOdometry = "nav_msgs/msg/Odometry", kCloud = "sensor_msgs/msg/PointCloud2",
+                         kTf = "tf2_msgs/msg/TFMessage", kPose = "geometry_msgs/msg/PoseStamped";
+
+/// A recording of files as messages: odometry, and of each of its poses a scan of the folder.
+inline std::vector<Sample> samples_of(const Trajectory& poses, const std::filesystem::path& scans, std::size_t count) {
+  std::vector<Sample> out;
+  for (std::size_t i = 0; i < std::min(count, poses.size()); ++i) {
+    const auto& [stamp, pose] = poses[i];
+    const auto cloud = formats::read_timed_pcd((scans / fmt::format("{:06d}.pcd", i)).string()).value();
+    out.push_back(sample_of("/odometry", kOdometry, stamp, odometry_of(stamp, pose, "map", "body")));
+    out.push_back(sample_of("/points", kCloud, stamp, cloud_of(stamp, "body", cloud.cloud.points)));
+  }
+  return out;
+}
+
+}  // namespace tutti::bags::test
