@@ -3,9 +3,9 @@
 # wherever their folders are. What is in none, such as the simulation, belongs to the programs and is not installed.
 include_guard()
 
-set(TUTTI_LIBRARIES_core base geometry model formats evaluation spectral estimation consistency)
+set(TUTTI_LIBRARIES_core base geometry model formats evaluation spectral estimation judge consistency)
 set(TUTTI_LIBRARIES_perception lidar visual visual_frontend bundle config images)
-set(TUTTI_LIBRARIES_robot robot wire)
+set(TUTTI_LIBRARIES_robot robot wire agent_state)
 set(TUTTI_LIBRARIES_server server finders)
 set(TUTTI_LIBRARIES_net bus storage node mapfile)
 # A component needs those before it, but for the server, which takes its messages from the robot's.

@@ -449,7 +449,7 @@ TEST_F(Kill, FrontEndsThatBeginAnewCostNoMap) {
   };
   const auto map_rmse_m = [&](const Mission& mission, std::size_t r) {
     Trajectory map;
-    for (const server::MapNode& node : mission.server().map().nodes)
+    for (const MapNode& node : mission.server().map().nodes)
       if (node.id.chain.robot == mission.agent(r).robot() && (map.empty() || map.back().stamp < node.stamp))
         map.push_back({node.stamp, node.T_world_body});
     return evaluation::agreement(map, world_.recordings[r].recording.reference)->rmse_m;

@@ -104,7 +104,7 @@ class Restart : public testing::Test {
   }
   [[nodiscard]] Trajectory mapped(const ChainId& chain) const {
     Trajectory out;
-    for (const server::MapNode& node : server_->map().nodes)
+    for (const MapNode& node : server_->map().nodes)
       if (node.id.chain == chain) out.push_back({node.stamp, node.T_world_body});
     return out;
   }

@@ -90,7 +90,7 @@ Errors errors_with(double sigma_m, double sigma_rad, double others) {
   Errors out{.raw_m = error(agent.corrected())};
   const server::MapEstimate map = map_of(agent);
   Trajectory joint;
-  for (const server::MapNode& node : map.nodes) joint.push_back({node.stamp, node.T_world_body});
+  for (const MapNode& node : map.nodes) joint.push_back({node.stamp, node.T_world_body});
   out.server_m = error(joint);
   ProxyGraph graph = server::monitor_graph(map, 1, {});
   for (graph.revision = 1; graph.revision <= 3; ++graph.revision) {

@@ -132,7 +132,7 @@ void print_robots(const mapfile::Content& content, const server::MapEstimate& ma
     session.first = std::min(session.first, submap->keyframes.front().stamp);
     session.last = std::max(session.last, submap->keyframes.back().stamp);
   }
-  for (const server::MapNode& node : map.nodes) ++sessions[node.id.chain].keyframes;
+  for (const MapNode& node : map.nodes) ++sessions[node.id.chain].keyframes;
   fmt::print("\n{:<20} {:>10} {:>20} {:>8} {:>9} {:>8}  {}\n", "robot", "number", "session", "submaps", "keyframes",
              "minutes", "in the joint map");
   for (const auto& [chain, session] : sessions) {

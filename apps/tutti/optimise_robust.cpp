@@ -43,7 +43,7 @@ struct Score {
   }
 };
 
-std::size_t robot_of(const server::MapNode& node) { return node.id.chain.robot.value; }
+std::size_t robot_of(const MapNode& node) { return node.id.chain.robot.value; }
 
 std::uint32_t largest_component(const server::MapEstimate& map) {
   std::map<std::uint32_t, std::size_t> sizes;

@@ -16,10 +16,10 @@ shift
 jobs=${JOBS:-2}
 tutti=$PWD/build/bench/apps/tutti/tutti
 calibration=$PWD/build/bench/bench/accuracy/tutti_calibration
-judge=$PWD/build/bench/bench/accuracy/tutti_judge
+judge=$PWD/build/bench/bench/accuracy/tutti_bench_judge
 if [ -z "${NO_BUILD:-}" ]; then
   cmake --preset bench > /dev/null
-  cmake --build build/bench --target tutti tutti_calibration tutti_judge -j "$jobs" > /dev/null
+  cmake --build build/bench --target tutti tutti_calibration tutti_bench_judge -j "$jobs" > /dev/null
 fi
 keep=$PWD/out/all/$(cat "$tutti" "$calibration" "$judge" | sha256sum | cut -c1-12)
 mkdir -p "$keep"

@@ -8,8 +8,8 @@
 
 #include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/chain_reduction.hpp"
 #include "tutti/estimation/gnc.hpp"
-#include "tutti/estimation/internal/chain_reduction.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
 
 /// The other school, on our solver: graduated non-convexity with the Geman-McClure loss, from given poses.

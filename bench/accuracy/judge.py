@@ -3,7 +3,7 @@
 """Who is wrong, on simulated places of every scale. Writes docs/results/judge.md.
 
 Usage: bench/accuracy/judge.py JUDGE_PROGRAM [--seeds N] [--places NAME...] [--out FOLDER]
-JUDGE_PROGRAM is build/bench/bench/accuracy/tutti_judge. A place that is finished in --out is not made again.
+JUDGE_PROGRAM is build/bench/bench/accuracy/tutti_bench_judge. A place that is finished in --out is not made again.
 """
 import argparse
 import json

@@ -26,8 +26,8 @@ server::MapEstimate tunnel_map() {
   config.keyframe_m = 0.16;
   const auto run = server::test::corridor_run(config, 1);
   server::MapEstimate map = server::estimate_map(run.submaps, run.verdicts, {});
-  const server::MapNode* last = nullptr;
-  for (server::MapNode& node : map.nodes) {
+  const MapNode* last = nullptr;
+  for (MapNode& node : map.nodes) {
     node.representative = last == nullptr || last->id.chain != node.id.chain ||
                           (node.T_odom_body.translation - last->T_odom_body.translation).norm() >= 0.7;
     if (node.representative) last = &node;

@@ -10,7 +10,7 @@
 #include "tutti/formats/image_file.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/node/journal.hpp"
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/refinement_codec.hpp"

@@ -23,7 +23,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/limits.hpp"

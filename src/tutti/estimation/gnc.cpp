@@ -9,12 +9,12 @@
 #include "tutti/base/check.hpp"
 #include "tutti/base/chi_square.hpp"
 #include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/chain_reduction.hpp"
 #include "tutti/estimation/fixed_nodes.hpp"
-#include "tutti/estimation/internal/chain_reduction.hpp"
 #include "tutti/estimation/internal/chordal.hpp"
 #include "tutti/estimation/internal/gauss_newton.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
-#include "tutti/estimation/internal/truncated_least_squares.hpp"
+#include "tutti/estimation/truncated_least_squares.hpp"
 
 namespace tutti::estimation {
 namespace {
@@ -43,16 +43,14 @@ bool is_binary(double weight) { return weight == 0.0 || weight == 1.0; }
 
 }  // namespace
 
-PoseGraphSolution internal::least_squares(const PoseGraph& graph, const GncConfig& config,
-                                          std::span<const std::size_t> fixed) {
+PoseGraphSolution least_squares(const PoseGraph& graph, const GncConfig& config, std::span<const std::size_t> fixed) {
   SolverConfig plain = config.solver;
   plain.loss = "none";
   return solve_pose_graph(graph, plain, {}, fixed);
 }
 
-GncResult internal::truncated_least_squares(const PoseGraph& graph, const GncConfig& config,
-                                            std::span<const double> truncation, const PoseGraphSolution& start,
-                                            std::span<const std::size_t> fixed) {
+GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& config, std::span<const double> truncation,
+                                  const PoseGraphSolution& start, std::span<const std::size_t> fixed) {
   const std::size_t edges = graph.edges.size();
   GncResult out{.solution = start, .inlier_weight = std::vector<double>(edges, 1.0)};
   if (!is_usable(out.solution.summary.termination)) return out;
@@ -98,8 +96,7 @@ GncResult reweight(const PoseGraph& graph, const GncConfig& config, std::span<co
   std::vector<double> truncation(graph.edges.size(), chi_square_quantile(config.confidence, 6.0));
   for (std::size_t e = 0; e < roles.size(); ++e)
     if (roles[e] == EdgeRole::trusted) truncation[e] = std::numeric_limits<double>::infinity();
-  return internal::truncated_least_squares(graph, config, truncation, internal::least_squares(graph, config, fixed),
-                                           fixed);
+  return truncated_least_squares(graph, config, truncation, least_squares(graph, config, fixed), fixed);
 }
 
 }  // namespace
@@ -113,7 +110,7 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
   TUTTI_CHECK(roles.empty() || roles.size() == graph.edges.size(), "{} roles, {} edges", roles.size(),
               graph.edges.size());
   if (!internal::is_finite(graph)) return reweight(graph, config, roles, fixed);  // says so
-  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles, fixed);
+  const ReducedGraph reduced = reduce_chains(graph, roles, fixed);
   if (reduced.runs.empty()) return reweight(graph, config, roles, fixed);
 
   // The runs bend little, so the reduced graph decides the same, at a fraction of the cost; then the full one is solved
@@ -135,7 +132,7 @@ GncResult solve_pose_graph_gnc(const PoseGraph& graph, const GncConfig& config, 
     scale[e] = std::max(out.inlier_weight[e], kWeightFloor);
   }
   out.solution.weights = out.inlier_weight;
-  internal::expand_chains(graph, reduced, reduced_poses, out.solution.poses);
+  expand_chains(graph, reduced, reduced_poses, out.solution.poses);
   const auto structure = internal::analyse_blocks(graph, {}, fixed);
   internal::GraphEquations equations(graph, structure);
   const int before = out.solution.summary.factorisations;

@@ -10,7 +10,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/estimation/between_factor.hpp"
-#include "tutti/estimation/internal/chain_reduction.hpp"
+#include "tutti/estimation/chain_reduction.hpp"
 #include "tutti/estimation/internal/graph_equations.hpp"
 #include "tutti/estimation/internal/selected_inverse.hpp"
 
@@ -121,7 +121,7 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
     TUTTI_CHECK(e < graph.edges.size(), "edge {} of {}", e, graph.edges.size());
     roles[e] = EdgeRole::robust;
   }
-  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles, {}, poses);
+  const ReducedGraph reduced = reduce_chains(graph, roles, {}, poses);
   std::vector<Pose3> at;
   for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
   const BlockStructure structure = internal::analyse_blocks(reduced.graph);
@@ -154,7 +154,7 @@ std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<cons
   for (std::size_t node = 0; node < reduced.nodes.size(); ++node)
     if (const int v = structure.variable[node]; v >= 0)
       moves.middleRows<6>(static_cast<Eigen::Index>(6 * node)) = shifts.middleRows<6>(6 * v);
-  moves = internal::expand_moves(graph, reduced, poses, moves);
+  moves = expand_moves(graph, reduced, poses, moves);
   std::vector<Influence> out;
   for (std::size_t k = 0; k < pulls.size(); ++k)
     out.push_back({pulls[k].edge, pulls[k].distance, moves.col(static_cast<Eigen::Index>(k))});
@@ -165,7 +165,7 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
                                   std::span<const std::vector<std::size_t>> groups) {
   std::vector<double> out(groups.size(), 0.0);
   if (groups.empty()) return out;
-  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles);
+  const ReducedGraph reduced = reduce_chains(graph, roles);
   std::vector<Pose3> at;
   for (const std::size_t node : reduced.nodes) at.push_back(poses[node]);
   const auto edge_of = [&](std::size_t e) {

@@ -13,7 +13,7 @@ namespace {
 using Ends = std::pair<KeyframeId, KeyframeId>;
 
 std::optional<ClosureFit::Misfit> misfit(const server::MapEstimate& map, const LoopClosure& closure) {
-  const server::MapNode *from = find_node(map, closure.from), *to = find_node(map, closure.to);
+  const MapNode *from = find_node(map, closure.from), *to = find_node(map, closure.to);
   if (from == nullptr || to == nullptr || from->component != to->component) return std::nullopt;
   const Vector6d error = local(closure.measurement.T_a_b, from->T_world_body.inverse() * to->T_world_body);
   const Matrix6d covariance = bounded_covariance(closure.measurement.covariance);
@@ -25,7 +25,7 @@ std::string reason_of(const ClosureInfo& info) {
     return fmt::format("{}ed by {}", to_string(info.word->wish), info.word->by.empty() ? "an operator" : info.word->by);
   if (info.state == ClosureState::candidate) return "not judged";
   if (info.state == ClosureState::accepted) return {};
-  return server::to_string(info.closures.front().objection);
+  return judge::to_string(info.closures.front().objection);
 }
 
 }  // namespace

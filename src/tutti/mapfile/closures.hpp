@@ -20,7 +20,7 @@ const char* to_string(ClosureState state);
 struct ClosureFit {
   LoopClosure closure;
   ClosureState state = ClosureState::candidate;
-  server::Objection objection = server::Objection::none;
+  judge::Objection objection = judge::Objection::none;
   /// By how much the map differs from it, and its squared error in units of its covariance (6 degrees of freedom);
   /// nothing when the map does not join its two ends.
   struct Misfit {

@@ -31,7 +31,7 @@ struct Place {
 std::optional<Place> place(const Submap& submap, const server::MapEstimate& map) {
   const Keyframe& first = submap.keyframes.front();
   const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
-  const server::MapNode* node = find_node(map, {submap.id.chain, middle.index});
+  const MapNode* node = find_node(map, {submap.id.chain, middle.index});
   if (node == nullptr) return std::nullopt;
   return Place{node->component, node->T_world_body * middle.T_odom_body.inverse() * first.T_odom_body};
 }
@@ -51,7 +51,7 @@ std::uint32_t component_to_show(const Content& content, const server::MapEstimat
 
 Status export_g2o(const server::MapEstimate& map, const std::filesystem::path& file) {
   std::vector<formats::VertexStamp> stamps;
-  for (const server::MapNode& node : map.nodes)
+  for (const MapNode& node : map.nodes)
     stamps.push_back({static_cast<std::int64_t>(stamps.size()), node.id, node.stamp});
   if (auto status = formats::write_g2o(file.string(), map.graph); !status) return status;
   return formats::write_graph_stamps(formats::stamps_beside(file.string()), stamps);
@@ -63,7 +63,7 @@ Result<std::vector<std::string>> export_tum(const Content& content, const server
   std::filesystem::create_directories(folder, failure);
   if (failure) return fail(ErrorCode::io, "{}: cannot make the folder: {}", folder.string(), failure.message());
   std::map<ChainId, Trajectory> trajectories;
-  for (const server::MapNode& node : map.nodes) trajectories[node.id.chain].push_back({node.stamp, node.T_world_body});
+  for (const MapNode& node : map.nodes) trajectories[node.id.chain].push_back({node.stamp, node.T_world_body});
   const server::ClosureNames names = content.closure_names();
   std::vector<std::string> files;
   for (const auto& [chain, trajectory] : trajectories) {

@@ -68,7 +68,7 @@ TEST_F(Export, GraphTrajectoriesAndCloudAreThoseOfTheServersMap) {
   // Where the middle keyframe of a submap is, its one point is.
   const Submap& first = *content.submaps.begin()->second;
   const Keyframe& middle = first.keyframes[first.keyframes.size() / 2];
-  const auto node = std::ranges::find(map.nodes, KeyframeId{first.id.chain, middle.index}, &server::MapNode::id);
+  const auto node = std::ranges::find(map.nodes, KeyframeId{first.id.chain, middle.index}, &MapNode::id);
   const Pose3 T = node->T_world_body * middle.T_odom_body.inverse() * first.keyframes.front().T_odom_body;
   const Eigen::Vector3d expected = T * Eigen::Vector3d(1.0, 2.0, 0.0);
   double nearest = 1e9;

@@ -33,7 +33,7 @@ Day day_of(const Mapper& mapper) {
   Day day{.epoch = mapper.server().state().epoch, .revision = mapper.server().state().revision};
   for (const auto& [pair, verdict] : mapper.server().state().verdicts)
     if (is_yesterday(pair.first.chain) && is_yesterday(pair.second.chain)) day.verdicts[pair] = verdict;
-  for (const server::MapNode& node : mapper.server().map().nodes)
+  for (const MapNode& node : mapper.server().map().nodes)
     if (is_yesterday(node.id.chain)) day.poses[node.id] = node.T_world_body;
   return day;
 }
@@ -84,7 +84,7 @@ void expect_days_to_join(Reopen&& reopen) {
   EXPECT_LT(error_of(today), 1.05 * error_of(yesterday));
   // Nothing but new closures moves yesterday's part.
   server::VerdictSet old(yesterday.verdicts.begin(), yesterday.verdicts.end());
-  for (const server::MapNode& node : server::estimate_map(mapper.server().state().submaps, old, {}).nodes)
+  for (const MapNode& node : server::estimate_map(mapper.server().state().submaps, old, {}).nodes)
     if (is_yesterday(node.id.chain)) {
       EXPECT_LT(local(node.T_world_body, yesterday.poses.at(node.id)).norm(), 1e-5) << node.id.index;
     }

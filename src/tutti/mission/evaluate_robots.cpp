@@ -60,7 +60,7 @@ ServerEstimate read_server_estimate(const server::MapEstimate& map, const server
   const auto component = components.of_robot.find(robot);
   if (component == components.of_robot.end()) return out;
   out.component = component->second;
-  for (const server::MapNode& node : map.nodes) {
+  for (const MapNode& node : map.nodes) {
     if (node.id.chain.robot != robot) continue;
     if (node.component == out.component)
       out.trajectory.push_back({node.stamp, node.T_world_body});

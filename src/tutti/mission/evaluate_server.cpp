@@ -56,7 +56,7 @@ void judge_closures(const server::MapServer& server, MissionRecord& record) {
 /// Stretches of odometry that the server convicted, with the times the report wants.
 void name_failures(const server::MapEstimate& map, ServerRecord& out) {
   std::map<KeyframeId, Timestamp> stamp;
-  for (const server::MapNode& node : map.nodes) stamp[node.id] = node.stamp;
+  for (const MapNode& node : map.nodes) stamp[node.id] = node.stamp;
   for (const server::FailedOdometry& failed : map.failed_odometry)
     out.failed_odometry.push_back({.robot = failed.chain.robot,
                                    .from = stamp.at({failed.chain, failed.from}),
@@ -70,7 +70,7 @@ void name_failures(const server::MapEstimate& map, ServerRecord& out) {
 std::optional<Pose3> odom_from_world(RobotId robot, const server::MapEstimate& map, std::uint32_t component) {
   std::vector<Eigen::Vector3d> odom;
   std::vector<Eigen::Vector3d> world;
-  for (const server::MapNode& node : map.nodes) {
+  for (const MapNode& node : map.nodes) {
     if (node.id.chain.robot != robot || node.component != component) continue;
     odom.push_back(node.T_odom_body.translation);
     world.push_back(node.T_world_body.translation);
@@ -141,7 +141,7 @@ void evaluate_server(const std::vector<RobotOutcome>& robots, const server::MapS
   for (const auto& [revision, refinement] : server.state().refinements.all())
     if (refinement->whole) record.server.refinement = refinement->counts;
   record.server.graph = server.map().graph;
-  for (const server::MapNode& node : server.map().nodes) record.server.nodes.push_back({node.id, node.stamp});
+  for (const MapNode& node : server.map().nodes) record.server.nodes.push_back({node.id, node.stamp});
   relate_robots(robots, server.map(), components.of_robot, record);
   evaluate_map(server, association, record);
 }

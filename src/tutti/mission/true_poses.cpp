@@ -11,7 +11,7 @@ std::map<KeyframeId, Pose3> true_ends(std::span<const LoopClosure> closures, con
   std::map<RobotId, std::map<Timestamp, KeyframeId>> ends;
   for (const LoopClosure& closure : closures)
     for (const KeyframeId& id : {closure.from, closure.to})
-      if (const server::MapNode* node = server::find_node(map, id)) ends[id.chain.robot][node->stamp] = id;
+      if (const MapNode* node = server::find_node(map, id)) ends[id.chain.robot][node->stamp] = id;
   std::map<KeyframeId, Pose3> out;
   for (const MissionRecording* robot : robots) {
     const auto& own = ends[robot->recording.robot];

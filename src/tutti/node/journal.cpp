@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 
 namespace tutti::node {
 namespace {

@@ -7,7 +7,7 @@
 #include "tutti/node/robot_tables.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {

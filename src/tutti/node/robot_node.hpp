@@ -13,7 +13,7 @@
 #include "tutti/node/step.hpp"
 #include "tutti/node/uplink.hpp"
 #include "tutti/robot/agent.hpp"
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 
 namespace tutti::node {
 

@@ -12,7 +12,7 @@
 #include "tutti/base/content_hash.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/storage/memory_store.hpp"
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {

@@ -9,7 +9,7 @@
 
 #include "tutti/node/robot_node.hpp"
 #include "tutti/storage/memory_store.hpp"
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 
 namespace tutti::node {
 namespace robot_odometry_test {

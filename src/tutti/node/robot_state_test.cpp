@@ -15,7 +15,7 @@
 #include "tutti/node/robot_node.hpp"
 #include "tutti/storage/memory_store.hpp"
 #include "tutti/storage/sqlite_store.hpp"
-#include "tutti/wire/agent_state.hpp"
+#include "tutti/wire/agent_state/agent_state.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/estimation/bundle/imu_preintegration.hpp"
+#include "tutti/estimation/imu_preintegration.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/model/way.hpp"
@@ -29,11 +29,11 @@ std::vector<ImuPreintegration> imu_steps(const Submap& submap, const std::vector
     for (const ImuSample& sample : images[i].imu)
       if (samples.empty() || samples.back().stamp < sample.stamp) samples.push_back(sample);
   std::vector<ImuPreintegration> out;
-  const auto gyro_bias = bundle::estimate_gyro_bias(samples, submap.keyframes);
+  const auto gyro_bias = estimation::estimate_gyro_bias(samples, submap.keyframes);
   if (!gyro_bias) return out;
   for (std::size_t k = 0; k + 1 < submap.keyframes.size(); ++k)
-    if (auto step = bundle::preintegrate(samples, submap.keyframes[k], submap.keyframes[k + 1], {.gyro = *gyro_bias},
-                                         images.front().imu_noise))
+    if (auto step = estimation::preintegrate(samples, submap.keyframes[k], submap.keyframes[k + 1],
+                                             {.gyro = *gyro_bias}, images.front().imu_noise))
       out.push_back(std::move(*step));
   return out;
 }

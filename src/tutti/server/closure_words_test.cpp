@@ -66,7 +66,7 @@ TEST(ClosureWords, ARejectedClosureIsAsIfItHadNotBeenFound) {
     EXPECT_EQ(map.closures.size(), plain.closures.size());
     EXPECT_FALSE(judged(map, closure).accepted);
     EXPECT_TRUE(judged(map, closure).by_operator);
-    EXPECT_EQ(judged(map, closure).objection, Objection::operators);
+    EXPECT_EQ(judged(map, closure).objection, judge::Objection::operators);
     const MapEstimate again = estimate_map(in.submaps, in.verdicts, {}, {{pair, word(Wish::withdraw)}});
     EXPECT_EQ(again.graph.poses, plain.graph.poses);
     EXPECT_FALSE(judged(again, closure).by_operator);
@@ -83,12 +83,12 @@ TEST(ClosureWords, AnAcceptedClosureIsInTheMapWhateverItContradicts) {
       if (!TestFinder::is_wrong(closure)) continue;
       ++wrong;
       EXPECT_FALSE(judged(plain, closure).accepted);
-      EXPECT_NE(judged(plain, closure).objection, Objection::none);
+      EXPECT_NE(judged(plain, closure).objection, judge::Objection::none);
       EXPECT_STRNE(to_string(judged(plain, closure).objection), "");
       const MapEstimate map = estimate_map(in.submaps, in.verdicts, {}, {{pair, word(Wish::accept)}});
       EXPECT_TRUE(map.converged);
       EXPECT_TRUE(judged(map, closure).accepted && judged(map, closure).by_operator);
-      EXPECT_EQ(judged(map, closure).objection, Objection::none);
+      EXPECT_EQ(judged(map, closure).objection, judge::Objection::none);
       EXPECT_TRUE(edge_of(map, closure).has_value());
     }
   }
@@ -122,7 +122,7 @@ TEST(ClosureWords, OneAcceptedClosureJoinsTwoRobots) {
   const VerdictSet one{*inter};
   const MapEstimate apart = estimate_map(in.submaps, one, {});
   EXPECT_EQ(apart.components, 2U);
-  EXPECT_EQ(apart.closures.front().objection, Objection::too_few);
+  EXPECT_EQ(apart.closures.front().objection, judge::Objection::too_few);
   EXPECT_EQ(estimate_map(in.submaps, one, {}, {{inter->first, word(Wish::accept)}}).components, 1U);
 }
 
@@ -135,7 +135,7 @@ class WordsToAServer : public testing::Test {
     answer(server_, *finder_);
     server_.optimise();
     for (const JudgedClosure& closure : server_.map().closures)
-      if (closure.objection == Objection::contradicted || closure.objection == Objection::misfit)
+      if (closure.objection == judge::Objection::contradicted || closure.objection == judge::Objection::misfit)
         refused_ = closure.closure;
     for (const auto& [pair, verdict] : server_.state().verdicts)
       if (verdict.closures.front() == refused_) pair_ = pair;

@@ -135,7 +135,7 @@ JudgedGraph judge_graph(const RobotGraph& graph, const MapConfig& config) {
     JudgedEdge& edge = out.edges[c.edge];
     const bool is_judged = find_node(out.map, c.closure.from) != nullptr && find_node(out.map, c.closure.to) != nullptr;
     edge.accepted = is_judged && judged->accepted;
-    edge.objection = is_judged ? judged->objection : Objection::no_map;
+    edge.objection = is_judged ? judged->objection : judge::Objection::no_map;
     if (is_judged) ++judged;
   }
   return out;

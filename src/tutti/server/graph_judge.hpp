@@ -21,8 +21,8 @@ struct RobotGraph {
 /// What has become of an edge.
 struct JudgedEdge {
   bool odometry = false;
-  bool accepted = true;                   ///< Of a closure; odometry is accepted, also where it failed.
-  Objection objection = Objection::none;  ///< Of a closure that is not accepted.
+  bool accepted = true;                                 ///< Of a closure; odometry is accepted, also where it failed.
+  judge::Objection objection = judge::Objection::none;  ///< Of a closure that is not accepted.
 };
 
 struct JudgedGraph {

@@ -75,7 +75,7 @@ TEST(GraphJudge, TellsWrongClosuresFromRightOnes) {
   for (std::size_t e = 0; e < of.wrong.size(); ++e) {
     const JudgedEdge& edge = judged.edges[e];
     EXPECT_EQ(edge.odometry, e < judged.map.odometry_edges);
-    EXPECT_EQ(edge.accepted, edge.objection == Objection::none);
+    EXPECT_EQ(edge.accepted, edge.objection == judge::Objection::none);
     EXPECT_FALSE(of.wrong[e] && edge.accepted);
     right += !of.wrong[e] && !edge.odometry ? 1U : 0U;
     kept += edge.accepted && !edge.odometry ? 1U : 0U;

@@ -10,9 +10,9 @@
 #include "tutti/base/chi_square.hpp"
 #include "tutti/base/disjoint_sets.hpp"
 #include "tutti/geometry/covariance.hpp"
-#include "tutti/server/closure_honesty.hpp"
-#include "tutti/server/closure_judge.hpp"
-#include "tutti/server/odometry_honesty.hpp"
+#include "tutti/judge/closure_honesty.hpp"
+#include "tutti/judge/judge_closures.hpp"
+#include "tutti/judge/odometry_honesty.hpp"
 #include "tutti/server/spare_pairs.hpp"
 
 namespace tutti::server {
@@ -39,28 +39,29 @@ SubmapSet without_contradictions(const SubmapSet& submaps, std::vector<SubmapId>
 
 /// Nodes and odometry edges of all submaps. Neighbouring submaps share a keyframe, so they attach by its id; a missing
 /// submap leaves a gap, and what follows it hangs on by closures alone until the submap comes.
-NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
+judge::NodeIndex attach_submaps(const SubmapSet& submaps, MapEstimate& map) {
   for (const auto& [id, submap] : submaps)
     for (const Keyframe& k : submap->keyframes) {
       const KeyframeId node{id.chain, k.index};
       if (map.nodes.empty() || map.nodes.back().id < node)
         map.nodes.push_back({node, k.stamp, k.representative, k.T_odom_body, k.T_odom_body, 0});
     }
-  NodeIndex index;
+  judge::NodeIndex index;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) index.emplace(map.nodes[i].id, i);
   for (const MapNode& node : map.nodes) map.graph.poses.push_back(node.T_odom_body);
   for (const auto& [id, submap] : submaps)
     for (std::size_t k = 0; k < submap->odometry.size(); ++k)
-      map.graph.edges.push_back({.from = index.at({id.chain, submap->keyframes[k].index}),
-                                 .to = index.at({id.chain, submap->keyframes[k + 1].index}),
-                                 .T_from_to = submap->odometry[k].T_a_b,
-                                 .information = information_of(bounded_covariance(submap->odometry[k].covariance))});
+      map.graph.edges.push_back(
+          {.from = index.at({id.chain, submap->keyframes[k].index}),
+           .to = index.at({id.chain, submap->keyframes[k + 1].index}),
+           .T_from_to = submap->odometry[k].T_a_b,
+           .information = judge::information_of(bounded_covariance(submap->odometry[k].covariance))});
   map.odometry_edges = map.graph.edges.size();
   return index;
 }
 
 /// Per node the covariance, as stated but for its bounds, of the step that ends there.
-std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, const NodeIndex& index) {
+std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, const judge::NodeIndex& index) {
   std::vector<std::optional<Matrix6d>> out(index.size());
   for (const auto& [id, submap] : submaps)
     for (std::size_t k = 0; k < submap->odometry.size(); ++k)
@@ -68,8 +69,8 @@ std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, cons
   return out;
 }
 
-Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, const SubmapSet& submaps,
-                          const NodeIndex& index, const std::set<SubmapPair>& spare) {
+judge::Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, const SubmapSet& submaps,
+                                 const judge::NodeIndex& index, const std::set<SubmapPair>& spare) {
   std::vector<std::pair<LoopClosure, std::optional<Wish>>> all;
   for (const auto& [pair, verdict] : verdicts) {
     if (!has_both(submaps, pair)) continue;
@@ -86,7 +87,7 @@ Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, cons
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
     return std::tie(a.first.from, a.first.to) < std::tie(b.first.from, b.first.to);
   });
-  Closures out;
+  judge::Closures out;
   for (auto& [closure, wish] : all) {
     if (wish == Wish::reject) {
       out.rejected.push_back(std::move(closure));
@@ -99,19 +100,20 @@ Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, cons
 }
 
 /// Closures that err by more than they say now say so.
-void raise_understated(const std::vector<OdometryChain>& chains, Closures& closures, MapEstimate& map) {
-  map.closure_factors = closure_honesty(chains, closures.judged);
+void raise_understated(const std::vector<judge::OdometryChain>& chains, judge::Closures& closures, MapEstimate& map) {
+  map.closure_factors = judge::closure_honesty(chains, closures.judged);
   for (LoopClosure& closure : closures.judged)
     if (const auto found = map.closure_factors.find(std::minmax(closure.from.chain, closure.to.chain));
         found != map.closure_factors.end())
-      closure.measurement.covariance = scaled(closure.measurement.covariance, found->second);
+      closure.measurement.covariance = judge::scaled(closure.measurement.covariance, found->second);
 }
 
 /// Odometry's rotations count as much as the closures show that they are worth.
 void see_through(MapEstimate& map) {
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     PoseGraphEdge& edge = map.graph.edges[e];
-    edge.information = scale_rotation(edge.information, 1.0 / map.rotation_factors.at(map.nodes[edge.from].id.chain));
+    edge.information =
+        judge::scale_rotation(edge.information, 1.0 / map.rotation_factors.at(map.nodes[edge.from].id.chain));
   }
 }
 
@@ -123,7 +125,7 @@ constexpr double kRightAfterAll = 0.999;
 
 /// Says by how much failed odometry missed, and leaves the graph as sure of it as it then deserves. A stretch that
 /// turns out to have been right, nearly or within its own doubt, is no failure.
-void record_failure(const estimation::FailedStretch& failed, MapEstimate& map) {
+void record_failure(const judge::FailedStretch& failed, MapEstimate& map) {
   const MapNode &a = map.nodes[failed.from], &b = map.nodes[failed.to];
   Matrix6d covariance = Matrix6d::Zero();
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
@@ -136,7 +138,7 @@ void record_failure(const estimation::FailedStretch& failed, MapEstimate& map) {
   const double jump_m = jump.head<3>().norm(), jump_rad = jump.tail<3>().norm();
   if (jump.dot(covariance.llt().solve(jump)) < chi_square_quantile(kRightAfterAll, 6)) return;
   map.failed_odometry.push_back({a.id.chain, a.id.index, b.id.index, jump_m, jump_rad});
-  weaken(map.graph, map, failed.from, failed.to, jump_m, jump_rad);
+  judge::weaken(map.graph, map.odometry_edges, failed.from, failed.to, jump_m, jump_rad);
 }
 
 void label_components(MapEstimate& map) {
@@ -147,7 +149,7 @@ void label_components(MapEstimate& map) {
   map.components = static_cast<std::uint32_t>(count);
 }
 
-void adopt(const Optimum& optimum, MapEstimate& map) {
+void adopt(const judge::Optimum& optimum, MapEstimate& map) {
   for (const std::size_t edge : optimum.fitting) {
     map.graph.edges.push_back(optimum.graph.edges[edge]);
     map.closures[optimum.closure_of_edge[edge - map.odometry_edges]].accepted = true;
@@ -155,14 +157,14 @@ void adopt(const Optimum& optimum, MapEstimate& map) {
   for (std::size_t c = 0; c < map.closures.size(); ++c) map.closures[c].objection = optimum.objections[c];
   map.graph.poses = optimum.robust.solution.poses;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) map.nodes[i].T_world_body = map.graph.poses[i];
-  for (const estimation::FailedStretch& failed : optimum.failed) record_failure(failed, map);
+  for (const judge::FailedStretch& failed : optimum.failed) record_failure(failed, map);
 }
 
 }  // namespace
 
-std::vector<OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
-                                           const std::vector<std::optional<Matrix6d>>& step_to) {
-  std::vector<OdometryChain> chains;
+std::vector<judge::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
+                                                  const std::vector<std::optional<Matrix6d>>& step_to) {
+  std::vector<judge::OdometryChain> chains;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (step_to[i])
       chains.back().step_covariance.push_back(*step_to[i]);
@@ -176,23 +178,23 @@ std::vector<OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
 namespace {
 
 /// What odometry is worth by the closures that fit. What failed is a gap: the map's word on it is not odometry's.
-std::map<ChainId, OdometryHonesty> honesty_after(const MapEstimate& map, const Optimum& optimum,
-                                                 const std::vector<LoopClosure>& closures) {
+std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, const judge::Optimum& optimum,
+                                                        const std::vector<LoopClosure>& closures) {
   std::vector<std::optional<Matrix6d>> step_to(map.nodes.size());
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
     const PoseGraphEdge& edge = map.graph.edges[e];
-    const auto holds = [&](const estimation::FailedStretch& f) { return f.from < edge.to && edge.from < f.to; };
+    const auto holds = [&](const judge::FailedStretch& f) { return f.from < edge.to && edge.from < f.to; };
     if (std::ranges::none_of(optimum.failed, holds))
       step_to[edge.to] = edge.information.ldlt().solve(Matrix6d::Identity());
   }
   std::vector<LoopClosure> fitting;
   for (const std::size_t e : optimum.fitting)
     fitting.push_back(closures[optimum.closure_of_edge[e - map.odometry_edges]]);
-  return odometry_honesty(odometry_chains(map.nodes, step_to), fitting);
+  return judge::odometry_honesty(odometry_chains(map.nodes, step_to), fitting);
 }
 
 /// True if the odometry of any chain was far worse than it said; it now says so.
-bool raise_understated(const std::map<ChainId, OdometryHonesty>& honesty, MapEstimate& map) {
+bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty, MapEstimate& map) {
   for (const auto& [chain, worth] : honesty)
     if (worth.whole > kUnderstated) map.understated[chain] = worth.whole;
   for (std::size_t e = 0; e < map.odometry_edges; ++e) {
@@ -207,34 +209,36 @@ bool raise_understated(const std::map<ChainId, OdometryHonesty>& honesty, MapEst
 MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
                               const WordSet& words) {
   MapEstimate map;
-  const NodeIndex index = attach_submaps(submaps, map);
+  const judge::NodeIndex index = attach_submaps(submaps, map);
   const auto spare = spare_pairs(verdicts, submaps, static_cast<std::size_t>(config.most_closed_pairs));
   map.spare_pairs = spare.size();
-  Closures closures = collect_closures(verdicts, words, submaps, index, spare);
+  judge::Closures closures = collect_closures(verdicts, words, submaps, index, spare);
   const std::vector<LoopClosure> stated = closures.judged;
-  const std::vector<OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
+  const std::vector<judge::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
   if (config.judge_closures) raise_understated(chains, closures, map);
   if (config.judge_odometry) {
-    for (const auto& [chain, worth] : odometry_honesty(chains, closures.judged))
+    for (const auto& [chain, worth] : judge::odometry_honesty(chains, closures.judged))
       map.rotation_factors[chain] = worth.rotation;
     see_through(map);
   }
-  Optimum optimum = judge_closures(map, index, closures, config);
+  judge::Optimum optimum = judge::judge_closures({map.nodes, map.graph, map.odometry_edges}, index, closures,
+                                                 config.who_is_wrong, config.gnc);
   auto honesty = honesty_after(map, optimum, closures.judged);
   if (config.judge_odometry && raise_understated(honesty, map)) {
-    const estimation::SearchWork before = optimum.work;
-    optimum = judge_closures(map, index, closures, config);
+    const judge::SearchWork before = optimum.work;
+    optimum = judge::judge_closures({map.nodes, map.graph, map.odometry_edges}, index, closures, config.who_is_wrong,
+                                    config.gnc);
     optimum.work += before;
     honesty = honesty_after(map, optimum, closures.judged);
   }
   map.work = optimum.work;
   for (const auto& [chain, worth] : honesty) map.overstated[chain] = std::min(1.0, worth.whole);
   for (std::size_t c = 0; c < closures.judged.size(); ++c)
-    map.closures.push_back({stated[c], false, closures.certain[c], Objection::no_map});
+    map.closures.push_back({stated[c], false, closures.certain[c], judge::Objection::no_map});
   map.converged = estimation::is_usable(optimum.robust.solution.summary.termination);
   if (map.converged) adopt(optimum, map);
   for (const LoopClosure& closure : closures.rejected)
-    map.closures.push_back({closure, false, true, Objection::operators});
+    map.closures.push_back({closure, false, true, judge::Objection::operators});
   std::ranges::stable_sort(
       map.closures, {}, [](const JudgedClosure& judged) { return std::pair(judged.closure.from, judged.closure.to); });
   label_components(map);
@@ -242,26 +246,6 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
 }
 
 }  // namespace
-
-const char* to_string(Objection objection) {
-  switch (objection) {
-    case Objection::none:
-      return "";
-    case Objection::operators:
-      return "by an operator";
-    case Objection::contradicted:
-      return "odometry and other closures contradict it";
-    case Objection::too_few:
-      return "too few closures join these two";
-    case Objection::misfit:
-      return "does not fit the map";
-    case Objection::lone:
-      return "with those of its place it contradicts the rest of the map";
-    case Objection::no_map:
-      return "the map cannot be solved";
-  }
-  return "";
-}
 
 const MapNode* find_node(const MapEstimate& map, const KeyframeId& id) {
   const auto node = std::ranges::lower_bound(map.nodes, id, {}, &MapNode::id);

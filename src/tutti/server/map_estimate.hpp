@@ -9,15 +9,17 @@
 
 #include "tutti/base/config.hpp"
 #include "tutti/estimation/gnc.hpp"
-#include "tutti/estimation/who_is_wrong/settings.hpp"
-#include "tutti/estimation/who_is_wrong/who_is_wrong.hpp"
+#include "tutti/judge/closure_honesty.hpp"
+#include "tutti/judge/explain_closures.hpp"
+#include "tutti/judge/judge_closures.hpp"
+#include "tutti/judge/odometry_loops.hpp"
+#include "tutti/judge/settings.hpp"
 #include "tutti/model/closure_word.hpp"
 #include "tutti/model/loop_closure.hpp"
+#include "tutti/model/map_node.hpp"
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/submap.hpp"
-#include "tutti/server/closure_honesty.hpp"
-#include "tutti/server/odometry_loops.hpp"
 
 namespace tutti::server {
 
@@ -29,32 +31,11 @@ inline bool has_both(const SubmapSet& submaps, const SubmapPair& pair) {
 }
 using VerdictSet = std::map<SubmapPair, ClosureVerdict>;
 
-struct MapNode {
-  KeyframeId id;
-  Timestamp stamp;
-  bool representative = false;
-  Pose3 T_odom_body;            ///< Raw odometry.
-  Pose3 T_world_body;           ///< The estimate.
-  std::uint32_t component = 0;  ///< Nodes of different components have unrelated world frames.
-};
-
-/// Why a closure is not in the map.
-enum class Objection {
-  none,          ///< It is.
-  operators,     ///< An operator has rejected it.
-  contradicted,  ///< Odometry and the other closures tell otherwise (who_is_wrong.hpp).
-  too_few,       ///< Too few closures join these two pieces of odometry.
-  misfit,        ///< It does not fit the map that the others make.
-  lone,          ///< With those of its place it contradicts all the rest of the map.
-  no_map         ///< The map could not be solved.
-};
-const char* to_string(Objection objection);  ///< For people; empty for none.
-
 struct JudgedClosure {
   LoopClosure closure;
   bool accepted = false;
   bool by_operator = false;  ///< By an operator's word, whatever the map says.
-  Objection objection = Objection::none;
+  judge::Objection objection = judge::Objection::none;
 };
 
 /// Odometry that the closures show to have failed: between these two keyframes of one chain it is not believed.
@@ -76,7 +57,7 @@ struct MapEstimate {
   std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (chain, from).
   /// By which the variances of closures between two chains count, where they err by more than they say
   /// (closure_honesty.hpp); `graph` has them so, `closures` as stated.
-  std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_factors;
+  std::map<std::pair<ChainId, ChainId>, judge::ClosureHonesty> closure_factors;
   /// By which the variances of each chain's odometry count, in rotation (odometry_honesty.hpp); `graph` has them so.
   std::map<ChainId, double> rotation_factors;
   /// Of chains whose odometry is far worse than it says: by which all its variances count; `graph` has them so.
@@ -90,12 +71,12 @@ struct MapEstimate {
   /// order. And all of a chain without which the map can be solved, and with which it cannot.
   std::vector<SubmapId> left_out;
   std::size_t spare_pairs = 0;  ///< Of submaps whose closures were not judged (MapConfig::most_closed_pairs).
-  estimation::SearchWork work;  ///< What judging the closures took.
+  judge::SearchWork work;       ///< What judging the closures took.
   bool converged = false;       ///< Otherwise no closure is accepted, and every robot's odometry stands alone.
 };
 
 struct MapConfig {
-  estimation::WhoIsWrongConfig who_is_wrong;
+  judge::WhoIsWrongConfig who_is_wrong;
   estimation::GncConfig gnc;
   bool judge_closures = true;
   bool judge_odometry = true;
@@ -116,8 +97,8 @@ struct MapConfig {
 
 /// Raw odometry of nodes sorted by id, one chain per piece without a gap. `step_to`: per node the covariance of the
 /// step that ends there, nothing where odometry begins.
-std::vector<OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
-                                           const std::vector<std::optional<Matrix6d>>& step_to);
+std::vector<judge::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
+                                                  const std::vector<std::optional<Matrix6d>>& step_to);
 
 /// Null when the map does not have it.
 const MapNode* find_node(const MapEstimate& map, const KeyframeId& id);

@@ -81,7 +81,7 @@ struct ServerWork {
   std::size_t pairs_looked_at = 0;  ///< Of submaps.
   std::size_t pairs_verified = 0;   ///< Verdicts taken.
   std::size_t updates = 0;
-  estimation::SearchWork search;  ///< Of all updates.
+  judge::SearchWork search;  ///< Of all updates.
   MonitorWork monitor;
 };
 

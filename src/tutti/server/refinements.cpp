@@ -11,7 +11,7 @@
 #include "tutti/estimation/pose_graph_solver.hpp"
 #include "tutti/estimation/termination.hpp"
 #include "tutti/geometry/covariance.hpp"
-#include "tutti/server/closure_judge.hpp"
+#include "tutti/judge/judge_closures.hpp"
 
 namespace tutti::server {
 namespace {
@@ -40,7 +40,7 @@ void put_steps(const Refinements& refinements, MapEstimate& map) {
     map.odometry_of_steps[e] =
         edge.information.inverse() * (overstated == map.overstated.end() ? 1.0 : overstated->second);
     edge.T_from_to = step->second->T_a_b;
-    edge.information = information_of(bounded_covariance(step->second->covariance));
+    edge.information = judge::information_of(bounded_covariance(step->second->covariance));
   }
 }
 

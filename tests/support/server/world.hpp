@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/random_pose.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/server/closure_finder.hpp"
 #include "tutti/server/map_estimate.hpp"
@@ -29,20 +30,8 @@ struct TestWorldConfig {
   double sigma_rad = 0.005;
 };
 
-inline Matrix6d diagonal_covariance(double sigma_m, double sigma_rad) {
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
-  return variance.asDiagonal();
-}
-
-inline Vector6d draw(Rng& rng, double sigma_m, double sigma_rad) {
-  Vector6d xi;
-  for (int i = 0; i < 3; ++i) {
-    xi(i) = rng.normal(sigma_m);
-    xi(i + 3) = rng.normal(sigma_rad);
-  }
-  return xi;
-}
+using tutti::test::diagonal_covariance;
+using tutti::test::draw;
 
 /// Overlapping submaps of one chain with noisy odometry, in an odom frame of its own.
 inline std::vector<Submap> make_submaps(const ChainId& chain, const TestWorldConfig& config, Rng rng) {

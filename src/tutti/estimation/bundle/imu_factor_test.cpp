@@ -53,8 +53,8 @@ ImuPreintegration random_preintegration(Rng& rng) {
   std::vector<ImuSample> samples;
   for (int i = -2; i < 105; ++i)
     samples.push_back({Timestamp{} + i * 0.01, random_vector(rng, 0.7), random_vector(rng, 5.0)});
-  return preintegrate(samples, {.index = 0, .stamp = Timestamp{}}, {.index = 1, .stamp = Timestamp{} + 1.0},
-                      {random_vector(rng, 0.1), random_vector(rng, 0.3)}, {})
+  return estimation::preintegrate(samples, {.index = 0, .stamp = Timestamp{}}, {.index = 1, .stamp = Timestamp{} + 1.0},
+                                  {random_vector(rng, 0.1), random_vector(rng, 0.3)}, {})
       .value();
 }
 
@@ -101,7 +101,7 @@ RC_GTEST_PROP(ImuFactor, InformationIsFull, ()) {
 
 /// No error where the motion is the one that the IMU felt; a bias that the linearisation did not know is corrected.
 TEST(ImuFactor, IsZeroAtTheTruth) {
-  const ImuBias bias{{0.002, -0.003, 0.004}, {0.02, 0.01, -0.03}};
+  const estimation::ImuBias bias{{0.002, -0.003, 0.004}, {0.02, 0.01, -0.03}};
   std::vector<ImuSample> samples;
   for (int i = -2; i < 300; ++i) {
     samples.push_back(scene_imu(i / 200.0, 20));
@@ -109,7 +109,7 @@ TEST(ImuFactor, IsZeroAtTheTruth) {
     samples.back().accelerometer += bias.accelerometer;
   }
   const Keyframe from{.index = 0, .stamp = Timestamp{} + 0.1}, to{.index = 1, .stamp = Timestamp{} + 1.2};
-  const auto imu = preintegrate(samples, from, to, {}, {}).value();
+  const auto imu = estimation::preintegrate(samples, from, to, {}, {}).value();
   const auto motion = [&](double t) {
     return MotionState{(scene_pose(t + 1e-4, 20).translation - scene_pose(t - 1e-4, 20).translation) / 2e-4, bias.gyro,
                        bias.accelerometer};

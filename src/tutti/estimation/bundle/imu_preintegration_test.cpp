@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/estimation/bundle/imu_preintegration.hpp"
+#include "tutti/estimation/imu_preintegration.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -41,7 +41,7 @@ RC_GTEST_PROP(ImuPreintegration, BiasJacobiansAreTheDerivatives, ()) {
   const auto from = keyframe(3, 0.0), to = keyframe(4, 0.47);
   Vector6d bias = random_tangent(rng, 0.1);
   const auto at = [&](const Vector6d& b) {
-    return preintegrate(samples, from, to, {b.head<3>(), b.tail<3>()}, {}).value();
+    return estimation::preintegrate(samples, from, to, {b.head<3>(), b.tail<3>()}, {}).value();
   };
   constexpr double h = 1e-5;
   Eigen::Matrix<double, 9, 6> numeric;
@@ -60,9 +60,9 @@ RC_GTEST_PROP(ImuPreintegration, PartsMakeTheWhole, ()) {
   // Split at a sample: elsewhere the trapezoids differ.
   const auto a = keyframe(0, 0.0), c = keyframe(2, 0.6);
   const Keyframe b{.index = 1, .stamp = samples[samples.size() / 2].stamp};
-  const auto whole = preintegrate(samples, a, c, {}, {}).value();
-  const auto first = preintegrate(samples, a, b, {}, {}).value();
-  const auto second = preintegrate(samples, b, c, {}, {}).value();
+  const auto whole = estimation::preintegrate(samples, a, c, {}, {}).value();
+  const auto first = estimation::preintegrate(samples, a, b, {}, {}).value();
+  const auto second = estimation::preintegrate(samples, b, c, {}, {}).value();
   const double t = second.duration_s;
   const Eigen::Vector3d position =
       first.delta_position + first.delta_velocity * t + first.delta_rotation * second.delta_position;
@@ -78,7 +78,7 @@ TEST(ImuPreintegration, FollowsTheMotion) {
   std::vector<ImuSample> samples;
   for (int i = -2; i < 300; ++i) samples.push_back(scene_imu(i / 200.0, 20));
   const double from = 0.1234, to = 1.2377, t = to - from;
-  const auto imu = preintegrate(samples, keyframe(0, from), keyframe(1, to), {}, {}).value();
+  const auto imu = estimation::preintegrate(samples, keyframe(0, from), keyframe(1, to), {}, {}).value();
   const Pose3 T_i = scene_pose(from, 20), T_j = scene_pose(to, 20);
   const auto velocity = [](double at) {
     return Eigen::Vector3d((scene_pose(at + 1e-4, 20).translation - scene_pose(at - 1e-4, 20).translation) / 2e-4);
@@ -97,7 +97,7 @@ TEST(ImuPreintegration, CovarianceIsThatOfTheNoise) {
   std::vector<ImuSample> exact;
   for (int i = 0; i <= 100; ++i) exact.push_back(scene_imu(i / 200.0, 6));
   const auto from = keyframe(0, 0.0), to = keyframe(1, 0.5);
-  const auto truth = preintegrate(exact, from, to, {}, noise).value();
+  const auto truth = estimation::preintegrate(exact, from, to, {}, noise).value();
   const Eigen::LLT<Matrix9d> llt(truth.covariance);
   ASSERT_EQ(llt.info(), Eigen::Success);
   Rng rng(1);
@@ -109,7 +109,7 @@ TEST(ImuPreintegration, CovarianceIsThatOfTheNoise) {
       sample.gyro += random_vector(rng, noise.gyro_noise_density * std::sqrt(200.0));
       sample.accelerometer += random_vector(rng, noise.accelerometer_noise_density * std::sqrt(200.0));
     }
-    const Vector9d error = difference(truth, preintegrate(samples, from, to, {}, noise).value());
+    const Vector9d error = difference(truth, estimation::preintegrate(samples, from, to, {}, noise).value());
     sum += llt.matrixL().solve(error).squaredNorm();
   }
   EXPECT_NEAR(sum / kRuns, 9.0, 0.9);  // chi-square of nine, its mean's sigma is 0.21
@@ -119,7 +119,7 @@ TEST(ImuPreintegration, RefusesWhatDoesNotCoverTheTime) {
   std::vector<ImuSample> samples;
   for (int i = 0; i <= 100; ++i) samples.push_back({Timestamp{} + i * 0.005, {}, {}});
   const auto preintegrated = [&](double from, double to) {
-    return preintegrate(samples, keyframe(0, from), keyframe(1, to), {}, {}).has_value();
+    return estimation::preintegrate(samples, keyframe(0, from), keyframe(1, to), {}, {}).has_value();
   };
   EXPECT_TRUE(preintegrated(0.0, 0.5));
   EXPECT_FALSE(preintegrated(-0.1, 0.3));
@@ -127,7 +127,7 @@ TEST(ImuPreintegration, RefusesWhatDoesNotCoverTheTime) {
   EXPECT_FALSE(preintegrated(0.3, 0.3));
   auto bad = samples;
   bad[50].gyro.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(preintegrate(bad, keyframe(0, 0.2), keyframe(1, 0.3), {}, {}));
+  EXPECT_FALSE(estimation::preintegrate(bad, keyframe(0, 0.2), keyframe(1, 0.3), {}, {}));
   samples.erase(samples.begin() + 20, samples.begin() + 50);
   EXPECT_FALSE(preintegrated(0.0, 0.5));
   EXPECT_TRUE(preintegrated(0.0, 0.09));
@@ -143,8 +143,8 @@ TEST(GyroBias, IsFound) {
   std::vector<Keyframe> keyframes;
   for (std::uint32_t k = 0; k < 6; ++k)
     keyframes.push_back({.index = k, .stamp = Timestamp{} + 1.1 * k, .T_odom_body = scene_pose(1.1 * k, 20)});
-  EXPECT_TRUE(matrix_near(estimate_gyro_bias(samples, keyframes).value(), bias, 1e-4));
-  EXPECT_FALSE(estimate_gyro_bias(samples, std::span(keyframes).first(3)));
+  EXPECT_TRUE(matrix_near(estimation::estimate_gyro_bias(samples, keyframes).value(), bias, 1e-4));
+  EXPECT_FALSE(estimation::estimate_gyro_bias(samples, std::span(keyframes).first(3)));
 }
 
 TEST(GyroBias, OfTheRecording) {
@@ -164,7 +164,7 @@ TEST(GyroBias, OfTheRecording) {
       formats::read_trajectory(shared_path("data/euroc/V1_01/rovioli_keyframes.tum").string()).value();
   std::vector<Keyframe> keyframes;
   for (const auto& pose : odometry) keyframes.push_back({.stamp = pose.stamp, .T_odom_body = pose.pose});
-  const auto bias = estimate_gyro_bias(samples, keyframes).value();
+  const auto bias = estimation::estimate_gyro_bias(samples, keyframes).value();
   EXPECT_TRUE(matrix_near(bias, Eigen::Vector3d(-0.002, 0.021, 0.077), 0.003));  // EuRoC's own estimate, rounded
 }
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "support/random_pose.hpp"
-#include "tutti/estimation/bundle/imu_preintegration.hpp"
 #include "tutti/estimation/bundle/refine_map.hpp"
+#include "tutti/estimation/imu_preintegration.hpp"
 
 namespace tutti::bundle {
 
@@ -26,7 +26,7 @@ struct SceneOptions {
   double odometry_scale_sigma = 0.0;                           ///< Of all its steps together, beside that.
   double start_sigma_m = 0.03, start_sigma_rad = 0.005;        ///< Of the poses that a refinement starts from.
   ImuNoise imu_noise;
-  ImuBias imu_bias{{0.02, -0.05, 0.08}, {0.1, -0.2, 0.05}};
+  estimation::ImuBias imu_bias{{0.02, -0.05, 0.08}, {0.1, -0.2, 0.05}};
   bool imu = false;
   int cameras = 1;      ///< The second one 0.2 m to the right of the first,
   Pose3 T_second_told;  ///< ... and where the calibration has it: by this from there, in its frame.
@@ -209,10 +209,11 @@ class SceneMaker {
 
   void add_imu(const Submap& submap, VisualPayload& visual) {
     if (!options_.imu) return;
-    const auto bias = estimate_gyro_bias(samples_, submap.keyframes);
+    const auto bias = estimation::estimate_gyro_bias(samples_, submap.keyframes);
     for (std::size_t k = 0; k + 1 < submap.keyframes.size(); ++k)
-      visual.imu.push_back(preintegrate(samples_, submap.keyframes[k], submap.keyframes[k + 1],
-                                        {.gyro = bias.value_or(Eigen::Vector3d::Zero())}, options_.imu_noise)
+      visual.imu.push_back(estimation::preintegrate(samples_, submap.keyframes[k], submap.keyframes[k + 1],
+                                                    {.gyro = bias.value_or(Eigen::Vector3d::Zero())},
+                                                    options_.imu_noise)
                                .value());
   }
 

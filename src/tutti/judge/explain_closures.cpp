@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/judge/explain_closures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+#include <utility>
+
+#include "tutti/base/check.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/judge/closure_support.hpp"
+#include "tutti/judge/hypothesis.hpp"
+
+namespace tutti::judge {
+namespace {
+
+/// Where in a stretch a failure seems at most this many times as large as where it seems least, and so many seconds of
+/// usual motion more, odometry may have failed. A radian counts as much as so many seconds of motion.
+constexpr double kAboutLeast = 1.5;
+constexpr double kAboutLeast_s = 1.0;
+constexpr double kRadian_s = 5.0;
+/// A group of closures is at least so many.
+constexpr std::size_t kLeastGroup = 2;
+
+/// How large a failure was, seen from a node of its stretch, in seconds of usual motion: a wrong turn shifts everything
+/// the more the farther away it was.
+double size_at(const OdometryWays& odometry, const FailedStretch& failed, std::size_t node) {
+  const Pose3 T_to_node = odometry.T(failed.to, node);
+  const Pose3 seen = T_to_node.inverse() * (retract(Pose3{}, failed.missed) * T_to_node);
+  return seen.translation.norm() / odometry.usual_speed() + kRadian_s * rotation_angle(seen);
+}
+
+/// Far from where odometry turned wrongly, the failure would have to be larger: it failed about here.
+FailedStretch narrowed(const OdometryWays& odometry, FailedStretch failed) {
+  std::vector<double> sizes;
+  for (std::size_t k = failed.from; k <= failed.to; ++k) sizes.push_back(size_at(odometry, failed, k));
+  const auto least = std::ranges::min_element(sizes);
+  const auto is_larger = [about = kAboutLeast * *least + kAboutLeast_s](double size) { return size > about; };
+  const auto begin = std::find_if(std::make_reverse_iterator(least), sizes.rend(), is_larger).base();
+  const auto end = std::find_if(least, sizes.end(), is_larger);
+  const std::size_t from = failed.from;
+  failed.to = std::max(from + static_cast<std::size_t>(end - sizes.begin()) - 1, from + 1);
+  failed.from = std::min(from + static_cast<std::size_t>(begin - sizes.begin()), failed.to - 1);
+  return failed;
+}
+
+class Search {
+ public:
+  /// All must outlive this.
+  Search(const HypothesisSolver& solver, const WhoIsWrongConfig& config) : solver_(solver), config_(config) {}
+
+  Solution run(std::vector<std::vector<std::size_t>> groups) const {
+    Solution best = solver_.solve({});
+    // Whatever failed pays for its places and at least one run.
+    if (!best.solved || !config_.let_odometry_fail || !best.suspicious || best.unexplained < config_.least_votes + 1.0)
+      return best;
+    if (Solution proposal = proposed(); proposal.solved && !proposal.failed.empty())
+      keep_better(best, without_idle(std::move(proposal)));
+    return refuse_groups(std::move(groups), best) ? without_idle(std::move(best)) : best;
+  }
+
+ private:
+  static bool keep_better(Solution& best, Solution other) {
+    if (!other.solved || other.misfit >= best.misfit) return false;
+    best = std::move(other);
+    return true;
+  }
+
+  /// What is let go when all odometry may be, in windows around it.
+  [[nodiscard]] Solution proposed() const {
+    if (solver_.runs() == 0) return {};
+    Solution all = solver_.solve({{{0, solver_.runs() - 1}}, {}});
+    std::vector<Window> windows;
+    for (std::size_t run = 0; all.solved && run < solver_.runs(); ++run) {
+      if (!all.let_go[run]) continue;
+      const Window window = solver_.around(run);
+      if (!windows.empty() && window.first <= windows.back().last)
+        windows.back().last = std::max(windows.back().last, window.last);
+      else
+        windows.push_back(window);
+    }
+    return solver_.judge({std::move(windows), {}}, std::move(all.optimum));
+  }
+
+  /// Takes back the windows that do not pay for themselves, the cheapest first and as many at once as together fit no
+  /// worse than by what the cheapest of them pays: each alone would then fit no worse either.
+  [[nodiscard]] Solution without_idle(Solution best) const {
+    std::set<std::size_t> needed;  // windows, by their first run
+    for (std::size_t batch = best.hypothesis.windows.size(); best.solved;) {
+      std::vector<std::size_t> open;
+      for (std::size_t k = 0; k < best.hypothesis.windows.size(); ++k)
+        if (!needed.contains(best.hypothesis.windows[k].first)) open.push_back(k);
+      if (open.empty()) break;
+      std::ranges::stable_sort(open, {}, [&](std::size_t k) { return best.prices[k]; });
+      open.resize(std::min(batch, open.size()));
+      Solution other = solver_.solve(without(best.hypothesis, open));
+      if (other.solved && other.fit - best.fit <= best.prices[open.front()]) {
+        best = std::move(other);
+        batch = 2 * open.size();
+        continue;
+      }
+      if (open.size() == 1) needed.insert(best.hypothesis.windows[open.front()].first);
+      batch = std::max<std::size_t>(open.size() / 2, 1);
+    }
+    return best;
+  }
+
+  static Hypothesis without(const Hypothesis& hypothesis, std::span<const std::size_t> windows) {
+    Hypothesis out{.windows = {}, .wrong = hypothesis.wrong};
+    for (std::size_t k = 0; k < hypothesis.windows.size(); ++k)
+      if (std::ranges::find(windows, k) == windows.end()) out.windows.push_back(hypothesis.windows[k]);
+    return out;
+  }
+
+  /// As long as the misfit falls enough when all closures of a group are wrong. True if any are refused.
+  bool refuse_groups(std::vector<std::vector<std::size_t>> groups, Solution& best) const {
+    std::erase_if(groups, [](const auto& group) { return group.size() < kLeastGroup; });
+    std::ranges::stable_sort(groups, std::greater(), [](const auto& group) { return group.size(); });
+    for (int refused = 0; refused < config_.most_refused_groups; ++refused) {
+      bool changed = false;
+      int tried = 0;
+      for (const auto& group : groups) {
+        double price = 0.0;  // votes of what would be lost
+        for (const std::size_t c : group) price += best.accepted[c] ? solver_.votes(c) : 0.0;
+        if (changed || tried >= config_.candidate_groups || price >= best.unexplained) continue;
+        ++tried;
+        Hypothesis more = best.hypothesis;
+        more.wrong.push_back(group);
+        changed = keep_better(best, solver_.solve(std::move(more)));
+      }
+      if (!changed) return refused > 0;
+    }
+    return config_.most_refused_groups > 0;
+  }
+
+  const HypothesisSolver& solver_;
+  const WhoIsWrongConfig& config_;
+};
+
+}  // namespace
+
+Judgement explain_closures(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
+                           std::span<const std::vector<std::size_t>> groups, const WhoIsWrongConfig& config,
+                           const estimation::GncConfig& gnc, const std::vector<bool>& certain) {
+  TUTTI_CHECK(odometry_edges <= graph.edges.size(), "{} of {} edges", odometry_edges, graph.edges.size());
+  const std::span<const PoseGraphEdge> closures = std::span(graph.edges).subspan(odometry_edges);
+  TUTTI_CHECK(certain.empty() || certain.size() == closures.size(), "{} of {} closures", certain.size(),
+              closures.size());
+  const auto is_certain = [&](std::size_t c) { return !certain.empty() && certain[c]; };
+  std::vector<bool> supported = supported_closures(odometry, closures, config);
+  std::vector<bool> considered_certain;
+  for (std::size_t c = 0; c < closures.size(); ++c) {
+    if (is_certain(c)) supported[c] = true;
+    if (supported[c]) considered_certain.push_back(is_certain(c));
+  }
+  PoseGraph considered{
+      .poses = graph.poses,
+      .edges = {graph.edges.begin(), graph.edges.begin() + static_cast<std::ptrdiff_t>(odometry_edges)}};
+  std::vector<std::size_t> closure_of;  // of each one considered
+  std::vector<std::size_t> position(closures.size(), 0);
+  for (std::size_t c = 0; c < closures.size(); ++c) {
+    if (!supported[c]) continue;
+    position[c] = closure_of.size();
+    closure_of.push_back(c);
+    considered.edges.push_back(closures[c]);
+  }
+  std::vector<std::vector<std::size_t>> considered_groups;
+  for (const auto& group : groups) {
+    auto& own = considered_groups.emplace_back();
+    for (const std::size_t c : group)
+      if (supported[c] && !is_certain(c)) own.push_back(position[c]);
+  }
+  const HypothesisSolver solver(considered, odometry, odometry_edges, config, gnc, std::move(considered_certain));
+  const Solution best = Search(solver, config).run(std::move(considered_groups));
+
+  Judgement out{.accepted = std::vector<bool>(closures.size(), false),
+                .failed = {},
+                .solved = best.solved,
+                .work = solver.work()};
+  if (!best.solved) return out;
+  for (std::size_t k = 0; k < closure_of.size(); ++k) out.accepted[closure_of[k]] = best.accepted[k] != 0;
+  for (const FailedStretch& failed : best.failed) out.failed.push_back(narrowed(odometry, failed));
+  return out;
+}
+
+}  // namespace tutti::judge

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/judge/explain_closures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "tutti/base/random.hpp"
+#include "tutti/geometry/so3.hpp"
+#include "tutti/judge/closure_support.hpp"
+#include "tutti/judge/hypothesis.hpp"
+
+namespace tutti::judge {
+namespace who_is_wrong_test {
+
+constexpr std::size_t kLap = 100, kNodes = 2 * kLap + 1;
+constexpr double kStep_m = 2.0;
+
+Matrix6d information(double sigma_m, double sigma_rad) {
+  Vector6d v;
+  v << Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m)), Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad));
+  return v.asDiagonal();
+}
+
+Vector6d noise(Rng& rng, double sigma_m, double sigma_rad) {
+  Vector6d out;
+  for (int i = 0; i < 6; ++i) out(i) = rng.normal(i < 3 ? sigma_m : sigma_rad);
+  return out;
+}
+
+/// Two laps round a circle of 200 m, with a closure at every `every`-th node of the second one.
+struct Laps {
+  Rng rng{7};
+  std::vector<Pose3> truth{Pose3{}};
+  PoseGraph graph{.poses = {Pose3{}}, .edges = {}};
+  std::size_t odometry_edges = kNodes - 1;
+
+  /// What odometry misses at the step from node `failed_at` (radians of yaw).
+  explicit Laps(std::size_t failed_at = 0, double missed_rad = 0.0) {
+    const Pose3 step{so3_exp({0.0, 0.0, 2.0 * M_PI / kLap}), {kStep_m, 0.0, 0.0}};
+    for (std::size_t k = 0; k + 1 < kNodes; ++k) {
+      truth.push_back(truth.back() * step);
+      Pose3 measured = retract(step, noise(rng, 0.01, 0.001));
+      if (k == failed_at) measured = measured * Pose3{so3_exp({0.0, 0.0, missed_rad}), {}};
+      graph.poses.push_back(graph.poses.back() * measured);
+      graph.edges.push_back({k, k + 1, measured, information(0.01, 0.001)});
+    }
+  }
+  void close(std::size_t from, std::size_t to, const Pose3& wrong_by = {}) {
+    const Pose3 T = retract(truth[from].inverse() * truth[to] * wrong_by, noise(rng, 0.03, 0.005));
+    graph.edges.push_back({from, to, T, information(0.03, 0.005)});
+  }
+  void close_laps(std::size_t every) {
+    for (std::size_t k = 1; k < kLap; k += every) close(k, k + kLap);
+  }
+  [[nodiscard]] OdometryWays ways() const { return {seconds(), std::span(graph.edges).first(odometry_edges)}; }
+  static std::vector<double> seconds() {  // a step takes two
+    std::vector<double> out;
+    for (std::size_t k = 0; k < kNodes; ++k) out.push_back(2.0 * static_cast<double>(k));
+    return out;
+  }
+  [[nodiscard]] Judgement explain(const std::vector<std::vector<std::size_t>>& groups = {},
+                                  const WhoIsWrongConfig& config = {}) const {
+    return explain_closures(graph, ways(), odometry_edges, groups, config, {});
+  }
+};
+
+/// Of laps without a certain closure, with what it refers to.
+struct Solver {
+  explicit Solver(const Laps& laps)
+      : ways(laps.ways()),
+        solver(laps.graph, ways, laps.odometry_edges, config, gnc,
+               std::vector<bool>(laps.graph.edges.size() - laps.odometry_edges, false)) {}
+  OdometryWays ways;
+  WhoIsWrongConfig config;
+  estimation::GncConfig gnc;
+  HypothesisSolver solver;
+};
+
+Pose3 off(Rng& rng) { return retract(Pose3{}, noise(rng, 5.0, 0.5)); }
+
+TEST(OdometryWays, KnowsThePiecesAndWhatLiesBetween) {
+  Laps laps;
+  laps.graph.edges.erase(laps.graph.edges.begin() + 60);  // a gap after node 60
+  const OdometryWays ways(Laps::seconds(), laps.graph.edges);
+  EXPECT_EQ(ways.piece(60), 0U);
+  EXPECT_EQ(ways.piece(200), 61U);
+  EXPECT_DOUBLE_EQ(ways.seconds(30), 60.0);
+  EXPECT_NEAR(ways.usual_speed(), kStep_m / 2.0, 0.05);
+  RelativePose sum{.T_a_b = {}, .covariance = Matrix6d::Zero()};
+  for (std::size_t e = 10; e < 14; ++e)
+    sum = compound(sum, {laps.graph.edges[e].T_from_to, laps.graph.edges[e].information.inverse()});
+  const RelativePose forth = ways.between(10, 14), back = ways.between(14, 10);
+  EXPECT_LT(local(sum.T_a_b, forth.T_a_b).norm(), 1e-9);
+  EXPECT_LT((sum.covariance - forth.covariance).norm(), 1e-9);
+  EXPECT_LT((inverse(forth).covariance - back.covariance).norm(), 1e-9);
+  EXPECT_NEAR(ways.turn_variance(10, 14), 4 * 3 * 1e-6, 1e-9);
+}
+
+TEST(ClosureSupport, RightClosuresHaveItAndWrongOnesDoNot) {
+  Laps laps(40, 0.3);  // nor does odometry speak for the right ones
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 20; ++k) laps.close(k, k + 120, off(laps.rng));
+  const auto supported = supported_closures(laps.ways(), std::span(laps.graph.edges).subspan(laps.odometry_edges), {});
+  EXPECT_EQ(std::count(supported.begin(), supported.begin() + 20, true), 20);
+  EXPECT_LE(std::count(supported.begin() + 20, supported.end(), true), 1);
+}
+
+TEST(WhoIsWrong, WrongClosuresAreWrongAndHonestOdometryIsNot) {
+  Laps laps;
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 20; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Judgement found = laps.explain();
+  EXPECT_TRUE(found.solved);
+  EXPECT_EQ(std::count(found.accepted.begin(), found.accepted.begin() + 20, true), 20);
+  EXPECT_EQ(std::count(found.accepted.begin() + 20, found.accepted.end(), true), 0);
+  EXPECT_TRUE(found.failed.empty());
+}
+
+TEST(WhoIsWrong, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
+  Laps lone;
+  lone.close(20, 120, Pose3{so3_exp({0.0, 0.0, 0.3}), {}});
+  EXPECT_FALSE(lone.explain().accepted[0]);
+  EXPECT_TRUE(lone.explain().failed.empty());
+
+  Laps laps(130, 0.3);
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Judgement found = laps.explain();
+  ASSERT_EQ(found.failed.size(), 1U);
+  EXPECT_LE(found.failed[0].from, 130U);
+  EXPECT_GE(found.failed[0].to, 131U);
+  EXPECT_LE(found.failed[0].to - found.failed[0].from, 10U);
+  EXPECT_NEAR(found.failed[0].missed.tail<3>().norm(), 0.3, 0.02);
+  EXPECT_GE(std::count(found.accepted.begin(), found.accepted.begin() + 20, true), 19);
+  EXPECT_EQ(std::count(found.accepted.begin() + 20, found.accepted.end(), true), 0);
+  EXPECT_TRUE(laps.explain({}, {.let_odometry_fail = false}).failed.empty());
+}
+
+TEST(WhoIsWrong, PlacesThatLookAlikeBlameNothing) {
+  Laps laps;
+  laps.close_laps(10);
+  const std::size_t right = laps.graph.edges.size() - laps.odometry_edges;
+  const Pose3 alike{so3_exp({0.0, 0.0, 0.5}), {6.0, 4.0, 0.0}};
+  const Pose3 T_moved = laps.truth[30] * alike * laps.truth[150].inverse();
+  std::vector<std::size_t> group;
+  for (std::size_t i = 30; i < 38; i += 2)
+    for (std::size_t j = 150; j < 158; j += 2) {
+      group.push_back(laps.graph.edges.size() - laps.odometry_edges);
+      laps.graph.edges.push_back({i, j, laps.truth[i].inverse() * T_moved * laps.truth[j], information(0.03, 0.005)});
+    }
+  const Judgement found = laps.explain({group});
+  EXPECT_TRUE(found.failed.empty());
+  for (std::size_t c = 0; c < found.accepted.size(); ++c) EXPECT_EQ(found.accepted[c], c < right) << c;
+}
+
+TEST(WhoIsWrong, DoesNotDependOnTheOrderOfTheClosures) {
+  Laps laps(130, 0.3);
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Judgement forth = laps.explain();
+  std::reverse(laps.graph.edges.begin() + static_cast<std::ptrdiff_t>(laps.odometry_edges), laps.graph.edges.end());
+  Judgement back = laps.explain();
+  std::reverse(back.accepted.begin(), back.accepted.end());
+  EXPECT_EQ(forth.accepted, back.accepted);
+  ASSERT_EQ(forth.failed.size(), back.failed.size());
+  EXPECT_EQ(forth.failed[0].from, back.failed[0].from);
+  EXPECT_EQ(forth.failed[0].to, back.failed[0].to);
+}
+
+// Nothing in the judgement is a length: a place twenty times as large, with errors twenty times as large, is judged
+// alike.
+TEST(WhoIsWrong, ScalingLengthsAndTheirErrorsChangesNothing) {
+  Laps laps(130, 0.3);
+  laps.close_laps(5);
+  for (std::size_t k = 0; k < 6; ++k) laps.close(k, k + 120, off(laps.rng));
+  const Judgement found = laps.explain();
+  for (const double scale : {0.05, 20.0}) {
+    Laps scaled = laps;
+    for (Pose3& pose : scaled.graph.poses) pose.translation *= scale;
+    Vector6d units = Vector6d::Ones();
+    units.head<3>() /= scale;
+    for (PoseGraphEdge& edge : scaled.graph.edges) {
+      edge.T_from_to.translation *= scale;
+      edge.information = units.asDiagonal() * edge.information * units.asDiagonal();
+    }
+    const Judgement other = scaled.explain();
+    EXPECT_EQ(found.accepted, other.accepted) << scale;
+    ASSERT_EQ(found.failed.size(), other.failed.size()) << scale;
+    EXPECT_EQ(found.failed[0].from, other.failed[0].from) << scale;
+    EXPECT_EQ(found.failed[0].to, other.failed[0].to) << scale;
+    EXPECT_NEAR(found.failed[0].missed.head<3>().norm() * scale, other.failed[0].missed.head<3>().norm(), 0.01 * scale);
+  }
+}
+
+// Two failures in one window cost about twice what one does.
+TEST(HypothesisSolver, EveryStretchOfAWindowPaysForHowFarItIsFromItsErrors) {
+  Laps one(50, 0.1), two(50, 0.1);
+  for (Laps* laps : {&one, &two}) {
+    if (laps == &two)
+      laps->graph.edges[54].T_from_to =
+          laps->graph.edges[54].T_from_to * Pose3{so3_exp({0, 0, 0.1}), Eigen::Vector3d::Zero()};
+    laps->close_laps(2);
+  }
+  const auto price = [](const Laps& laps) {
+    const Solver of(laps);
+    const Solution all = of.solver.solve({{{0, of.solver.runs() - 1}}, {}});
+    return all.prices.size() == 1 ? all.prices[0] - of.config.least_votes : 0.0;
+  };
+  EXPECT_GT(price(one), 1.0);
+  EXPECT_GT(price(two), 1.8 * price(one));
+}
+
+// What is let go when all odometry may be is, around it, worth as much as what is found when only that may be.
+TEST(HypothesisSolver, AnOptimumHoldsUnderLessThatMayBeLetGo) {
+  for (const double missed_rad : {0.1, 0.4}) {
+    Laps laps(50, missed_rad);
+    laps.close_laps(5);
+    const Solver of(laps);
+    const HypothesisSolver& solver = of.solver;
+    const Solution all = solver.solve({{{0, solver.runs() - 1}}, {}});
+    const auto run = static_cast<std::size_t>(std::ranges::find(all.let_go, 1) - all.let_go.begin());
+    ASSERT_LT(run, solver.runs());
+    const Solution judged = solver.judge({{solver.around(run)}, {}}, all.optimum);
+    const Solution solved = solver.solve({{solver.around(run)}, {}});
+    EXPECT_NEAR(judged.misfit, solved.misfit, 0.01);
+    EXPECT_EQ(judged.let_go, solved.let_go);
+    EXPECT_EQ(judged.accepted, solved.accepted);
+    ASSERT_EQ(judged.prices.size(), 1U);
+    EXPECT_GT(judged.prices[0], of.config.least_votes);
+    EXPECT_LT(judged.misfit, solver.solve({}).misfit);
+  }
+}
+
+}  // namespace who_is_wrong_test
+}  // namespace tutti::judge

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/judge/hypothesis.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "tutti/base/chi_square.hpp"
+#include "tutti/estimation/between_factor.hpp"
+#include "tutti/estimation/truncated_least_squares.hpp"
+
+namespace tutti::judge {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+/// What is wrong for certain counts so little (as a factor on its information) that it moves nothing.
+constexpr double kNothing = 1e-9;
+/// Odometry may have failed where closures strain it by more than this beyond chance (truncations), or where they are
+/// refused by this share of all votes. Otherwise refused closures are strewn about, as wrong ones are.
+constexpr double kStrained = 1.0;
+constexpr double kManyRefused = 0.1;
+/// Odometry fails by no more than a body would get to at this many times the usual speed.
+constexpr double kReach = 10.0;
+/// Where solutions begin is solved to this share of the cost: with wrong closures in it the rest takes most of the
+/// steps, and says nothing.
+constexpr double kBeginning = 1e-3;
+
+/// With nothing let go or refused.
+estimation::PoseGraphSolution beginning(const PoseGraph& graph, estimation::GncConfig gnc) {
+  gnc.solver.relative_cost_tolerance = std::max(kBeginning, gnc.solver.relative_cost_tolerance);
+  return estimation::least_squares(graph, gnc);
+}
+
+}  // namespace
+
+HypothesisSolver::HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
+                                   const WhoIsWrongConfig& config, const estimation::GncConfig& gnc,
+                                   std::vector<bool> certain)
+    : odometry_(odometry),
+      config_(config),
+      gnc_(gnc),
+      limit_(chi_square_quantile(gnc.confidence, 6)),
+      certain_(std::move(certain)) {
+  std::vector<estimation::EdgeRole> roles(graph.edges.size(), estimation::EdgeRole::robust);
+  std::fill_n(roles.begin(), odometry_edges, estimation::EdgeRole::trusted);
+  reduced_ = estimation::reduce_chains(graph, roles);
+  for (std::size_t e = odometry_edges; e < graph.edges.size(); ++e) closures_.push_back(*reduced_.edge[e]);
+  for (std::size_t e = 0; e < reduced_.graph.edges.size(); ++e)
+    if (reduced_.roles[e] == estimation::EdgeRole::trusted) runs_.push_back(e);
+  std::ranges::sort(runs_, {}, [&](std::size_t e) { return reduced_.graph.edges[e].from; });
+  count_votes();
+  all_held_ = beginning(reduced_.graph, gnc_);
+  work_.factorisations += static_cast<std::size_t>(all_held_.summary.factorisations);
+}
+
+std::size_t HypothesisSolver::begin_of(std::size_t run) const {
+  return reduced_.nodes[reduced_.graph.edges[runs_[run]].from];
+}
+std::size_t HypothesisSolver::end_of(std::size_t run) const {
+  return reduced_.nodes[reduced_.graph.edges[runs_[run]].to];
+}
+
+/// Closures that look alike come by the square of the scans they join, so each shares the vote of the busier of its two
+/// ends with all others that end there, at the same keyframe, between the same two pieces.
+void HypothesisSolver::count_votes() {
+  using End = std::tuple<std::size_t, std::size_t, bool>;  // node, the other piece, which end
+  std::map<End, int> closures_at;
+  const auto ends_of = [&](std::size_t edge) {
+    const auto [i, j] =
+        std::minmax(reduced_.nodes[reduced_.graph.edges[edge].from], reduced_.nodes[reduced_.graph.edges[edge].to]);
+    return std::pair(End{i, odometry_.piece(j), false}, End{j, odometry_.piece(i), true});
+  };
+  for (const std::size_t edge : closures_) {
+    const auto [i, j] = ends_of(edge);
+    ++closures_at[i];
+    ++closures_at[j];
+  }
+  for (const std::size_t edge : closures_) {
+    const auto [i, j] = ends_of(edge);
+    votes_.push_back(1.0 / std::max(closures_at[i], closures_at[j]));
+  }
+}
+
+Window HypothesisSolver::around(std::size_t run) const {
+  Window out{run, run};
+  const auto is_near = [&](std::size_t other) {
+    return odometry_.piece(begin_of(other)) == odometry_.piece(begin_of(run)) &&
+           std::max(odometry_.seconds(begin_of(run)) - odometry_.seconds(end_of(other)),
+                    odometry_.seconds(begin_of(other)) - odometry_.seconds(end_of(run))) < config_.search_s;
+  };
+  while (out.first > 0 && is_near(out.first - 1)) --out.first;
+  while (out.last + 1 < runs_.size() && is_near(out.last + 1)) ++out.last;
+  return out;
+}
+
+Solution HypothesisSolver::solve(Hypothesis hypothesis) const {
+  std::vector<double> truncation(reduced_.graph.edges.size(), limit_);
+  for (const std::size_t run : runs_) truncation[run] = kInfinite;
+  for (std::size_t c = 0; c < closures_.size(); ++c)
+    if (certain_[c]) truncation[closures_[c]] = kInfinite;
+  for (const Window& window : hypothesis.windows)
+    for (std::size_t run = window.first; run <= window.last; ++run) truncation[runs_[run]] = limit_;
+  ++work_.hypotheses;
+  const auto counted = [&](estimation::GncResult optimum, int before) {
+    work_.factorisations += static_cast<std::size_t>(optimum.solution.summary.factorisations - before);
+    return optimum;
+  };
+  if (hypothesis.wrong.empty())
+    return judge(std::move(hypothesis),
+                 counted(estimation::truncated_least_squares(reduced_.graph, gnc_, truncation, all_held_),
+                         all_held_.summary.factorisations));
+  PoseGraph graph = reduced_.graph;
+  for (const auto& group : hypothesis.wrong)
+    for (const std::size_t c : group) graph.edges[closures_[c]].information *= kNothing;
+  return judge(std::move(hypothesis),
+               counted(estimation::truncated_least_squares(graph, gnc_, truncation, beginning(graph, gnc_)), 0));
+}
+
+Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult optimum) const {
+  Solution out{
+      .hypothesis = std::move(hypothesis), .let_go = {}, .accepted = {}, .failed = {}, .optimum = std::move(optimum)};
+  const estimation::GncResult& robust = out.optimum;
+  const std::vector<Pose3>& poses = robust.solution.poses;
+  out.solved = estimation::is_usable(robust.solution.summary.termination);
+  if (!out.solved) return out;
+
+  const auto error = [&](std::size_t e) {  // of a truncation
+    const PoseGraphEdge& edge = reduced_.graph.edges[e];
+    const Vector6d residual = estimation::between_residual(poses[edge.from], poses[edge.to], edge.T_from_to);
+    return residual.dot(edge.information * residual) / limit_;
+  };
+  std::vector<double> excess{0.0};  // of the strain up to each run
+  for (const std::size_t run : runs_) {
+    out.let_go.push_back(robust.inlier_weight[run] < 0.5);
+    out.misfit += out.let_go.back() ? 1.0 : error(run);
+    excess.push_back(excess.back() + std::max(0.0, error(run) - 1.0));
+  }
+  for (std::size_t c = 0; c < closures_.size(); ++c) out.accepted.push_back(robust.inlier_weight[closures_[c]] >= 0.5);
+  for (const auto& group : out.hypothesis.wrong)
+    for (const std::size_t c : group) out.accepted[c] = 0;
+  out.misfit += config_.least_votes * static_cast<double>(out.hypothesis.wrong.size());
+  for (std::size_t c = 0; c < closures_.size(); ++c) {
+    const double most = certain_[c] ? kInfinite : 1.0;
+    out.misfit += votes_[c] * (out.accepted[c] ? std::min(error(closures_[c]), most) : 1.0);
+    if (!out.accepted[c]) out.unexplained += votes_[c];
+  }
+  double strain = 0.0;
+  for (std::size_t run = 0; run < runs_.size(); ++run) {
+    const Window window = around(run);
+    strain = std::max(strain, excess[window.last + 1] - excess[window.first]);
+  }
+  double all = 0.0;
+  for (const double votes : votes_) all += votes;
+  out.suspicious = strain >= kStrained || out.unexplained >= kManyRefused * all;
+  out.unexplained += strain;
+  out.fit = out.misfit;
+  find_failed(poses, out);
+  return out;
+}
+
+/// What a stretch pays for how far it failed, in truncations. An error is as likely to be of any size, to a factor,
+/// along each of its six axes, up to what a body can do: the logarithm of that density over that of odometry's own
+/// errors.
+double HypothesisSolver::votes_for(const FailedStretch& failed) const {
+  const double duration_s = odometry_.seconds(failed.to) - odometry_.seconds(failed.from);
+  if (failed.missed.head<3>().norm() > kReach * odometry_.usual_speed() * duration_s) return kInfinite;
+  const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;
+  const double squared_distance = failed.missed.dot(covariance.llt().solve(failed.missed));
+  return std::max(0.0, 6.0 / limit_ * std::log(squared_distance / limit_));
+}
+
+void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& out) const {
+  std::vector<Window> paying;
+  for (const Window& window : out.hypothesis.windows) {
+    const std::size_t known = out.failed.size();
+    for (std::size_t run = window.first; run <= window.last; ++run) {
+      if (!out.let_go[run]) continue;
+      const bool continues = out.failed.size() > known && out.failed.back().to == begin_of(run);
+      if (!continues) out.failed.push_back({.from = begin_of(run)});
+      FailedStretch& failed = out.failed.back();
+      failed.to = end_of(run);
+      const auto at = [&](std::size_t node) {
+        return poses[std::ranges::lower_bound(reduced_.nodes, node) - reduced_.nodes.begin()];
+      };
+      failed.missed = local(odometry_.T(failed.from, failed.to), at(failed.from).inverse() * at(failed.to));
+    }
+    if (out.failed.size() == known) continue;
+    paying.push_back(window);
+    double& price = out.prices.emplace_back(config_.least_votes);
+    for (std::size_t f = known; f < out.failed.size(); ++f) price += votes_for(out.failed[f]);
+    out.misfit += price;
+  }
+  out.hypothesis.windows = std::move(paying);
+}
+
+}  // namespace tutti::judge

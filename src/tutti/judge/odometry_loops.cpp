@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/judge/odometry_loops.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <set>
+#include <tuple>
+#include <utility>
+
+namespace tutti::judge {
+namespace {
+
+/// Odometry between any two keyframes of one chain.
+class Ways {
+ public:
+  explicit Ways(std::span<const OdometryChain> chains) {
+    for (const OdometryChain& chain : chains) {
+      Piece& piece = pieces_[{chain.id, chain.first_index}];
+      piece.chain = &chain;
+      piece.covariance.push_back(Matrix6d::Zero());
+      for (std::size_t k = 0; k < chain.step_covariance.size(); ++k) {
+        const Matrix6d Ad = adjoint(T_first_body(chain, k + 1));
+        piece.covariance.push_back(piece.covariance.back() + Ad * chain.step_covariance[k] * Ad.transpose());
+      }
+    }
+  }
+
+  /// T_a_b with covariance; nothing across a gap.
+  [[nodiscard]] std::optional<RelativePose> between(const KeyframeId& a, const KeyframeId& b) const {
+    const auto after = pieces_.upper_bound(std::min(a, b));
+    if (after == pieces_.begin()) return std::nullopt;
+    const auto& [first, piece] = *std::prev(after);
+    const std::size_t from = a.index - first.index, to = b.index - first.index;
+    if (first.chain != a.chain || first.chain != b.chain || std::max(from, to) >= piece.covariance.size())
+      return std::nullopt;
+    const Pose3 T_first_b = T_first_body(*piece.chain, to);
+    const Matrix6d to_b = adjoint(T_first_b.inverse());
+    const double sign = from < to ? 1.0 : -1.0;
+    return RelativePose{T_first_body(*piece.chain, from).inverse() * T_first_b,
+                        sign * to_b * (piece.covariance[to] - piece.covariance[from]) * to_b.transpose()};
+  }
+
+ private:
+  struct Piece {
+    const OdometryChain* chain = nullptr;
+    std::vector<Matrix6d> covariance;  ///< Of each pose, in the frame of the first.
+  };
+  static Pose3 T_first_body(const OdometryChain& chain, std::size_t k) {
+    return chain.T_odom_body.front().inverse() * chain.T_odom_body[k];
+  }
+
+  std::map<KeyframeId, Piece> pieces_;  // by first keyframe
+};
+
+LoopClosure turned(const LoopClosure& closure) { return {closure.to, closure.from, inverse(closure.measurement)}; }
+
+/// Closures between two chains, the end of `one` first, in its order.
+std::vector<LoopClosure> closures_with(std::span<const LoopClosure> closures, const ChainId& one,
+                                       const ChainId& other) {
+  std::vector<LoopClosure> out;
+  for (LoopClosure closure : closures) {
+    if (closure.from.chain == other && closure.to.chain == one) closure = turned(closure);
+    if (closure.from.chain == one && closure.to.chain == other) out.push_back(closure);
+  }
+  std::ranges::stable_sort(out, {}, [](const LoopClosure& c) { return c.from.index; });
+  return out;
+}
+
+/// As a loop of the robot whose odometry between these keyframes it goes over.
+OdometryLoop over(OdometryLoop loop, const KeyframeId& a, const KeyframeId& b) {
+  std::tie(loop.first, loop.last) = std::minmax(a.index, b.index);
+  return loop;
+}
+
+std::uint32_t keyframes_between(const KeyframeId& a, const KeyframeId& b) {
+  return std::max(a.index, b.index) - std::min(a.index, b.index);
+}
+
+/// The nearest other one of `all`, which are sorted by where they begin, on one chain; the first of equals. Those that
+/// begin farther away than the nearest so far are not looked at: a day has tens of thousands of closures.
+std::optional<std::size_t> nearest_to(std::size_t a, std::span<const LoopClosure> all) {
+  std::optional<std::size_t> nearest;
+  std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
+  const auto look = [&](std::size_t b) {  // false: no farther this way
+    const std::uint32_t begin = keyframes_between(all[a].from, all[b].from);
+    if (begin > least) return false;
+    const std::uint32_t apart = std::max(begin, keyframes_between(all[a].to, all[b].to));
+    if (apart == 0 || apart > least || (apart == least && nearest && b > *nearest)) return true;
+    nearest = b;
+    least = apart;
+    return true;
+  };
+  for (std::size_t b = a; b > 0 && look(b - 1);) --b;
+  for (std::size_t b = a + 1; b < all.size() && look(b);) ++b;
+  return nearest;
+}
+
+}  // namespace
+
+OdometryLoop loop_of(const ClosurePair& pair) {
+  const auto& [first, second, of_one, of_two] = pair;
+  const Matrix6d over_two = adjoint(of_two.T_a_b.inverse());
+  const Matrix6d over_second = adjoint(second.measurement.T_a_b.inverse());
+  return {.missed = local(first.measurement.T_a_b * of_two.T_a_b, of_one.T_a_b * second.measurement.T_a_b),
+          .odometry = of_two.covariance + over_second * of_one.covariance * over_second.transpose(),
+          .closures = over_two * first.measurement.covariance * over_two.transpose() + second.measurement.covariance};
+}
+
+std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
+    std::span<const OdometryChain> chains, std::span<const LoopClosure> closures) {
+  const Ways ways(chains);
+  std::map<std::pair<ChainId, ChainId>, std::vector<LoopClosure>> between;
+  for (const LoopClosure& closure : closures) {
+    const LoopClosure forth = closure.to < closure.from ? turned(closure) : closure;
+    between[{forth.from.chain, forth.to.chain}].push_back(forth);
+  }
+  std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> out;
+  for (auto& [two, all] : between) {
+    std::ranges::stable_sort(all, {}, [](const LoopClosure& c) { return std::pair(c.from, c.to); });
+    std::set<std::pair<std::size_t, std::size_t>> known;
+    for (std::size_t a = 0; a < all.size(); ++a) {
+      const auto nearest = nearest_to(a, all);
+      if (!nearest || !known.insert(std::minmax(a, *nearest)).second) continue;
+      const auto& [first, second] = std::pair(all[std::min(a, *nearest)], all[std::max(a, *nearest)]);
+      const auto of_one = ways.between(first.from, second.from), of_two = ways.between(first.to, second.to);
+      if (of_one && of_two) out[two].push_back({first, second, *of_one, *of_two});
+    }
+  }
+  return out;
+}
+
+std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
+                                                            std::span<const LoopClosure> closures) {
+  const Ways ways(chains);
+  std::map<ChainId, std::vector<OdometryLoop>> loops;
+  for (const OdometryChain& chain : chains) loops[chain.id];
+  for (const auto& [from, to, measurement] : closures)
+    if (const auto odometry = ways.between(from, to))
+      loops.at(from.chain)
+          .push_back(over({local(measurement.T_a_b, odometry->T_a_b), odometry->covariance, measurement.covariance},
+                          from, to));
+  for (auto one = loops.begin(); one != loops.end(); ++one)
+    for (auto two = std::next(one); two != loops.end(); ++two) {
+      const std::vector<LoopClosure> between = closures_with(closures, one->first, two->first);
+      const std::size_t apart = between.size() / 2;
+      for (std::size_t c = apart; c < between.size(); ++c) {
+        const LoopClosure &first = between[c - apart], &second = between[c];
+        const auto of_one = ways.between(first.from, second.from);
+        const auto of_two = ways.between(first.to, second.to);
+        if (!of_one || !of_two) continue;
+        const OdometryLoop loop = loop_of({first, second, *of_one, *of_two});
+        one->second.push_back(over(loop, first.from, second.from));
+        two->second.push_back(over(loop, first.to, second.to));
+      }
+    }
+  return loops;
+}
+
+}  // namespace tutti::judge

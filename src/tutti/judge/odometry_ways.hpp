@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "tutti/geometry/stretch_covariance.hpp"
+#include "tutti/model/pose_graph.hpp"
+#include "tutti/model/relative_pose.hpp"
+
+namespace tutti::judge {
+
+/// The odometry of a pose graph: pieces without a gap, each a chain of edges from one node to a later one.
+class OdometryWays {
+ public:
+  /// `seconds`: when each node was, from any moment on. `odometry`: at most one edge begins and one ends at a node,
+  /// begins before ends.
+  OdometryWays(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry);
+
+  /// The first node of the piece that holds this one.
+  [[nodiscard]] std::size_t piece(std::size_t node) const { return at_[node].piece; }
+  [[nodiscard]] double seconds(std::size_t node) const { return at_[node].seconds; }
+  /// Median speed of all steps, m/s, above 0: neither what fails now and then nor one wild piece tells.
+  [[nodiscard]] double usual_speed() const { return usual_speed_; }
+  /// T_first_node of the piece.
+  [[nodiscard]] const Pose3& pose(std::size_t node) const { return at_[node].pose; }
+  /// T_a_b of two nodes of one piece, either first.
+  [[nodiscard]] Pose3 T(std::size_t a, std::size_t b) const { return pose(a).inverse() * pose(b); }
+  /// The same with covariance.
+  [[nodiscard]] RelativePose between(std::size_t a, std::size_t b) const;
+  /// Trace of the rotation's covariance between two nodes of one piece.
+  [[nodiscard]] double turn_variance(std::size_t a, std::size_t b) const;
+
+ private:
+  struct At {
+    std::size_t piece = 0;
+    std::size_t position = 0;  ///< Along the piece.
+    double seconds = 0.0;
+    double turn_variance = 0.0;  ///< Since the begin.
+    Pose3 pose;
+  };
+  std::vector<At> at_;
+  std::vector<StretchCovariance> covariance_;  // per piece, by its first node
+  double usual_speed_ = 0.0;
+};
+
+}  // namespace tutti::judge
