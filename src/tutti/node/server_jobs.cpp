@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <iterator>
-#include <system_error>
 #include <utility>
 
 #include "tutti/node/server_node.hpp"
@@ -13,17 +11,11 @@
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
-namespace {
-
-constexpr unsigned kMostDoubled = 10;
-constexpr double kFailedAgain = 0.1;  // of the time for an answer
-
-}  // namespace
 
 void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step) {
   auto answer = wire::decode_verdicts(*envelope.bytes);
   if (!answer) return refuse(envelope, answer.error().message, now, step);
-  const bool was_open = close(answer->job, now).has_value();
+  const bool was_open = jobs_.close(answer->job, now).has_value();
   if (answer->cannot) {
     if (was_open) note_waiting(answer->failed, answer->why, now, step);
     return;
@@ -36,7 +28,7 @@ void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, 
   Verdicts refused{.job = answer->job, .verdicts = {}, .failed = {}, .why = {}};
   for (ClosureVerdict& verdict : answer->verdicts) {
     const bool is_workers = envelope.from.role == bus::Endpoint::Role::worker && !verdict.closures.empty();
-    failed_.erase(verdict.pair);
+    failed_.forget(verdict.pair);
     waiting_.erase(verdict.pair);
     verdict.worker = is_workers ? std::optional(envelope.from.number) : std::nullopt;
     if (const Status taken = take(verdict, refused, step); !taken) refuse(envelope, taken.error().message, now, step);
@@ -77,16 +69,7 @@ void ServerNode::note_waiting(const std::vector<SubmapPair>& pairs, const std::s
   why_waiting_ = wire::plain_text(why);
   if (was_empty && !waiting_.empty()) step.tell(now, VerificationFailed{*waiting_.begin(), why});
   if (was_empty != waiting_.empty()) ++changes_;
-  if (std::ranges::any_of(workers_, [&](const auto& entry) {
-        return now - entry.second.last_seen <= kWorkerIsThere_s && can(entry.second.status, server_.finder().id());
-      }))
-    ask_waiting(now, step);
-}
-
-bool ServerNode::can(const NodeStatus& worker, const MethodId& id) {
-  return std::ranges::any_of(worker.can, [&](const MethodId& can) {
-    return can.name == id.name && can.version == id.version && (can.settings == 0 || can.settings == id.settings);
-  });
+  if (workers_.any_can(server_.finder().id(), now)) ask_waiting(now, step);
 }
 
 void ServerNode::ask_waiting(Timestamp now, Step& step) {
@@ -103,7 +86,7 @@ void ServerNode::keep(const Verdicts& refused, Step& step) {
 void ServerNode::receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto job = wire::decode_job(*envelope.bytes);
   if (!job) return refuse(envelope, job.error().message, now, step);
-  if (!close(job->id, now)) return;
+  if (!jobs_.close(job->id, now)) return;
   Verdicts refused{.job = job->id, .verdicts = {}, .failed = {}, .why = {}};
   if (job->pairs.size() == 1) {
     give_up(job->pairs.front(), "every worker that had it has ended", now, refused, step);
@@ -120,24 +103,17 @@ void ServerNode::note_failed(const SubmapPair& pair, const std::string& why, Tim
                              Step& step) {
   const server::SubmapSet& submaps = server_.state().submaps;
   if (!server::has_both(submaps, pair)) return;
-  Failed& failed = failed_[pair];
-  if (failed.again) return;  // it is known: the answer has come twice
-  if (++failed.times >= config_.most_tries)
-    return give_up(pair, fmt::format("{} tries have failed: {}", failed.times, why), now, refused, step);
+  const FailedPairs::Next next = failed_.note(pair, now);
+  if (next == FailedPairs::Next::nothing) return;
+  if (next == FailedPairs::Next::give_up)
+    return give_up(pair, fmt::format("{} tries have failed: {}", config_.most_tries, why), now, refused, step);
   step.tell(now, VerificationFailed{pair, why});
-  if (config_.job_timeout_s > 0.0)
-    failed.again = now + failed_again_after(failed.times);
-  else
-    give_back(pair);
-}
-
-double ServerNode::failed_again_after(unsigned times) const {
-  return kFailedAgain * config_.job_timeout_s * static_cast<double>(1U << (times - 1));
+  if (next == FailedPairs::Next::ask_now) give_back(pair);
 }
 
 /// The map goes on without it, and another finder asks again.
 void ServerNode::give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step) {
-  failed_.erase(pair);
+  failed_.forget(pair);
   const ClosureVerdict verdict{
       .pair = pair, .closures = {}, .refusal = Refusal{RefusalReason::unverified}, .finder = server_.state().finder};
   if (!take(verdict, refused, step)) return;
@@ -166,8 +142,7 @@ Status ServerNode::take(const ClosureVerdict& verdict, Verdicts& refused, Step& 
   return {};
 }
 
-/// A job is one submap against others: `newest`, if it is in the pair. Its name is no other map's: a bus takes one job
-/// of a name. `asked`: how often before.
+/// A job is one submap against others: `newest`, if it is in the pair. `asked`: how often before.
 void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, std::size_t most_pairs,
                            Step& step) {
   std::map<SubmapId, std::vector<SubmapPair>> pairs;
@@ -177,38 +152,14 @@ void ServerNode::send_jobs(std::optional<SubmapId> newest, Timestamp now, unsign
     for (std::size_t first = 0; first < of_it.size(); first += most_pairs) {
       const std::size_t last = std::min(of_it.size(), first + most_pairs);
       const auto at = [&](std::size_t i) { return of_it.begin() + static_cast<std::ptrdiff_t>(i); };
-      const Job job{.id = job_name(jobs_),
+      const Job job{.id = jobs_.next_name(),
                     .pairs = {at(first), at(last)},
                     .finder = server_.state().finder,
                     .settings = server_.finder().settings()};
-      open_jobs_.emplace(jobs_++, OpenJob{job.pairs, nullptr, now, asked});
+      jobs_.open({job.pairs, nullptr, now, asked});
       step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::job, job.id,
                                std::make_shared<const std::string>(wire::encode(job))});
     }
-}
-
-std::string ServerNode::job_name(std::uint64_t number) const { return fmt::format("{}{}", names_of_jobs(), number); }
-
-/// An older map that was put back counts its starts once more.
-std::string ServerNode::names_of_jobs() const {
-  const std::string start = fmt::format("{}/{}/", server_.state().epoch, start_);
-  return config_.incarnation == 0 ? start : fmt::format("{}{:08x}/", start, config_.incarnation);
-}
-
-/// The jobs that were sent later have not had their turn, as long as it goes on: a long queue is no reason to ask
-/// again.
-std::optional<ServerNode::OpenJob> ServerNode::close(const std::string& job, Timestamp now) {
-  const std::string mine = names_of_jobs();
-  std::uint64_t number = 0;
-  if (!job.starts_with(mine)) return std::nullopt;
-  const char* end = job.data() + job.size();
-  if (const auto read = std::from_chars(job.data() + mine.size(), end, number);
-      read.ec != std::errc() || read.ptr != end)
-    return std::nullopt;
-  if (number >= jobs_) return std::nullopt;
-  auto open = open_jobs_.extract(number);
-  for (auto later = open_jobs_.upper_bound(number); later != open_jobs_.end(); ++later) later->second.since = now;
-  return open ? std::optional(std::move(open.mapped())) : std::nullopt;
 }
 
 bool ServerNode::give_back(const SubmapPair& pair) {
@@ -219,42 +170,21 @@ bool ServerNode::give_back(const SubmapPair& pair) {
   return true;
 }
 
-/// Every time twice as long: without workers the bus fills slowly.
-Timestamp ServerNode::due(const OpenJob& job) const {
-  return job.since + config_.job_timeout_s * static_cast<double>(1U << std::min(job.asked, kMostDoubled));
-}
-
 std::optional<Timestamp> ServerNode::next_timer() const {
-  std::optional<Timestamp> next = timer_;
-  const auto consider = [&](Timestamp t) { next = next ? std::min(*next, t) : t; };
-  if (compute_at_) consider(*compute_at_);
-  if (settle_at_) consider(*settle_at_);
-  if (config_.job_timeout_s <= 0.0) return next;
-  for (const auto& [number, job] : open_jobs_) consider(due(job));
-  for (const auto& [pair, failed] : failed_)
-    if (failed.again) consider(*failed.again);
-  if (refine_again_) consider(refine_again_->due);
+  std::optional<Timestamp> next;
+  for (const auto& due :
+       {timer_, compute_at_, settle_at_, jobs_.next_due(), failed_.next_due(), refinements_.next_due()})
+    if (due) next = std::min(next.value_or(*due), *due);
   return next;
 }
 
 /// The bus gives up a job that has ended five workers, and may lose one. An answer that comes after all does no harm.
 void ServerNode::ask_again(Timestamp now, Step& step) {
-  if (config_.job_timeout_s <= 0.0) return;
   bool is_due = false;
-  for (auto& [pair, failed] : failed_)
-    if (failed.again && *failed.again <= now) {
-      failed.again.reset();
-      is_due = give_back(pair) || is_due;
-    }
+  for (const SubmapPair& pair : failed_.take_due(now)) is_due = give_back(pair) || is_due;
   if (is_due) send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
-  refine_again(now, step);
-  std::vector<OpenJob> late;
-  for (auto job = open_jobs_.begin(); job != open_jobs_.end();) {
-    const auto next = std::next(job);
-    if (due(job->second) <= now) late.push_back(std::move(open_jobs_.extract(job).mapped()));
-    job = next;
-  }
-  for (const OpenJob& job : late) {
+  if (auto job = refinements_.take_due(now)) ask_for_refinement(std::move(*job), now, 0, step);
+  for (const JobBook::OpenJob& job : jobs_.take_late(now)) {
     const std::string why = fmt::format("no worker has answered for {:g} s: asked again", now - job.since);
     if (job.refinement) {
       ask_for_refinement(*job.refinement, now, job.asked + 1, step);

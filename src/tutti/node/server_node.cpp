@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
-#include "tutti/base/content_hash.hpp"
 #include "tutti/consistency/proxy_graph_builder.hpp"
 #include "tutti/node/internal/opened_map.hpp"
 #include "tutti/node/map_meta.hpp"
@@ -20,31 +19,16 @@
 namespace tutti::node {
 namespace {
 
-constexpr std::size_t kMostUnreadSessions = 100;
-constexpr std::size_t kMostUnreadStretches = 500;  // in each of these
-constexpr std::size_t kMostRefused = 256;          // of a robot; the last ones
-constexpr std::size_t kMostStrangers = 1000;       // who are told something
-
 /// The first multiple of the period that is not before `now`.
 Timestamp next_update(Timestamp now, double period_s) {
   return Timestamp{} + std::ceil((now - Timestamp{}) / period_s - 1e-9) * period_s;
 }
 
-/// It has come in a version that is read.
-void forget_unread(SubmapId id, Receipt& receipt) {
-  if (!receipt.leaves_unread(id)) return;
-  NumberSet& numbers = receipt.unread.at(id.chain.session);
-  numbers.erase(id.index);
-  if (numbers.stretches().empty()) receipt.unread.erase(id.chain.session);
-}
-
-/// What is kept of a receipt: all else follows from the map.
-storage::Write refusals_of(const Receipt& receipt) {
-  const Receipt kept{.robot = receipt.robot,
-                     .refused = receipt.refused,
-                     .why_refused = receipt.why_refused,
-                     .refusals = receipt.refusals};
-  return {kMetaTable, fmt::format("{}{}", kRefusedPrefix, receipt.robot.value), wire::encode(kept)};
+/// What the names of all jobs of a start begin with: no other map's do. An older map that was put back counts its
+/// starts once more.
+std::string names_of_jobs(std::uint64_t epoch, std::uint64_t start, std::uint32_t incarnation) {
+  const std::string prefix = fmt::format("{}/{}/", epoch, start);
+  return incarnation == 0 ? prefix : fmt::format("{}{:08x}/", prefix, incarnation);
 }
 
 bus::MessageKind kind_of(std::string_view table) {
@@ -85,6 +69,9 @@ ServerNode::ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::C
       registry_(std::move(opened.registry)),
       unread_rows_(std::move(opened.unread_rows)),
       start_(opened.start + 1),
+      jobs_(names_of_jobs(server_.state().epoch, start_, config.incarnation), config.job_timeout_s),
+      failed_(config.job_timeout_s, config.most_tries),
+      refinements_(config.job_timeout_s, config.most_tries),
       had_news_(opened.news),
       stored_counts_(opened.counts) {
   if (config.refiner != nullptr) server_.refine_with(config.refiner);
@@ -98,8 +85,8 @@ storage::Write ServerNode::meta() const {
 Step ServerNode::resume(Timestamp now) {
   Step step;
   registry_.start(now);
-  for (auto& [robot, receipt] : receipts_)
-    if (const auto owner = registry_.owner(robot)) receipt.owner_session = owner->session;
+  for (const auto& [robot, receipt] : receipts_.members())
+    if (const auto owner = registry_.owner(robot)) receipts_.of_member(robot).owner_session = owner->session;
   const bool is_whole = server_.state().revision > 0 && !had_news_;
   if (is_whole) {
     server_.nothing_is_new();
@@ -110,7 +97,7 @@ Step ServerNode::resume(Timestamp now) {
   step.writes.push_back(to_row(config_.server));
   tell_unread_rows(now, step);
   recall_words();
-  for (const auto& [robot, receipt] : receipts_) send_receipt(robot, step);
+  for (const auto& [robot, receipt] : receipts_.members()) send_receipt(robot, step);
   send_jobs(std::nullopt, now, 0, config_.pairs_per_job, step);
   note_settling(now);
   return step;
@@ -172,29 +159,18 @@ std::string ServerNode::objection_to(RobotId robot) const {
 bool ServerNode::admit(RobotId robot) {
   if (!robots_.insert(robot).second) return false;
   server_.add_robot(robot);
-  if (auto known = strangers_.extract(robot)) receipts_.try_emplace(robot, std::move(known.mapped().receipt));
+  receipts_.admit(robot);
   return true;
 }
 
 void ServerNode::dismiss(RobotId robot, Timestamp now) {
   robots_.erase(robot);
   server_.remove_robot(robot);
-  if (auto told = receipts_.extract(robot)) strangers_.insert({robot, {std::move(told.mapped()), now}});
+  receipts_.dismiss(robot, now);
 }
 
 Receipt* ServerNode::receipt_of(RobotId robot, Timestamp now) {
-  if (robots_.contains(robot) || receipts_.contains(robot)) {
-    Receipt& receipt = receipts_[robot];
-    receipt.robot = robot;
-    return &receipt;
-  }
-  if (strangers_.size() >= kMostStrangers && !strangers_.contains(robot))
-    std::erase_if(strangers_, [&](const auto& entry) { return now - entry.second.heard >= kStrangerIsGone_s; });
-  if (strangers_.size() >= kMostStrangers && !strangers_.contains(robot)) return nullptr;
-  Stranger& stranger = strangers_[robot];
-  stranger.heard = now;
-  stranger.receipt.robot = robot;
-  return &stranger.receipt;
+  return receipts_.of_anybody(robot, robots_.contains(robot), now);
 }
 
 void ServerNode::receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -232,13 +208,12 @@ Status ServerNode::take_submap(const bus::Envelope& envelope, Timestamp now, Ste
     return taken;
   }
   if (is_new) {
-    Receipt& receipt = receipts_[id.chain.robot];
-    receipt.robot = id.chain.robot;
+    Receipt& receipt = receipts_.of_member(id.chain.robot);
     receipt.stored[id.chain.session].insert(id.index);
     forget_unread(id, receipt);
     if (receipt.refuses(id)) {  // something else that came under its id
       receipt.forget_refusals(id);
-      step.writes.push_back(refusals_of(receipt));
+      step.writes.push_back(refusals_row(receipt));
     }
     if (registry_.note_session(id.chain))
       step.writes.push_back({kMetaTable, RobotRegistry::key(id.chain.robot), registry_.row(id.chain.robot)});
@@ -259,28 +234,20 @@ void ServerNode::tell_unread_rows(Timestamp now, Step& step) {
   }
 }
 
-/// Not stored: it is for the robot to keep it, which has the right one where this is garbage. Bounded as refusals are.
 /// A robot that nobody knows is told so too, and is none of the mission's for that.
 void ServerNode::note_unread(SubmapId id, Timestamp now, Step& step) {
   Receipt* const receipt = receipt_of(id.chain.robot, now);
   if (receipt == nullptr) return;
-  const bool is_bounded = receipt->unread.size() < kMostUnreadSessions || receipt->unread.contains(id.chain.session);
-  if (!receipt->contains(id) && is_bounded &&
-      receipt->unread[id.chain.session].stretches().size() < kMostUnreadStretches)
-    receipt->unread[id.chain.session].insert(id.index);
+  node::note_unread(id, *receipt);
   send_receipt(*receipt, step);
 }
 
-/// The last ones, each with its content: nobody's garbage fills the receipt, or keeps out the submap that a robot will
-/// send under this id.
 void ServerNode::note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now,
                               Step& step) {
   Receipt* const receipt = receipt_of(id.chain.robot, now);
   if (receipt == nullptr) return;
-  if (!receipt->contains(id) && receipt->refuse(id, content_hash(*envelope.bytes), kMostRefused)) {
-    receipt->why_refused = wire::plain_text(why);
-    if (robots_.contains(id.chain.robot)) step.writes.push_back(refusals_of(*receipt));
-  }
+  if (node::note_refused(id, *envelope.bytes, why, *receipt) && robots_.contains(id.chain.robot))
+    step.writes.push_back(refusals_row(*receipt));
   send_receipt(*receipt, step);
 }
 
@@ -301,7 +268,7 @@ void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step&
   }
 }
 
-void ServerNode::send_receipt(RobotId robot, Step& step) const { send_receipt(receipts_.at(robot), step); }
+void ServerNode::send_receipt(RobotId robot, Step& step) const { send_receipt(receipts_.members().at(robot), step); }
 
 void ServerNode::send_receipt(Receipt receipt, Step& step) const {
   receipt.incarnation = config_.incarnation;

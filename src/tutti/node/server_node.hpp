@@ -10,12 +10,17 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/node/answered_words.hpp"
 #include "tutti/node/broadcast.hpp"
+#include "tutti/node/job_book.hpp"
 #include "tutti/node/map_meta.hpp"
+#include "tutti/node/receipts.hpp"
+#include "tutti/node/refinement_queue.hpp"
 #include "tutti/node/robot_registry.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/stored_rows.hpp"
 #include "tutti/node/submap_frames.hpp"
+#include "tutti/node/worker_roster.hpp"
 #include "tutti/server/closure_names.hpp"
 #include "tutti/server/map_server.hpp"
 
@@ -80,8 +85,6 @@ class ServerNode {
   [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_.last(); }  ///< The last one; empty before.
 
  private:
-  static constexpr double kWorkerIsThere_s = 10.0;   // five of its statuses
-  static constexpr double kStrangerIsGone_s = 60.0;  // a robot without submaps
   ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
              const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
              OpenedMap opened);
@@ -100,13 +103,11 @@ class ServerNode {
                     Step& step);
   [[nodiscard]] std::set<RobotId> strangers_there(Timestamp now) const;
   void receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
-  [[nodiscard]] bool waits_too_long(RobotId robot, const NodeStatus& status, Timestamp now);
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// For good: the robot need not send it again.
   void note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
-  /// The receipt of any robot, made where there is none yet. Null: it is a stranger's, and too many strangers have one.
+  /// Receipts::of_anybody()
   [[nodiscard]] Receipt* receipt_of(RobotId robot, Timestamp now);
-  [[nodiscard]] const Receipt* told_to(RobotId robot) const;
   void send_receipt(Receipt receipt, Step& step) const;
   /// The robot need not send it again before the next start, which may be of a newer version.
   void note_unread(SubmapId id, Timestamp now, Step& step);
@@ -127,43 +128,27 @@ class ServerNode {
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Takes one verdict of these; a refusal that now holds is kept in `refused`.
   Status take(const ClosureVerdict& verdict, Verdicts& refused, Step& step);
-  /// What was asked for and has no answer yet: pairs, or a refinement.
-  struct OpenJob {
-    std::vector<SubmapPair> pairs;
-    std::shared_ptr<const RefinementJob> refinement;
-    Timestamp since;     // it was sent, or had its turn at the earliest
-    unsigned asked = 0;  // before
-  };
   void send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, std::size_t most_pairs, Step& step);
-  [[nodiscard]] std::string job_name(std::uint64_t number) const;
-  [[nodiscard]] std::string names_of_jobs() const;  // what all of this start begin with
-  /// It need not be asked again. Nothing: it is not open, or of an earlier start.
-  std::optional<OpenJob> close(const std::string& job, Timestamp now);
   /// What the last map wants, if anything.
   void send_refinement_job(Timestamp now, Step& step);
   void ask_for_refinement(RefinementJob job, Timestamp now, unsigned asked, Step& step);
   /// It is asked again later, or given up.
   void note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step);
   void give_up_refinement(std::uint64_t revision, const std::string& why, Timestamp now, Step& step);
-  void refine_again(Timestamp now, Step& step);
   /// The map has been updated: when all of it is to be refined, if nothing more comes.
   void note_settling(Timestamp now);
   void settle(Timestamp now, Step& step);
-  /// How long after the so-manieth failure, s.
-  [[nodiscard]] double failed_again_after(unsigned times) const;
   void set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, bool was_open,
                  Timestamp now, Step& step);
   /// The worker that had them has not got the finder: they are asked again when there is one that has.
   void note_waiting(const std::vector<SubmapPair>& pairs, const std::string& why, Timestamp now, Step& step);
   void ask_waiting(Timestamp now, Step& step);
-  static bool can(const NodeStatus& worker, const MethodId& id);
   /// A worker says what it can.
   void receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step);
   /// No worker could verify it this time: it is asked again later, or refused.
   void note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
   void give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
   static void keep(const Verdicts& refused, Step& step);
-  [[nodiscard]] Timestamp due(const OpenJob& job) const;
   void ask_again(Timestamp now, Step& step);
   /// False: a submap of it is not there.
   bool give_back(const SubmapPair& pair);
@@ -179,38 +164,21 @@ class ServerNode {
   ServerNodeConfig config_;
   std::shared_ptr<const SubmapFrames> frames_;
   server::MapServer server_;
-  std::map<RobotId, Receipt> receipts_;
-  struct Stranger {
-    Receipt receipt;  // as it was told, or is to be told
-    Timestamp heard;
-  };
-  std::map<RobotId, Stranger> strangers_;   // robots that are none of the mission's, or not yet
-  std::vector<MissionStatus::Word> words_;  // the last that were answered
+  Receipts receipts_;
+  AnsweredWords words_;
   RobotRegistry registry_;
   std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are told
-  std::map<RobotId, Timestamp> waits_since_;       // robots with a backlog: since then without a receipt that was due
-  std::map<std::uint32_t, MissionStatus::Worker> workers_;
+  WorkerRoster workers_;
   std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
-  std::map<std::uint64_t, OpenJob> open_jobs_;  // of this start, by number
-  struct Failed {
-    unsigned times = 0;
-    std::optional<Timestamp> again;  // when it is to be asked; nothing: it is being asked
-  };
-  std::map<SubmapPair, Failed> failed_;  // in this start
-  std::set<SubmapPair> waiting_;         // for a worker that has the finder
+  std::uint64_t start_ = 0;  // of all on this store; names jobs
+  JobBook jobs_;             // of this start
+  FailedPairs failed_;
+  std::set<SubmapPair> waiting_;  // for a worker that has the finder
   std::string why_waiting_;
-  unsigned failed_refinements_ = 0;  // since the last that was taken or given up
-  struct RefineAgain {
-    RefinementJob job;
-    Timestamp due;
-  };
-  std::optional<RefineAgain> refine_again_;
-  std::optional<RefinementJob> refinement_waiting_;  // for a worker that has the refiner
+  RefinementQueue refinements_;
   std::optional<Timestamp> settle_at_;
   std::uint64_t changes_ = 0;
-  std::uint64_t start_ = 0;  // of all on this store; names jobs
-  std::uint64_t jobs_ = 0;   // sent in this start
-  bool had_news_ = false;    // when the store was opened
+  bool had_news_ = false;  // when the store was opened
   std::optional<Timestamp> timer_;
   std::optional<Timestamp> compute_at_;  // the map that was there when the store was opened
   std::optional<MapCounts> stored_counts_;

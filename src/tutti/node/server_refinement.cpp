@@ -26,25 +26,25 @@ void ServerNode::send_refinement_job(Timestamp now, Step& step) {
 }
 
 void ServerNode::ask_for_refinement(RefinementJob job, Timestamp now, unsigned asked, Step& step) {
-  job.id = job_name(jobs_);
+  job.id = jobs_.next_name();
   job.refiner = config_.refiner->id();
   job.settings = config_.refiner->settings();
   if (const Status valid = wire::validate(job); !valid)
     return give_up_refinement(job.revision, valid.error().message, now, step);
   step.messages.push_back({bus::Endpoint::server(), bus::Endpoint::any_worker(), bus::MessageKind::refinement_job,
                            job.id, std::make_shared<const std::string>(wire::encode(job))});
-  open_jobs_.emplace(jobs_++, OpenJob{{}, std::make_shared<const RefinementJob>(std::move(job)), now, asked});
+  jobs_.open({{}, std::make_shared<const RefinementJob>(std::move(job)), now, asked});
 }
 
 void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto refinement = wire::decode_refinement(*envelope.bytes);
   if (!refinement) return refuse(envelope, refinement.error().message, now, step);
-  const auto closed = close(refinement->job, now);
+  const auto closed = jobs_.close(refinement->job, now);
   const auto failed = [&](const std::string& why) {
     if (closed && closed->refinement) note_failed_refinement(*closed->refinement, why, now, step);
   };
   if (refinement->cannot && closed && closed->refinement) {
-    refinement_waiting_ = *closed->refinement;
+    refinements_.wait(*closed->refinement);
     why_waiting_ = wire::plain_text(refinement->why);
     ++changes_;
     return step.tell(now, RefinementFailed{refinement->revision, refinement->why});
@@ -55,7 +55,7 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
     refuse(envelope, taken.error().message, now, step);
     return failed(taken.error().message);
   }
-  failed_refinements_ = 0;
+  refinements_.start_anew();
   const std::set<std::uint64_t> after = revisions(server_.state().refinements);
   for (const std::uint64_t revision : before)
     if (!after.contains(revision)) step.writes.push_back({kMetaTable, refinement_key(revision), std::nullopt});
@@ -69,19 +69,17 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
 void ServerNode::receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto job = wire::decode_refinement_job(*envelope.bytes);
   if (!job) return refuse(envelope, job.error().message, now, step);
-  if (close(job->id, now)) give_up_refinement(job->revision, "every worker that had it has ended", now, step);
+  if (jobs_.close(job->id, now)) give_up_refinement(job->revision, "every worker that had it has ended", now, step);
 }
 
 void ServerNode::note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step) {
-  const bool again = ++failed_refinements_ < config_.most_tries && config_.job_timeout_s > 0.0;
-  if (!again) return give_up_refinement(job.revision, why, now, step);
-  refine_again_ = RefineAgain{job, now + failed_again_after(failed_refinements_)};
+  if (!refinements_.note_failed(job, now)) return give_up_refinement(job.revision, why, now, step);
   step.tell(now, RefinementFailed{job.revision, why});
 }
 
 /// The map goes on without it, and asks for another when something new has come.
 void ServerNode::give_up_refinement(std::uint64_t revision, const std::string& why, Timestamp now, Step& step) {
-  failed_refinements_ = 0;
+  refinements_.start_anew();
   server_.give_up_refinement();
   note_refusal(bus::Endpoint::Role::worker, bus::MessageKind::refinement_job,
                fmt::format("the refinement of revision {} is given up: {}", revision, why));
@@ -99,11 +97,6 @@ void ServerNode::settle(Timestamp now, Step& step) {
   settle_at_.reset();
   server_.settle();
   send_refinement_job(now, step);
-}
-
-void ServerNode::refine_again(Timestamp now, Step& step) {
-  if (!refine_again_ || refine_again_->due > now) return;
-  ask_for_refinement(std::exchange(refine_again_, std::nullopt)->job, now, 0, step);
 }
 
 }  // namespace tutti::node

@@ -11,9 +11,6 @@
 namespace tutti::node {
 namespace {
 
-constexpr double kWorkerIsGone_s = 300.0;
-constexpr double kReceiptAgain_s = 60.0;
-constexpr std::size_t kMostWorkers = 1000;      // the last heard
 constexpr std::size_t kMostStrangersTold = 50;  // to viewers: the last heard
 
 std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
@@ -46,13 +43,10 @@ void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, St
 }
 
 void ServerNode::receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step) {
-  std::erase_if(workers_, [&](const auto& entry) { return now - entry.second.last_seen > kWorkerIsGone_s; });
-  if (workers_.size() >= kMostWorkers && !workers_.contains(number))
-    workers_.erase(std::ranges::min_element(workers_, {}, [](const auto& entry) { return entry.second.last_seen; }));
-  workers_.insert_or_assign(number, MissionStatus::Worker{number, now, status});
+  workers_.hear(number, status, now);
   if (!waiting_.empty() && can(status, server_.finder().id())) ask_waiting(now, step);
-  if (refinement_waiting_ && can(status, refinement_waiting_->refiner))
-    ask_for_refinement(*std::exchange(refinement_waiting_, std::nullopt), now, 0, step);
+  if (refinements_.waiting() && can(status, refinements_.waiting()->refiner))
+    ask_for_refinement(*refinements_.take_waiting(), now, 0, step);
 }
 
 /// It is told so, once.
@@ -84,35 +78,16 @@ void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status
     if (receipt.conflict && receipt.conflict->session == status.session) receipt.conflict.reset();
     if (before != owner) step.tell(now, RobotJoined{robot, status.name, status.session});
   }
-  const bool is_due = heard.accepted && waits_too_long(robot, status, now);
+  const bool is_due = heard.accepted && receipts_.waits_too_long(robot, status, now);
   if (receipt != old) ++changes_;
   if (receipt != old || is_due) send_receipt(receipt, step);
-}
-
-/// Then its last receipt may have been lost, with a bus that was killed, and its submap does not come a second time:
-/// the bus takes an id once a day.
-bool ServerNode::waits_too_long(RobotId robot, const NodeStatus& status, Timestamp now) {
-  if (status.backlog_submaps == 0) {
-    waits_since_.erase(robot);
-    return false;
-  }
-  const auto since = waits_since_.try_emplace(robot, now).first;
-  if (now - since->second < kReceiptAgain_s) return false;
-  since->second = now;
-  return true;
-}
-
-const Receipt* ServerNode::told_to(RobotId robot) const {
-  if (const auto found = receipts_.find(robot); found != receipts_.end()) return &found->second;
-  const auto found = strangers_.find(robot);
-  return found == strangers_.end() ? nullptr : &found->second.receipt;
 }
 
 /// The last heard of those without submaps, who are there.
 std::set<RobotId> ServerNode::strangers_there(Timestamp now) const {
   std::vector<std::pair<Timestamp, RobotId>> heard;
   for (const auto& [robot, known] : registry_.robots())
-    if (!robots_.contains(robot) && known.last_seen && now - *known.last_seen < kStrangerIsGone_s)
+    if (!robots_.contains(robot) && known.last_seen && now - *known.last_seen < Receipts::kStrangerIsGone_s)
       heard.emplace_back(*known.last_seen, robot);
   std::ranges::sort(heard, std::greater());
   std::set<RobotId> there;
@@ -123,8 +98,7 @@ std::set<RobotId> ServerNode::strangers_there(Timestamp now) const {
 MissionStatus ServerNode::mission_status(Timestamp now) const {
   const server::MapServerState& state = server_.state();
   const MapCounts made = counts();
-  const std::uint64_t waiting = waiting_.size() + (refinement_waiting_ ? 1 : 0);
-  const auto later = std::ranges::count_if(failed_, [](const auto& failed) { return failed.second.again.has_value(); });
+  const std::uint64_t waiting = waiting_.size() + (refinements_.waiting() ? 1 : 0);
   MissionStatus out{.time = now,
                     .epoch = state.epoch,
                     .incarnation = config_.incarnation,
@@ -132,7 +106,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
                     .submaps = state.submaps.size(),
                     .closures = made.closures,
                     .components = made.components,
-                    .pending_jobs = open_jobs_.size() + static_cast<std::uint64_t>(later) + (refine_again_ ? 1 : 0) +
+                    .pending_jobs = jobs_.size() + failed_.waiting() + (refinements_.next_due() ? 1 : 0) +
                                     (settle_at_ ? 1 : 0) + waiting,
                     .has_news = server_.has_news()};
   out.finder = to_string(state.finder);
@@ -146,7 +120,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
     if (out.robots.size() == wire::kMaxRobots) break;
     MissionStatus::Robot& entry = out.robots.emplace_back();
     entry.robot = robot;
-    if (const Receipt* const told = told_to(robot)) {
+    if (const Receipt* const told = receipts_.find(robot)) {
       entry.submaps = count(told->stored);
       entry.refused = count(told->refused);
       entry.unread = count(told->unread);
@@ -161,9 +135,9 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
     }
     if (entry.status.name.empty()) entry.status.name = default_name(bus::Endpoint::of(robot));
   }
-  for (const auto& [number, worker] : workers_) out.workers.push_back(worker);
+  for (const auto& [number, worker] : workers_.all()) out.workers.push_back(worker);
   for (const auto& [from, refusals] : refusals_) out.refusals.push_back(refusals);
-  out.words = words_;
+  out.words = words_.all();
   return out;
 }
 

@@ -9,17 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "tutti/base/content_hash.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
-namespace {
-
-constexpr std::size_t kMostWords = 32;  // that are told as answered
-
-}  // namespace
 
 /// An operator's word is not a robot's or a worker's to give.
 void ServerNode::receive_word(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -52,10 +46,7 @@ Result<bool> ServerNode::take_word(const bus::Envelope& envelope, const ClosureW
 }
 
 void ServerNode::note_word(const std::string& frame, const std::string& why) {
-  const MissionStatus::Word word{content_hash(frame), wire::plain_text(why)};
-  std::erase_if(words_, [&](const MissionStatus::Word& known) { return known.content == word.content; });
-  words_.push_back(word);
-  if (words_.size() > kMostWords) words_.erase(words_.begin());
+  words_.note(frame, why);
   ++changes_;
 }
 
