@@ -47,7 +47,7 @@ class CommandLine(unittest.TestCase):
 
     def test_help_of_every_command(self):
         self.expect(tutti("--help"), 0, "run", "demo", "eval", "optimise", "compare")
-        for command in ("run", "demo", "eval", "optimise", "world", "simulate", "compare", "settings", "status", "map", "server", "robot", "worker"):
+        for command in ("run", "demo", "eval", "optimise", "world", "simulate", "export", "compare", "settings", "status", "map", "server", "robot", "worker"):
             self.expect(tutti(command, "--help"), 0, "--help")
         self.expect(tutti("mission", "up", "--help"), 0, "--workers")
         for command in ("list", "info", "export", "merge", "closure"):
@@ -266,6 +266,13 @@ class CommandLine(unittest.TestCase):
         for word in ("accept", "reject", "withdraw"):
             self.expect(tutti("map", "closure", word, "a/1-b/2", empty), 1, "a/1-b/2", "ROBOT/SUBMAP-ROBOT/SUBMAP")
         self.expect(tutti("map", "closure", "accept", "a/1-b/2", "--bus", "nats://192.0.2.1:4222"), 1, "TLS")
+
+    def test_export_writes_a_file_for_viewers(self):
+        self.expect(tutti("demo", *BRIEF, "--out", self.path / "out"), 0)
+        self.expect(tutti("export", self.path / "out", "-o", self.path / "out.mcap"), 0, "messages of", "topics")
+        self.expect(tutti("bag", "info", self.path / "out.mcap"), 0, "/alpha/corrected", "nav_msgs/msg/Path", "/tf_static")
+        self.expect(tutti("export", self.path, "-o", self.path / "x.mcap"), 1, "report.json")
+        self.expect(tutti("export", self.path / "none", "-o", self.path / "x.mcap"), 1, "none")
 
     def test_simulate_writes_a_bag_a_robot(self):
         mission = self.mission("source: simulation\nclosures: {finder: reference}\n"

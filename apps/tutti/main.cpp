@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   tutti::app::add_compare_command(app, exit_code);
   tutti::app::add_optimise_command(app, exit_code);
   tutti::app::add_map_command(app, exit_code);
+  tutti::app::add_export_command(app, exit_code);
   tutti::app::add_bag_command(app, exit_code);
   tutti::app::add_settings_command(app, exit_code);
   tutti::app::add_status_command(app, exit_code);

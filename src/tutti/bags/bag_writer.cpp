@@ -53,23 +53,36 @@ Result<RosWriter> RosWriter::create(const std::string& path, const McapWriterOpt
   return RosWriter(std::move(*writer));
 }
 
-Status RosWriter::write(const std::string& topic, const std::string& type, Timestamp stamp, std::string_view cdr,
-                        Durability durability) {
-  const auto [at, is_new] = topics_.try_emplace(topic, Topic{.type = type, .durability = durability});
-  TUTTI_CHECK(at->second.type == type, "{} is of {}, now of {}", topic, at->second.type, type);
-  if (is_new)
-    at->second.channel = writer_.add(
-        {.topic = topic,
-         .type = type,
-         .schema = ros_definition(type),
-         .schema_encoding = "ros2msg",
-         .message_encoding = "cdr",
-         .metadata = {{"offered_qos_profiles", qos(durability, "")}, {"topic_type_hash", ros_type_hash(type)}}});
-  if (auto ok = writer_.write(at->second.channel, stamp, cdr); !ok) return ok;
-  ++at->second.count;
+Status RosWriter::put(const McapTopic& definition, Durability durability, Timestamp stamp, std::string_view data) {
+  Topic& topic = topics_[definition.topic];
+  if (topic.channel == 0) topic = {writer_.add(definition), definition.type, durability, 0};
+  TUTTI_CHECK(topic.type == definition.type, "{} is of {}, now of {}", definition.topic, topic.type, definition.type);
+  if (auto ok = writer_.write(topic.channel, stamp, data); !ok) return ok;
+  ++topic.count;
   first_ = std::min(first_, stamp);
   last_ = std::max(last_, stamp);
   return {};
+}
+
+Status RosWriter::write(const std::string& topic, const std::string& type, Timestamp stamp, std::string_view cdr,
+                        Durability durability) {
+  McapTopic definition{.topic = topic, .type = type, .schema_encoding = "ros2msg", .message_encoding = "cdr"};
+  if (!topics_.contains(topic)) {
+    definition.schema = ros_definition(type);
+    definition.metadata = {{"offered_qos_profiles", qos(durability, "")}, {"topic_type_hash", ros_type_hash(type)}};
+  }
+  return put(definition, durability, stamp, cdr);
+}
+
+Status RosWriter::write_json(const std::string& topic, const std::string& type, const std::string& schema,
+                             Timestamp stamp, std::string_view json) {
+  return put({.topic = topic,
+              .type = type,
+              .schema = schema,
+              .schema_encoding = "jsonschema",
+              .message_encoding = "json",
+              .metadata = {}},
+             Durability::volatile_, stamp, json);
 }
 
 Result<BagWriter> BagWriter::create(const std::string& folder, const McapWriterOptions& options) {

@@ -32,6 +32,9 @@ class RosWriter {
   /// `cdr` of a type that ros_definitions.hpp knows ("nav_msgs/msg/Odometry"), the same for all of a topic.
   Status write(const std::string& topic, const std::string& type, Timestamp stamp, std::string_view cdr,
                Durability durability = Durability::volatile_);
+  /// `json` as `schema`, JSON Schema of an object, says: what is no message of ROS's. Foxglove and PlotJuggler read it.
+  Status write_json(const std::string& topic, const std::string& type, const std::string& schema, Timestamp stamp,
+                    std::string_view json);
   Status close() { return writer_.close(); }
 
   [[nodiscard]] const std::map<std::string, Topic>& topics() const { return topics_; }
@@ -39,6 +42,8 @@ class RosWriter {
   [[nodiscard]] Timestamp last() const { return last_; }
 
  private:
+  Status put(const McapTopic& definition, Durability durability, Timestamp stamp, std::string_view data);
+
   McapWriter writer_;
   std::map<std::string, Topic> topics_;
   Timestamp first_ = kLastTimestamp, last_ = kFirstTimestamp;

@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
-#include <optional>
 #include <utility>
 
 #include "tutti/base/file.hpp"
@@ -13,6 +11,7 @@
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/mapfile/placement.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 #include "tutti/server/map_components.hpp"
@@ -22,30 +21,6 @@ namespace {
 
 constexpr double kVoxel_m = 0.1;
 constexpr std::size_t kThinAt = 1'000'000;  // points, so that a long map's cloud stays small in memory
-
-/// Where a submap lies: T_world_submap, in the world of a component. Nothing: the map does not have it.
-struct Place {
-  std::uint32_t component = 0;
-  Pose3 T_world_submap;
-};
-std::optional<Place> place(const Submap& submap, const server::MapEstimate& map) {
-  const Keyframe& first = submap.keyframes.front();
-  const Keyframe& middle = submap.keyframes[submap.keyframes.size() / 2];
-  const MapNode* node = find_node(map, {submap.id.chain, middle.index});
-  if (node == nullptr) return std::nullopt;
-  return Place{node->component, node->T_world_body * middle.T_odom_body.inverse() * first.T_odom_body};
-}
-
-/// The largest, or, where nobody there has a cloud, the one with most points.
-std::uint32_t component_to_show(const Content& content, const server::MapEstimate& map) {
-  const std::uint32_t largest = server::choose_components(map).largest;
-  std::map<std::uint32_t, std::size_t> points;
-  for (const auto& [id, size] : content.payload_sizes)
-    if (const auto at = place(*content.submaps.at(id), map); at && size.points > 0)
-      points[at->component] += size.points;
-  if (points.empty() || points.contains(largest)) return largest;
-  return std::ranges::max_element(points, {}, [](const auto& entry) { return entry.second; })->first;
-}
 
 }  // namespace
 
@@ -74,17 +49,15 @@ Result<std::vector<std::string>> export_tum(const Content& content, const server
   return files;
 }
 
-Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
-                                 const server::MapEstimate& map, const std::filesystem::path& file) {
-  const std::uint32_t component = component_to_show(content, map);
+Result<JointCloud> joint_cloud(const storage::TableStore& store, const Content& content,
+                               const server::MapEstimate& map) {
+  JointCloud out{.component = component_to_show(content, map)};
   const auto clouds = node::SubmapFrames::of(store);
-  ExportedCloud out{.of_the_largest = component == server::choose_components(map).largest};
-  PointCloud joint;
   std::size_t thin_at = kThinAt;
   for (const auto& [id, size] : content.payload_sizes) {
     if (size.points == 0) continue;
     const auto at = place(*content.submaps.at(id), map);
-    if (!at || at->component != component) {
+    if (!at || at->component != out.component) {
       ++out.left_out;
       continue;
     }
@@ -92,15 +65,25 @@ Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content
     if (!cloud) return tl::unexpected(cloud.error());
     ++out.submaps;
     const Eigen::Isometry3d T(at->T_world_submap.matrix());
-    for (const Eigen::Vector3f& p : (*cloud)->points) joint.points.push_back((T * p.cast<double>()).cast<float>());
-    if (joint.points.size() < thin_at) continue;
-    joint = lidar::voxel_downsample(joint, kVoxel_m);
-    thin_at = 2 * joint.points.size() + kThinAt;
+    std::vector<Eigen::Vector3f>& points = out.cloud.points;
+    for (const Eigen::Vector3f& p : (*cloud)->points) points.push_back((T * p.cast<double>()).cast<float>());
+    if (points.size() < thin_at) continue;
+    out.cloud = lidar::voxel_downsample(out.cloud, kVoxel_m);
+    thin_at = 2 * out.cloud.points.size() + kThinAt;
   }
-  joint = lidar::voxel_downsample(joint, kVoxel_m);
-  out.points = joint.points.size();
-  if (joint.points.empty()) return out;
-  if (auto status = formats::write_ply(file.string(), joint.points); !status) return tl::unexpected(status.error());
+  out.cloud = lidar::voxel_downsample(out.cloud, kVoxel_m);
+  return out;
+}
+
+Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
+                                 const server::MapEstimate& map, const std::filesystem::path& file) {
+  const auto joint = joint_cloud(store, content, map);
+  if (!joint) return tl::unexpected(joint.error());
+  const std::vector<Eigen::Vector3f>& points = joint->cloud.points;
+  const ExportedCloud out{points.size(), joint->submaps, joint->left_out,
+                          joint->component == server::choose_components(map).largest};
+  if (points.empty()) return out;
+  if (auto status = formats::write_ply(file.string(), points); !status) return tl::unexpected(status.error());
   return out;
 }
 

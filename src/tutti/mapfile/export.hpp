@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "tutti/mapfile/content.hpp"
+#include "tutti/model/point_cloud.hpp"
 
 namespace tutti::mapfile {
 
@@ -19,15 +21,23 @@ Status export_g2o(const server::MapEstimate& map, const std::filesystem::path& f
 Result<std::vector<std::string>> export_tum(const Content& content, const server::MapEstimate& map,
                                             const std::filesystem::path& folder);
 
+/// What all robots of a component saw (component_to_show()), in its frame, thinned to voxels of 0.1 m.
+struct JointCloud {
+  std::uint32_t component = 0;
+  PointCloud cloud;
+  std::size_t submaps = 0;   ///< With a cloud, in it,
+  std::size_t left_out = 0;  ///< and not in it.
+};
+Result<JointCloud> joint_cloud(const storage::TableStore& store, const Content& content,
+                               const server::MapEstimate& map);
+
 struct ExportedCloud {
   std::size_t points = 0;
   std::size_t submaps = 0;
   std::size_t left_out = 0;    ///< Submaps with a cloud that are not in this component.
   bool of_the_largest = true;  ///< Component; otherwise that has no clouds, and this is the one with most points.
 };
-/// What all robots of the largest component saw, in its frame, thinned to voxels of 0.1 m; where they saw nothing, of
-/// the component that has most points. Where nobody saw anything, no file. A submap hangs on the keyframe in its
-/// middle.
+/// joint_cloud() as a file; none where nobody saw anything.
 Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
                                  const server::MapEstimate& map, const std::filesystem::path& file);
 
