@@ -268,7 +268,10 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("map", "closure", "accept", "a/1-b/2", "--bus", "nats://192.0.2.1:4222"), 1, "TLS")
 
     def test_export_writes_a_file_for_viewers(self):
-        self.expect(tutti("demo", *BRIEF, "--out", self.path / "out"), 0)
+        self.expect(tutti("demo", *BRIEF, "--out", self.path / "out", "--map", self.path / "map"), 0)
+        self.expect(tutti("map", "info", self.path / "map"), 0, "joint map")
+        self.expect(tutti("export", self.path / "map", "-o", self.path / "map.mcap"), 0, "messages of")
+        self.expect(tutti("run", "x", "--map", self.path / "map"), 2)
         self.expect(tutti("export", self.path / "out", "-o", self.path / "out.mcap"), 0, "messages of", "topics")
         self.expect(tutti("bag", "info", self.path / "out.mcap"), 0, "/alpha/corrected", "nav_msgs/msg/Path", "/tf_static")
         self.expect(tutti("export", self.path, "-o", self.path / "x.mcap"), 1, "report.json")

@@ -15,6 +15,7 @@
 #include "options.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/lab/run_mission.hpp"
+#include "tutti/mapfile/make_map.hpp"
 #include "tutti/mission/bag_mission.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/simulation/surface.hpp"
@@ -55,7 +56,7 @@ class ProgressLine {
 
 /// What `run` and `demo` share.
 struct MissionArguments {
-  fs::path mission, out;
+  fs::path mission, out, map;
   mission::RunOptions run{.version = TUTTI_VERSION};
   std::vector<std::string> assignments;
   bool print_config = false;
@@ -69,6 +70,10 @@ void add_mission_options(CLI::App& command, MissionArguments& arguments) {
   command.add_option("--seed", arguments.run.seed, "Everything random comes from this number; default: 1")
       ->type_name("N")
       ->check(whole_number());
+  command
+      .add_option("--map", arguments.map,
+                  "Also write the server's map as a file, for tutti map, tutti export and tutti server")
+      ->type_name("MAP");
   add_number(command, "--rate", arguments.run.rate,
              "Times real time, e.g. 1; shows each robot's and the server's CPU share and worst update\n"
              "latency. Without it: as fast as possible",
@@ -101,6 +106,13 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
   std::error_code failure;  // before the mission, not after it
   fs::create_directories(out, failure);
   if (failure) return failed(fmt::format("--out {}: cannot make the folder: {}", out, failure.message()));
+  if (!arguments.map.empty()) {
+    if (fs::exists(arguments.map, failure))
+      return failed(fmt::format("--map {}: is there already", arguments.map.string()), 2);
+    arguments.run.keep_map = [&arguments](const storage::TableStore& map) {
+      return mapfile::copy_map(map, arguments.map);
+    };
+  }
   ProgressLine progress;
   arguments.run.progress = std::ref(progress);
   const auto record = lab::run_mission(*config, arguments.run);

@@ -12,6 +12,8 @@ namespace tutti::mapfile {
 
 /// A new map that `fill` writes into. `out` must not be there; it appears whole or, on an error, not at all.
 Status make_map(const std::filesystem::path& out, const std::function<Status(storage::TableStore&)>& fill);
+/// One that has all rows of another store.
+Status copy_map(const storage::TableStore& from, const std::filesystem::path& out);
 /// So that nothing is left of it when a program ends in between: the name of a file that is being made beside `out`.
 std::filesystem::path part_of(const std::filesystem::path& out);
 void remove_store(const std::filesystem::path& file);

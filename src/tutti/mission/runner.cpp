@@ -120,6 +120,7 @@ class MissionRun {
       if (auto ok = robot.actor->check_scans(); !ok) return ok;
     return {};
   }
+  [[nodiscard]] const storage::TableStore& map_store() const { return store_; }
   MissionRecord record() const;
 
  private:
@@ -355,6 +356,8 @@ Result<MissionRecord> run_mission(const MissionConfig& config, MissionParts part
   MissionRun mission(config, options, std::move(parts));
   mission.run();
   if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());
+  if (options.keep_map)
+    if (const auto ok = options.keep_map(mission.map_store()); !ok) return tl::unexpected(ok.error());
   return mission.record();
 }
 

@@ -15,6 +15,7 @@
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/server/closure_finder.hpp"
+#include "tutti/storage/table_store.hpp"
 
 namespace tutti::mission {
 
@@ -43,6 +44,8 @@ struct RunOptions {
   std::string version;         ///< Of the program, for the report.
   std::string settings_yaml;   ///< That the report is to show; empty: those of the configuration.
   std::function<void(const Progress&)> progress;
+  /// Is given what the server has stored, once the mission is over.
+  std::function<Status(const storage::TableStore&)> keep_map;
 };
 
 /// What a robot's agent draws from.
