@@ -272,6 +272,8 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("map", "info", self.path / "map"), 0, "joint map")
         self.expect(tutti("export", self.path / "map", "-o", self.path / "map.mcap"), 0, "messages of")
         self.expect(tutti("run", "x", "--map", self.path / "map"), 2)
+        self.expect(tutti("map", "export", self.path / "map", "--grid", self.path / "g.yaml"), 1, "no points below any robot")
+        self.expect(tutti("map", "export", self.path / "map", "--grid", "g.yaml", "--low", 2, "--high", 1), 2, "--low")
         self.expect(tutti("export", self.path / "out", "-o", self.path / "out.mcap"), 0, "messages of", "topics")
         self.expect(tutti("bag", "info", self.path / "out.mcap"), 0, "/alpha/corrected", "nav_msgs/msg/Path", "/tf_static")
         self.expect(tutti("export", self.path, "-o", self.path / "x.mcap"), 1, "report.json")

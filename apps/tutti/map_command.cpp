@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "map_grid_options.hpp"
 #include "options.hpp"
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/mapfile/export.hpp"
@@ -192,11 +193,12 @@ int show_map(const fs::path& file) {
 
 struct ExportOptions {
   std::string map, g2o, tum, ply;
+  std::shared_ptr<GridOptions> grid;
 };
 
 int export_map(const ExportOptions& options) {
-  if (options.g2o.empty() && options.tum.empty() && options.ply.empty())
-    return complain("map export", "nothing to write: expected --g2o, --tum or --ply", 2);
+  if (options.g2o.empty() && options.tum.empty() && options.ply.empty() && !wants_grid(*options.grid))
+    return complain("map export", "nothing to write: expected --g2o, --tum, --ply, --grid or --voxels", 2);
   const auto map = mapfile::open(options.map);
   if (!map) return complain("map export", map.error().message);
   const auto content = mapfile::read(**map);
@@ -221,7 +223,7 @@ int export_map(const ExportOptions& options) {
                cloud->left_out > 0 ? fmt::format("; {} are not tied to these", cloud->left_out) : "",
                cloud->of_the_largest ? "" : "; the largest part of the map has no clouds, this is of another");
   }
-  return 0;
+  return export_grids(**map, *content, estimate, *options.grid);
 }
 
 struct MergeOptions {
@@ -274,6 +276,8 @@ void add_map_command(CLI::App& app, int& exit_code) {
       ->type_name("FILE.g2o");
   out->add_option("--tum", options->tum, "Every session's trajectory in the joint map, as NAME.tum.")->type_name("DIR");
   out->add_option("--ply", options->ply, "What all robots saw, thinned to voxels of 0.1 m.")->type_name("FILE.ply");
+  options->grid = add_grid_options(*out);
+  out->footer("Example: tutti map export state/map.tutti --grid map.yaml\n");
   out->callback([options, &exit_code] { exit_code = export_map(*options); });
 
   const auto merging = std::make_shared<MergeOptions>();

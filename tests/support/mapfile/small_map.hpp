@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -47,13 +48,12 @@ class Mapper {
     node_ = std::move(*opened);
     take(node_->resume(now_));
   }
-  /// All submaps of a session, each with one point as its cloud; then the map is updated.
-  void walk(const ChainId& chain, std::uint64_t seed = 1) {
+  /// All submaps of a session, each with a cloud, by default of one point; then the map is updated.
+  void walk(const ChainId& chain, std::uint64_t seed = 1,
+            const std::function<PointCloud(const Submap&)>& cloud_of = one_point) {
     for (Submap& submap :
          server::test::make_submaps(chain, {}, Rng(seed).fork(chain.robot.value).fork(chain.session))) {
-      PointCloud cloud;
-      cloud.points.emplace_back(1.0F, 2.0F, 0.5F * static_cast<float>(submap.id.index));
-      submap.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+      submap.cloud = std::make_shared<const PointCloud>(cloud_of(submap));
       for (Keyframe& keyframe : submap.keyframes)
         keyframe.stamp.ns += static_cast<std::int64_t>(chain.session) * 1'000'000'000'000;
       const SubmapMessage message{{chain.robot, chain.session, submap.id.index}, std::move(submap)};
@@ -63,6 +63,9 @@ class Mapper {
           now_));
     }
     update();
+  }
+  static PointCloud one_point(const Submap& submap) {
+    return {{{1.0F, 2.0F, 0.5F * static_cast<float>(submap.id.index)}}};
   }
   void update() {
     now_ = now_ + 100.0;

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/grids/map_grid.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <set>
+#include <vector>
+
+#include "tutti/mapfile/placement.hpp"
+#include "tutti/node/submap_frames.hpp"
+
+namespace tutti::grids {
+namespace {
+
+/// Where the robots of one part of the map were, and what they saw, one submap in memory.
+class MapPart {
+ public:
+  MapPart(const storage::TableStore& store, const mapfile::Content& content, const server::MapEstimate& map)
+      : content_(content),
+        map_(map),
+        clouds_(node::SubmapFrames::of(store)),
+        component_(mapfile::component_to_show(content, map)) {
+    Eigen::Vector3d up = Eigen::Vector3d::Zero();
+    for (const auto& node : map.nodes)
+      if (node.component == component_) {
+        ways_[node.id.chain].push_back({node.stamp, node.T_world_body});
+        up += node.T_world_body.rotation * Eigen::Vector3d::UnitZ();
+      }
+    T_level_world_.rotation = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+  }
+
+  [[nodiscard]] const Pose3& T_level_world() const { return T_level_world_; }
+  [[nodiscard]] const std::map<ChainId, Trajectory>& ways() const { return ways_; }
+  [[nodiscard]] std::size_t left_out() const { return left_out_; }
+
+  /// `visit(chain, submap)` with every submap that has a cloud, in the frame that T_frame_world maps to.
+  Status each(const Pose3& T_frame_world, const std::function<void(const ChainId&, const LevelSubmap&)>& visit) {
+    left_out_ = 0;
+    for (const auto& [id, size] : content_.payload_sizes) {
+      if (size.points == 0) continue;
+      const Submap& submap = *content_.submaps.at(id);
+      const auto place = mapfile::place(submap, map_);
+      if (!place || place->component != component_) {
+        ++left_out_;
+        continue;
+      }
+      const auto cloud = clouds_->cloud(id);
+      if (!cloud) return tl::unexpected(cloud.error());
+      visit(id.chain, placed(submap, T_frame_world, T_frame_world * place->T_world_submap, **cloud));
+    }
+    return {};
+  }
+
+ private:
+  [[nodiscard]] LevelSubmap placed(const Submap& submap, const Pose3& T_frame_world, const Pose3& T_frame_submap,
+                                   const PointCloud& cloud) const {
+    LevelSubmap out;
+    for (const Keyframe& keyframe : submap.keyframes)
+      if (const auto* node = find_node(map_, {submap.id.chain, keyframe.index}))
+        out.keyframes.push_back({node->stamp, T_frame_world * node->T_world_body});
+    const Eigen::Isometry3d T(T_frame_submap.matrix());
+    for (const Eigen::Vector3f& point : cloud.points) out.points.push_back((T * point.cast<double>()).cast<float>());
+    const Timestamp from = submap.keyframes.front().stamp, until = submap.keyframes.back().stamp;
+    for (const auto& [chain, way] : ways_) {
+      if (chain.robot == submap.id.chain.robot) continue;
+      // With one keyframe before and one behind, as the time may lie between two.
+      auto first = std::ranges::lower_bound(way, from, {}, &StampedPose::stamp);
+      auto last = std::ranges::upper_bound(way, until, {}, &StampedPose::stamp);
+      if (first == way.end() || last == way.begin()) continue;
+      if (first != way.begin()) --first;
+      if (last != way.end()) ++last;
+      for (; first != last; ++first) out.mates.push_back(T_frame_world * first->pose.translation);
+    }
+    return out;
+  }
+
+  const mapfile::Content& content_;
+  const server::MapEstimate& map_;
+  std::shared_ptr<node::SubmapFrames> clouds_;
+  std::uint32_t component_;
+  Pose3 T_level_world_;
+  std::map<ChainId, Trajectory> ways_;
+  std::size_t left_out_ = 0;
+};
+
+/// How far below the body points are, in bins.
+class Below {
+ public:
+  void add(const LevelSubmap& submap) {
+    constexpr double kNear_m = 4.0;
+    for (const Eigen::Vector3f& one : submap.points) {
+      const Eigen::Vector3d point = one.cast<double>();
+      const StampedPose& nearest = *std::ranges::min_element(
+          submap.keyframes, {}, [&](const StampedPose& k) { return (k.pose.translation - point).squaredNorm(); });
+      const Eigen::Vector3d down = nearest.pose.translation - point;
+      const auto bin = static_cast<std::size_t>(std::max(0.0, down.z()) / kBin_m);
+      if (down.z() > kLeast_m && down.head<2>().norm() < kNear_m && bin < bins_.size()) ++bins_[bin];
+    }
+  }
+  /// The middle of where most are, to half a bin; nothing of too few points.
+  [[nodiscard]] std::optional<double> most() const {
+    constexpr std::size_t kLeastPoints = 100;
+    std::size_t best = 0, best_count = 0;
+    for (std::size_t i = 1; i + 1 < bins_.size(); ++i)
+      if (const std::size_t count = bins_[i - 1] + bins_[i] + bins_[i + 1]; count > best_count) {
+        best = i;
+        best_count = count;
+      }
+    if (best_count < kLeastPoints) return std::nullopt;
+    double sum = 0.0;
+    for (std::size_t i = best - 1; i <= best + 1; ++i)
+      sum += static_cast<double>(bins_[i]) * (static_cast<double>(i) + 0.5) * kBin_m;
+    return sum / static_cast<double>(best_count);
+  }
+
+ private:
+  static constexpr double kBin_m = 0.05;
+  static constexpr double kLeast_m = 0.05;
+  std::array<std::size_t, 80> bins_{};  ///< 4 m
+};
+
+Result<std::map<ChainId, double>> body_heights(MapPart& part, const MapGridConfig& config) {
+  std::map<ChainId, double> out;
+  if (config.body_height_m) {
+    for (const auto& [chain, way] : part.ways()) out[chain] = *config.body_height_m;
+    return out;
+  }
+  std::map<ChainId, Below> below;
+  const auto seen = part.each(part.T_level_world(), [&](const ChainId& chain, const LevelSubmap& submap) {
+    if (!submap.keyframes.empty()) below[chain].add(submap);
+  });
+  if (!seen) return tl::unexpected(seen.error());
+  for (const auto& [chain, points] : below)
+    if (const auto height = points.most()) out[chain] = *height;
+  if (out.empty())
+    return fail(ErrorCode::invalid, "no points below any robot: where the ground is has to be said (body height)");
+  return out;
+}
+
+}  // namespace
+
+Result<MapGrid> grid_of_map(const storage::TableStore& store, const mapfile::Content& content,
+                            const server::MapEstimate& map, const MapGridConfig& config) {
+  MapPart part(store, content, map);
+  MapGrid out{.T_level_world = part.T_level_world()};
+  auto heights = body_heights(part, config);
+  if (!heights) return tl::unexpected(heights.error());
+  out.body_height_m = std::move(*heights);
+  std::vector<Ground> ground;
+  for (const auto& [chain, way] : part.ways())
+    if (const auto height = out.body_height_m.find(chain); height != out.body_height_m.end())
+      for (const StampedPose& pose : way)
+        ground.push_back(out.T_level_world * pose.pose.translation - Eigen::Vector3d(0.0, 0.0, height->second));
+  auto builder = GridBuilder::create(config.grid, ground);
+  if (!builder) return tl::unexpected(builder.error());
+  const auto added = part.each(out.T_level_world, [&](const ChainId&, const LevelSubmap& submap) {
+    builder->add(submap);
+    ++out.submaps;
+    for (const Eigen::Vector3f& point : submap.points)
+      out.mate_points += is_mate(submap, point.cast<double>(), config.grid.mate_m) ? 1 : 0;
+  });
+  if (!added) return tl::unexpected(added.error());
+  out.left_out = part.left_out();
+  out.grid = builder->grid();
+  return out;
+}
+
+Result<PointCloud> voxels_of_map(const storage::TableStore& store, const mapfile::Content& content,
+                                 const server::MapEstimate& map, double voxel_m, double mate_m) {
+  MapPart part(store, content, map);
+  std::set<std::array<int, 3>> voxels;
+  const auto added = part.each(Pose3{}, [&](const ChainId&, const LevelSubmap& submap) {
+    for (const Eigen::Vector3f& point : submap.points) {
+      if (is_mate(submap, point.cast<double>(), mate_m)) continue;
+      const Eigen::Array3d at = (point.cast<double>().array() / voxel_m).floor();
+      voxels.insert({static_cast<int>(at.x()), static_cast<int>(at.y()), static_cast<int>(at.z())});
+    }
+  });
+  if (!added) return tl::unexpected(added.error());
+  PointCloud out;
+  for (const auto& [x, y, z] : voxels)
+    out.points.push_back((voxel_m * Eigen::Vector3d(x + 0.5, y + 0.5, z + 0.5)).cast<float>());
+  return out;
+}
+
+}  // namespace tutti::grids

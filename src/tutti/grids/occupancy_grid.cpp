@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/grids/occupancy_grid.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "tutti/base/file.hpp"
+
+namespace tutti::grids {
+
+std::size_t OccupancyGrid::count(Cell cell) const { return static_cast<std::size_t>(std::ranges::count(cells, cell)); }
+
+Status write_nav2_map(const OccupancyGrid& grid, const std::string& yaml_path, const std::vector<std::string>& notes) {
+  namespace fs = std::filesystem;
+  const fs::path image = fs::path(yaml_path).replace_extension(".pgm");
+  if (image == yaml_path) return fail(ErrorCode::invalid, "{}: expected a name that ends with .yaml", yaml_path);
+  constexpr char kFree = '\xfe', kOccupied = '\0', kUnknown = '\xcd';  // 254, 0, 205
+  std::string pgm = fmt::format("P5\n{} {}\n255\n", grid.width, grid.height);
+  for (std::size_t y = grid.height; y-- > 0;)  // images begin at the top
+    for (std::size_t x = 0; x < grid.width; ++x) {
+      const OccupancyGrid::Cell cell = grid.at(x, y);
+      pgm += cell == OccupancyGrid::free ? kFree : cell == OccupancyGrid::occupied ? kOccupied : kUnknown;
+    }
+  if (auto ok = write_file(image.string(), pgm); !ok) return ok;
+  std::string yaml;
+  for (const std::string& note : notes) yaml += "# " + note + "\n";
+  yaml += fmt::format(
+      "image: {}\nmode: trinary\nresolution: {}\norigin: [{}, {}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
+      "free_thresh: 0.25\n",
+      image.filename().string(), grid.resolution_m, grid.origin.x(), grid.origin.y());
+  return write_file(yaml_path, yaml);
+}
+
+}  // namespace tutti::grids
