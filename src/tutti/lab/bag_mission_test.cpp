@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+
+#include "tutti/finders/sensor_finder_maker.hpp"
+#include "tutti/lab/mission_input.hpp"
+#include "tutti/lab/write_bags.hpp"
+#include "tutti/mapfile/content.hpp"
+#include "tutti/mission/odometry_covariance.hpp"
+#include "tutti/mission/runner.hpp"
+
+namespace tutti::lab {
+namespace bag_mission_test {
+
+namespace fs = std::filesystem;
+
+/// The map that a mission ends with.
+class MapOf {
+ public:
+  mission::RunOptions options() {
+    mission::RunOptions out{.seed = 1, .threads = 1};
+    out.keep_map = [this](const storage::TableStore& store) -> Status {
+      const auto content = mapfile::read(store);
+      if (!content) return tl::unexpected(content.error());
+      map_ = mapfile::estimate(*content);
+      return {};
+    };
+    return out;
+  }
+  const server::MapEstimate& operator*() const { return *map_; }
+
+ private:
+  std::optional<server::MapEstimate> map_;
+};
+
+/// Two robots in a small tunnel: what they recorded, written as bags and run from these, is the mission itself. Bags'
+/// odometry is given the covariances of recordings, so the mission's is, too.
+TEST(BagMission, FromSimulatedBagsIsTheMission) {
+  MissionConfig config;
+  config.source = "simulation";
+  config.simulation.sensors = "lidar";
+  config.simulation.lidar.azimuth_step_deg = 1.0;
+  config.simulation.world.network = {.rows = 2, .columns = 2, .block_m = 10.0, .jitter_m = 1.0};
+  config.simulation.robots.resize(2);
+  for (auto& robot : config.simulation.robots) robot.walk.duration_s = 40.0;
+  mission::MissionParts parts{
+      .input = load_input(config, {}, 1).value(), .finder = nullptr, .refiner = nullptr, .companions = {}};
+  for (mission::MissionRecording& robot : parts.input.robots)
+    robot.recording.increment_covariance = mission::increment_covariances(robot.recording.odometry, {});
+  parts.finder = finders::make_finder(config.closures);
+  MapOf simulated, recorded;
+  ASSERT_TRUE(mission::run_mission(config, std::move(parts), simulated.options()));
+
+  const fs::path folder = fs::path(::testing::TempDir()) / ("bag_mission_" + std::to_string(getpid()));
+  const auto bags = write_bags(config, 1, folder.string());
+  ASSERT_TRUE(bags) << bags.error().message;
+  mission::MissionConfig from_bags;
+  for (const WrittenBag& bag : *bags)
+    from_bags.robots.push_back({.name = fs::path(bag.folder).filename().string(), .bag = bag.folder});
+  const auto run = mission::run_mission(from_bags, recorded.options());
+  fs::remove_all(folder);
+  ASSERT_TRUE(run) << run.error().message;
+
+  const server::MapEstimate &expected = *simulated, &actual = *recorded;
+  ASSERT_EQ(actual.nodes.size(), expected.nodes.size());
+  double worst = 0.0;  // m and rad
+  for (std::size_t i = 0; i < actual.nodes.size(); ++i) {
+    EXPECT_EQ(actual.nodes[i].stamp.ns - kBagsBegin_ns, expected.nodes[i].stamp.ns);
+    worst = std::max(worst, local(expected.nodes[i].T_world_body, actual.nodes[i].T_world_body).norm());
+  }
+  EXPECT_LT(worst, 1e-4);  // points are float32, and were moved to the LiDAR and back
+  ASSERT_EQ(actual.closures.size(), expected.closures.size());
+  EXPECT_GT(actual.closures.size(), 3U);
+  for (std::size_t i = 0; i < actual.closures.size(); ++i) {
+    const auto &one = actual.closures[i], &other = expected.closures[i];
+    EXPECT_EQ(one.accepted, other.accepted);
+    EXPECT_EQ(one.closure.from, other.closure.from);
+    EXPECT_EQ(one.closure.to, other.closure.to);
+  }
+}
+
+}  // namespace bag_mission_test
+}  // namespace tutti::lab
