@@ -2,7 +2,7 @@
 # Third-party libraries, found when a module first links them, here and by find_package(tutti), which installs this file.
 # Packages of Debian 12: scripts/install_dependencies.sh lists them.
 
-# SuiteSparse 5.12, LAPACKE, zstd, lz4, SQLite, NATS and OpenCV ship no CMake configuration that works everywhere: plain imported
+# SuiteSparse 5.12, LAPACKE, zstd, lz4, bz2, SQLite, NATS and OpenCV ship no CMake configuration that works everywhere: plain imported
 # targets. OpenCV's own is only in libopencv-dev, which wants everything that OpenCV has.
 function(tutti_import_library target header)
   cmake_parse_arguments(ARG "" "" "LIBS;SUFFIXES" ${ARGN})
@@ -36,6 +36,7 @@ set(TUTTI_THIRD_PARTY
   "tutti::lapacke|import lapacke.h LIBS lapacke openblas"
   "tutti::zstd|import zstd.h LIBS zstd"
   "tutti::lz4|import lz4frame.h LIBS lz4"
+  "tutti::bz2|import bzlib.h LIBS bz2"
   "tutti::nanoflann|import nanoflann.hpp"
   "tutti::sqlite|import sqlite3.h LIBS sqlite3"
   "tutti::nats|import nats/nats.h LIBS nats"

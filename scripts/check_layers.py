@@ -21,7 +21,7 @@ CONFINED = [
     (r"sqlite3", r"(storage/(sqlite_.*\.cpp|internal/sqlite\.hpp)|bags/(db3_reader|.*_test)\.cpp|tests/support/bags/rosbag2_writer\.hpp)$",
      "storage/sqlite_*.cpp and internal/sqlite.hpp, and bags/db3_reader.cpp, which only reads, and its tests"),
     (r"opencv2/", r"perception/visual/frontend/.*\.cpp$", "perception/visual/frontend/*.cpp"),
-    (r"lz4", r"(tests/support/)?bags/", "bags/"),
+    (r"lz4|bzlib", r"(tests/support/)?bags/", "bags/"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),

@@ -71,7 +71,8 @@ int show_bag(const std::string& path) {
 }  // namespace
 
 void add_bag_command(CLI::App& app, int& exit_code) {
-  auto* bag = app.add_subcommand("bag", "What robots have recorded: rosbag2's folders, .mcap and .db3 files.");
+  auto* bag =
+      app.add_subcommand("bag", "What robots have recorded: rosbag2's folders, .mcap and .db3 files, ROS 1's .bag.");
   bag->require_subcommand(1);
   const auto path = std::make_shared<std::string>();
   auto* info = bag->add_subcommand(
@@ -80,7 +81,7 @@ void add_bag_command(CLI::App& app, int& exit_code) {
       "All of the bag is read, one chunk at a time. One that is cut off is read up to the cut.\n"
       "tutti run --bag NAME=BAG runs a mission from it.\n"
       "Example: tutti bag info recording/\n");
-  info->add_option("bag", *path, "A folder that rosbag2 wrote, or an .mcap or .db3 file; packed by zstd or lz4 or not.")
+  info->add_option("bag", *path, "A folder that rosbag2 wrote, or an .mcap, .db3 or (ROS 1) .bag file; packed or not.")
       ->required()
       ->type_name("BAG");
   info->callback([path, &exit_code] { exit_code = show_bag(*path); });

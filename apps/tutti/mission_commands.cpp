@@ -193,15 +193,16 @@ void add_run_command(CLI::App& app, int& exit_code) {
       "The same mission, data and seed give the same report.json.");
   const auto bags = std::make_shared<std::vector<std::string>>(), topics = std::make_shared<std::vector<std::string>>();
   auto* mission = command->add_option("mission", arguments->mission, "Mission file")->type_name("MISSION.yaml");
-  auto* bag = command
-                  ->add_option(
-                      "--bag", *bags,
-                      "Instead of a mission file: a robot and what it recorded, a folder of rosbag2's, .mcap or .db3;\n"
-                      "several times, e.g. --bag alpha=recordings/a --bag bravo=recordings/b. Topics are found by type")
-                  ->type_name("NAME=BAG")
-                  ->expected(1)
-                  ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-                  ->excludes(mission);
+  auto* bag =
+      command
+          ->add_option(
+              "--bag", *bags,
+              "Instead of a mission file: a robot and what it recorded, a folder of rosbag2's, .mcap, .db3 or .bag;\n"
+              "several times, e.g. --bag alpha=recordings/a --bag bravo=recordings/b. Topics are found by type")
+          ->type_name("NAME=BAG")
+          ->expected(1)
+          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+          ->excludes(mission);
   command
       ->add_option("--topic", *topics,
                    "Of a bag where several topics would do: --topic alpha.scans=/points,\n"

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "fuzz/fuzz_target.hpp"
-#include "support/bags/bag_writer.hpp"
+#include "support/bags/ros1_writer.hpp"
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
 #include "support/wire/visual.hpp"
@@ -95,12 +95,17 @@ void add_bags(std::map<std::string, std::vector<std::string>>& out) {
   out["mcap"] = {closed(joined({begin, records}), definitions, 2)};
   for (const char* const compression : {"", "zstd", "lz4"})
     out["mcap"].push_back(closed(joined({begin, chunk(records, compression, records.size(), 0)}), definitions, 2, 1));
-  for (const bool big : {false, true}) {
+  const std::vector<Sample> samples{{"/odom", "nav_msgs/msg/Odometry", 5, odometry("odom", "base_link", 2)},
+                                    {"/points", "sensor_msgs/msg/PointCloud2", 7, point_cloud(2)}};
+  for (const char* const compression : {"none", "bz2", "lz4"})
+    out["ros1_bag"].push_back(bags::test::ros1_bag(samples, compression, 1));
+  out["rosbag2_metadata"] = {metadata_of({"bag_0.mcap", "bag_1.mcap.zstd"}, 12)};
+  for (const int how : {0, 1, 2}) {
     char type = '\0';
     for (const std::string& bytes :
-         {odometry("odom", "base_link", big), transforms(big), point_cloud(big), imu(big), image(big),
-          compressed_image(big), camera_info(big), nav_sat_fix(big), pose_stamped(big)}) {
-      out["cdr"].push_back(joined({std::string_view(&type, 1), bytes}));
+         {odometry("odom", "base_link", how), transforms(how), point_cloud(how), imu(how), image(how),
+          compressed_image(how), camera_info(how), nav_sat_fix(how), pose_stamped(how)}) {
+      out[how == 2 ? "ros1_message" : "cdr"].push_back(joined({std::string_view(&type, 1), bytes}));
       ++type;
     }
   }

@@ -8,7 +8,10 @@
 #include "support/wire/messages.hpp"
 #include "tutti/bags/bag_info.hpp"
 #include "tutti/bags/mcap_reader.hpp"
+#include "tutti/bags/point_cloud.hpp"
+#include "tutti/bags/ros1_reader.hpp"
 #include "tutti/bags/ros_messages.hpp"
+#include "tutti/bags/rosbag2_metadata.hpp"
 #include "tutti/base/check.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
@@ -136,40 +139,52 @@ void kitti_poses(std::string_view bytes) {
 }
 
 /// What is counted adds up, whatever is in the file.
-void mcap(std::string_view bytes) {
-  auto bag = bags::McapReader::open(std::make_unique<std::istringstream>(std::string(bytes)), "fuzz");
-  if (!bag) return;
-  const bags::BagInfo info = bags::inspect(*bag);
+void add_up(bags::BagReader& bag) {
+  const bags::BagInfo info = bags::inspect(bag);
   std::uint64_t messages = 0;
   for (const bags::TopicInfo& topic : info.topics) messages += topic.count;
   TUTTI_CHECK(messages == info.messages, "{} messages of topics, {} in all", messages, info.messages);
   static_cast<void>(bags::uses(info));
 }
-/// The first byte says which type.
-void cdr(std::string_view bytes) {
+void mcap(std::string_view bytes) {
+  auto bag = bags::McapReader::open(std::make_unique<std::istringstream>(std::string(bytes)), "fuzz");
+  if (bag) add_up(*bag);
+}
+void ros1_bag(std::string_view bytes) {
+  auto bag = bags::Ros1Reader::open(std::make_unique<std::istringstream>(std::string(bytes)), "fuzz");
+  if (bag) add_up(*bag);
+}
+void rosbag2_metadata(std::string_view bytes) {
+  static_cast<void>(bags::parse_rosbag2_metadata(std::string(bytes), "fuzz"));
+}
+/// The first byte says which type. What is a cloud is one of points, too.
+void message(std::string_view bytes, bags::RosEncoding encoding) {
   if (bytes.empty()) return;
   const std::string_view rest = bytes.substr(1);
   switch (static_cast<unsigned char>(bytes.front()) % 9) {
     case 0:
-      return static_cast<void>(bags::decode_odometry(rest));
+      return static_cast<void>(bags::decode_odometry(rest, encoding));
     case 1:
-      return static_cast<void>(bags::decode_tf(rest));
+      return static_cast<void>(bags::decode_tf(rest, encoding));
     case 2:
-      return static_cast<void>(bags::decode_point_cloud(rest));
+      if (const auto cloud = bags::decode_point_cloud(rest, encoding)) static_cast<void>(bags::to_timed_cloud(*cloud));
+      return;
     case 3:
-      return static_cast<void>(bags::decode_imu(rest));
+      return static_cast<void>(bags::decode_imu(rest, encoding));
     case 4:
-      return static_cast<void>(bags::decode_image(rest));
+      return static_cast<void>(bags::decode_image(rest, encoding));
     case 5:
-      return static_cast<void>(bags::decode_compressed_image(rest));
+      return static_cast<void>(bags::decode_compressed_image(rest, encoding));
     case 6:
-      return static_cast<void>(bags::decode_camera_info(rest));
+      return static_cast<void>(bags::decode_camera_info(rest, encoding));
     case 7:
-      return static_cast<void>(bags::decode_nav_sat_fix(rest));
+      return static_cast<void>(bags::decode_nav_sat_fix(rest, encoding));
     default:
-      return static_cast<void>(bags::decode_pose_stamped(rest));
+      return static_cast<void>(bags::decode_pose_stamped(rest, encoding));
   }
 }
+void cdr(std::string_view bytes) { message(bytes, bags::RosEncoding::cdr); }
+void ros1_message(std::string_view bytes) { message(bytes, bags::RosEncoding::ros1); }
 
 void cameras(std::string_view bytes) { static_cast<void>(formats::parse_cameras(std::string(bytes), "fuzz")); }
 void image_list(std::string_view bytes) {
@@ -226,6 +241,9 @@ const std::map<std::string, Target>& targets() {
       {"receipt", receipt},
       {"refinement", refinement},
       {"refinement_job", refinement_job},
+      {"ros1_bag", ros1_bag},
+      {"ros1_message", ros1_message},
+      {"rosbag2_metadata", rosbag2_metadata},
       {"status", status},
       {"submap", submap},
       {"submap_copy", submap_copy},

@@ -12,6 +12,7 @@
 #include "tutti/bags/internal/chunk.hpp"
 #include "tutti/bags/internal/packed_file.hpp"
 #include "tutti/bags/mcap_reader.hpp"
+#include "tutti/bags/ros1_reader.hpp"
 #include "tutti/bags/rosbag2_metadata.hpp"
 #include "tutti/base/file.hpp"
 
@@ -38,7 +39,7 @@ Result<std::unique_ptr<BagReader>> boxed(Result<Reader> reader) {
 
 Result<std::unique_ptr<BagReader>> open_plain(const std::string& path, const std::string& magic) {
   if (magic.starts_with(kSqliteMagic)) return boxed(Db3Reader::open(path));
-  if (magic.starts_with(kRos1Magic)) return fail(ErrorCode::unsupported, "{}: a ROS 1 bag, which is not read", path);
+  if (magic.starts_with(kRos1Magic)) return boxed(Ros1Reader::open(path));
   return boxed(McapReader::open(path));
 }
 
@@ -159,7 +160,7 @@ const BagChannel* BagFiles::own(const BagChannel* channel) {
 Result<std::optional<BagMessage>> BagFiles::taken(BagMessage message) {
   message.channel = own(message.channel);
   message.position.file = static_cast<std::uint32_t>(file_);
-  // No CDR and no message of ROS 1's that is known begins so: rosbag2 says in metadata.yaml that messages are packed,
+  // No CDR begins so: rosbag2 says in metadata.yaml that messages are packed,
   // but that may be missing.
   if (message.channel->message_encoding == "cdr" && message.data.starts_with(internal::kZstdMagic)) {
     auto data = internal::unpack_message(message.data);

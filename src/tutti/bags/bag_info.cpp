@@ -32,8 +32,8 @@ Result<std::string> frame_of(const Result<Message>& message) {
   return message->header.frame_id;
 }
 
-Result<std::string> frames_of_tf(std::string_view cdr) {
-  const auto transforms = decode_tf(cdr);
+Result<std::string> frames_of_tf(std::string_view bytes, RosEncoding encoding) {
+  const auto transforms = decode_tf(bytes, encoding);
   if (!transforms) return tl::unexpected(transforms.error());
   std::string out;
   for (std::size_t i = 0; i < std::min(transforms->size(), kMostFrames); ++i)
@@ -43,27 +43,28 @@ Result<std::string> frames_of_tf(std::string_view cdr) {
   return out;
 }
 
-Result<std::string> frames_of(std::string_view type, std::string_view cdr) {
+Result<std::string> frames_of(std::string_view type, std::string_view bytes, RosEncoding encoding) {
   switch (use_of(type)) {
     case Use::odometry: {
-      const auto message = decode_odometry(cdr);
+      const auto message = decode_odometry(bytes, encoding);
       if (!message) return tl::unexpected(message.error());
       return fmt::format("{} -> {}", message->header.frame_id, message->child_frame_id);
     }
     case Use::scans:
-      return frame_of(decode_point_cloud(cdr));
+      return frame_of(decode_point_cloud(bytes, encoding));
     case Use::images:
-      return type == "sensor_msgs/msg/Image" ? frame_of(decode_image(cdr)) : frame_of(decode_compressed_image(cdr));
+      return type == "sensor_msgs/msg/Image" ? frame_of(decode_image(bytes, encoding))
+                                             : frame_of(decode_compressed_image(bytes, encoding));
     case Use::calibration:
-      return frame_of(decode_camera_info(cdr));
+      return frame_of(decode_camera_info(bytes, encoding));
     case Use::imu:
-      return frame_of(decode_imu(cdr));
+      return frame_of(decode_imu(bytes, encoding));
     case Use::fixes:
-      return frame_of(decode_nav_sat_fix(cdr));
+      return frame_of(decode_nav_sat_fix(bytes, encoding));
     case Use::poses:
-      return frame_of(decode_pose_stamped(cdr));
+      return frame_of(decode_pose_stamped(bytes, encoding));
     case Use::transforms:
-      return frames_of_tf(cdr);
+      return frames_of_tf(bytes, encoding);
     case Use::nothing:
       break;
   }
@@ -72,10 +73,9 @@ Result<std::string> frames_of(std::string_view type, std::string_view cdr) {
 
 void look_at(TopicInfo& topic, const BagMessage& message) {
   if (topic.count++ == 0 && topic.use != Use::nothing) {
-    const auto frames =
-        message.channel->message_encoding == "cdr"
-            ? frames_of(topic.type, message.data)
-            : fail(ErrorCode::unsupported, "encoding '{:.40}', expected cdr", message.channel->message_encoding);
+    const auto encoding = to_encoding(message.channel->message_encoding);
+    const auto frames = encoding ? frames_of(topic.type, message.data, *encoding)
+                                 : Result<std::string>(tl::unexpected(encoding.error()));
     (frames ? topic.frames : topic.problem) = frames ? *frames : frames.error().message;
   }
   topic.first = std::min(topic.first, message.log_time);

@@ -181,7 +181,7 @@ TEST(Mcap, WhatIsWrongIsNamed) {
             at + "Channel: channel 2 ('/b') has schema 9, expected one that is defined before");
   EXPECT_EQ(error_of(channel(1, 1, "/b")), at + "Channel: channel 1 is '/b', expected '/a' as before");
   EXPECT_EQ(error_of(schema(1, "other")), at + "Schema: schema 1 is 'other', expected 'pkg/msg/Type' as before");
-  EXPECT_EQ(error_of(chunk("", "brotli")), at + "Chunk: compression 'brotli', expected none, zstd or lz4");
+  EXPECT_EQ(error_of(chunk("", "brotli")), at + "Chunk: compression 'brotli', expected none, zstd, lz4 or bz2");
   EXPECT_EQ(error_of(message(1, ~std::uint64_t{0}, "")).substr(0, at.size() + 20), at + "Message: byte 14: lo");
 }
 

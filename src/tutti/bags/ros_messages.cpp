@@ -15,10 +15,10 @@ using internal::Cursor;
 constexpr std::size_t kEncapsulationBytes = 4;
 constexpr std::size_t kMostPadding = 3;
 
-/// The length counts the NUL behind the text; some writers give an empty string no NUL.
+/// Of CDR the length counts the NUL behind the text; some writers give an empty string no NUL.
 std::string text(Cursor& in, std::string_view what) {
   std::string_view bytes = in.counted(what);
-  if (bytes.empty()) return {};
+  if (bytes.empty() || in.layout() == Cursor::Layout::packed) return std::string(bytes);
   if (bytes.back() != '\0') in.complain(fmt::format("{} does not end with a NUL", what));
   bytes.remove_suffix(1);
   return std::string(bytes);
@@ -53,6 +53,7 @@ Eigen::Quaterniond quaternion(Cursor& in, std::string_view what) {
 RosHeader header(Cursor& in) {
   constexpr std::int64_t kPerSecond = 1'000'000'000;
   RosHeader out;
+  if (in.layout() == Cursor::Layout::packed) in.number<std::uint32_t>("header.seq");
   const auto seconds = in.number<std::int32_t>("header.stamp.sec");
   const auto rest = in.number<std::uint32_t>("header.stamp.nanosec");
   out.stamp.ns = kPerSecond * seconds + rest;
@@ -67,28 +68,41 @@ RosPose pose(Cursor& in) {
   return out;
 }
 
+Result<Cursor> cursor_of(std::string_view bytes, RosEncoding encoding, const char* type) {
+  if (encoding == RosEncoding::ros1) return Cursor(bytes);
+  if (bytes.size() < kEncapsulationBytes)
+    return fail(ErrorCode::parse, "{}: {} bytes, expected at least {}", type, bytes.size(), kEncapsulationBytes);
+  if (bytes[0] != 0 || (bytes[1] != 0 && bytes[1] != 1))
+    return fail(ErrorCode::unsupported, "{}: encapsulation {:02x} {:02x}, expected 00 00 or 00 01 (CDR, XCDR1)", type,
+                static_cast<unsigned char>(bytes[0]), static_cast<unsigned char>(bytes[1]));
+  return Cursor(bytes.substr(kEncapsulationBytes), bytes[1] == 0 ? Cursor::Order::big : Cursor::Order::little,
+                Cursor::Layout::aligned);
+}
+
 /// `read(in)` takes the fields one after the other.
 template <class Read>
-auto decode(std::string_view cdr, const char* type, const Read& read)
+auto decode(std::string_view bytes, RosEncoding encoding, const char* type, const Read& read)
     -> Result<decltype(read(std::declval<Cursor&>()))> {
-  if (cdr.size() < kEncapsulationBytes)
-    return fail(ErrorCode::parse, "{}: {} bytes, expected at least {}", type, cdr.size(), kEncapsulationBytes);
-  if (cdr[0] != 0 || (cdr[1] != 0 && cdr[1] != 1))
-    return fail(ErrorCode::unsupported, "{}: encapsulation {:02x} {:02x}, expected 00 00 or 00 01 (CDR, XCDR1)", type,
-                static_cast<unsigned char>(cdr[0]), static_cast<unsigned char>(cdr[1]));
-  Cursor in(cdr.substr(kEncapsulationBytes), cdr[1] == 0 ? Cursor::Order::big : Cursor::Order::little,
-            Cursor::Layout::aligned);
-  auto out = read(in);
-  if (in.ok() && in.left() > kMostPadding)
-    in.complain(fmt::format("{} bytes are left, expected the end: another definition of the type?", in.left()));
-  if (!in.ok()) return fail(ErrorCode::parse, "{}: {}", type, *in.error());
+  auto in = cursor_of(bytes, encoding, type);
+  if (!in) return tl::unexpected(in.error());
+  auto out = read(*in);
+  const std::size_t most = encoding == RosEncoding::cdr ? kMostPadding : 0;
+  if (in->ok() && in->left() > most)
+    in->complain(fmt::format("{} bytes are left, expected the end: another definition of the type?", in->left()));
+  if (!in->ok()) return fail(ErrorCode::parse, "{}: {}", type, *in->error());
   return out;
 }
 
 }  // namespace
 
-Result<RosOdometry> decode_odometry(std::string_view cdr) {
-  return decode(cdr, "nav_msgs/msg/Odometry", [](Cursor& in) {
+Result<RosEncoding> to_encoding(std::string_view name) {
+  if (name == "cdr") return RosEncoding::cdr;
+  if (name == "ros1") return RosEncoding::ros1;
+  return fail(ErrorCode::unsupported, "encoding '{:.40}', expected cdr or ros1", name);
+}
+
+Result<RosOdometry> decode_odometry(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "nav_msgs/msg/Odometry", [](Cursor& in) {
     RosOdometry out;
     out.header = header(in);
     out.child_frame_id = text(in, "child_frame_id");
@@ -101,9 +115,9 @@ Result<RosOdometry> decode_odometry(std::string_view cdr) {
   });
 }
 
-Result<std::vector<RosTransform>> decode_tf(std::string_view cdr) {
+Result<std::vector<RosTransform>> decode_tf(std::string_view bytes, RosEncoding encoding) {
   constexpr std::size_t kLeastBytes = 8 + 4 + 4 + 56;  // stamp, two empty strings, seven numbers
-  return decode(cdr, "tf2_msgs/msg/TFMessage", [](Cursor& in) {
+  return decode(bytes, encoding, "tf2_msgs/msg/TFMessage", [](Cursor& in) {
     std::vector<RosTransform> out(sequence(in, kLeastBytes, "transforms"));
     for (RosTransform& transform : out) {
       transform.header = header(in);
@@ -115,9 +129,9 @@ Result<std::vector<RosTransform>> decode_tf(std::string_view cdr) {
   });
 }
 
-Result<RosPointCloud> decode_point_cloud(std::string_view cdr) {
+Result<RosPointCloud> decode_point_cloud(std::string_view bytes, RosEncoding encoding) {
   constexpr std::size_t kLeastBytes = 4 + 4 + 1 + 4;
-  return decode(cdr, "sensor_msgs/msg/PointCloud2", [](Cursor& in) {
+  return decode(bytes, encoding, "sensor_msgs/msg/PointCloud2", [](Cursor& in) {
     RosPointCloud out;
     out.header = header(in);
     out.height = in.number<std::uint32_t>("height");
@@ -138,8 +152,8 @@ Result<RosPointCloud> decode_point_cloud(std::string_view cdr) {
   });
 }
 
-Result<RosImu> decode_imu(std::string_view cdr) {
-  return decode(cdr, "sensor_msgs/msg/Imu", [](Cursor& in) {
+Result<RosImu> decode_imu(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "sensor_msgs/msg/Imu", [](Cursor& in) {
     RosImu out;
     out.header = header(in);
     out.orientation = quaternion(in, "orientation");
@@ -152,8 +166,8 @@ Result<RosImu> decode_imu(std::string_view cdr) {
   });
 }
 
-Result<RosImage> decode_image(std::string_view cdr) {
-  return decode(cdr, "sensor_msgs/msg/Image", [](Cursor& in) {
+Result<RosImage> decode_image(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "sensor_msgs/msg/Image", [](Cursor& in) {
     RosImage out;
     out.header = header(in);
     out.height = in.number<std::uint32_t>("height");
@@ -166,8 +180,8 @@ Result<RosImage> decode_image(std::string_view cdr) {
   });
 }
 
-Result<RosCompressedImage> decode_compressed_image(std::string_view cdr) {
-  return decode(cdr, "sensor_msgs/msg/CompressedImage", [](Cursor& in) {
+Result<RosCompressedImage> decode_compressed_image(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "sensor_msgs/msg/CompressedImage", [](Cursor& in) {
     RosCompressedImage out;
     out.header = header(in);
     out.format = text(in, "format");
@@ -176,8 +190,8 @@ Result<RosCompressedImage> decode_compressed_image(std::string_view cdr) {
   });
 }
 
-Result<RosCameraInfo> decode_camera_info(std::string_view cdr) {
-  return decode(cdr, "sensor_msgs/msg/CameraInfo", [](Cursor& in) {
+Result<RosCameraInfo> decode_camera_info(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "sensor_msgs/msg/CameraInfo", [](Cursor& in) {
     RosCameraInfo out;
     out.header = header(in);
     out.height = in.number<std::uint32_t>("height");
@@ -196,8 +210,8 @@ Result<RosCameraInfo> decode_camera_info(std::string_view cdr) {
   });
 }
 
-Result<RosNavSatFix> decode_nav_sat_fix(std::string_view cdr) {
-  return decode(cdr, "sensor_msgs/msg/NavSatFix", [](Cursor& in) {
+Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "sensor_msgs/msg/NavSatFix", [](Cursor& in) {
     RosNavSatFix out;
     out.header = header(in);
     out.status = in.number<std::int8_t>("status.status");
@@ -211,8 +225,8 @@ Result<RosNavSatFix> decode_nav_sat_fix(std::string_view cdr) {
   });
 }
 
-Result<RosPoseStamped> decode_pose_stamped(std::string_view cdr) {
-  return decode(cdr, "geometry_msgs/msg/PoseStamped", [](Cursor& in) {
+Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding encoding) {
+  return decode(bytes, encoding, "geometry_msgs/msg/PoseStamped", [](Cursor& in) {
     RosPoseStamped out;
     out.header = header(in);
     out.pose = pose(in);

@@ -12,11 +12,16 @@
 #include "tutti/base/result.hpp"
 #include "tutti/base/timestamp.hpp"
 
-/// Messages of ROS 2 as they stand in bags and on the wire: CDR, the first version (XCDR1), of either byte order.
+/// Messages of ROS 2 as they stand in bags and on the wire: CDR, the first version (XCDR1), of either byte order; and
+/// those of ROS 1, which have the same fields, packed, and a number in their header, which is passed over.
 /// Fields have the names, units and frames of ROS's own definitions (common_interfaces). Lengths are checked, values
 /// are not: quaternions may be no rotations, covariances zero, -1 or nonsense, numbers not finite. What is a view is
 /// one into the bytes that were decoded.
 namespace tutti::bags {
+
+enum class RosEncoding { cdr, ros1 };
+/// Of a channel's "cdr" or "ros1".
+Result<RosEncoding> to_encoding(std::string_view name);
 
 struct RosHeader {
   Timestamp stamp;
@@ -110,16 +115,17 @@ struct RosPoseStamped {
   RosPose pose;
 };
 
-/// Each of all bytes of a message, its 4-byte encapsulation header with them. The error says type, byte (behind that
-/// header) and what was expected; more than the three bytes that fill up to a multiple of four may not be left.
-Result<RosOdometry> decode_odometry(std::string_view cdr);
-Result<std::vector<RosTransform>> decode_tf(std::string_view cdr);
-Result<RosPointCloud> decode_point_cloud(std::string_view cdr);
-Result<RosImu> decode_imu(std::string_view cdr);
-Result<RosImage> decode_image(std::string_view cdr);
-Result<RosCompressedImage> decode_compressed_image(std::string_view cdr);
-Result<RosCameraInfo> decode_camera_info(std::string_view cdr);
-Result<RosNavSatFix> decode_nav_sat_fix(std::string_view cdr);
-Result<RosPoseStamped> decode_pose_stamped(std::string_view cdr);
+/// Each of all bytes of a message, of CDR's its 4-byte encapsulation header with them. The error says type, byte
+/// (behind that header) and what was expected; more than the three bytes that fill up to a multiple of four may not be
+/// left.
+Result<RosOdometry> decode_odometry(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<std::vector<RosTransform>> decode_tf(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosPointCloud> decode_point_cloud(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosImu> decode_imu(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosImage> decode_image(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosCompressedImage> decode_compressed_image(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosCameraInfo> decode_camera_info(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosNavSatFix> decode_nav_sat_fix(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
+Result<RosPoseStamped> decode_pose_stamped(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 
 }  // namespace tutti::bags

@@ -32,6 +32,11 @@ void take_pose(OdometryTrack& track, Timestamp stamp, const Eigen::Vector3d& pos
 
 void refuse(OdometryTrack& track, const Error& error) { track.refused.add(++track.messages, error.message); }
 
+/// Of an encoding that is none of ROS's decoding says what it found instead of CDR.
+bags::RosEncoding encoding_of(const BagMessage& message) {
+  return bags::to_encoding(message.channel->message_encoding).value_or(bags::RosEncoding::cdr);
+}
+
 class Indexer {
  public:
   explicit Indexer(const std::string& pair) : pair_(pair) {}
@@ -56,7 +61,7 @@ class Indexer {
 
  private:
   static void take_odometry(OdometryTrack& track, const BagMessage& message) {
-    const auto odometry = bags::decode_odometry(message.data);
+    const auto odometry = bags::decode_odometry(message.data, encoding_of(message));
     if (!odometry) return refuse(track, odometry.error());
     if (track.messages == 0) {
       track.frame = bags::frame_name(odometry->header.frame_id);
@@ -66,7 +71,7 @@ class Indexer {
   }
 
   static void take_pose_stamped(OdometryTrack& track, const BagMessage& message) {
-    const auto pose = bags::decode_pose_stamped(message.data);
+    const auto pose = bags::decode_pose_stamped(message.data, encoding_of(message));
     if (!pose) return refuse(track, pose.error());
     if (track.messages == 0) track.frame = bags::frame_name(pose->header.frame_id);
     take_pose(track, pose->header.stamp, pose->pose.position, pose->pose.orientation);
@@ -74,7 +79,7 @@ class Indexer {
 
   void take_transforms(const BagMessage& message, bool is_static) {
     ++tf_messages_;
-    const auto transforms = bags::decode_tf(message.data);
+    const auto transforms = bags::decode_tf(message.data, encoding_of(message));
     if (!transforms) return index.bad_transforms.add(tf_messages_, transforms.error().message);
     for (const bags::RosTransform& transform : *transforms) {
       if (const auto ok = index.tree.add(transform, is_static); !ok)
@@ -92,7 +97,7 @@ class Indexer {
 
   static void take_scan(ScanTrack& track, const BagMessage& message) {
     ++track.messages;
-    const auto cloud = bags::decode_point_cloud(message.data);
+    const auto cloud = bags::decode_point_cloud(message.data, encoding_of(message));
     if (!cloud) return track.refused.add(track.messages, cloud.error().message);
     const std::string frame = bags::frame_name(cloud->header.frame_id);
     if (track.scans.empty()) track.frame = frame;

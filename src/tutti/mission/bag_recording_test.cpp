@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "support/bags/robot_bag.hpp"
+#include "support/bags/ros1_writer.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/base/config_io.hpp"
 #include "tutti/base/random.hpp"
@@ -141,6 +142,25 @@ TEST_F(Bags, ScansAreDeskewedByWhateverTimesPointsHave) {
     EXPECT_NE(notes_of(*input).find(said), std::string::npos) << notes_of(*input);
     EXPECT_EQ(input->robots.front().recording.scan_stamps.size(), kScans);
     EXPECT_LT(error_of(*input), 1e-3) << said;
+  }
+}
+
+TEST_F(Bags, OfRos1AreRunAlike) {
+  std::vector<Sample> samples;
+  samples.push_back(sample_of("/tf", "tf/tfMessage", kStart, tf_of(kStart, {{"/base_link", "/lidar", kBodyLidar}}, 2)));
+  for (const StampedPose& sample : odometry_)
+    samples.push_back(sample_of("/odom", kOdometry, sample.stamp,
+                                odometry_of(sample.stamp, sample.pose, "/odom", "/base_link", 0.0, 2)));
+  for (std::size_t i = 0; i < kScans; ++i)
+    samples.push_back(
+        sample_of("/points", kCloud, kStart + scan_time(i) + kSweep_s, cloud(i, {.time_field = "time", .how = 2})));
+  for (const char* const compression : {"none", "bz2", "lz4"}) {
+    write_bytes(folder_ / "bag", ros1_bag(samples, compression, 37));
+    const auto input = load();
+    ASSERT_TRUE(input) << input.error().message;
+    EXPECT_EQ(input->robots.front().recording.odometry.size(), odometry_.size());
+    EXPECT_EQ(input->robots.front().recording.scan_stamps.size(), kScans);
+    EXPECT_LT(error_of(*input), 1e-3);
   }
 }
 

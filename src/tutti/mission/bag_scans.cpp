@@ -66,7 +66,9 @@ class BagScans final : public ScanSource {
     if (!message) return in_context(name_of(place), message.error());
     if (!*message || (*message)->channel->topic != topic_)
       return fail(ErrorCode::io, "{}: is not there any more: has the bag changed?", name_of(place));
-    const auto decoded = bags::decode_point_cloud((*message)->data);
+    const auto encoding = bags::to_encoding((*message)->channel->message_encoding);
+    if (!encoding) return in_context(name_of(place), encoding.error());
+    const auto decoded = bags::decode_point_cloud((*message)->data, *encoding);
     if (!decoded) return in_context(name_of(place), decoded.error());
     auto cloud = bags::to_timed_cloud(*decoded);
     if (!cloud) return in_context(name_of(place), cloud.error());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bzlib.h>
 #include <lz4frame.h>
 
 #include <algorithm>
@@ -42,6 +43,14 @@ inline std::string message(std::uint16_t of_channel, std::uint64_t ns, std::stri
 
 inline std::string packed(std::string_view bytes, std::string_view compression) {
   if (compression == "zstd") return internal::pack_zstd(bytes);
+  if (compression == "bz2") {
+    auto size = static_cast<unsigned>(bytes.size() + bytes.size() / 100 + 600);
+    std::string out(size, '\0');
+    BZ2_bzBuffToBuffCompress(out.data(), &size, const_cast<char*>(bytes.data()), static_cast<unsigned>(bytes.size()), 9,
+                             0, 0);
+    out.resize(size);
+    return out;
+  }
   if (compression == "lz4") {
     std::string out(LZ4F_compressFrameBound(bytes.size(), nullptr), '\0');
     out.resize(LZ4F_compressFrame(out.data(), out.size(), bytes.data(), bytes.size(), nullptr));
@@ -73,16 +82,16 @@ inline std::string closed(std::string data, std::string_view definitions, std::u
   return data + kMagic;
 }
 
-/// Writes CDR of either byte order.
+/// Writes CDR of either byte order, or as ROS 1 does: `how` is 0 (little), 1 (big) or 2 (ROS 1).
 class CdrWriter {
  public:
-  explicit CdrWriter(bool big = false) : big_(big) {}
+  explicit CdrWriter(int how = 0) : how_(how) {}
 
   template <class T>
   CdrWriter& number(T value) {
-    out_.append((sizeof(T) - out_.size() % sizeof(T)) % sizeof(T), '\0');
+    if (how_ != 2) out_.append((sizeof(T) - out_.size() % sizeof(T)) % sizeof(T), '\0');
     std::string bytes = little(value);
-    if (big_) std::ranges::reverse(bytes);
+    if (how_ == 1) std::ranges::reverse(bytes);
     out_ += bytes;
     return *this;
   }
@@ -92,8 +101,9 @@ class CdrWriter {
     return *this;
   }
   CdrWriter& text(std::string_view value) {
-    number(static_cast<std::uint32_t>(value.size() + 1));
-    out_.append(value).append(1, '\0');
+    const bool nul = how_ != 2;
+    number(static_cast<std::uint32_t>(value.size() + (nul ? 1 : 0)));
+    out_.append(value).append(nul ? 1 : 0, '\0');
     return *this;
   }
   CdrWriter& bytes(std::string_view value) {
@@ -102,19 +112,21 @@ class CdrWriter {
     return *this;
   }
   CdrWriter& header(std::string_view frame, std::int32_t seconds = 7, std::uint32_t ns = 5) {
+    if (how_ == 2) number(std::uint32_t{99});  // seq
     return number(seconds).number(ns).text(frame);
   }
   [[nodiscard]] std::string done() const {
-    return std::string("\0", 1) + (big_ ? '\0' : '\1') + std::string("\0\0", 2) + out_;
+    if (how_ == 2) return out_;
+    return std::string("\0", 1) + (how_ == 1 ? '\0' : '\1') + std::string("\0\0", 2) + out_;
   }
 
  private:
-  bool big_;
+  int how_;
   std::string out_;
 };
 
-inline std::string odometry(std::string_view frame = "odom", std::string_view child = "base_link", bool big = false) {
-  return CdrWriter(big)
+inline std::string odometry(std::string_view frame = "odom", std::string_view child = "base_link", int how = 0) {
+  return CdrWriter(how)
       .header(frame)
       .text(child)
       .numbers(7, 1.0)
@@ -123,8 +135,8 @@ inline std::string odometry(std::string_view frame = "odom", std::string_view ch
       .numbers(36, 200.0)
       .done();
 }
-inline std::string transforms(bool big = false) {
-  return CdrWriter(big)
+inline std::string transforms(int how = 0) {
+  return CdrWriter(how)
       .number(std::uint32_t{2})
       .header("base")
       .text("lidar")
@@ -134,8 +146,8 @@ inline std::string transforms(bool big = false) {
       .numbers(7, 8.0)
       .done();
 }
-inline std::string point_cloud(bool big = false) {
-  return CdrWriter(big)
+inline std::string point_cloud(int how = 0) {
+  return CdrWriter(how)
       .header("lidar")
       .number(std::uint32_t{1})
       .number(std::uint32_t{2})
@@ -155,8 +167,8 @@ inline std::string point_cloud(bool big = false) {
       .number(std::uint8_t{1})
       .done();
 }
-inline std::string imu(bool big = false) {
-  return CdrWriter(big)
+inline std::string imu(int how = 0) {
+  return CdrWriter(how)
       .header("imu")
       .numbers(4, 1.0)
       .numbers(9, 10.0)
@@ -166,8 +178,8 @@ inline std::string imu(bool big = false) {
       .numbers(9, 50.0)
       .done();
 }
-inline std::string image(bool big = false) {
-  return CdrWriter(big)
+inline std::string image(int how = 0) {
+  return CdrWriter(how)
       .header("camera")
       .number(std::uint32_t{1})
       .number(std::uint32_t{3})
@@ -177,11 +189,11 @@ inline std::string image(bool big = false) {
       .bytes("abc")
       .done();
 }
-inline std::string compressed_image(bool big = false) {
-  return CdrWriter(big).header("camera").text("jpeg").bytes("\xff\xd8").done();
+inline std::string compressed_image(int how = 0) {
+  return CdrWriter(how).header("camera").text("jpeg").bytes("\xff\xd8").done();
 }
-inline std::string camera_info(bool big = false) {
-  return CdrWriter(big)
+inline std::string camera_info(int how = 0) {
+  return CdrWriter(how)
       .header("camera")
       .number(std::uint32_t{480})
       .number(std::uint32_t{752})
@@ -195,8 +207,8 @@ inline std::string camera_info(bool big = false) {
       .number(std::uint8_t{0})
       .done();
 }
-inline std::string nav_sat_fix(bool big = false) {
-  return CdrWriter(big)
+inline std::string nav_sat_fix(int how = 0) {
+  return CdrWriter(how)
       .header("gps")
       .number(std::int8_t{-1})
       .number(std::uint16_t{3})
@@ -205,6 +217,6 @@ inline std::string nav_sat_fix(bool big = false) {
       .number(std::uint8_t{2})
       .done();
 }
-inline std::string pose_stamped(bool big = false) { return CdrWriter(big).header("map").numbers(7, 1.0).done(); }
+inline std::string pose_stamped(int how = 0) { return CdrWriter(how).header("map").numbers(7, 1.0).done(); }
 
 }  // namespace tutti::bags::test

@@ -21,9 +21,8 @@
 namespace tutti::bags::test {
 
 inline void write_header(CdrWriter& out, Timestamp stamp, std::string_view frame) {
-  out.number(static_cast<std::int32_t>(stamp.ns / 1'000'000'000))
-      .number(static_cast<std::uint32_t>(stamp.ns % 1'000'000'000))
-      .text(frame);
+  out.header(frame, static_cast<std::int32_t>(stamp.ns / 1'000'000'000),
+             static_cast<std::uint32_t>(stamp.ns % 1'000'000'000));
 }
 inline void write_pose(CdrWriter& out, const Pose3& pose) {
   for (const double value : pose.translation) out.number(value);
@@ -32,8 +31,8 @@ inline void write_pose(CdrWriter& out, const Pose3& pose) {
 
 /// `covariance`: of every element.
 inline std::string odometry_of(Timestamp stamp, const Pose3& pose, std::string_view frame = "odom",
-                               std::string_view child = "base_link", double covariance = 0.0) {
-  CdrWriter out;
+                               std::string_view child = "base_link", double covariance = 0.0, int how = 0) {
+  CdrWriter out(how);
   write_header(out, stamp, frame);
   out.text(child);
   write_pose(out, pose);
@@ -47,8 +46,9 @@ inline std::string pose_stamped_of(Timestamp stamp, const Pose3& pose, std::stri
   return out.done();
 }
 /// {parent, child, T_parent_child}
-inline std::string tf_of(Timestamp stamp, const std::vector<std::tuple<std::string, std::string, Pose3>>& transforms) {
-  CdrWriter out;
+inline std::string tf_of(Timestamp stamp, const std::vector<std::tuple<std::string, std::string, Pose3>>& transforms,
+                         int how = 0) {
+  CdrWriter out(how);
   out.number(static_cast<std::uint32_t>(transforms.size()));
   for (const auto& [parent, child, pose] : transforms) {
     write_header(out, stamp, parent);
@@ -67,6 +67,7 @@ struct CloudShape {
   std::uint32_t rows = 1;
   std::uint32_t padding = 0;  ///< Bytes behind each row.
   std::string without;        ///< This coordinate is missing.
+  int how = 0;                ///< CdrWriter
 };
 
 /// `times`: seconds of each point, after the stamp or by its clock, written in the shape's unit.
@@ -107,7 +108,7 @@ inline std::string cloud_of(Timestamp stamp, std::string_view frame, const std::
     }
     if ((i + 1) % width == 0) data.append(shape.padding, '\xaa');
   }
-  CdrWriter out;
+  CdrWriter out(shape.how);
   write_header(out, stamp, frame);
   out.number(shape.rows).number(width).number(static_cast<std::uint32_t>(fields.size()));
   for (const auto& [name, offset, type] : fields) out.text(name).number(offset).number(type).number(std::uint32_t{1});

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/bags/internal/chunk.hpp"
 
+#include <bzlib.h>
 #include <lz4frame.h>
 #include <zstd.h>
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <memory>
 
 #include "tutti/base/check.hpp"
@@ -70,6 +72,29 @@ Result<std::string> unpack_lz4(std::string_view packed, std::uint64_t size, bool
   });
 }
 
+/// In one stream, as ROS 1 writes it.
+Result<std::string> unpack_bz2(std::string_view packed, std::uint64_t size, bool cut) {
+  bz_stream stream{};
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return fail(ErrorCode::io, "bz2: no memory for a decoder");
+  const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> end(&stream, BZ2_bzDecompressEnd);
+  bool ended = false;
+  return unpack(packed, size, cut, "bz2", [&](std::string_view in, char* out, std::size_t room) {
+    if (ended) return Progress{0, 0, true, in.empty() ? nullptr : "bytes behind its end"};
+    const auto most = [](std::size_t bytes) {
+      return static_cast<unsigned>(std::min<std::size_t>(bytes, std::numeric_limits<unsigned>::max()));
+    };
+    stream.next_in = const_cast<char*>(in.data());  // which it only reads
+    stream.avail_in = most(in.size());
+    stream.next_out = out;
+    stream.avail_out = most(room);
+    const unsigned before_in = stream.avail_in, before_out = stream.avail_out;
+    const int code = BZ2_bzDecompress(&stream);
+    ended = code == BZ_STREAM_END;
+    return Progress{before_in - stream.avail_in, before_out - stream.avail_out, ended,
+                    code == BZ_OK || ended ? nullptr : "is damaged"};
+  });
+}
+
 }  // namespace
 
 std::uint32_t crc32(std::string_view bytes, std::uint32_t before) {
@@ -105,7 +130,8 @@ Result<std::string> unpack_chunk(std::string_view packed, std::string_view compr
   }
   if (compression == "zstd") return unpack_zstd(packed, size, cut);
   if (compression == "lz4") return unpack_lz4(packed, size, cut);
-  return fail(ErrorCode::unsupported, "compression '{:.40}', expected none, zstd or lz4", compression);
+  if (compression == "bz2") return unpack_bz2(packed, size, cut);
+  return fail(ErrorCode::unsupported, "compression '{:.40}', expected none, zstd, lz4 or bz2", compression);
 }
 
 }  // namespace tutti::bags::internal

@@ -18,9 +18,9 @@ std::uint32_t crc32(std::string_view bytes, std::uint32_t before = 0);
 /// One zstd frame that says its size.
 std::string pack_zstd(std::string_view bytes);
 
-/// Unpacks the records of an MCAP chunk: compression "" (none), "zstd" or "lz4" (its frame format), `size` bytes
-/// unpacked. Memory grows with what really comes out, so that a length that lies costs nothing. Of a chunk that is
-/// `cut` off, what comes out before the cut. The error says what was expected.
+/// Unpacks the records of a chunk: compression "" (none), "zstd", "lz4" (its frame format) or "bz2" (ROS 1's), `size`
+/// bytes unpacked. Memory grows with what really comes out, so that a length that lies costs nothing. Of a chunk that
+/// is `cut` off, what comes out before the cut. The error says what was expected.
 Result<std::string> unpack_chunk(std::string_view packed, std::string_view compression, std::uint64_t size, bool cut);
 
 }  // namespace tutti::bags::internal

@@ -19,12 +19,13 @@ namespace tutti::bags::internal {
 class Cursor {
  public:
   enum class Order { little, big };
-  /// MCAP packs its numbers; CDR aligns each to its own size, counted from the first of `bytes`.
+  /// MCAP and ROS 1 pack their numbers; CDR aligns each to its own size, counted from the first of `bytes`.
   enum class Layout { packed, aligned };
 
   explicit Cursor(std::string_view bytes, Order order = Order::little, Layout layout = Layout::packed)
       : bytes_(bytes), order_(order), layout_(layout) {}
 
+  [[nodiscard]] Layout layout() const { return layout_; }
   [[nodiscard]] std::size_t at() const { return at_; }
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
   [[nodiscard]] bool ok() const { return !error_; }

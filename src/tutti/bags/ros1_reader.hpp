@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <istream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tutti/bags/bag_reader.hpp"
+
+namespace tutti::bags {
+
+/// ROS 1 bags, format 2.0 (http://wiki.ros.org/Bags/Format/2.0), their chunks packed by bz2, lz4 or not. Types are
+/// given the names that ROS 2 has for them. A bag that was never closed, or is cut off, is read up to the last whole
+/// message, also within its last chunk, and a note says so. An error names byte and record.
+class Ros1Reader final : public BagReader {
+ public:
+  static Result<Ros1Reader> open(const std::string& path);
+  /// `name` is for the errors.
+  static Result<Ros1Reader> open(std::unique_ptr<std::istream> stream, std::string name);
+
+  Result<std::optional<BagMessage>> next() override;
+  Status seek(const BagPosition& position) override;
+  /// Of the index at once.
+  [[nodiscard]] std::vector<const BagChannel*> channels() const override;
+  [[nodiscard]] std::optional<std::uint64_t> stated_messages() const override { return stated_messages_; }
+  [[nodiscard]] std::vector<std::string> notes() const override { return notes_; }
+  [[nodiscard]] std::string storage() const override { return fmt::format("ROS 1 bag, {} chunks", chunks_read_); }
+
+ private:
+  enum class Op : std::uint8_t { message = 2, bag_header, index, chunk, chunk_info, connection };
+  /// What its header says, as far as it is there.
+  struct Record {
+    Op op{};
+    std::uint32_t connection = 0;
+    Timestamp time;
+    std::string topic, compression;
+    std::uint32_t size = 0;  ///< Of a chunk, unpacked.
+    std::uint64_t index_at = 0;
+    std::uint32_t chunks = 0;  ///< Of the bag.
+    std::uint64_t data_size = 0;
+    BagPosition position;
+  };
+
+  Ros1Reader(std::unique_ptr<std::istream> stream, std::string name)
+      : stream_(std::move(stream)), name_(std::move(name)) {}
+  static std::string name_of(Op op);
+  Status start();
+  void read_index(std::uint64_t at, std::uint32_t chunks);
+  Status read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out);
+  [[nodiscard]] Result<Record> parse_header(std::string_view header, const BagPosition& position) const;
+  Result<std::optional<Record>> next_record();
+  Result<std::optional<BagMessage>> next_of_file();
+  Result<std::optional<BagMessage>> next_of_chunk();
+  Result<std::optional<BagMessage>> take(const Record& record, std::string_view data);
+  Status enter_chunk(const Record& record);
+  Status define(const Record& record, std::string_view data);
+  void end(std::string note);
+  template <class... Args>
+  [[nodiscard]] tl::unexpected<Error> fail_at(const BagPosition& position, ErrorCode code,
+                                              fmt::format_string<Args...> format, Args&&... args) const;
+
+  std::unique_ptr<std::istream> stream_;
+  std::string name_;
+  std::uint64_t size_ = 0;    ///< Of the file.
+  std::uint64_t offset_ = 0;  ///< Of the next record.
+  std::uint64_t stream_at_ = 0;
+  bool ended_ = false;
+  bool cut_ = false;  ///< The file ends in the record that was read last.
+  std::string data_;  ///< Of the record of the file that was read last.
+  std::string chunk_;
+  std::size_t chunk_at_ = 0;
+  std::uint64_t chunk_offset_ = 0;
+  bool chunk_cut_ = false;
+  std::uint64_t chunks_read_ = 0;
+  bool all_defined_ = false;
+  std::map<std::uint32_t, BagChannel> channels_;
+  std::optional<std::uint64_t> stated_messages_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace tutti::bags
