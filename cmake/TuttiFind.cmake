@@ -30,7 +30,7 @@ endfunction()
 set(TUTTI_THIRD_PARTY
   "Eigen3::Eigen|Eigen3 3.4 NO_MODULE" "tl::expected|tl-expected" "fmt::fmt|fmt" "spdlog::spdlog|spdlog"
   "yaml-cpp|yaml-cpp" "nlohmann_json::nlohmann_json|nlohmann_json" "CLI11::CLI11|CLI11"
-  "protobuf::libprotobuf-lite|Protobuf" "PNG::PNG|PNG" "Threads::Threads|Threads" "Spectra::Spectra|spectra"
+  "protobuf::libprotobuf-lite|Protobuf" "PNG::PNG|PNG" "ZLIB::ZLIB|ZLIB" "Threads::Threads|Threads" "Spectra::Spectra|spectra"
   "Ceres::ceres|Ceres 2.1"
   "tutti::cholmod|import cholmod.h LIBS cholmod SUFFIXES suitesparse"
   "tutti::lapacke|import lapacke.h LIBS lapacke openblas"
