@@ -39,7 +39,7 @@ bags::RosEncoding encoding_of(const BagMessage& message) {
 
 class Indexer {
  public:
-  explicit Indexer(const std::string& pair) : pair_(pair) {}
+  Indexer(const std::string& pair, bool with_images) : pair_(pair), with_images_(with_images) {}
 
   void take(const BagMessage& message) {
     const std::string& topic = message.channel->topic;
@@ -53,6 +53,7 @@ class Indexer {
       case bags::Use::scans:
         return take_scan(index.scans[topic], message);
       default:
+        if (with_images_) take_sight(message);
         return;
     }
   }
@@ -112,7 +113,56 @@ class Indexer {
       track.refused.add(track.messages, ok.error().message);
   }
 
+  void take_sight(const BagMessage& message) {
+    const std::string& topic = message.channel->topic;
+    const bags::RosEncoding encoding = encoding_of(message);
+    const bags::Use use = bags::use_of(message.channel->type);
+    if (use == bags::Use::calibration && !index.cameras.contains(topic)) {
+      if (auto info = bags::decode_camera_info(message.data, encoding)) index.cameras.emplace(topic, std::move(*info));
+    } else if (use == bags::Use::imu) {
+      take_imu(index.imu[topic], message);
+    } else if (use == bags::Use::images) {
+      ImageTrack& track = index.images[topic];
+      track.is_compressed = message.channel->type != "sensor_msgs/msg/Image";
+      if (track.is_compressed)
+        take_image(track, message, bags::decode_compressed_image(message.data, encoding),
+                   &bags::RosCompressedImage::format);
+      else
+        take_image(track, message, bags::decode_image(message.data, encoding), &bags::RosImage::encoding);
+    }
+  }
+
+  template <class Message>
+  static void take_image(ImageTrack& track, const BagMessage& message, const Result<Message>& image,
+                         std::string Message::*encoding) {
+    ++track.messages;
+    if (!image) return track.refused.add(track.messages, image.error().message);
+    const Timestamp stamp = image->header.stamp;
+    if (track.images.empty()) {
+      track.frame = bags::frame_name(image->header.frame_id);
+      track.encoding = (*image).*encoding;
+    } else if (auto ok = check_stamp(stamp, track.images.back().stamp); !ok) {
+      return track.refused.add(track.messages, ok.error().message);
+    }
+    track.images.push_back({stamp, message.position, track.messages});
+  }
+
+  static void take_imu(ImuTrack& track, const BagMessage& message) {
+    ++track.messages;
+    const auto imu = bags::decode_imu(message.data, encoding_of(message));
+    if (!imu) return track.refused.add(track.messages, imu.error().message);
+    const ImuSample sample{imu->header.stamp, imu->angular_velocity, imu->linear_acceleration};
+    if (track.samples.empty()) track.frame = bags::frame_name(imu->header.frame_id);
+    if (!sample.gyro.allFinite() || !sample.accelerometer.allFinite())
+      return track.refused.add(track.messages, "not all numbers are finite");
+    if (!track.samples.empty())
+      if (auto ok = check_stamp(sample.stamp, track.samples.back().stamp); !ok)
+        return track.refused.add(track.messages, ok.error().message);
+    track.samples.push_back(sample);
+  }
+
   const std::string& pair_;
+  bool with_images_;
   std::uint64_t tf_messages_ = 0;
 };
 
@@ -122,8 +172,8 @@ void Refusals::add(std::uint64_t message, const std::string& why) {
   if (count++ == 0) first = fmt::format("message {}: {}", message, why);
 }
 
-BagIndex index_bag(bags::BagReader& bag, const std::string& pair) {
-  Indexer indexer(pair);
+BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_images) {
+  Indexer indexer(pair, with_images);
   BagIndex& index = indexer.index;
   while (true) {
     const auto message = bag.next();

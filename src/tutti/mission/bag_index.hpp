@@ -12,6 +12,7 @@
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/model/visual.hpp"
 
 namespace tutti::mission {
 
@@ -30,6 +31,7 @@ struct OdometryTrack {
   Refusals refused;
 };
 
+/// Of a scan or an image.
 struct ScanPlace {
   Timestamp stamp;
   bags::BagPosition position;
@@ -43,6 +45,21 @@ struct ScanTrack {
   Refusals refused;
 };
 
+/// Images of one topic; `encoding` is "jpeg" and the like of compressed ones.
+struct ImageTrack {
+  std::vector<ScanPlace> images;
+  std::string frame, encoding;
+  bool is_compressed = false;
+  std::uint64_t messages = 0;
+  Refusals refused;
+};
+struct ImuTrack {
+  std::vector<ImuSample> samples;  ///< In `frame`.
+  std::string frame;
+  std::uint64_t messages = 0;
+  Refusals refused;
+};
+
 /// What a mission wants to know of a bag before it reads scans one by one. Poses of all topics that may be odometry's
 /// are held, of /tf those in frames called odom.
 struct BagIndex {
@@ -50,12 +67,16 @@ struct BagIndex {
   std::map<std::string, OdometryTrack> poses;       ///< geometry_msgs/PoseStamped;
   std::map<std::string, OdometryTrack> transforms;  ///< "odom->base_link".
   std::map<std::string, ScanTrack> scans;
+  std::map<std::string, ImageTrack> images;
+  std::map<std::string, bags::RosCameraInfo> cameras;  ///< The first message of each topic.
+  std::map<std::string, ImuTrack> imu;
   bags::TransformTree tree;
   Refusals bad_transforms, bad_records;
   std::vector<std::string> notes;  ///< The bag's own.
 };
 
-/// Reads all of it once. `pair`: "map->base" is held too, whatever it is called.
-BagIndex index_bag(bags::BagReader& bag, const std::string& pair);
+/// Reads all of it once. `pair`: "map->base" is held too, whatever it is called. Images, cameras and IMUs only
+/// `with_images`.
+BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_images);
 
 }  // namespace tutti::mission

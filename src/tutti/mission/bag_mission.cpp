@@ -39,8 +39,9 @@ Result<std::string> bag_mission(const std::vector<std::string>& bags, const std:
     const auto at =
         std::ranges::find_if(robots.list, [&](const ConfigNode& node) { return node.find("name")->scalar == robot; });
     const std::string kind = dot == std::string::npos ? "" : named->first.substr(dot + 1);
-    if (at == robots.list.end() || (kind != "odometry" && kind != "scans"))
-      return fail(ErrorCode::configuration, "--topic {}: expected NAME.odometry= or NAME.scans= of a robot with --bag",
+    if (at == robots.list.end() || (kind != "odometry" && kind != "scans" && kind != "images" && kind != "imu"))
+      return fail(ErrorCode::configuration,
+                  "--topic {}: expected NAME.odometry=, NAME.scans=, NAME.images= or NAME.imu= of a robot with --bag",
                   argument);
     at->map.back().second.map.emplace_back(kind, scalar(named->second));
   }

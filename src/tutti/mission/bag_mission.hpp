@@ -9,8 +9,8 @@
 namespace tutti::mission {
 
 /// The mission file of `tutti run --bag`: a robot a bag, LiDAR closures, everything else as it is by default.
-/// `bags`: "alpha=recordings/alpha"; `topics`: "alpha.scans=/points", of odometry or scans. The error says which of
-/// them is not understood.
+/// `bags`: "alpha=recordings/alpha"; `topics`: "alpha.scans=/points", of odometry, scans, images or imu. The error says
+/// which of them is not understood.
 Result<std::string> bag_mission(const std::vector<std::string>& bags, const std::vector<std::string>& topics);
 
 }  // namespace tutti::mission

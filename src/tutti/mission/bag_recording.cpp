@@ -135,12 +135,12 @@ Status check_clock(const BagRecording& bag) {
 
 }  // namespace
 
-Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot) {
+Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bool with_images) {
   BagRecording out;
   out.file = (data / robot.bag).string();
   const auto reader = bags::open_bag(out.file);
   if (!reader) return tl::unexpected(reader.error());
-  BagIndex index = index_bag(**reader, robot.topics.odometry);
+  BagIndex index = index_bag(**reader, robot.topics.odometry, with_images);
   out.notes = index.notes;
   if (const Refusals& bad = index.bad_records; bad.count > 0)
     out.notes.push_back(
@@ -155,6 +155,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot) {
   out.odometry = track.poses;
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
   if (track.refused.count > 0) out.notes.push_back(note_refused(source, track.refused, track.messages));
+  if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
     if (robot.topics.scans.empty() && index.scans.empty()) what += ", no scans (sensor_msgs/PointCloud2)";
     if (!index.scans.empty()) what += fmt::format(", no scans: {}", list_of(index.scans));

@@ -315,8 +315,41 @@ TEST_F(Bags, WithoutScansThereIsNothingToCloseOn) {
   std::vector<Sample> samples = robot({});
   std::erase_if(samples, [](const Sample& sample) { return sample.type == kCloud; });
   write(samples);
-  EXPECT_NE(problem().find("no scans (sensor_msgs/PointCloud2); but closures.finder is 'lidar'"), std::string::npos)
+  EXPECT_NE(problem().find("no scans (sensor_msgs/PointCloud2); but closures.finder is 'lidar', expected"),
+            std::string::npos)
       << problem();
+}
+
+TEST_F(Bags, ImagesAndImuAreTakenWhereClosuresAreFoundFromThem) {
+  write(with_camera(robot({}), odometry_, kBodyLidar, "mono8"));
+  EXPECT_EQ(load()->robots.front().recording.visual, nullptr);  // closures are LiDAR's
+  const auto input = load({}, {"closures.finder=sensors"});
+  ASSERT_TRUE(input) << input.error().message;
+  const Recording& recording = input->robots.front().recording;
+  EXPECT_NE(recording.scans, nullptr);
+  ASSERT_NE(recording.visual, nullptr);
+  const TrackedImages images = recording.visual->images(0, true);
+  ASSERT_EQ(images.images.size(), 1U) << notes_of(*input);
+  EXPECT_FALSE(images.images[0].keypoints.empty());
+  EXPECT_EQ(images.cameras->front().model.fx, 100.0);
+  ASSERT_EQ(recording.imu.size(), 50U);
+  EXPECT_LT((recording.imu[0].gyro - Eigen::Vector3d(-2, 1, 3)).norm(), 1e-12);  // a quarter turn of 1 2 3
+  EXPECT_LT((recording.imu[0].accelerometer - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
+}
+
+TEST_F(Bags, ImagesThatCannotBeUsedAreSaid) {
+  write(with_camera(robot({}), odometry_, kBodyLidar, "32FC1"));
+  EXPECT_NE(
+      load({}, {"closures.finder=visual"}).error().message.find("/camera/image_raw: encoding '32FC1' is no picture"),
+      std::string::npos);
+  std::vector<Sample> samples = with_camera(robot({}), odometry_, kBodyLidar, "mono8");
+  std::erase_if(samples, [](const Sample& sample) { return sample.topic == "/camera/camera_info"; });
+  write(samples);
+  const auto input = load({}, {"closures.finder=sensors"});
+  ASSERT_TRUE(input) << input.error().message;
+  EXPECT_NE(notes_of(*input).find("no images are used: /camera/image_raw: no sensor_msgs/CameraInfo beside it"),
+            std::string::npos)
+      << notes_of(*input);
 }
 
 /// Real scans: what a mission gets of a bag is what it gets of files.

@@ -36,7 +36,8 @@ void check_images(const RobotConfig& robot, const std::string& path, const Probl
   if (robot.odometry.file.empty() && robot.bag.empty() && !from_maplab) problem(path + ".odometry.file: missing");
   if (!robot.bag.empty() && (!robot.odometry.file.empty() || !robot.scans.empty() || from_maplab))
     problem(path + ".bag: given, and odometry or scans of files too, expected one of them");
-  if (robot.bag.empty() && !(robot.topics.odometry.empty() && robot.topics.scans.empty()))
+  const BagTopicsConfig& topics = robot.topics;
+  if (robot.bag.empty() && !(topics.odometry + topics.scans + topics.images + topics.imu).empty())
     problem(path + ".topics: given, but there is no bag");
   if (!robot.odometry.file.empty() && from_maplab)
     problem(path + ".odometry.file: given, but images.maplab_submaps have the odometry");
@@ -113,7 +114,7 @@ std::vector<std::string> problems_of_finder(const MissionConfig& config) {
   for (std::size_t i = 0; i < config.robots.size(); ++i) {
     if (config.closures.finder == "lidar" && config.robots[i].scans.empty() && config.robots[i].bag.empty())
       problems.push_back(fmt::format("robots.{}.scans: missing, but closures.finder is 'lidar'", i));
-    if (config.closures.finder == "visual" && !config.robots[i].images.is_given())
+    if (config.closures.finder == "visual" && !config.robots[i].images.is_given() && config.robots[i].bag.empty())
       problems.push_back(fmt::format("robots.{}.images: missing, but closures.finder is 'visual'", i));
   }
   return problems;

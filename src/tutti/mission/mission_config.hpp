@@ -116,11 +116,16 @@ struct ImagesConfig {
 struct BagTopicsConfig {
   std::string odometry;
   std::string scans;
+  std::string images;
+  std::string imu;
   template <class V>
   void describe(V& v) {
     v.field("odometry", odometry, any(),
             "A topic of nav_msgs/Odometry or geometry_msgs/PoseStamped, or two frames of /tf: \"odom->base_link\".");
     v.field("scans", scans, any(), "A topic of sensor_msgs/PointCloud2.");
+    v.field("images", images, any(),
+            "Topics of sensor_msgs/Image or CompressedImage: of one camera, or of two with a comma between them.");
+    v.field("imu", imu, any(), "A topic of sensor_msgs/Imu.");
   }
 };
 

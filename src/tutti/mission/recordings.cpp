@@ -70,8 +70,53 @@ Result<std::pair<Trajectory, Pose3>> read_reference(const RobotConfig& robot, co
   return std::pair(std::move(*reference), T_common_reference);
 }
 
-Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, const visual::TrackingConfig& tracking,
+void take_images(RobotImages images, Recording& out) {
+  out.visual = std::move(images.visual);
+  out.image_stamps = std::move(images.stamps);
+  out.imu = std::move(images.imu);
+  out.imu_noise = images.imu_noise;
+}
+
+/// What the bag has beside odometry, which may have been changed.
+Status take_bag(const BagRecording& bag, const Trajectory& odometry, const RobotConfig& robot,
+                const visual::TrackingConfig& tracking, MissionRecording& out) {
+  const auto note = [&](const std::string& text) { out.notes.push_back(fmt::format("{}: {}", robot.name, text)); };
+  for (const std::string& text : bag.notes) note(text);
+  if (!bag.scans.empty()) {
+    std::string how;
+    auto scans = open_scans(bag, odometry, robot, how);
+    if (!scans) return tl::unexpected(scans.error());
+    out.recording.scans = std::move(*scans);
+    for (const ScanPlace& place : bag.scans) out.recording.scan_stamps.push_back(place.stamp);
+    note(how);
+  }
+  if (!bag.no_images.empty()) note("no images are used: " + bag.no_images);
+  if (bag.cameras.empty()) return {};
+  auto images = open_images(bag, odometry, robot, tracking);
+  if (!images) return tl::unexpected(images.error());
+  note(images->note);
+  take_images(std::move(*images), out.recording);
+  return {};
+}
+
+/// A bag without what closures are found from would silently have none.
+Status check_bag(const RobotConfig& robot, const std::string& finder, const MissionRecording& loaded) {
+  const bool has = finder == "lidar"    ? loaded.recording.scans != nullptr
+                   : finder == "visual" ? loaded.recording.visual != nullptr
+                                        : loaded.recording.scans != nullptr || loaded.recording.visual != nullptr;
+  if (robot.bag.empty() || has) return {};
+  std::string said;
+  for (const std::string& text : loaded.notes) said += (said.empty() ? "" : "; ") + text;
+  return fail(
+      ErrorCode::invalid,
+      "robot {}: {}; but closures.finder is '{}', expected lidar of scans, visual of images, sensors of what is "
+      "there (--set closures.finder=..)",
+      robot.name, said, finder);
+}
+
+Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, const MissionConfig& config,
                                 const ChangeOdometry& change) {
+  const visual::TrackingConfig& tracking = config.tracking;
   std::optional<formats::MaplabRecording> maplab;
   if (!robot.images.maplab_submaps.empty()) {
     auto read = read_maplab(robot.images, data);
@@ -80,7 +125,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   }
   std::optional<BagRecording> bag;
   if (!robot.bag.empty()) {
-    auto read = read_bag(data, robot);
+    auto read = read_bag(data, robot, config.closures.finder != "lidar" && !robot.images.is_given());
     if (!read) return tl::unexpected(read.error());
     bag = std::move(*read);
   }
@@ -121,26 +166,14 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     out.notes.push_back(fmt::format("{}: {}", robot.name, (*scans)->note()));
     out.recording.scans = *scans;
   }
-  if (bag) {
-    for (const std::string& note : bag->notes) out.notes.push_back(fmt::format("{}: {}", robot.name, note));
-    if (!bag->scans.empty()) {
-      std::string note;
-      auto scans = open_scans(*bag, raw, robot, note);
-      if (!scans) return tl::unexpected(scans.error());
-      out.recording.scans = std::move(*scans);
-      for (const ScanPlace& place : bag->scans) out.recording.scan_stamps.push_back(place.stamp);
-      out.notes.push_back(fmt::format("{}: {}", robot.name, note));
-    }
-  }
+  if (bag)
+    if (auto ok = take_bag(*bag, raw, robot, tracking, out); !ok) return tl::unexpected(ok.error());
   if (robot.images.is_given()) {
     auto images =
         maplab ? listed_images(*maplab, robot.images, data, raw, from) : open_images(robot.images, data, raw, tracking);
     if (!images) return tl::unexpected(images.error());
     out.notes.push_back(fmt::format("{}: {}", robot.name, images->note));
-    out.recording.visual = std::move(images->visual);
-    out.recording.image_stamps = std::move(images->stamps);
-    out.recording.imu = std::move(images->imu);
-    out.recording.imu_noise = images->imu_noise;
+    take_images(std::move(*images), out.recording);
   }
   out.recording.increment_covariance = increment_covariances(raw, robot.covariance);
   out.recording.odometry = std::move(raw);
@@ -152,14 +185,12 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
   std::vector<MissionRecording> out;
   for (const RobotConfig& robot : config.robots) {
     const ChangeOdometry change = out.size() < changes.size() ? changes[out.size()] : ChangeOdometry();
-    auto loaded = replay(robot, data, config.tracking, change);
+    auto loaded = replay(robot, data, config, change);
     if (!loaded) return in_context("robot " + robot.name, loaded.error());
     loaded->recording.robot = RobotId{static_cast<std::uint32_t>(out.size())};
     loaded->recording.name = robot.name;
     loaded->start_s = robot.start_s;
-    if (!robot.bag.empty() && config.closures.finder == "lidar" && !loaded->recording.scans)
-      return fail(ErrorCode::invalid, "robot {}: {}; but closures.finder is 'lidar'", robot.name,
-                  loaded->notes.front());
+    if (auto ok = check_bag(robot, config.closures.finder, *loaded); !ok) return tl::unexpected(ok.error());
     loaded->score_against_reference = robot.score_against_reference && !loaded->recording.reference.empty();
     out.push_back(std::move(*loaded));
   }

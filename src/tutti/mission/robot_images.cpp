@@ -159,7 +159,13 @@ Result<RobotImages> open_images(const ImagesConfig& config, const fs::path& data
   if (auto ok = check_first_images(folder->cameras.front().images); !ok) return tl::unexpected(ok.error());
   ImageStream stream = formats::stream_images(std::move(folder->cameras), tracking.max_stamp_difference_s);
   if (auto ok = read_depth(config, data, stream); !ok) return tl::unexpected(ok.error());
-  RobotImages out{.visual = nullptr, .imu = std::move(folder->imu), .imu_noise = folder->imu_noise, .note = {}};
+  return serve_images(std::move(stream), std::move(folder->imu), folder->imu_noise, config, odometry, tracking);
+}
+
+Result<RobotImages> serve_images(ImageStream stream, std::vector<ImuSample> imu, const ImuNoise& noise,
+                                 const ImagesConfig& config, const Trajectory& odometry,
+                                 const visual::TrackingConfig& tracking) {
+  RobotImages out{.visual = nullptr, .imu = std::move(imu), .imu_noise = noise, .note = {}};
   out.note = fmt::format("{} images of {}, {}", stream.stamps.size(),
                          stream.load_depth            ? "one camera with depth"
                          : stream.cameras.size() == 1 ? "one camera"

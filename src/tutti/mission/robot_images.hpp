@@ -9,6 +9,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/formats/maplab_submaps.hpp"
 #include "tutti/mission/mission_config.hpp"
+#include "tutti/model/image_stream.hpp"
 #include "tutti/model/recording.hpp"
 
 namespace tutti::mission {
@@ -36,5 +37,10 @@ Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const 
 /// be read is an error, too.
 Result<RobotImages> open_images(const ImagesConfig& config, const std::filesystem::path& data,
                                 const Trajectory& odometry, const visual::TrackingConfig& tracking);
+
+/// The last part of that: points are followed through `stream`, by the stamps of its images and those of odometry.
+Result<RobotImages> serve_images(ImageStream stream, std::vector<ImuSample> imu, const ImuNoise& noise,
+                                 const ImagesConfig& config, const Trajectory& odometry,
+                                 const visual::TrackingConfig& tracking);
 
 }  // namespace tutti::mission

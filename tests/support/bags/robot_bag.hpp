@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "support/bags/rosbag2_writer.hpp"
+#include "tutti/base/random.hpp"
 #include "tutti/base/timestamp.hpp"
 #include "tutti/formats/pcd.hpp"
 #include "tutti/geometry/pose3.hpp"
@@ -132,6 +133,35 @@ inline std::vector<Sample> samples_of(const Trajectory& poses, const std::filesy
     out.push_back(sample_of("/points", kCloud, stamp, cloud_of(stamp, "body", cloud.cloud.points)));
   }
   return out;
+}
+
+/// With a camera that looks at one picture, and an IMU that is turned by a quarter about z.
+inline std::vector<Sample> with_camera(std::vector<Sample> samples, const Trajectory& odometry,
+                                       const Pose3& T_base_camera, const std::string& encoding) {
+  const Timestamp start = odometry.front().stamp;
+  const Pose3 turned{Eigen::Quaterniond(std::sqrt(0.5), 0, 0, std::sqrt(0.5)), Eigen::Vector3d::Zero()};
+  samples.push_back(sample_of("/tf_static", kTf, start,
+                              tf_of(start, {{"base_link", "camera", T_base_camera}, {"base_link", "imu", turned}})));
+  Rng rng(4);
+  std::string pixels(160 * 120, '\0');
+  for (char& pixel : pixels) pixel = static_cast<char>(rng.index(256));
+  for (std::size_t i = 0; i < odometry.size(); i += 5) {
+    const Timestamp stamp = odometry[i].stamp;
+    CdrWriter image, info, imu;
+    write_header(image, stamp, "camera");
+    image.number(std::uint32_t{120}).number(std::uint32_t{160}).text(encoding);
+    image.number(std::uint8_t{0}).number(std::uint32_t{160}).bytes(pixels);
+    write_header(info, stamp, "camera");
+    info.number(std::uint32_t{120}).number(std::uint32_t{160}).text("plumb_bob").number(std::uint32_t{0});
+    for (const double k : {100.0, 0.0, 80.0, 0.0, 100.0, 60.0, 0.0, 0.0, 1.0}) info.number(k);
+    info.numbers(9, 0.0).numbers(12, 0.0).numbers(6, std::uint32_t{0}).number(std::uint8_t{0});
+    write_header(imu, stamp, "imu");
+    imu.numbers(4, 0.0).numbers(9, 0.0).numbers(3, 1.0).numbers(9, 0.0).numbers(3, 4.0).numbers(9, 0.0);
+    samples.push_back(sample_of("/camera/image_raw", "sensor_msgs/msg/Image", stamp, image.done()));
+    samples.push_back(sample_of("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info.done()));
+    samples.push_back(sample_of("/imu", "sensor_msgs/msg/Imu", stamp, imu.done()));
+  }
+  return samples;
 }
 
 }  // namespace tutti::bags::test

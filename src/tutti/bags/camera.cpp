@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/camera.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+
+namespace tutti::bags {
+namespace {
+
+/// Bytes of a pixel, and where its red is; of grey -1, of a Bayer pattern -2.
+struct PixelLayout {
+  std::string_view name;
+  std::uint32_t bytes = 1;
+  int red = -1;
+};
+constexpr int kGrey = -1, kBayer = -2;
+constexpr std::array kLayouts{PixelLayout{"mono8", 1, kGrey},
+                              PixelLayout{"8UC1", 1, kGrey},
+                              PixelLayout{"rgb8", 3, 0},
+                              PixelLayout{"bgr8", 3, 2},
+                              PixelLayout{"8UC3", 3, 2},
+                              PixelLayout{"rgba8", 4, 0},
+                              PixelLayout{"bgra8", 4, 2},
+                              PixelLayout{"bayer_rggb8", 1, kBayer},
+                              PixelLayout{"bayer_bggr8", 1, kBayer},
+                              PixelLayout{"bayer_gbrg8", 1, kBayer},
+                              PixelLayout{"bayer_grbg8", 1, kBayer}};
+
+const PixelLayout* layout_of(std::string_view encoding) {
+  const auto at = std::ranges::find(kLayouts, encoding, &PixelLayout::name);
+  return at == kLayouts.end() ? nullptr : &*at;
+}
+
+Result<CameraKind> kind_of(const RosCameraInfo& message) {
+  const std::string& model = message.distortion_model;
+  const std::size_t numbers = message.d.size();
+  if (numbers == 0) return CameraKind::pinhole;
+  if (model == "plumb_bob" && (numbers == 4 || (numbers == 5 && message.d[4] == 0.0))) return CameraKind::pinhole;
+  if (model == "plumb_bob" && numbers == 5) return CameraKind::rational;
+  if (model == "rational_polynomial" && numbers == 8) return CameraKind::rational;
+  if ((model == "equidistant" || model == "fisheye") && numbers == 4) return CameraKind::equidistant;
+  if (model == "double_sphere" && numbers == 2) return CameraKind::double_sphere;
+  return fail(ErrorCode::unsupported,
+              "distortion_model '{:.40}' with {} numbers, expected plumb_bob (4 or 5), rational_polynomial (8), "
+              "equidistant (4) or double_sphere (2)",
+              model, numbers);
+}
+
+std::uint8_t mean_of_four(const std::uint8_t* at, std::size_t right, std::size_t below) {
+  return static_cast<std::uint8_t>((at[0] + at[right] + at[below] + at[right + below] + 2) / 4);
+}
+
+/// By ITU-R BT.709, as PNG files are read.
+std::uint8_t luminance(const std::uint8_t* pixel, int red) {
+  constexpr int kRed = 13933, kGreen = 46871, kBlue = 4732;  // of 65536
+  return static_cast<std::uint8_t>((kRed * pixel[red] + kGreen * pixel[1] + kBlue * pixel[2 - red] + 32768) / 65536);
+}
+
+}  // namespace
+
+Result<CameraModel> to_camera(const RosCameraInfo& message) {
+  const auto kind = kind_of(message);
+  if (!kind) return tl::unexpected(kind.error());
+  constexpr std::uint32_t kMost_px = 1 << 16;
+  if (message.width > kMost_px || message.height > kMost_px)
+    return fail(ErrorCode::invalid, "{} x {} pixels, expected at most {} each", message.width, message.height,
+                kMost_px);
+  if (message.binning_x > 1 || message.binning_y > 1)
+    return fail(ErrorCode::unsupported, "binning {} x {}, expected none", message.binning_x, message.binning_y);
+  CameraModel out{.kind = *kind,
+                  .width_px = static_cast<int>(message.width),
+                  .height_px = static_cast<int>(message.height),
+                  .fx = message.k[0],
+                  .fy = message.k[4],
+                  .cx = message.k[2],
+                  .cy = message.k[5]};
+  const std::size_t numbers =
+      *kind == CameraKind::pinhole ? std::min<std::size_t>(4, message.d.size()) : message.d.size();
+  std::copy_n(message.d.begin(), numbers, out.distortion.begin());
+  if (auto ok = check_camera(out); !ok) return in_context("is the camera calibrated?", ok.error());
+  return out;
+}
+
+bool is_picture(std::string_view encoding) { return layout_of(encoding) != nullptr; }
+
+Result<Image> to_image(const RosImage& message) {
+  const PixelLayout* const layout = layout_of(message.encoding);
+  if (layout == nullptr)
+    return fail(ErrorCode::unsupported, "encoding '{:.40}', expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8",
+                message.encoding);
+  const std::uint64_t row = std::uint64_t{message.width} * layout->bytes;
+  if (message.width == 0 || message.height == 0 || message.step < row ||
+      message.data.size() < (message.height - 1) * std::uint64_t{message.step} + row)
+    return fail(ErrorCode::invalid, "{} x {} pixels of {} bytes, rows of {} bytes, {} bytes in all", message.width,
+                message.height, layout->bytes, message.step, message.data.size());
+  Image out(static_cast<int>(message.width), static_cast<int>(message.height));
+  const auto* const data = reinterpret_cast<const std::uint8_t*>(message.data.data());
+  std::uint8_t* to = out.grey.data();
+  for (std::uint32_t y = 0; y < message.height; ++y) {
+    const std::uint8_t* at = data + std::size_t{y} * message.step;
+    const std::size_t below = y + 1 < message.height ? message.step : 0;
+    for (std::uint32_t x = 0; x < message.width; ++x, at += layout->bytes)
+      *to++ = layout->red == kGrey    ? *at
+              : layout->red == kBayer ? mean_of_four(at, x + 1 < message.width ? 1 : 0, below)
+                                      : luminance(at, layout->red);
+  }
+  return out;
+}
+
+}  // namespace tutti::bags

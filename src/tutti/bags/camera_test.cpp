@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/bags/camera.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tutti::bags {
+namespace camera_test {
+
+RosCameraInfo info(const std::string& model, std::vector<double> d) {
+  RosCameraInfo out{.height = 480, .width = 752, .distortion_model = model, .d = std::move(d)};
+  out.k = {460, 0, 370, 0, 458, 250, 0, 0, 1};
+  return out;
+}
+
+TEST(BagCamera, EveryModelIsTaken) {
+  const auto kind = [](const RosCameraInfo& message) { return to_camera(message).value().kind; };
+  EXPECT_EQ(kind(info("plumb_bob", {-0.3, 0.1, 0.0, 0.0, 0.0})), CameraKind::pinhole);
+  EXPECT_EQ(kind(info("plumb_bob", {-0.3, 0.1, 0.0, 0.0, 0.01})), CameraKind::rational);
+  EXPECT_EQ(kind(info("rational_polynomial", {0.1, 0.01, 0, 0, 0, 0.1, 0, 0})), CameraKind::rational);
+  EXPECT_EQ(kind(info("fisheye", {0.01, 0, 0, 0})), CameraKind::equidistant);
+  EXPECT_EQ(kind(info("", {})), CameraKind::pinhole);
+  const CameraModel camera = to_camera(info("plumb_bob", {-0.3, 0.1, 0.001, 0.002, 0.0})).value();
+  EXPECT_EQ(camera.fy, 458.0);
+  EXPECT_EQ(camera.cx, 370.0);
+  EXPECT_EQ(camera.distortion[3], 0.002);
+}
+
+TEST(BagCamera, OneThatIsNotCalibratedIsRefused) {
+  RosCameraInfo none = info("plumb_bob", {0, 0, 0, 0, 0});
+  none.k = {};
+  EXPECT_NE(to_camera(none).error().message.find("is the camera calibrated?"), std::string::npos);
+  EXPECT_NE(to_camera(info("thin_prism", {1, 2})).error().message.find("'thin_prism' with 2 numbers"),
+            std::string::npos);
+  none = info("plumb_bob", {});
+  none.binning_x = 2;
+  EXPECT_FALSE(to_camera(none));
+}
+
+TEST(BagCamera, ImagesBecomeGrey) {
+  const std::string colour("\xff\x00\x00\x00\xff\x00\x00\x00\xff\x07", 10);  // red, green, blue, and padding
+  const auto grey = [](const char* encoding, std::uint32_t width, std::uint32_t height, std::uint32_t step,
+                       std::string_view data) {
+    return to_image({.height = height, .width = width, .encoding = encoding, .step = step, .data = data});
+  };
+  using Bytes = std::vector<std::uint8_t>;
+  EXPECT_EQ(grey("rgb8", 3, 1, 10, colour)->grey, (Bytes{54, 182, 18}));
+  EXPECT_EQ(grey("bgr8", 3, 1, 10, colour)->grey, (Bytes{18, 182, 54}));
+  EXPECT_EQ(grey("mono8", 2, 2, 3, "abxcd")->grey, (Bytes{'a', 'b', 'c', 'd'}));
+  EXPECT_EQ(grey("bayer_rggb8", 2, 2, 2, std::string("\x10\x20\x30\x40", 4))->grey, (Bytes{40, 48, 56, 64}));
+  EXPECT_FALSE(grey("mono8", 2, 2, 3, "abxc"));
+  EXPECT_FALSE(grey("mono8", 2, 2, 1, "abcd"));
+  EXPECT_FALSE(grey("mono8", 0xffffffff, 0xffffffff, 0xffffffff, "abcd"));
+  EXPECT_NE(grey("16UC1", 1, 1, 2, "ab").error().message.find("encoding '16UC1'"), std::string::npos);
+  EXPECT_FALSE(is_picture("32FC1"));
+}
+
+}  // namespace camera_test
+}  // namespace tutti::bags
