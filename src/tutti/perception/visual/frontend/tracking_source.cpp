@@ -15,9 +15,6 @@
 namespace tutti::visual {
 namespace {
 
-/// An image begins fewer tracks than 2 to this: after a restart their numbers are new.
-constexpr unsigned kNumberBits = 16;
-
 /// The stamp nearest to `stamp`, of at least one.
 std::size_t nearest(const std::vector<Timestamp>& stamps, Timestamp stamp) {
   const auto after = std::ranges::lower_bound(stamps, stamp) - stamps.begin();
@@ -72,13 +69,6 @@ Status check_stamps(const std::vector<Timestamp>& stamps, const Trajectory& odom
               "{:.4f} for the middle half of the former), which is the offset of their clocks or none; the stamps do "
               "not tell, nor does what moves in the images",
               found, nearest_s, nearest_s + (nearest_s > 0.0 ? -gap_s : gap_s), quantile(0.25), quantile(0.75));
-}
-
-/// With depth, the camera by which its views are.
-std::vector<Camera> cameras_of(const ImageStream& stream, const TrackerConfig& config) {
-  auto out = stream.cameras;
-  if (stream.load_depth) out.push_back(depth_camera(out.front(), stream.depth, config.sigma_px));
-  return out;
 }
 
 /// Follows the images at their own stamps as far as it takes to see by how much their clock is off; images that cannot
@@ -153,40 +143,40 @@ std::optional<Error> judge_turn(ImageStream& stream, const Trajectory& odometry,
 
 Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream stream, Trajectory odometry,
                                                              const TrackingConfig& config) {
-  if (stream.cameras.empty() || stream.cameras.size() > 2)
-    return fail(ErrorCode::unsupported, "{} cameras, expected one or two", stream.cameras.size());
-  if (stream.load_depth && stream.cameras.size() != 1)
-    return fail(ErrorCode::unsupported, "{} cameras with depth, expected one", stream.cameras.size());
-  for (const Camera& camera : stream.cameras)
-    if (auto ok = check_camera(camera.model); !ok) return tl::unexpected(ok.error());
+  const auto depth = [&] { return stream.load_depth ? std::optional(stream.depth) : std::nullopt; };
+  if (const auto ok = ImageTracker::make(stream.cameras, depth(), config.tracker); !ok)
+    return tl::unexpected(ok.error());
   const auto by_motion = [&] { return watched_offset_s(stream, odometry, config.tracker); };
   if (auto ok = check_stamps(stream.stamps, odometry, config.max_stamp_difference_s, by_motion); !ok)
     return tl::unexpected(ok.error());
   std::optional<Error> turned;
   if (stream.cameras.size() == 2 && config.turned_stereo != "believe") turned = judge_turn(stream, odometry, config);
-  std::shared_ptr<TrackingSource> out(new TrackingSource(std::move(stream), std::move(odometry), config));
+  auto tracker = ImageTracker::make(stream.cameras, depth(), config.tracker);  // of what is left of them
+  if (!tracker) return tl::unexpected(tracker.error());
+  std::shared_ptr<TrackingSource> out(
+      new TrackingSource(std::move(stream), std::move(odometry), config, std::move(*tracker)));
   if (turned) out->errors_.push_back(*std::move(turned));
   return out;
 }
 
-TrackingSource::TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config)
+TrackingSource::TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config,
+                               std::unique_ptr<ImageTracker> tracker)
     : stream_(std::move(stream)),
-      cameras_(std::make_shared<const std::vector<Camera>>(cameras_of(stream_, config.tracker))),
       odometry_(std::move(odometry)),
       config_(config),
-      tracker_(stream_.cameras, config.tracker),
+      tracker_(std::move(tracker)),
       clock_(stream_.cameras.front()) {}
 
 TrackedImages TrackingSource::images(std::size_t sample, bool keyframe) {
   TUTTI_CHECK(sample < odometry_.size(), "sample {} of {}", sample, odometry_.size());
   const Timestamp stamp = odometry_[sample].stamp;
-  TrackedImages out{.stamp = stamp, .cameras = cameras_, .images = {}};
+  TrackedImages out{.stamp = stamp, .cameras = tracker_->cameras(), .images = {}};
   const std::size_t moment = nearest(stream_.stamps, stamp);
   // Images on the way from the last sample carry the tracks; those before a first one have nothing to tell.
   const bool follows = sample > 0 && sample == next_sample_;
   if (!follows && moment >= next_moment_) {
     next_moment_ = moment;
-    tracker_.restart((moment << kNumberBits) + 1);
+    tracker_->restart(moment);
   }
   next_sample_ = std::max(next_sample_, sample + 1);
   for (; next_moment_ < moment && stream_.stamps[next_moment_] < stamp; ++next_moment_)
@@ -214,37 +204,14 @@ void TrackingSource::check_clock() {
                                    *roll_deg)});
 }
 
-void TrackingSource::add_depth(std::size_t moment, std::vector<TrackedImage>& tracked) {
-  constexpr std::uint64_t kOfOneImage = std::uint64_t{1} << 62U;  // numbers of tracks to which no tracker counts
-  auto depth = stream_.load_depth(moment);
-  if (depth && depth->empty()) return;
-  if (depth)
-    if (const auto ok = check_depth_size(*depth, stream_.cameras.front()); !ok)
-      depth = in_context(fmt::format("depth at {} ns", stream_.stamps[moment].ns), ok.error());
-  if (!depth) {
-    errors_.push_back(depth.error());
-    return;
-  }
-  if (auto amiss = depth_watch_.add(*depth, stream_.depth)) errors_.push_back({ErrorCode::invalid, *std::move(amiss)});
-  tracked.push_back(view_by_depth(tracked.front(), *depth, stream_.depth, stream_.cameras.front(), cameras_->at(1),
-                                  kOfOneImage + (moment << kNumberBits)));
-}
-
 std::vector<TrackedImage> TrackingSource::track(std::size_t moment, bool keyframe) {
-  std::vector<Image> images;
-  for (std::size_t camera = 0; camera < stream_.cameras.size(); ++camera) {
-    auto image = stream_.load(moment, camera);
-    if (image) {
-      const auto ok = check_sizes({&*image, 1}, {&stream_.cameras[camera], 1});
-      if (!ok) image = in_context(fmt::format("camera {} at {} ns", camera, stream_.stamps[moment].ns), ok.error());
-    }
-    if (!image) errors_.push_back(image.error());
-    if (!image && camera == 0) return {};
-    images.push_back(image ? *std::move(image) : Image());
-  }
-  auto tracked = tracker_.track(images, keyframe);
-  if (keyframe && stream_.load_depth && !tracked.empty()) add_depth(moment, tracked);
-  if (!tracked.empty()) clock_.add(stream_.stamps[moment], tracked.front());
+  SeenImages seen{.stamp = stream_.stamps[moment], .moment = moment, .images = {}};
+  for (std::size_t camera = 0; camera < stream_.cameras.size(); ++camera)
+    seen.images.push_back(stream_.load(moment, camera));
+  if (stream_.load_depth) seen.load_depth = [&] { return stream_.load_depth(moment); };
+  auto tracked = tracker_->track(seen, keyframe);
+  for (Error& error : tracker_->take_errors()) errors_.push_back(std::move(error));
+  if (!tracked.empty()) clock_.add(seen.stamp, tracked.front());
   return tracked;
 }
 

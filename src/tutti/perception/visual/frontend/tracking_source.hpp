@@ -12,8 +12,7 @@
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/recording.hpp"
 #include "tutti/perception/visual/clock_check.hpp"
-#include "tutti/perception/visual/depth_view.hpp"
-#include "tutti/perception/visual/frontend/visual_tracker.hpp"
+#include "tutti/perception/visual/frontend/image_tracker.hpp"
 
 namespace tutti::visual {
 
@@ -47,19 +46,16 @@ class TrackingSource : public VisualSource {
   std::vector<Error> take_errors() override { return std::exchange(errors_, {}); }
 
  private:
-  TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config);
+  TrackingSource(ImageStream stream, Trajectory odometry, const TrackingConfig& config,
+                 std::unique_ptr<ImageTracker> tracker);
   void check_clock();
-  /// Of what the first camera saw, the view by depth.
-  void add_depth(std::size_t moment, std::vector<TrackedImage>& tracked);
   [[nodiscard]] std::vector<TrackedImage> track(std::size_t moment, bool keyframe);
 
   ImageStream stream_;
-  std::shared_ptr<const std::vector<Camera>> cameras_;
   Trajectory odometry_;
   TrackingConfig config_;
-  VisualTracker tracker_;
+  std::unique_ptr<ImageTracker> tracker_;
   ClockCheck clock_;
-  DepthWatch depth_watch_;
   bool clock_checked_ = false;
   std::size_t next_moment_ = 0, next_sample_ = 0;
   std::vector<Error> errors_;

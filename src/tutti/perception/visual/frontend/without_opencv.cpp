@@ -12,4 +12,15 @@ Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream, Trajec
 
 TrackedImages TrackingSource::images(std::size_t, bool) { TUTTI_CHECK(false, "there is no such source"); }
 
+Result<std::unique_ptr<ImageTracker>> ImageTracker::make(std::vector<Camera>, std::optional<DepthSensor>,
+                                                         const TrackerConfig&) {
+  return fail(ErrorCode::unsupported,
+              "images cannot be tracked: this program was built without OpenCV (TUTTI_BUILD_VISUAL=OFF)");
+}
+
+std::vector<TrackedImage> ImageTracker::track(const SeenImages&, bool) {
+  TUTTI_CHECK(false, "there is no such tracker");
+}
+void ImageTracker::restart(std::uint64_t) { TUTTI_CHECK(false, "there is no such tracker"); }
+
 }  // namespace tutti::visual
