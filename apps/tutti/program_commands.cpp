@@ -84,7 +84,8 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   options->version = TUTTI_VERSION;
   CLI::App* command = app.add_subcommand(
       "robot",
-      "One robot: takes odometry and scans from a live feed, or replays its recording in a mission, sends submaps to "
+      "One robot: takes odometry, scans and images from a live feed, or replays its recording in a mission, sends "
+      "submaps to "
       "the\n"
       "server and corrects itself by what the server sends back. Needs no link: what the server has not stored waits "
       "in\n"
@@ -101,7 +102,8 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   add_mission_name(*command, common->mission.name, kFilesName);
   command
       ->add_option("--feed", options->feed,
-                   "Take odometry and scans on this Unix socket and answer with where the robot is (docs/protocol.md)")
+                   "Take odometry, scans, images and IMU on this Unix socket and answer with where the robot is "
+                   "(docs/protocol.md)")
       ->type_name("SOCKET");
   command
       ->add_option("--feed-group", options->feed_access.group,

@@ -151,14 +151,26 @@ std::map<std::string, std::vector<std::string>> seeds() {
   out["journal"] = {node::encode(node::OdometrySample{.stamp = {5}}), node::encode(scan),
                     node::encode(node::HeardGraph{"frame", 7})};
 
-  // hello, odometry, scan, end (proto/tutti/v1/feed.proto)
+  // hello, odometry, scan, end, images, imu, time, and of a newer protocol (proto/tutti/v1/feed.proto)
   const std::string one("\0\0\0\0\0\0\xf0\x3f", 8);
   const std::string hello("\x0a\x04\x08\x01\x12\x00", 6), end("\x22\x00", 2);
   const std::string of_sample = joined({"\x08\x05\x12\x09\x39", one, "\x1a\x30", one, one, one, one, one, one});
   const std::string sample = joined({"\x12", std::string(1, static_cast<char>(of_sample.size())), of_sample});
   const std::string points = joined({"\x1a\x10\x08\x05\x12\x0c", little({1.0F, 2.0F, 3.0F})});
-  out["feed_message"] = {hello, sample, points, end};
-  out["feed"] = {joined({fed(hello), fed(sample), fed(points), fed(end)})};
+  const auto field = [](char tag, const std::string& payload) {
+    return joined({std::string_view(&tag, 1), std::string(1, static_cast<char>(payload.size())), payload});
+  };
+  const std::string camera =
+      joined({"\x10\x08\x18\x04\x21", one, "\x29", one, "\x31", one, "\x39", one, "\x4a\x09\x39", one});
+  const std::string sensors = joined({"\x08\x01", field('\x12', camera), field('\x22', {})});
+  const std::string sees = field('\x0a', joined({"\x08\x01", field('\x22', sensors), "\x30\x05"}));
+  const std::string seen = field('\x2a', joined({"\x08\x05", field('\x12', "\x10\x01\x1a\x04grey")}));
+  const std::string three = joined({one, one, one});
+  const std::string felt = field('\x32', joined({"\x0a\x01\x05", field('\x12', three), field('\x1a', three)}));
+  const std::string time("\x3a\x02\x08\x05", 4), later("\x42\x00", 2);
+  out["feed_message"] = {hello, sample, points, end, sees, seen, felt, time, later};
+  out["feed"] = {joined({fed(hello), fed(sample), fed(points), fed(end)}),
+                 joined({fed(sees), fed(sample), fed(seen), fed(felt), fed(time), fed(later)})};
 
   out["tum"] = {"# t x y z qx qy qz qw\n1700000000.000000001 1 2 3 0 0 0 1\n1700000000.5 1.5 2 3 0 0 0.6 0.8\n"};
   out["euroc_csv"] = {"#timestamp, p, q\n1403636579758555392,4.6,-1.7,0.6,0.5,-0.5,0.5,0.5,0.1\n"};

@@ -113,7 +113,17 @@ void feed(std::string_view bytes) {
     if (*payload) static_cast<void>(program::decode_from_client(**payload));
   }
 }
-void feed_message(std::string_view bytes) { static_cast<void>(program::decode_from_client(bytes)); }
+void feed_message(std::string_view bytes) {
+  const auto message = program::decode_from_client(bytes);
+  if (!message) return;
+  if (const auto* hello = std::get_if<program::FeedHello>(&*message); hello != nullptr && hello->sensors)
+    TUTTI_CHECK(program::check_sensors(*hello->sensors), "sensors that cannot be");
+  program::FeedSensors eye;
+  eye.cameras.resize(1);
+  eye.cameras[0].model = {.width_px = 2, .height_px = 2, .fx = 1.0, .fy = 1.0};
+  if (const auto* images = std::get_if<program::FedImages>(&*message))
+    static_cast<void>(program::check_images(*images, eye));
+}
 
 /// Whatever it is: an error or a value.
 template <auto parse>
@@ -223,7 +233,7 @@ const std::map<std::string, Target>& targets() {
       {"feed_message", feed_message},
       {"g2o", g2o},
       {"graph_stamps", file<formats::parse_graph_stamps>},
-      {"image", file<formats::decode_image>},
+      {"image", file<[](std::string_view bytes, const char* name) { return formats::decode_image(bytes, name); }>},
       {"image_list", image_list},
       {"imu_csv", file<formats::parse_imu_csv>},
       {"job", job},

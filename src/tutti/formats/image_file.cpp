@@ -19,13 +19,16 @@ namespace {
 
 constexpr std::int64_t kMaxPixels = 100'000'000;  ///< A damaged header must not make us allocate what it says.
 
-Status check_size(std::int64_t width, std::int64_t height, const std::string& name) {
+Status check_size(std::int64_t width, std::int64_t height, const std::string& name, ExpectedSize expected) {
+  if (expected.width_px > 0 && (width != expected.width_px || height != expected.height_px))
+    return fail(ErrorCode::invalid, "{}: an image of {} x {} pixels, expected {} x {}", name, width, height,
+                expected.width_px, expected.height_px);
   if (width >= 1 && height >= 1 && width <= kMaxPixels / height) return {};
   return fail(ErrorCode::invalid, "{}: an image of {} x {} pixels, expected at most {} in all", name, width, height,
               kMaxPixels);
 }
 
-Result<Image> decode_png(std::string_view bytes, const std::string& name) {
+Result<Image> decode_png(std::string_view bytes, const std::string& name, ExpectedSize expected) {
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
   const auto freed = [](png_image* it) { png_image_free(it); };
@@ -33,14 +36,14 @@ Result<Image> decode_png(std::string_view bytes, const std::string& name) {
   const auto failed = [&] { return fail(ErrorCode::parse, "{}: damaged PNG image: {}", name, header.message); };
 
   if (png_image_begin_read_from_memory(&header, bytes.data(), bytes.size()) == 0) return failed();
-  if (auto ok = check_size(header.width, header.height, name); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_size(header.width, header.height, name, expected); !ok) return tl::unexpected(ok.error());
   header.format = PNG_FORMAT_GRAY;
   Image image(static_cast<int>(header.width), static_cast<int>(header.height));
   if (png_image_finish_read(&header, nullptr, image.grey.data(), 0, nullptr) == 0) return failed();
   return image;
 }
 
-Result<Image> decode_jpeg(std::string_view bytes, const std::string& name) {
+Result<Image> decode_jpeg(std::string_view bytes, const std::string& name, ExpectedSize expected) {
   const std::unique_ptr<void, int (*)(void*)> decoder(tjInitDecompress(), &tjDestroy);
   TUTTI_CHECK(decoder != nullptr, "libjpeg-turbo: {}", tjGetErrorStr2(nullptr));
   const auto failed = [&] {
@@ -51,7 +54,7 @@ Result<Image> decode_jpeg(std::string_view bytes, const std::string& name) {
   int width = 0, height = 0, subsampling = 0, colours = 0;
   if (tjDecompressHeader3(decoder.get(), data, bytes.size(), &width, &height, &subsampling, &colours) != 0)
     return failed();
-  if (auto ok = check_size(width, height, name); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_size(width, height, name, expected); !ok) return tl::unexpected(ok.error());
   Image image(width, height);
   // A warning is an error, too: it means that pixels were made up.
   if (tjDecompress2(decoder.get(), data, bytes.size(), image.grey.data(), width, 0, height, TJPF_GRAY, 0) != 0)
@@ -90,7 +93,7 @@ std::string encode(int width_px, int height_px, png_uint_32 format, const void* 
 
 }  // namespace
 
-Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name) {
+Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name, ExpectedSize expected) {
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
   const auto freed = [](png_image* it) { png_image_free(it); };
@@ -100,7 +103,7 @@ Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name)
   };
   const std::string plain = without_colour(bytes);
   if (png_image_begin_read_from_memory(&header, plain.data(), plain.size()) == 0) return failed();
-  if (auto ok = check_size(header.width, header.height, name); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_size(header.width, header.height, name, expected); !ok) return tl::unexpected(ok.error());
   if (header.format != PNG_FORMAT_LINEAR_Y)
     return fail(ErrorCode::unsupported, "{}: {} {}, expected a grey PNG image of 16 bits a pixel, as depth is", name,
                 (header.format & PNG_FORMAT_FLAG_LINEAR) != 0 ? "16 bits of" : "8 bits of",
@@ -122,9 +125,9 @@ std::string encode_depth(const DepthImage& image) {
   return encode(image.width_px, image.height_px, PNG_FORMAT_LINEAR_Y, image.value.data());
 }
 
-Result<Image> decode_image(std::string_view bytes, const std::string& name) {
-  if (bytes.starts_with("\x89PNG")) return decode_png(bytes, name);
-  if (bytes.starts_with("\xFF\xD8")) return decode_jpeg(bytes, name);
+Result<Image> decode_image(std::string_view bytes, const std::string& name, ExpectedSize expected) {
+  if (bytes.starts_with("\x89PNG")) return decode_png(bytes, name, expected);
+  if (bytes.starts_with("\xFF\xD8")) return decode_jpeg(bytes, name, expected);
   return fail(ErrorCode::unsupported, "{}: neither a PNG nor a JPEG image ({} bytes)", name, bytes.size());
 }
 

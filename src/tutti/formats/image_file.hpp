@@ -14,15 +14,19 @@ namespace tutti::formats {
 /// A PNG or JPEG file as grey, whichever its content is; colour by its luminance (JPEG's Y; for PNG the ITU-R BT.709
 /// weights of libpng). A truncated or damaged image is an error that names it, never half an image.
 Result<Image> read_image(const std::string& path);
-/// The same from bytes; `name` is for the errors.
-Result<Image> decode_image(std::string_view bytes, const std::string& name);
+/// Of an image whose size is known; zeros: any.
+struct ExpectedSize {
+  int width_px = 0, height_px = 0;
+};
+/// The same from bytes; `name` is for the errors. Of another size than expected it is refused before it is decoded.
+Result<Image> decode_image(std::string_view bytes, const std::string& name, ExpectedSize expected = {});
 
 /// As PNG; not an empty one.
 std::string encode_png(const Image& image);
 
 /// A depth image: a grey PNG file of 16 bits a pixel; its numbers as they stand there.
 Result<DepthImage> read_depth(const std::string& path);
-Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name);
+Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name, ExpectedSize expected = {});
 /// As such a PNG; not an empty one.
 std::string encode_depth(const DepthImage& image);
 

@@ -112,6 +112,7 @@ Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
   options.settings = {.mission = std::move(*name),
                       .robots = robot_names(*config),
                       .agent = config->agent,
+                      .tracking = config->tracking,
                       .randomness = mission::agent_randomness(source.seed, options.name)};
   if (!options.feed.empty()) return {};
   const auto number = program::number_of(options.name, options.settings.robots, false);

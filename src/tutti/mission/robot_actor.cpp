@@ -146,18 +146,10 @@ void RobotActor::feed_scan(Timestamp now) {
   if (refused == refused_scans_.count) ++taken_scans_;
 }
 
-/// From the last sample before the last keyframe before `stamp` to the first one not before it.
+/// Since the last keyframe before `stamp`.
 std::vector<ImuSample> RobotActor::imu_since_keyframe(Timestamp stamp) const {
-  const std::vector<ImuSample>& imu = recording_.recording.imu;
-  const std::vector<Keyframe>& keyframes = node_->agent().keyframes();
-  const auto at = std::ranges::lower_bound(keyframes, stamp, {}, &Keyframe::stamp);
-  if (at == keyframes.begin()) return {};
-  const Timestamp before = std::prev(at)->stamp;
-  auto first = std::ranges::upper_bound(imu, before, {}, &ImuSample::stamp);
-  auto last = std::ranges::lower_bound(imu, stamp, {}, &ImuSample::stamp);
-  if (first != imu.begin()) --first;
-  if (last != imu.end()) ++last;
-  return first < last ? std::vector<ImuSample>(first, last) : std::vector<ImuSample>();
+  const auto before = node_->agent().keyframe_before(stamp);
+  return before ? imu_over(recording_.recording.imu, *before, stamp) : std::vector<ImuSample>();
 }
 
 /// Every image is tracked, those of keyframes are kept.

@@ -18,6 +18,7 @@ struct DepthSensor {
   double sigma_m = 0.0;                ///< Standard deviation: this, and beside it
   double sigma_per_m2 = 0.0014;        ///< this at 1 m, growing with the square of the depth (a Kinect's).
   double least_m = 0.3, most_m = 8.0;  ///< What is nearer or farther is not believed.
+  friend bool operator==(const DepthSensor&, const DepthSensor&) = default;
 };
 
 /// The images of a robot: files, or a simulated camera. All its cameras are exposed at the same moments.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -77,6 +78,17 @@ struct ImuNoise {
   double accelerometer_random_walk = 3e-3;    ///< m/s^3/sqrt(Hz)
   friend bool operator==(const ImuNoise&, const ImuNoise&) = default;
 };
+
+/// Of samples by increasing stamps, those that say how a body moved from one moment to another: from the last one
+/// before or at `from` to the first one not before `until`, as far as there are any.
+template <class Samples>
+std::vector<ImuSample> imu_over(const Samples& samples, Timestamp from, Timestamp until) {
+  auto first = std::ranges::upper_bound(samples, from, {}, &ImuSample::stamp);
+  auto last = std::ranges::lower_bound(samples, until, {}, &ImuSample::stamp);
+  if (first != samples.begin()) --first;
+  if (last != samples.end()) ++last;
+  return first < last ? std::vector<ImuSample>(first, last) : std::vector<ImuSample>();
+}
 
 /// The images of all cameras at one moment.
 struct TrackedImages {

@@ -98,6 +98,7 @@ struct ScanRefused {
 struct ImagesRefused {
   RobotId robot;
   std::string why;
+  bool later = false;  ///< Not by the step that took them.
 };
 /// Keyframe after keyframe without what a sensor of the robot sees: it is broken, or comes too late. Then no closures
 /// are found.

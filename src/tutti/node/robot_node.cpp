@@ -262,7 +262,7 @@ void RobotNode::take_outgoing(Timestamp now, Step& step) {
   Frames fresh;
   const auto submaps = agent_.take_outgoing();
   for (Error& error : agent_.take_image_errors())
-    step.tell(now, ImagesRefused{agent_.robot(), std::move(error.message)});
+    step.tell(now, ImagesRefused{agent_.robot(), std::move(error.message), true});
   for (const SubmapMessage& message : submaps) {
     if (const Status ok = wire::validate(message); !ok) {
       step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap, ok.error().message});

@@ -49,6 +49,8 @@ class RobotNode {
 
   /// The first step after every start.
   Step resume(Timestamp now);
+  /// RobotAgent::expect_sensors(); it is not stored, and is to be said again after every start.
+  void expect_sensors(bool scans, bool images) { agent_.expect_sensors(scans, images); }
   /// RobotAgent::add_odometry(), add_scan(), add_images(), finish(); what it refuses is told as an event. One that
   /// comes again, as after a restart, is refused or changes nothing.
   Step add_odometry(const OdometrySample& sample, Timestamp now);

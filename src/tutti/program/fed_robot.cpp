@@ -30,24 +30,42 @@ void FedRobot::end() {
     if (!take(*input)) return;
 }
 
+/// It was received before anybody knew whether it shows anything new.
+void FedRobot::hear(const Scan& scan, Timestamp now) {
+  const robot::RobotAgent& agent = robot_.node().agent();
+  if (agent.newest_sample() != scan.stamp || agent.wants_scan()) robot_.add_scan(scan, now);
+}
+
+/// Every image is tracked, those of keyframes are kept.
+void FedRobot::hear(const FedImages& images, Timestamp now) {
+  const robot::RobotAgent& agent = robot_.node().agent();
+  const bool is_keyframe = agent.wants_images(images.stamp);
+  TrackedImages seen = camera_.see(images, is_keyframe);
+  tell_image_errors(images.stamp, now);
+  if (!is_keyframe || seen.images.empty()) return;
+  if (images.sensors->imu)
+    if (const auto before = agent.keyframe_before(images.stamp)) seen.imu = front_.imu(*before, images.stamp);
+  robot_.add_images(seen, now);
+}
+
+/// To the client all; of a row of images with errors the first is an event.
+void FedRobot::tell_image_errors(Timestamp stamp, Timestamp now) {
+  const std::vector<Error> errors = camera_.take_errors();
+  for (const Error& error : errors) {
+    front_.refuse(stamp, error.message);
+    if (!std::exchange(images_fail_, true))
+      robot_.tell(now, node::ImagesRefused{robot_.node().agent().robot(), error.message, true});
+  }
+  images_fail_ = !errors.empty();
+}
+
 bool FedRobot::take(const FeedInput& input) {
   const Timestamp now = clock_.now();
-  Timestamp stamp;
-  if (const auto* sample = std::get_if<node::OdometrySample>(&input)) {
-    stamp = sample->stamp;
-    robot_.add_odometry(*sample, now);
-  } else if (const auto* scan = std::get_if<Scan>(&input)) {
-    stamp = scan->stamp;
-    // It was received before anybody knew whether it shows anything new.
-    const robot::RobotAgent& agent = robot_.node().agent();
-    if (agent.newest_sample() != stamp || agent.wants_scan()) robot_.add_scan(*scan, now);
-  } else {
-    robot_.finish(now);
-  }
+  std::visit([&](const auto& what) { hear(what, now); }, input);
   front_.note_heard();
   node::Step step = robot_.take_step();
   note(step);
-  if (const Status ok = taken(step); !ok) front_.refuse(stamp, ok.error().message);
+  if (const Status ok = taken(step); !ok) front_.refuse(stamp_of(input), ok.error().message);
   const bool is_said = !step.writes.empty() || !step.messages.empty() || !step.events.empty();
   if (is_said && !host_.carry_out(std::move(step))) return false;
   if (robot_.node().is_stored()) front_.note_stored();

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <utility>
 
 #include "tutti/program/clock.hpp"
+#include "tutti/program/fed_camera.hpp"
 #include "tutti/program/feed/feed_front.hpp"
 #include "tutti/program/feed/robot_view.hpp"
 #include "tutti/program/host.hpp"
@@ -20,8 +22,10 @@ class FedRobot {
   static constexpr double kPublish_s = 0.05;  ///< At least so often, while it is behind.
 
   /// All that it is given outlives it.
-  FedRobot(FeedFront& front, LiveRobot& robot, Host& host, const Clock& clock, RobotView view)
-      : front_(front), robot_(robot), host_(host), clock_(clock), view_(std::move(view)) {
+  FedRobot(FeedFront& front, LiveRobot& robot, Host& host, const Clock& clock, RobotView view,
+           const visual::TrackerConfig& tracker = {})
+      : front_(front), robot_(robot), host_(host), clock_(clock), view_(std::move(view)), camera_(tracker) {
+    expect(*front_.sensors());
     front_.begin_again(robot_.node().agent().newest_sample());
   }
 
@@ -35,6 +39,13 @@ class FedRobot {
  private:
   /// False: it cannot be stored, and the robot goes.
   bool take(const FeedInput& input);
+  void hear(const node::OdometrySample& sample, Timestamp now) { robot_.add_odometry(sample, now); }
+  void hear(const Scan& scan, Timestamp now);
+  void hear(const FedImages& images, Timestamp now);
+  void hear(const std::shared_ptr<const FeedSensors>& sensors, Timestamp /*now*/) { expect(*sensors); }
+  void hear(FeedEnded, Timestamp now) { robot_.finish(now); }
+  void expect(const FeedSensors& sensors) { robot_.expect_sensors(sensors.scans, !sensors.cameras.empty()); }
+  void tell_image_errors(Timestamp stamp, Timestamp now);
   void publish();
 
   FeedFront& front_;
@@ -42,6 +53,8 @@ class FedRobot {
   Host& host_;
   const Clock& clock_;
   RobotView view_;
+  FedCamera camera_;
+  bool images_fail_ = false;  // the last ones
   double publish_s_ = 0.0;
 };
 

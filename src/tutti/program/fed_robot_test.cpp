@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/program/full_disk.hpp"
+#include "support/program/hosting.hpp"
 #include "support/robot/drifting_robot.hpp"
 
 namespace tutti::program {
@@ -27,57 +28,15 @@ Scan scan(std::size_t i) {
   return {kOdometry[i].stamp, std::make_shared<const PointCloud>(std::move(cloud)), {}};
 }
 
-class NoPort final : public bus::Port {
- public:
-  Status send(bus::Envelope) override { return {}; }
-  std::vector<bus::Received> receive() override { return {}; }
-  void acknowledge(std::uint64_t) override {}
-  void still_busy(std::uint64_t) override {}
-};
-
-/// What of HostedRobot is about being fed.
-class Hosting final : public Hosted {
- public:
-  Hosting(std::unique_ptr<LiveRobot> robot, FeedFront& front, Host& host, const Clock& clock)
-      : robot_(std::move(robot)), fed_(front, *robot_, host, clock, RobotView("alpha")) {}
-  Answer start(Timestamp now) override {
-    robot_->resume(now);
-    return said();
-  }
-  Answer receive(const bus::Received&, Timestamp) override { return {}; }
-  [[nodiscard]] std::optional<Timestamp> next_work() const override { return robot_->node().next_timer(); }
-  Answer work(Timestamp now) override {
-    robot_->on_timer(now);
-    return said();
-  }
-  void wait(double) override { fed_.wait(0.0); }
-  Answer end() override {
-    fed_.end();
-    robot_->store_all();
-    return said();
-  }
-  [[nodiscard]] Json status(Timestamp) const override { return {}; }
-  [[nodiscard]] const robot::RobotAgent& agent() const { return robot_->node().agent(); }
-
- private:
-  Answer said() {
-    Answer out{robot_->take_step(), {}};
-    fed_.note(out.step);
-    return out;
-  }
-  std::unique_ptr<LiveRobot> robot_;
-  FedRobot fed_;
-};
-
 class FedRobotTest : public testing::Test {
  protected:
   FedRobotTest() {
     front_ = std::make_unique<FeedFront>(RobotView("alpha").state(open_robot()->node()), FeedFront::Limits{});
     Host::Parts parts;
     parts.store = &disk_;
-    parts.open_port = []() -> Result<std::unique_ptr<bus::Port>> { return std::make_unique<NoPort>(); };
+    parts.open_port = []() -> Result<std::unique_ptr<bus::Port>> { return std::make_unique<test::SentPort>(nullptr); };
     parts.open_node = [this](bus::Port&) -> Result<std::unique_ptr<Hosted>> {
-      return std::make_unique<Hosting>(open_robot(), *front_, *host_, clock_);
+      return std::make_unique<test::Hosting>(open_robot(), *front_, *host_, clock_);
     };
     host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
   }
@@ -100,7 +59,9 @@ class FedRobotTest : public testing::Test {
       host_->wait(0.0);
     }
   }
-  [[nodiscard]] const robot::RobotAgent& agent() const { return dynamic_cast<Hosting*>(host_->hosted())->agent(); }
+  [[nodiscard]] const robot::RobotAgent& agent() const {
+    return dynamic_cast<test::Hosting*>(host_->hosted())->agent();
+  }
   void expect_the_robot_of_all_that_was_fed() {
     robot::RobotAgent alone(kRobot, 7, {}, Rng(1));
     for (std::size_t i = 0; i < kOdometry.size(); ++i) {

@@ -84,24 +84,52 @@ std::string HostedRobot::progress(double time_s) const {
   return (has_ended() ? "the recording has ended" : feed_->is_fed() ? "a client feeds" : "no client feeds") + behind;
 }
 
+/// What is fed, and by whose clock.
+Json HostedRobot::feed_status() const {
+  const FeedSession::Feeder feeder = feed_->feeder();
+  const FeedFront::Figures of = feed_->front().figures();
+  const FeedFront::Load load = feed_->front().load();
+  const FeedClock& clock = feeder.clock;
+  Json of_clock{{"by", clock.how() == FeedClock::How::measured   ? "measured"
+                       : clock.how() == FeedClock::How::declared ? "declared"
+                                                                 : "the robot's"},
+                {"offset_ns", clock.offset_ns()}};
+  if (clock.measured_ns()) of_clock["measured_offset_ns"] = *clock.measured_ns();
+  if (clock.drift_ppm()) of_clock["drift_ppm"] = *clock.drift_ppm();
+  return {{"client", feeder.name},
+          {"connected", feed_->is_fed()},
+          {"bytes", feeder.bytes},
+          {"clock", std::move(of_clock)},
+          {"inputs_waiting", load.waiting},
+          {"scans_left_out", load.scans_left_out},
+          {"samples_joined", load.samples_joined},
+          {"images", of.images},
+          {"images_left_out", of.images_left_out},
+          {"image_bytes_waiting", of.image_bytes},
+          {"imu_samples", of.imu},
+          {"imu_samples_left_out", of.imu_left_out}};
+}
+
 Json HostedRobot::status(Timestamp now) const {
   const NodeStatus status = driver_->node().status(now);
   const bus::NatsState link = port_.state();
   const double time_s = now - Timestamp{};
-  return {{"program", "robot"},
-          {"name", status.name},
-          {"time_s", time_s},
-          {"finished", has_ended()},
-          {"backlog", status.backlog_submaps},
-          {"keyframes", status.keyframes},
-          {"revision", status.heard_revision},
-          {"connected", link.connected},
-          {"alone", alone_},
-          {"refused", driver_->node().conflict().value_or("")},
-          {"line",
-           fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
-                       status.keyframes, status.backlog_submaps, status.heard_revision,
-                       link.connected ? "" : ", no link: " + link.last_error, alone_.empty() ? "" : ", " + alone_)}};
+  Json out{{"program", "robot"},
+           {"name", status.name},
+           {"time_s", time_s},
+           {"finished", has_ended()},
+           {"backlog", status.backlog_submaps},
+           {"keyframes", status.keyframes},
+           {"revision", status.heard_revision},
+           {"connected", link.connected},
+           {"alone", alone_},
+           {"refused", driver_->node().conflict().value_or("")},
+           {"line",
+            fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
+                        status.keyframes, status.backlog_submaps, status.heard_revision,
+                        link.connected ? "" : ", no link: " + link.last_error, alone_.empty() ? "" : ", " + alone_)}};
+  if (feed_) out["feed"] = feed_status();
+  return out;
 }
 
 }  // namespace tutti::program

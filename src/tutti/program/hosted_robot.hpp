@@ -34,7 +34,7 @@ class HostedRobot final : public Hosted {
   /// Its samples come from clients; `robot` is its driver.
   void feed_live(LiveFeed& feed, LiveRobot& robot, Host& host, RobotView view) {
     feed_ = &feed;
-    fed_.emplace(feed.front(), robot, host, clock_, std::move(view));
+    fed_.emplace(feed.front(), robot, host, clock_, std::move(view), options_.settings.tracking.tracker);
   }
 
   Answer start(Timestamp now) override {
@@ -67,6 +67,7 @@ class HostedRobot final : public Hosted {
   void note_conflict();
   [[nodiscard]] bool has_ended() const { return feed_ ? feed_->front().has_ended() : ended_; }
   [[nodiscard]] std::string progress(double time_s) const;
+  [[nodiscard]] Json feed_status() const;
 
   std::unique_ptr<RobotDriver> driver_;
   double duration_s_;

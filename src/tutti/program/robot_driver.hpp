@@ -52,6 +52,10 @@ class LiveRobot final : public RobotDriver {
   node::Step take_step() override { return std::exchange(step_, {}); }
   void add_odometry(const node::OdometrySample& sample, Timestamp now) { take(node_->add_odometry(sample, now)); }
   void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
+  void add_images(const TrackedImages& images, Timestamp now) { take(node_->add_images(images, now)); }
+  /// What became of its samples before they came to the node.
+  void tell(Timestamp now, const node::ImagesRefused& what) { step_.tell(now, what); }
+  void expect_sensors(bool scans, bool images) { node_->expect_sensors(scans, images); }
 
  private:
   void take(node::Step step) { step_.add(std::move(step)); }

@@ -96,10 +96,15 @@ void RobotProgram::tell_alone() {
 }
 
 Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
-  const node::RobotNodeConfig config{.agent = options_.settings.agent,
-                                     .name = options_.name,
-                                     .uplink = {.bytes_per_s = options_.uplink_bytes_per_s},
-                                     .max_archive_bytes = options_.max_archive_bytes};
+  node::RobotNodeConfig config{.agent = options_.settings.agent,
+                               .name = options_.name,
+                               .uplink = {.bytes_per_s = options_.uplink_bytes_per_s},
+                               .max_archive_bytes = options_.max_archive_bytes};
+  if (feed_) {
+    const auto sensors = feed_->front().sensors();
+    config.agent.submap.has_scans = sensors->scans;
+    config.agent.submap.has_images = !sensors->cameras.empty();
+  }
   const std::uint64_t session = options_.session.value_or(folder_->made_ns());
   if (options_.feed.empty()) return options_.replay(config, session, *store_);
   const std::string& policy = config.agent.policy.name;
@@ -141,17 +146,18 @@ void RobotProgram::tell_feed() {
   if (const std::string thrown = feed_->take_thrown(); !thrown.empty())
     log_->say(Level::error, "the feed has thrown, which is a defect of it; clients have to connect again: " + thrown);
   const FeedFront::Load load = feed_->front().load(), before = std::exchange(load_, load);
-  const std::size_t now = load.scans_left_out + load.samples_joined,
-                    was = before.scans_left_out + before.samples_joined;
+  const std::size_t now = load.scans_left_out + load.samples_joined + load.images_left_out,
+                    was = before.scans_left_out + before.samples_joined + before.images_left_out;
   if (now > 0 && was == 0)
     log_->say(Level::warning,
-              fmt::format("the map is behind what is fed: {} inputs wait; scans are left out, {} so far, "
+              fmt::format("the map is behind what is fed: {} inputs wait; {} scans and {} images are left out so far, "
                           "then odometry is taken together; poses are answered all the same",
-                          load.waiting, load.scans_left_out));
+                          load.waiting, load.scans_left_out, load.images_left_out));
   if (now == 0 && was > 0)
-    log_->say(Level::info, fmt::format("the map has caught up with what is fed: {} scans were left out, {} odometry "
-                                       "samples taken together",
-                                       before.scans_left_out, before.samples_joined));
+    log_->say(Level::info,
+              fmt::format("the map has caught up with what is fed: {} scans and {} images were left out, {} "
+                          "odometry samples taken together",
+                          before.scans_left_out, before.images_left_out, before.samples_joined));
 }
 
 /// A recording is replayed from where it stood; for a robot that is fed, time has passed.

@@ -10,6 +10,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/feed_server.hpp"
 #include "tutti/program/robot_driver.hpp"
@@ -25,11 +26,13 @@ struct RobotSettings {
   std::string mission;              ///< Its name on the bus (bus::check_mission_name).
   std::vector<std::string> robots;  ///< By their number; empty: nobody has told.
   robot::AgentConfig agent;
+  visual::TrackingConfig tracking;
   Rng randomness{1};  ///< Of its agent.
   /// Of these, what a mission file may say.
   template <class V>
   void describe(V& v) {
     v.field("agent", agent);
+    v.field("tracking", tracking, any(), "Of the images that are fed.");
   }
 };
 

@@ -2,6 +2,7 @@
 #include "tutti/robot/agent.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -98,6 +99,17 @@ void RobotAgent::add_moment(Timestamp stamp) {
 void RobotAgent::finish() {
   submaps_.finish();
   add_keyframes();
+}
+
+std::optional<Timestamp> RobotAgent::keyframe_before(Timestamp stamp) const {
+  const auto at = std::ranges::lower_bound(state_.keyframes, stamp, {}, &Keyframe::stamp);
+  return at == state_.keyframes.begin() ? std::nullopt : std::optional(std::prev(at)->stamp);
+}
+
+void RobotAgent::expect_sensors(bool scans, bool images) {
+  config_.submap.has_scans = scans;
+  config_.submap.has_images = images;
+  submaps_.expect_sensors(scans, images);
 }
 
 std::optional<std::uint64_t> RobotAgent::keyframes_without_scan() const {

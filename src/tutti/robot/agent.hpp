@@ -127,6 +127,10 @@ class RobotAgent {
   [[nodiscard]] bool wants_scan(Timestamp stamp) const { return submaps_.wants_scan(stamp); }
   [[nodiscard]] bool wants_images(Timestamp stamp) const { return submaps_.wants_images(stamp); }
   [[nodiscard]] NextKeyframe next_keyframe() const { return submaps_.next_keyframe(); }
+  /// Of the newest keyframe before this moment; nothing: there is none.
+  [[nodiscard]] std::optional<Timestamp> keyframe_before(Timestamp stamp) const;
+  /// SubmapConfig::has_scans and has_images, of a robot of which that becomes known later.
+  void expect_sensors(bool scans, bool images);
   /// Stamp of the latest odometry sample.
   [[nodiscard]] std::optional<Timestamp> newest_sample() const { return submaps_.newest_sample(); }
   /// The newest; nothing: none yet.

@@ -116,6 +116,11 @@ class SubmapBuilder {
   Status add_images(const TrackedImages& images);
   /// As of a scan or images that are not given: it makes the keyframe that they would make.
   void add_moment(Timestamp stamp);
+  /// SubmapConfig::has_scans and has_images, where that becomes known later.
+  void expect_sensors(bool scans, bool images) {
+    config_.has_scans = scans;
+    config_.has_images = images;
+  }
   /// Would a scan of this stamp be taken? Also yes when only more odometry can tell, or add_scan() has something to
   /// say.
   [[nodiscard]] bool wants_scan(Timestamp stamp) const;

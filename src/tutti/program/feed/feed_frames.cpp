@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/program/feed/feed_frames.hpp"
 
-#include <google/protobuf/io/coded_stream.h>
-
 #include <algorithm>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -25,55 +22,6 @@ void write(const Pose3& T, v1::Feed::Pose& out) {
   out.set_qz(T.rotation.z());
   out.set_qw(T.rotation.w());
 }
-Pose3 read(const v1::Feed::Pose& in) {
-  return {Eigen::Quaterniond(in.qw(), in.qx(), in.qy(), in.qz()), {in.x(), in.y(), in.z()}};
-}
-
-FromClient read(const v1::Feed::Odometry& in) {
-  const Timestamp stamp{in.stamp_ns()};
-  if (!in.has_t_odom_body()) return BadSample{stamp, "an odometry sample without T_odom_body"};
-  node::OdometrySample out{.stamp = stamp, .T_odom_body = read(in.t_odom_body())};
-  const auto& numbers = in.increment_covariance();
-  if (numbers.size() != 6 && numbers.size() != 36)
-    return BadSample{
-        stamp, fmt::format("an increment_covariance of {} numbers, expected 36, or 6 of its diagonal", numbers.size())};
-  for (int i = 0; i < numbers.size(); ++i) {
-    if (numbers.size() == 6)
-      out.increment_covariance(i, i) = numbers.Get(i);
-    else
-      out.increment_covariance(i / 6, i % 6) = numbers.Get(i);
-  }
-  return out;
-}
-
-FromClient read(const v1::Feed::Scan& in) {
-  const Timestamp stamp{in.stamp_ns()};
-  if (in.xyz_size() % 3 != 0)
-    return BadSample{stamp, fmt::format("a scan of {} coordinates, expected three a point", in.xyz_size())};
-  const int points = in.xyz_size() / 3;
-  if (in.age_s_size() != 0 && in.age_s_size() != points)
-    return BadSample{stamp, fmt::format("a scan of {} points and {} ages", points, in.age_s_size())};
-  PointCloud cloud;
-  cloud.points.reserve(static_cast<std::size_t>(points));
-  for (int i = 0; i < points; ++i) cloud.points.emplace_back(in.xyz(3 * i), in.xyz(3 * i + 1), in.xyz(3 * i + 2));
-  Scan out{.stamp = stamp, .cloud = std::make_shared<const PointCloud>(std::move(cloud)), .age_s = {}};
-  if (in.age_s_size() > 0) out.age_s = std::make_shared<const std::vector<float>>(in.age_s().begin(), in.age_s().end());
-  return out;
-}
-
-/// Exactly one message, and none that robots send: protobuf prints what it thinks of their text.
-Status check_is_one_of_clients(const char* bytes, int size) {
-  google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(bytes), size);
-  const std::uint32_t tag = in.ReadTag(), number = tag >> 3U;
-  std::uint32_t length = 0;
-  constexpr std::uint32_t kLengthDelimited = 2;
-  if (static_cast<std::size_t>(size) > kMaxFeedBytes || (tag & 7U) != kLengthDelimited || !in.ReadVarint32(&length) ||
-      length != static_cast<std::uint32_t>(size - in.CurrentPosition()))
-    return fail(ErrorCode::parse, "a frame that holds no Feed message");
-  if (number > v1::Feed::kEndOfRecordingFieldNumber)
-    return fail(ErrorCode::parse, "a message that clients do not send (number {})", number);
-  return {};
-}
 
 std::string framed(const v1::Feed& message) {
   const std::string payload = message.SerializeAsString();
@@ -83,14 +31,20 @@ std::string framed(const v1::Feed& message) {
   return out + payload;
 }
 
-/// Text goes out as UTF-8, which protobuf asks for: what is not plain becomes '?'.
+/// A stamp by the clock of the client that is told it.
+std::int64_t told(Timestamp stamp, std::int64_t offset_ns) {
+  std::int64_t out = 0;
+  if (!__builtin_sub_overflow(stamp.ns, offset_ns, &out)) return out;
+  return offset_ns > 0 ? kFirstTimestamp.ns : kLastTimestamp.ns;
+}
+
+}  // namespace
+
 std::string plain(std::string text) {
   std::ranges::replace_if(
       text, [](char c) { return c < ' ' || c > '~'; }, '?');
   return text;
 }
-
-}  // namespace
 
 Result<std::optional<std::string>> FrameReader::take(std::string_view& bytes) {
   const auto fill = [&](std::string& part, std::size_t size) {
@@ -109,28 +63,7 @@ Result<std::optional<std::string>> FrameReader::take(std::string_view& bytes) {
   return std::exchange(payload_, {});
 }
 
-Result<FromClient> decode_from_client(std::string_view payload) {
-  v1::Feed message;
-  const auto bytes = static_cast<int>(std::min(payload.size(), kMaxFeedBytes + 1));
-  if (auto ok = check_is_one_of_clients(payload.data(), bytes); !ok) return tl::unexpected(ok.error());
-  if (!message.ParseFromArray(payload.data(), bytes))
-    return fail(ErrorCode::parse, "a frame that holds no Feed message");
-  switch (message.what_case()) {
-    case v1::Feed::kHello:
-      return FeedHello{message.hello().protocol_version(), plain(message.hello().client_name()),
-                       message.hello().listens_only()};
-    case v1::Feed::kOdometry:
-      return read(message.odometry());
-    case v1::Feed::kScan:
-      return read(message.scan());
-    case v1::Feed::kEndOfRecording:
-      return FeedEnd{};
-    default:
-      return fail(ErrorCode::parse, "a frame that holds no Feed message");
-  }
-}
-
-std::string welcome_frame(const FeedState& state, const Pose3& T_map_odom) {
+std::string welcome_frame(const FeedState& state, const Pose3& T_map_odom, std::int64_t offset_ns) {
   v1::Feed message;
   auto& out = *message.mutable_welcome();
   out.set_protocol_version(kFeedVersion);
@@ -138,15 +71,18 @@ std::string welcome_frame(const FeedState& state, const Pose3& T_map_odom) {
   out.set_robot(state.chain.robot.value);
   out.set_session(state.chain.session);
   out.set_has_odometry(state.newest.has_value());
-  if (state.newest) out.set_last_stamp_ns(state.newest->stamp.ns);
+  if (state.newest) out.set_last_stamp_ns(told(state.newest->stamp, offset_ns));
   write(T_map_odom, *out.mutable_t_map_odom());
+  for (const char* kind : kFromClient) out.add_takes(kind);
+  out.set_clock_offset_ns(offset_ns);
   return framed(message);
 }
 
-std::string correction_frame(const FeedState& state, const SmoothMap::Answer& answer, std::uint64_t dropped) {
+std::string correction_frame(const FeedState& state, const SmoothMap::Answer& answer, std::uint64_t dropped,
+                             std::int64_t offset_ns) {
   v1::Feed message;
   auto& out = *message.mutable_correction();
-  out.set_stamp_ns(state.newest->stamp.ns);
+  out.set_stamp_ns(told(state.newest->stamp, offset_ns));
   write(answer.T_map_odom * state.newest->pose, *out.mutable_t_map_body());
   write(answer.T_map_odom, *out.mutable_t_map_odom());
   for (const double x : answer.covariance.reshaped()) out.add_t_map_odom_covariance(x);
@@ -156,14 +92,15 @@ std::string correction_frame(const FeedState& state, const SmoothMap::Answer& an
   out.set_wants_scan(state.wants_scan);
   out.set_dropped(dropped);
   out.set_has_stored(state.stored.has_value());
-  if (state.stored) out.set_stored_stamp_ns(state.stored->ns);
+  if (state.stored) out.set_stored_stamp_ns(told(*state.stored, offset_ns));
   return framed(message);
 }
 
-std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump, const std::string& why) {
+std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump, std::int64_t offset_ns,
+                       const std::string& why) {
   v1::Feed message;
   auto& out = *message.mutable_jump();
-  out.set_stamp_ns(state.newest->stamp.ns);
+  out.set_stamp_ns(told(state.newest->stamp, offset_ns));
   write(jump.from, *out.mutable_t_map_odom_from());
   write(jump.to, *out.mutable_t_map_odom_to());
   out.set_translation_m(jump.translation_m);
@@ -173,7 +110,7 @@ std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump, cons
   return framed(message);
 }
 
-std::string situation_frame(const FeedState& state) {
+std::string situation_frame(const FeedState& state, std::int64_t offset_ns) {
   v1::Feed message;
   auto& out = *message.mutable_situation();
   out.set_in_map(state.component.has_value());
@@ -189,17 +126,28 @@ std::string situation_frame(const FeedState& state) {
   for (const FeedAlert& alert : state.alerts) {
     auto& to = *out.add_alert();
     to.set_text(plain(alert.text));
-    to.set_since_stamp_ns(alert.since.ns);
-    to.set_from_stamp_ns(alert.from.ns);
-    to.set_until_stamp_ns(alert.until.ns);
+    to.set_since_stamp_ns(told(alert.since, offset_ns));
+    to.set_from_stamp_ns(told(alert.from, offset_ns));
+    to.set_until_stamp_ns(told(alert.until, offset_ns));
   }
   return framed(message);
 }
 
-std::string refused_frame(Timestamp stamp, const std::string& why) {
+std::string refused_frame(Timestamp stamp, const std::string& why, std::int64_t offset_ns) {
   v1::Feed message;
-  message.mutable_refused()->set_stamp_ns(stamp.ns);
+  message.mutable_refused()->set_stamp_ns(told(stamp, offset_ns));
   message.mutable_refused()->set_why(plain(why));
+  return framed(message);
+}
+
+std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, std::int64_t offset_ns,
+                              std::int64_t measured_ns) {
+  v1::Feed message;
+  auto& out = *message.mutable_time_answer();
+  out.set_clock_now_ns(client_now_ns);
+  out.set_robot_now_ns(robot_now.ns);
+  out.set_clock_offset_ns(offset_ns);
+  out.set_measured_offset_ns(measured_ns);
   return framed(message);
 }
 

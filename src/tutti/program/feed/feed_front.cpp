@@ -14,17 +14,16 @@
 namespace tutti::program {
 namespace {
 
-std::size_t bytes_of(const FeedInput& input) {
+std::size_t scan_bytes_of(const FeedInput& input) {
   const auto* scan = std::get_if<Scan>(&input);
   if (scan == nullptr) return 0;
   const std::size_t ages = scan->age_s ? scan->age_s->size() : 0;
   return scan->cloud->points.size() * sizeof(Eigen::Vector3f) + ages * sizeof(float);
 }
 
-Timestamp stamp_of(const FeedInput& input) {
-  if (const auto* sample = std::get_if<node::OdometrySample>(&input)) return sample->stamp;
-  const auto* scan = std::get_if<Scan>(&input);
-  return scan != nullptr ? scan->stamp : Timestamp{};
+std::size_t image_bytes_of(const FeedInput& input) {
+  const auto* images = std::get_if<FedImages>(&input);
+  return images == nullptr ? 0 : bytes_of(*images);
 }
 
 bool is_odometry(const FeedInput& input) { return std::holds_alternative<node::OdometrySample>(input); }
@@ -38,6 +37,13 @@ node::OdometrySample joined(const node::OdometrySample& first, const node::Odome
 }
 
 }  // namespace
+
+Timestamp stamp_of(const FeedInput& input) {
+  if (const auto* sample = std::get_if<node::OdometrySample>(&input)) return sample->stamp;
+  if (const auto* images = std::get_if<FedImages>(&input)) return images->stamp;
+  const auto* scan = std::get_if<Scan>(&input);
+  return scan != nullptr ? scan->stamp : Timestamp{};
+}
 
 FeedFront::FeedFront(FeedState robot, const Limits& limits)
     : limits_(limits), robot_(std::move(robot)), localiser_(robot_.chain.robot) {
@@ -53,6 +59,7 @@ Status FeedFront::add_odometry(const node::OdometrySample& sample) {
   if (*has_jumped) jumps_.insert(sample.stamp);
   ended_ = false;
   push(sample);
+  release_images();
   fed_.notify_one();
   if (waiting() > limits_.inputs) {
     note_behind(sample.stamp);
@@ -65,7 +72,7 @@ Status FeedFront::add_scan(const Scan& scan) {
   const std::scoped_lock lock(mutex_);
   if (closed_) return fail(ErrorCode::io, "the robot's program ends");
   if (!scan.cloud) return fail(ErrorCode::invalid, "scan at {} ns has no cloud", scan.stamp.ns);
-  const std::size_t bytes = bytes_of(scan);
+  const std::size_t bytes = scan_bytes_of(scan);
   if (scan_bytes_ + bytes > limits_.scan_bytes || waiting() >= limits_.inputs / 2) {
     note_behind(scan.stamp);
     ++scans_left_out_;
@@ -83,13 +90,102 @@ Status FeedFront::add_scan(const Scan& scan) {
 Status FeedFront::finish() {
   const std::scoped_lock lock(mutex_);
   if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+  release_images(true);
   push(FeedEnded{});
   fed_.notify_one();
   return {};
 }
 
+void FeedFront::set_sensors(const FeedSensors& sensors) {
+  const std::scoped_lock lock(mutex_);
+  if (sensors == *sensors_) return;
+  release_images(true);
+  sensors_ = std::make_shared<const FeedSensors>(sensors);
+  push(sensors_);
+  fed_.notify_one();
+}
+
+bool FeedFront::is_ahead(Timestamp stamp) const {
+  return !localiser_.newest() || stamp - localiser_.newest()->stamp > kAhead_s;
+}
+
+Status FeedFront::may_wait(const FedImages& images) const {
+  if (auto ok = check_images(images, *sensors_); !ok) return ok;
+  if (newest_images_ && images.stamp <= *newest_images_)
+    return fail(ErrorCode::invalid, "images at {} ns: there were some at {} ns, stamps must increase", images.stamp.ns,
+                newest_images_->ns);
+  if (is_ahead(images.stamp))
+    return fail(ErrorCode::invalid, "images at {} ns: no odometry within {} s before", images.stamp.ns, kAhead_s);
+  if (image_bytes_ + bytes_of(images) > limits_.image_bytes || waiting() + images_.size() >= limits_.inputs / 2)
+    return fail(ErrorCode::io,
+                "the map is behind: {} inputs and {} bytes of images wait, at most {} with {}; the images at {} ns are "
+                "left out",
+                waiting() + images_.size(), image_bytes_, limits_.inputs / 2, limits_.image_bytes, images.stamp.ns);
+  return {};
+}
+
+Status FeedFront::add_images(FedImages images) {
+  const std::scoped_lock lock(mutex_);
+  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+  if (Status ok = may_wait(images); !ok) {
+    ++images_refused_;
+    if (ok.error().code == ErrorCode::io) {
+      note_behind(images.stamp);
+      ++images_left_out_;
+    }
+    return ok;
+  }
+  ++images_taken_;
+  newest_images_ = images.stamp;
+  image_bytes_ += bytes_of(images);
+  images.sensors = sensors_;
+  images_.push_back(std::move(images));
+  release_images();
+  fed_.notify_one();
+  return {};
+}
+
+/// Those whose odometry and IMU have come, or all: what has not come yet will not help them any more.
+void FeedFront::release_images(bool all) {
+  const auto is_due = [&](Timestamp stamp) {
+    if (all) return true;
+    if (localiser_.newest()->stamp < stamp) return false;
+    return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= stamp) ||
+           localiser_.newest()->stamp - stamp >= kImuPatience_s;
+  };
+  for (; !images_.empty() && is_due(images_.front().stamp); images_.pop_front()) push(std::move(images_.front()));
+}
+
+Status FeedFront::add_imu(const std::vector<ImuSample>& samples) {
+  const std::scoped_lock lock(mutex_);
+  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
+  if (!sensors_->imu)
+    return fail(ErrorCode::unsupported, "{} IMU samples: Hello said of no IMU (Sensors.imu)", samples.size());
+  std::size_t backwards = 0, ahead = 0;
+  for (const ImuSample& sample : samples) {
+    const bool is_backwards = !imu_.empty() && sample.stamp <= imu_.back().stamp;
+    if (is_backwards)
+      ++backwards;
+    else if (is_ahead(sample.stamp))
+      ++ahead;
+    else
+      imu_.push_back(sample);
+  }
+  imu_taken_ += samples.size() - backwards - ahead;
+  imu_refused_ += backwards + ahead;
+  while (imu_.size() > limits_.imu) imu_.pop_front();
+  release_images();
+  fed_.notify_one();
+  if (backwards + ahead == 0) return {};
+  return fail(
+      ErrorCode::invalid,
+      "of {} IMU samples from {} ns on {} are not after the one before, and of {} there is no odometry within {} s "
+      "before",
+      samples.size(), samples.front().stamp.ns, backwards, ahead, kAhead_s);
+}
+
 void FeedFront::note_behind(Timestamp stamp) {
-  if (samples_joined_ + scans_left_out_ == 0) behind_since_ = stamp;
+  if (samples_joined_ + scans_left_out_ + images_left_out_ == 0) behind_since_ = stamp;
 }
 
 /// Of samples that are closer than finest_s_, as SensorTimeline::add() does, two become one; never across a jump.
@@ -139,8 +235,11 @@ FeedState FeedFront::state() const {
     out.wants_scan =
         robot_.wants_scan || robot_.next_keyframe.is_due({out.newest->stamp, localiser_.watch().T_odom_body()});
   if (!trouble_.empty()) out.alerts.push_back({trouble_, trouble_since_, trouble_since_, trouble_since_});
-  if (scans_left_out_ + samples_joined_ > 0) {
-    const std::string text = fmt::format("the map is behind what is fed, localisation goes on: scans are left out{}",
+  if (scans_left_out_ + samples_joined_ + images_left_out_ > 0) {
+    const std::string text = fmt::format("the map is behind what is fed, localisation goes on: {}are left out{}",
+                                         images_left_out_ == 0  ? "scans "
+                                         : scans_left_out_ == 0 ? "images "
+                                                                : "scans and images ",
                                          samples_joined_ > 0 ? ", odometry is taken together" : "");
     out.alerts.push_back({text, behind_since_, behind_since_, behind_since_});
   }
@@ -165,6 +264,16 @@ void FeedFront::note_heard() {
   in_hand_ = false;
 }
 
+std::shared_ptr<const FeedSensors> FeedFront::sensors() const {
+  const std::scoped_lock lock(mutex_);
+  return sensors_;
+}
+
+std::vector<ImuSample> FeedFront::imu(Timestamp from, Timestamp until) const {
+  const std::scoped_lock lock(mutex_);
+  return imu_over(imu_, from, until);
+}
+
 bool FeedFront::is_drained() const {
   const std::scoped_lock lock(mutex_);
   return taken_ == inputs_.size();
@@ -173,13 +282,15 @@ bool FeedFront::is_drained() const {
 void FeedFront::note_stored() {
   const std::scoped_lock lock(mutex_);
   for (; taken_ > 0; --taken_) {
-    ended_ = std::holds_alternative<FeedEnded>(inputs_.front());
+    if (!std::holds_alternative<std::shared_ptr<const FeedSensors>>(inputs_.front()))
+      ended_ = std::holds_alternative<FeedEnded>(inputs_.front());
     if (const auto* sample = std::get_if<node::OdometrySample>(&inputs_.front())) stored_ = sample->stamp;
-    scan_bytes_ -= bytes_of(inputs_.front());
+    scan_bytes_ -= scan_bytes_of(inputs_.front());
+    image_bytes_ -= image_bytes_of(inputs_.front());
     inputs_.pop_front();
   }
   if (!inputs_.empty()) return;
-  scans_left_out_ = samples_joined_ = 0;
+  scans_left_out_ = samples_joined_ = images_left_out_ = 0;
   finest_s_ = 0.0;
   jumps_.clear();
 }
@@ -201,7 +312,8 @@ void FeedFront::leave_out_what_fails() {
   refusals_.push_back({stamp_of(*input), fmt::format("left out: the robot's program failed {} times with it, which is "
                                                      "a defect of it",
                                                      failed_.times)});
-  scan_bytes_ -= bytes_of(*input);
+  scan_bytes_ -= scan_bytes_of(*input);
+  image_bytes_ -= image_bytes_of(*input);
   inputs_.erase(input);
   failed_ = {};
 }
@@ -238,7 +350,12 @@ bool FeedFront::has_ended() const {
 
 FeedFront::Load FeedFront::load() const {
   const std::scoped_lock lock(mutex_);
-  return {inputs_.size() - taken_, scans_left_out_, samples_joined_};
+  return {inputs_.size() - taken_, scans_left_out_, samples_joined_, images_left_out_};
+}
+
+FeedFront::Figures FeedFront::figures() const {
+  const std::scoped_lock lock(mutex_);
+  return {images_taken_, images_refused_, imu_taken_, imu_refused_, image_bytes_};
 }
 
 }  // namespace tutti::program

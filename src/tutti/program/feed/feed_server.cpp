@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <optional>
 #include <vector>
@@ -20,6 +21,11 @@ namespace tutti::program {
 namespace {
 
 constexpr std::size_t kReadBytes = 256U << 10U;  // at most, of one client, before the others have their turn
+
+Timestamp wall_clock() {
+  const auto since_epoch = std::chrono::system_clock::now().time_since_epoch();
+  return {std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count()};
+}
 
 bool would_wait() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR; }
 
@@ -75,6 +81,9 @@ Result<std::unique_ptr<FeedServer>> FeedServer::listen(const std::string& path, 
   if (::listen(listener, settings.max_clients) != 0) return failed("listen");
   return std::unique_ptr<FeedServer>(new FeedServer(path, listener, target, settings));
 }
+
+FeedServer::FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings)
+    : path_(std::move(path)), listener_(listener), settings_(settings), session_(target, settings, wall_clock) {}
 
 FeedServer::~FeedServer() {
   for (const auto& [client, file] : files_) close(file);

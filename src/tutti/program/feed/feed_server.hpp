@@ -34,8 +34,7 @@ class FeedServer {
   [[nodiscard]] std::size_t clients() const { return files_.size(); }
 
  private:
-  FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings)
-      : path_(std::move(path)), listener_(listener), settings_(settings), session_(target, settings) {}
+  FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings);
   void accept_one();
   /// Of those that have not said who they are the one that came first; false: there is none.
   bool drop_silent();

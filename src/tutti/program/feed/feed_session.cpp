@@ -1,18 +1,42 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/program/feed/feed_session.hpp"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <iterator>
 #include <utility>
 
 namespace tutti::program {
 
-FeedSession::FeedSession(FeedTarget& target, const FeedSettings& settings)
+namespace {
+
+/// By the robot's clock; what it was if there is no such time by it.
+std::optional<Timestamp> to_robot(const FeedClock& clock, FromClient& message) {
+  const auto shift = [&](Timestamp& stamp) -> std::optional<Timestamp> {
+    const auto moved = clock.to_robot(stamp);
+    if (!moved) return stamp;
+    stamp = *moved;
+    return std::nullopt;
+  };
+  if (auto* sample = std::get_if<node::OdometrySample>(&message)) return shift(sample->stamp);
+  if (auto* scan = std::get_if<Scan>(&message)) return shift(scan->stamp);
+  if (auto* images = std::get_if<FedImages>(&message)) return shift(images->stamp);
+  if (auto* imu = std::get_if<FeedImu>(&message))
+    for (ImuSample& sample : imu->samples)
+      if (const auto wrong = shift(sample.stamp)) return wrong;
+  return std::nullopt;
+}
+
+}  // namespace
+
+FeedSession::FeedSession(FeedTarget& target, const FeedSettings& settings, Now now)
     : target_(target),
       settings_(settings),
       map_(settings, target.state().T_map_odom),
       T_odom_fed_(target.state().T_odom_fed),
-      situation_(situation_frame(target.state())) {}
+      situation_(situation_frame(target.state(), 0)),
+      now_(std::move(now)) {}
 
 void FeedSession::disconnect(Client client) {
   clients_.erase(client);
@@ -21,33 +45,66 @@ void FeedSession::disconnect(Client client) {
 
 void FeedSession::receive(Client client, std::string_view bytes) {
   Connection& connection = clients_.at(client);
+  if (feeder_ == client) last_.bytes += bytes.size();
   while (!connection.over) {
     const auto payload = connection.reader.take(bytes);
     if (!payload) return close(client, payload.error().message);
     if (!*payload) return;
-    const auto message = decode_from_client(**payload);
+    auto message = decode_from_client(**payload);
     if (!message) return close(client, message.error().message);
-    take(client, *message);
+    take(client, std::move(*message));
   }
 }
 
-void FeedSession::take(Client client, const FromClient& message) {
+void FeedSession::take(Client client, FromClient message) {
   Connection& connection = clients_.at(client);
   if (const auto* hello = std::get_if<FeedHello>(&message)) return greet(client, *hello);
   if (!connection.greeted) return close(client, "expected Hello first of all");
+  if (const auto* unknown = std::get_if<FeedUnknown>(&message)) {
+    const std::string why = fmt::format("a message of number {}, which this robot does not know; it takes {}",
+                                        unknown->number, fmt::join(kFromClient, ", "));
+    return put(connection, refused_frame({}, why, 0));
+  }
   if (feeder_ != client) return close(client, "this client said that it only listens");
   if (const auto* bad = std::get_if<BadSample>(&message))
-    put(connection, refused_frame(bad->stamp, bad->why));
-  else if (const auto* sample = std::get_if<node::OdometrySample>(&message))
-    take_odometry(client, *sample);
-  else if (const auto* scan = std::get_if<Scan>(&message))
-    take_scan(client, *scan);
-  else if (const Status ok = target_.finish(); !ok)
-    put(connection, refused_frame({}, ok.error().message));
-  else {
-    connection.ended = connection.waits_for_end = true;
-    answer_end();
-  }
+    return put(connection, refused_frame(bad->stamp, bad->why, 0));  // by its own clock
+  if (const auto* time = std::get_if<FeedTime>(&message)) return take_time(client, *time);
+  if (!std::holds_alternative<FeedEnd>(message)) return take_fed(client, std::move(message));
+  if (const Status ok = target_.finish(); !ok) return put(connection, refused_frame({}, ok.error().message, 0));
+  connection.ended = connection.waits_for_end = true;
+  answer_end();
+}
+
+void FeedSession::take_fed(Client client, FromClient message) {
+  Connection& connection = clients_.at(client);
+  if (const auto stamp = to_robot(last_.clock, message))
+    return put(
+        connection,
+        refused_frame(
+            *stamp, fmt::format("with the clock's offset of {} ns there is no such time", last_.clock.offset_ns()), 0));
+  if (const auto* sample = std::get_if<node::OdometrySample>(&message)) return take_odometry(client, *sample);
+  const auto* imu = std::get_if<FeedImu>(&message);
+  auto* images = std::get_if<FedImages>(&message);
+  const auto* scan = std::get_if<Scan>(&message);
+  const Timestamp stamp = imu != nullptr ? imu->samples.front().stamp : images != nullptr ? images->stamp : scan->stamp;
+  if (connection.ended) return refuse(client, stamp, "the recording has ended");
+  const Status taken = imu != nullptr      ? target_.add_imu(imu->samples)
+                       : images != nullptr ? target_.add_images(std::move(*images))
+                                           : target_.add_scan(*scan);
+  if (!taken) refuse(client, stamp, taken.error().message);
+}
+
+void FeedSession::take_time(Client client, const FeedTime& time) {
+  const Timestamp now = now_();
+  const auto measured_ns = last_.clock.check(time.clock_now_ns, now);
+  if (!measured_ns)
+    return put(clients_.at(client),
+               refused_frame({time.clock_now_ns}, "a clock that is farther from the robot's than 64 bits hold", 0));
+  put(clients_.at(client), time_answer_frame(time.clock_now_ns, now, last_.clock.offset_ns(), *measured_ns));
+}
+
+void FeedSession::refuse(Client client, Timestamp stamp, const std::string& why) {
+  put(clients_.at(client), refused_frame(stamp, why, offset_ns(client)));
 }
 
 void FeedSession::greet(Client client, const FeedHello& hello) {
@@ -58,7 +115,12 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
                  fmt::format("protocol version {}, this program speaks version {}", hello.version, kFeedVersion));
   if (!hello.listens_only) {
     if (feeder_) return close(client, "another client feeds this robot already; listens_only may join it");
+    if (!hello.sensors) return close(client, "sensors: " + hello.sensors.error().message);
+    if (!last_.clock.begin(hello.clock_offset_ns, hello.clock_now_ns, now_()))
+      return close(client, "a clock that is farther from the robot's than 64 bits hold");
+    last_.name = hello.client;
     feeder_ = client;
+    target_.set_sensors(*hello.sensors);
   }
   const auto listeners = std::ranges::count_if(clients_, [](const auto& other) { return other.second.listens_only; });
   if (hello.listens_only && listeners + 1 >= settings_.max_clients)
@@ -66,32 +128,27 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
   connection.listens_only = hello.listens_only;
   connection.greeted = true;
   const FeedState state = target_.state();
-  put(connection, welcome_frame(state, map_.T_map_odom()));
-  put(connection, situation_frame(state));
+  put(connection, welcome_frame(state, map_.T_map_odom(), offset_ns(client)));
+  put(connection, situation_frame(state, offset_ns(client)));
 }
 
 void FeedSession::take_odometry(Client client, const node::OdometrySample& sample) {
   Connection& connection = clients_.at(client);
-  if (connection.ended) return put(connection, refused_frame(sample.stamp, "the recording has ended"));
-  if (const Status ok = target_.add_odometry(sample); !ok)
-    return put(connection, refused_frame(sample.stamp, ok.error().message));
+  if (connection.ended) return refuse(client, sample.stamp, "the recording has ended");
+  if (const Status ok = target_.add_odometry(sample); !ok) return refuse(client, sample.stamp, ok.error().message);
   const FeedState state = target_.state();
   if (!(state.T_odom_fed == T_odom_fed_)) {
     const Pose3 before = std::exchange(T_odom_fed_, state.T_odom_fed);
-    broadcast(jump_frame(state, map_.change_odom(before.inverse() * T_odom_fed_),
-                         "odometry jumps: its front end began anew"));
+    const SmoothMap::Jump jump = map_.change_odom(before.inverse() * T_odom_fed_);
+    broadcast([&](std::int64_t offset_ns) {
+      return jump_frame(state, jump, offset_ns, "odometry jumps: its front end began anew");
+    });
   }
   const SmoothMap::Answer answer = map_.step(*state.newest, state.T_map_odom, state.covariance);
-  if (answer.jump) broadcast(jump_frame(state, *answer.jump));
+  if (answer.jump) broadcast([&](std::int64_t offset_ns) { return jump_frame(state, *answer.jump, offset_ns); });
   for (auto& [number, listener] : clients_)
-    if (listener.greeted) put(listener, correction_frame(state, answer, listener.dropped), true);
+    if (listener.greeted) put(listener, correction_frame(state, answer, listener.dropped, offset_ns(number)), true);
   refresh();
-}
-
-void FeedSession::take_scan(Client client, const Scan& scan) {
-  Connection& connection = clients_.at(client);
-  if (connection.ended) return put(connection, refused_frame(scan.stamp, "the recording has ended"));
-  if (const Status ok = target_.add_scan(scan); !ok) put(connection, refused_frame(scan.stamp, ok.error().message));
 }
 
 void FeedSession::answer_end() {
@@ -102,12 +159,13 @@ void FeedSession::answer_end() {
 
 void FeedSession::refresh() {
   for (const FeedRefusal& refusal : target_.take_refusals())
-    if (feeder_) put(clients_.at(*feeder_), refused_frame(refusal.stamp, refusal.why));
+    if (feeder_) refuse(*feeder_, refusal.stamp, refusal.why);
   answer_end();
-  std::string now = situation_frame(target_.state());
+  const FeedState state = target_.state();
+  std::string now = situation_frame(state, 0);
   if (now == situation_) return;
   situation_ = std::move(now);
-  broadcast(situation_);
+  broadcast([&](std::int64_t offset_ns) { return offset_ns == 0 ? situation_ : situation_frame(state, offset_ns); });
 }
 
 void FeedSession::close(Client client, const std::string& why) {
@@ -117,9 +175,9 @@ void FeedSession::close(Client client, const std::string& why) {
   if (feeder_ == client) feeder_.reset();
 }
 
-void FeedSession::broadcast(const std::string& frame) {
+void FeedSession::broadcast(const std::function<std::string(std::int64_t offset_ns)>& frame) {
   for (auto& [number, connection] : clients_)
-    if (connection.greeted) put(connection, frame);
+    if (connection.greeted) put(connection, frame(offset_ns(number)));
 }
 
 void FeedSession::put(Connection& connection, std::string frame, bool is_correction) {

@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "tutti/program/feed/feed_clock.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/program/feed/feed_settings.hpp"
 #include "tutti/program/feed/feed_target.hpp"
@@ -21,8 +23,11 @@ namespace tutti::program {
 class FeedSession {
  public:
   using Client = std::uint64_t;
+  /// The robot's time now, since the Unix epoch.
+  using Now = std::function<Timestamp()>;
   /// `target` outlives it. Corrections begin with the target's T_map_odom of now.
-  FeedSession(FeedTarget& target, const FeedSettings& settings);
+  FeedSession(
+      FeedTarget& target, const FeedSettings& settings, Now now = [] { return Timestamp{}; });
 
   void connect(Client client) { clients_[client]; }
   /// Whoever feeds may come again, or another; the robot goes on where it stood.
@@ -43,6 +48,13 @@ class FeedSession {
   /// It has said all, and the answer to that is still to come.
   [[nodiscard]] bool waits_for_end(Client client) const { return clients_.at(client).waits_for_end; }
   [[nodiscard]] bool has_feeder() const { return feeder_.has_value(); }
+  /// Of whoever feeds, or did last.
+  struct Feeder {
+    std::string name;
+    FeedClock clock;
+    std::uint64_t bytes = 0;  ///< That all who fed have said.
+  };
+  [[nodiscard]] const Feeder& feeder() const { return last_; }
 
  private:
   struct Frame {
@@ -65,13 +77,16 @@ class FeedSession {
   void close(Client client, const std::string& why);
   void put(Connection& connection, std::string frame, bool is_correction = false);
   void make_room(Connection& connection);
-  /// To all that were greeted.
-  void broadcast(const std::string& frame);
-  void take(Client client, const FromClient& message);
+  /// To all that were greeted, by the clock of each (FeedClock::offset_ns()).
+  void broadcast(const std::function<std::string(std::int64_t offset_ns)>& frame);
+  [[nodiscard]] std::int64_t offset_ns(Client client) const { return feeder_ == client ? last_.clock.offset_ns() : 0; }
+  void refuse(Client client, Timestamp stamp, const std::string& why);
+  void take(Client client, FromClient message);
+  void take_fed(Client client, FromClient message);
+  void take_time(Client client, const FeedTime& time);
   void greet(Client client, const FeedHello& hello);
   void answer_end();
   void take_odometry(Client client, const node::OdometrySample& sample);
-  void take_scan(Client client, const Scan& scan);
 
   FeedTarget& target_;
   FeedSettings settings_;
@@ -80,6 +95,8 @@ class FeedSession {
   std::string situation_;  ///< The frame that was last told.
   std::map<Client, Connection> clients_;
   std::optional<Client> feeder_;
+  Feeder last_;
+  Now now_;
 };
 
 }  // namespace tutti::program

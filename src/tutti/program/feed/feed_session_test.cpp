@@ -6,68 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "support/program/feed/client.hpp"
+#include "support/program/feed/session_fixture.hpp"
 
 namespace tutti::program {
 namespace feed_session_test {
 
 using Feed = v1::Feed;
-
-/// Takes samples of increasing stamps; what else it knows is set by hand.
-class ScriptedTarget final : public FeedTarget {
- public:
-  Status add_odometry(const node::OdometrySample& sample) override {
-    if (known.newest && sample.stamp <= known.newest->stamp) return fail(ErrorCode::invalid, "stamps must increase");
-    known.newest = {sample.stamp, sample.T_odom_body};
-    return {};
-  }
-  Status add_scan(const Scan& scan) override {
-    if (!known.newest || scan.stamp != known.newest->stamp) return fail(ErrorCode::invalid, "not of the newest sample");
-    scans.push_back(scan.stamp);
-    return {};
-  }
-  Status finish() override {
-    ++finished;
-    known.ended = ends_at_once;
-    return {};
-  }
-  [[nodiscard]] FeedState state() const override { return known; }
-  std::vector<FeedRefusal> take_refusals() override { return std::exchange(refusals, {}); }
-
-  FeedState known{.chain = {RobotId{4}, 77}, .name = "alpha", .newest = {}};
-  std::vector<Timestamp> scans;
-  int finished = 0;
-  bool ends_at_once = true;
-  std::vector<FeedRefusal> refusals;
-};
-
-class FeedSessionTest : public testing::Test {
- protected:
-  static std::string sample(std::int64_t ns) { return test::odometry({{ns}, {}}, Matrix6d::Identity()); }
-  /// All that waits for the client, read by it.
-  std::vector<Feed> read(FeedSession::Client client) {
-    std::string bytes;
-    while (!session_.output(client).empty()) {
-      const std::string_view part = session_.output(client).substr(0, 100);
-      bytes += part;
-      session_.sent(client, part.size());
-    }
-    return test::messages(bytes);
-  }
-  std::vector<Feed> say(FeedSession::Client client, const std::string& bytes) {
-    session_.receive(client, bytes);
-    return read(client);
-  }
-  /// A client that was greeted, as number `client`.
-  void join(FeedSession::Client client, bool listens_only = false) {
-    session_.connect(client);
-    ASSERT_EQ(say(client, test::hello(listens_only)).size(), 2U);
-  }
-
-  ScriptedTarget target_;
-  FeedSettings settings_{.max_queue_kb = 8};
-  FeedSession session_{target_, settings_};
-};
+using FeedSessionTest = test::SessionFixture;
 
 TEST_F(FeedSessionTest, AnswersHelloAndEverySample) {
   session_.connect(1);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
+#include "tutti/program/feed/feed_sensors.hpp"
 #include "tutti/robot/next_keyframe.hpp"
 #include "tutti/robot/odometry_watch.hpp"
 
@@ -65,6 +67,15 @@ class FeedTarget {
   /// An error: it was refused, and why; nothing has changed.
   virtual Status add_odometry(const node::OdometrySample& sample) = 0;
   virtual Status add_scan(const Scan& scan) = 0;
+  /// What its client has, from its next input on.
+  virtual void set_sensors(const FeedSensors& /*sensors*/) {}
+  virtual Status add_images(FedImages images) {
+    return fail(ErrorCode::unsupported, "images at {} ns: this robot takes none", images.stamp.ns);
+  }
+  /// An error where any of them was left out.
+  virtual Status add_imu(const std::vector<ImuSample>& samples) {
+    return fail(ErrorCode::unsupported, "{} IMU samples: this robot takes none", samples.size());
+  }
   /// FeedState::ended says when it is done.
   virtual Status finish() = 0;
   /// Since the last call.

@@ -42,16 +42,23 @@ void LiveFeed::serve(int wait_ms) {
     if (!server_ && !listen()) return std::this_thread::sleep_for(kListensAgain);
     server_->serve(wait_ms);
     is_fed_ = server_->session().has_feeder();
+    const std::scoped_lock lock(told_mutex_);
+    feeder_ = server_->session().feeder();
   } catch (const std::exception& error) {
     is_fed_ = false;
     server_.reset();  // whose bytes they were is not known
-    const std::scoped_lock lock(thrown_mutex_);
+    const std::scoped_lock lock(told_mutex_);
     thrown_ = error.what();
   }
 }
 
+FeedSession::Feeder LiveFeed::feeder() const {
+  const std::scoped_lock lock(told_mutex_);
+  return feeder_;
+}
+
 std::string LiveFeed::take_thrown() {
-  const std::scoped_lock lock(thrown_mutex_);
+  const std::scoped_lock lock(told_mutex_);
   return std::exchange(thrown_, {});
 }
 

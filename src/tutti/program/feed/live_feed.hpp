@@ -27,6 +27,7 @@ class LiveFeed {
   [[nodiscard]] const FeedFront& front() const { return front_; }
   /// Somebody feeds.
   [[nodiscard]] bool is_fed() const { return is_fed_; }
+  [[nodiscard]] FeedSession::Feeder feeder() const;
   /// What a client has made the thread throw, since the last call; empty: nothing. All clients lose their connection
   /// then, and may come again.
   std::string take_thrown();
@@ -43,8 +44,9 @@ class LiveFeed {
   FeedFront front_;
   std::unique_ptr<FeedServer> server_;
   std::atomic<bool> is_fed_ = false;
-  std::mutex thrown_mutex_;
+  mutable std::mutex told_mutex_;  // of what follows
   std::string thrown_;
+  FeedSession::Feeder feeder_;
   std::jthread thread_;
 };
 

@@ -78,6 +78,8 @@ Status taken(const node::Step& step) {
       return fail(ErrorCode::invalid, "{}", sample->why);
     if (const auto* scan = std::get_if<node::ScanRefused>(&event.what); scan != nullptr && !scan->later)
       return fail(ErrorCode::invalid, "{}", scan->why);
+    if (const auto* images = std::get_if<node::ImagesRefused>(&event.what); images != nullptr && !images->later)
+      return fail(ErrorCode::invalid, "{}", images->why);
   }
   return {};
 }

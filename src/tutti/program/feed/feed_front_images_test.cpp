@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "support/program/feed/node_target.hpp"
+#include "support/robot/drifting_robot.hpp"
+#include "tutti/program/feed/feed_front.hpp"
+
+namespace tutti::program {
+namespace feed_front_images_test {
+
+const Trajectory kOdometry = robot::test::drifting_odometry(20);
+
+node::OdometrySample sample(std::size_t i) {
+  return {kOdometry[i].stamp, kOdometry[i].pose, robot::test::kStepCovariance};
+}
+
+/// Of one camera of 8 x 4 pixels, with an IMU.
+FeedSensors eyes() {
+  FeedSensors out;
+  out.cameras.resize(1);
+  out.cameras[0].model = {.width_px = 8, .height_px = 4, .fx = 5.0, .fy = 5.0, .cx = 3.5, .cy = 1.5};
+  out.imu = ImuNoise{};
+  return out;
+}
+FedImages images(Timestamp stamp) { return {stamp, {{0, true, std::string(32, 'x')}}, {}}; }
+std::vector<ImuSample> imu(Timestamp stamp) { return {{stamp, {}, {}}}; }
+
+/// What the robot is given next: o, i, s (what is fed), or nothing.
+char next(FeedFront& front) {
+  const auto input = front.take(0.0);
+  if (!input) return ' ';
+  front.note_heard();
+  return std::holds_alternative<node::OdometrySample>(*input) ? 'o'
+         : std::holds_alternative<FedImages>(*input)          ? 'i'
+                                                              : 's';
+}
+
+TEST(FeedFrontImages, ImagesComeWhenOdometryAndTheImuHaveReachedThem) {
+  FeedFront front(test::NodeTarget().state(), {});
+  front.set_sensors(eyes());
+  EXPECT_EQ(next(front), 's');
+  EXPECT_FALSE(front.add_images(images(kOdometry[0].stamp)));  // nobody knows yet where that is
+  EXPECT_TRUE(front.add_odometry(sample(0)));
+  EXPECT_EQ(next(front), 'o');
+  const Timestamp between = kOdometry[1].stamp + -0.05;
+  EXPECT_TRUE(front.add_images(images(between)));
+  EXPECT_EQ(next(front), ' ');
+  EXPECT_TRUE(front.add_imu(imu(kOdometry[0].stamp)));
+  EXPECT_TRUE(front.add_odometry(sample(1)));
+  EXPECT_EQ(next(front), 'o');
+  EXPECT_EQ(next(front), ' ');
+  EXPECT_TRUE(front.add_imu(imu(between + 0.001)));
+  EXPECT_EQ(next(front), 'i');
+  EXPECT_EQ(front.imu(kOdometry[0].stamp, between).size(), 2U);
+  EXPECT_FALSE(front.add_images(images(between)));  // again
+  EXPECT_TRUE(front.add_images(images(kOdometry[1].stamp)));
+  std::size_t i = 2;  // the IMU is not heard any more: it is not waited for
+  for (; kOdometry[i].stamp - kOdometry[1].stamp < FeedFront::kImuPatience_s; ++i) {
+    EXPECT_TRUE(front.add_odometry(sample(i)));
+    EXPECT_EQ(next(front), 'o');
+    EXPECT_EQ(next(front), ' ');
+  }
+  EXPECT_TRUE(front.add_odometry(sample(i)));
+  EXPECT_EQ(next(front), 'o');
+  EXPECT_EQ(next(front), 'i');
+}
+
+TEST(FeedFrontImages, StampsThatJumpBackOrFarAheadAreRefusedAndDoNoHarm) {
+  FeedFront front(test::NodeTarget().state(), {});
+  front.set_sensors(eyes());
+  EXPECT_TRUE(front.add_odometry(sample(0)));
+  const Timestamp now = kOdometry[0].stamp;
+  const auto ahead =
+      front.add_imu({{now + 0.1, {}, {}}, {now + 3600.0, {}, {}}, {now + 0.05, {}, {}}, {now + 0.2, {}, {}}});
+  ASSERT_FALSE(ahead);
+  EXPECT_NE(ahead.error().message.find("of 4 IMU samples"), std::string::npos) << ahead.error().message;
+  EXPECT_EQ(front.figures().imu, 2U);
+  EXPECT_EQ(front.figures().imu_left_out, 2U);
+  EXPECT_FALSE(front.add_images(images(now + 3600.0)));
+  EXPECT_TRUE(front.add_images(images(now + 0.1)));
+  EXPECT_FALSE(front.add_images(images(now + 0.05)));
+  EXPECT_EQ(front.figures().images, 1U);
+  EXPECT_EQ(front.figures().images_left_out, 2U);
+}
+
+TEST(FeedFrontImages, WhatWaitsInImagesIsBoundedAndCounted) {
+  FeedFront front(test::NodeTarget().state(), {.image_bytes = 1000, .imu = 50});
+  FeedSensors sensors = eyes();
+  sensors.imu.reset();
+  front.set_sensors(sensors);
+  EXPECT_TRUE(front.add_odometry(sample(0)));
+  for (std::size_t i = 1; i <= 100; ++i) {  // at 60 Hz
+    const Timestamp stamp = kOdometry[0].stamp + static_cast<double>(i) / 200.0;
+    const auto taken = front.add_images(images(stamp));
+    EXPECT_EQ(taken.has_value(), i <= 31) << i;
+    if (!taken) {
+      EXPECT_NE(taken.error().message.find("left out"), std::string::npos);
+    }
+  }
+  EXPECT_EQ(front.figures().images_left_out, 69U);
+  EXPECT_EQ(front.figures().image_bytes, 31U * 32U);
+  ASSERT_EQ(front.state().alerts.size(), 1U);
+  EXPECT_NE(front.state().alerts[0].text.find("images are left out"), std::string::npos);
+  for (std::size_t i = 1; i <= 10; ++i) EXPECT_TRUE(front.add_odometry(sample(i)));
+  while (next(front) != ' ') {
+  }
+  front.note_stored();
+  EXPECT_EQ(front.figures().image_bytes, 0U);
+  EXPECT_TRUE(front.state().alerts.empty());
+  sensors.imu = ImuNoise{};
+  front.set_sensors(sensors);
+  for (std::size_t i = 1; i <= 100; ++i)
+    EXPECT_TRUE(front.add_imu(imu(kOdometry[0].stamp + static_cast<double>(i) / 200.0)));
+  EXPECT_EQ(front.imu(kFirstTimestamp, kLastTimestamp).size(), 50U);
+}
+
+}  // namespace feed_front_images_test
+}  // namespace tutti::program

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "tutti/program/fed_robot.hpp"
+
+namespace tutti::program::test {
+
+/// Keeps what is sent, if anybody wants it.
+class SentPort final : public bus::Port {
+ public:
+  explicit SentPort(std::vector<bus::Envelope>* sent) : sent_(sent) {}
+  Status send(bus::Envelope envelope) override {
+    if (sent_ != nullptr) sent_->push_back(std::move(envelope));
+    return {};
+  }
+  std::vector<bus::Received> receive() override { return {}; }
+  void acknowledge(std::uint64_t) override {}
+  void still_busy(std::uint64_t) override {}
+
+ private:
+  std::vector<bus::Envelope>* sent_;
+};
+
+/// What of HostedRobot is about being fed.
+class Hosting final : public Hosted {
+ public:
+  Hosting(std::unique_ptr<LiveRobot> robot, FeedFront& front, Host& host, const Clock& clock,
+          const visual::TrackerConfig& tracker = {})
+      : robot_(std::move(robot)), fed_(front, *robot_, host, clock, RobotView("alpha"), tracker) {}
+  Answer start(Timestamp now) override {
+    robot_->resume(now);
+    return said();
+  }
+  Answer receive(const bus::Received&, Timestamp) override { return {}; }
+  [[nodiscard]] std::optional<Timestamp> next_work() const override { return robot_->node().next_timer(); }
+  Answer work(Timestamp now) override {
+    robot_->on_timer(now);
+    return said();
+  }
+  void wait(double) override { fed_.wait(0.0); }
+  Answer end() override {
+    fed_.end();
+    robot_->store_all();
+    return said();
+  }
+  [[nodiscard]] Json status(Timestamp) const override { return {}; }
+  [[nodiscard]] const robot::RobotAgent& agent() const { return robot_->node().agent(); }
+
+ private:
+  Answer said() {
+    Answer out{robot_->take_step(), {}};
+    fed_.note(out.step);
+    return out;
+  }
+  std::unique_ptr<LiveRobot> robot_;
+  FedRobot fed_;
+};
+
+}  // namespace tutti::program::test
