@@ -12,22 +12,12 @@ std::optional<double> optional_of(const Json& value) {
   return value.is_null() ? std::nullopt : std::optional(value.get<double>());
 }
 
-Json to_json(const consistency::SuspectedOrigin& origin) {
-  return {{"from_ns", origin.from.ns},
-          {"until_ns", origin.until.ns},
-          {"place_m", {origin.place_m.x(), origin.place_m.y(), origin.place_m.z()}},
-          {"scale", origin.scale},
-          {"length_m", origin.length_m},
-          {"translation_m", origin.translation_m},
-          {"rotation_rad", origin.rotation_rad},
-          {"significance", origin.significance},
-          {"alert", origin.alert}};
-}
-
 template <class T>
 T at(const Json& json, const char* key) {
   return json.at(key).get<T>();
 }
+
+}  // namespace
 
 consistency::SuspectedOrigin origin_of(const Json& json) {
   const auto place = at<std::vector<double>>(json, "place_m");
@@ -42,15 +32,13 @@ consistency::SuspectedOrigin origin_of(const Json& json) {
           .alert = at<bool>(json, "alert")};
 }
 
-}  // namespace
-
 Json to_json(const mission::UpdateRecord& update) {
   Json answers = Json::array();
   for (const mission::AnswerRecord& answer : update.answers)
     answers.push_back(
         {{"policy", answer.policy}, {"constraints", answer.constraints}, {"rmse_m", or_null(answer.rmse_m)}});
   Json origins = Json::array();
-  for (const consistency::SuspectedOrigin& origin : update.origins) origins.push_back(to_json(origin));
+  for (const consistency::SuspectedOrigin& origin : update.origins) origins.push_back(program::to_json(origin));
   return {{"time_s", update.time_s},
           {"event", kUpdateScored},
           {"revision", update.revision},

@@ -121,7 +121,10 @@ Told tell(const node::ChangeOfMind& told) {
 }
 Told tell(const node::RobotUpdated& robot) {
   const robot::UpdateSummary& update = robot.summary;
+  Json origins = Json::array();
+  for (const consistency::SuspectedOrigin& origin : update.explanation.origins) origins.push_back(to_json(origin));
   return {{{"event", "robot_updated"},
+           {"origins", std::move(origins)},
            {"robot", robot.robot.value},
            {"revision", update.revision},
            {"synchronised", update.synchronised},
@@ -233,6 +236,18 @@ Result<Level> level_of(const std::string& word) {
   for (std::size_t i = 0; i < kLevels.size(); ++i)
     if (word == kLevels.at(i).first) return static_cast<Level>(i);
   return fail(ErrorCode::configuration, "log level '{}', expected debug, info, warning or error", word);
+}
+
+Json to_json(const consistency::SuspectedOrigin& origin) {
+  return {{"from_ns", origin.from.ns},
+          {"until_ns", origin.until.ns},
+          {"place_m", {origin.place_m.x(), origin.place_m.y(), origin.place_m.z()}},
+          {"scale", origin.scale},
+          {"length_m", origin.length_m},
+          {"translation_m", origin.translation_m},
+          {"rotation_rad", origin.rotation_rad},
+          {"significance", origin.significance},
+          {"alert", origin.alert}};
 }
 
 Json to_json(const node::Event& event) { return tell_event(event).json; }

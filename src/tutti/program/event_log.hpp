@@ -26,6 +26,7 @@ enum class Level { debug, info, warning, error };
 /// "debug", "info", "warning", "error".
 Result<Level> level_of(const std::string& word);
 
+Json to_json(const consistency::SuspectedOrigin& origin);
 /// "time_s", "event" (what happened, one word), then what it says.
 Json to_json(const node::Event& event);
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "tutti/model/proxy_graph.hpp"
 #include "tutti/node/status_envelope.hpp"
 
 namespace tutti::program {
@@ -17,10 +18,22 @@ constexpr double kStarts_s = 15.0;       // so long a second program of this rob
 }  // namespace
 
 Answer HostedRobot::receive(const bus::Received& message, Timestamp now) {
+  std::optional<Trajectory> map;
+  if (feed_ && feed_->front().wants_ways())
+    if (const auto graph = driver_->node().graph_in(message.envelope); graph && *graph)
+      map = trajectory_of((*graph)->graph, driver_->node().agent().chain());
   driver_->receive(message.envelope, now);
   for (const Json& note : driver_->take_notes()) log_.write(note);
   note_conflict();
-  return said({message.ticket});
+  Answer out = said({message.ticket});
+  const bool has_updated = std::ranges::any_of(out.step.events, [](const node::Event& event) {
+    const auto* update = std::get_if<node::RobotUpdated>(&event.what);
+    return update != nullptr && update->summary.synchronised > 0;
+  });
+  const robot::RobotAgent& agent = driver_->node().agent();
+  if (map && has_updated)
+    feed_->front().say({agent.map_age(), agent.ledger().size(), agent.corrected(), std::move(*map)});
+  return out;
 }
 
 /// Who has just started ends; who maps goes on, whatever others say.

@@ -91,7 +91,10 @@ Result<FeedSensors> read(const v1::Feed::Sensors& in) {
 }
 
 FromClient read(v1::Feed::Hello& in) {
-  FeedHello out{.version = in.protocol_version(), .client = plain(in.client_name()), .listens_only = in.listens_only()};
+  FeedHello out{.version = in.protocol_version(),
+                .client = plain(in.client_name()),
+                .listens_only = in.listens_only(),
+                .wants_way = in.wants_way()};
   if (in.has_sensors()) out.sensors = read(in.sensors());
   if (in.has_clock_offset_ns()) out.clock_offset_ns = in.clock_offset_ns();
   if (in.has_clock_now_ns()) out.clock_now_ns = in.clock_now_ns();
@@ -148,7 +151,7 @@ Result<std::uint32_t> number_of_client(const char* bytes, int size) {
   if (static_cast<std::size_t>(size) > kMaxFeedBytes || (tag & 7U) != kLengthDelimited || !in.ReadVarint32(&length) ||
       length != static_cast<std::uint32_t>(size - in.CurrentPosition()))
     return fail(ErrorCode::parse, "a frame that holds no Feed message");
-  if (number >= v1::Feed::kWelcomeFieldNumber && number <= v1::Feed::kTimeAnswerFieldNumber)
+  if (number >= v1::Feed::kWelcomeFieldNumber && number <= v1::Feed::kWayFieldNumber)
     return fail(ErrorCode::parse, "a message that clients do not send (number {})", number);
   return number;
 }

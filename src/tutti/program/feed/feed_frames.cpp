@@ -141,13 +141,35 @@ std::string refused_frame(Timestamp stamp, const std::string& why, std::int64_t 
 }
 
 std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, std::int64_t offset_ns,
-                              std::int64_t measured_ns) {
+                              std::int64_t measured_ns, const std::optional<Timestamp>& stored) {
   v1::Feed message;
   auto& out = *message.mutable_time_answer();
   out.set_clock_now_ns(client_now_ns);
   out.set_robot_now_ns(robot_now.ns);
   out.set_clock_offset_ns(offset_ns);
   out.set_measured_offset_ns(measured_ns);
+  out.set_has_stored(stored.has_value());
+  if (stored) out.set_stored_stamp_ns(told(*stored, offset_ns));
+  return framed(message);
+}
+
+std::optional<std::string> way_frame(const FeedWay& way, std::int64_t offset_ns) {
+  constexpr std::size_t kMostBytesPerPose = 70;
+  if ((way.corrected.size() + way.map.size() + 1) * kMostBytesPerPose > kMaxFeedBytes) return std::nullopt;
+  v1::Feed message;
+  auto& out = *message.mutable_way();
+  out.set_map_epoch(way.map_age.first);
+  out.set_map_revision(way.map_age.second);
+  out.set_constraints(way.constraints);
+  const auto add = [&](const Trajectory& poses, auto& stamps, auto& numbers) {
+    for (const auto& [stamp, pose] : poses) {
+      stamps.Add(told(stamp, offset_ns));
+      for (const double x : pose.translation) numbers.Add(x);
+      for (const double x : pose.rotation.coeffs()) numbers.Add(x);  // x y z w
+    }
+  };
+  add(way.corrected, *out.mutable_stamp_ns(), *out.mutable_t_map_body());
+  add(way.map, *out.mutable_map_stamp_ns(), *out.mutable_t_world_body());
   return framed(message);
 }
 

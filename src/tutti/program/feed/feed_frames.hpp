@@ -41,6 +41,7 @@ struct FeedHello {
   bool listens_only = false;
   Result<FeedSensors> sensors = FeedSensors{};  ///< An error: why they cannot be.
   std::optional<std::int64_t> clock_offset_ns = {}, clock_now_ns = {};
+  bool wants_way = false;
 };
 struct FeedEnd {};
 struct FeedImu {
@@ -77,7 +78,9 @@ std::string jump_frame(const FeedState& state, const SmoothMap::Jump& jump, std:
 std::string situation_frame(const FeedState& state, std::int64_t offset_ns);
 std::string refused_frame(Timestamp stamp, const std::string& why, std::int64_t offset_ns);
 std::string time_answer_frame(std::int64_t client_now_ns, Timestamp robot_now, std::int64_t offset_ns,
-                              std::int64_t measured_ns);
+                              std::int64_t measured_ns, const std::optional<Timestamp>& stored);
+/// Nothing: it is too long for a message.
+std::optional<std::string> way_frame(const FeedWay& way, std::int64_t offset_ns);
 std::string ended_frame();
 std::string closed_frame(const std::string& why);
 

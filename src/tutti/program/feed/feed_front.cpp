@@ -251,6 +251,29 @@ std::vector<FeedRefusal> FeedFront::take_refusals() {
   return std::exchange(refusals_, {});
 }
 
+void FeedFront::want_ways() {
+  const std::scoped_lock lock(mutex_);
+  wants_ways_ = true;
+}
+
+bool FeedFront::wants_ways() const {
+  const std::scoped_lock lock(mutex_);
+  return wants_ways_;
+}
+
+void FeedFront::say(FeedWay way) {
+  const std::scoped_lock lock(mutex_);
+  ways_.push_back(std::move(way));
+  if (ways_.size() > kWays) ways_.pop_front();
+}
+
+std::vector<FeedWay> FeedFront::take_ways() {
+  const std::scoped_lock lock(mutex_);
+  std::vector<FeedWay> out(std::make_move_iterator(ways_.begin()), std::make_move_iterator(ways_.end()));
+  ways_.clear();
+  return out;
+}
+
 std::optional<FeedInput> FeedFront::take(double wall_s) {
   std::unique_lock lock(mutex_);
   const auto has_more = [&] { return inputs_.size() > taken_; };

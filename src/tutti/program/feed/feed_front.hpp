@@ -53,6 +53,8 @@ class FeedFront final : public FeedTarget {
   Status finish() override;
   [[nodiscard]] FeedState state() const override;
   std::vector<FeedRefusal> take_refusals() override;
+  void want_ways() override;
+  std::vector<FeedWay> take_ways() override;
 
   // For the robot.
   /// The next input, waiting for it so many wall seconds; nothing: there is none. Until note_heard() the robot has not
@@ -73,6 +75,10 @@ class FeedFront final : public FeedTarget {
   void refuse(Timestamp stamp, std::string why);
   /// What the robot knows now.
   void publish(FeedState robot);
+  [[nodiscard]] bool wants_ways() const;
+  /// Kept are the newest kWays that were not taken.
+  void say(FeedWay way);
+  static constexpr std::size_t kWays = 4;
   /// Told to clients as an alert, until it is empty.
   void say_trouble(std::string trouble);
   /// Nothing is taken from clients any more: the program ends.
@@ -135,6 +141,8 @@ class FeedFront final : public FeedTarget {
   double finest_s_ = 0.0;                                                      // samples that are closer are one
   std::set<Timestamp> jumps_;  // samples before which odometry has jumped
   Timestamp behind_since_;
+  bool wants_ways_ = false;
+  std::deque<FeedWay> ways_;
   std::string trouble_;
   Timestamp trouble_since_;
   bool ended_ = false, closed_ = false;

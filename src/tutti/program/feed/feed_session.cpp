@@ -100,7 +100,8 @@ void FeedSession::take_time(Client client, const FeedTime& time) {
   if (!measured_ns)
     return put(clients_.at(client),
                refused_frame({time.clock_now_ns}, "a clock that is farther from the robot's than 64 bits hold", 0));
-  put(clients_.at(client), time_answer_frame(time.clock_now_ns, now, last_.clock.offset_ns(), *measured_ns));
+  put(clients_.at(client),
+      time_answer_frame(time.clock_now_ns, now, last_.clock.offset_ns(), *measured_ns, target_.state().stored));
 }
 
 void FeedSession::refuse(Client client, Timestamp stamp, const std::string& why) {
@@ -127,6 +128,8 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
     return close(client, fmt::format("{} clients listen, no more may: one place is for who feeds", listeners));
   connection.listens_only = hello.listens_only;
   connection.greeted = true;
+  connection.wants_way = hello.wants_way;
+  if (hello.wants_way) target_.want_ways();
   const FeedState state = target_.state();
   put(connection, welcome_frame(state, map_.T_map_odom(), offset_ns(client)));
   put(connection, situation_frame(state, offset_ns(client)));
@@ -161,6 +164,10 @@ void FeedSession::refresh() {
   for (const FeedRefusal& refusal : target_.take_refusals())
     if (feeder_) refuse(*feeder_, refusal.stamp, refusal.why);
   answer_end();
+  for (const FeedWay& way : target_.take_ways())
+    for (auto& [number, listener] : clients_)
+      if (listener.wants_way)
+        if (auto frame = way_frame(way, offset_ns(number))) put(listener, std::move(*frame), true);
   const FeedState state = target_.state();
   std::string now = situation_frame(state, 0);
   if (now == situation_) return;

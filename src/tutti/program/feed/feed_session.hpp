@@ -72,6 +72,7 @@ class FeedSession {
     bool ended = false;          ///< It said that the recording has,
     bool waits_for_end = false;  ///< and is not answered yet.
     bool listens_only = false;
+    bool wants_way = false;
   };
 
   void close(Client client, const std::string& why);

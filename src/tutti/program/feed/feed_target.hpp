@@ -54,6 +54,14 @@ struct FeedState {
   bool ended = false;                 ///< The client has said so, and all before is stored.
 };
 
+/// After an update of the map.
+struct FeedWay {
+  std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age()
+  std::size_t constraints = 0;                      ///< RobotAgent::ledger()
+  Trajectory corrected;                             ///< RobotAgent::corrected()
+  Trajectory map;                                   ///< trajectory_of() the graph that was heard.
+};
+
 /// A sample or scan that was taken from the client and turned out to be no good.
 struct FeedRefusal {
   Timestamp stamp;
@@ -78,6 +86,10 @@ class FeedTarget {
   }
   /// FeedState::ended says when it is done.
   virtual Status finish() = 0;
+  /// From now on there are ways to take.
+  virtual void want_ways() {}
+  /// Since the last call, as far as they are kept.
+  virtual std::vector<FeedWay> take_ways() { return {}; }
   /// Since the last call.
   virtual std::vector<FeedRefusal> take_refusals() { return {}; }
   [[nodiscard]] virtual FeedState state() const = 0;

@@ -14,6 +14,7 @@
 #include "support/program/feed/client.hpp"
 #include "support/program/feed/node_target.hpp"
 #include "support/robot/drifting_robot.hpp"
+#include "tutti/program/feed/feed_client.hpp"
 
 namespace tutti::program {
 namespace live_feed_test {
@@ -107,6 +108,39 @@ TEST(LiveFeed, AnswersWhileTheRobotIsStuck) {
   EXPECT_EQ((*feed)->take_thrown(), "");
   feed->reset();
   EXPECT_NE(access(path.c_str(), F_OK), 0);
+}
+
+/// The way that a robot corrects comes to who asked for it, to the bit.
+TEST(LiveFeed, TellsTheCorrectedWayToAFeedClient) {
+  const std::string path = testing::TempDir() + "live_feed_way_" + std::to_string(getpid());
+  test::NodeTarget robot;
+  auto feed = LiveFeed::open(path, {}, robot.state());
+  ASSERT_TRUE(feed.has_value()) << feed.error().message;
+  Client other(path);
+  other.say(test::hello(true));
+  const auto client = FeedClient::connect(path, "driver", {}, true);
+  ASSERT_TRUE(client.has_value()) << client.error().message;
+  const auto hear = [&] {
+    while (true) {
+      const auto said = (*client)->hear(10'000);
+      if (!said || !*said) return FromRobot{FeedOther{}};
+      if (!std::holds_alternative<FeedOther>(**said)) return **said;
+    }
+  };
+  EXPECT_EQ(std::get<FeedWelcome>(hear()).robot, "alpha");
+  EXPECT_TRUE((*feed)->front().wants_ways());
+  const Trajectory way = robot::test::drifting_odometry(30);
+  (*feed)->front().say({{2, 7}, 5, way, {way[3], way[9]}});
+  const auto heard = std::get<FeedWay>(hear());
+  EXPECT_EQ(heard.map_age, (std::pair<std::uint64_t, std::uint64_t>{2, 7}));
+  EXPECT_EQ(heard.constraints, 5U);
+  EXPECT_EQ(heard.corrected, way);
+  EXPECT_EQ(heard.map, (Trajectory{way[3], way[9]}));
+  EXPECT_TRUE((*client)->say(node::OdometrySample{way[0].stamp, way[0].pose, Matrix6d::Zero()}));
+  EXPECT_EQ(std::get<FeedAnswer>(hear()).stamp, way[0].stamp);
+  EXPECT_TRUE(other.hear().has_welcome());
+  EXPECT_TRUE(other.hear().has_situation());
+  EXPECT_TRUE(other.hear().has_correction());  // and no way
 }
 
 /// What a robot program that ends has still to say is said.
