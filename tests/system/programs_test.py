@@ -161,6 +161,11 @@ class Programs(unittest.TestCase):
 
     def test_mission_up_is_tutti_run(self):
         out = self.mission_up()
+        for name in ("alpha", "bravo"):  # whom the lab has fed, and told nothing of their recordings
+            told = (out / "state/robots" / name / "events.jsonl").read_text()
+            self.assertIn('"update_timed"', told)
+            self.assertNotIn("update_scored", told)
+            self.assertIn('"update_scored"', (out / "state/players" / name / "events.jsonl").read_text())
         again = run("mission", "up", MISSION, "--out", out)
         self.assertEqual(again.returncode, 1)
         self.assertIn("earlier mission", again.stderr)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/lab/collect_mission.hpp"
 
+#include <exception>
+#include <map>
 #include <memory>
 #include <set>
 #include <utility>
@@ -25,8 +27,38 @@ using program::Json, program::kEnded;
 
 namespace fs = std::filesystem;
 
+/// What went wrong, by what robots have told: one line of a kind with a count and the first case.
+class Troubles {
+ public:
+  void take(const Json& event) {
+    const std::string what = event.value("event", "");
+    for (const auto& [kind, sentence] : kKinds)
+      if (what == kind && (what != "sensor_missing" || event.value("keyframes", 0) > 0)) {
+        auto& [count, first] = seen_[sentence];
+        count += 1 + event.value("left_out", std::size_t{0});
+        if (first.empty()) first = event.contains("why") ? event.value("why", "") : event.dump();
+      }
+  }
+  [[nodiscard]] std::vector<std::string> lines(const std::string& robot) const {
+    std::vector<std::string> out;
+    for (const auto& [what, of] : seen_)
+      out.push_back(fmt::format("{}: {} {}, the first because: {}", robot, of.first, what, of.second));
+    return out;
+  }
+
+ private:
+  static constexpr std::pair<const char*, const char*> kKinds[] = {
+      {"sample_refused", "odometry samples refused"},
+      {"odometry_jumped", "steps of odometry that no body makes"},
+      {"scan_refused", "wanted scans that are not there or no good"},
+      {"images_refused", "times images refused"},
+      {"sensor_missing", "times a sensor was missing"}};
+  std::map<std::string, std::pair<std::size_t, std::string>> seen_;
+};
+
 /// A robot's store and what was made of it; the store lives as long.
 struct Robot {
+  Troubles troubles;
   std::unique_ptr<storage::TableStore> store;
   std::unique_ptr<mission::RobotActor> actor;
   mission::FinishedRobot finished;
@@ -46,23 +78,42 @@ mission::TrafficRecord traffic_of(const Json& row, const std::string& robot) {
 }
 
 /// One event of a robot program.
-Status take(const Json& event, const std::string& name, Robot& robot) {
+Status take(const Json& event, const std::string& name, Robot& robot) try {
   const std::string what = event.value("event", "");
-  if (what == kUpdateScored) {
-    auto update = update_of(event);
-    if (!update) return tl::unexpected(update.error());
-    robot.finished.updates.push_back(std::move(*update));
+  if (what == "robot_updated" && event.at("synchronised").get<std::size_t>() > 0) {
+    mission::UpdateRecord update{.time_s = event.at("time_s").get<double>(),
+                                 .revision = event.at("revision").get<std::uint64_t>()};
+    for (const Json& origin : event.at("origins")) update.origins.push_back(origin_of(origin));
+    robot.finished.updates.push_back(std::move(update));
   }
-  if (what != kEnded) return {};
-  try {
+  if (what == program::kUpdateTimed) {
+    const auto add = [&](const char* key, std::vector<double>& to) {
+      if (const double ms = event.at(key).get<double>(); ms > 0.0) to.push_back(ms);
+    };
+    add("update_ms", robot.timing.update_ms);
+    add("comparison_ms", robot.timing.comparison_ms);
+    add("optimisation_ms", robot.timing.optimisation_ms);
+  }
+  if (what == kEnded) {
     robot.finished.traffic.clear();
     for (const Json& row : event.at("traffic")) robot.finished.traffic.push_back(traffic_of(row, name));
-    robot.finished.troubles = event.at("troubles").get<std::vector<std::string>>();
-    robot.timing.update_ms = event.at("update_ms").get<std::vector<double>>();
-    robot.timing.comparison_ms = event.at("comparison_ms").get<std::vector<double>>();
-    robot.timing.optimisation_ms = event.at("optimisation_ms").get<std::vector<double>>();
-  } catch (const Json::exception& error) {
-    return fail(ErrorCode::parse, "an event '{}': {}", kEnded, error.what());
+  }
+  robot.troubles.take(event);
+  return {};
+} catch (const std::exception& error) {  // of the JSON library, or a place of less than three numbers
+  return fail(ErrorCode::parse, "event {}: {}", event.dump(), error.what());
+}
+
+/// What a player has scored, beside what the robot said of the same update.
+Status take_score(const Json& event, Robot& robot) {
+  if (event.value("event", "") != kUpdateScored) return {};
+  auto score = update_of(event);
+  if (!score) return tl::unexpected(score.error());
+  for (mission::UpdateRecord& update : robot.finished.updates) {
+    if (update.revision != score->revision) continue;
+    update.onboard_rmse_m = score->onboard_rmse_m;
+    update.server_rmse_m = score->server_rmse_m;
+    update.answers = score->answers;
   }
   return {};
 }
@@ -80,7 +131,7 @@ consistency::Explanation explain_again(const mission::RobotActor& actor, const M
 }
 
 Result<Robot> read_robot(const MissionConfig& config, const MissionSource& source,
-                         const mission::MissionRecording& recording, const fs::path& folder) {
+                         const mission::MissionRecording& recording, const fs::path& folder, const fs::path& scores) {
   const std::string& name = recording.recording.name;
   Robot robot;
   auto store = storage::open_sqlite_store(folder / program::kRobotFile, storage::robot_schema());
@@ -96,6 +147,11 @@ Result<Robot> read_robot(const MissionConfig& config, const MissionSource& sourc
     if (taken) taken = take(event, name, robot);
   });
   if (!read || !taken) return in_context(folder.string(), (read ? taken : read).error());
+  robot.finished.troubles = robot.troubles.lines(name);
+  const Status scored = program::read_events(scores, [&](const Json& event) {
+    if (taken) taken = take_score(event, robot);
+  });
+  if (!scored || !taken) return in_context(scores.string(), (scored ? taken : scored).error());
   robot.finished.outcome = robot.actor->outcome();
   return robot;
 }
@@ -140,7 +196,8 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   std::vector<Robot> robots;
   std::set<RobotId> ids;
   for (const mission::MissionRecording& recording : input->robots) {
-    auto robot = read_robot(config, source, recording, state / "robots" / recording.recording.name);
+    auto robot = read_robot(config, source, recording, state / "robots" / recording.recording.name,
+                            state / "players" / recording.recording.name);
     if (!robot) return tl::unexpected(robot.error());
     robots.push_back(std::move(*robot));
     ids.insert(recording.recording.robot);

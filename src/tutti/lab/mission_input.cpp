@@ -38,6 +38,7 @@ Result<mission::MissionInput> fly(const MissionConfig& config, std::uint64_t see
   for (std::size_t i = 0; i < hall->robots.size(); ++i) {
     auto& [recording, images] = hall->robots[i];
     if (!images.stamps.empty()) {
+      recording.images = std::make_shared<const ImageStream>(images);
       auto source = visual::TrackingSource::open(std::move(images), recording.odometry, config.tracking);
       if (!source) return in_context("robot " + recording.name, source.error());
       recording.visual = std::move(*source);

@@ -37,6 +37,21 @@ bool is_over(const MissionStatus& status, const std::vector<std::string>& names)
   });
 }
 
+/// A folder of its own whose name is short, as a socket's must be.
+struct SocketFolder {
+  SocketFolder() {
+    std::string name = (fs::temp_directory_path() / "tutti-XXXXXX").string();
+    if (mkdtemp(name.data()) != nullptr) path = name;
+  }
+  ~SocketFolder() {
+    std::error_code ignored;
+    if (!path.empty()) fs::remove_all(path, ignored);
+  }
+  SocketFolder(const SocketFolder&) = delete;
+  SocketFolder& operator=(const SocketFolder&) = delete;
+  fs::path path;
+};
+
 class MissionUp {
  public:
   MissionUp(const MissionUpOptions& options, MissionConfig config)
@@ -56,6 +71,7 @@ class MissionUp {
   std::vector<std::string> names_;
   std::string name_;  // on the bus
   fs::path state_;
+  SocketFolder sockets_;
   Children children_;
   std::string bus_;
   SteadyClock::time_point begin_ = SteadyClock::now();
@@ -68,12 +84,12 @@ std::vector<std::string> MissionUp::words(const std::string& command, const fs::
   std::vector<std::string> out{options_.program.string(), command, mission.file, "--seed",
                                std::to_string(mission.seed)};
   const auto add = [&](std::initializer_list<std::string> more) { out.insert(out.end(), more); };
-  if (!mission.data.empty()) add({"--data", mission.data.string()});
+  if (!mission.data.empty() && command != "robot") add({"--data", mission.data.string()});
   for (const std::string& assignment : mission.assignments) add({"--set", assignment});
   if (!folder.empty()) add({"--state", folder.string()});
   if (replays) add({"--rate", fmt::format("{}", options_.rate)});
-  if (!bus_.empty()) add({"--bus", bus_});
-  add({"--mission", name_});
+  if (!bus_.empty() && command != "mission") add({"--bus", bus_});
+  if (command != "mission") add({"--mission", name_});
   add({"--end-with-parent", std::to_string(getpid())});
   return out;
 }
@@ -107,6 +123,7 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
   auto on_bus = name_on_bus(options_.mission, config_);
   if (!on_bus) return tl::unexpected(on_bus.error());
   name_ = std::move(*on_bus);
+  if (sockets_.path.empty()) return fail(ErrorCode::io, "no folder for sockets can be made");
   if (Status started = start_server(stop); !started) return started;
   for (int i = 0; i < options_.workers; ++i) {
     auto worker = words("worker", {}, false);
@@ -115,9 +132,15 @@ Status MissionUp::start(const std::atomic<bool>& stop) {
     if (Status started = children_.start(name, worker, state_ / (name + ".out")); !started) return started;
   }
   for (const std::string& name : names_) {
+    const std::string feed = (sockets_.path / name).string();
     auto robot = words("robot", state_ / "robots" / name, true);
-    robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0"});
+    robot.insert(robot.end(), {"--name", name, "--stay", "--session", "0", "--feed", feed});
     if (Status started = children_.start("robot " + name, robot, state_ / (name + ".out")); !started) return started;
+    auto player = words("mission", {}, true);
+    player.insert(player.begin() + 2, "play");
+    player.insert(player.end(), {"--name", name, "--feed", feed, "--scores", (state_ / "players" / name).string()});
+    const fs::path output = state_ / (name + "_player.out");
+    if (Status started = children_.start("player " + name, player, output); !started) return started;
   }
   return {};
 }
@@ -155,7 +178,9 @@ void MissionUp::tell(const MissionStatus& status) const {
 /// The server last: it still takes what the others say.
 void MissionUp::end() {
   wall_s_ = std::chrono::duration<double>(SteadyClock::now() - begin_).count();
-  std::vector<std::string> others;
+  std::vector<std::string> others, players;
+  for (const std::string& name : names_) players.push_back("player " + name);
+  children_.stop(players);
   for (const std::string& name : names_) others.push_back("robot " + name);
   for (int i = 0; i < options_.workers; ++i) others.push_back(fmt::format("worker{}", i + 1));
   children_.stop(others);

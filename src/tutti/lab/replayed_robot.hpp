@@ -9,8 +9,7 @@
 
 namespace tutti::lab {
 
-/// A robot of a mission in a program of its own: its samples come from its recording, and what it makes of each map is
-/// scored.
+/// A robot of a mission in a program of its own: its samples come from its recording.
 class ReplayedRobot final : public program::RobotDriver {
  public:
   explicit ReplayedRobot(std::unique_ptr<mission::RobotActor> actor) : actor_(std::move(actor)) {}
@@ -23,12 +22,9 @@ class ReplayedRobot final : public program::RobotDriver {
   node::Step take_step() override { return actor_->take_step(); }
   [[nodiscard]] double next_time() const override { return actor_->next_time(); }
   void replay_next(Timestamp now) override { actor_->replay_next(now); }
-  std::vector<program::Json> take_notes() override;
-  [[nodiscard]] program::Json last_words() const override;
 
  private:
   std::unique_ptr<mission::RobotActor> actor_;
-  std::size_t noted_ = 0;  // updates
 };
 
 }  // namespace tutti::lab

@@ -72,6 +72,7 @@ Result<std::pair<Trajectory, Pose3>> read_reference(const RobotConfig& robot, co
 
 void take_images(RobotImages images, Recording& out) {
   out.visual = std::move(images.visual);
+  out.images = std::move(images.images);
   out.image_stamps = std::move(images.stamps);
   out.imu = std::move(images.imu);
   out.imu_noise = images.imu_noise;

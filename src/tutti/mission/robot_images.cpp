@@ -178,8 +178,10 @@ Result<RobotImages> serve_images(ImageStream stream, std::vector<ImuSample> imu,
       if (const auto pose = pose_at(odometry, stamp)) moments.push_back({stamp, *pose});
   out.stamps = stamps_of(moments);
   if (!moments.empty()) out.note += ", at their own stamps";
+  auto images = std::make_shared<const ImageStream>(stream);
   auto source = visual::TrackingSource::open(std::move(stream), moments.empty() ? odometry : moments, tracking);
   if (!source && source.error().code == ErrorCode::unsupported) return tl::unexpected(source.error());
+  if (source) out.images = std::move(images);
   if (source)
     out.visual = std::move(*source);
   else

@@ -22,6 +22,7 @@ struct RobotImages {
   std::string note;  ///< What was found, for the report.
   /// Recording::image_stamps
   std::vector<Timestamp> stamps = {};
+  std::shared_ptr<const ImageStream> images = nullptr;  ///< Recording::images
 };
 
 /// Of config.maplab_submaps.

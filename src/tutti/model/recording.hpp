@@ -10,6 +10,7 @@
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/model/image_stream.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
@@ -55,9 +56,10 @@ struct Recording {
   std::string name;
   Trajectory odometry;                         ///< T_odom_body, raw, drifting.
   std::vector<Matrix6d> increment_covariance;  ///< Of odometry k -> k + 1; one fewer than odometry.
-  Trajectory reference;                     ///< T_reference_body, one frame for all robots; empty when there is none.
-  std::shared_ptr<const ScanSource> scans;  ///< Null when there is no range sensor.
-  std::shared_ptr<VisualSource> visual;     ///< Null when there is no camera.
+  Trajectory reference;                       ///< T_reference_body, one frame for all robots; empty when there is none.
+  std::shared_ptr<const ScanSource> scans;    ///< Null when there is no range sensor.
+  std::shared_ptr<VisualSource> visual;       ///< Null when there is no camera.
+  std::shared_ptr<const ImageStream> images;  ///< That `visual` follows points through; null: it has other sources.
   /// The moments of scans and of images, increasing; none: those of the odometry samples.
   std::vector<Timestamp> scan_stamps, image_stamps;
   std::vector<ImuSample> imu;  ///< Increasing stamps; empty when there is no IMU.

@@ -5,6 +5,26 @@
 
 namespace tutti::program {
 
+/// How long an update took is noted.
+void LiveRobot::receive(const bus::Envelope& envelope, Timestamp now) {
+  const double begin_s = Clock::steady_s();
+  double stage_s = begin_s, compare_s = 0.0, optimise_s = 0.0;
+  bool has_compared = false;
+  node_->observe([&](robot::UpdateStage ended) {
+    const double lap_s = Clock::steady_s() - std::exchange(stage_s, Clock::steady_s());
+    has_compared = true;
+    if (ended == robot::UpdateStage::compare) compare_s = lap_s;
+    if (ended == robot::UpdateStage::optimise) optimise_s = lap_s;
+  });
+  take(node_->receive(envelope, now));
+  node_->observe({});
+  if (!has_compared) return;
+  notes_.push_back({{"event", kUpdateTimed},
+                    {"update_ms", 1e3 * (Clock::steady_s() - begin_s)},
+                    {"comparison_ms", 1e3 * compare_s},
+                    {"optimisation_ms", 1e3 * optimise_s}});
+}
+
 void FedRobot::note(const node::Step& step) {
   for (const node::Event& event : step.events) view_.note(event, robot_.node());
 }

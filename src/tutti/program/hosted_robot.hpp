@@ -54,7 +54,6 @@ class HostedRobot final : public Hosted {
   [[nodiscard]] bool finished() const override;
   [[nodiscard]] Json status(Timestamp now) const override;
   [[nodiscard]] bool is_whole_in_map() const { return driver_->node().is_whole_in_map(); }
-  [[nodiscard]] const RobotDriver& driver() const { return *driver_; }
   /// Why this program is not to be: another one is this robot.
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
 

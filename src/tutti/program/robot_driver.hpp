@@ -31,9 +31,9 @@ class RobotDriver {
   virtual void replay_next(Timestamp /*now*/) {}
   /// Events beside those of the steps, since the last call.
   virtual std::vector<Json> take_notes() { return {}; }
-  /// What the last event of the program says beside its traffic.
-  [[nodiscard]] virtual Json last_words() const { return Json::object(); }
 };
+
+inline constexpr const char* kUpdateTimed = "update_timed";  ///< How long an update of the map took.
 
 /// Makes the driver of a robot that replays, on its store; called again when the store could not be written.
 using ReplayMaker = std::function<Result<std::unique_ptr<RobotDriver>>(
@@ -46,10 +46,11 @@ class LiveRobot final : public RobotDriver {
   [[nodiscard]] const node::RobotNode& node() const override { return *node_; }
   void resume(Timestamp now) override { take(node_->resume(now)); }
   void on_timer(Timestamp now) override { take(node_->on_timer(now)); }
-  void receive(const bus::Envelope& envelope, Timestamp now) override { take(node_->receive(envelope, now)); }
+  void receive(const bus::Envelope& envelope, Timestamp now) override;
   void finish(Timestamp now) override { take(node_->finish(now)); }
   void store_all() override { take(node_->store_all()); }
   node::Step take_step() override { return std::exchange(step_, {}); }
+  std::vector<Json> take_notes() override { return std::exchange(notes_, {}); }
   void add_odometry(const node::OdometrySample& sample, Timestamp now) { take(node_->add_odometry(sample, now)); }
   void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
   void add_images(const TrackedImages& images, Timestamp now) { take(node_->add_images(images, now)); }
@@ -62,6 +63,7 @@ class LiveRobot final : public RobotDriver {
 
   std::unique_ptr<node::RobotNode> node_;
   node::Step step_;
+  std::vector<Json> notes_;
 };
 
 }  // namespace tutti::program

@@ -23,7 +23,7 @@ namespace tutti::program {
 namespace {
 
 /// The last event of a program: what only it knows.
-Json last_words(const Host::TrafficTable& table, const HostedRobot* robot) {
+Json last_words(const Host::TrafficTable& table) {
   Json rows = Json::array();
   for (const auto& [key, traffic] : table)
     rows.push_back({{"sent", key.first},
@@ -31,10 +31,7 @@ Json last_words(const Host::TrafficTable& table, const HostedRobot* robot) {
                     {"messages", traffic.messages},
                     {"bytes", traffic.bytes},
                     {"largest", traffic.largest}});
-  Json event{{"event", kEnded}, {"traffic", std::move(rows)}};
-  if (robot == nullptr) return event;
-  event.update(robot->driver().last_words());
-  return event;
+  return {{"event", kEnded}, {"traffic", std::move(rows)}};
 }
 
 /// What a status may carry, and a unit of systemd, a folder and a subject of the bus can be called.
@@ -215,7 +212,7 @@ Status RobotProgram::run(const std::atomic<bool>& stop) {
   host_->run(stop);
   tell_service_manager("STOPPING=1");
   const auto* robot = dynamic_cast<const HostedRobot*>(host_->hosted());
-  log_->write(last_words(host_->traffic(), robot));
+  log_->write(last_words(host_->traffic()));
   if (robot != nullptr && robot->refused())
     return fail(ErrorCode::invalid,
                 "the server refuses this robot: {}: stop the other one, give this one another name, or name it in the "
