@@ -61,12 +61,12 @@ inline GemanMcClure solve_geman_mcclure(const PoseGraph& graph, std::span<const 
                                         const estimation::GncConfig& config) {
   using namespace estimation;
   const double c2 = chi_square_quantile(config.confidence, 6.0);
-  const internal::ReducedGraph reduced = internal::reduce_chains(graph, roles);
+  const ReducedGraph reduced = reduce_chains(graph, roles);
   std::vector<Pose3> poses;
   for (const std::size_t node : reduced.nodes) poses.push_back(graph.poses[node]);
   graduate(reduced.graph, reduced.roles, c2, config.solver, true, poses);
   GemanMcClure out{.poses = graph.poses, .accepted = {}};
-  internal::expand_chains(graph, reduced, poses, out.poses);
+  expand_chains(graph, reduced, poses, out.poses);
   graduate(graph, roles, c2, config.solver, false, out.poses);
   for (const PoseGraphEdge& edge : graph.edges) {
     const Vector6d r = between_residual(out.poses[edge.from], out.poses[edge.to], edge.T_from_to);

@@ -369,6 +369,10 @@ Status ConfigLoader::finish(const std::string& name) {
   return config_internal::to_status(name, findings_.problems);
 }
 
+Status ConfigLoader::finish_with_unknown(const std::string& name) const {
+  return config_internal::to_status(name, findings_.problems);
+}
+
 void merge_config(ConfigNode& into, const ConfigNode& more) {
   if (into.kind != more.kind || into.kind == ConfigNode::Kind::scalar) {
     into = more;

@@ -228,6 +228,8 @@ class ConfigLoader {
   }
   /// Every violation is in the one message; `name` is the document's.
   Status finish(const std::string& name);
+  /// The same of a document that another version may have written: keys that nobody knows are left alone.
+  Status finish_with_unknown(const std::string& name) const;
 
  private:
   config_internal::Findings findings_;

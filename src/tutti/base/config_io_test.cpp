@@ -363,6 +363,17 @@ TEST(ConfigLoader, EveryKeyIsOfOneOfTheReaders) {
             "x.yaml:2: robots.0.voxel_m: is 0, must be > 0\nx.yaml:2: robots.0.speed_mps: is -1, must be > 0");
 }
 
+TEST(ConfigLoader, KeysOfAnotherVersionMayBeLeftAlone) {
+  const ConfigNode node = parse("seed: 5\nof_tomorrow: {deep: 1}\nbase: {of_yesterday: 2, voxel_m: 0.5}\n");
+  Settings settings;
+  ConfigLoader loader;
+  loader.load(node, settings);
+  EXPECT_TRUE(loader.finish_with_unknown("x.yaml").has_value());
+  EXPECT_EQ(settings.seed, 5U);
+  EXPECT_EQ(settings.base.voxel_m, 0.5);
+  EXPECT_FALSE(loader.finish("x.yaml").has_value());
+}
+
 TEST(Config, MergedDumpsLoadBackBoth) {
   Settings settings{.seed = 7, .robots = {{.name = "bravo"}, {}}};
   ConfigNode both = dump_config(settings);

@@ -67,9 +67,10 @@ struct PolicyConfig {
   double threshold_small_m = 0.2;
   int top_count = 10;
   double top_threshold_m = 0.07;
-  int mid_hops = 5;
-  int nearest_submaps = 4;
-  int default_budget = 25;
+  int mid_hops = 5;         ///< Mid-scale links go this many nodes back and forth in time.
+  int nearest_submaps = 4;  ///< Large-scale links go to this many submaps.
+  int default_budget = 25;  ///< uniform and random: constraints held when no budget is given.
+  /// skeleton: links are split until every node is this close to the server's map.
   double skeleton_tolerance_m = 0.01;
   double adaptive_error_share = 0.25;
 
@@ -89,12 +90,6 @@ struct PolicyConfig {
             "spectral: summed disagreement of the other scales above which a node gets links to its neighbours.");
     v.field("top_count", top_count, at_least(1.0), "spectral, classifier top: nodes labelled per update.");
     v.field("top_threshold_m", top_threshold_m, at_least(0.0), "spectral, classifier top: and only above this.");
-    v.field("mid_hops", mid_hops, at_least(1.0), "Mid-scale links go this many nodes back and forth in time.");
-    v.field("nearest_submaps", nearest_submaps, at_least(1.0), "Large-scale links go to this many submaps.");
-    v.field("default_budget", default_budget, at_least(1.0),
-            "uniform and random: constraints held when no budget is given.");
-    v.field("skeleton_tolerance_m", skeleton_tolerance_m, greater_than(0.0),
-            "skeleton: links are split until every node is this close to the server's map.");
     v.field("adaptive_error_share", adaptive_error_share, greater_than(0.0),
             "adaptive: once robot and map disagree, links are split until every node is this close to the map, as a "
             "share of what the map itself is unsure of there.");

@@ -24,7 +24,9 @@ struct ProxyGraphConfig {
   double sigma_m = 1.0;
   int node_budget = 0;
   std::string reducer = "budget";
-  double sparsify_threshold = 1e-3;
+  double sparsify_threshold = 1e-3;  ///< Drop a reduced edge whose weight is below this fraction of the smaller degree
+                                     ///< of its ends, but none that holds the graph together; 0 = keep all.
+  /// Samples from which the server learns how sure it is of each trajectory's shape; 0 = do not send it.
   int shape_samples = 64;
   int shape_deletions = 32;
 
@@ -39,11 +41,6 @@ struct ProxyGraphConfig {
         "reducer", reducer, one_of({"budget", "paper"}),
         "Which nodes stay: 'budget' meets node_budget and is reproducible; 'paper' keeps u_max(n) >= 0 (eq. 3) once "
         "the graph exceeds node_budget.");
-    v.field("sparsify_threshold", sparsify_threshold, between(0.0, 1.0),
-            "Drop a reduced edge whose weight is below this fraction of the smaller degree of its ends, but none that "
-            "holds the graph together; 0 = keep all.");
-    v.field("shape_samples", shape_samples, between(0.0, 10'000.0),
-            "Samples from which the server learns how sure it is of each trajectory's shape; 0 = do not send it.");
     v.field("shape_deletions", shape_deletions, between(0.0, 10'000.0),
             "And that any one closure may be wrong: how many of those on which the map hinges, the most influential "
             "ones, are taken away one by one to see what would change; 0 = none.");

@@ -15,8 +15,6 @@ struct GncConfig {
   template <class V>
   void describe(V& v) {
     v.field("solver", solver, {}, "The weighted least-squares solver inside; its loss is not used.");
-    v.field("confidence", confidence, between(0.5, 0.999999999),
-            "Share of true closures whose error is expected to pass.");
   }
 };
 

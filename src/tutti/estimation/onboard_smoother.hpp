@@ -14,15 +14,12 @@ class GraphEquations;
 }
 
 struct OnboardSmootherConfig {
-  int max_iterations = 20;
-  double relative_cost_tolerance = 1e-6;
+  int max_iterations = 20;                ///< Gauss-Newton steps on the reduced graph at most.
+  double relative_cost_tolerance = 1e-6;  ///< Converged when a step can lower the cost by less than this share of it.
   int polishing_steps = 0;
 
   template <class V>
   void describe(V& v) {
-    v.field("max_iterations", max_iterations, at_least(1), "Gauss-Newton steps on the reduced graph at most.");
-    v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
-            "Converged when a step can lower the cost by less than this share of it.");
     v.field("polishing_steps", polishing_steps, between(0, 10),
             "Gauss-Newton steps on the full graph after the reduced one, at most; none that raises its cost.");
   }

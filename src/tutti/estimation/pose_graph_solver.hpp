@@ -12,21 +12,17 @@
 namespace tutti::estimation {
 
 struct SolverConfig {
-  int max_iterations = 50;
-  double relative_cost_tolerance = 1e-9;
+  int max_iterations = 50;                ///< Gauss-Newton steps at most; 0 only initialises.
+  double relative_cost_tolerance = 1e-9;  ///< Converged when a step can lower the cost by less than this share of it.
   std::string initialisation = "chordal";
   std::string loss = "none";
-  double loss_scale = 1.0;
+  double loss_scale = 1.0;  ///< Scale of the loss, in standard deviations.
 
   template <class V>
   void describe(V& v) {
-    v.field("max_iterations", max_iterations, at_least(0), "Gauss-Newton steps at most; 0 only initialises.");
-    v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
-            "Converged when a step can lower the cost by less than this share of it.");
     v.field("initialisation", initialisation, one_of({"chordal", "given"}),
             "Where to start: from the measurements alone, or from the given poses.");
     v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the robust edges.");
-    v.field("loss_scale", loss_scale, greater_than(0.0), "Scale of the loss, in standard deviations.");
   }
 };
 

@@ -26,7 +26,6 @@ TEST(FinderMaker, MakesWhatTheServerHasOfItsSettings) {
     FinderConfig config = config_of(name);
     config.min_submap_gap = 5;
     config.lidar.min_overlap += 0.0625;
-    config.visual.min_matches += 3;
     const auto served = make_finder(config);
     const auto made = maker.finder(served->id(), served->settings());
     ASSERT_TRUE(made.has_value()) << made.error().message;
@@ -34,7 +33,7 @@ TEST(FinderMaker, MakesWhatTheServerHasOfItsSettings) {
     EXPECT_EQ((*made)->settings(), served->settings());
   }
   bundle::RefinementConfig refinement;
-  refinement.bundle.max_iterations += 1;
+  refinement.merge.landmarks_per_keyframe += 1;
   const BundleRefiner served(refinement);
   const auto made = maker.refiner(served.id(), served.settings());
   ASSERT_TRUE(made.has_value()) << made.error().message;

@@ -53,7 +53,9 @@ Result<server::ServerConfig> read_settings(const storage::TableStore& map) {
   if (!*row) return settings;
   const auto node = parse_yaml(**row, "the map's settings");
   if (!node) return tl::unexpected(node.error());
-  if (auto ok = load_config(*node, settings, "the map's settings"); !ok) return tl::unexpected(ok.error());
+  ConfigLoader loader;
+  loader.load(*node, settings);
+  if (auto ok = loader.finish_with_unknown("the map's settings"); !ok) return tl::unexpected(ok.error());
   return settings;
 }
 

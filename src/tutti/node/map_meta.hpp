@@ -42,7 +42,8 @@ Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map)
 
 /// The row `settings`: what the server judges closures by, so that whoever reads the map sees it as the server does.
 storage::Write to_row(const server::ServerConfig& settings);
-/// The defaults where there is none. An error: it is of another program's version, or damaged.
+/// The defaults where there is none. Settings that only another version knows are left alone: its map may then be
+/// judged a little otherwise than by its own server. An error: the row is damaged.
 Result<server::ServerConfig> read_settings(const storage::TableStore& map);
 
 /// Rows `refinement/REVISION`: the refinements that hold, as they came. One that cannot be read is none: it is made

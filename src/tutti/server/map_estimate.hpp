@@ -78,6 +78,7 @@ struct MapEstimate {
 struct MapConfig {
   judge::WhoIsWrongConfig who_is_wrong;
   estimation::GncConfig gnc;
+  /// Closures that err by more than they say count as their neighbours show (off: as they say).
   bool judge_closures = true;
   bool judge_odometry = true;
   int most_closed_pairs = 40;
@@ -85,8 +86,6 @@ struct MapConfig {
   void describe(V& v) {
     v.field("who_is_wrong", who_is_wrong);
     v.field("gnc", gnc);
-    v.field("judge_closures", judge_closures, any(),
-            "Closures that err by more than they say count as their neighbours show (off: as they say).");
     v.field("judge_odometry", judge_odometry, any(),
             "Odometry that turns better than it says, or is far worse, counts as the closures show (off: as it says).");
     v.field("most_closed_pairs", most_closed_pairs, at_least(1),

@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/camera.hpp"
 #include "tutti/geometry/pose3.hpp"
@@ -19,15 +18,9 @@ namespace tutti::simulation {
 
 /// How good the images of a camera are.
 struct ImageConfig {
-  double noise_sigma = 2.0;
-  double exposure_swing = 0.15;
-  double exposure_period_s = 20.0;
-  template <class V>
-  void describe(V& v) {
-    v.field("noise_sigma", noise_sigma, between(0.0, 100.0), "Noise of a pixel, of 255 grey values.");
-    v.field("exposure_swing", exposure_swing, between(0.0, 0.9), "Exposure is this share longer, and shorter,");
-    v.field("exposure_period_s", exposure_period_s, greater_than(0.0), "once in this time.");
-  }
+  double noise_sigma = 2.0;         ///< Noise of a pixel, of 255 grey values.
+  double exposure_swing = 0.15;     ///< Exposure is this share longer, and shorter,
+  double exposure_period_s = 20.0;  ///< once in this time.
 };
 
 /// The same camera with images of half the width and height.

@@ -14,26 +14,19 @@ namespace tutti::simulation {
 struct FlightConfig {
   double duration_s = 60.0;
   double rate_hz = 10.0;
-  double round_s = 40.0;
-  double semi_length_m = 6.0;
-  double semi_width_m = 4.0;
+  double round_s = 40.0;       ///< Time for one round, counter-clockwise.
+  double semi_length_m = 6.0;  ///< Of the ellipse that is flown, x.
+  double semi_width_m = 4.0;   ///< Of the ellipse that is flown, y.
   double height_m = 1.8;
-  double wobble_m = 0.3;
-  double tilt_deg = 5.0;
-  double look_outwards_deg = 35.0;
+  double wobble_m = 0.3;            ///< How far it strays from the ellipse, in every direction.
+  double tilt_deg = 5.0;            ///< Largest roll and pitch.
+  double look_outwards_deg = 35.0;  ///< From the direction of flight to the right, towards the walls.
   double start_deg = 0.0;
   template <class V>
   void describe(V& v) {
     v.field("duration_s", duration_s, above_zero_to(7.0 * 86400.0), "Length of the flight.");
     v.field("rate_hz", rate_hz, between(0.1, 1000.0), "Poses per second.");
-    v.field("round_s", round_s, above_zero_to(86400.0), "Time for one round, counter-clockwise.");
-    v.field("semi_length_m", semi_length_m, above_zero_to(1000.0), "Of the ellipse that is flown, x.");
-    v.field("semi_width_m", semi_width_m, above_zero_to(1000.0), "Of the ellipse that is flown, y.");
     v.field("height_m", height_m, between(0.0, 100.0), "Mean height above the floor.");
-    v.field("wobble_m", wobble_m, between(0.0, 10.0), "How far it strays from the ellipse, in every direction.");
-    v.field("tilt_deg", tilt_deg, between(0.0, 60.0), "Largest roll and pitch.");
-    v.field("look_outwards_deg", look_outwards_deg, between(-180.0, 180.0),
-            "From the direction of flight to the right, towards the walls.");
     v.field("start_deg", start_deg, between(-360.0, 360.0), "Where on the ellipse it begins.");
   }
 };

@@ -41,7 +41,7 @@ struct HallMissionConfig {
   ImageConfig images;
   int cameras = 1;
   bool depth = false;
-  bool half_resolution = true;
+  bool half_resolution = true;  ///< Images of 376 x 240 instead of 752 x 480 pixels: a quarter of the time.
   bool imu = true;
   LidarConfig lidar;
   ImuConfig imu_noise;
@@ -49,12 +49,9 @@ struct HallMissionConfig {
   template <class V>
   void describe(V& v) {
     v.field("world", world, any(), "Where they fly.");
-    v.field("images", images, any(), "Noise and exposure of the cameras.");
     v.field("cameras", cameras, between(1, 2), "Of a robot with any; the second is 11 cm to the right of the first.");
     v.field("depth", depth, any(),
             "The camera, of one, is an RGB-D camera: depth within 8 m, 1.4 mm off at 1 m, growing with its square.");
-    v.field("half_resolution", half_resolution, any(),
-            "Images of 376 x 240 instead of 752 x 480 pixels: a quarter of the time.");
     v.field("imu", imu, any(), "Robots with a camera have an IMU, too.");
     v.field("lidar", lidar, any(), "LiDARs.");
     v.field("imu_noise", imu_noise, any(), "IMUs.");

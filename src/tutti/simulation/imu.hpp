@@ -21,8 +21,8 @@ struct ImuConfig {
   double gyro_random_walk = ImuNoise{}.gyro_random_walk;
   double accelerometer_noise_density = ImuNoise{}.accelerometer_noise_density;
   double accelerometer_random_walk = ImuNoise{}.accelerometer_random_walk;
-  double gyro_bias_sigma = 0.01;
-  double accelerometer_bias_sigma = 0.05;
+  double gyro_bias_sigma = 0.01;           ///< rad/s: bias at the start.
+  double accelerometer_bias_sigma = 0.05;  ///< m/s^2: bias at the start.
   template <class V>
   void describe(V& v) {
     v.field("rate_hz", rate_hz, between(1.0, 10000.0), "Samples per second.");
@@ -30,8 +30,6 @@ struct ImuConfig {
     v.field("gyro_random_walk", gyro_random_walk, at_least(0.0), "rad/s^2/sqrt(Hz)");
     v.field("accelerometer_noise_density", accelerometer_noise_density, at_least(0.0), "m/s^2/sqrt(Hz)");
     v.field("accelerometer_random_walk", accelerometer_random_walk, at_least(0.0), "m/s^3/sqrt(Hz)");
-    v.field("gyro_bias_sigma", gyro_bias_sigma, at_least(0.0), "rad/s: bias at the start.");
-    v.field("accelerometer_bias_sigma", accelerometer_bias_sigma, at_least(0.0), "m/s^2: bias at the start.");
   }
   [[nodiscard]] ImuNoise noise() const {
     return {gyro_noise_density, gyro_random_walk, accelerometer_noise_density, accelerometer_random_walk};

@@ -10,37 +10,24 @@
 namespace tutti::bundle {
 
 struct BundleConfig {
-  int max_iterations = 30;
-  double relative_cost_tolerance = 1e-4;
+  int max_iterations = 30;                ///< Steps at most.
+  double relative_cost_tolerance = 1e-4;  ///< Converged when a step lowers the cost by less than this share of it.
   std::string loss = "cauchy";
-  double loss_scale = 2.0;
-  double odometry_loss_scale = 5.0;
+  double loss_scale = 2.0;           ///< Its scale, in standard deviations.
+  double odometry_loss_scale = 5.0;  ///< Scale of the Cauchy loss on odometry, in standard deviations.
   double odometry_scale_sigma = 0.02;
-  double gyro_random_walk = 1e-4;
-  double accelerometer_random_walk = 4e-3;
-  double max_bias_sigma = 0.05;
-  double max_imu_scale_sigmas = 3.0;
+  double gyro_random_walk = 1e-4;           ///< Of the gyro's bias, rad/s^2/sqrt(Hz).
+  double accelerometer_random_walk = 4e-3;  ///< Of the accelerometer's bias, m/s^3/sqrt(Hz).
+  double max_bias_sigma = 0.05;  ///< IMU factors are held back where motion does not tell the accelerometer's bias this
+                                 ///< well, m/s^2 (a tenth of what is known beforehand),
+  double max_imu_scale_sigmas = 3.0;  ///< ... and where they make the way longer or shorter by more than so many of its
+                                      ///< standard deviations without them.
 
   template <class V>
   void describe(V& v) {
-    v.field("max_iterations", max_iterations, at_least(0), "Steps at most.");
-    v.field("relative_cost_tolerance", relative_cost_tolerance, greater_than(0.0),
-            "Converged when a step lowers the cost by less than this share of it.");
     v.field("loss", loss, one_of({"none", "huber", "cauchy", "geman_mcclure"}), "Robust loss on the views.");
-    v.field("loss_scale", loss_scale, greater_than(0.0), "Its scale, in standard deviations.");
-    v.field("odometry_loss_scale", odometry_loss_scale, greater_than(0.0),
-            "Scale of the Cauchy loss on odometry, in standard deviations.");
     v.field("odometry_scale_sigma", odometry_scale_sigma, greater_than(0.0),
             "By how much odometry may be wrong in scale all along its way, beside its covariance.");
-    v.field("gyro_random_walk", gyro_random_walk, greater_than(0.0), "Of the gyro's bias, rad/s^2/sqrt(Hz).");
-    v.field("accelerometer_random_walk", accelerometer_random_walk, greater_than(0.0),
-            "Of the accelerometer's bias, m/s^3/sqrt(Hz).");
-    v.field("max_bias_sigma", max_bias_sigma, greater_than(0.0),
-            "IMU factors are held back where motion does not tell the accelerometer's bias this well, m/s^2 (a tenth "
-            "of what is known beforehand),");
-    v.field("max_imu_scale_sigmas", max_imu_scale_sigmas, greater_than(0.0),
-            "... and where they make the way longer or shorter by more than so many of its standard deviations "
-            "without them.");
   }
 };
 

@@ -11,17 +11,13 @@
 namespace tutti::bundle {
 
 struct GuidedMatchConfig {
-  double radius_px = 40.0;
+  double radius_px = 40.0;  ///< How far from where the map's poses project it to a landmark is looked for.
   double max_hamming = 0.16;
-  double max_hamming_ratio = 0.9;
+  double max_hamming_ratio = 0.9;  ///< Distance of a match over that of the nearest descriptor of another landmark.
 
   template <class V>
   void describe(V& v) {
-    v.field("radius_px", radius_px, greater_than(0.0),
-            "How far from where the map's poses project it to a landmark is looked for.");
     v.field("max_hamming", max_hamming, between(0.0, 1.0), "Bits in which a match may differ, as a share of all.");
-    v.field("max_hamming_ratio", max_hamming_ratio, between(0.0, 1.0),
-            "Distance of a match over that of the nearest descriptor of another landmark.");
   }
 };
 

@@ -37,28 +37,21 @@ struct LandmarkMatch {
 };
 
 struct MergeConfig {
+  /// A view farther than this from where its landmark projects to, before the adjustment, is another thing.
   double max_reprojection_px = 20.0;
-  double min_parallax_deg = 1.0;
+  double min_parallax_deg = 1.0;  ///< A landmark whose rays never differ by this much is too uncertain along them.
   int landmarks_per_keyframe = 150;
+  /// Thinning: a keyframe whose landmarks nearly all have this many other views gives up its own; 0 = never.
   int redundant_views = 0;
-  double odometry_sigma_m = 0.02;
-  double odometry_sigma_deg = 0.3;
+  double odometry_sigma_m = 0.02;   ///< Added to the odometry's own covariance, per root of a second: odometry that is
+                                    ///< too sure of itself bends the map, one that is too modest costs little.
+  double odometry_sigma_deg = 0.3;  ///< The same of its rotation.
   bool use_imu = false;
 
   template <class V>
   void describe(V& v) {
-    v.field("max_reprojection_px", max_reprojection_px, greater_than(0.0),
-            "A view farther than this from where its landmark projects to, before the adjustment, is another thing.");
-    v.field("min_parallax_deg", min_parallax_deg, greater_than(0.0),
-            "A landmark whose rays never differ by this much is too uncertain along them.");
     v.field("landmarks_per_keyframe", landmarks_per_keyframe, at_least(0),
             "Thinning: every keyframe keeps about this many of its landmarks, the best observed; 0 = all.");
-    v.field("redundant_views", redundant_views, at_least(0),
-            "Thinning: a keyframe whose landmarks nearly all have this many other views gives up its own; 0 = never.");
-    v.field("odometry_sigma_m", odometry_sigma_m, at_least(0.0),
-            "Added to the odometry's own covariance, per root of a second: odometry that is too sure of itself bends "
-            "the map, one that is too modest costs little.");
-    v.field("odometry_sigma_deg", odometry_sigma_deg, at_least(0.0), "The same of its rotation.");
     v.field("use_imu", use_imu, any(),
             "IMU factors where a payload has them: velocities, biases and gravity are estimated.");
   }

@@ -11,14 +11,12 @@
 namespace tutti::bundle {
 
 struct StereoConfig {
+  /// A robot's cameras are contradicted where together they make its way longer or shorter than its odometry by more
+  /// than so many standard deviations: their calibration may be wrong.
   double max_sigmas = 3.0;
   std::string contradicted = "one_camera";
   template <class V>
   void describe(V& v) {
-    v.field(
-        "max_sigmas", max_sigmas, greater_than(0.0),
-        "A robot's cameras are contradicted where together they make its way longer or shorter than its odometry by "
-        "more than so many standard deviations: their calibration may be wrong.");
     v.field("contradicted", contradicted, one_of({"one_camera", "correct"}),
             "Then its first camera alone is believed, or the baseline is made as long as the odometry asks for.");
   }

@@ -14,9 +14,6 @@ struct NormalConfig {
   template <class V>
   void describe(V& v) {
     v.field("neighbours", neighbours, between(4, 64), "Points of the plane fit.");
-    v.field("max_radius_m", max_radius_m, greater_than(0.0), "Neighbours farther than this are not used.");
-    v.field("max_surface_ratio", max_surface_ratio, between(0.0, 1.0),
-            "Smallest over middle eigenvalue of the neighbours' scatter above which a point has no normal.");
   }
 };
 
@@ -24,12 +21,10 @@ struct NormalConfig {
 struct RegistrationLevel {
   double max_distance_m = 0.3;  ///< Correspondences farther apart are not used.
   int max_points = 4000;        ///< Source points used, evenly spread.
-  int max_iterations = 15;
+  int max_iterations = 15;      ///< Gauss-Newton steps at most.
   template <class V>
   void describe(V& v) {
     v.field("max_distance_m", max_distance_m, greater_than(0.0), "Correspondences farther apart are not used.");
-    v.field("max_points", max_points, at_least(10), "Source points used, evenly spread.");
-    v.field("max_iterations", max_iterations, at_least(1), "Gauss-Newton steps at most.");
   }
 };
 
@@ -39,8 +34,6 @@ struct RegistrationConfig {
   template <class V>
   void describe(V& v) {
     v.field("levels", levels, any(), "Stages of the registration, coarse to fine.");
-    v.field("overlap_distance_m", overlap_distance_m, greater_than(0.0),
-            "A point overlaps when a target point with a like normal is this close.");
   }
 };
 
@@ -55,9 +48,6 @@ struct CandidateConfig {
   template <class V>
   void describe(V& v) {
     v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 64 x 64 view from above.");
-    v.field("wall_directions", wall_directions, between(1, 4),
-            "Main directions of each submap's walls; any of one is laid on any of the other, either way round.");
-    v.field("max_guesses", max_guesses, between(1, 16), "Best alignments handed to the registration.");
   }
 };
 
@@ -65,7 +55,7 @@ struct CandidateConfig {
 struct LidarClosureConfig {
   double min_duration_s = 5.0;  ///< Shorter submaps saw too little, on foot: they gave wrong closures.
   double min_way_m = 10.0;      ///< But they are used when they come as far as this: by car that is 1.4 s.
-  int min_keyframes = 6;
+  int min_keyframes = 6;        ///< Submaps with fewer keyframes are not used.
   int min_points = 500;
   double voxel_m = 0.3;  ///< Clouds are thinned to this; denser ones cost time and gain nothing.
   NormalConfig normals;
@@ -84,7 +74,6 @@ struct LidarClosureConfig {
     v.field("min_duration_s", min_duration_s, at_least(0.0),
             "Submaps shorter than this and than min_way_m are not used.");
     v.field("min_way_m", min_way_m, at_least(0.0), "Travel from which a submap may take less than min_duration_s.");
-    v.field("min_keyframes", min_keyframes, at_least(1), "Submaps with fewer keyframes are not used.");
     v.field("min_points", min_points, at_least(10), "Submaps with fewer points are not used.");
     v.field("voxel_m", voxel_m, greater_than(0.0), "Clouds are thinned to voxels of this edge.");
     v.field("normals", normals, any(), "Surface normals.");
@@ -94,18 +83,9 @@ struct LidarClosureConfig {
     v.field("max_viewpoint_distance_m", max_viewpoint_distance_m, greater_than(0.0),
             "Between the middles of the two ways; closures from farther apart are not looked for. In a network that is "
             "walked for an hour a few metres leave more than enough closures.");
-    v.field("max_misfit", max_misfit, greater_than(0.0),
-            "Residuals over what noise, roughness and bent odometry explain, in the worst direction.");
-    v.field("max_plane_rmse_m", max_plane_rmse_m, greater_than(0.0), "Point-to-plane residual over the overlap.");
-    v.field("min_eigenvalue", min_eigenvalue, between(0.0, 0.34),
-            "Smallest eigenvalue of the normalised translation Hessian; below it the clouds can slide.");
     v.field(
         "sure_eigenvalue", sure_eigenvalue, between(0.0, 0.34),
         "Below this eigenvalue max_misfit shrinks in proportion towards 1: little evidence must fit all the better.");
-    v.field("max_contradiction", max_contradiction, between(0.0, 1.0),
-            "Share of the points in view that stand where the other submap looked through.");
-    v.field("max_rival_ratio", max_rival_ratio, between(0.0, 1.0),
-            "Quality of the second best alignment over the best above which the place is ambiguous.");
   }
 };
 

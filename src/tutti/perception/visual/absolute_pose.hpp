@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/visual.hpp"
@@ -19,12 +18,6 @@ struct AbsolutePoseConfig {
   double max_reprojection_px = 3.0;  ///< Of an inlier.
   int max_samples = 1000;            ///< Of RANSAC.
   double confidence = 0.9999;        ///< That one of the samples drawn had inliers alone.
-  template <class V>
-  void describe(V& v) {
-    v.field("max_reprojection_px", max_reprojection_px, greater_than(0.0), "Reprojection error of an inlier.");
-    v.field("max_samples", max_samples, at_least(1), "Samples of RANSAC at most.");
-    v.field("confidence", confidence, between(0.0, 1.0), "That a sample without outliers was drawn; stops earlier.");
-  }
 };
 
 /// A pixel of one of the body's cameras that is thought to see a known point.

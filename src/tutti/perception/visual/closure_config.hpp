@@ -24,17 +24,11 @@ struct VisualClosureConfig {
   void describe(V& v) {
     v.field("min_time_apart_s", min_time_apart_s, at_least(0.0),
             "Submaps nearer in time are not compared, whosever they are: for robots cut from one recording.");
-    v.field("min_landmarks", min_landmarks, at_least(4), "Submaps with fewer landmarks with descriptors are not used.");
     v.field("max_residual_px", max_residual_px, greater_than(0.0),
             "RMS of a submap's landmarks in its own images above which its calibration is not believed.");
     v.field("max_hamming", max_hamming, between(0.0, 1.0), "Bits in which a match may differ, as a share of all.");
-    v.field("max_hamming_ratio", max_hamming_ratio, between(0.0, 1.0),
-            "Distance of a match over that of the nearest descriptor of another landmark.");
-    v.field("min_matches", min_matches, at_least(4), "Matches, and inliers among them, of a keyframe.");
-    v.field("pose", pose, any(), "Where a keyframe is among the other submap's landmarks.");
     v.field("max_position_sigma_m", max_position_sigma_m, greater_than(0.0),
             "Standard deviation of a closure's position in its most uncertain direction.");
-    v.field("min_spread", min_spread, between(0.0, 1.0), "Box around the inliers as a share of the image.");
     v.field("ransac_seed", ransac_seed, any(), "Another one draws other samples.");
   }
 };

@@ -6,7 +6,6 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "tutti/base/config.hpp"
 #include "tutti/geometry/camera.hpp"
 #include "tutti/geometry/pose3.hpp"
 
@@ -16,12 +15,6 @@ struct TriangulationConfig {
   int min_views = 2;                 ///< That fit; the cameras of one keyframe count each.
   double min_parallax_deg = 1.0;     ///< Between two of the rays that fit.
   double max_reprojection_px = 3.0;  ///< A view farther off does not fit.
-  template <class V>
-  void describe(V& v) {
-    v.field("min_views", min_views, at_least(2), "Images in which a landmark must fit.");
-    v.field("min_parallax_deg", min_parallax_deg, greater_than(0.0), "Largest angle under which it must be seen.");
-    v.field("max_reprojection_px", max_reprojection_px, greater_than(0.0), "Views farther off are not of it.");
-  }
 };
 
 /// A pixel that is thought to see the point.

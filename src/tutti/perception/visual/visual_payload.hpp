@@ -22,7 +22,6 @@ struct VisualSubmapConfig {
   bool send_imu = false;                     ///< What the IMU measured between keyframes, for who adjusts the map.
   template <class V>
   void describe(V& v) {
-    v.field("triangulation", triangulation, any(), "Landmarks from tracks.");
     v.field("max_residual_px", max_residual_px, greater_than(0.0),
             "Half of a submap's tracks reproject within this (RMS of a track), or within twice what pixels and the "
             "odometry's covariance explain; else its images are not believed at all.");

@@ -15,8 +15,8 @@ struct DescriptorConfig {
   std::string kind = "brisk";
   int keypoints = 600;
   int threshold = 20;
-  int cell_px = 40;
-  int distance_px = 4;
+  int cell_px = 40;     ///< Keypoints are spread evenly over cells of this size.
+  int distance_px = 4;  ///< Keypoints are at least this far from each other.
   template <class V>
   void describe(V& v) {
     v.field("kind", kind, one_of({"brisk", "orb"}),
@@ -24,8 +24,6 @@ struct DescriptorConfig {
     v.field("keypoints", keypoints, between(10, 5000), "Most keypoints of an image that are described.");
     v.field("threshold", threshold, between(1, 255),
             "Grey values by which a corner differs from what is round it, over all scales.");
-    v.field("cell_px", cell_px, between(8, 1000), "Keypoints are spread evenly over cells of this size.");
-    v.field("distance_px", distance_px, between(1, 100), "Keypoints are at least this far from each other.");
   }
 };
 

@@ -20,32 +20,22 @@ class Pyramid;
 
 struct TrackerConfig {
   int features = 200;
-  double enough_share = 0.9;
+  double enough_share = 0.9;  ///< New ones are looked for when fewer than this share of them is left.
   int threshold = 12;
-  int cell_px = 40;
-  int distance_px = 16;
-  int window_px = 15;
+  int cell_px = 40;      ///< New corners are spread evenly over cells of this size.
+  int distance_px = 16;  ///< New corners are at least this far from any other.
+  int window_px = 15;    ///< Side of the window by which a point is followed.
   int levels = 3;
-  double agreement_px = 0.7;
-  double epipolar_px = 2.0;
-  double sigma_px = 0.5;
+  double agreement_px = 0.7;  ///< A point followed to the next image and back again comes back within this.
+  double epipolar_px = 2.0;   ///< Stereo: the two views of a point lie within this of one plane with the two cameras.
+  double sigma_px = 0.5;      ///< Standard deviation of a followed point, as it is passed on.
   DescriptorConfig descriptors;
   template <class V>
   void describe(V& v) {
     v.field("features", features, between(10, 5000), "Points followed at a time, in every image.");
-    v.field("enough_share", enough_share, between(0.0, 1.0),
-            "New ones are looked for when fewer than this share of them is left.");
     v.field("threshold", threshold, between(1, 255),
             "Grey values by which a new corner differs from what is round it.");
-    v.field("cell_px", cell_px, between(8, 1000), "New corners are spread evenly over cells of this size.");
-    v.field("distance_px", distance_px, between(1, 1000), "New corners are at least this far from any other.");
-    v.field("window_px", window_px, between(5, 61), "Side of the window by which a point is followed.");
     v.field("levels", levels, between(0, 6), "How often the image is halved: how far a point may move at once.");
-    v.field("agreement_px", agreement_px, greater_than(0.0),
-            "A point followed to the next image and back again comes back within this.");
-    v.field("epipolar_px", epipolar_px, greater_than(0.0),
-            "Stereo: the two views of a point lie within this of one plane with the two cameras.");
-    v.field("sigma_px", sigma_px, greater_than(0.0), "Standard deviation of a followed point, as it is passed on.");
     v.field("descriptors", descriptors, any(), "Of keyframes.");
   }
 };
