@@ -14,7 +14,7 @@ packages=(
 )
 for option in "$@"; do
   case "$option" in
-    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf mold) ;;
+    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf python3-numpy mold) ;;
     --bench) packages+=(libbenchmark-dev) ;;
     *)
       echo "usage: $0 [--tests] [--bench]" >&2

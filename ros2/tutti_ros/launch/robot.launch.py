@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""ros2 launch tutti_ros robot.launch.py namespace:=r1 odom:=odom points:=points bus:=nats://HOST:PORT"""
+import os
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    value = LaunchConfiguration
+    arguments = {
+        "namespace": ("r1", "of the robot, and its name in the map"),
+        "odom": ("odom", "topic of nav_msgs/Odometry, relative to the namespace"),
+        "points": ("points", "topic of sensor_msgs/PointCloud2, relative to the namespace"),
+        "bus": ("", "nats://HOST:PORT as the server prints it; empty: tutti robot is started by somebody else"),
+        "mission": ("tutti", "name of the mission on the bus, as the server's"),
+        "state": (["/tmp/tutti_", value("namespace")], "folder that the robot keeps what it knows in"),
+        "socket": ([value("state"), ".feed"], "of tutti robot --feed"),
+        "params": (os.path.join(get_package_share_directory("tutti_ros"), "config", "robot.yaml"), "parameters"),
+        "use_sim_time": ("false", "the clock of /clock"),
+    }
+    declared = [DeclareLaunchArgument(name, default_value=default, description=text)
+                for name, (default, text) in arguments.items()]
+    robot = ExecuteProcess(
+        cmd=["tutti", "robot", "--name", value("namespace"), "--bus", value("bus"), "--mission", value("mission"),
+             "--state", value("state"), "--feed", value("socket"), "--stay"],
+        output="screen", respawn=True, respawn_delay=2.0,
+        condition=IfCondition(PythonExpression(["'", value("bus"), "' != ''"])))
+    node = Node(
+        package="tutti_ros", executable="tutti_ros", name="tutti_ros", namespace=value("namespace"), output="screen",
+        respawn=True, respawn_delay=2.0,
+        parameters=[value("params"), {"socket": value("socket"), "use_sim_time": value("use_sim_time")}],
+        remappings=[("odom", value("odom")), ("points", value("points"))])
+    return LaunchDescription([*declared, robot, node])

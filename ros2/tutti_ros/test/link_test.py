@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is said to a robot, and said again: run by tutti_ros_test.py."""
+import struct
+import unittest
+
+import numpy as np
+from made_messages import pose_at
+from tutti_ros import from_ros, poses
+from tutti_ros.link import Feed, Link, feed_pose, frame, scan_frame
+from tutti_ros.situation import ERROR, OK, WARN, OnMap, diagnosis
+
+NOISE = from_ros.OdometryNoise()
+
+
+class Reconnecting(unittest.TestCase):
+    """The state machine alone: what it says and says again."""
+
+    def welcome(self, link, last_ns=None):
+        self.assertEqual(self.parse(link.connected())[0].WhichOneof("what"), "hello")
+        self.assertEqual(link.next_frame(), b"")  # not before the robot's answer
+        said = frame(welcome=Feed.Welcome(has_odometry=last_ns is not None, last_stamp_ns=last_ns or 0,
+                                          T_map_odom=feed_pose(poses.IDENTITY)))
+        for byte in said:  # however it comes
+            link.hear(bytes([byte]))
+        self.assertEqual(link.state, "feeding")
+
+    def parse(self, data):
+        out = []
+        while data:
+            size, = struct.unpack_from("<I", data)
+            out.append(Feed.FromString(data[4:4 + size]))
+            data = data[4 + size:]
+        return out
+
+    def said(self, link):
+        out = b""
+        while more := link.next_frame():
+            out += more
+        return [getattr(message, message.WhichOneof("what")) for message in self.parse(out)]
+
+    def stored(self, link, stamp_ns):
+        link.hear(frame(correction=Feed.Correction(has_stored=True, stored_stamp_ns=stamp_ns)))
+
+    def filled(self, count=10):
+        link = Link(NOISE)
+        for i in range(count):
+            link.add_odometry(1000 + i * 10**8, pose_at(i))
+        return link
+
+    def test_everything_is_said_to_a_robot_that_knows_nothing(self):
+        link = self.filled()
+        self.welcome(link)
+        self.assertEqual([s.stamp_ns for s in self.said(link)], [1000 + i * 10**8 for i in range(10)])
+        link.add_odometry(10**12, pose_at(10))
+        self.assertEqual([s.stamp_ns for s in self.said(link)], [10**12])
+
+    def test_goes_on_behind_what_the_robot_has(self):
+        link = self.filled()
+        link.add_scan(1000 + 4 * 10**8, np.ones((2, 3), np.float32), np.zeros(2, np.float32))
+        self.welcome(link, 1000 + 4 * 10**8)
+        said = self.said(link)
+        self.assertEqual([s.stamp_ns for s in said], [1000 + i * 10**8 for i in range(5, 10)] + [1000 + 4 * 10**8])
+        np.testing.assert_allclose(said[0].increment_covariance[0], 0.02**2 + 0.003**2 * 0.1)  # 1 m from the one it has
+        self.assertEqual(list(said[-1].xyz), [1.0] * 6)
+
+    def test_what_a_killed_robot_lost_is_said_again(self):
+        link = self.filled()
+        self.welcome(link)
+        self.said(link)
+        self.stored(link, 1000 + 3 * 10**8)
+        self.assertEqual(len(link.kept), 7)
+        waits = [link.lost("killed") for _ in range(8)]
+        self.assertEqual(waits[:3] + waits[-1:], [0.25, 0.5, 1.0, 5.0])
+        self.assertEqual(link.why, "killed")
+        link.add_odometry(10**12, pose_at(10))  # while away
+        self.welcome(link, 1000 + 3 * 10**8)
+        self.assertEqual([s.stamp_ns for s in self.said(link)], [1000 + i * 10**8 for i in range(4, 10)] + [10**12])
+        self.assertEqual(link.lost("again"), 0.25)
+
+    def test_memory_is_bounded_and_increments_stay_whole(self):
+        link = self.filled(3)
+        link.most_samples = 5
+        self.welcome(link)
+        self.said(link)
+        link.lost("away")
+        for i in range(3, 20):
+            link.add_odometry(1000 + i * 10**8, pose_at(i))
+        self.assertEqual(len(link.kept), 5)
+        self.assertEqual(link.counts["forgotten_while_away"], 15)
+        self.welcome(link)
+        first = self.said(link)[0]
+        self.assertEqual(first.stamp_ns, 1000 + 15 * 10**8)
+        self.assertAlmostEqual(first.increment_covariance[0], 15 * (0.02**2 + 0.003**2 * 0.1))
+        link.most_scan_bytes = 100
+        for i in range(3):
+            link.add_scan(10**12 + i, np.ones((5, 3), np.float32), None)
+        self.assertLessEqual(link.scan_bytes, 100)
+
+    def test_an_unknown_stretch_is_stated_as_one(self):
+        link = self.filled(2)
+        self.welcome(link, 500)
+        self.assertEqual(self.said(link)[0].increment_covariance[0], 1.0)
+
+    def test_refusals_and_garbage(self):
+        link = self.filled()
+        with self.assertRaisesRegex(ValueError, "expected stamps to increase"):
+            link.add_odometry(1000, pose_at(1))
+        link.connected()
+        link.hear(frame(closed=Feed.Closed(why="a second feeder")))
+        link.lost("the robot has ended")
+        self.assertEqual((link.state, link.why), ("refused", "a second feeder"))
+        link.connected()
+        with self.assertRaisesRegex(ValueError, "no Tutti robot"):
+            link.hear(b"HTTP/1.1 400")
+        self.welcome(link)
+        self.said(link)
+        link.end_recording()
+        self.assertIsInstance(self.said(link)[0], Feed.EndOfRecording)
+
+    def test_a_scans_frame_is_protobufs(self):
+        rng = np.random.default_rng(1)
+        for count in (0, 1, 40, 5000):
+            points = rng.normal(size=(count, 3)).astype(np.float32)
+            for ages in (None, rng.uniform(size=count).astype(np.float32)):
+                whole = Feed.Scan(stamp_ns=10**18, xyz=points.ravel(), age_s=[] if ages is None else ages)
+                got, = self.parse(scan_frame(10**18, points, ages))
+                self.assertEqual(got, Feed(scan=whole))
+        with self.assertRaisesRegex(ValueError, "expected at most 16777216"):
+            scan_frame(1, np.zeros((1_500_000, 3), np.float32), None)
+
+    def test_diagnosis(self):
+        link, on_map = self.filled(), OnMap()
+        self.assertEqual(diagnosis(link, on_map, [])[0], ERROR)
+        self.welcome(link)
+        self.assertEqual(diagnosis(link, on_map, [])[:2], (WARN, "no odometry was said yet"))
+        self.said(link)
+        self.assertEqual(diagnosis(link, on_map, [])[0], OK)
+        on_map.take("situation", Feed.Situation(alert=[Feed.Alert(text="disk full")]))
+        self.assertEqual(diagnosis(link, on_map, [])[:2], (WARN, "disk full"))
+        self.assertEqual(diagnosis(link, on_map, [], is_alive=False)[0], ERROR)
+
+    def test_the_way_and_what_came_since(self):
+        on_map = OnMap()
+        for i in range(10):
+            on_map.add_odometry(i, pose_at(i))
+            on_map.add_odometry(i, pose_at(i + 0.01))  # not worth a place
+        on_map.take("way", Feed.Way(stamp_ns=[0, 5], T_map_body=[*pose_at(0), *pose_at(50)]))
+        on_map.take("correction", Feed.Correction(T_map_odom=feed_pose((0.0, 7.0, 0.0, 0.0, 0.0, 0.0, 1.0))))
+        path = on_map.path()
+        self.assertEqual([stamp for stamp, _ in path], [0, 5, 6, 7, 8, 9])
+        self.assertEqual((path[1][1][0], path[2][1][:2]), (50.0, (6.0, 7.0)))

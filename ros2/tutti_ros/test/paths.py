@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""As tutti_ros_test.py is told."""
+import pathlib
+import sys
+
+TUTTI, SOURCE, PROTO, SHARED = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3], pathlib.Path(sys.argv[4])

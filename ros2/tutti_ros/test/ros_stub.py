@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""As much of ROS 2 as the node touches: message types with checked fields, CDR both ways, and an rclpy that keeps what is
+published. No ROS is on the machines that Tutti is tested on."""
+import array
+import struct
+import sys
+import types
+
+DEFINITIONS = {
+    "builtin_interfaces/Time": "int32 sec, uint32 nanosec",
+    "std_msgs/Header": "builtin_interfaces/Time stamp, string frame_id",
+    "std_msgs/ColorRGBA": "float32 r, float32 g, float32 b, float32 a",
+    "geometry_msgs/Point": "float64 x, float64 y, float64 z",
+    "geometry_msgs/Vector3": "float64 x, float64 y, float64 z",
+    "geometry_msgs/Quaternion": "float64 x, float64 y, float64 z, float64 w",
+    "geometry_msgs/Pose": "geometry_msgs/Point position, geometry_msgs/Quaternion orientation",
+    "geometry_msgs/PoseStamped": "std_msgs/Header header, geometry_msgs/Pose pose",
+    "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose, float64[36] covariance",
+    "geometry_msgs/PoseWithCovarianceStamped": "std_msgs/Header header, geometry_msgs/PoseWithCovariance pose",
+    "geometry_msgs/Twist": "geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular",
+    "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist, float64[36] covariance",
+    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation",
+    "geometry_msgs/TransformStamped": "std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform",
+    "nav_msgs/Odometry": "std_msgs/Header header, string child_frame_id, geometry_msgs/PoseWithCovariance pose, "
+                         "geometry_msgs/TwistWithCovariance twist",
+    "nav_msgs/Path": "std_msgs/Header header, geometry_msgs/PoseStamped[] poses",
+    "sensor_msgs/PointField": "string name, uint32 offset, uint8 datatype, uint32 count",
+    "sensor_msgs/PointCloud2": "std_msgs/Header header, uint32 height, uint32 width, sensor_msgs/PointField[] fields, "
+                               "bool is_bigendian, uint32 point_step, uint32 row_step, uint8[] data, bool is_dense",
+    "diagnostic_msgs/KeyValue": "string key, string value",
+    "diagnostic_msgs/DiagnosticStatus": "byte level, string name, string message, string hardware_id, "
+                                        "diagnostic_msgs/KeyValue[] values",
+    "diagnostic_msgs/DiagnosticArray": "std_msgs/Header header, diagnostic_msgs/DiagnosticStatus[] status",
+    "visualization_msgs/Marker": "std_msgs/Header header, string ns, int32 id, int32 type, int32 action, "
+                                 "geometry_msgs/Pose pose, geometry_msgs/Vector3 scale, std_msgs/ColorRGBA color, string text",
+    "visualization_msgs/MarkerArray": "visualization_msgs/Marker[] markers",
+}
+NUMBERS = {"int32": "i", "uint32": "I", "uint8": "B", "float32": "f", "float64": "d", "bool": "?"}
+CONSTANTS = {"visualization_msgs/Marker": {"SPHERE": 2, "TEXT_VIEW_FACING": 9, "ADD": 0, "DELETEALL": 3}}
+TYPES = {}
+
+
+def default(kind):
+    if kind.endswith("]"):
+        base, _, length = kind[:-1].partition("[")
+        return [0.0] * int(length) if length else (array.array("B") if base == "uint8" else [])
+    if kind in TYPES:
+        return TYPES[kind]()
+    return {"string": "", "byte": b"\0", "bool": False}.get(kind, 0.0 if kind.startswith("float") else 0)
+
+
+def check(kind, value, what):
+    """As rosidl's Python does: an int is no float."""
+    expected = {"string": str, "byte": bytes, "bool": bool}.get(kind) or TYPES.get(kind)
+    if kind.endswith("]"):
+        expected = (list, array.array, bytes)
+        length = kind[:-1].partition("[")[2]
+        assert not length or len(value) == int(length) and all(isinstance(x, float) for x in value), what
+    elif expected is None:
+        expected = float if kind.startswith("float") else int
+        assert expected is float or value >= 0 or kind == "int32", what
+    assert isinstance(value, expected) and (expected is not int or not isinstance(value, bool)), (what, kind, value)
+
+
+def make_type(name, definition):
+    fields = [tuple(words.split()) for words in definition.split(", ")]
+
+    def init(self):
+        for kind, field in fields:
+            object.__setattr__(self, field, default(kind))
+
+    def set_checked(self, field, value):
+        check(kinds[field], value, f"{name}.{field}")
+        object.__setattr__(self, field, value)
+
+    kinds = {field: kind for kind, field in fields}
+    return type(name.split("/")[1], (), {"__init__": init, "__setattr__": set_checked, "fields_": fields,
+                                         **CONSTANTS.get(name, {})})
+
+
+for type_name, text in DEFINITIONS.items():
+    TYPES[type_name] = make_type(type_name, text)
+
+
+class Reader:
+    """Of XCDR1: alignment counts from the end of the encapsulation header."""
+
+    def __init__(self, cdr):
+        self.order, self.data, self.at = "<" if cdr[1] & 1 else ">", memoryview(cdr)[4:], 0
+
+    def number(self, code):
+        size = struct.calcsize("=" + code)
+        self.at += -self.at % size
+        value, = struct.unpack_from(self.order + code, self.data, self.at)
+        self.at += size
+        return value
+
+    def read(self, kind):
+        if kind in NUMBERS:
+            return self.number(NUMBERS[kind])
+        if kind.endswith("]"):
+            base, _, length = kind[:-1].partition("[")
+            count = int(length) if length else self.number("I")
+            if base == "uint8":
+                self.at += count
+                return array.array("B", self.data[self.at - count:self.at])
+            return [self.read(base) for _ in range(count)]
+        if kind == "string":
+            count = self.number("I")
+            self.at += count
+            return bytes(self.data[self.at - count:self.at - 1]).decode()
+        out = TYPES[kind]()
+        for field_kind, field in out.fields_:
+            setattr(out, field, self.read(field_kind))
+        return out
+
+
+class Writer:
+    def __init__(self):
+        self.out = bytearray()
+
+    def number(self, code, value):
+        self.out += bytes(-len(self.out) % struct.calcsize("=" + code)) + struct.pack("<" + code, value)
+
+    def write(self, kind, value):
+        if kind in NUMBERS:
+            self.number(NUMBERS[kind], value)
+        elif kind.endswith("]"):
+            base, _, length = kind[:-1].partition("[")
+            if not length:
+                self.number("I", len(value))
+            if base == "uint8":
+                self.out += bytes(value)
+            else:
+                for x in value:
+                    self.write(base, x)
+        elif kind == "string":
+            self.number("I", len(value.encode()) + 1)
+            self.out += value.encode() + b"\0"
+        else:
+            for field_kind, field in value.fields_:
+                self.write(field_kind, getattr(value, field))
+
+
+def decode(kind, cdr):
+    return Reader(cdr).read(kind)
+
+
+def encode(kind, message):
+    writer = Writer()
+    writer.write(kind, message)
+    return b"\0\1\0\0" + bytes(writer.out)
+
+
+class Publisher:
+    def __init__(self):
+        self.said = []
+
+    def publish(self, message):
+        self.said.append(message)
+
+    def get_subscription_count(self):
+        return 1
+
+
+class Logger:
+    def warning(self, text, **_):
+        pass
+
+    info = warning
+
+
+class Clock:
+    def now(self):
+        return self
+
+    def to_msg(self):
+        return TYPES["builtin_interfaces/Time"]()
+
+
+class Node:
+    given = {}  # parameters
+
+    def __init__(self, name):
+        self.name, self.made, self.callbacks, self.qos = name, {}, {}, {}
+
+    def declare_parameter(self, name, value):
+        return types.SimpleNamespace(value=self.given.get(name, value))
+
+    def create_publisher(self, kind, topic, qos):
+        self.made[topic], self.qos[topic] = Publisher(), qos
+        return self.made[topic]
+
+    def create_subscription(self, kind, topic, callback, qos):
+        self.callbacks[topic], self.qos[topic] = callback, qos
+
+    def create_service(self, kind, name, callback):
+        self.callbacks[name] = callback
+
+    def create_timer(self, period_s, callback):
+        assert isinstance(period_s, float)
+        self.callbacks[callback.__name__] = callback
+
+    def get_logger(self):
+        return Logger()
+
+    def get_clock(self):
+        return Clock()
+
+    def get_fully_qualified_name(self):
+        return "/r1/" + self.name
+
+    def destroy_node(self):
+        pass
+
+
+class Tf:
+    """tf2_ros: what is sent, and transforms to be found."""
+    sent, known = [], {}
+
+    class TransformException(Exception):
+        pass
+
+    class TransformBroadcaster:
+        def __init__(self, node):
+            pass
+
+        def sendTransform(self, transform):
+            Tf.sent.append(transform)
+
+    class Buffer:
+        def lookup_transform(self, parent, child, _):
+            if (parent, child) not in Tf.known:
+                raise Tf.TransformException(f"no transform from '{child}' to '{parent}'")
+            return Tf.known[parent, child]
+
+    class TransformListener:
+        def __init__(self, buffer, node):
+            pass
+
+
+def install():
+    """Puts the modules that the node imports where it finds them."""
+    def module(name, **has):
+        sys.modules[name] = types.ModuleType(name)
+        sys.modules[name].__dict__.update(has)
+        return sys.modules[name]
+
+    time = module("rclpy.time", Time=object)
+    executors = module("rclpy.executors", ExternalShutdownException=type("ExternalShutdownException", (Exception,), {}))
+    module("rclpy.node", Node=Node)
+    module("rclpy.qos", DurabilityPolicy=types.SimpleNamespace(TRANSIENT_LOCAL="transient local"),
+           ReliabilityPolicy=types.SimpleNamespace(RELIABLE="reliable"),
+           QoSProfile=lambda **what: what, qos_profile_sensor_data="sensor data")
+    module("rclpy", time=time, executors=executors)
+    module("tf2_ros", **{name: getattr(Tf, name) for name in
+                         ("TransformException", "TransformBroadcaster", "Buffer", "TransformListener")})
+    module("std_srvs.srv", Trigger=object)
+    for name, made in TYPES.items():
+        package, word = name.split("/")
+        found = sys.modules.get(package + ".msg") or module(package + ".msg")
+        setattr(found, word, made)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What ROS messages say, as the live feed wants it. Messages are anything with the fields of nav_msgs/Odometry and
+sensor_msgs/PointCloud2; what is no sample is a ValueError that says why."""
+import dataclasses
+import math
+
+import numpy as np
+
+from tutti_ros.poses import angle, rotation
+
+TIME_FIELDS = ("t", "time", "timestamp", "offset_time")
+UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
+SHORTEST_SWEEP_S, LONGEST_SWEEP_S = 0.001, 0.5
+LONGEST_AGE_S = 1.0
+TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}  # sensor_msgs/PointField
+
+
+def nanoseconds(stamp):
+    return stamp.sec * 10**9 + stamp.nanosec
+
+
+def pose_of(position, orientation):
+    pose = (position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
+    norm = math.sqrt(sum(q * q for q in pose[3:]))
+    if not all(map(math.isfinite, pose)) or abs(norm - 1.0) > 0.01:
+        raise ValueError(f"a pose {pose} that is none, expected finite numbers and a unit quaternion")
+    return (*pose[:3], *(q / norm for q in pose[3:]))
+
+
+def odometry_of(message):
+    """(stamp_ns, T_odom_body)"""
+    return nanoseconds(message.header.stamp), pose_of(message.pose.pose.position, message.pose.pose.orientation)
+
+
+@dataclasses.dataclass
+class OdometryNoise:
+    """How much odometry is to be trusted; the same model and defaults as robots[].covariance of a mission file. Variances
+    add up along the way. The covariance in Odometry messages is not read: it is that of the pose, not of an increment,
+    and all zero, -1 or 1e6 with many drivers."""
+    translation_m_per_sqrt_m: float = 0.02
+    translation_m_per_sqrt_deg: float = 0.001
+    translation_m_per_sqrt_s: float = 0.003
+    rotation_deg_per_sqrt_m: float = 0.1
+    rotation_deg_per_sqrt_deg: float = 0.02
+    rotation_deg_per_sqrt_s: float = 0.02
+
+    def variances(self, before, after, seconds):
+        """(m^2, rad^2) of the increment between two poses."""
+        metres, degrees = math.dist(before[:3], after[:3]), math.degrees(angle(before, after))
+        add = lambda m, deg, s: m * m * metres + deg * deg * degrees + s * s * seconds
+        return (add(self.translation_m_per_sqrt_m, self.translation_m_per_sqrt_deg, self.translation_m_per_sqrt_s),
+                add(self.rotation_deg_per_sqrt_m, self.rotation_deg_per_sqrt_deg, self.rotation_deg_per_sqrt_s)
+                * math.radians(1.0)**2)
+
+
+def points_of(message):
+    """(points Nx3 float32 in the sensor's frame, their times as they stand there, or None); without points that are not
+    finite. Reads rows with padding and both byte orders."""
+    fields = {field.name: field for field in message.fields}
+    order = ">" if message.is_bigendian else "<"
+    time = next((name for name in TIME_FIELDS if name in fields and fields[name].count <= 1), None)
+    names = ["x", "y", "z"] + ([time] if time else [])
+    formats, offsets = [], []
+    for name in names:
+        field = fields.get(name)
+        if field is None or field.datatype not in ((5, 6, 7, 8) if name == time else (7, 8)):
+            raise ValueError(f"no field '{name}' of floats among {sorted(fields)}" if name != time else
+                             f"field '{name}' has datatype {field.datatype}, expected 5 to 8")
+        formats.append(order + TYPES[field.datatype])
+        offsets.append(field.offset)
+        if field.offset + np.dtype(formats[-1]).itemsize > message.point_step:
+            raise ValueError(f"field '{name}' at byte {field.offset} of points of {message.point_step} bytes")
+    rows, columns, step = message.height, message.width, message.point_step
+    row_step = message.row_step if rows > 1 else columns * step  # of one row many drivers do not care what they say
+    needed = (rows - 1) * row_step + columns * step if rows else 0
+    data = np.frombuffer(message.data, np.uint8)
+    if row_step < columns * step or len(data) < needed:
+        raise ValueError(f"{len(data)} bytes of points in rows of {row_step}, expected {rows} rows of {columns} points "
+                         f"of {step} bytes")
+    if rows * columns == 0:
+        return np.empty((0, 3), np.float32), None
+    layout = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": step})
+    cloud = np.ndarray((rows, columns), layout, data, strides=(row_step, step)).reshape(-1)
+    points = np.stack([cloud[name].astype(np.float32) for name in "xyz"], axis=1)
+    finite = np.isfinite(points).all(axis=1)
+    return points[finite], cloud[time].astype(np.float64)[finite] if time else None
+
+
+def seconds_after_stamp(times, stamp_ns):
+    """When points were measured, in s after the message's stamp, of numbers in a unit and since a moment that drivers do not
+    agree about: the unit that makes a sweep of them, since the stamp or by the stamp's clock. None: all at the stamp."""
+    if times is None or len(times) == 0:
+        return None
+    if not np.isfinite(times).all():
+        raise ValueError("the time of a point is no number")
+    first, last = float(times.min()), float(times.max())
+    if first == last:
+        return None
+    unit_s = next((u for u in UNITS_S if SHORTEST_SWEEP_S <= u * (last - first) <= LONGEST_SWEEP_S), None)
+    if unit_s is None:
+        raise ValueError(f"points' times go from {first} to {last}, expected a sweep of {SHORTEST_SWEEP_S} to "
+                         f"{LONGEST_SWEEP_S} s")
+    if unit_s * max(abs(first), abs(last)) <= LONGEST_AGE_S:
+        return unit_s * times
+    after = unit_s * (times - stamp_ns * 1e-9 / unit_s)
+    if max(abs(after.min()), abs(after.max())) > LONGEST_AGE_S:
+        raise ValueError(f"points' times go from {first} to {last}, expected within {LONGEST_AGE_S} s of 0 or of the "
+                         f"stamp {stamp_ns} ns: a clock of its own?")
+    return after
+
+
+def moved(T_body_sensor, points):
+    """Without a product of matrices: for one of this size OpenBLAS wakes threads that then spin, 70 % of a core at 10 Hz."""
+    R, t = rotation(T_body_sensor).astype(np.float32), np.array(T_body_sensor[:3], np.float32)
+    return points[:, :1] * R[:, 0] + points[:, 1:2] * R[:, 1] + points[:, 2:] * R[:, 2] + t
+
+
+def scan_of(message, T_body_sensor, deskewed=False):
+    """(stamp_ns, points Nx3 float32 in the body frame, ages in s or None): the stamp is that of the newest point, so that
+    ages are positive and the robot waits until odometry is there."""
+    stamp_ns = nanoseconds(message.header.stamp)
+    points, times = points_of(message)
+    points = moved(T_body_sensor, points)
+    after = None if deskewed else seconds_after_stamp(times, stamp_ns)
+    if after is None:
+        return stamp_ns, points, None
+    newest_s = float(after.max())
+    return stamp_ns + round(newest_s * 1e9), points, (newest_s - after).astype(np.float32)

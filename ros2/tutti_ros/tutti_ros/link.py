@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The client's side of the live feed without a socket or a clock: what to say next, what was heard, what to say again
+after a connection was lost. docs/protocol.md says why."""
+import collections
+import dataclasses
+import struct
+
+import numpy as np
+
+from tutti_ros.feed_messages import Feed
+
+PROTOCOL_VERSION = 1
+LONGEST_FRAME = 16 * 1024 * 1024
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.25, 5.0
+UNSEEN_M2, UNSEEN_RAD2 = 1.0, 0.03  # of a stretch of odometry that this program did not see
+
+
+def frame(**what):
+    return framed(Feed(**what).SerializeToString())
+
+
+def framed(payload):
+    if len(payload) > LONGEST_FRAME:
+        raise ValueError(f"a message of {len(payload)} bytes, expected at most {LONGEST_FRAME}")
+    return struct.pack("<I", len(payload)) + payload
+
+
+def varint(number):
+    out = b""
+    while number > 127:
+        out, number = out + bytes([number & 127 | 128]), number >> 7
+    return out + bytes([number])
+
+
+def scan_frame(stamp_ns, points, ages):
+    """Like frame(scan=...), but numpy's floats are the packed field as they are: protobuf's Python takes 10 ms and more for
+    60,000 points, which is 10 % of a core, and nobody is answered meanwhile."""
+    def packed(number, floats):
+        data = np.ascontiguousarray(floats, "<f4").tobytes()
+        return varint(number << 3 | 2) + varint(len(data)) + data
+
+    scan = Feed.Scan(stamp_ns=stamp_ns).SerializeToString() + packed(Feed.Scan.XYZ_FIELD_NUMBER, points)
+    if ages is not None:
+        scan += packed(Feed.Scan.AGE_S_FIELD_NUMBER, ages)
+    return framed(varint(Feed.SCAN_FIELD_NUMBER << 3 | 2) + varint(len(scan)) + scan)
+
+
+def feed_pose(pose):
+    return Feed.Pose(**dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), pose)))
+
+
+def pose_from(said):
+    return said.x, said.y, said.z, said.qx, said.qy, said.qz, said.qw
+
+
+@dataclasses.dataclass
+class Sample:
+    stamp_ns: int
+    pose: tuple = ()        # T_odom_body; of a scan empty
+    spent: tuple = (0, 0)   # variances (m^2, rad^2) of the way so far: differences are those of increments
+    frame: bytes = b""      # of a scan
+
+
+class Link:
+    """Samples are kept until the robot has them on its disk, so that one that was killed is told again what it lost; the
+    oldest go from `most_samples` and `most_scan_bytes` on. States: away, greeting, feeding, refused (the robot closed
+    the connection, and said why; tried again like any other)."""
+
+    def __init__(self, noise, client_name="tutti_ros", has_scans=True, most_samples=20_000, most_scan_bytes=64 * 1024 * 1024):
+        self.noise, self.client_name, self.has_scans = noise, client_name, has_scans
+        self.most_samples, self.most_scan_bytes = most_samples, most_scan_bytes
+        self.state, self.why, self.wait_s = "away", "not connected yet", FIRST_WAIT_S
+        self.counts = collections.Counter()
+        self.kept, self.scan_bytes = collections.deque(), 0
+        self.waiting = collections.deque()  # those of `kept` that are to be said on this connection
+        self.last = None           # the newest odometry sample
+        self.known_spent = None    # of the newest that the robot has; None: one that this program did not see
+        self.welcome, self.goodbye, self.received = None, False, b""
+
+    def add_odometry(self, stamp_ns, pose):
+        if self.last and stamp_ns <= self.last.stamp_ns:
+            self.counts["odometry_left_out"] += 1
+            raise ValueError(f"odometry of {stamp_ns} ns after {self.last.stamp_ns} ns, expected stamps to increase")
+        spent = (0.0, 0.0)
+        if self.last:
+            seconds = (stamp_ns - self.last.stamp_ns) * 1e-9
+            more = self.noise.variances(self.last.pose, pose, seconds)
+            spent = tuple(a + b for a, b in zip(self.last.spent, more))
+        self.last = Sample(stamp_ns, pose, spent)
+        self._add(self.last)
+
+    def add_scan(self, stamp_ns, points, ages):
+        self._add(Sample(stamp_ns, frame=scan_frame(stamp_ns, points, ages)))
+
+    def end_recording(self):
+        self.goodbye = True
+
+    def _add(self, sample):
+        self.kept.append(sample)
+        self.scan_bytes += len(sample.frame)
+        if self.state == "feeding":
+            self.waiting.append(sample)
+        while len(self.kept) > self.most_samples or self.scan_bytes > self.most_scan_bytes:
+            oldest = self.kept.popleft()
+            self.scan_bytes -= len(oldest.frame)
+            if self.waiting and self.waiting[0] is oldest:
+                self.waiting.popleft()
+            if self.state != "feeding":
+                self.counts["forgotten_while_away"] += 1
+
+    def connected(self):
+        """What to say first."""
+        self.state, self.received, self.welcome = "greeting", b"", None
+        self.waiting.clear()
+        hello = Feed.Hello(protocol_version=PROTOCOL_VERSION, client_name=self.client_name.encode(), wants_way=True,
+                           sensors=Feed.Sensors(scans=self.has_scans))
+        return frame(hello=hello)
+
+    def lost(self, why):
+        """How many seconds to wait before another try."""
+        if self.state != "refused":
+            self.why = why
+        self.state = "refused" if self.state == "refused" else "away"
+        self.waiting.clear()
+        wait_s, self.wait_s = self.wait_s, min(2.0 * self.wait_s, LONGEST_WAIT_S)
+        return wait_s
+
+    def next_frame(self):
+        """What to say now; empty: nothing."""
+        if self.state != "feeding":
+            return b""
+        if not self.waiting:
+            if not self.goodbye:
+                return b""
+            self.goodbye = False
+            return frame(end_of_recording=Feed.EndOfRecording())
+        sample = self.waiting.popleft()
+        self.counts["odometry" if sample.pose else "scans"] += 1
+        return sample.frame or self._odometry(sample)
+
+    def _odometry(self, sample):
+        if self.known_spent is None:
+            variances = (UNSEEN_M2, UNSEEN_RAD2)
+        else:
+            variances = (max(a - b, 1e-12) for a, b in zip(sample.spent, self.known_spent))
+        self.known_spent = sample.spent
+        m2, rad2 = variances
+        return frame(odometry=Feed.Odometry(stamp_ns=sample.stamp_ns, T_odom_body=feed_pose(sample.pose),
+                                            increment_covariance=[m2] * 3 + [rad2] * 3))
+
+    def hear(self, data):
+        """Messages that are complete with these bytes, as (kind, message)."""
+        self.received += data
+        said = []
+        while len(self.received) >= 4:
+            size, = struct.unpack_from("<I", self.received)
+            if not 1 <= size <= LONGEST_FRAME:
+                raise ValueError(f"a frame of {size} bytes, expected 1 to {LONGEST_FRAME}: no Tutti robot?")
+            if len(self.received) < 4 + size:
+                break
+            message = Feed.FromString(self.received[4:4 + size])
+            self.received = self.received[4 + size:]
+            kind = message.WhichOneof("what")
+            if kind:  # else of a newer robot
+                said.append((kind, getattr(message, kind)))
+                self._take(*said[-1])
+        return said
+
+    def _take(self, kind, message):
+        if kind == "welcome":
+            self._begin(message)
+        elif kind == "correction":
+            self.counts["corrections"] += 1
+            if message.has_stored:
+                self._forget_before(message.stored_stamp_ns)
+        elif kind == "refused":
+            self.counts["refused"] += 1
+            self.why = message.why
+        elif kind == "jump":
+            self.counts["jumps"] += 1
+        elif kind == "closed":
+            self.state, self.why = "refused", message.why
+
+    def _begin(self, welcome):
+        """Goes on behind what the robot has."""
+        self.state, self.why, self.wait_s, self.welcome = "feeding", "", FIRST_WAIT_S, welcome
+        self.known_spent = None if welcome.has_odometry else (0.0, 0.0)
+        for sample in self.kept:
+            if not welcome.has_odometry or sample.stamp_ns > welcome.last_stamp_ns:
+                self.waiting.append(sample)
+            elif sample.stamp_ns == welcome.last_stamp_ns:
+                if sample.pose:
+                    self.known_spent = sample.spent
+                else:  # it may have been lost with the robot
+                    self.waiting.append(sample)
+
+    def _forget_before(self, stamp_ns):
+        while self.kept and self.kept[0].stamp_ns < stamp_ns:
+            if self.waiting and self.waiting[0] is self.kept[0]:
+                return
+            self.scan_bytes -= len(self.kept.popleft().frame)
