@@ -90,9 +90,12 @@ class Programs(unittest.TestCase):
         self.assertEqual(len(ros_stub.Tf.sent), 200)  # the last correction goes on
         robot = self.start_robot("r1", bus)
         self.wait_for(lambda: node.link.state == "feeding" and not node.link.waiting, "the robot again")
+        self.wait_for(lambda: node.on_map.correction.stamp_ns == 200 * 10**8, "all that was said again")
         drive(200, 250)
         poses = node.made["corrected_pose"].said
         self.wait_for(lambda: from_ros.nanoseconds(poses[-1].header.stamp) == 250 * 10**8, "the last sample")
+        stamps = [from_ros.nanoseconds(sent.header.stamp) for sent in ros_stub.Tf.sent]
+        self.assertEqual(stamps, [(2 + i) * 10**8 for i in range(250)])  # none twice: tf2 warns of each
         node.callbacks["publish_path"]()
         path = node.made["corrected_path"].said[-1]
         self.assertEqual(path.header.frame_id, "r1/map")

@@ -252,7 +252,7 @@ def install():
     module("rclpy.qos", DurabilityPolicy=types.SimpleNamespace(TRANSIENT_LOCAL="transient local"),
            ReliabilityPolicy=types.SimpleNamespace(RELIABLE="reliable"),
            QoSProfile=lambda **what: what, qos_profile_sensor_data="sensor data")
-    module("rclpy", time=time, executors=executors)
+    module("rclpy", ok=lambda: True, time=time, executors=executors)
     module("tf2_ros", **{name: getattr(Tf, name) for name in
                          ("TransformException", "TransformBroadcaster", "Buffer", "TransformListener")})
     module("std_srvs.srv", Trigger=object)

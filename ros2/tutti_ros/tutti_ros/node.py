@@ -50,7 +50,7 @@ class TuttiNode(Node):
         self.frames = None  # map, odom, base
         self.lidar_poses = {"": self._stated_lidar_pose()} if self.T_body_lidar else {}
         self.on_map, self.trouble = OnMap(), collections.deque(maxlen=5)
-        self.mate_publishers = {}
+        self.mate_publishers, self.newest_tf_ns = {}, -1
         self.link = Link(noise, has_scans=self.use_scans)
         self.connection = Connection(self.socket, self.link, self.hear)
         self.tf_broadcaster = tf2_ros.TransformBroadcaster(self)
@@ -136,6 +136,8 @@ class TuttiNode(Node):
 
     # From the robot, in the thread of the connection.
     def hear(self, kind, message):
+        if not rclpy.ok():  # interrupted: nothing can be published any more
+            return
         with self.connection.lock:
             self.on_map.take(kind, message)
         if kind == "correction":
@@ -153,7 +155,9 @@ class TuttiNode(Node):
             self.get_logger().info(f"{kind}: {message.robot_name if kind == 'welcome' else 'everything is stored'}")
 
     def publish_transform(self, stamp_ns, T_map_odom):
-        if self.publish_tf and self.frames:
+        """Once for each stamp: what a robot is told again was published while it was away, and tf2 warns of repetitions."""
+        if self.publish_tf and self.frames and stamp_ns > self.newest_tf_ns:
+            self.newest_tf_ns = stamp_ns
             out = TransformStamped()
             ahead_ns = int(self.transform_tolerance_s * 1e9)
             set_transform(out, stamp_ns + ahead_ns, self.frames[0], self.frames[1], T_map_odom)
