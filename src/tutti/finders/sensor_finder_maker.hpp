@@ -19,9 +19,9 @@ std::shared_ptr<const server::ClosureFinder> make_finder(const FinderConfig& con
 std::shared_ptr<const server::MapRefiner> make_refiner(const FinderConfig& finder,
                                                        const bundle::RefinementConfig& config);
 
-/// All of the settings that the configured finder's answers depend on, as YAML, and nothing else. Members of the structs
-/// that are no settings are not in it: whoever makes the finder of the text has their defaults, so who changes them in
-/// C++ gives the finder a name of its own (NamedFinder).
+/// All of the settings that the configured finder's answers depend on, as YAML, and nothing else. Members of the
+/// structs that are no settings are not in it: whoever makes the finder of the text has their defaults, so who changes
+/// them in C++ gives the finder a name of its own (NamedFinder).
 std::string settings_of(const FinderConfig& config);
 std::string settings_of(const bundle::RefinementConfig& config);
 

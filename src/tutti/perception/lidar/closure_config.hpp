@@ -22,19 +22,11 @@ struct RegistrationLevel {
   double max_distance_m = 0.3;  ///< Correspondences farther apart are not used.
   int max_points = 4000;        ///< Source points used, evenly spread.
   int max_iterations = 15;      ///< Gauss-Newton steps at most.
-  template <class V>
-  void describe(V& v) {
-    v.field("max_distance_m", max_distance_m, greater_than(0.0), "Correspondences farther apart are not used.");
-  }
 };
 
 struct RegistrationConfig {
   std::vector<RegistrationLevel> levels{{1.5, 500, 8}, {0.6, 1000, 8}, {0.3, 4000, 12}};  ///< Coarse to fine.
   double overlap_distance_m = 0.3;  ///< A point overlaps when a target point with a like normal is this close.
-  template <class V>
-  void describe(V& v) {
-    v.field("levels", levels, any(), "Stages of the registration, coarse to fine.");
-  }
 };
 
 inline constexpr double kDistinct_deg = 12.0;  ///< Two alignments differ by this yaw,
@@ -78,7 +70,6 @@ struct LidarClosureConfig {
     v.field("voxel_m", voxel_m, greater_than(0.0), "Clouds are thinned to voxels of this edge.");
     v.field("normals", normals, any(), "Surface normals.");
     v.field("candidates", candidates, any(), "Rough alignment.");
-    v.field("registration", registration, any(), "Point-to-plane registration.");
     v.field("min_overlap", min_overlap, between(0.0, 1.0), "Mean overlap of both directions.");
     v.field("max_viewpoint_distance_m", max_viewpoint_distance_m, greater_than(0.0),
             "Between the middles of the two ways; closures from farther apart are not looked for. In a network that is "

@@ -5,8 +5,8 @@
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/agent_state/agent_state.hpp"
-#include "tutti/wire/agent_state/archive.hpp"
-#include "tutti/wire/agent_state/checks.hpp"
+#include "tutti/wire/agent_state/internal/archive.hpp"
+#include "tutti/wire/agent_state/internal/checks.hpp"
 #include "tutti/wire/frame.hpp"
 #include "tutti/wire/internal/payload.hpp"
 

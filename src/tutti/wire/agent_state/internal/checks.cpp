@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/wire/agent_state/checks.hpp"
+#include "tutti/wire/agent_state/internal/checks.hpp"
 
 #include <algorithm>
 #include <cmath>
