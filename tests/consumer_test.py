@@ -120,8 +120,11 @@ class Consumer(unittest.TestCase):
         self.assertIn("libtutti_server.a", targets)
         for absent in ("test_base", "libtutti_bus.a", "libtutti_mission.a", "install:"):
             self.assertNotIn(absent, targets)
-        self.expect(self.configure("lacking", f"-DTUTTI_SOURCE={SOURCE}", "-DTUTTI_COMPONENTS=server", "-DTUTTI_WITH_CERES=OFF"), 1,
-                    "left out: bundle, for want of Ceres::ceres")
+        # A robot and a server need no bundle adjustment.
+        self.expect(self.configure("lacking", f"-DTUTTI_SOURCE={SOURCE}", "-DTUTTI_COMPONENTS=server", "-DTUTTI_WITH_CERES=OFF"), 0,
+                    "left out: bundle, for want of Ceres::ceres", "left out: finders")
+        self.expect(self.configure("lacking_more", f"-DTUTTI_SOURCE={SOURCE}", "-DTUTTI_COMPONENTS=server", "-DTUTTI_WITH_ZSTD=OFF"), 1,
+                    "left out: wire, for want of tutti::zstd")
         self.expect(self.configure("odd", f"-DTUTTI_SOURCE={SOURCE}", "-DTUTTI_COMPONENTS=sever"), 1, "'sever' is none of")
 
 

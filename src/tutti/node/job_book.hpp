@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tutti/base/timestamp.hpp"
 #include "tutti/model/loop_closure.hpp"
 #include "tutti/model/refinement.hpp"
 

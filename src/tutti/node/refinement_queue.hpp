@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "tutti/base/timestamp.hpp"
 #include "tutti/model/refinement.hpp"
 
 namespace tutti::node {
