@@ -11,54 +11,10 @@
 #include <cerrno>
 #include <cstring>
 
-#include "tutti/v1/feed.pb.h"
+#include "tutti/program/feed/internal/feed_messages.hpp"
 
 namespace tutti::program {
 namespace {
-
-void put_in(const Pose3& T, v1::Feed::Pose& out) {
-  out.set_x(T.translation.x());
-  out.set_y(T.translation.y());
-  out.set_z(T.translation.z());
-  out.set_qx(T.rotation.x());
-  out.set_qy(T.rotation.y());
-  out.set_qz(T.rotation.z());
-  out.set_qw(T.rotation.w());
-}
-
-void put_in(const FeedSensors& sensors, v1::Feed::Sensors& out) {
-  out.set_scans(sensors.scans);
-  for (const Camera& camera : sensors.cameras) {
-    auto& to = *out.add_camera();
-    to.set_kind(static_cast<v1::Feed::Camera::Kind>(camera.model.kind));
-    to.set_width_px(static_cast<std::uint32_t>(camera.model.width_px));
-    to.set_height_px(static_cast<std::uint32_t>(camera.model.height_px));
-    to.set_fx(camera.model.fx);
-    to.set_fy(camera.model.fy);
-    to.set_cx(camera.model.cx);
-    to.set_cy(camera.model.cy);
-    for (const double x : camera.model.distortion) to.add_distortion(x);
-    put_in(camera.T_body_camera, *to.mutable_t_body_camera());
-  }
-  if (sensors.depth) {
-    out.mutable_depth()->set_unit_m(sensors.depth->unit_m);
-    out.mutable_depth()->set_sigma_m(sensors.depth->sigma_m);
-    out.mutable_depth()->set_sigma_per_m2(sensors.depth->sigma_per_m2);
-    out.mutable_depth()->set_least_m(sensors.depth->least_m);
-    out.mutable_depth()->set_most_m(sensors.depth->most_m);
-  }
-  if (!sensors.imu) return;
-  out.mutable_imu()->set_gyro_noise_density(sensors.imu->gyro_noise_density);
-  out.mutable_imu()->set_gyro_random_walk(sensors.imu->gyro_random_walk);
-  out.mutable_imu()->set_accelerometer_noise_density(sensors.imu->accelerometer_noise_density);
-  out.mutable_imu()->set_accelerometer_random_walk(sensors.imu->accelerometer_random_walk);
-}
-
-void put_in(const EncodedImage& image, v1::Feed::Image& out) {
-  out.set_camera(image.camera);
-  out.set_encoding(image.is_raw ? v1::Feed::Image::RAW : v1::Feed::Image::FILE);
-  out.set_data(image.bytes);
-}
 
 template <class Stamps, class Numbers>
 Trajectory trajectory(const Stamps& stamps, const Numbers& numbers) {
@@ -121,8 +77,8 @@ Result<std::unique_ptr<FeedClient>> FeedClient::connect(const std::string& socke
   hello.mutable_hello()->set_protocol_version(kFeedVersion);
   hello.mutable_hello()->set_client_name(name);
   hello.mutable_hello()->set_wants_way(wants_way);
-  put_in(sensors, *hello.mutable_hello()->mutable_sensors());
-  if (auto ok = out->send(hello.SerializeAsString()); !ok) return tl::unexpected(ok.error());
+  internal::write(sensors, *hello.mutable_hello()->mutable_sensors());
+  if (auto ok = out->send(hello); !ok) return tl::unexpected(ok.error());
   return out;
 }
 
@@ -130,12 +86,11 @@ FeedClient::~FeedClient() {
   if (file_ >= 0) close(file_);
 }
 
-Status FeedClient::send(const std::string& payload) {
-  if (payload.size() > kMaxFeedBytes)
-    return fail(ErrorCode::invalid, "a message of {} bytes, expected at most {}", payload.size(), kMaxFeedBytes);
-  std::string bytes;
-  for (std::size_t i = 0; i < 4; ++i) bytes += static_cast<char>(payload.size() >> (8 * i) & 0xffU);
-  bytes += payload;
+Status FeedClient::send(const v1::Feed& message) {
+  const std::size_t size = message.ByteSizeLong();
+  if (size > kMaxFeedBytes)
+    return fail(ErrorCode::invalid, "a message of {} bytes, expected at most {}", size, kMaxFeedBytes);
+  const std::string bytes = internal::framed(message);
   for (std::string_view left = bytes; !left.empty();) {
     const ssize_t count = ::send(file_, left.data(), left.size(), MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;
@@ -145,54 +100,24 @@ Status FeedClient::send(const std::string& payload) {
   return {};
 }
 
-Status FeedClient::say(const node::OdometrySample& sample) {
-  v1::Feed message;
-  message.mutable_odometry()->set_stamp_ns(sample.stamp.ns);
-  put_in(sample.T_odom_body, *message.mutable_odometry()->mutable_t_odom_body());
-  for (int i = 0; i < 36; ++i)
-    message.mutable_odometry()->add_increment_covariance(sample.increment_covariance(i / 6, i % 6));
-  return send(message.SerializeAsString());
-}
+Status FeedClient::say(const node::OdometrySample& sample) { return send(internal::message_of(sample)); }
 
-Status FeedClient::say(const Scan& scan) {
-  v1::Feed message;
-  message.mutable_scan()->set_stamp_ns(scan.stamp.ns);
-  for (const Eigen::Vector3f& point : scan.cloud->points)
-    for (const float x : point) message.mutable_scan()->add_xyz(x);
-  if (scan.age_s) message.mutable_scan()->mutable_age_s()->Add(scan.age_s->begin(), scan.age_s->end());
-  return send(message.SerializeAsString());
-}
+Status FeedClient::say(const Scan& scan) { return send(internal::message_of(scan)); }
 
-Status FeedClient::say(const FedImages& images) {
-  v1::Feed message;
-  message.mutable_images()->set_stamp_ns(images.stamp.ns);
-  for (const EncodedImage& image : images.images) put_in(image, *message.mutable_images()->add_image());
-  if (images.depth) put_in(*images.depth, *message.mutable_images()->mutable_depth());
-  return send(message.SerializeAsString());
-}
+Status FeedClient::say(const FedImages& images) { return send(internal::message_of(images)); }
 
-Status FeedClient::say(const std::vector<ImuSample>& samples) {
-  v1::Feed message;
-  for (const ImuSample& sample : samples) {
-    message.mutable_imu()->add_stamp_ns(sample.stamp.ns);
-    for (int i = 0; i < 3; ++i) {
-      message.mutable_imu()->add_gyro(sample.gyro[i]);
-      message.mutable_imu()->add_accelerometer(sample.accelerometer[i]);
-    }
-  }
-  return send(message.SerializeAsString());
-}
+Status FeedClient::say(const std::vector<ImuSample>& samples) { return send(internal::message_of(samples)); }
 
 Status FeedClient::say_time() {
   v1::Feed message;
   message.mutable_time();
-  return send(message.SerializeAsString());
+  return send(message);
 }
 
 Status FeedClient::say_end() {
   v1::Feed message;
   message.mutable_end_of_recording();
-  return send(message.SerializeAsString());
+  return send(message);
 }
 
 Result<std::optional<FromRobot>> FeedClient::hear(int timeout_ms) {

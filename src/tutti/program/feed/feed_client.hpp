@@ -10,6 +10,10 @@
 
 #include "tutti/program/feed/feed_frames.hpp"
 
+namespace tutti::v1 {
+class Feed;
+}
+
 /// The other end of a live feed: a driver's.
 namespace tutti::program {
 
@@ -56,7 +60,7 @@ class FeedClient {
 
  private:
   explicit FeedClient(int file) : file_(file) {}
-  Status send(const std::string& payload);
+  Status send(const v1::Feed& message);
 
   int file_;
   FrameReader reader_;

@@ -5,31 +5,14 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/base/check.hpp"
-#include "tutti/v1/feed.pb.h"
+#include "tutti/program/feed/internal/feed_messages.hpp"
 
 namespace tutti::program {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 4;
-
-void write(const Pose3& T, v1::Feed::Pose& out) {
-  out.set_x(T.translation.x());
-  out.set_y(T.translation.y());
-  out.set_z(T.translation.z());
-  out.set_qx(T.rotation.x());
-  out.set_qy(T.rotation.y());
-  out.set_qz(T.rotation.z());
-  out.set_qw(T.rotation.w());
-}
-
-std::string framed(const v1::Feed& message) {
-  const std::string payload = message.SerializeAsString();
-  TUTTI_CHECK(payload.size() <= kMaxFeedBytes, "a feed message of {} bytes", payload.size());
-  std::string out;
-  for (std::size_t i = 0; i < kHeaderBytes; ++i) out += static_cast<char>(payload.size() >> (8 * i) & 0xffU);
-  return out + payload;
-}
+using internal::framed;
+using internal::kHeaderBytes;
+using internal::write;
 
 /// A stamp by the clock of the client that is told it.
 std::int64_t told(Timestamp stamp, std::int64_t offset_ns) {

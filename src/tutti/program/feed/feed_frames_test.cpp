@@ -72,7 +72,9 @@ TEST(FeedFrames, NothingIsPrintedOfTextThatIsNone) {
 TEST(FeedFrames, SayWhatAClientSays) {
   Matrix6d covariance = Matrix6d::Random();
   const Pose3 pose{Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {1, 2, 3}};
-  const auto sample = decode_from_client(test::odometry({{-7}, pose}, covariance.transpose()).substr(4));
+  const std::string said = test::odometry({{-7}, pose}, covariance);
+  EXPECT_EQ(test::messages(said).at(0).odometry().increment_covariance(1), covariance(0, 1));
+  const auto sample = decode_from_client(said.substr(4));
   const auto& odometry = std::get<node::OdometrySample>(*sample);
   EXPECT_EQ(odometry.stamp.ns, -7);
   EXPECT_EQ(odometry.T_odom_body, pose);

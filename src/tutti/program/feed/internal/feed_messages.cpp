@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/feed/internal/feed_messages.hpp"
+
+#include "tutti/base/check.hpp"
+
+namespace tutti::program::internal {
+namespace {
+
+void write(const EncodedImage& image, v1::Feed::Image& out) {
+  out.set_camera(image.camera);
+  out.set_encoding(image.is_raw ? v1::Feed::Image::RAW : v1::Feed::Image::FILE);
+  out.set_data(image.bytes);
+}
+
+}  // namespace
+
+void write(const Pose3& T, v1::Feed::Pose& out) {
+  out.set_x(T.translation.x());
+  out.set_y(T.translation.y());
+  out.set_z(T.translation.z());
+  out.set_qx(T.rotation.x());
+  out.set_qy(T.rotation.y());
+  out.set_qz(T.rotation.z());
+  out.set_qw(T.rotation.w());
+}
+
+void write(const FeedSensors& sensors, v1::Feed::Sensors& out) {
+  out.set_scans(sensors.scans);
+  for (const Camera& camera : sensors.cameras) {
+    auto& to = *out.add_camera();
+    to.set_kind(static_cast<v1::Feed::Camera::Kind>(camera.model.kind));
+    to.set_width_px(static_cast<std::uint32_t>(camera.model.width_px));
+    to.set_height_px(static_cast<std::uint32_t>(camera.model.height_px));
+    to.set_fx(camera.model.fx);
+    to.set_fy(camera.model.fy);
+    to.set_cx(camera.model.cx);
+    to.set_cy(camera.model.cy);
+    for (const double x : camera.model.distortion) to.add_distortion(x);
+    write(camera.T_body_camera, *to.mutable_t_body_camera());
+  }
+  if (sensors.depth) {
+    out.mutable_depth()->set_unit_m(sensors.depth->unit_m);
+    out.mutable_depth()->set_sigma_m(sensors.depth->sigma_m);
+    out.mutable_depth()->set_sigma_per_m2(sensors.depth->sigma_per_m2);
+    out.mutable_depth()->set_least_m(sensors.depth->least_m);
+    out.mutable_depth()->set_most_m(sensors.depth->most_m);
+  }
+  if (!sensors.imu) return;
+  out.mutable_imu()->set_gyro_noise_density(sensors.imu->gyro_noise_density);
+  out.mutable_imu()->set_gyro_random_walk(sensors.imu->gyro_random_walk);
+  out.mutable_imu()->set_accelerometer_noise_density(sensors.imu->accelerometer_noise_density);
+  out.mutable_imu()->set_accelerometer_random_walk(sensors.imu->accelerometer_random_walk);
+}
+
+v1::Feed message_of(const node::OdometrySample& sample) {
+  v1::Feed message;
+  message.mutable_odometry()->set_stamp_ns(sample.stamp.ns);
+  write(sample.T_odom_body, *message.mutable_odometry()->mutable_t_odom_body());
+  for (int i = 0; i < 36; ++i)
+    message.mutable_odometry()->add_increment_covariance(sample.increment_covariance(i / 6, i % 6));
+  return message;
+}
+
+v1::Feed message_of(const Scan& scan) {
+  v1::Feed message;
+  message.mutable_scan()->set_stamp_ns(scan.stamp.ns);
+  for (const Eigen::Vector3f& point : scan.cloud->points)
+    for (const float x : point) message.mutable_scan()->add_xyz(x);
+  if (scan.age_s) message.mutable_scan()->mutable_age_s()->Add(scan.age_s->begin(), scan.age_s->end());
+  return message;
+}
+
+v1::Feed message_of(const FedImages& images) {
+  v1::Feed message;
+  message.mutable_images()->set_stamp_ns(images.stamp.ns);
+  for (const EncodedImage& image : images.images) write(image, *message.mutable_images()->add_image());
+  if (images.depth) write(*images.depth, *message.mutable_images()->mutable_depth());
+  return message;
+}
+
+v1::Feed message_of(const std::vector<ImuSample>& samples) {
+  v1::Feed message;
+  for (const ImuSample& sample : samples) {
+    message.mutable_imu()->add_stamp_ns(sample.stamp.ns);
+    for (int i = 0; i < 3; ++i) {
+      message.mutable_imu()->add_gyro(sample.gyro[i]);
+      message.mutable_imu()->add_accelerometer(sample.accelerometer[i]);
+    }
+  }
+  return message;
+}
+
+std::string framed(const v1::Feed& message) {
+  const std::string payload = message.SerializeAsString();
+  TUTTI_CHECK(payload.size() <= kMaxFeedBytes, "a feed message of {} bytes", payload.size());
+  std::string out;
+  for (std::size_t i = 0; i < kHeaderBytes; ++i) out += static_cast<char>(payload.size() >> (8 * i) & 0xffU);
+  return out + payload;
+}
+
+}  // namespace tutti::program::internal

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tutti/program/feed/feed_frames.hpp"
+#include "tutti/v1/feed.pb.h"
+
+/// Values of the feed as its messages (feed.proto): of both ends.
+namespace tutti::program::internal {
+
+void write(const Pose3& T, v1::Feed::Pose& out);
+void write(const FeedSensors& sensors, v1::Feed::Sensors& out);
+
+/// What a client says.
+v1::Feed message_of(const node::OdometrySample& sample);
+v1::Feed message_of(const Scan& scan);
+v1::Feed message_of(const FedImages& images);
+v1::Feed message_of(const std::vector<ImuSample>& samples);
+
+inline constexpr std::size_t kHeaderBytes = 4;
+/// As bytes on the socket: so many of the length, little endian, and the message. At most kMaxFeedBytes.
+std::string framed(const v1::Feed& message);
+
+}  // namespace tutti::program::internal
