@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <limits>
 #include <utility>
 
 #include "tutti/bags/internal/chunk.hpp"
@@ -37,56 +35,38 @@ Timestamp stamp(Cursor& cursor, std::string_view what) {
 template <class... Args>
 tl::unexpected<Error> McapReader::fail_at(const Record& record, ErrorCode code, fmt::format_string<Args...> format,
                                           Args&&... args) const {
-  return fail(code, "{}: byte {}: record {}{}: {}", name_, record.offset, name_of(record.opcode),
+  return fail(code, "{}: byte {}: record {}{}: {}", file_.name(), record.offset, name_of(record.opcode),
               chunk_.empty() ? "" : " in this chunk", fmt::format(format, std::forward<Args>(args)...));
 }
 
-Result<McapReader> McapReader::open(const std::string& path) {
-  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (!*file) return fail(ErrorCode::io, "{}: cannot be opened", path);
-  return open(std::move(file), path);
-}
+Result<McapReader> McapReader::open(const std::string& path) { return open(internal::FileBytes::open(path)); }
 
 Result<McapReader> McapReader::open(std::unique_ptr<std::istream> stream, std::string name) {
-  McapReader reader(std::move(stream), std::move(name));
+  return open(internal::FileBytes::open(std::move(stream), std::move(name)));
+}
+
+Result<McapReader> McapReader::open(Result<internal::FileBytes> file) {
+  if (!file) return tl::unexpected(file.error());
+  McapReader reader(std::move(*file));
   if (auto ok = reader.start(); !ok) return tl::unexpected(ok.error());
   return reader;
 }
 
 Status McapReader::start() {
-  stream_->seekg(0, std::ios::end);
-  const auto end = stream_->tellg();
-  if (!*stream_ || end < 0 || end == std::numeric_limits<std::streamoff>::max())
-    return fail(ErrorCode::io, "{}: its size is not known: expected a file", name_);
-  size_ = stream_at_ = static_cast<std::uint64_t>(end);
   std::string magic;
-  if (auto ok = read_bytes(0, std::min<std::uint64_t>(size_, kMagic.size()), magic); !ok) return ok;
-  if (magic != kMagic) return fail(ErrorCode::parse, "{}: byte 0: is no MCAP file, expected 89 'MCAP0' 0d 0a", name_);
+  if (auto ok = file_.read(0, std::min<std::uint64_t>(file_.size(), kMagic.size()), magic); !ok) return ok;
+  if (magic != kMagic)
+    return fail(ErrorCode::parse, "{}: byte 0: is no MCAP file, expected 89 'MCAP0' 0d 0a", file_.name());
   offset_ = defined_until_ = kMagic.size();
   look_at_summary();
   all_defined_ = summary_ && channels_.size() >= summary_->channels;
   return {};
 }
 
-Status McapReader::read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out) {
-  if (stream_at_ != offset) {
-    stream_->clear();
-    stream_->seekg(static_cast<std::streamoff>(offset));
-  }
-  out.resize(size);
-  stream_->read(out.data(), static_cast<std::streamsize>(size));
-  if (!*stream_) {
-    stream_at_ = size_ + 1;
-    return fail(ErrorCode::io, "{}: byte {}: {} bytes cannot be read", name_, offset, size);
-  }
-  stream_at_ = offset + size;
-  return {};
-}
-
 /// There must be so many bytes as a record's head has.
 Result<McapReader::Record> McapReader::record_at(std::uint64_t offset) {
   std::string head;
-  if (auto ok = read_bytes(offset, kRecordHeadBytes, head); !ok) return tl::unexpected(ok.error());
+  if (auto ok = file_.read(offset, kRecordHeadBytes, head); !ok) return tl::unexpected(ok.error());
   Cursor cursor(head);
   Record record{.offset = offset};
   record.opcode = cursor.number<std::uint8_t>("opcode");
@@ -102,12 +82,12 @@ void McapReader::end(std::string note) {
 /// Messages do not need the summary: one that is not there, or broken, is only noted.
 void McapReader::look_at_summary() {
   const std::uint64_t tail = kRecordHeadBytes + kFooterBytes + kMagic.size();
-  if (size_ < kMagic.size() + tail) return;
+  if (file_.size() < kMagic.size() + tail) return;
   std::string magic, footer;
-  if (!read_bytes(size_ - kMagic.size(), kMagic.size(), magic) || magic != kMagic) return;
-  const auto record = record_at(size_ - tail);
+  if (!file_.read(file_.size() - kMagic.size(), kMagic.size(), magic) || magic != kMagic) return;
+  const auto record = record_at(file_.size() - tail);
   if (!record || record->opcode != kFooter || record->size != kFooterBytes) return;
-  if (!read_bytes(record->offset + kRecordHeadBytes, kFooterBytes, footer)) return;
+  if (!file_.read(record->offset + kRecordHeadBytes, kFooterBytes, footer)) return;
   const auto begin = Cursor(footer).number<std::uint64_t>("summary_start");
   if (begin == 0) return;
   Status ok;
@@ -135,7 +115,7 @@ Status McapReader::read_summary(std::uint64_t begin, std::uint64_t end) {
     if (record->size > internal::kMaxChunkBytes)
       return fail_at(*record, ErrorCode::unsupported, "length {}, expected at most {}", record->size,
                      internal::kMaxChunkBytes);
-    if (auto ok = read_bytes(record->offset + kRecordHeadBytes, record->size, content); !ok) return ok;
+    if (auto ok = file_.read(record->offset + kRecordHeadBytes, record->size, content); !ok) return ok;
     const Status ok = record->opcode == kSchema    ? define_schema(*record, content)
                       : record->opcode == kChannel ? define_channel(*record, content)
                                                    : take_statistics(*record, content);
@@ -307,8 +287,8 @@ Status McapReader::seek(const BagPosition& position) {
     }
   }
   if (position.inside > chunk_.size())
-    return fail(ErrorCode::parse, "{}: byte {}: chunk of {} bytes, expected more than {}: has the file changed?", name_,
-                position.at, chunk_.size(), position.inside);
+    return fail(ErrorCode::parse, "{}: byte {}: chunk of {} bytes, expected more than {}: has the file changed?",
+                file_.name(), position.at, chunk_.size(), position.inside);
   chunk_at_ = position.inside;
   return {};
 }
@@ -339,10 +319,10 @@ Result<std::optional<BagMessage>> McapReader::next_of_chunk() {
 }
 
 Result<std::optional<BagMessage>> McapReader::next_of_file() {
-  const std::uint64_t left = size_ - offset_;
+  const std::uint64_t left = file_.size() - offset_;
   if (ended_) return std::nullopt;
   if (left < kRecordHeadBytes) {
-    end(fmt::format("{}: byte {}: ends without a footer: cut off, or never closed", name_, size_));
+    end(fmt::format("{}: byte {}: ends without a footer: cut off, or never closed", file_.name(), file_.size()));
     return std::nullopt;
   }
   auto record = record_at(offset_);
@@ -353,7 +333,7 @@ Result<std::optional<BagMessage>> McapReader::next_of_file() {
   const std::uint64_t begin = offset_ + kRecordHeadBytes, there = left - kRecordHeadBytes;
   const bool cut = record->size > there;
   if (cut) {
-    end(fmt::format("{}: byte {}: cut off: record {} wants {} bytes, {} are left", name_, offset_,
+    end(fmt::format("{}: byte {}: cut off: record {} wants {} bytes, {} are left", file_.name(), offset_,
                     name_of(record->opcode), record->size, there));
     record->size = there;
   } else {
@@ -366,7 +346,7 @@ Result<std::optional<BagMessage>> McapReader::next_of_file() {
   if (record->size > internal::kMaxChunkBytes)
     return fail_at(*record, ErrorCode::unsupported, "length {}, expected at most {}", record->size,
                    internal::kMaxChunkBytes);
-  if (auto ok = read_bytes(begin, record->size, record_); !ok) {
+  if (auto ok = file_.read(begin, record->size, record_); !ok) {
     end("");
     return tl::unexpected(ok.error());
   }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
+#include "tutti/bags/internal/file_bytes.hpp"
 #include "tutti/base/result.hpp"
 
 /// MCAP files (https://mcap.dev/spec): what rosbag2 records since ROS 2 Iron.
@@ -54,12 +55,11 @@ class McapReader final : public BagReader {
     std::uint64_t inside = 0;  ///< and of it in that.
   };
 
-  McapReader(std::unique_ptr<std::istream> stream, std::string name)
-      : stream_(std::move(stream)), name_(std::move(name)) {}
+  explicit McapReader(internal::FileBytes file) : file_(std::move(file)) {}
+  static Result<McapReader> open(Result<internal::FileBytes> file);
   Status start();
   void look_at_summary();
   Status read_summary(std::uint64_t begin, std::uint64_t end);
-  Status read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out);
   Result<Record> record_at(std::uint64_t offset);
   Result<std::optional<BagMessage>> next_of_file();
   Result<std::optional<BagMessage>> next_of_chunk();
@@ -76,11 +76,8 @@ class McapReader final : public BagReader {
   [[nodiscard]] tl::unexpected<Error> fail_at(const Record& record, ErrorCode code, fmt::format_string<Args...> format,
                                               Args&&... args) const;
 
-  std::unique_ptr<std::istream> stream_;
-  std::string name_;
-  std::uint64_t size_ = 0;       ///< Of the file.
-  std::uint64_t offset_ = 0;     ///< Of the next record.
-  std::uint64_t stream_at_ = 0;  ///< Seeking costs what is buffered: it is done only where the stream is not there yet.
+  internal::FileBytes file_;
+  std::uint64_t offset_ = 0;  ///< Of the next record.
   bool ended_ = false;
   std::string record_;              ///< Content of the record of the file that was read last.
   std::string chunk_;               ///< Unpacked records of the chunk that is read,

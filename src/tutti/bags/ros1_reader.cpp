@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <limits>
 
 #include "tutti/bags/internal/chunk.hpp"
 #include "tutti/bags/internal/cursor.hpp"
@@ -49,39 +47,36 @@ std::string Ros1Reader::name_of(Op op) {
 template <class... Args>
 tl::unexpected<Error> Ros1Reader::fail_at(const BagPosition& position, ErrorCode code,
                                           fmt::format_string<Args...> format, Args&&... args) const {
-  return fail(code, "{}: byte {}: {}{}", name_, position.at,
+  return fail(code, "{}: byte {}: {}{}", file_.name(), position.at,
               chunk_.empty() ? "" : fmt::format("at byte {} of the chunk: ", position.inside),
               fmt::format(format, std::forward<Args>(args)...));
 }
 
-Result<Ros1Reader> Ros1Reader::open(const std::string& path) {
-  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (!*file) return fail(ErrorCode::io, "{}: cannot be opened", path);
-  return open(std::move(file), path);
-}
+Result<Ros1Reader> Ros1Reader::open(const std::string& path) { return open(internal::FileBytes::open(path)); }
 
 Result<Ros1Reader> Ros1Reader::open(std::unique_ptr<std::istream> stream, std::string name) {
-  Ros1Reader reader(std::move(stream), std::move(name));
+  return open(internal::FileBytes::open(std::move(stream), std::move(name)));
+}
+
+Result<Ros1Reader> Ros1Reader::open(Result<internal::FileBytes> file) {
+  if (!file) return tl::unexpected(file.error());
+  Ros1Reader reader(std::move(*file));
   if (auto ok = reader.start(); !ok) return tl::unexpected(ok.error());
   return reader;
 }
 
 Status Ros1Reader::start() {
-  stream_->seekg(0, std::ios::end);
-  const auto end = stream_->tellg();
-  if (!*stream_ || end < 0 || end == std::numeric_limits<std::streamoff>::max())
-    return fail(ErrorCode::io, "{}: its size is not known: expected a file", name_);
-  size_ = stream_at_ = static_cast<std::uint64_t>(end);
   std::string magic;
-  if (auto ok = read_bytes(0, std::min<std::uint64_t>(size_, kRos1Begin.size()), magic); !ok) return ok;
-  if (magic != kRos1Begin) return fail(ErrorCode::parse, "{}: byte 0: is no ROS 1 bag, expected '#ROSBAG V2.0'", name_);
+  if (auto ok = file_.read(0, std::min<std::uint64_t>(file_.size(), kRos1Begin.size()), magic); !ok) return ok;
+  if (magic != kRos1Begin)
+    return fail(ErrorCode::parse, "{}: byte 0: is no ROS 1 bag, expected '#ROSBAG V2.0'", file_.name());
   offset_ = kRos1Begin.size();
   const auto header = next_record();
   if (header && *header && (*header)->op == Op::bag_header && (*header)->index_at > offset_ &&
-      (*header)->index_at < size_)
+      (*header)->index_at < file_.size())
     read_index((*header)->index_at, (*header)->chunks);
   else
-    notes_.push_back(fmt::format("{}: has no index: cut off, or never closed", name_));
+    notes_.push_back(fmt::format("{}: has no index: cut off, or never closed", file_.name()));
   ended_ = cut_ = false;
   offset_ = kRos1Begin.size();
   return {};
@@ -103,19 +98,7 @@ void Ros1Reader::read_index(std::uint64_t at, std::uint32_t chunks) {
   }
   all_defined_ = record && !*record && !cut_ && infos == chunks;
   if (all_defined_) stated_messages_ = messages;
-  if (!all_defined_) notes_.push_back(fmt::format("{}: byte {}: its index is broken and not used", name_, at));
-}
-
-Status Ros1Reader::read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out) {
-  if (stream_at_ != offset) {
-    stream_->clear();
-    stream_->seekg(static_cast<std::streamoff>(offset));
-  }
-  out.resize(size);
-  stream_->read(out.data(), static_cast<std::streamsize>(size));
-  stream_at_ = *stream_ ? offset + size : size_ + 1;
-  if (!*stream_) return fail(ErrorCode::io, "{}: byte {}: {} bytes cannot be read", name_, offset, size);
-  return {};
+  if (!all_defined_) notes_.push_back(fmt::format("{}: byte {}: its index is broken and not used", file_.name(), at));
 }
 
 void Ros1Reader::end(std::string note) {
@@ -159,20 +142,21 @@ Result<std::optional<Ros1Reader::Record>> Ros1Reader::next_record() {
   const BagPosition position{.at = offset_};
   const auto cut_off = [&](std::string_view what, std::uint64_t wants, std::uint64_t left) {
     cut_ = true;
-    end(fmt::format("{}: byte {}: cut off: {} wants {} bytes, {} are left", name_, position.at, what, wants, left));
+    end(fmt::format("{}: byte {}: cut off: {} wants {} bytes, {} are left", file_.name(), position.at, what, wants,
+                    left));
   };
   std::string length, header;
   const auto counted = [&](std::string_view what, std::uint64_t& out) -> Result<bool> {
-    if (size_ - offset_ < 4) {
-      cut_off(what, 4, size_ - offset_);
+    if (file_.size() - offset_ < 4) {
+      cut_off(what, 4, file_.size() - offset_);
       return false;
     }
-    if (auto ok = read_bytes(offset_, 4, length); !ok) return tl::unexpected(ok.error());
+    if (auto ok = file_.read(offset_, 4, length); !ok) return tl::unexpected(ok.error());
     offset_ += 4;
     out = Cursor(length).number<std::uint32_t>(what);
     return true;
   };
-  if (offset_ == size_) {
+  if (offset_ == file_.size()) {
     end("");
     return std::nullopt;
   }
@@ -180,24 +164,24 @@ Result<std::optional<Ros1Reader::Record>> Ros1Reader::next_record() {
   const auto has_header = counted("length of a header", header_size);
   if (!has_header || !*has_header)
     return has_header ? Result<std::optional<Record>>(std::nullopt) : tl::unexpected(has_header.error());
-  if (header_size > size_ - offset_) {
-    cut_off("header of a record", header_size, size_ - offset_);
+  if (header_size > file_.size() - offset_) {
+    cut_off("header of a record", header_size, file_.size() - offset_);
     return std::nullopt;
   }
   if (header_size > kMaxHeaderBytes) {
     end("");
     return fail_at(position, ErrorCode::parse, "header of {} bytes, expected at most {}", header_size, kMaxHeaderBytes);
   }
-  if (auto ok = read_bytes(offset_, header_size, header); !ok) return tl::unexpected(ok.error());
+  if (auto ok = file_.read(offset_, header_size, header); !ok) return tl::unexpected(ok.error());
   offset_ += header_size;
   auto record = parse_header(header, position);
   std::uint64_t size = 0;
   const auto has_data = counted("length of a record", size);
   if (!has_data || !*has_data)
     return has_data ? Result<std::optional<Record>>(std::nullopt) : tl::unexpected(has_data.error());
-  if (size > size_ - offset_) {
-    cut_off(fmt::format("record {}", record ? name_of(record->op) : "of unknown kind"), size, size_ - offset_);
-    size = size_ - offset_;
+  if (size > file_.size() - offset_) {
+    cut_off(fmt::format("record {}", record ? name_of(record->op) : "of unknown kind"), size, file_.size() - offset_);
+    size = file_.size() - offset_;
   }
   const std::uint64_t begin = std::exchange(offset_, offset_ + size);
   if (!record) return tl::unexpected(record.error());  // the next one stands where this one's data ends
@@ -207,7 +191,7 @@ Result<std::optional<Ros1Reader::Record>> Ros1Reader::next_record() {
   if (size > internal::kMaxChunkBytes)
     return fail_at(position, ErrorCode::unsupported, "record {} of {} bytes, expected at most {}", name_of(record->op),
                    size, internal::kMaxChunkBytes);
-  if (auto ok = read_bytes(begin, size, data_); !ok) return tl::unexpected(ok.error());
+  if (auto ok = file_.read(begin, size, data_); !ok) return tl::unexpected(ok.error());
   return *record;
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
+#include "tutti/bags/internal/file_bytes.hpp"
 
 namespace tutti::bags {
 
@@ -48,12 +49,11 @@ class Ros1Reader final : public BagReader {
     BagPosition position;
   };
 
-  Ros1Reader(std::unique_ptr<std::istream> stream, std::string name)
-      : stream_(std::move(stream)), name_(std::move(name)) {}
+  explicit Ros1Reader(internal::FileBytes file) : file_(std::move(file)) {}
+  static Result<Ros1Reader> open(Result<internal::FileBytes> file);
   static std::string name_of(Op op);
   Status start();
   void read_index(std::uint64_t at, std::uint32_t chunks);
-  Status read_bytes(std::uint64_t offset, std::uint64_t size, std::string& out);
   [[nodiscard]] Result<Record> parse_header(std::string_view header, const BagPosition& position) const;
   Result<std::optional<Record>> next_record();
   Result<std::optional<BagMessage>> next_of_file();
@@ -66,11 +66,8 @@ class Ros1Reader final : public BagReader {
   [[nodiscard]] tl::unexpected<Error> fail_at(const BagPosition& position, ErrorCode code,
                                               fmt::format_string<Args...> format, Args&&... args) const;
 
-  std::unique_ptr<std::istream> stream_;
-  std::string name_;
-  std::uint64_t size_ = 0;    ///< Of the file.
+  internal::FileBytes file_;
   std::uint64_t offset_ = 0;  ///< Of the next record.
-  std::uint64_t stream_at_ = 0;
   bool ended_ = false;
   bool cut_ = false;  ///< The file ends in the record that was read last.
   std::string data_;  ///< Of the record of the file that was read last.
