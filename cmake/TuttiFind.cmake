@@ -2,8 +2,8 @@
 # Third-party libraries, found when a module first links them, here and by find_package(tutti), which installs this file.
 # Packages of Debian 12: scripts/install_dependencies.sh lists them.
 
-# SuiteSparse 5.12, LAPACKE, zstd, lz4, bz2, SQLite, NATS and OpenCV ship no CMake configuration that works everywhere: plain imported
-# targets. OpenCV's own is only in libopencv-dev, which wants everything that OpenCV has.
+# SuiteSparse 5.12, LAPACKE, zstd, lz4, bz2, libcrypto, SQLite, NATS and OpenCV ship no CMake configuration that works
+# everywhere: plain imported targets. OpenCV's own is only in libopencv-dev, which wants everything that OpenCV has.
 function(tutti_import_library target header)
   cmake_parse_arguments(ARG "" "" "LIBS;SUFFIXES" ${ARGN})
   string(TOUPPER ${target} upper)
@@ -37,6 +37,7 @@ set(TUTTI_THIRD_PARTY
   "tutti::zstd|import zstd.h LIBS zstd"
   "tutti::lz4|import lz4frame.h LIBS lz4"
   "tutti::bz2|import bzlib.h LIBS bz2"
+  "tutti::crypto|import openssl/evp.h LIBS crypto"
   "tutti::nanoflann|import nanoflann.hpp"
   "tutti::sqlite|import sqlite3.h LIBS sqlite3"
   "tutti::nats|import nats/nats.h LIBS nats"

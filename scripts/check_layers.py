@@ -22,6 +22,7 @@ CONFINED = [
      "storage/sqlite_*.cpp and internal/sqlite.hpp, and bags/db3_reader.cpp, which only reads, and its tests"),
     (r"opencv2/", r"perception/visual/frontend/.*\.cpp$", "perception/visual/frontend/*.cpp"),
     (r"lz4|bzlib", r"(tests/support/)?bags/", "bags/"),
+    (r"openssl/", r"bags/internal/sha256\.cpp$", "bags/internal/sha256.cpp"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
     (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),
