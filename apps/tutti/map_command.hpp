@@ -7,7 +7,7 @@ class App;
 
 namespace tutti::app {
 
-/// `tutti map closure ...`, below `tutti map`.
+/// Adds `tutti map closure` to `tutti map`.
 void add_map_closure_command(CLI::App& map, int& exit_code);
 
 }  // namespace tutti::app

@@ -13,7 +13,7 @@
 
 namespace tutti::app {
 
-/// CLI11's own PositiveNumber and NonNegativeNumber let NaN through.
+/// Accepts finite numbers above zero (or also zero). CLI11's own PositiveNumber and NonNegativeNumber accept NaN.
 inline CLI::Validator finite(bool zero_too) {
   return {[zero_too](const std::string& input) {
             double value = 0.0;
@@ -24,7 +24,7 @@ inline CLI::Validator finite(bool zero_too) {
           ""};
 }
 
-/// CLI11's own Range lets NaN through.
+/// Accepts numbers from `low` to `high`. CLI11's own Range accepts NaN.
 inline CLI::Validator within(double low, double high) {
   return {[low, high](const std::string& input) {
             double value = 0.0;
@@ -34,7 +34,7 @@ inline CLI::Validator within(double low, double high) {
           ""};
 }
 
-/// CLI11 takes -1, and what is too large, for the largest number there is.
+/// Accepts whole numbers of 64 bits. CLI11 takes -1, and numbers that are too large, for the largest one.
 inline CLI::Validator whole_number() {
   return {[](const std::string& input) {
             std::uint64_t value = 0;
@@ -46,7 +46,7 @@ inline CLI::Validator whole_number() {
           ""};
 }
 
-/// An option that takes a number; shows its default if it has one.
+/// Adds an option that takes a number, and shows its default if it has one.
 template <class Number>
 CLI::Option* add_number(CLI::App& command, const std::string& name, Number& value, const std::string& help,
                         const std::string& unit, const CLI::Validator& check = finite(false)) {
@@ -55,7 +55,7 @@ CLI::Option* add_number(CLI::App& command, const std::string& name, Number& valu
   return option;
 }
 
-/// Says on stderr why a command failed; returns the exit code.
+/// Prints on stderr why a command failed; returns the exit code.
 inline int complain(const char* command, const std::string& message, int exit_code = 1) {
   fmt::print(stderr, "tutti {}: {}\n", command, message);
   return exit_code;

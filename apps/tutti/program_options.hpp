@@ -13,11 +13,11 @@
 
 namespace tutti::app {
 
-/// What all programs that run until they are stopped share.
+/// Arguments of all programs that run until they are stopped.
 struct ProgramArguments {
   lab::MissionSource mission;
   std::string log_level = "warning";
-  int parent = 0;  ///< That it ends with; 0: none.
+  int parent = 0;  ///< Process number of the program with which this one ends; 0: none.
 };
 
 inline CLI::Option* add_mission_name(CLI::App& command, std::string& name, const std::string& otherwise) {
@@ -58,7 +58,7 @@ inline void add_program_options(CLI::App& command, ProgramArguments& arguments) 
   command.add_option("--end-with-parent", arguments.parent, "")->group("");
 }
 
-/// Calls `run` until it ends or a signal asks for it; returns the exit code.
+/// Calls `run`, which returns when it has ended or a signal has asked it to; returns the exit code.
 inline int run_program(const char* name, const ProgramArguments& arguments, program::Level& console,
                        const std::function<Status()>& run) {
   const auto level = program::level_of(arguments.log_level);

@@ -25,7 +25,7 @@ namespace {
 using namespace tutti;
 using namespace tutti::visual;
 
-constexpr double kWrong_m = 0.5, kWrong_deg = 5.0;                          // issue 18
+constexpr double kWrong_m = 0.5, kWrong_deg = 5.0;                          // beyond which a relative pose is wrong
 constexpr double kRevisit_m = 0.8, kRevisit_deg = 20.0, kRevisit_s = 15.0;  // as in the data's SOURCES file
 
 template <class T>

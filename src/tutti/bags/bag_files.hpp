@@ -14,11 +14,13 @@
 
 namespace tutti::bags {
 
-/// The files of one recording, one after the other, of which one is open at a time. Messages that are packed one by one
-/// are unpacked. A file that is missing or cannot be read is an error in its place; the others are read.
+/// Reads the files of one recording one after the other, of which one is open at a time. Messages that are compressed
+/// one by one come out decompressed. A file that is missing or cannot be read is one error of next(), in its place; the
+/// others are read.
 class BagFiles final : public BagReader {
  public:
-  /// At least one file. Fails when the first one that is there cannot be opened and there is no other.
+  /// At least one file. Fails when there is only one file and it cannot be opened. `notes` and `stated_messages` are
+  /// what the folder says, to be handed out by the functions of these names.
   static Result<std::unique_ptr<BagReader>> open(std::vector<std::string> files, std::vector<std::string> notes,
                                                  std::optional<std::uint64_t> stated_messages);
 
@@ -37,13 +39,13 @@ class BagFiles final : public BagReader {
   const BagChannel* own(const BagChannel* channel);
 
   std::vector<std::string> files_;
-  std::vector<std::string> notes_;  ///< Of the folder, and of the files that were left.
+  std::vector<std::string> notes_;  ///< Of the folder, and of the files that have been read.
   std::optional<std::uint64_t> stated_messages_;
-  std::size_t file_ = 0;  ///< The open one, or the next.
+  std::size_t file_ = 0;  ///< Position of the open file, or of the next one.
   std::unique_ptr<BagReader> reader_;
-  std::set<BagChannel> channels_;                           ///< Of all files,
-  std::map<const BagChannel*, const BagChannel*> of_file_;  ///< and of the open one those.
-  std::set<std::size_t> packed_;                            ///< Files that are packed as a whole.
+  std::set<BagChannel> channels_;  ///< Of all files, so that messages of one topic have one channel.
+  std::map<const BagChannel*, const BagChannel*> of_file_;  ///< From the open file's channels to ours.
+  std::set<std::size_t> packed_;                            ///< Files that are compressed as a whole.
   bool messages_packed_ = false;
   std::string unpacked_;
 };

@@ -10,7 +10,7 @@
 
 namespace tutti::bags {
 
-/// What Tutti could use a topic for, by its type alone.
+/// What Tutti can use a topic for, by its message type alone.
 enum class Use { nothing, odometry, scans, images, calibration, imu, fixes, poses, transforms };
 
 Use use_of(std::string_view type);
@@ -20,24 +20,24 @@ struct TopicInfo {
   Use use = Use::nothing;
   std::uint64_t count = 0;
   Timestamp first = kLastTimestamp, last = kFirstTimestamp;  ///< Log times: the earliest and the latest.
-  std::string frames;   ///< Of the first message, where its type is known: "odom -> base_link", else empty.
-  std::string problem;  ///< Why the first message could not be decoded, else empty.
-  [[nodiscard]] double rate_hz() const;  ///< 0 of fewer than two messages, or of no time.
+  std::string frames;   ///< Frames of the first message ("odom -> base_link"); empty for types without a use.
+  std::string problem;  ///< Why the first message could not be decoded; empty if it could.
+  [[nodiscard]] double rate_hz() const;  ///< Mean rate; 0 for fewer than two messages.
 };
 
 struct BagInfo {
-  std::vector<TopicInfo> topics;  ///< By name.
+  std::vector<TopicInfo> topics;  ///< Sorted by name, then by type.
   std::uint64_t messages = 0;
-  std::uint64_t errors = 0;        ///< Records and chunks that could not be read;
-  std::vector<std::string> said;   ///< what the first ten of them had,
-  std::vector<std::string> notes;  ///< and what is odd besides.
+  std::uint64_t errors = 0;        ///< Records and chunks that could not be read.
+  std::vector<std::string> said;   ///< Messages of the first ten errors.
+  std::vector<std::string> notes;  ///< BagReader::notes(), and a count of messages that disagrees with the bag's own.
 };
 
-/// Reads all of the bag once, one chunk at a time.
+/// Reads the whole bag once, one chunk at a time.
 BagInfo inspect(BagReader& bag);
 
-/// What Tutti would take from it, a line each: "odometry     /odom (27.1 Hz), odom -> base_link". Several of a kind are
-/// all named, and of what is missing it says what that means.
+/// What Tutti would take from the bag, for people, a line per kind of input: "odometry     /odom (odom -> base_link)".
+/// All topics of a kind are named; where a kind is missing the line says what that means.
 std::vector<std::string> uses(const BagInfo& info);
 
 }  // namespace tutti::bags

@@ -12,11 +12,11 @@
 
 namespace tutti::bags {
 
-/// How late a subscriber may come. Latched: who comes late is given the last message, as of /tf_static and of maps.
+/// Whether a subscriber that comes late gets the last message (latched, as of /tf_static and maps) or not.
 enum class Durability { volatile_, latched };
 
-/// Writes ROS 2's messages as rosbag2 does: a topic begins with its first message, and each says its type, its
-/// definition and that definition's hash.
+/// Writes ROS 2 messages into one MCAP file as rosbag2 does: a topic's record comes with its first message and says its
+/// type, the type's definition and the definition's hash. Errors are those of McapWriter.
 class RosWriter {
  public:
   struct Topic {
@@ -29,10 +29,12 @@ class RosWriter {
   explicit RosWriter(McapWriter writer) : writer_(std::move(writer)) {}
   static Result<RosWriter> create(const std::string& path, const McapWriterOptions& options = {});
 
-  /// `cdr` of a type that ros_definitions.hpp knows ("nav_msgs/msg/Odometry"), the same for all of a topic.
+  /// `cdr`: a message of a `type` that ros_definitions.hpp knows ("nav_msgs/msg/Odometry"); all messages of a topic
+  /// have one type (checked).
   Status write(const std::string& topic, const std::string& type, Timestamp stamp, std::string_view cdr,
                Durability durability = Durability::volatile_);
-  /// `json` as `schema`, JSON Schema of an object, says: what is no message of ROS's. Foxglove and PlotJuggler read it.
+  /// Writes data that is no ROS message: `json`, an object as `schema` (JSON Schema) says. Foxglove and PlotJuggler
+  /// show it.
   Status write_json(const std::string& topic, const std::string& type, const std::string& schema, Timestamp stamp,
                     std::string_view json);
   Status close() { return writer_.close(); }
@@ -49,17 +51,17 @@ class RosWriter {
   Timestamp first_ = kLastTimestamp, last_ = kFirstTimestamp;
 };
 
-/// A bag as rosbag2 makes it: a folder NAME with NAME_0.mcap and metadata.yaml, for `ros2 bag play` and the like.
+/// Writes a bag as rosbag2 does: a folder NAME with NAME_0.mcap and metadata.yaml, for `ros2 bag play` and the like.
 class BagWriter {
  public:
-  /// The folder must not be there, or be empty; those above it are made.
+  /// `folder` must be missing or empty; missing folders above it are made.
   static Result<BagWriter> create(const std::string& folder, const McapWriterOptions& options = {});
 
   Status write(const std::string& topic, const std::string& type, Timestamp stamp, std::string_view cdr,
                Durability durability = Durability::volatile_) {
     return writer_.write(topic, type, stamp, cdr, durability);
   }
-  /// Writes what stands at the end of the file, and metadata.yaml.
+  /// Writes the end of the file and metadata.yaml; nothing may be written after it.
   Status close();
 
   [[nodiscard]] const RosWriter& written() const { return writer_; }

@@ -15,8 +15,9 @@ struct sqlite3_stmt;
 
 namespace tutti::bags {
 
-/// rosbag2's SQLite files (.db3): one row a message, CDR as in MCAP. The file is never written, nor is anything beside
-/// it. An error of SQLite's (a damaged page) ends the reading; rows before it came out.
+/// Reads rosbag2's SQLite files (.db3): one row a message, CDR as in MCAP. Neither the file nor its folder is written,
+/// but for FILE-shm where a recorder has left its write-ahead log, FILE-wal. An error of SQLite (a damaged page) ends
+/// the reading, after the rows before it.
 class Db3Reader final : public BagReader {
  public:
   static Result<Db3Reader> open(const std::string& path);

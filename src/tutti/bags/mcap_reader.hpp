@@ -15,7 +15,7 @@
 #include "tutti/bags/internal/file_bytes.hpp"
 #include "tutti/base/result.hpp"
 
-/// MCAP files (https://mcap.dev/spec): what rosbag2 records since ROS 2 Iron.
+/// Reads MCAP files (https://mcap.dev/spec), which rosbag2 records since ROS 2 Iron.
 namespace tutti::bags {
 
 /// What the file's own statistics say.
@@ -23,22 +23,22 @@ struct McapSummary {
   std::uint64_t messages = 0;
   std::uint32_t channels = 0;
   std::map<std::uint16_t, std::uint64_t> messages_of_channel;
-  std::uint64_t chunks = 0;         ///< By the statistics,
-  std::uint64_t chunk_indexes = 0;  ///< and how many of them are indexed.
+  std::uint64_t chunks = 0;         ///< By the statistics.
+  std::uint64_t chunk_indexes = 0;  ///< Number of chunks that have an index record.
 };
 
-/// Reads files chunked or not, with or without summary. Chunks whose CRC is not theirs are refused. A file that is cut
-/// off is read up to the last whole message, also within its last chunk, and a note says so. An error names byte and
-/// record.
+/// Reads files with or without chunks and with or without a summary. A chunk whose CRC does not match is an error. A
+/// file that is cut off is read up to the last whole message, also within its last chunk, and a note says so. Errors
+/// name byte and record.
 class McapReader final : public BagReader {
  public:
   static Result<McapReader> open(const std::string& path);
-  /// `name` is for the errors.
+  /// `name` stands for the stream in errors.
   static Result<McapReader> open(std::unique_ptr<std::istream> stream, std::string name);
 
   Result<std::optional<BagMessage>> next() override;
   Status seek(const BagPosition& position) override;
-  /// Of the summary at once.
+  /// The channels of a summary are known at once.
   [[nodiscard]] std::vector<const BagChannel*> channels() const override;
   [[nodiscard]] std::optional<std::uint64_t> stated_messages() const override {
     return summary_ ? std::optional(summary_->messages) : std::nullopt;
@@ -51,8 +51,8 @@ class McapReader final : public BagReader {
   struct Record {
     std::uint8_t opcode = 0;
     std::uint64_t size = 0;
-    std::uint64_t offset = 0;  ///< Of it in the file, or of its chunk,
-    std::uint64_t inside = 0;  ///< and of it in that.
+    std::uint64_t offset = 0;  ///< Byte in the file, of the record or of its chunk.
+    std::uint64_t inside = 0;  ///< Byte in the chunk.
   };
 
   explicit McapReader(internal::FileBytes file) : file_(std::move(file)) {}
@@ -79,14 +79,14 @@ class McapReader final : public BagReader {
   internal::FileBytes file_;
   std::uint64_t offset_ = 0;  ///< Of the next record.
   bool ended_ = false;
-  std::string record_;              ///< Content of the record of the file that was read last.
-  std::string chunk_;               ///< Unpacked records of the chunk that is read,
-  std::size_t chunk_at_ = 0;        ///< how far,
-  std::uint64_t chunk_offset_ = 0;  ///< where it stands in the file,
-  bool chunk_cut_ = false;          ///< and whether the file ends in it.
+  std::string record_;              ///< Content of the last record that was read from the file.
+  std::string chunk_;               ///< Decompressed records of the chunk that is being read.
+  std::size_t chunk_at_ = 0;        ///< How far it has been read.
+  std::uint64_t chunk_offset_ = 0;  ///< Its byte in the file.
+  bool chunk_cut_ = false;          ///< Whether the file ends in it.
   std::uint64_t chunks_read_ = 0;
-  bool all_defined_ = false;                      ///< The summary has all channels; else
-  std::uint64_t defined_until_ = 0;               ///< those before this byte are known to whoever jumps.
+  bool all_defined_ = false;                      ///< True: the summary has all channels.
+  std::uint64_t defined_until_ = 0;               ///< Otherwise channels that are defined before this byte are known.
   std::map<std::uint16_t, std::string> schemas_;  ///< Names.
   std::map<std::uint16_t, BagChannel> channels_;
   std::optional<McapSummary> summary_;

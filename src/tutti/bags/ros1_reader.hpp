@@ -17,18 +17,18 @@
 
 namespace tutti::bags {
 
-/// ROS 1 bags, format 2.0 (http://wiki.ros.org/Bags/Format/2.0), their chunks packed by bz2, lz4 or not. Types are
-/// given the names that ROS 2 has for them. A bag that was never closed, or is cut off, is read up to the last whole
-/// message, also within its last chunk, and a note says so. An error names byte and record.
+/// Reads ROS 1 bags, format 2.0 (http://wiki.ros.org/Bags/Format/2.0), with chunks compressed by bz2, lz4 or not at
+/// all. Types get ROS 2's names. A bag that was never closed, or is cut off, is read up to the last whole message, also
+/// within its last chunk, and a note says so. Errors name the byte.
 class Ros1Reader final : public BagReader {
  public:
   static Result<Ros1Reader> open(const std::string& path);
-  /// `name` is for the errors.
+  /// `name` stands for the stream in errors.
   static Result<Ros1Reader> open(std::unique_ptr<std::istream> stream, std::string name);
 
   Result<std::optional<BagMessage>> next() override;
   Status seek(const BagPosition& position) override;
-  /// Of the index at once.
+  /// The channels of an index are known at once.
   [[nodiscard]] std::vector<const BagChannel*> channels() const override;
   [[nodiscard]] std::optional<std::uint64_t> stated_messages() const override { return stated_messages_; }
   [[nodiscard]] std::vector<std::string> notes() const override { return notes_; }
@@ -36,15 +36,15 @@ class Ros1Reader final : public BagReader {
 
  private:
   enum class Op : std::uint8_t { message = 2, bag_header, index, chunk, chunk_info, connection };
-  /// What its header says, as far as it is there.
+  /// What a record's header says; fields that it lacks stay zero.
   struct Record {
     Op op{};
     std::uint32_t connection = 0;
     Timestamp time;
     std::string topic, compression;
-    std::uint32_t size = 0;  ///< Of a chunk, unpacked.
+    std::uint32_t size = 0;  ///< Of a chunk, decompressed.
     std::uint64_t index_at = 0;
-    std::uint32_t chunks = 0;  ///< Of the bag.
+    std::uint32_t chunks = 0;  ///< Number of chunks, in the bag's header.
     std::uint64_t data_size = 0;
     BagPosition position;
   };
@@ -70,7 +70,7 @@ class Ros1Reader final : public BagReader {
   std::uint64_t offset_ = 0;  ///< Of the next record.
   bool ended_ = false;
   bool cut_ = false;  ///< The file ends in the record that was read last.
-  std::string data_;  ///< Of the record of the file that was read last.
+  std::string data_;  ///< Data of the last record that was read from the file.
   std::string chunk_;
   std::size_t chunk_at_ = 0;
   std::uint64_t chunk_offset_ = 0;

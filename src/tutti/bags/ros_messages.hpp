@@ -12,15 +12,15 @@
 #include "tutti/base/result.hpp"
 #include "tutti/base/timestamp.hpp"
 
-/// Messages of ROS 2 as they stand in bags and on the wire: CDR, the first version (XCDR1), of either byte order; and
-/// those of ROS 1, which have the same fields, packed, and a number in their header, which is passed over.
-/// Fields have the names, units and frames of ROS's own definitions (common_interfaces). Lengths are checked, values
-/// are not: quaternions may be no rotations, covariances zero, -1 or nonsense, numbers not finite. What is a view is
-/// one into the bytes that were decoded.
+/// Decodes messages of ROS 2 as they are in bags and on the wire, CDR of the first version (XCDR1) in either byte
+/// order, and messages of ROS 1, which have the same fields, packed, and a sequence number in their header, which is
+/// skipped. Fields have the names, units and frames of ROS's own definitions (common_interfaces). Lengths are checked,
+/// values are not: quaternions may be no rotations, covariances zero, -1 or nonsense, numbers not finite. Views
+/// (std::string_view) point into the bytes that were decoded.
 namespace tutti::bags {
 
 enum class RosEncoding { cdr, ros1 };
-/// Of a channel's "cdr" or "ros1".
+/// From BagChannel::message_encoding; errors: neither "cdr" nor "ros1".
 Result<RosEncoding> to_encoding(std::string_view name);
 
 struct RosHeader {
@@ -34,17 +34,18 @@ struct RosPose {
 };
 
 struct RosOdometry {
-  RosHeader header;            ///< The pose is one in header.frame_id,
-  std::string child_frame_id;  ///< of this, and the twist one in it.
+  RosHeader header;            ///< `pose` is T_frame_child, frame being header.frame_id;
+  std::string child_frame_id;  ///< the twist is in the axes of this frame.
   RosPose pose;
-  std::array<double, 36> pose_covariance{};  ///< Row by row, translation before rotation about fixed axes.
+  /// Row by row, translation (m) before rotation (rad), in the axes of header.frame_id.
+  std::array<double, 36> pose_covariance{};
   Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();  ///< m/s, rad/s
   std::array<double, 36> twist_covariance{};
 };
 
 struct RosTransform {
-  RosHeader header;            ///< T_parent_child: from child_frame_id
-  std::string child_frame_id;  ///< to header.frame_id.
+  RosHeader header;            ///< The transform is T_parent_child: the parent is header.frame_id,
+  std::string child_frame_id;  ///< the child this frame.
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
 };
@@ -62,7 +63,7 @@ struct RosPointCloud {
   std::vector<RosPointField> fields;
   bool is_bigendian = false;
   std::uint32_t point_step = 0, row_step = 0;  ///< Bytes.
-  std::string_view data;                       ///< As many bytes as it has; height * row_step are promised.
+  std::string_view data;                       ///< As long as the message has it, which need not be height * row_step.
   bool is_dense = false;
 };
 
@@ -106,7 +107,7 @@ struct RosNavSatFix {
   std::int8_t status = 0;  ///< -1: no fix.
   std::uint16_t service = 0;
   double latitude_deg = 0.0, longitude_deg = 0.0, altitude_m = 0.0;  ///< WGS 84, above the ellipsoid.
-  std::array<double, 9> position_covariance{};                       ///< m^2; east, north, up.
+  std::array<double, 9> position_covariance{};                       ///< m^2; axes east, north, up; row by row.
   std::uint8_t position_covariance_type = 0;                         ///< 0: unknown.
 };
 
@@ -115,9 +116,8 @@ struct RosPoseStamped {
   RosPose pose;
 };
 
-/// Each of all bytes of a message, of CDR's its 4-byte encapsulation header with them. The error says type, byte
-/// (behind that header) and what was expected; more than the three bytes that fill up to a multiple of four may not be
-/// left.
+/// Each takes all bytes of one message, for CDR with the 4-byte encapsulation header. Errors say type, byte (counted
+/// behind that header) and what was expected. Bytes may not be left over, except for up to three of padding in CDR.
 Result<RosOdometry> decode_odometry(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<std::vector<RosTransform>> decode_tf(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);
 Result<RosPointCloud> decode_point_cloud(std::string_view bytes, RosEncoding encoding = RosEncoding::cdr);

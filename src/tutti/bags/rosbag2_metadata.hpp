@@ -10,14 +10,16 @@
 
 namespace tutti::bags {
 
-/// What a reader needs of rosbag2's metadata.yaml; files say for themselves in what they are stored and packed.
+/// What BagFiles needs of rosbag2's metadata.yaml. How files are stored and compressed is not read: the files
+/// themselves tell.
 struct Rosbag2Metadata {
   std::vector<std::string> files;  ///< Names in the bag's folder, in the order of recording.
   std::optional<std::uint64_t> messages;
 };
 
-/// An error names what is missing; `name` is for it. Of a file's path only the last part is taken: older versions put
-/// the folder's name before it, and a bag has no business outside of its folder.
+/// Reads metadata.yaml; `name` stands for the text in errors, which name what is missing. Only the last part of a
+/// file's path is taken: older versions put the folder's name before it, and a bag must not name files outside of its
+/// folder.
 Result<Rosbag2Metadata> parse_rosbag2_metadata(const std::string& text, const std::string& name);
 
 }  // namespace tutti::bags

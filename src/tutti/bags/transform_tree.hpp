@@ -12,22 +12,24 @@
 
 namespace tutti::bags {
 
-/// "/velodyne", as ROS 1 has it, is "velodyne".
+/// The frame's name without ROS 1's leading slash: "/velodyne" is "velodyne".
 std::string frame_name(const std::string& frame);
 
-/// A pose of ROS's: finite, within kMaxCoordinate_m, its quaternion of norm 1 within 0.001, which becomes 1. The error
-/// says what it is.
+/// A pose from a message: finite, within kMaxCoordinate_m, with a quaternion of norm 1 within 0.001, which is
+/// normalised. Errors say the value.
 Result<Pose3> to_pose(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation);
 
-/// Where frames of one robot are that do not move against each other: what /tf_static says, and what /tf says of joints
-/// that never move.
+/// Poses between those frames of one robot that do not move against each other: the transforms of /tf_static, and those
+/// of /tf that never change.
 class TransformTree {
  public:
-  /// A pose that is none is an error and changes nothing. Of what is said again of a frame the first counts.
+  /// Adds a transform; one that to_pose() refuses is an error and changes nothing. Of several transforms of one child
+  /// frame the first counts; if a later one of /tf (not `is_static`) differs by 1 mm, 1 mrad or its parent, the frame
+  /// moves, and find() does not go through it.
   Status add(const RosTransform& transform, bool is_static);
-  /// Maps `from` to `to`; nothing when no chain of transforms leads there.
+  /// T_to_from, or no value when no chain of transforms that do not move joins the two frames.
   [[nodiscard]] std::optional<Pose3> find(const std::string& to, const std::string& from) const;
-  /// "base_link, lidar"; for messages.
+  /// All frames that do not move, "base_link, lidar", for messages.
   [[nodiscard]] std::string frames() const;
 
  private:

@@ -11,8 +11,8 @@ namespace tutti::internal {
 
 }  // namespace tutti::internal
 
-/// Broken precondition = our own bug: throws std::logic_error with file and line. Usage: TUTTI_CHECK(n > 0, "n = {}",
-/// n).
+/// Guards a precondition whose violation is a bug of the program, not of its input: throws std::logic_error with
+/// condition, file, line and message. Usage: TUTTI_CHECK(n > 0, "n = {}", n).
 #define TUTTI_CHECK(condition, ...)                                                                 \
   do {                                                                                              \
     if (!(condition)) [[unlikely]]                                                                  \

@@ -19,13 +19,13 @@
 ///   };
 ///
 /// and that list gives loading from YAML (unknown key = error, missing key = default), range checks (all violations
-/// reported at once with path, value and bound), `--set a.b=value`, printing and documentation.
-/// Field types: bool, int, uint64, double, std::string, std::vector<double>, std::optional<scalar>, nested structs with
-/// describe, std::vector of nested structs. This header is all that a settings struct needs; what reads, writes and
-/// lists them is in base/config_io.hpp.
+/// reported at once with path, value and bound), `--set a.b=value`, printing and documentation. Field types: bool, int,
+/// uint64, double, std::string, std::vector<double>, std::optional of a scalar, structs with describe(), std::vector of
+/// such structs. This header is all that a settings struct needs; base/config_io.hpp reads, writes and lists settings.
 namespace tutti {
 
-/// Range of a number; infinite where open. Strings may list their choices.
+/// Range of a number, closed at both ends unless `low_open`; an infinite end is no limit. Strings may list their
+/// choices.
 struct Bound {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();

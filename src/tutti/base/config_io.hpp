@@ -16,8 +16,8 @@
 #include "tutti/base/config.hpp"
 #include "tutti/base/result.hpp"
 
-/// Reads, writes and documents the settings structs of base/config.hpp. Only loaders include this: it is long to
-/// compile.
+/// Reads, writes and documents the settings structs of base/config.hpp. Only the code that loads settings includes this
+/// header, because it takes long to compile.
 namespace tutti {
 
 /// A parsed YAML document without any YAML library in the interface. Scalars keep their text.
@@ -29,14 +29,18 @@ struct ConfigNode {
   std::vector<std::pair<std::string, ConfigNode>> map;  ///< In file order.
   int line = 0;                                         ///< 1-based; 0 = from the command line.
 
+  /// The value of a key of a map; null when the key is missing or this node is no map.
   [[nodiscard]] const ConfigNode* find(std::string_view key) const;
 };
 
-/// Parses YAML text; `name` appears in messages.
+/// Parses one YAML document; `name` stands for it in messages. Errors: bad syntax, a repeated key, nesting or aliases
+/// beyond any honest file.
 Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name);
 Result<ConfigNode> load_yaml(const std::string& path);
+/// YAML text that parse_yaml() reads back with the same content.
 std::string to_yaml(const ConfigNode& node);
-/// Applies "a.b.0.c=value" (list elements by index; a missing map key is created; the value is parsed as YAML).
+/// Applies "a.b.0.c=value" (list elements by index; a missing map key is created; the value is parsed as YAML). On an
+/// error `root` stays as it was.
 Status apply_override(ConfigNode& root, const std::string& assignment);
 
 namespace config_internal {
@@ -69,9 +73,9 @@ std::string type_name(const double&);
 std::string type_name(const std::string&);
 struct Findings;
 void complain(Findings& findings, const ConfigNode& node, const std::string& path, const std::string& text);
-/// What stands there, for messages: "'2.5'", "a list", "a map", "nothing".
+/// The node's content in a message: "'2.5'", "a list", "a map", "nothing".
 std::string show(const ConfigNode& node);
-/// Empty when the value is inside; otherwise "must be > 0".
+/// Empty when the value is within the bound; otherwise what it must be: "must be > 0".
 std::string violation(const Bound& bound, double value);
 std::string violation(const Bound& bound, const std::string& value);
 std::string describe_bound(const Bound& bound);
@@ -226,16 +230,18 @@ class ConfigLoader {
     config_internal::Loader loader(node, "", findings_);
     config.describe(loader);
   }
-  /// Every violation is in the one message; `name` is the document's.
+  /// An error when any load() met a value of a wrong type or range, or when a key is known to no struct; its message
+  /// lists all of them. `name` is the document's.
   Status finish(const std::string& name);
-  /// The same of a document that another version may have written: keys that nobody knows are left alone.
+  /// As finish(), for a document that another version of the program may have written: keys that no struct knows are no
+  /// error.
   Status finish_with_unknown(const std::string& name) const;
 
  private:
   config_internal::Findings findings_;
 };
 
-/// Fills `config` from a node; every violation is in the one message.
+/// Fills one struct from a document: ConfigLoader::load() and finish().
 template <class T>
 Status load_config(const ConfigNode& node, T& config, const std::string& name) {
   ConfigLoader loader;
@@ -243,9 +249,11 @@ Status load_config(const ConfigNode& node, T& config, const std::string& name) {
   return loader.finish(name);
 }
 
-/// Adds what `more` has to `into`: maps key by key, lists element by element; what both have is as in `more`.
+/// Lays `more` over `into`: maps are merged key by key, lists element by element, and where both have a value that of
+/// `more` counts.
 void merge_config(ConfigNode& into, const ConfigNode& more);
 
+/// The settings of `config` as a document that load_config() reads back.
 template <class T>
 ConfigNode dump_config(T config) {
   config_internal::Dumper dumper;
@@ -253,6 +261,7 @@ ConfigNode dump_config(T config) {
   return dumper.node;
 }
 
+/// Path, type, default, range and help of every setting, defaults as they are in `config`.
 template <class T>
 std::vector<config_internal::FieldDoc> document_config(T config) {
   std::vector<config_internal::FieldDoc> out;

@@ -9,19 +9,20 @@
 
 namespace tutti {
 
-/// Which of some numbered things belong together: union-find with path halving.
+/// Groups the elements 0 .. count - 1 by joining pairs: union-find with path halving.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t count) : parent_(count) {
     std::iota(parent_.begin(), parent_.end(), std::size_t{0});
   }
-  /// False if they belonged together before.
+  /// Makes one set of the sets of `a` and `b`; false if they were one set before.
   bool join(std::size_t a, std::size_t b) {
     const auto [low, high] = std::minmax({root(a), root(b)});
     parent_[high] = low;
     return low != high;
   }
-  /// Per thing its set, 0, 1, ... in the order of their first members; and how many sets there are.
+  /// Per element the number of its set, sets being numbered 0, 1, ... in the order of their first elements; and the
+  /// number of sets.
   [[nodiscard]] std::pair<std::vector<int>, int> labels() {
     std::vector<int> label(parent_.size());
     int count = 0;

@@ -8,7 +8,8 @@
 
 namespace tutti {
 
-/// Whole files; the errors name them.
+/// Reads a whole file, or writes one in place of what stood there. Errors (ErrorCode::io) name the file and why.
+/// write_file() is not atomic.
 Result<std::string> read_file(const std::string& path);
 Status write_file(const std::string& path, std::string_view bytes);
 

@@ -8,8 +8,8 @@
 
 namespace tutti {
 
-/// A robot, for as long as its mission knows it. Robots assign keyframe and submap ids themselves; the ids are valid
-/// everywhere and never rewritten.
+/// A robot of a mission, by its number. Robots assign keyframe and submap ids themselves; the ids are valid everywhere
+/// and never rewritten.
 struct RobotId {
   std::uint32_t value = 0;
   friend auto operator<=>(const RobotId&, const RobotId&) = default;
@@ -44,15 +44,15 @@ struct SubmapId {
   friend auto operator<=>(const SubmapId&, const SubmapId&) = default;
 };
 
-/// For hashes and seeds: of one session all different.
+/// An id as one number, for hashes and seeds. Ids of equal session numbers never share one.
 inline std::uint64_t packed(const ChainId& chain, std::uint32_t index) {
   constexpr std::uint64_t kGoldenRatio = 0x9e3779b97f4a7c15U;
   return ((std::uint64_t{chain.robot.value} << 32U) | index) ^ (chain.session * kGoldenRatio);
 }
 
-/// "robot", and ":session" behind it unless that is 0.
+/// "ROBOT:SESSION"; "ROBOT" alone for session 0.
 std::string to_string(const ChainId& chain);
-/// "chain/index"
+/// "CHAIN/INDEX", such as "3:5/17".
 std::string to_string(const SubmapId& id);
 
 }  // namespace tutti

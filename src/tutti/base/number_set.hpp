@@ -7,7 +7,8 @@
 
 namespace tutti {
 
-/// A set of numbers that come mostly one after the other, in memory that grows with its gaps, not with the numbers.
+/// A set of numbers of which most follow each other, such as the submaps that have arrived: its memory grows with the
+/// gaps, not with the numbers.
 class NumberSet {
  public:
   struct Stretch {  ///< Numbers begin ... end - 1.
@@ -16,16 +17,17 @@ class NumberSet {
     friend bool operator==(const Stretch&, const Stretch&) = default;
   };
 
-  /// Again changes nothing. Not the largest number of 64 bits.
+  /// A number that is in the set already changes nothing. The largest number of 64 bits cannot be stored.
   void insert(std::uint64_t number);
-  /// One that is not in it changes nothing.
+  /// A number that is not in the set changes nothing.
   void erase(std::uint64_t number);
   [[nodiscard]] bool contains(std::uint64_t number) const;
-  /// The first number, counted from 0, that is not in it.
+  /// The smallest number that is not in the set.
   [[nodiscard]] std::uint64_t watermark() const;
-  /// Ascending, not empty, neither overlapping nor touching. One that begins at 0 ends at the watermark.
+  /// The set as stretches, ascending, none empty, none overlapping or touching another.
   [[nodiscard]] const std::vector<Stretch>& stretches() const { return stretches_; }
-  /// Behind what is in it: not empty, neither overlapping nor touching that; otherwise false, and nothing changes.
+  /// Adds a stretch that is not empty and begins at least one number behind the last one; otherwise returns false and
+  /// changes nothing.
   bool append(Stretch stretch);
   void clear() { stretches_.clear(); }
   friend bool operator==(const NumberSet&, const NumberSet&) = default;

@@ -9,16 +9,17 @@
 
 namespace tutti {
 
-/// Every bit of the outcome depends on every bit of x, and no two x have the same: the finaliser of splitmix64 (Steele,
-/// Lea, Flood 2014).
+/// A bijection of 64-bit numbers in which every bit of the result depends on every bit of x: the finaliser of
+/// splitmix64 (Steele, Lea, Flood 2014).
 constexpr std::uint64_t mixed(std::uint64_t x) {
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
   x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
   return x ^ (x >> 31U);
 }
 
-/// Seeded randomness that is handed in, never global. `fork("alpha/odometry")` gives an independent stream that depends
-/// only on the seed and the name, so adding a consumer never changes what the others draw.
+/// Seeded randomness, always handed in, never global. fork("alpha/odometry") gives an independent stream that depends
+/// only on the seed and the name, so adding a consumer never changes what the others draw. Draws of one Rng are a
+/// sequence: one thread at a time.
 class Rng {
  public:
   explicit Rng(std::uint64_t seed) : seed_(mixed(seed)), engine_(seed_) {}

@@ -14,7 +14,7 @@ enum class ErrorCode {
   io,           ///< A file could not be opened, read or written.
   parse,        ///< Text or bytes do not follow their format.
   invalid,      ///< Well formed, but a value is out of its range (NaN, non-unit quaternion, stamps going backwards...).
-  unsupported,  ///< Well formed, but a variant or protocol version this program does not speak.
+  unsupported,  ///< Well formed, but of a variant or protocol version that this program does not read.
   unknown_robot,  ///< A message names a robot that is not part of the mission.
   configuration,  ///< A setting is unknown or out of range.
 };

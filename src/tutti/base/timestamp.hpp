@@ -11,7 +11,7 @@
 namespace tutti {
 
 /// Nanoseconds since the Unix epoch, signed, so that differences never wrap. Subtract first, convert to seconds after:
-/// a double holds an epoch in nanoseconds only to about 256 ns.
+/// a double holds a time since the epoch only to about 256 ns.
 struct Timestamp {
   std::int64_t ns = 0;
   friend auto operator<=>(const Timestamp&, const Timestamp&) = default;
@@ -20,7 +20,8 @@ struct Timestamp {
 inline constexpr Timestamp kFirstTimestamp{std::numeric_limits<std::int64_t>::min()};
 inline constexpr Timestamp kLastTimestamp{std::numeric_limits<std::int64_t>::max()};
 
-/// To the nearest nanosecond; what 64 bits do not hold (292 years) becomes the most they hold. Not for NaN.
+/// Seconds to the nearest nanosecond. Durations that 64 bits do not hold (beyond 292 years) become the longest that
+/// they hold. NaN is not allowed.
 inline std::int64_t to_nanoseconds(double seconds) {
   constexpr double kTooMany = 0x1p63;
   const double ns = seconds * 1e9;
@@ -34,7 +35,7 @@ inline double operator-(Timestamp a, Timestamp b) {
   const bool wraps = __builtin_sub_overflow(a.ns, b.ns, &ns);
   return (wraps ? static_cast<double>(a.ns) - static_cast<double>(b.ns) : static_cast<double>(ns)) * 1e-9;
 }
-/// Ends at the first or the last timestamp: so does a step that 64 bits do not hold, from anywhere.
+/// Saturates at the first and the last timestamp; a step of more than 292 years leads there from anywhere.
 inline Timestamp operator+(Timestamp a, double seconds) {
   const Timestamp step{to_nanoseconds(seconds)};
   if (step == kFirstTimestamp || step == kLastTimestamp) return step;
@@ -44,7 +45,8 @@ inline Timestamp operator+(Timestamp a, double seconds) {
 }
 inline Timestamp operator-(Timestamp a, double seconds) { return a + -seconds; }
 
-/// Median time from one to the next, s; 0 of fewer than two.
+/// Median of the differences between consecutive stamps, s; of an even number of them the larger middle one. 0 for
+/// fewer than two stamps.
 double typical_gap_s(std::span<const Timestamp> stamps);
 
 }  // namespace tutti

@@ -5,12 +5,12 @@
 
 namespace tutti::bus {
 
-/// What a port owes to a message, by its kind.
+/// What a port (port.hpp) guarantees for a message, by the message's kind.
 enum class Delivery {
-  durable,   ///< Comes until it is acknowledged, also to a receiver that has started again. In any order, maybe twice.
-  retained,  ///< Only the newest value counts: it comes last, and at once to whoever comes later. Never acknowledged.
-  work_queue,  ///< As durable, to any one of the workers at a time.
-  best_effort  ///< Once at most, to who is there.
+  durable,     ///< Comes until it is acknowledged, also to a receiver that has restarted; in any order, maybe twice.
+  retained,    ///< Only the newest value counts: it comes last, and at once to a receiver that comes later.
+  work_queue,  ///< As durable, to any one worker at a time.
+  best_effort  ///< Comes at most once, to receivers that are connected.
 };
 
 constexpr Delivery delivery_of(wire::MessageKind kind) {

@@ -15,21 +15,22 @@ namespace tutti::bus {
 
 using wire::MessageKind;
 
-/// Who sends and receives: the server, a robot, a worker, which verifies loop closures for the server, or a viewer, who
-/// only looks on.
+/// Who sends or receives: the server; a robot; a worker, which verifies loop closures and refines maps for the server;
+/// or a viewer, which shows the mission and passes on an operator's words.
 struct Endpoint {
   enum class Role : std::uint8_t { server, robot, worker, viewer };
   Role role = Role::server;
-  std::uint32_t number = 0;  ///< Of the robot, the worker or the viewer.
+  std::uint32_t number = 0;  ///< Number of the robot, the worker or the viewer.
 
   static Endpoint server() { return {}; }
   static Endpoint of(RobotId id) { return {Role::robot, id.value}; }
   static Endpoint worker(std::uint32_t number) { return {Role::worker, number}; }
-  /// Whoever of the workers is free: only as a receiver, or of a job that none of them has lived to answer.
+  /// Any worker that is free: as the receiver of a job, and as the sender of a job that comes back because it ended
+  /// every worker that had it.
   static Endpoint any_worker() { return worker(std::numeric_limits<std::uint32_t>::max()); }
 
   static Endpoint viewer(std::uint32_t number) { return {Role::viewer, number}; }
-  /// Each of the viewers: only as a receiver.
+  /// All viewers, as a receiver.
   static Endpoint all_viewers() { return viewer(std::numeric_limits<std::uint32_t>::max()); }
 
   [[nodiscard]] std::optional<RobotId> robot() const {
@@ -43,8 +44,8 @@ struct Envelope {
   Endpoint from;
   Endpoint to;
   MessageKind kind = MessageKind::submap;
-  /// Of the content, the same whenever it is sent again: a port may store one message of a kind and id only. At most
-  /// 200 letters, digits and any of "./:-_". Empty where only the newest value counts.
+  /// Names the content: the same whenever it is sent again, as a port may store only one message of a kind and id. At
+  /// most 200 letters, digits and any of "./:-_". Empty for retained messages.
   std::string id;
   std::shared_ptr<const std::string> bytes;  ///< Never null. Shared by all receivers of a broadcast.
 };

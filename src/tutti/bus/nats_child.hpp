@@ -32,18 +32,18 @@ struct NatsChildOptions {
   }
 };
 
-/// Only reachable from this machine: 127.0.0.0/8, ::1, localhost.
+/// True for addresses that only this machine can reach: 127.0.0.0/8, ::1, localhost.
 bool is_loopback(std::string_view host);
 
-/// A nats-server with JetStream as a child process. It ends with this process, however that ends, and its folder,
-/// which holds its configuration, messages and log, belongs to one at a time.
+/// A nats-server with JetStream as a child process. The child ends with this process, however this one ends. Its folder
+/// holds its configuration, messages and log, and is locked, so that one nats-server has it at a time.
 class NatsChild {
  public:
-  /// Returns when it takes messages. Makes the folder if it is missing. Errors: not installed, the port is taken,
-  /// the folder is another one's, too little disk, or what its log says.
+  /// Returns when the child takes messages. Makes the folder if it is missing. Errors: not installed, the port is
+  /// taken, another nats-server has the folder, too little disk, or what the child's log says.
   static Result<std::unique_ptr<NatsChild>> start(const std::filesystem::path& folder,
                                                   const NatsChildOptions& options = {});
-  /// Stops it: first politely.
+  /// Stops the child, by SIGINT and after 3 s by SIGKILL.
   ~NatsChild();
   NatsChild(const NatsChild&) = delete;
   NatsChild& operator=(const NatsChild&) = delete;
@@ -51,7 +51,7 @@ class NatsChild {
   [[nodiscard]] const std::string& url() const { return url_; }  ///< "nats://127.0.0.1:40123"
   [[nodiscard]] int pid() const { return pid_; }
   [[nodiscard]] bool running() const;
-  /// To be called about once a second: starts it again, at the same address, when it has ended, and stops it for as
+  /// To be called about once a second: starts a child that has ended again, at the same address, and stops it for as
   /// long as less than half of min_free_bytes are free. An error says why it is not running now.
   Status tend();
 
@@ -66,7 +66,7 @@ class NatsChild {
 
   std::filesystem::path folder_;
   NatsChildOptions options_;
-  int lock_ = -1;  ///< Open and locked; the child has it too, so that it holds the lock to its end.
+  int lock_ = -1;  ///< The lock file, open and locked; the child inherits it and holds the lock until it ends.
   std::unique_ptr<Process> process_;
   std::string url_;
   int pid_ = -1;

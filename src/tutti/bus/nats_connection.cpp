@@ -15,7 +15,6 @@
 namespace tutti::bus {
 namespace {
 
-// What was measured, and what bites: shared/NATS.md.
 constexpr std::int64_t kReconnect_ms = 500;
 constexpr std::int64_t kReconnectJitter_ms = 200;
 constexpr std::int64_t kConnect_ms = 2000;

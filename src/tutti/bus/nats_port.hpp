@@ -20,7 +20,8 @@ struct NatsPortOptions {
   std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_stream_bytes = std::uint64_t{512} << 20U;
   double stranded_s = 30.0;
-  std::function<bool()> may_connect = {};  ///< Asked before each connection; none: always. See MissionLease.
+  /// Asked before each connection, empty: always allowed. A server's port asks its MissionLease.
+  std::function<bool()> may_connect = {};
   template <class V>
   void describe(V& v) {
     v.field("url", url, any(), "\"nats://HOST:PORT\"");
@@ -40,33 +41,33 @@ struct NatsPortOptions {
   }
 };
 
-/// How a port stands with its bus.
+/// State of a port's connection to its bus.
 struct NatsState {
   std::string url;
-  bool connected = false;  ///< And listening.
+  bool connected = false;  ///< Connected, and subscribed to all that this port receives.
   std::uint64_t reconnects = 0;
-  std::size_t waiting_messages = 0;  ///< Their parts: not sent, or not confirmed by the bus.
+  std::size_t waiting_messages = 0;  ///< Parts of messages that are not sent, or not confirmed by the bus.
   std::uint64_t waiting_bytes = 0;
   std::size_t waiting_acknowledgements = 0;
-  std::uint64_t refused = 0;            ///< Arrived, and were none of ours, or never whole.
-  std::uint64_t streams_made_anew = 0;  ///< Of the server's port: the bus had lost them, or gave nothing of them.
-  std::uint64_t jobs_removed = 0;       ///< Of the server's port: those that no worker gets any more.
-  /// So long the bus, which is there, has stored nothing of what was sent.
+  std::uint64_t refused = 0;            ///< Messages that arrived and could not be understood, or never became whole.
+  std::uint64_t streams_made_anew = 0;  ///< Server's port only: streams that the bus had lost, or gave nothing of.
+  std::uint64_t jobs_removed = 0;       ///< Server's port only: jobs that no worker gets any more.
+  /// For how long a connected bus has confirmed nothing of what was sent.
   double unconfirmed_s = 0.0;
   std::string last_error;
 };
 
-/// A port over NATS JetStream. The server's makes what the mission needs on the bus, and leaves what is there. A thread
-/// of its own connects, sends and acknowledges, and sends again what the bus has not confirmed, with the same id: the
-/// bus stores each once. What is sent first: status, retained, then the rest in the order of send(), of submaps the
-/// newest. Without a bus it waits for one. Ends within seconds, after what was acknowledged is so on the bus, if that
-/// can be reached.
+/// A port over NATS JetStream (docs/bus.md). The server's port makes the streams that the mission needs on the bus and
+/// keeps those that exist. Threads of its own connect, send, receive and acknowledge. What the bus has not confirmed is
+/// sent again with the same id, of which the bus stores one. Sent first are status messages, then retained ones, then
+/// the rest in the order of send(), of submaps the newest. Without a bus the port waits for one. The destructor takes
+/// seconds at most, in which acknowledgements are delivered if the bus can be reached.
 class NatsPort : public Port {
  public:
   [[nodiscard]] virtual NatsState state() const = 0;
 };
 
-/// Does not wait for the bus. Errors are of the options.
+/// Opens the endpoint's port without waiting for the bus. Errors are those of the options.
 Result<std::unique_ptr<NatsPort>> open_nats_port(Endpoint endpoint, const NatsPortOptions& options);
 
 }  // namespace tutti::bus

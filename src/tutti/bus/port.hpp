@@ -9,15 +9,15 @@
 
 namespace tutti::bus {
 
-/// What has arrived, and its number for acknowledge(): of the port that gave it, never used twice by it.
+/// A message that has arrived, and the ticket that acknowledge() takes for it. A port never gives a ticket twice.
 struct Received {
   Envelope envelope;
   std::uint64_t ticket = 0;
 };
 
-/// One endpoint's way to the others: its only one, from when it starts until it ends. bus/delivery.hpp says what is
-/// owed to which kind of message. To be used by one thread. port_conformance_test.cpp holds every
-/// implementation to this contract.
+/// Connects one endpoint to the others; an endpoint has one port at a time. bus/delivery.hpp says what is guaranteed
+/// for each kind of message. A port is used by one thread. port_conformance_test.cpp holds every implementation to this
+/// contract.
 class Port {
  public:
   /// A message that was received and not acknowledged comes again at once to the next port of this endpoint, a job to
@@ -26,7 +26,7 @@ class Port {
   virtual ~Port() = default;
   /// Takes a message, which leaves when it can; never waits for the network. `envelope.from` is this endpoint. A
   /// retained message takes the place of the last one to the same receiver. Any other message with the kind and id of
-  /// one that has not left yet changes nothing. An error: the message was not taken, because too many wait, and is to
+  /// one that has not left yet changes nothing. On an error the message was not taken, because too many wait, and must
   /// be sent again later.
   [[nodiscard]] virtual Status send(Envelope envelope) = 0;
   /// Returns what has come, without waiting. A worker gets one job at a time: the next one comes when the last is
@@ -37,7 +37,8 @@ class Port {
   /// needed, but allowed, for messages that are retained or best effort. A worker stores nothing: its acknowledgement
   /// leaves after all that it has sent before.
   virtual void acknowledge(std::uint64_t ticket) = 0;
-  /// Says that work on this message goes on. Unless a long job says so every few seconds, another worker gets it, too.
+  /// Says that work on this message goes on. If a worker does not call this every few seconds during
+  /// a long job, another worker gets the job, too.
   virtual void still_busy(std::uint64_t ticket) = 0;
 };
 

@@ -13,18 +13,19 @@
 
 namespace tutti::bus {
 
-/// Ports in virtual time: robots are joined to a broker beside the server by the simulated radio; workers, viewers and
-/// server by nothing that takes time. What lies at the broker outlives the ports; what waits at a robot for its radio
-/// goes with the robot's port. One without a port hears nothing; retained values are sent when it is there again.
+/// Ports in virtual time: the simulated radio joins robots to a broker beside the server; workers, viewers and the
+/// server reach the broker without delay. Messages at the broker outlive the ports; messages that wait at a robot for
+/// its radio are lost with the robot's port. An endpoint without a port receives nothing; when it connects again
+/// retained values are sent to it. One thread at a time.
 class SimulatedNetwork {
  public:
   explicit SimulatedNetwork(SimulatedRadio radio, Timestamp start) : radio_(std::move(radio)), now_(start) {}
   SimulatedNetwork(const SimulatedNetwork&) = delete;
   SimulatedNetwork& operator=(const SimulatedNetwork&) = delete;
 
-  /// The endpoint's only port; it must not outlive the network.
+  /// Makes the endpoint's port, of which there may be one at a time. It must not outlive the network.
   [[nodiscard]] std::unique_ptr<Port> connect(Endpoint endpoint);
-  /// It is this time now; what has arrived by then is there to be received.
+  /// Sets the time, which never goes back; messages that have arrived by then can be received.
   void advance(Timestamp now);
   /// SimulatedRadio::next_delivery().
   [[nodiscard]] std::optional<Timestamp> next_delivery() const { return radio_.next_delivery(); }
@@ -34,12 +35,13 @@ class SimulatedNetwork {
   class SimulatedPort;
   struct Message {
     Envelope envelope;
-    bool given = false;  ///< To the present port of its receiver; of a job: to `envelope.to`.
+    bool given = false;  ///< Whether the receiver's present port has returned it from receive(); for a job the receiver
+                         ///< is then `envelope.to`.
   };
   void send(Envelope envelope);
   void arrive(Envelope envelope);
   void show(Endpoint viewer, Envelope envelope);
-  /// A newer value of this one has arrived before it.
+  /// True for a retained value that arrives after a newer one.
   [[nodiscard]] bool is_overtaken(const Arrival& arrival);
   [[nodiscard]] std::vector<Received> receive(Endpoint endpoint);
   void acknowledge(std::uint64_t ticket) { messages_.erase(ticket); }
@@ -49,9 +51,10 @@ class SimulatedNetwork {
   Timestamp now_;
   std::set<Endpoint> connected_;
   std::uint64_t next_ticket_ = 0;
-  std::map<std::uint64_t, Message> messages_;  ///< By ticket: what is there and not acknowledged.
+  std::map<std::uint64_t, Message> messages_;  ///< By ticket: messages at the broker that are not acknowledged.
   std::map<std::pair<Endpoint, MessageKind>, Envelope> retained_;
-  std::map<std::pair<Endpoint, MessageKind>, std::uint64_t> newest_;  ///< Number of the newest retained one to arrive.
+  /// Number of the newest retained message that has arrived.
+  std::map<std::pair<Endpoint, MessageKind>, std::uint64_t> newest_;
 };
 
 }  // namespace tutti::bus

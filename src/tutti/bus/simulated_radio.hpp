@@ -18,10 +18,10 @@
 
 namespace tutti::bus {
 
-/// Longer than any radio takes; a robot that is away for longer has an outage.
+/// Limit on the times of a link: no radio takes longer, and a robot that is away for longer has an outage.
 inline constexpr double kLongestLinkTime_s = 3600.0;
 
-/// Time without contact: [from_s, until_s) in seconds after the radio's start; infinity: for ever.
+/// Time without contact: [from_s, until_s) in seconds after the radio's start; infinity means for ever.
 struct Outage {
   double from_s = 0.0;
   double until_s = 0.0;
@@ -61,62 +61,64 @@ struct LinkConfig {
   }
 };
 
-/// A message that has come.
+/// A message that has arrived.
 struct Arrival : Envelope {
   Timestamp sent;
   Timestamp arrived;
-  std::uint64_t number = 0;  ///< Of all messages, in the order of sending.
+  std::uint64_t number = 0;  ///< Counts all messages in the order of sending.
 };
 
-/// Of one (from, to, kind).
+/// Counts for one SimulatedRadio::Topic.
 struct TopicStatistics {
   std::uint64_t published = 0;          ///< Messages.
-  std::uint64_t delivered = 0;          ///< Messages, duplicates counted.
-  std::uint64_t lost = 0;               ///< Messages lost for good by the link.
-  std::uint64_t superseded = 0;         ///< Waiting proxy graphs replaced by a newer one.
+  std::uint64_t delivered = 0;          ///< Messages, duplicates of the link included.
+  std::uint64_t lost = 0;               ///< Messages that the link lost and did not repeat: deltas of proxy graphs.
+  std::uint64_t superseded = 0;         ///< Waiting retained messages that a newer one replaced.
   std::uint64_t dropped = 0;            ///< Messages dropped because the queue was full.
-  std::uint64_t published_bytes = 0;    ///< Payload handed to the radio.
-  std::uint64_t transmitted_bytes = 0;  ///< Payload on the radio, repetitions counted.
-  std::uint64_t largest_message = 0;    ///< Bytes, of those handed to the radio.
+  std::uint64_t published_bytes = 0;    ///< Bytes of the published messages.
+  std::uint64_t transmitted_bytes = 0;  ///< Bytes on the radio, repetitions included.
+  std::uint64_t largest_message = 0;    ///< Bytes of the largest published message.
   friend bool operator==(const TopicStatistics&, const TopicStatistics&) = default;
 };
 
-/// The radio between robots and server in virtual time, without threads. Each robot has one link to the server; one
-/// end of every message is the server. What happens to a message is drawn from (seed, its kind, its number), so the
-/// same calls give the same arrivals, whatever other kinds are sent beside it. A message waits in the bounded queue of
-/// its direction until there is contact and bandwidth; its airtime passes with contact only, its latency always. Of
-/// waiting messages that are retained (delivery.hpp) only the newest of a kind is kept. A lost proxy graph is lost (a
-/// newer one follows); everything else is sent again, with contact, until it arrives.
+/// The radio between robots and server in virtual time, without threads. Each robot has one link to the server; one end
+/// of every message is the server. What happens to a message is drawn from (seed, its kind, its number), so the same
+/// calls give the same arrivals, whatever other kinds are sent beside it. A message waits in the bounded queue of its
+/// direction until there is contact and bandwidth; its airtime passes with contact only, its latency always. Of waiting
+/// retained messages (delivery.hpp) only the newest of a kind is kept, and a durable one that already waits is not
+/// queued twice. A lost delta of a proxy graph stays lost (a newer one follows); all other messages are sent again,
+/// when there is contact, until they arrive.
 class SimulatedRadio {
  public:
   SimulatedRadio(Timestamp start, const LinkConfig& link, std::uint64_t seed);
 
-  /// For one robot instead of the common link; before its first message.
+  /// Gives one robot a link of its own; to be called before its first message.
   void set_link(RobotId robot, const LinkConfig& link);
-  /// `now` never goes back.
+  /// Hands a message to the radio at time `now`, which never goes back. A full queue drops its oldest message.
   void send(Timestamp now, Envelope message);
-  /// All messages that have arrived by `now`, in the order of arrival, each once (duplicates of the link: twice).
+  /// Returns the messages that have arrived by `now` since the last call, in the order of arrival; one that the link
+  /// duplicates comes twice.
   std::vector<Arrival> deliver_until(Timestamp now);
   /// Nothing arrives before this time, and nothing ever arrives when there is none. deliver_until() at this time may
   /// still return nothing: a message that only now leaves its queue arrives later.
   [[nodiscard]] std::optional<Timestamp> next_delivery() const;
 
   using Topic = std::tuple<Endpoint, Endpoint, MessageKind>;  ///< (from, to, kind)
-  /// How many messages wait or are under way.
+  /// Per topic the number of messages that wait or are under way.
   [[nodiscard]] std::map<Topic, std::size_t> undelivered() const;
-  /// What has not left this end yet is gone, as when its program ends.
+  /// Drops the messages that have not left this endpoint yet, as when its program ends.
   void forget_waiting(Endpoint from);
   [[nodiscard]] const std::map<Topic, TopicStatistics>& statistics() const { return statistics_; }
 
  private:
   struct Waiting {
-    std::uint64_t of_kind = 0;  ///< Number among those of its kind.
+    std::uint64_t of_kind = 0;  ///< Counts the messages of its kind.
     Arrival message;
   };
   struct Direction {
     LinkConfig link;
     std::deque<Waiting> queue;
-    Timestamp free_at;  ///< The bandwidth is used up to here.
+    Timestamp free_at;  ///< The bandwidth is in use until here.
     Timestamp last_arrival;
   };
   Direction& direction(Endpoint from, Endpoint to);
@@ -130,7 +132,7 @@ class SimulatedRadio {
   LinkConfig link_;
   Rng rng_;
   std::uint64_t next_number_ = 0;
-  std::map<MessageKind, std::uint64_t> sent_;  ///< How many.
+  std::map<MessageKind, std::uint64_t> sent_;  ///< Number of messages sent.
   std::map<RobotId, LinkConfig> links_;
   std::map<std::pair<Endpoint, Endpoint>, Direction> directions_;
   /// By arrival and number: of equal arrivals, what was sent first.

@@ -10,25 +10,25 @@
 
 namespace tutti::consistency {
 
-/// Where the raw odometry was thought to part from the map at one update.
+/// The stretches that one update of a robot suspects, of odometry that left the map.
 struct Suspicion {
   double time_s = 0.0;  ///< Mission time.
   std::uint64_t revision = 0;
   std::vector<SuspectedOrigin> origins;
 };
 
-/// A suspected localisation failure, followed over the updates: what two updates suspect is one when they overlap.
+/// A suspected localisation failure, followed over a robot's updates.
 struct Alert {
-  SuspectedOrigin origin;      ///< As last seen.
+  SuspectedOrigin origin;      ///< As the latest update that raised it described it.
   double known_since_s = 0.0;  ///< Mission time of the first update that raised it.
   std::uint64_t known_since_revision = 0;
-  /// Mission time of the first update that no longer raised it; none = it stands.
+  /// Mission time of the first update that no longer raised it; nothing while it stands.
   std::optional<double> withdrawn_s;
 };
 
-/// The alerts (SuspectedOrigin::alert) of one robot's updates, in time order, put together: an alert is the same as one
-/// of an earlier update when their stretches overlap, and is then known since that one; an earlier one that nothing
-/// overlaps any more is withdrawn. Sorted by the start of the stretch.
+/// Follows the alerts (origins with SuspectedOrigin::alert) through one robot's updates, which are in time order. Two
+/// alerts of different updates are the same when their stretches overlap; the alert is then known since the earlier
+/// update. An alert that no origin of a later update overlaps is withdrawn. Sorted by the start of the stretch.
 std::vector<Alert> follow_alerts(std::span<const Suspicion> updates);
 
 }  // namespace tutti::consistency

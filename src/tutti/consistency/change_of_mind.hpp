@@ -6,24 +6,25 @@
 
 namespace tutti::consistency {
 
-/// How one chain's trajectory in a newer map differs from that in an older one, by how sure the older map was of it.
+/// How one chain's trajectory in a newer map differs from that in an older map, in units of the older map's
+/// uncertainty.
 struct MapChange {
-  /// The largest difference over what three standard deviations of the older map allow for: above 1 the map has changed
-  /// its mind, and has not merely learned more. 0 where the older map does not say how sure it is, or where the two
-  /// have fewer than two nodes in common.
+  /// The largest difference divided by three of the older map's standard deviations. Above 1 the map has changed its
+  /// mind, and not merely learned more. 0 where the older map does not say how sure it is, or where the two maps have
+  /// fewer than two nodes in common.
   double significance = 0.0;
-  /// What the node that moves most moves by, the two trajectories laid rigidly on each other.
+  /// The largest movement of any node, after one rigid alignment of the two trajectories.
   double translation_m = 0.0;
   double rotation_rad = 0.0;
-  /// The nodes that move by at least half as much lie between these moments.
+  /// The first and last moment of the nodes that move in position by at least half of `translation_m`.
   Timestamp from, until;
   [[nodiscard]] bool is_change_of_mind() const { return significance > 1.0; }
   friend bool operator==(const MapChange&, const MapChange&) = default;
 };
 
-/// The older map's own test (DisagreementTest) of the newer map's poses. Two estimates of which the newer knows all
-/// that the older knew differ by less than the older's own errors, so a calibrated map that only learns changes its
-/// mind once in 370 updates. What the newer map has beside the older one's nodes does not count.
+/// Applies the older map's own test (DisagreementTest) to the newer map's poses. When the newer map knows all that the
+/// older one knew, the two differ by less than the older one's errors; a calibrated map that only learns therefore
+/// exceeds a significance of 1 in one update of 370. Nodes that only one of the maps has do not count.
 MapChange map_change(const ProxyGraph& older, const ProxyGraph& newer, const ChainId& chain);
 
 }  // namespace tutti::consistency

@@ -15,6 +15,7 @@
 
 namespace tutti::consistency {
 
+/// Settings of the paper's comparison.
 struct CompareConfig {
   int scales = 7;
   std::string signal = "distance";
@@ -34,29 +35,33 @@ struct CompareConfig {
   }
 };
 
-/// Where, and at which scale, the robot's estimate disagrees with the server's.
+/// Where, and at which scale, the robot's estimate disagrees with the server's, by the paper's measure.
 struct Comparison {
-  std::vector<NodePair> pairs;   ///< The synchronised nodes in time order: row r of `disagreement` is pairs[r].
-  Eigen::MatrixXd disagreement;  ///< pairs x scales, d^s of eq. (8), metres; scale 0 = largest. Empty when only
-                                 ///< synchronised.
-  double lambda_max = 0.0;       ///< Common to both filter banks: the larger of the two graphs'. 0 = no edges.
-  int order = 0;                 ///< Of the Chebyshev polynomials (the larger of the two); 0 = exact.
+  std::vector<NodePair> pairs;   ///< The synchronised nodes in time order; pairs[r] belongs to row r of `disagreement`.
+  Eigen::MatrixXd disagreement;  ///< pairs x scales: d^s of eq. (8), metres; scale 0 = largest. Empty when nodes were
+                                 ///< only synchronised.
+  double lambda_max = 0.0;  ///< Common to both filter banks: the larger of the two graphs' largest eigenvalues; 0 when
+                            ///< there are no edges.
+  int order = 0;            ///< Order of the Chebyshev polynomials (the larger of the two graphs'); 0: exact transform.
 };
 
-/// Section III of the paper, steps 4 and 5: synchronise, build the robot's own graph by the server's rule, filter both
-/// signals, d^s.
+/// Section III of the paper, steps 4 and 5: synchronises, builds the robot's own graph by the server's rule, filters
+/// both signals, and returns d^s.
 ///
-/// Compared are the subgraphs induced on this robot's synchronised nodes. If the server's graph is reduced, its side is
-/// the carried weights, and the robot reduces its own graph over kept + eliminated nodes to the kept ones and keeps the
-/// edges the server kept: equal poses then give d^s = 0 in both cases. If the robot lacks some of the nodes of a
-/// reduced graph, it reduces what it has; the two graphs then differ and d^s does not vanish even for equal poses: near
-/// the gap in every scale, all along in the large ones. Fewer than two pairs: disagreement is 0 for the pairs there
-/// are. Nodes without edges keep their whole signal in scale 0. `config.signal` must be known (checked).
+/// The two graphs are the subgraphs induced by this robot's synchronised nodes. If the server's graph is reduced, its
+/// weights are those that it carries; the robot reduces its own graph over kept and eliminated nodes to the kept ones,
+/// and keeps the edges that the server kept. Equal poses then give d^s = 0, reduced or not. A robot that lacks some
+/// nodes of a reduced graph reduces those it has; the graphs then differ, and d^s does not vanish even for equal poses:
+/// near the gap at every scale, everywhere at the large ones.
+///
+/// With fewer than two pairs the disagreement is 0. Nodes without edges keep their whole signal in scale 0. An unknown
+/// `config.signal` throws.
 Comparison compare(const ProxyGraph& graph, const ChainId& chain, std::span<const RobotNode> nodes,
                    const CompareConfig& config);
 
-/// The core: two graphs over the same n nodes (Laplacians) with a signal each (n x d) -> n x scales. `lambda_max` must
-/// be at least either graph's largest eigenvalue; 0 when neither has an edge. Returns the polynomial order in `order`.
+/// The core of compare(): two graphs over the same n nodes (Laplacians, n x n), each with a signal (n x d) -> d^s, n x
+/// scales. `lambda_max` must be at least the largest eigenvalue of either graph, and 0 when neither has an edge.
+/// `order` is set to the polynomial order.
 Eigen::MatrixXd disagreement(const Eigen::SparseMatrix<double>& L_server, const Eigen::MatrixXd& f_server,
                              const Eigen::SparseMatrix<double>& L_robot, const Eigen::MatrixXd& f_robot,
                              double lambda_max, const CompareConfig& config, int& order);

@@ -8,33 +8,34 @@
 
 namespace tutti::consistency {
 
+/// What an update did to the ledger, in constraints.
 struct LedgerUpdate {
   std::size_t added = 0;
   std::size_t replaced = 0;
-  std::size_t unchanged = 0;  ///< Chosen again, but not different enough.
-  std::size_t removed = 0;    ///< Only when the choice replaces all.
-  std::size_t withdrawn = 0;  ///< No longer supported by the server's map.
+  std::size_t unchanged = 0;  ///< Chosen again, but not different enough to be replaced.
+  std::size_t removed = 0;    ///< Dropped, because the selection replaces all.
+  std::size_t withdrawn = 0;  ///< Dropped, because the server's map no longer has an end of it.
 };
 
-/// The constraints a robot holds, at most one per pair of nodes. A value.
+/// The constraints that a robot holds, at most one per pair of nodes. A plain value.
 class Ledger {
  public:
   Ledger() = default;
-  /// From a saved list; duplicates as in update().
+  /// From a saved list; of constraints on the same pair the last counts.
   explicit Ledger(std::vector<Constraint> constraints);
 
-  /// Sorted by (from_stamp, to_stamp), from before to.
+  /// Sorted by (from_stamp, to_stamp); `from` is the earlier node.
   [[nodiscard]] const std::vector<Constraint>& constraints() const { return constraints_; }
   [[nodiscard]] std::size_t size() const { return constraints_.size(); }
 
-  /// Takes `chosen` in. A constraint between the same two nodes, either way round, is replaced only when the new one
-  /// differs beyond a threshold (0.5 mm, 0.005 degrees, a tenth of a standard deviation); otherwise it stays untouched.
-  /// With `replaces_all`, constraints whose nodes are not in `chosen` go. The same pair twice in `chosen`: the last
-  /// counts.
+  /// Takes `chosen` in. A constraint between the same two nodes (in either direction) is replaced only when the new one
+  /// differs by more than 0.5 mm, 0.005 degrees or a tenth of a standard deviation; otherwise it stays untouched, which
+  /// keeps the robot's solution where it is. With `replaces_all`, held constraints on pairs that are not in `chosen`
+  /// are removed. Of constraints on the same pair in `chosen` the last counts.
   LedgerUpdate update(std::vector<Constraint> chosen, bool replaces_all);
 
-  /// Withdraws every constraint with an end that this proxy graph does not know of (any more): neither among its nodes
-  /// nor among those that its reduction removed. Returns how many.
+  /// Drops every constraint with an end that this proxy graph has neither among its nodes nor among those that its
+  /// reduction eliminated. Returns how many.
   std::size_t withdraw_unknown(const ProxyGraph& graph, const ChainId& chain);
 
   friend bool operator==(const Ledger&, const Ledger&) = default;
@@ -43,7 +44,7 @@ class Ledger {
   std::vector<Constraint> constraints_;
 };
 
-/// The same constraint running from the earlier node to the later.
+/// The constraint, inverted if necessary so that it runs from the earlier node to the later one.
 Constraint in_time_order(Constraint constraint);
 
 }  // namespace tutti::consistency

@@ -10,23 +10,24 @@
 
 namespace tutti::consistency {
 
-/// A representative node that the server keeps a reference to, with its latest estimate.
+/// A representative node of the server's map, with its latest estimate: the input of the proxy graph.
 struct ServerNode {
   ChainId chain;
   Timestamp stamp;
   Pose3 T_world_body;
-  /// Of this pose relative to the same chain's previous ServerNode (right tangent); ignored for the first.
+  /// Covariance of this pose relative to the same chain's previous ServerNode (right tangent); ignored for the first.
   Matrix6d covariance = Matrix6d::Zero();
 };
 
+/// How a proxy graph is made, and how much the server says about its own uncertainty.
 struct ProxyGraphConfig {
   double radius_m = 7.0;
   double sigma_m = 1.0;
   int node_budget = 0;
   std::string reducer = "budget";
-  double sparsify_threshold = 1e-3;  ///< Drop a reduced edge whose weight is below this fraction of the smaller degree
-                                     ///< of its ends, but none that holds the graph together; 0 = keep all.
-  /// Samples from which the server learns how sure it is of each trajectory's shape; 0 = do not send it.
+  double sparsify_threshold = 1e-3;  ///< A reduced edge is dropped when its weight is below this fraction of the
+                                     ///< smaller degree of its ends, unless it holds the graph together; 0 = keep all.
+  /// Number of samples from which the server estimates how sure it is of each trajectory's shape; 0 = it does not say.
   int shape_samples = 64;
   int shape_deletions = 32;
 
@@ -47,22 +48,23 @@ struct ProxyGraphConfig {
   }
 };
 
-/// What the graph monitor broadcasts: nodes sorted by (chain, stamp); whatever order `nodes` came in, the result is the
-/// same. A repeated (chain, stamp) is our own mistake (checked).
+/// The proxy graph that the graph monitor broadcasts. Nodes are sorted by (chain, stamp), so the result does not depend
+/// on the order of `nodes`. A repeated (chain, stamp) throws.
 ///
-/// Reduction (only above the budget) is done per chain on the subgraph induced by that chain's nodes, so that the robot
-/// can repeat it on its own estimate: Schur complement of the Laplacian (eq. 3), then sparsified. The budget is shared
-/// between the chains in proportion to their nodes, at least two each (one if the chain has one node). The covariance
-/// of a kept node is compounded over the removed nodes before it.
+/// Above the budget each chain is reduced on the subgraph induced by its own nodes, so that its robot can repeat the
+/// reduction on its own estimate: Schur complement of the Laplacian (eq. 3), then sparsification. Chains share the
+/// budget in proportion to their nodes, with at least two nodes each (one if the chain has one). The covariance of a
+/// kept node compounds those of the removed nodes before it.
 ProxyGraph build_proxy_graph(std::uint64_t revision, std::vector<ServerNode> nodes,
                              std::vector<ChainComponent> components, const ProxyGraphConfig& config);
 
-/// `chain` is its robot's newest, whatever the numbers: the robot was last seen in it, if the graph has nodes of it.
+/// Sets where the chain's robot was last seen to the end of `chain`, its newest one; does nothing when the graph has no
+/// nodes of the chain.
 void see_last_in(ProxyGraph& graph, const ChainId& chain);
 
-/// What this robot needs of the graph: all of its newest chain (the one it was last seen in), and where the robots of
-/// the same component were last seen. Of a robot without nodes only what belongs to no chain. Nothing else in the graph
-/// changes what a robot of that chain does with it.
+/// The part of the graph that this robot needs: everything about its newest chain (the one it was last seen in), and
+/// where the robots of the same component were last seen. A robot without nodes gets the fields that belong to no
+/// chain. Nothing outside this part changes what the robot does.
 ProxyGraph own_part(const ProxyGraph& whole, RobotId robot);
 
 }  // namespace tutti::consistency

@@ -9,13 +9,13 @@
 
 namespace tutti::consistency {
 
-/// One of a robot's own representative nodes with its current (corrected) estimate. Lists of them are in time order.
+/// One of a robot's own representative nodes with its corrected estimate. Lists of them are in time order.
 struct RobotNode {
   Timestamp stamp;
   Pose3 T_map_body;
   std::size_t chain_index = 0;  ///< Position in the robot's odometry chain.
-  RelativePose odometry;        ///< Raw, from the previous node of the list; unused for the first.
-  std::uint32_t submap = 0;     ///< SubmapId::index of the submap it belongs to.
+  RelativePose odometry;        ///< Raw odometry from the previous node of the list; unused for the first.
+  std::uint32_t submap = 0;     ///< SubmapId::index of the submap that the node belongs to.
   friend bool operator==(const RobotNode&, const RobotNode&) = default;
 };
 

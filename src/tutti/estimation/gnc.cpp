@@ -19,9 +19,9 @@
 namespace tutti::estimation {
 namespace {
 
-/// A rejected edge keeps this weight inside the solver, so that what it alone connected stays determined.
 constexpr double kControlStep = 1.4;  // factor of mu between outer iterations
 constexpr int kMaxOuterIterations = 100;
+/// A rejected edge keeps this weight inside the solver, so that what it alone connected stays determined.
 constexpr double kWeightFloor = 1e-8;
 /// Inner solves only follow the changing weights; the last one uses the caller's tolerance.
 constexpr double kInnerTolerance = 1e-3;

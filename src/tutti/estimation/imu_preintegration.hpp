@@ -7,7 +7,8 @@
 #include "tutti/model/submap.hpp"
 #include "tutti/model/visual.hpp"
 
-/// Forster, Carlone, Dellaert, Scaramuzza, "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry" (2017).
+/// IMU preintegration after Forster, Carlone, Dellaert, Scaramuzza, "On-Manifold Preintegration for Real-Time
+/// Visual-Inertial Odometry", T-RO 2017; equation numbers are of that paper.
 namespace tutti::estimation {
 
 /// Biases of an IMU, in the body frame.
@@ -16,19 +17,20 @@ struct ImuBias {
   Eigen::Vector3d accelerometer = Eigen::Vector3d::Zero();  ///< m/s^2
 };
 
-/// Samples further apart than this are no measurement of what happened between them.
+/// Longest time between two samples: a longer gap is an error, as nothing tells what happened in it.
 inline constexpr double kMaxImuGap_s = 0.1;
 
-/// What the samples say of the time between two keyframes, eqs. (35) to (38), with covariance, eq. (63), and the
-/// derivatives by the biases, eq. (44), at `bias`. Between two samples, rate and acceleration are their mean, and the
-/// acceleration acts in the attitude half way; at the ends, samples are interpolated. Only the samples of that time are
-/// looked at: increasing stamps that cover it, no gap above kMaxImuGap_s, finite.
+/// The relative motion between two keyframes by the samples, eqs. (35) to (38), with its covariance, eq. (63), and its
+/// derivatives by the biases, eq. (44), at `bias`. Between two samples the rate and the acceleration are the means of
+/// both, and the acceleration acts at the attitude half way; at the keyframes' stamps samples are interpolated. Of
+/// `samples` only those of that time are read: they must cover it, be finite, and have increasing stamps without a gap
+/// above kMaxImuGap_s; else ErrorCode::invalid.
 Result<ImuPreintegration> preintegrate(std::span<const ImuSample> samples, const Keyframe& from, const Keyframe& to,
                                        const ImuBias& bias, const ImuNoise& noise);
 
-/// The constant gyro bias, rad/s, with which the integrated gyro turns as the odometry does from keyframe to keyframe
-/// (least squares over Log(dR(bias)^T R_i_j), integrated anew at every estimate). Steps that the samples do not cover
-/// are left out; at least three must remain.
+/// The constant gyro bias, rad/s, with which the integrated gyro turns as the odometry does from keyframe to keyframe:
+/// least squares over Log(dR(bias)^T R_i_j), integrated anew at every iteration. Steps between keyframes that the
+/// samples do not cover are left out; fewer than three remaining ones are ErrorCode::invalid.
 Result<Eigen::Vector3d> estimate_gyro_bias(std::span<const ImuSample> samples, std::span<const Keyframe> keyframes);
 
 }  // namespace tutti::estimation

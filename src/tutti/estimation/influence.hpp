@@ -11,34 +11,36 @@
 
 namespace tutti::estimation {
 
-/// What becomes of the optimum when one edge is taken away.
+/// What removing one edge does to the optimum.
 struct Influence {
   std::size_t edge = 0;   ///< Into graph.edges.
   double distance = 0.0;  ///< Mahalanobis length of `shift` in the covariance of all poses.
-  Eigen::VectorXd
-      shift;  ///< 6 per node, right tangents: the pose without the edge is retract(pose, shift), first order.
+  /// 6 rows per node, right tangents: without the edge the pose is retract(pose, shift), to first order.
+  Eigen::VectorXd shift;
 };
 
-/// The edges among `candidates` whose absence moves the optimum `poses` farthest for what is known of it, by more than
-/// `least_distance`, at most `count`, farthest first. Case deletion (Cook, "Detection of influential observations in
-/// linear regression", 1977): with residual r, Jacobian J and information Omega of the edge, H the Hessian of all edges
-/// and C = J H^-1 J^T,
+/// The edges among `candidates` (positions in graph.edges) whose removal moves the optimum `poses` farthest in units of
+/// its uncertainty: those of a distance above `least_distance`, at most `count`, farthest first. Case deletion (Cook,
+/// "Detection of influential observations in linear regression", 1977): with residual r, Jacobian J and information
+/// Omega of the edge, H the Hessian of all edges and C = J H^-1 J^T,
 ///   shift = H^-1 J^T (Omega^-1 - C)^-1 r,   distance^2 = shift^T H shift,
-/// so one selected inverse serves all candidates, and one solution each the chosen ones. In directions in which nothing
-/// but the edge holds its two ends together it has no residual and, taken away, moves nothing. The first node of each
+/// so one selected inverse serves all candidates, and each chosen edge takes one more solution. In a direction in which
+/// only the edge holds its two ends together it has no residual, so removing it moves nothing. The first node of each
 /// connected component does not move. Empty for a graph that does not determine its poses.
 std::vector<Influence> largest_influences(const PoseGraph& graph, std::span<const Pose3> poses,
                                           std::span<const std::size_t> candidates, std::size_t count,
                                           double least_distance = 0.0);
 
-/// Per group of edges, what taking all of it away changes where it is, for what the rest knows of it: with x the
-/// relative pose between the ends of the group's middle edge, at the optimum `poses` and at that of the graph without
-/// the group, and P its covariance in the latter,
+/// Per group of edges (positions in graph.edges), how far the group moves the place that it is about, in units of what
+/// the rest of the graph knows of that place. With x the relative pose between the ends of the group's middle edge, at
+/// the optimum `poses` (with) and at the optimum of the graph without the group (without), and P the covariance of x in
+/// the graph without the group:
 ///   (x_with - x_without)^T P^-1 (x_with - x_without),
-/// below chi-square with 6 degrees of freedom if the group's edges and all others are right: all edges of a group count
-/// as one witness. Zero where the rest knows nothing. First order, and exact then: with K what the group knows of its
-/// own edges (whitened, J H^-1 J^T, at most 1) and r their residuals, the move is K (I - K)^-1 r, its covariance
-/// K (I - K)^-1. One selected inverse serves all groups. Zeros for a graph that does not determine its poses.
+/// which is at most chi-square with 6 degrees of freedom if the group's edges and all others are right, so all edges of
+/// a group count as one witness. Zero where the rest knows nothing. To first order: with r the whitened residuals of
+/// the group's edges, J their whitened Jacobians and K = J H^-1 J^T <= 1, the move is K (I - K)^-1 r and its covariance
+/// K (I - K)^-1, both at the middle edge. One selected inverse serves all groups. Zeros for a graph that does not
+/// determine its poses. `roles` as in solve_pose_graph(); an edge of a group must not be within a run of trusted steps.
 std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3> poses, std::span<const EdgeRole> roles,
                                   std::span<const std::vector<std::size_t>> groups);
 

@@ -12,7 +12,7 @@
 namespace tutti::estimation {
 
 struct SolverConfig {
-  int max_iterations = 50;                ///< Gauss-Newton steps at most; 0 only initialises.
+  int max_iterations = 50;                ///< Limit on the Gauss-Newton steps; 0 only initialises.
   double relative_cost_tolerance = 1e-9;  ///< Converged when a step can lower the cost by less than this share of it.
   std::string initialisation = "chordal";
   std::string loss = "none";
@@ -26,16 +26,17 @@ struct SolverConfig {
   }
 };
 
-/// Whether an edge may be wrong. `trusted` edges (odometry) never get a robust loss.
+/// Whether an edge may be wrong: `trusted` edges (odometry) never get a robust loss.
 enum class EdgeRole : unsigned char { trusted, robust };
 
-/// Odometry guessed from numbering: edges between consecutive nodes are trusted, all others robust.
+/// Roles for a graph that does not say which edges are odometry: edges between consecutive nodes are trusted, all
+/// others robust.
 std::vector<EdgeRole> roles_from_numbering(const PoseGraph& graph);
 
 struct SolveSummary {
   Termination termination = Termination::not_run;
   int iterations = 0;
-  int factorisations = 0;       ///< Of the Hessian; GNC: of all its solutions together.
+  int factorisations = 0;       ///< Factorisations of the Hessian; for GNC those of all its solutions together.
   double initial_cost = -1.0;   ///< Sum of rho(r^T Omega r) (chi2 without a loss) at the initial poses.
   double final_cost = -1.0;     ///< The same at the returned poses.
   double gradient_norm = -1.0;  ///< Largest entry of J^T Omega r at the last linearisation.
@@ -55,7 +56,7 @@ struct PoseGraphSolution {
 PoseGraphSolution solve_pose_graph(const PoseGraph& graph, const SolverConfig& config,
                                    std::span<const EdgeRole> roles = {});
 
-/// Sum of r^T Omega r over all edges at the graph's poses.
+/// Sum of r^T Omega r over all edges at the graph's poses (r: between_factor.hpp).
 double chi2(const PoseGraph& graph);
 
 }  // namespace tutti::estimation

@@ -20,13 +20,14 @@ struct RobustLoss {
   [[nodiscard]] double rho(double s) const;
   /// Weight of the factor in iteratively re-weighted least squares: rho'(s), in (0, 1].
   [[nodiscard]] double weight(double s) const;
-  /// Second derivative of rho(r^2) / 2 by r, as a share of the weight, at s = r^2: 1 + 2 s rho''(s) / rho'(s); 1
-  /// without a loss. Where the loss is hardly convex any more or not at all, it is 1 instead: there re-weighting alone
+  /// Second derivative of rho(r^2) / 2 by r, as a share of the weight, at s = r^2: 1 + 2 s rho''(s) / rho'(s). Where
+  /// that is below 0.1, so that the loss is hardly convex or not at all, 1 is returned instead: there only re-weighting
   /// is safe.
   [[nodiscard]] double curvature(double s) const;
 };
 
-/// From its name in a configuration ("none", "huber", "cauchy", "geman_mcclure"); another name is a bug of the caller.
+/// The kind of a name in a configuration ("none", "huber", "cauchy", "geman_mcclure"); another name is a bug of the
+/// caller.
 LossKind loss_kind(const std::string& name);
 
 }  // namespace tutti::estimation

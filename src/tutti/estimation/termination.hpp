@@ -33,7 +33,7 @@ constexpr std::string_view to_string(Termination t) {
   return "";
 }
 
-/// The poses are an optimum or on the way there.
+/// True when the returned poses are an optimum or on the way to one.
 constexpr bool is_usable(Termination t) {
   return t == Termination::converged || t == Termination::max_iterations || t == Termination::stalled;
 }

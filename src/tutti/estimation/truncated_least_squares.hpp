@@ -8,11 +8,13 @@
 
 namespace tutti::estimation {
 
-/// Sum over the edges of min(r^T Omega r, truncation), made small by graduated non-convexity (gnc.hpp), on the graph as
-/// it is. An edge with an infinite truncation is trusted. config.confidence is not used. `start`: the same without
-/// truncations (least_squares()).
+/// Minimises the sum over the edges of min(r^T Omega r, truncation[edge]) by graduated non-convexity (gnc.hpp), on the
+/// graph as it is, without compounding runs. An edge with an infinite truncation is trusted. `start`: the solution
+/// without truncations, least_squares() of the same graph. `fixed`: nodes that keep their poses (fixed_nodes.hpp).
+/// config.confidence is not used.
 GncResult truncated_least_squares(const PoseGraph& graph, const GncConfig& config, std::span<const double> truncation,
                                   const PoseGraphSolution& start, std::span<const std::size_t> fixed = {});
+/// solve_pose_graph() with config.solver, without any loss.
 PoseGraphSolution least_squares(const PoseGraph& graph, const GncConfig& config,
                                 std::span<const std::size_t> fixed = {});
 

@@ -8,8 +8,8 @@
 
 namespace tutti::evaluation {
 
-/// How well two estimates of the same robot agree where their stamps are equal (server against corrected robot): their
-/// difference after one rigid alignment, with `b` in the role of the reference. Nothing when no stamp is in both.
+/// How well two estimates of one robot agree (the server's against the robot's corrected one): the ATE of `a` with `b`
+/// as the reference, over the poses of equal stamps. No value when they have no stamp in common.
 std::optional<AteResult> agreement(const Trajectory& a, const Trajectory& b);
 
 }  // namespace tutti::evaluation

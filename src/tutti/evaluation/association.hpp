@@ -8,7 +8,7 @@
 
 namespace tutti::evaluation {
 
-/// One body seen by both trajectories at one moment.
+/// The poses of one body by both trajectories at one moment.
 struct PosePair {
   Timestamp stamp;  ///< The estimate's.
   Pose3 estimate;   ///< T_estimate_body
@@ -30,9 +30,11 @@ struct AssociationConfig {
   }
 };
 
-/// At most one pair per pose of the estimate, in its order. Interpolating, a pose pairs when its stamp equals a
-/// reference stamp or lies between two at most max_gap_s apart; otherwise when the nearest reference stamp (the earlier
-/// of two equally near) is within max_difference_s, and then one reference pose may serve several poses.
+/// Pairs every pose of the estimate with at most one pose of the reference, in the estimate's order; poses without a
+/// partner are left out. With config.interpolate a pose has a partner when its stamp equals a reference stamp or lies
+/// between two that are at most max_gap_s apart. Without, the partner is the pose of the nearest reference stamp (the
+/// earlier of two equally near) within max_difference_s; one reference pose may then be the partner of several poses.
+/// Both trajectories have increasing stamps.
 std::vector<PosePair> associate(const Trajectory& estimate, const Trajectory& reference,
                                 const AssociationConfig& config = {});
 

@@ -17,15 +17,16 @@ struct AteResult {
   double mean_m = 0.0;
   double median_m = 0.0;
   double max_m = 0.0;
-  double rmse_deg = 0.0;       ///< Of the angle between the aligned estimate's attitude and the reference's.
+  /// Root mean square of the angle between the aligned estimate's attitude and the reference's.
+  double rmse_deg = 0.0;
   Pose3 T_reference_estimate;  ///< The alignment.
 };
 
-/// Aligns positions (Umeyama 1991) and measures; nothing without pairs. Up to two pairs, or positions on one line,
-/// leave part of the rotation open: align_points() then takes the smallest. Several robots in one estimate frame:
-/// concatenate their pairs, which gives them one joint alignment.
+/// ATE after aligning the positions with align_points(); no value without pairs. Up to two pairs, or positions on one
+/// line, leave part of the rotation open: the smallest rotation is taken. The joint ATE of several robots whose
+/// estimates share a frame is that of their concatenated pairs.
 std::optional<AteResult> ate(std::span<const PosePair> pairs);
-/// The same under a given alignment.
+/// As ate(), under a given alignment.
 std::optional<AteResult> ate_aligned(std::span<const PosePair> pairs, const Pose3& T_reference_estimate);
 
 }  // namespace tutti::evaluation

@@ -12,24 +12,24 @@
 
 namespace tutti::evaluation {
 
-/// Cloud-to-cloud distance: how far the points of one cloud are from the surface that another describes. Every point
-/// counts the same: thin clouds to equal voxels first, or places seen often count more.
+/// Statistics of the distances between the points of one cloud and the surface that another cloud describes. Every
+/// point counts the same, so thin both clouds to equal voxels first; otherwise places that were seen often count more.
 struct CloudDistance {
   std::size_t points = 0;
   double mean_m = 0.0;
   double rms_m = 0.0;
   double p95_m = 0.0;        ///< 95 % of the points are at most this far.
-  double within_10cm = 0.0;  ///< Shares of the points, 0 to 1.
+  double within_10cm = 0.0;  ///< This and the next two: shares of the points, 0 to 1.
   double within_30cm = 0.0;
   double within_1m = 0.0;
 };
 
-/// Over the distances that are finite; nothing when none is.
+/// Statistics of the finite distances; no value when none is finite.
 std::optional<CloudDistance> summarise(std::span<const float> distances_m);
 
-/// A cloud that distances are measured to. Distances to its bare points could not be smaller than about half their
-/// spacing, whatever the map; so where the nearest point and its neighbours are flat, it is the distance to the patch
-/// of plane through them, which reaches as far as they do. Elsewhere it is the distance to the nearest point.
+/// The cloud that distances are measured to. Distances to bare points would hardly be smaller than half of the points'
+/// spacing, however good the map. So where the nearest point and its 7 neighbours are flat, the distance is that to the
+/// patch of plane through these points, which reaches as far as they do; elsewhere it is that to the nearest point.
 /// Immutable, safe to share between threads.
 class CloudIndex {
  public:
@@ -39,8 +39,8 @@ class CloudIndex {
   CloudIndex(const CloudIndex&) = delete;
   CloudIndex& operator=(const CloudIndex&) = delete;
 
-  /// Distance of every point of `cloud_b`, metres, never more than to the nearest point; NaN for points that are not
-  /// finite, or when this cloud is empty.
+  /// Distance of every point of `cloud_b`, m, never larger than that to the nearest point; NaN for points that are not
+  /// finite, and for all points when this cloud is empty.
   [[nodiscard]] std::vector<float> distances(const PointCloud& cloud_b, const Pose3& T_a_b = {}) const;
 
  private:

@@ -8,16 +8,18 @@
 
 namespace tutti::evaluation {
 
-/// The way along a trajectory, shared out among keyframes on it: each stands for the way from half-way to the keyframe
-/// before it to half-way to the one after it; the first and the last also for all before and after them.
+/// The length of a trajectory, divided among keyframes on it, so that one can say for what share of the way something
+/// holds. A keyframe stands for the way from half way to the keyframe before it until half way to the one after it; the
+/// first and the last one also stand for all that lies before and after.
 class KeyframeWay {
  public:
+  /// `way`: all poses of the trajectory; `keyframes`: poses at some of its stamps. Both by increasing stamps.
   KeyframeWay(std::span<const StampedPose> way, const Trajectory& keyframes);
 
-  /// The whole way; also when no keyframe lies on it.
+  /// Length of the trajectory, also when there are no keyframes.
   [[nodiscard]] double whole_m() const { return whole_m_; }
-  /// The part of it that some of the keyframes stand for (all of them: the whole way): `poses` have a stamp each, in
-  /// increasing order. Others do not count.
+  /// Length that the keyframes at the stamps of `poses` stand for together. `poses`: a range of anything with a
+  /// `stamp`, increasing; stamps of no keyframe do not count.
   template <class Poses>
   [[nodiscard]] double part_m(const Poses& poses) const {
     double sum_m = 0.0;

@@ -7,10 +7,11 @@
 
 namespace tutti::evaluation {
 
-/// The most that a correction changes short motions by, over pairs i, j of poses: j is the next pose after i, and the
-/// first at least `delta_s` later (left out where that overshoots by more than half, a gap). With R the raw and C the
-/// corrected estimate, R_ij = R_i^-1 R_j and C_ij likewise: |t(C_ij) - t(R_ij)| and the angle of rot(R_ij)^T rot(C_ij).
-/// No reference is in it: a good correction bends odometry gently, whatever it bends it to.
+/// The largest change of a short motion by a correction. It needs no reference: a good correction bends odometry
+/// gently, wherever it bends it to. Over pairs i, j of poses, j being the next pose after i and also the first one at
+/// least `delta_s` later (left out where it is later than (1 + kMaxOvershoot) delta_s, a gap): with R the raw and C the
+/// corrected estimate, R_ij = R_i^-1 R_j and C_ij likewise, the largest |t(C_ij) - t(R_ij)| and the largest angle of
+/// rot(R_ij)^T rot(C_ij).
 struct Kink {
   double translation_m = 0.0;
   double rotation_deg = 0.0;
@@ -18,7 +19,7 @@ struct Kink {
   Timestamp rotation_at;
 };
 
-/// Poses pair up where their stamps are equal; delta_s > 0. Nothing with fewer than two common poses.
+/// Compares the poses of equal stamps; delta_s > 0. No value with fewer than two stamps in common.
 std::optional<Kink> kink(const Trajectory& raw, const Trajectory& corrected, double delta_s = 1.0);
 
 }  // namespace tutti::evaluation

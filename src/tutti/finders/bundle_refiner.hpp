@@ -10,12 +10,12 @@
 
 namespace tutti::finders {
 
-/// Bundle adjustment over all that cameras saw of a job's submaps: their landmarks, joined where neighbours share a
-/// keyframe and where an accepted visual closure found them to be the same.
+/// Refines a map by bundle adjustment over everything that cameras saw of a job's submaps. Landmarks are merged where
+/// neighbouring submaps share a keyframe, and where an accepted visual closure found them to be the same point.
 class BundleRefiner final : public server::MapRefiner {
  public:
   static constexpr const char* kName = "bundle";
-  static constexpr std::uint32_t kVersion = 4;  ///< Raised by hand in the commit that changes what refine() makes.
+  static constexpr std::uint32_t kVersion = 4;  ///< A commit that changes the result of refine() raises it by hand.
   explicit BundleRefiner(const bundle::RefinementConfig& config);
   [[nodiscard]] MethodId id() const override { return {kName, kVersion, settings_hash(settings_)}; }
   [[nodiscard]] std::string settings() const override { return settings_; }

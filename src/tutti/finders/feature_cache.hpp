@@ -15,10 +15,10 @@
 
 namespace tutti::finders {
 
-/// Features of the newest submaps, as many as fit into a budget of bytes. Every new submap meets all others in turn: by
-/// the time an old one is wanted again all the others were, so that of those used last hardly any would be there. Those
-/// kept by their own age are there every time, and a new one always finds room. Safe to call from several threads.
-/// What the features take in memory, bytes_of(features) says, a function beside their type.
+/// Keeps the features of the newest submaps that fit into a budget of bytes; F is their type, and bytes_of(const F&), a
+/// function beside it, tells their size. Every new submap is compared with all others in turn; keeping the last used
+/// features would hardly ever help, while the newest submaps' features are found every time. May be called from several
+/// threads.
 template <class F>
 class FeatureCache {
  public:
@@ -26,8 +26,8 @@ class FeatureCache {
 
   explicit FeatureCache(std::size_t budget_bytes) : budget_bytes_(budget_bytes) {}
 
-  /// What is kept, or else what `compute` makes of it, once for all threads that ask meanwhile. A submap is as old as
-  /// the first call that names it. What `compute` throws, this throws.
+  /// The features of a submap: kept ones, or else what `compute` returns, which is called once for all threads that ask
+  /// meanwhile. The age of a submap is that of the first call for it. Exceptions of `compute` are passed on.
   Result<Features> get(SubmapId id, const std::function<Result<Features>()>& compute);
   [[nodiscard]] std::size_t held_bytes() const;  ///< Never more than the budget.
 
@@ -37,7 +37,7 @@ class FeatureCache {
     Features features;
     std::size_t bytes = 0;
   };
-  void keep(Age age, const Features& features);  // under the lock
+  void keep(Age age, const Features& features);  // called with the lock held
 
   std::size_t budget_bytes_;
   mutable std::mutex mutex_;  // guards everything below

@@ -9,11 +9,12 @@
 
 namespace tutti::finders {
 
-/// Who finds closures from what sensors saw.
+/// Which finder finds closures from what sensors saw, and its settings.
 struct FinderConfig {
   std::string finder = "lidar";
-  int min_submap_gap = 2;  ///< Submaps of one robot nearer than this are not compared; neighbours overlap anyway.
-  double feature_cache_mb = 1000.0;  ///< lidar: about 2,400 submaps of 5,000 points.
+  /// Submaps of one robot with a smaller difference of indices are not compared; neighbours overlap anyway.
+  int min_submap_gap = 2;
+  double feature_cache_mb = 1000.0;  ///< For lidar about 2,400 submaps of 5,000 points.
   lidar::LidarClosureConfig lidar;
   visual::VisualClosureConfig visual;
   template <class V>
@@ -24,7 +25,7 @@ struct FinderConfig {
   }
 
  protected:
-  /// All but who finds them.
+  /// Describes all settings but `finder`.
   template <class V>
   void describe_sensors(V& v) {
     v.field("min_submap_gap", min_submap_gap, at_least(1.0),

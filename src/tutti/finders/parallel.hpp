@@ -10,9 +10,9 @@
 
 namespace tutti::finders {
 
-/// Calls task(0) ... task(count - 1), each once, on up to `threads` threads (this one among them), and returns when all
-/// are done; the first exception of a task is thrown here. Standard threads and no pool: batches are few and heavy, and
-/// ThreadSanitizer understands them.
+/// Calls task(0) ... task(count - 1), each once, on up to `threads` threads including the calling one, and returns when
+/// all are done. The first exception of a task is rethrown. There is no pool of threads, because batches are few and
+/// heavy, and ThreadSanitizer understands standard threads.
 inline void for_each_parallel(std::size_t count, std::size_t threads, const std::function<void(std::size_t)>& task) {
   std::atomic<std::size_t> next{0};
   const auto work = [&] {

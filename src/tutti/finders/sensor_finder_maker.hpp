@@ -12,24 +12,24 @@
 
 namespace tutti::finders {
 
-/// The configured finder, under a name that says all that its answers depend on: `settings()`, of which any worker
-/// makes it again.
+/// The configured finder. Its id covers everything that its answers depend on: settings(), from which any worker can
+/// make it.
 std::shared_ptr<const server::ClosureFinder> make_finder(const FinderConfig& config);
-/// Null where no cameras find closures.
+/// The configured refiner; null when the finder does not use cameras.
 std::shared_ptr<const server::MapRefiner> make_refiner(const FinderConfig& finder,
                                                        const bundle::RefinementConfig& config);
 
-/// All of the settings that the configured finder's answers depend on, as YAML, and nothing else. Members of the
-/// structs that are no settings are not in it: whoever makes the finder of the text has their defaults, so who changes
-/// them in C++ gives the finder a name of its own (NamedFinder).
+/// All settings that the configured finder's (refiner's) answers depend on, and no others, as YAML. Members of the
+/// structs that are no settings are missing in it and get their defaults in a finder made from the text; code that
+/// changes these members must give the finder a name of its own (NamedFinder).
 std::string settings_of(const FinderConfig& config);
 std::string settings_of(const bundle::RefinementConfig& config);
 
-/// Makes every finder and refiner of sensor data of these texts. What other finders need (a reference, a mission) is in
-/// no text: only who has the mission has it.
+/// Makes finders and refiners of sensor data from such texts. Other finders need a reference or a mission, which no
+/// text holds.
 class SensorFinderMaker final : public server::FinderMaker {
  public:
-  /// `feature_cache_mb`: of each finder (FinderConfig).
+  /// `feature_cache_mb` is for each finder made (FinderConfig).
   explicit SensorFinderMaker(double feature_cache_mb) : feature_cache_mb_(feature_cache_mb) {}
   [[nodiscard]] std::vector<MethodId> can() const override;
   [[nodiscard]] Result<std::shared_ptr<const server::ClosureFinder>> finder(const MethodId& id,

@@ -18,8 +18,8 @@
 
 namespace tutti::finders {
 
-/// From the submap clouds alone. Features stay in memory of the newest submaps that fit into `cache_bytes`; those of
-/// others are computed again for every pair, with the same result.
+/// Finds closures from submap clouds. Features of the newest submaps are kept in `cache_bytes` of memory; those of
+/// others are computed again for each pair, with the same result.
 class LidarClosureFinder final : public server::ClosureFinder {
  public:
   LidarClosureFinder(const lidar::LidarClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
@@ -41,7 +41,7 @@ class LidarClosureFinder final : public server::ClosureFinder {
   mutable FeatureCache<lidar::SubmapFeatures> cache_;
 };
 
-/// From what cameras saw alone. Features are kept as the LiDAR's are.
+/// Finds closures from what cameras saw. Features are kept as LidarClosureFinder keeps them.
 class VisualClosureFinder final : public server::ClosureFinder {
  public:
   VisualClosureFinder(const visual::VisualClosureConfig& config, int min_submap_gap, std::size_t cache_bytes);
@@ -62,8 +62,8 @@ class VisualClosureFinder final : public server::ClosureFinder {
   mutable FeatureCache<visual::SubmapFeatures> cache_;
 };
 
-/// Several finders, one per kind of payload: a pair is compared by each that can. Mixed fleets meet through the robots
-/// that carry both kinds.
+/// Combines several finders, one per kind of payload: each pair is compared by every finder that can. Robots with
+/// different sensors are joined through robots that carry both kinds.
 class JointClosureFinder final : public server::ClosureFinder {
  public:
   explicit JointClosureFinder(std::vector<std::shared_ptr<const server::ClosureFinder>> finders);
@@ -78,10 +78,10 @@ class JointClosureFinder final : public server::ClosureFinder {
   std::vector<std::shared_ptr<const server::ClosureFinder>> finders_;
 };
 
-/// Another finder, under a name that says what its settings are; so do its verdicts.
+/// Another finder under an id that covers its settings; its verdicts carry this id too.
 class NamedFinder final : public server::ClosureFinder {
  public:
-  /// `settings`: ClosureFinder::settings().
+  /// `settings` is the text that ClosureFinder::settings() returns.
   NamedFinder(std::shared_ptr<const server::ClosureFinder> finder, MethodId id, std::string settings)
       : finder_(std::move(finder)), id_(std::move(id)), settings_(std::move(settings)) {}
   [[nodiscard]] MethodId id() const override { return id_; }
@@ -105,7 +105,7 @@ class NamedFinder final : public server::ClosureFinder {
   std::string settings_;
 };
 
-/// The configured finder, without a name.
+/// The configured finder, with an id that does not cover its settings.
 std::shared_ptr<const server::ClosureFinder> make_unnamed_finder(const FinderConfig& config);
 
 }  // namespace tutti::finders

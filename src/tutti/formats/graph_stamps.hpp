@@ -11,8 +11,9 @@
 #include "tutti/base/result.hpp"
 #include "tutti/base/timestamp.hpp"
 
-/// Which robot and moment each vertex of a pose graph is: the csv that a mission writes beside graph.g2o, with the
-/// header `id,robot,keyframe,stamp_ns` (docs/report.md).
+/// Reads and writes the csv that a mission writes beside graph.g2o, which says which keyframe each vertex is and when
+/// it was taken: `id,robot,keyframe,stamp_ns` (docs/report.md). Sessions are not in the file: keyframes are read as of
+/// session 0.
 namespace tutti::formats {
 
 struct VertexStamp {
@@ -22,10 +23,10 @@ struct VertexStamp {
   friend bool operator==(const VertexStamp&, const VertexStamp&) = default;
 };
 
-/// Where the stamps of a graph's file are looked for: "x_stamps.csv" beside "x.g2o".
+/// The path at which the stamps of a graph's file are expected: "x_stamps.csv" beside "x.g2o".
 std::string stamps_beside(const std::string& graph_path);
 
-/// In file order. Errors name file and line.
+/// The rows in file order. Errors name file and line.
 Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name);
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path);
 Status write_graph_stamps(const std::string& path, std::span<const VertexStamp> stamps);

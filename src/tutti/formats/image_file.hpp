@@ -11,30 +11,34 @@
 
 namespace tutti::formats {
 
-/// A PNG or JPEG file as grey, whichever its content is; colour by its luminance (JPEG's Y; for PNG the ITU-R BT.709
-/// weights of libpng). A truncated or damaged image is an error that names it, never half an image.
+/// Reads a PNG or JPEG file, told apart by content, as grey values of 8 bits. Colour becomes its luminance (JPEG's Y;
+/// for PNG the ITU-R BT.709 weights of libpng). A truncated or damaged image is an error that names the file, never
+/// half an image.
 Result<Image> read_image(const std::string& path);
-/// Of an image whose size is known; zeros: any.
+/// The size that an image must have; zeros accept any.
 struct ExpectedSize {
   int width_px = 0, height_px = 0;
 };
-/// The same from bytes; `name` is for the errors. Of another size than expected it is refused before it is decoded.
+/// As read_image(), from bytes; `name` stands for them in errors. An image of another size than expected is refused
+/// before it is decoded.
 Result<Image> decode_image(std::string_view bytes, const std::string& name, ExpectedSize expected = {});
 
-/// As PNG; not an empty one.
+/// The image, which is not empty, as a PNG file.
 std::string encode_png(const Image& image);
 
-/// A depth image: a grey PNG file of 16 bits a pixel; its numbers as they stand there.
+/// Reads a depth image: a grey PNG file of 16 bits a pixel, its numbers unchanged (DepthSensor::unit_m says what they
+/// mean).
 Result<DepthImage> read_depth(const std::string& path);
 Result<DepthImage> decode_depth(std::string_view bytes, const std::string& name, ExpectedSize expected = {});
-/// As such a PNG; not an empty one.
+/// The depth image, which is not empty, as such a PNG file.
 std::string encode_depth(const DepthImage& image);
 
-/// The images of a recording, read when asked for. Its moments are the stamps of the first camera; images that another
-/// took within `max_difference_s` are of the same moment. At least one camera.
+/// The images of a recording as a stream that reads each file when asked. The moments are the stamps of the first
+/// camera. Of every other camera, the image nearest to a moment belongs to it if within `max_difference_s`; where there
+/// is none, the image is empty. At least one camera.
 ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s = 0.005);
-/// And with the depth of what the first camera saw: of each of its images the depth image nearest in time, by
-/// increasing stamps, not farther than that. How many have one.
+/// Adds to a stream the depth of what its first camera saw: for every moment the depth image nearest in time, if within
+/// `max_difference_s`. `files`: by increasing stamps. Returns the number of moments that have depth.
 std::size_t add_depth(ImageStream& stream, const std::vector<ImageFile>& files, const DepthSensor& sensor,
                       double max_difference_s);
 

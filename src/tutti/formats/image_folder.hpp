@@ -8,11 +8,12 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/visual.hpp"
 
-/// Which image files a recording has and when they were taken; no pixel is read. Errors name file, line and value.
+/// Reads which image files a recording has and when they were taken, without reading a pixel. Errors name file, line
+/// and value.
 namespace tutti::formats {
 
 struct ImageFile {
-  Timestamp stamp;  ///< By the body's clock: the camera's time offset is in it.
+  Timestamp stamp;  ///< By the body's clock: the camera's time offset has been added.
   std::string path;
 };
 
@@ -28,15 +29,15 @@ struct CameraCalibration {
   double time_offset_s = 0.0;  ///< Added to its images' stamps gives the body's time (Kalibr's timeshift_cam_imu).
 };
 
-/// Our own calibration file: a list `cameras` of `model` (pinhole, equidistant, double_sphere), `width_px`,
-/// `height_px`, `intrinsics` [fx, fy, cx, cy], `distortion` (four numbers, as geometry/camera.hpp orders them, of a
-/// pinhole also OpenCV's five or eight; two for the double sphere; none for none), `T_body_camera` (4 x 4, row by row)
-/// and `time_offset_s`.
+/// Reads Tutti's calibration file (YAML): a list `cameras`, each with `model` (pinhole, equidistant, double_sphere),
+/// `width_px`, `height_px`, `intrinsics` [fx, fy, cx, cy], `distortion` (in the order of CameraKind: four numbers, for
+/// a pinhole also OpenCV's five or eight, for the double sphere two; an empty list means no distortion),
+/// `T_body_camera` (4 x 4, row by row) and `time_offset_s`.
 Result<std::vector<CameraCalibration>> parse_cameras(const std::string& text, const std::string& name);
 Result<std::vector<CameraCalibration>> read_cameras(const std::string& path);
 
-/// Images listed in a csv `stamp[ns],file of camera 0,file of camera 1,...`, files relative to `folder`; an empty cell:
-/// this camera took none then.
+/// Reads a list of images, a csv `stamp[ns],file of camera 0,file of camera 1,...` with files relative to `folder` and
+/// increasing stamps; an empty cell means that this camera took no image then. Returns one entry per camera.
 Result<std::vector<CameraImages>> parse_image_list(std::string_view text, const std::string& name,
                                                    const std::string& folder,
                                                    const std::vector<CameraCalibration>& cameras);
@@ -50,7 +51,7 @@ struct EurocFolder {
   ImuNoise imu_noise;
 };
 
-/// `folder` is mav0 or holds it. The body is the IMU: imu0's T_BS must be the identity.
+/// Reads such a recording; `folder` is mav0 or contains it. The body is the IMU, so imu0's T_BS must be the identity.
 Result<EurocFolder> read_euroc_folder(const std::string& folder);
 
 }  // namespace tutti::formats

@@ -10,8 +10,9 @@
 
 namespace tutti::formats {
 
-/// EuRoC's raw IMU: `stamp[ns],wx,wy,wz[rad/s],ax,ay,az[m/s^2]`; '#' starts a comment. Errors name file and line: wrong
-/// column count, NaN or infinity, values no IMU has, stamps that do not increase.
+/// Reads IMU samples as EuRoC's csv: `stamp[ns],wx,wy,wz[rad/s],ax,ay,az[m/s^2]`; '#' starts a comment. Errors name
+/// file and line: wrong column count, NaN or infinity, values that no IMU has (beyond 1e3 rad/s or 1e5 m/s^2), stamps
+/// that do not increase.
 Result<std::vector<ImuSample>> parse_imu_csv(std::string_view text, const std::string& name);
 Result<std::vector<ImuSample>> read_imu_csv(const std::string& path);
 

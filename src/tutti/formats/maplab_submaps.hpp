@@ -9,14 +9,16 @@
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
 
-/// What ROVIOLI, the front end of maplab, saw: folders with keyframes.tum, keypoints.csv, landmarks.csv and
-/// vi_map_raw/sensors.yaml, one per submap.
+/// Reads submaps of ROVIOLI, the front end of maplab: one folder per submap, with keyframes.tum, keypoints.csv,
+/// landmarks.csv and vi_map_raw/sensors.yaml.
 namespace tutti::formats {
 
 struct MaplabRecording {
-  Trajectory odometry;               ///< T_M_I of the keyframes, I being the body; M is the first submap's.
-  std::vector<TrackedImage> images;  ///< One per keyframe. Tracks are landmarks of quality 2 seen in two or more.
-  std::vector<Camera> cameras;       ///< One.
+  Trajectory odometry;  ///< T_M_I of the keyframes, in maplab's names: I is the body, M the odometry frame of the first
+                        ///< submap.
+  /// One per keyframe. A track is a landmark of quality 2 that two or more images see.
+  std::vector<TrackedImage> images;
+  std::vector<Camera> cameras;  ///< One camera.
   ImuNoise imu_noise;
 
   struct Summary {
@@ -24,14 +26,16 @@ struct MaplabRecording {
     std::size_t keypoints = 0;
     std::size_t good_landmarks = 0;    ///< Of quality 2, counted in every submap that has them.
     std::size_t joined_landmarks = 0;  ///< Continued in the next submap under another or the same id.
-    std::size_t conflicts = 0;  ///< Tracks of maplab's that carry several landmarks; landmarks twice in an image.
+    /// Tracks of maplab that carry several landmarks, and landmarks that are twice in one image.
+    std::size_t conflicts = 0;
   };
   Summary summary;
 };
 
-/// `folders`: consecutive submaps of one robot. A submap's last keyframe is the first of the next one, with the same
-/// keypoints; only there are their landmarks joined, as ids do not link submaps. Where its two poses differ, the frames
-/// M do, and the trajectory is continued from the earlier one.
+/// `folders`: consecutive submaps of one robot. The last keyframe of a submap must be the first of the next one, with
+/// the same keypoints. Landmarks of two submaps are joined in this shared keyframe only, because landmark ids do not
+/// link submaps. Where the two submaps give it different poses their frames M differ, and the trajectory is continued
+/// from the earlier one. Errors name the folder.
 Result<MaplabRecording> read_maplab_submaps(const std::vector<std::string>& folders);
 
 }  // namespace tutti::formats

@@ -19,18 +19,19 @@ struct Rgb {
   std::uint8_t blue = 0;
 };
 
-using Triangle = std::array<std::uint32_t, 3>;  ///< Positions of its corners among the points.
+using Triangle = std::array<std::uint32_t, 3>;  ///< Indices of the corners among the points.
 
-/// PLY 1.0, binary little endian, vertices x y z (float) and, with colours, red green blue (uchar). `colours` is empty
-/// or has one entry per point. With triangles: element `face` with one list of uchar and int, vertex_indices.
+/// A PLY 1.0 file, binary little endian: vertices x y z (float) and, with colours, red green blue (uchar); with
+/// triangles an element `face` with the list vertex_indices (uchar, int). `colours` is empty or has one entry per
+/// point.
 std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {},
                    std::span<const Triangle> triangles = {});
 Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {},
                  std::span<const Triangle> triangles = {});
 
-/// The vertices of an ascii or binary little-endian PLY file: x, y, z float or double at any position, other scalar
-/// properties skipped, elements after `vertex` (faces) ignored, points with a non-finite coordinate dropped. List
-/// properties in or before the vertices and big-endian files are ErrorCode::unsupported.
+/// The vertices of an ascii or binary little-endian PLY file. x, y, z are float or double at any position; other scalar
+/// properties and elements after `vertex` (faces) are skipped, and points with a non-finite coordinate dropped. List
+/// properties in or before the vertices and big-endian files are ErrorCode::unsupported, damage is ErrorCode::parse.
 Result<PointCloud> parse_ply(std::string_view bytes, const std::string& name);
 Result<PointCloud> read_ply(const std::string& path);
 

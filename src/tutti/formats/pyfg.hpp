@@ -12,16 +12,17 @@
 #include "tutti/base/timestamp.hpp"
 #include "tutti/model/relative_pose.hpp"
 
-/// Multi-robot pose graphs as PyFG text (PyFactorGraph, github.com/MarineRoboticsGroup), as COSMO-Bench's are handed
-/// round. Lines that we read, stamps in seconds, quaternions x y z w:
+/// Reads and writes multi-robot pose graphs as PyFG text (PyFactorGraph, github.com/MarineRoboticsGroup), the format of
+/// COSMO-Bench. Three kinds of lines are read, stamps in seconds, positions in m, quaternions x y z w:
 ///   VERTEX_SE3:QUAT stamp name x y z qx qy qz qw                     the true pose
 ///   VERTEX_SE3:QUAT:PRIOR stamp name 7 of the pose, 21 of its covariance
 ///   EDGE_SE3:QUAT stamp from to 7 of the pose, 21 of its covariance
-/// A name is the letter of the robot and a number, A12. A covariance is the upper triangle, row by row, in the tangent
+/// A name is the letter of the robot and a number: A12. A covariance is the upper triangle, row by row, in the tangent
 /// [translation; rotation vector] of RelativePose. Writers give it a fixed number of decimals, so small variances may
-/// be 0 and matrices may come out indefinite: of these the nearest positive semidefinite one is taken (negative
-/// eigenvalues become 0) and counted; one without a positive eigenvalue is refused unless it is 0. Landmarks and ranges
-/// (VERTEX_XYZ, EDGE_SE3_XYZ, EDGE_RANGE) and graphs in the plane (SE2) are refused: a map without them is another one.
+/// be 0 and a matrix may become indefinite; the nearest positive semidefinite one is then taken (negative eigenvalues
+/// become 0) and counted. A matrix without a positive eigenvalue is refused unless it is 0. Files with landmarks or
+/// ranges (VERTEX_XYZ, EDGE_SE3_XYZ, EDGE_RANGE) and planar graphs (SE2) are refused, because the rest of them would be
+/// another graph.
 namespace tutti::formats {
 
 struct PyfgName {
@@ -34,7 +35,7 @@ std::string to_string(const PyfgName& name);
 struct PyfgVertex {
   PyfgName name;
   Timestamp stamp;
-  Pose3 pose;                  ///< T_world_body; in files of benchmarks the truth.
+  Pose3 pose;                  ///< T_world_body; in benchmarks the ground truth.
   std::optional<Pose3> prior;  ///< T_world_body of its PRIOR line, whose covariance is checked and not kept.
   friend bool operator==(const PyfgVertex&, const PyfgVertex&) = default;
 };
@@ -48,19 +49,19 @@ struct PyfgEdge {
 };
 
 struct PyfgFile {
-  std::vector<PyfgVertex> vertices;  ///< By name: robot after robot, each by number.
+  std::vector<PyfgVertex> vertices;  ///< Sorted by name: by robot, then by number.
   std::vector<PyfgEdge> edges;       ///< In file order.
-  std::size_t indefinite = 0;        ///< Covariances that had to be replaced.
+  std::size_t indefinite = 0;        ///< Covariances that were replaced.
 };
 
-/// Errors name file and line: another tag, column count, a name that is none, a vertex that comes twice or is not
-/// there, values that are not finite, no unit quaternion, no covariance.
+/// Errors name file and line: an unknown tag, a wrong column count, a bad name, a vertex that is missing or comes
+/// twice, a number that is not finite, a quaternion that is not of unit norm, a covariance that is none.
 Result<PyfgFile> parse_pyfg(std::string_view text, const std::string& name);
 Result<PyfgFile> read_pyfg(const std::string& path);
-/// True if the first line that is no comment is of PyFG: a name stands where g2o has a number.
+/// True if the first line that is no comment has a name where g2o has a number.
 bool looks_like_pyfg(std::string_view text);
 
-/// Reads back bit for bit, but for the covariance of priors, which is written as 1e-6 (m2, rad2).
+/// Text that reads back bit for bit. Priors are written with a covariance of 1e-6 (m^2, rad^2).
 std::string to_pyfg(const PyfgFile& file);
 Status write_pyfg(const std::string& path, const PyfgFile& file);
 

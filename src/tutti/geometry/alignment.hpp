@@ -7,8 +7,9 @@
 
 namespace tutti {
 
-/// Rigid T_a_b (no scale) that minimises sum ||p_a - T_a_b p_b||^2 (Umeyama 1991). Sizes must agree; with fewer than 3
-/// points, or collinear ones, the undetermined part of the rotation is the smallest one. Empty input gives identity.
+/// Rigid T_a_b (no scale) that minimises sum ||p_a - T_a_b p_b||^2 over the pairs of points of equal index (Umeyama,
+/// PAMI 1991, eq. 40), m. Both spans have one size. Fewer than 3 points, or points on a line, leave part of the
+/// rotation open: the smallest rotation that fits is taken. No points give the identity.
 Pose3 align_points(std::span<const Eigen::Vector3d> points_a, std::span<const Eigen::Vector3d> points_b);
 
 }  // namespace tutti

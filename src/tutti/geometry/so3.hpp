@@ -10,11 +10,13 @@ namespace tutti {
 
 inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
+/// The matrix [v] of the cross product: skew(v) u = v x u.
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 
 /// Exp(theta), eqs. (101), (132); accurate for any |theta| (series below 1e-4).
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& theta);
-/// Log(q) in (-pi, pi], eq. (103), (133); q and -q give the same. |q| must be 1 within 1e-6.
+/// Log(q), rad, |Log(q)| <= pi, eqs. (103), (133). q and -q give the same vector, except at the angle pi, where they
+/// give opposite ones. |q| must be 1 within 1e-6.
 Eigen::Vector3d so3_log(const Eigen::Quaterniond& q);
 /// Right Jacobian: Exp(theta + d) ~ Exp(theta) Exp(Jr(theta) d), eq. (143), and its inverse, eq. (144).
 Eigen::Matrix3d so3_right_jacobian(const Eigen::Vector3d& theta);

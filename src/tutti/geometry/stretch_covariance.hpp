@@ -16,17 +16,18 @@ namespace tutti {
 class StretchCovariance {
  public:
   StretchCovariance() = default;
-  /// `poses`: T_w_k in any one frame, k = 0 .. n - 1. `steps[k]`: of T_{k-1}^-1 T_k (right tangent); steps[0] is not
-  /// used. As many steps as poses (checked).
+  /// `poses`: T_w_k in any one frame w, k = 0 .. n - 1. `steps[k]`: covariance of T_{k-1}^-1 T_k (right tangent);
+  /// steps[0] is not used, but both spans have one size (checked).
   StretchCovariance(std::span<const Pose3> poses, std::span<const Matrix6d> steps);
 
   [[nodiscard]] std::size_t size() const { return poses_.size(); }
-  /// Of T_a_b = T_a^-1 T_b (right tangent, first order), a <= b < size(); zero for a == b.
+  /// Covariance of T_a_b = T_w_a^-1 T_w_b (right tangent, first order), a <= b < size(); zero for a == b.
   [[nodiscard]] Matrix6d operator()(std::size_t a, std::size_t b) const;
 
  private:
   std::vector<Pose3> poses_;
-  /// level[l][k]: the steps between pose k and the middle of its block of 2^(l + 1) poses, seen from the middle.
+  /// level_[l][k]: covariance of the steps between pose k and the middle of its block of 2^(l + 1) poses, in the
+  /// middle's frame.
   std::vector<std::vector<Matrix6d>> level_;
 };
 

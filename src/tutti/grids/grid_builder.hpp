@@ -10,39 +10,43 @@
 
 namespace tutti::grids {
 
+/// How GridBuilder decides what is occupied.
 struct GridConfig {
   double resolution_m = 0.1;
-  double low_m = 0.15;    ///< What stands in the way is between this
-  double high_m = 1.5;    ///< and this above the ground.
-  double range_m = 10.0;  ///< What is farther from the nearest pose of its submap is not used.
-  double point_m = 0.3;  ///< Edge of the voxels to which submaps' clouds were thinned: a point stands for so much wall.
-  double robot_m = 0.25;  ///< About a robot's way so much is free, as it was there.
-  double mate_m = 0.7;    ///< So far from where another robot was at the time points are its body.
+  double low_m = 0.15;    ///< An obstacle is at least this high above the ground,
+  double high_m = 1.5;    ///< and not above this height.
+  double range_m = 10.0;  ///< Points farther, seen from above, from the nearest pose of their submap are not used.
+  /// Edge of the voxels to which submaps' clouds were thinned: a point stands for this much wall.
+  double point_m = 0.3;
+  double robot_m = 0.25;  ///< Free radius around a robot's trajectory, because the robot was there.
+  double mate_m = 0.7;    ///< Points this near to where another robot was at the time are taken for that robot's body.
 };
 
 /// A submap in a level frame: z is up.
 struct LevelSubmap {
   Trajectory keyframes;  ///< T_level_body
   std::vector<Eigen::Vector3f> points;
-  std::vector<Eigen::Vector3d> mates;  ///< Where others were while it was recorded.
+  std::vector<Eigen::Vector3d> mates;  ///< Positions of other robots while it was recorded, level frame.
 };
 
-/// The ground below a moment of a robot's way, level frame.
+/// A point of the ground below a robot's trajectory, level frame.
 using Ground = Eigen::Vector3d;
 
-/// Is a point of a submap another robot's body?
+/// True for a point (level frame) of another robot's body.
 bool is_mate(const LevelSubmap& submap, const Eigen::Vector3d& point, double mate_m);
 
-/// Collects submaps into a grid: each says once of a cell that something stands in the slab above its ground, or that
-/// nothing does: where the ground itself was seen, and where rays pass through that slab from the nearest pose of the
-/// submap to the voxel of a point, stopped by what stands in their way. The ground of a cell is that below the nearest
-/// part of any robot's way. One map from above: of two floors above each other each cell has the nearer one's ground.
+/// Collects submaps into an occupancy grid. A submap votes at most once on a cell that something stands in the slab
+/// [low_m, high_m] above the cell's ground, and at most once that nothing does. Votes for free come from ground that
+/// was seen and from rays through the slab, from the nearest pose of the submap to the voxel of a point; a ray ends
+/// where the same submap has an obstacle. The ground of a cell is that below the nearest part of any robot's
+/// trajectory, so of two floors above each other a cell gets the nearer one.
 class GridBuilder {
  public:
-  /// `ground`: of all robots' ways; at least one. An error: the grid would have too many cells.
+  /// `ground`: points below all robots' trajectories, at least one. A grid of more than 4e8 cells is an error.
   static Result<GridBuilder> create(const GridConfig& config, const std::vector<Ground>& ground);
   void add(const LevelSubmap& submap);
-  /// A cell is occupied where at least every third of the submaps that know it says so, free where others do.
+  /// The grid of all submaps so far: a cell is occupied where at least one in three votes says so, free where there are
+  /// other votes, and unknown elsewhere.
   [[nodiscard]] OccupancyGrid grid() const;
 
  private:
@@ -66,9 +70,9 @@ class GridBuilder {
   GridConfig config_;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   int width_ = 0, height_ = 0;
-  std::vector<float> ground_;                      ///< NaN where no way is near.
-  std::vector<std::uint16_t> hits_, passes_;       ///< Submaps that say so.
-  std::vector<std::uint32_t> hit_by_, passed_by_;  ///< The last submap that did.
+  std::vector<float> ground_;  ///< Height of each cell's ground, level frame; NaN where no trajectory is near.
+  std::vector<std::uint16_t> hits_, passes_;       ///< Votes of submaps, per cell.
+  std::vector<std::uint32_t> hit_by_, passed_by_;  ///< The last submap that voted, per cell.
   std::uint32_t submap_ = 0;
 };
 

@@ -11,30 +11,32 @@
 
 namespace tutti::grids {
 
-/// What a grid of a map's file is made with.
+/// How a grid of a map's file is made.
 struct MapGridConfig {
   GridConfig grid;
-  std::optional<double> body_height_m;  ///< Of the robots' body frames above the ground; none: found in their clouds.
+  std::optional<double> body_height_m;  ///< Height of the body frames above the ground; no value: found in the clouds.
 };
 
 struct MapGrid {
   OccupancyGrid grid;
-  Pose3 T_level_world;  ///< A rotation: the map's world has the tilt of the odometry that began it.
+  Pose3 T_level_world;  ///< A rotation, because the map's world has the tilt of the odometry that began it.
   std::map<ChainId, double> body_height_m;
-  std::size_t submaps = 0;      ///< That it is made of,
-  std::size_t left_out = 0;     ///< and with a cloud that is not in that part of the map.
-  std::size_t mate_points = 0;  ///< Cut out as other robots' bodies.
+  std::size_t submaps = 0;      ///< Submaps that the grid is made of.
+  std::size_t left_out = 0;     ///< Submaps with a cloud that are not in the component.
+  std::size_t mate_points = 0;  ///< Points cut out as other robots' bodies.
 };
 
-/// The part of the map that mapfile::component_to_show() says, in a level frame with the origin of its world: up is
-/// what the robots' bodies have for up on average. How high a body is above the ground is found for each session as
-/// the distance below the body at which most points within 4 m are. Made from the submaps where they are now, so that
-/// it follows every optimisation. Other robots' bodies are cut out of a submap's cloud within `mate_m` of where they
-/// were while it was recorded, by stamps of one clock. An error: there are no clouds, or no ground is to be found.
+/// The occupancy grid of the component that mapfile::component_to_show() names, in a level frame with the origin of its
+/// world: up is the mean z axis of the robots' bodies. Unless config.body_height_m says it, the height of a session's
+/// body above the ground is the depth below the body at which most of its points within 4 m are. The grid is made from
+/// the submaps at their present poses, so a new one follows every optimisation. Other robots' bodies are cut out of a
+/// submap's cloud within `mate_m` of where they were while it was recorded, which takes stamps of one clock. Errors:
+/// there are no clouds, or no ground can be found.
 Result<MapGrid> grid_of_map(const storage::TableStore& store, const mapfile::Content& content,
                             const server::MapEstimate& map, const MapGridConfig& config);
 
-/// Centres of the voxels in which any point of that part of the map is, without other robots' bodies, in its world.
+/// Centres of the voxels (edge `voxel_m`) that contain points of that component, without other robots' bodies, in its
+/// world, m.
 Result<PointCloud> voxels_of_map(const storage::TableStore& store, const mapfile::Content& content,
                                  const server::MapEstimate& map, double voxel_m, double mate_m);
 

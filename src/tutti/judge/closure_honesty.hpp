@@ -11,22 +11,24 @@
 
 namespace tutti::judge {
 
-/// Factors on the variances of closures, at least 1.
+/// Factors, at least 1, on the variances that closures state.
 struct ClosureHonesty {
   double translation = 1.0;
   double rotation = 1.0;
   friend bool operator==(const ClosureHonesty&, const ClosureHonesty&) = default;
 };
 
-/// By how much the closures between each two chains (the smaller first; or of one with itself) err more than they say.
-/// Every closure is held against its neighbour (neighbouring_closures(), odometry_loops.hpp): the least factors on both
-/// with which a quarter of the pairs miss by no more than chi-square allows a quarter, first the rotations, then the
-/// whole. A quarter, so that up to half of the pairs may hold a wrong closure. Nothing is changed (factor 1) with fewer
-/// than 8 pairs, or where both factors are below 2, as chance makes them.
+/// By how much the closures between two chains (the smaller first; or of one chain with itself) err more than they
+/// state. Every closure is compared with its neighbour (neighbouring_closures(), odometry_loops.hpp). The factors are
+/// the least with which a quarter of the pairs miss by no more than chi-square allows a quarter, first of rotation
+/// alone, then of translation for the whole. A quarter, so that half of the pairs may contain a wrong closure. A factor
+/// that would exceed 400 is 1, because too many closures are wrong to tell. Chains with fewer than 8 pairs, or with
+/// both factors below 2, as chance makes them, have no entry. docs/math.md, "Who is wrong?".
 std::map<std::pair<ChainId, ChainId>, ClosureHonesty> closure_honesty(std::span<const OdometryChain> chains,
                                                                       std::span<const LoopClosure> closures);
 
-/// S C S, S = diag(sqrt(translation) three times, sqrt(rotation) three times): right tangent.
+/// A closure's covariance C (right tangent) with the factors applied: S C S, S = diag(sqrt(translation) three times,
+/// sqrt(rotation) three times).
 Matrix6d scaled(const Matrix6d& covariance, const ClosureHonesty& by);
 
 }  // namespace tutti::judge

@@ -10,36 +10,43 @@
 
 namespace tutti::judge {
 
-/// Neighbouring runs of odometry that may be let go, by number.
+/// Consecutive runs of odometry, by number, that may be let go together.
 struct Window {
   std::size_t first = 0;
   std::size_t last = 0;  ///< Inclusive.
 };
 
+/// An assumption about what is wrong: odometry may be let go in these windows alone, and these closures are wrong.
 struct Hypothesis {
-  std::vector<Window> windows;                  ///< In order; none overlap. Of a solution: that let something go.
-  std::vector<std::vector<std::size_t>> wrong;  ///< Groups of closures.
+  std::vector<Window> windows;  ///< In order; none overlap. In a Solution only those in which something was let go.
+  std::vector<std::vector<std::size_t>> wrong;  ///< Groups of closures that are wrong for certain.
 };
 
-/// What a hypothesis makes of the closures. Votes: closures that end at one keyframe share one.
+/// The pose graph solved under a hypothesis, and what follows for the closures. Misfits are in votes, of which closures
+/// that end at one keyframe share one.
 struct Solution {
   Hypothesis hypothesis;
   bool solved = false;
-  std::vector<char> let_go;           ///< Per run.
-  std::vector<char> accepted;         ///< Per closure.
-  std::vector<FailedStretch> failed;  ///< Runs let go, neighbours together; nodes of the graph.
-  estimation::GncResult optimum;      ///< On the graph of the closures' ends.
-  double misfit = 0.0;                ///< In votes, with what windows and wrong groups pay.
-  double fit = 0.0;                   ///< The misfit without what windows pay.
-  std::vector<double> prices;         ///< What of the misfit each window pays; infinite where one failed too far.
-  bool suspicious = false;            ///< More than wrong closures strewn about may be behind what is unexplained.
-  double unexplained = 0.0;  ///< Votes of refused closures, and what strains one window of odometry beyond chance.
+  std::vector<char> let_go;    ///< Per run.
+  std::vector<char> accepted;  ///< Per closure.
+  /// Runs that were let go, neighbours joined; `from` and `to` are nodes of the graph.
+  std::vector<FailedStretch> failed;
+  estimation::GncResult optimum;  ///< On the graph of the closures' ends.
+  double misfit = 0.0;            ///< With the prices of windows and of wrong groups.
+  double fit = 0.0;               ///< The misfit without the prices of windows.
+  std::vector<double> prices;  ///< Per window its part of the misfit; infinite where odometry would have failed by more
+                               ///< than a body can move.
+  bool suspicious = false;     ///< What is unexplained is concentrated, or much, so that more than scattered wrong
+                               ///< closures may be behind it.
+  /// Votes of refused closures, plus the largest strain beyond chance on one window of odometry.
+  double unexplained = 0.0;
 };
 
 /// Solves a pose graph under hypotheses, on the graph of the closures' ends.
 class HypothesisSolver {
  public:
-  /// All must outlive this. `certain`: of each closure, whether it is right whatever it strains.
+  /// `odometry`, `config` and `gnc` must outlive the solver. `graph`, `odometry_edges`: as in explain_closures().
+  /// `certain`: per closure whether it is right whatever it strains.
   HypothesisSolver(const PoseGraph& graph, const OdometryWays& odometry, std::size_t odometry_edges,
                    const WhoIsWrongConfig& config, const estimation::GncConfig& gnc, std::vector<bool> certain);
 
@@ -49,9 +56,9 @@ class HypothesisSolver {
   /// is then this hypothesis's own, because it may let nothing else go.
   [[nodiscard]] Solution judge(Hypothesis hypothesis, estimation::GncResult optimum) const;
   [[nodiscard]] std::size_t runs() const { return runs_.size(); }
-  /// The runs around one, within the search distance on its piece.
+  /// The runs within config.search_s of a run, on the same piece of odometry.
   [[nodiscard]] Window around(std::size_t run) const;
-  /// So far.
+  /// Cost of all calls so far.
   [[nodiscard]] const SearchWork& work() const { return work_; }
   [[nodiscard]] double votes(std::size_t closure) const { return votes_[closure]; }
 

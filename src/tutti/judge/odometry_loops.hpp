@@ -13,7 +13,7 @@
 
 namespace tutti::judge {
 
-/// Odometry of one chain without a gap: a piece of it. A chain may have several, which do not overlap.
+/// A piece of a chain's odometry without a gap. A chain with missing submaps has several pieces, which do not overlap.
 struct OdometryChain {
   ChainId id;
   std::uint32_t first_index = 0;          ///< KeyframeId::index of T_odom_body[0]; the others count up from it.
@@ -21,35 +21,37 @@ struct OdometryChain {
   std::vector<Matrix6d> step_covariance;  ///< Of keyframe k -> k + 1 (right tangent); one fewer than poses.
 };
 
-/// A way over odometry and closures back to where it began.
+/// A loop over odometry and closures back to where it began.
 struct OdometryLoop {
-  Vector6d missed;          ///< By how far it fails to close (right tangent at its end: m, rad).
-  Matrix6d odometry;        ///< Covariance of `missed` that is odometry's, as stated,
-  Matrix6d closures;        ///< ... and what is the closures'.
-  std::uint32_t first = 0;  ///< KeyframeId::index: of the robot's own odometry it goes over these keyframes,
-  std::uint32_t last = 0;   ///< ... inclusive.
+  Vector6d missed;          ///< By how much the loop fails to close (right tangent at its end: m, rad).
+  Matrix6d odometry;        ///< Part of the covariance of `missed` that odometry states.
+  Matrix6d closures;        ///< Part that the closures state.
+  std::uint32_t first = 0;  ///< KeyframeId::index of the first keyframe that it goes over on its own chain.
+  std::uint32_t last = 0;   ///< ... and of the last one.
 };
 
-/// The loops that tell of each robot's odometry, every robot of `chains` among them: its closures with itself; and with
-/// every other robot pairs of closures, half their number apart, with both odometries between them, which tell of both
-/// robots. Half their number apart, because odometry, not the closures, is to be judged. Loops over a gap in odometry
-/// are left out.
+/// The loops that tell of each chain's odometry, with an entry for every chain in `chains`. Each closure of a chain
+/// with itself is a loop; and so are, with every other chain, pairs of closures with both odometries between their
+/// ends, which tell of both chains. The two closures of a pair are half of their number apart, so that much odometry
+/// lies between them: it, not the closures, is to be judged. Loops over a gap in odometry are left out.
 std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
                                                             std::span<const LoopClosure> closures);
 
 /// Two closures between the same two chains, with the odometry between their ends.
 struct ClosurePair {
-  LoopClosure first;    ///< Both from the chain with the smaller id, or from the earlier keyframe.
+  /// Both closures are from the chain with the smaller id, or, on one chain, from the earlier keyframe.
+  LoopClosure first;
   LoopClosure second;   ///< Begins no earlier than `first`.
-  RelativePose of_one;  ///< Odometry from first.from to second.from,
-  RelativePose of_two;  ///< ... and from first.to to second.to.
+  RelativePose of_one;  ///< Odometry from first.from to second.from.
+  RelativePose of_two;  ///< Odometry from first.to to second.to.
 };
 
-/// One way by closure, then odometry of the second chain; the other by odometry of the first, then closure.
+/// The loop of a pair: local(first * of_two, of_one * second).
 OdometryLoop loop_of(const ClosurePair& pair);
 
-/// Of each two chains with closures (or of one with itself) every closure and the nearest other one, by the larger
-/// distance in keyframes of their two ends, without gaps in odometry between them; each pair once.
+/// For every two chains with closures (or one with itself), every closure paired with its nearest other closure, each
+/// pair once. Nearness is the larger distance, in keyframes, of the two closures' ends; closures between the same two
+/// keyframes, and pairs with a gap in odometry between them, are left out.
 std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
     std::span<const OdometryChain> chains, std::span<const LoopClosure> closures);
 

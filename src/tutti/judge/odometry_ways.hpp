@@ -11,23 +11,24 @@
 
 namespace tutti::judge {
 
-/// The odometry of a pose graph: pieces without a gap, each a chain of edges from one node to a later one.
+/// The odometry of a pose graph, for relative poses between any two of its nodes. Odometry consists of pieces without a
+/// gap, each a chain of edges that lead from a node to a later one.
 class OdometryWays {
  public:
-  /// `seconds`: when each node was, from any moment on. `odometry`: at most one edge begins and one ends at a node,
-  /// begins before ends.
+  /// `seconds`: time of each node, from any origin. `odometry`: at most one edge begins and one ends at a node, and
+  /// from < to.
   OdometryWays(std::span<const double> seconds, std::span<const PoseGraphEdge> odometry);
 
   /// The first node of the piece that holds this one.
   [[nodiscard]] std::size_t piece(std::size_t node) const { return at_[node].piece; }
   [[nodiscard]] double seconds(std::size_t node) const { return at_[node].seconds; }
-  /// Median speed of all steps, m/s, above 0: neither what fails now and then nor one wild piece tells.
+  /// Median speed of all steps, m/s, above 0, which occasional failures and one diverged piece hardly change.
   [[nodiscard]] double usual_speed() const { return usual_speed_; }
-  /// T_first_node of the piece.
+  /// T_first_node, `first` being the first node of its piece.
   [[nodiscard]] const Pose3& pose(std::size_t node) const { return at_[node].pose; }
   /// T_a_b of two nodes of one piece, either first.
   [[nodiscard]] Pose3 T(std::size_t a, std::size_t b) const { return pose(a).inverse() * pose(b); }
-  /// The same with covariance.
+  /// T_a_b with its covariance.
   [[nodiscard]] RelativePose between(std::size_t a, std::size_t b) const;
   /// Trace of the rotation's covariance between two nodes of one piece.
   [[nodiscard]] double turn_variance(std::size_t a, std::size_t b) const;
@@ -37,7 +38,7 @@ class OdometryWays {
     std::size_t piece = 0;
     std::size_t position = 0;  ///< Along the piece.
     double seconds = 0.0;
-    double turn_variance = 0.0;  ///< Since the begin.
+    double turn_variance = 0.0;  ///< Since the piece began.
     Pose3 pose;
   };
   std::vector<At> at_;

@@ -5,19 +5,19 @@
 
 namespace tutti::judge {
 
-/// What odometry and closures must show against each other (who_is_wrong.hpp).
+/// Settings of judge_closures() and explain_closures().
 struct WhoIsWrongConfig {
   bool let_odometry_fail = true;
-  double confidence = 0.999;  ///< Share of pairs of true closures that should agree.
-  int least_support = 2;      ///< A closure with which fewer others agree, and odometry neither, is not considered.
-  double least_votes = 2.0;   ///< Failed odometry must explain more votes than this, one more for every run that is let
-                              ///< go, and more for what is far from the errors that odometry says it has.
-  double search_s = 20.0;  ///< Odometry so long before and after a candidate may have failed, too, before the candidate
-                           ///< must pay for itself.
-  int candidate_groups = 3;     ///< Groups of neighbouring closures, the largest, that are tried as wrong all together;
-                                ///< each must explain more than least_votes.
-  int most_refused_groups = 5;  ///< Groups that can be wrong all together.
-  int min_joining_closures = 2;  ///< Fewer closures do not join two robots, or two pieces of one robot's odometry.
+  double confidence = 0.999;  ///< Share of pairs of right closures that agree.
+  /// A closure with which fewer others agree, nor the odometry between its ends, is not considered.
+  int least_support = 2;
+  double least_votes = 2.0;  ///< Failed odometry must explain more votes than this, one more for every run that is let
+                             ///< go, and more the farther it is from the errors that odometry states.
+  double search_s = 20.0;  ///< A window reaches this long before and after a run of odometry that seems to have failed.
+  int candidate_groups = 3;  ///< Number of groups of neighbouring closures, the largest first, that are tried as wrong
+                             ///< all together; each must explain more than least_votes.
+  int most_refused_groups = 5;   ///< Limit on the groups that are refused so.
+  int min_joining_closures = 2;  ///< Fewer closures do not join two pieces of odometry.
 
   template <class V>
   void describe(V& v) {

@@ -12,7 +12,8 @@
 
 namespace tutti::lab {
 
-/// Programs started by this one. They are asked to end when it ends, however that is (end_with_parent()).
+/// Programs that this one has started. They are asked to end when this program ends, even if it is killed
+/// (end_with_parent()).
 class Children {
  public:
   Children() = default;
@@ -20,11 +21,11 @@ class Children {
   Children(const Children&) = delete;
   Children& operator=(const Children&) = delete;
 
-  /// `words`: the program and its arguments; what it prints goes to the file `output`.
+  /// Starts a program. `words` are the program and its arguments; its output goes to the file `output`.
   Status start(const std::string& name, std::vector<std::string> words, const std::filesystem::path& output);
-  /// An error when one has ended, with the end of what it printed.
+  /// Fails when a program has ended, with the end of its output.
   Status check();
-  /// SIGTERM, and SIGKILL to those that run on for 30 s. Returns when they have ended.
+  /// Sends SIGTERM, then SIGKILL to those still running after 30 s. Returns when they have ended.
   void stop(const std::vector<std::string>& names);
   void stop_all();
 

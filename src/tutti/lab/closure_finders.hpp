@@ -13,18 +13,18 @@
 
 namespace tutti::lab {
 
-/// A planted closure in terms of robots and stamps.
+/// A planted closure, in robots and stamps: a wrong closure at a given place and time.
 struct PlantedClosure {
   RobotId robot;
   Timestamp stamp;
   RobotId other;
   Timestamp other_stamp;
-  Pose3 T_claimed_true;  ///< Error of where the robot is claimed to be, in the other's body frame.
+  Pose3 T_claimed_true;  ///< Error of the claimed pose of `robot`, in the body frame of `other`.
 };
 
-/// For recordings without sensor data: true relative poses plus noise and a share of wrong ones. On the two submaps
-/// that contain the moments of a planted closure it says that one instead: between the keyframes next to them, the true
-/// relative pose but for the error, as confident as the others.
+/// For recordings without sensor data: closures from true relative poses, with noise and a share of wrong ones. For the
+/// two submaps that contain the moments of a planted closure it gives that one instead: between the keyframes nearest
+/// to these moments, the true relative pose with the given error, and the covariance of right ones.
 class ReferenceClosureFinder final : public server::ClosureFinder {
  public:
   ReferenceClosureFinder(std::map<RobotId, Trajectory> reference, const simulation::ReferenceClosureConfig& config,
@@ -50,11 +50,11 @@ class ReferenceClosureFinder final : public server::ClosureFinder {
 
   simulation::ReferenceClosures closures_;
   std::vector<PlantedClosure> planted_;
-  Matrix6d covariance_;  // of those
+  Matrix6d covariance_;  // of planted closures
 };
 
-/// What load_input() accepts is complete: planted closures name robots of the mission. A finder that needs the mission,
-/// because it draws or knows the reference, has no settings that a worker could make it of.
+/// The finder of a mission that load_input() has accepted (planted closures then name robots of the mission). A finder
+/// that needs the mission, because it draws or knows the reference, has no settings from which a worker could make it.
 std::shared_ptr<const server::ClosureFinder> make_closure_finder(
     const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed);
 

@@ -10,8 +10,8 @@
 
 namespace tutti::lab {
 
-/// The record of a mission whose programs have ended, from what they left in STATE/server and STATE/robots/NAME: maps
-/// and estimates from their stores, the course of the mission from their events. No timing but the robots' own.
+/// The record of a mission whose programs have ended, from their stores and events in STATE/server and
+/// STATE/robots/NAME. Of timing it only has what robots measured. Fails when something is missing or cannot be read.
 Result<mission::MissionRecord> collect_mission(const MissionConfig& config, const MissionSource& source,
                                                const std::filesystem::path& state, const std::string& version);
 

@@ -10,25 +10,26 @@
 #include "tutti/lab/mission_config.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// A map to drive on against the simulated world, which is known exactly.
+/// Scores an occupancy grid against the simulated world, which is known exactly.
 namespace tutti::lab {
 
-/// What is really in the slab of a cell.
+/// What the simulated world has in the slab of a cell.
 enum class TrueCell : std::uint8_t {
-  free,     ///< Nothing, anywhere in it.
-  surface,  ///< A wall or a thing goes through it.
-  rock      ///< It is all within one.
+  free,     ///< Nothing.
+  surface,  ///< A wall or an object cuts it.
+  rock      ///< All of it is inside one.
 };
 
+/// How many cells are what they are said to be, counted near the robots' way.
 struct GridScore {
-  static constexpr std::size_t kSaid = 3;                 ///< Free, occupied, unknown,
-  std::array<std::array<std::size_t, 3>, kSaid> cells{};  ///< by TrueCell; within `near_m` of a way.
-  std::size_t occupied_near_surface = 0;                  ///< Of those said occupied, with a surface in or beside it.
+  static constexpr std::size_t kSaid = 3;                 ///< What the grid says: free, occupied or unknown,
+  std::array<std::array<std::size_t, 3>, kSaid> cells{};  ///< then what is true (TrueCell).
+  std::size_t occupied_near_surface = 0;  ///< Cells said to be occupied that have a surface in or beside them.
   [[nodiscard]] std::size_t of(grids::OccupancyGrid::Cell said, TrueCell real) const;
 };
 
-/// Looks at every `stride`th cell in both directions whose centre is within `near_m` of a robot's true way. The grid is
-/// laid onto the truth by the one rigid motion that fits the map's keyframes to the robots' true poses best.
+/// Examines every `stride`-th cell in both directions whose centre is within `near_m` of a robot's true way. The grid
+/// is aligned with the truth by one rigid motion, fitted to the map's keyframes and the robots' true poses.
 Result<GridScore> score_grid(const grids::MapGrid& made, const grids::GridConfig& config,
                              const server::MapEstimate& map, const MissionConfig& mission, std::uint64_t seed,
                              double near_m = 3.0, std::size_t stride = 1);

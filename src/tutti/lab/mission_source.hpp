@@ -17,32 +17,34 @@
 
 namespace tutti::lab {
 
-/// What a program is told of its mission.
+/// The mission that a program was started with.
 struct MissionSource {
-  std::string file;  ///< MISSION.yaml; "demo": the built-in one; empty: none, and every setting has its default.
+  std::string file;  ///< MISSION.yaml; "demo": the built-in mission; empty: none, and every setting has its default.
   std::filesystem::path data;
   std::vector<std::string> assignments;  ///< KEY=VALUE
   std::uint64_t seed = 1;
-  std::string name = {};  ///< That the mission is to have on the bus; empty: the file's.
+  std::string name = {};  ///< The mission's name on the bus; empty: the file's.
 };
 
+/// Loads the mission; with the defaults of all settings when there is none.
 Result<MissionConfig> load(const MissionSource& source);
 
-/// What the mission is called on the bus: as the program was told, else as the file says, else as all are that are told
-/// nothing. An error: no name for a bus.
+/// The mission's name on the bus: the one in `source`, else the file's, else the default of programs that are told
+/// none. Fails when it cannot be a name on a bus.
 Result<std::string> name_on_bus(const MissionSource& source, const MissionConfig& config);
-/// Whether that was chosen by anybody.
+/// True if somebody chose that name.
 bool is_named(const MissionSource& source);
 
-/// The robots of the mission by their place in it, which is their number; empty when there is no mission.
+/// The robots of the mission; a robot's position in the list is its number. Empty when there is no mission.
 std::vector<std::string> robot_names(const MissionConfig& config);
-/// Reads the recordings only if the finder needs them.
+/// The mission's closure finder. Recordings are read only if the finder needs them.
 Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const MissionConfig& config,
                                                                  const MissionSource& source);
-/// What the programs of the mission are told of it.
+/// The settings that the mission gives its server and workers.
 Result<program::ServerSettings> server_settings(const MissionSource& source);
 Result<program::WorkerSettings> worker_settings(const MissionSource& source);
-/// And, unless it is fed (RobotOptions::feed), its recording, read here: sets settings, replay and duration_s.
+/// Sets the settings, replay and duration_s of a robot, and reads its recording for that unless the robot is fed
+/// (RobotOptions::feed).
 Status tell_robot(const MissionSource& source, program::RobotOptions& options);
 
 }  // namespace tutti::lab

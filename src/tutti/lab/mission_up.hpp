@@ -12,20 +12,21 @@
 
 namespace tutti::lab {
 
+/// What to run, and where.
 struct MissionUpOptions {
-  std::filesystem::path program;  ///< tutti itself.
+  std::filesystem::path program;  ///< The program `tutti` itself.
   MissionSource mission;
-  std::filesystem::path out;  ///< The programs' state and output go to OUT/state, which must not be there yet.
+  std::filesystem::path out;  ///< State and output of the programs go to OUT/state, which must not exist yet.
   double rate = 1.0;
-  int workers = 0;  ///< 0: the server verifies closures itself,
-  int threads = 1;  ///< on so many threads; each worker has as many.
+  int workers = 0;  ///< 0: the server verifies closures itself.
+  int threads = 1;  ///< Of the server without workers, and of each worker.
   std::string version;
-  std::function<void(const std::string&)> progress;  ///< One line, about twice a second.
+  std::function<void(const std::string&)> progress;  ///< Called with one line, about twice a second.
 };
 
-/// A whole mission as programs of this machine: a server with a bus of its own, a robot for each of the mission, and
-/// workers. Ends when all robots have replayed their recordings, the server has mapped everything, and every robot has
-/// heard the last map. An error: a program has ended before, with what it said; or `stop`.
+/// Runs a whole mission as programs on this machine: a server with its own bus, a program for each robot, and workers.
+/// Returns when all robots have replayed their recordings, the server has mapped everything, and every robot has
+/// received the last map. Fails when a program ends earlier (with its output), or at `stop`.
 Result<mission::MissionRecord> mission_up(const MissionUpOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace tutti::lab

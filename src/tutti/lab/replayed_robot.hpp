@@ -9,7 +9,7 @@
 
 namespace tutti::lab {
 
-/// A robot of a mission in a program of its own: its samples come from its recording.
+/// A mission's robot in a program of its own, with the samples of its recording.
 class ReplayedRobot final : public program::RobotDriver {
  public:
   explicit ReplayedRobot(std::unique_ptr<mission::RobotActor> actor) : actor_(std::move(actor)) {}

@@ -7,8 +7,8 @@
 
 namespace tutti::lab {
 
-/// mission::run_mission() of a mission file: simulates its robots or reads their recordings, and adds what the mission
-/// spoils and compares.
+/// Runs a mission file by mission::run_mission(): simulates its robots or reads their recordings, and adds what the
+/// laboratory spoils and compares.
 Result<mission::MissionRecord> run_mission(const MissionConfig& config, mission::RunOptions options);
 
 }  // namespace tutti::lab

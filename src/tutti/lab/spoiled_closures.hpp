@@ -13,7 +13,7 @@
 
 namespace tutti::lab {
 
-/// Wrong closures forced into a mission, to see what the server makes of them.
+/// How wrong closures are that the laboratory puts into a mission.
 struct SpoiledClosureConfig {
   double agreeing_share = 0.3;
   template <class V>
@@ -23,13 +23,14 @@ struct SpoiledClosureConfig {
   }
 };
 
-/// Makes a share of the verdicts that another finder accepts wrong, as confident as before. Which ones, and how wrong,
-/// depends on (seed, pair) only; agreeing ones share their error over blocks of two submaps of each robot.
+/// Makes a share of another finder's accepted verdicts wrong, with their covariance unchanged. Which ones, and how
+/// wrong they are, depends on (seed, pair) only; agreeing ones share their error over blocks of two submaps of each
+/// robot.
 class SpoiledClosureFinder final : public server::ClosureFinder {
  public:
   SpoiledClosureFinder(std::shared_ptr<const server::ClosureFinder> inner, double wrong_share,
                        const SpoiledClosureConfig& config, std::uint64_t seed);
-  /// The other's: whoever makes it gives it a name of its own (finders::NamedFinder).
+  /// The other finder's id; the caller must give this finder one of its own (finders::NamedFinder).
   [[nodiscard]] MethodId id() const override { return inner_->id(); }
   [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
     return inner_->can_compare(first, second);
@@ -45,7 +46,7 @@ class SpoiledClosureFinder final : public server::ClosureFinder {
   std::uint64_t seed_;
 };
 
-/// One wrong closure at a given place and time.
+/// One wrong closure at a given place and time; `describe` explains the fields.
 struct PlantedClosureConfig {
   std::string robot;
   double at_s = 0.0;

@@ -9,13 +9,14 @@
 
 namespace tutti::lab {
 
+/// Kind of the event that to_json() makes.
 inline constexpr const char* kUpdateScored = "update_scored";
 
-/// An event of a robot program: what it made of one proxy graph, and how far that is from the reference.
+/// An event of a robot program: what the robot made of one proxy graph, and how far the result is from the reference.
 program::Json to_json(const mission::UpdateRecord& update);
-/// Of program::to_json(); throws what the JSON library throws.
+/// Reads what program::to_json() wrote; throws what the JSON library throws.
 consistency::SuspectedOrigin origin_of(const program::Json& json);
-/// Of such an event.
+/// Reads what to_json() of an update wrote; fails when fields are missing.
 Result<mission::UpdateRecord> update_of(const program::Json& event);
 
 }  // namespace tutti::lab

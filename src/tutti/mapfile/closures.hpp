@@ -9,20 +9,22 @@
 
 namespace tutti::mapfile {
 
+/// What the map made of a closure.
 enum class ClosureState {
-  candidate,  ///< Found, but not judged: enough others tie these submaps, or a submap is left out of the map.
+  candidate,  ///< Found, but not judged: enough other closures tie these submaps, or the map leaves out one of them.
   accepted,
   rejected
 };
+/// "candidate", "accepted", "rejected".
 const char* to_string(ClosureState state);
 
-/// How a closure stands to the joint map.
+/// A closure, and how well it fits the joint map.
 struct ClosureFit {
   LoopClosure closure;
   ClosureState state = ClosureState::candidate;
   judge::Objection objection = judge::Objection::none;
-  /// By how much the map differs from it, and its squared error in units of its covariance (6 degrees of freedom);
-  /// nothing when the map does not join its two ends.
+  /// Difference between the closure and the map, and its squared Mahalanobis distance in the closure's covariance (6
+  /// degrees of freedom). No value when the map does not join the closure's two ends.
   struct Misfit {
     double position_m = 0.0;
     double rotation_rad = 0.0;
@@ -35,14 +37,14 @@ struct ClosureFit {
 struct ClosureInfo {
   SubmapPair pair;
   std::string name;
-  ClosureState state = ClosureState::candidate;  ///< Accepted when any of them is.
-  std::string reason;                            ///< Why not accepted; who said so.
-  std::vector<ClosureFit> closures;              ///< None: an operator has rejected in advance what may be found.
-  std::optional<ClosureVerdict> verdict;         ///< Evidence, version of the finder, who verified it and when.
-  std::optional<ClosureWord> word;               ///< The operator's, also when it is withdrawn.
+  ClosureState state = ClosureState::candidate;  ///< Accepted when any of the closures is.
+  std::string reason;                     ///< For people: why the state is not accepted, or which operator decided.
+  std::vector<ClosureFit> closures;       ///< Empty when an operator has rejected in advance what may be found.
+  std::optional<ClosureVerdict> verdict;  ///< With the evidence, the finder's version, the worker and the time.
+  std::optional<ClosureWord> word;        ///< The operator's word, also one that was withdrawn.
 };
 
-/// All pairs with closures or words, by their submaps.
+/// All pairs with closures or with a word that was not withdrawn, by their submaps.
 std::vector<ClosureInfo> closures(const Content& content, const server::MapEstimate& map);
 
 }  // namespace tutti::mapfile

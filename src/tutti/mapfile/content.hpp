@@ -13,43 +13,48 @@
 #include "tutti/server/closure_names.hpp"
 #include "tutti/storage/table_store.hpp"
 
-/// A map as a file that no server has open: looked into, told an operator's word, exported, joined with another.
+/// Reads a map's file that no server has open, recomputes its estimate, and stores operators' words in it.
 namespace tutti::mapfile {
 
-/// What a map's store holds. Clouds stay there.
+/// What a map's store holds, except for the submaps' payloads.
 struct Content {
   node::MapMeta meta;
-  std::optional<node::MapCounts> counts;  ///< Of the last update.
+  std::optional<node::MapCounts> counts;  ///< Counts of the last update.
   server::ServerConfig settings;
   server::SubmapSet submaps;
-  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of submaps that carry any.
+  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Only submaps that carry a payload are in it.
   server::VerdictSet verdicts;                    ///< With their evidence.
   WordSet words;
   server::Refinements refinements;
   std::map<RobotId, std::string> names;
-  std::map<MethodId, std::size_t> refused;  ///< Pairs, by who refused them.
-  std::map<MethodId, std::size_t> aside;    ///< Pairs with closures of finders that the server's was not: not believed.
+  std::map<MethodId, std::size_t> refused;  ///< Refused pairs, by the finder that refused them.
+  /// Pairs with closures of other finders than the server's, which are not believed.
+  std::map<MethodId, std::size_t> aside;
   struct Table {
     std::size_t rows = 0;
-    std::uint64_t bytes = 0;                          ///< Of keys and rows.
-    std::map<std::uint16_t, std::size_t> versions{};  ///< Rows by the version of their message; not of `meta`.
-    std::size_t unread = 0;                           ///< Rows of versions that this program does not read: left out.
+    std::uint64_t bytes = 0;                          ///< Size of keys and rows.
+    std::map<std::uint16_t, std::size_t> versions{};  ///< Rows by the version of their message; empty for `meta`.
+    std::size_t unread = 0;  ///< Rows of versions that this program does not read, which are left out.
   };
   std::map<std::string, Table> tables;
 
   [[nodiscard]] server::ClosureNames closure_names() const;
 };
 
+/// Reads all tables of a map. A row that is damaged is an error; one of a version that is not read is counted in
+/// Table::unread.
 Result<Content> read(const storage::TableStore& map);
 
-/// The joint map, judged as the server judges it, and refined as it has it.
+/// The joint map, estimated as the server does with its settings: closures judged, refinements applied, laid on the
+/// earth where submaps carry fixes.
 server::MapEstimate estimate(const Content& content);
 
-/// A map's file, which must be there. An error: it is open in another program, or no map.
+/// Opens an existing map's file, for this program alone. Errors: there is no such file, it is no map, or another
+/// program has it open.
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file);
 
-/// Puts an operator's word into the map; the server that opens it next follows it. An error, and nothing is stored: the
-/// closure is not there (server::MapServer::receive), or a word that was given later holds.
+/// Stores an operator's word, which the server that opens the map next follows. On an error nothing is stored: the
+/// closure's name or submaps are unknown, there is no closure to accept, or a word that was given later holds.
 Status put_word(storage::TableStore& map, const ClosureWord& word);
 
 }  // namespace tutti::mapfile

@@ -12,21 +12,22 @@
 
 namespace tutti::mapfile {
 
-/// The joint pose graph, odometry and accepted closures, as a mission's report writes it: vertices are numbered by
-/// their place, and beside "x.g2o" lies "x_stamps.csv" (formats/graph_stamps.hpp).
+/// Writes the joint pose graph, odometry and accepted closures, as a mission's report does: vertices are numbered by
+/// position, and beside "x.g2o" comes "x_stamps.csv" (formats/graph_stamps.hpp).
 Status export_g2o(const server::MapEstimate& map, const std::filesystem::path& file);
 
-/// Every session's trajectory in the joint map as FOLDER/NAME.tum, NAME as in closures' names; the folder is made.
-/// Returns the files' names. Sessions that nothing ties together have unrelated frames (server::choose_components).
+/// Writes every session's T_world_body as FOLDER/NAME.tum, NAME as in closures' names, and makes the folder if it is
+/// missing. Returns the files' names. Sessions in different components have unrelated worlds
+/// (server::choose_components).
 Result<std::vector<std::string>> export_tum(const Content& content, const server::MapEstimate& map,
                                             const std::filesystem::path& folder);
 
-/// What all robots of a component saw (component_to_show()), in its frame, thinned to voxels of 0.1 m.
+/// The clouds of all submaps in the component that component_to_show() names, in its world, thinned to voxels of 0.1 m.
 struct JointCloud {
   std::uint32_t component = 0;
   PointCloud cloud;
-  std::size_t submaps = 0;   ///< With a cloud, in it,
-  std::size_t left_out = 0;  ///< and not in it.
+  std::size_t submaps = 0;   ///< Submaps with a cloud, in the component.
+  std::size_t left_out = 0;  ///< Submaps with a cloud that are not in the component.
 };
 Result<JointCloud> joint_cloud(const storage::TableStore& store, const Content& content,
                                const server::MapEstimate& map);
@@ -34,10 +35,10 @@ Result<JointCloud> joint_cloud(const storage::TableStore& store, const Content& 
 struct ExportedCloud {
   std::size_t points = 0;
   std::size_t submaps = 0;
-  std::size_t left_out = 0;    ///< Submaps with a cloud that are not in this component.
-  bool of_the_largest = true;  ///< Component; otherwise that has no clouds, and this is the one with most points.
+  std::size_t left_out = 0;    ///< Submaps with a cloud that are not in the component.
+  bool of_the_largest = true;  ///< False: the largest component has no clouds, and this is the one with most points.
 };
-/// joint_cloud() as a file; none where nobody saw anything.
+/// Writes joint_cloud() as a PLY file; without points no file is written.
 Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
                                  const server::MapEstimate& map, const std::filesystem::path& file);
 

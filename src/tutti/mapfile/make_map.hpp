@@ -10,15 +10,17 @@
 
 namespace tutti::mapfile {
 
-/// A new map that `fill` writes into. `out` must not be there; it appears whole or, on an error, not at all.
+/// Makes a new map's file that `fill` writes. `out` must not exist; it appears whole or, on an error, not at all.
 Status make_map(const std::filesystem::path& out, const std::function<Status(storage::TableStore&)>& fill);
-/// One that has all rows of another store.
+/// Makes a new map's file with all rows of another store; `out` as in make_map().
 Status copy_map(const storage::TableStore& from, const std::filesystem::path& out);
-/// So that nothing is left of it when a program ends in between: the name of a file that is being made beside `out`.
+/// The name that make_map() uses beside `out` until the file is whole, for programs that remove what an interrupted one
+/// left.
 std::filesystem::path part_of(const std::filesystem::path& out);
+/// Removes a store's file and what SQLite leaves beside it; a missing file is no error.
 void remove_store(const std::filesystem::path& file);
 
-/// Commits rows in portions, so that a large map does not have to fit into memory.
+/// Commits rows in portions of 16 MB, so that a large map need not fit into memory. flush() commits the rest.
 class Writer {
  public:
   explicit Writer(storage::TableStore& out) : out_(out) {}

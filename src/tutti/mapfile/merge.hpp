@@ -10,17 +10,19 @@ namespace tutti::mapfile {
 
 struct Merged {
   std::size_t submaps = 0;
-  std::size_t shared = 0;  ///< Submaps that were in both.
+  std::size_t shared = 0;  ///< Submaps that are in both maps.
 };
 
-/// Puts what two maps hold into an empty third: submaps, verdicts and words, their bytes as they came. Pairs of submaps
-/// from both are candidates for the server that opens it, and robots hear what it sends: its epoch is larger than both.
-/// Robots keep their numbers, so that one number must not be two robots' (by name, where both maps know it), and one
-/// submap not be two; these are errors that name them. Of two verdicts on one pair the newer finder's is taken, of two
-/// words the later, of settings the first map's.
+/// Puts what two maps hold into an empty third: submaps, verdicts, answers and words with their bytes unchanged,
+/// refinements as ones of parts of the joint map. The server that opens the third map looks for closures between the
+/// two, and robots follow it, because its epoch is larger than both. Robots keep their numbers, so it is an error that
+/// names them when one number is two robots' (by name, where both maps know it), when one name has two numbers, or when
+/// a submap is in both maps with different content. Of two verdicts on one pair by versions of one finder the newer
+/// version's is taken, otherwise the first map's (of one and the same finder a refusal goes first); of two words the
+/// later; of settings the first map's.
 Result<Merged> merge(const storage::TableStore& a, const storage::TableStore& b, storage::TableStore& out);
 
-/// The same with files. `out` must not be there; it appears whole or not at all.
+/// As above, with files. `out` must not exist; it appears whole or not at all.
 Result<Merged> merge(const std::filesystem::path& a, const std::filesystem::path& b, const std::filesystem::path& out);
 
 }  // namespace tutti::mapfile

@@ -8,12 +8,13 @@
 
 namespace tutti::mapfile {
 
-/// Where a submap lies, in the world of a component. It hangs on the keyframe in its middle.
+/// Pose of a submap in the world of its component. It follows from the estimate of the keyframe in the submap's middle
+/// and the odometry from the submap's first keyframe to it.
 struct Place {
   std::uint32_t component = 0;
   Pose3 T_world_submap;
 };
-/// Nothing: the map does not have it.
+/// No value when the map leaves the submap out.
 std::optional<Place> place(const Submap& submap, const server::MapEstimate& map);
 
 /// The largest component, or, where nobody there has a cloud, the one with most points.

@@ -14,44 +14,48 @@
 #include "tutti/evaluation/kink.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// Two trajectories of one body, explained as a robot explains itself against the server's map: A plays the server, B
-/// the robot's odometry.
+/// Compares two trajectories of one body in the way in which a robot compares itself with the server's map: A takes the
+/// place of the server, B that of the robot's odometry.
 namespace tutti::mission {
 
-/// One trajectory of a file or folder.
+/// One trajectory from a file or folder.
 struct NamedTrajectory {
-  std::string name;  ///< Of the robot; empty when there is only one.
+  std::string name;  ///< Name of the robot; empty when there is only one.
   Trajectory poses;
-  /// Of the motion from pose k to k + 1 (right tangent), positive definite; one fewer than poses, or empty: not known.
+  /// Covariance of the motion from pose k to k + 1 (right tangent), positive definite; one fewer than poses, or empty
+  /// when unknown.
   std::vector<Matrix6d> step_covariance;
 };
 
+/// How two trajectories are compared; A judges, B is judged.
 struct CompareTrajectoriesConfig {
   evaluation::AssociationConfig association;  ///< B's poses are the estimates, A's the references.
   double tolerance_m = 0.05;                  ///< Standard deviation of A's positions, over stretches of any length.
-  double tolerance_deg = 0.5;                 ///< The same of its rotations.
-  /// Nodes are this far apart along A, nearer where B parts from A by twice as much; 0: a 500th of the way, at least
-  /// 0.1 m.
+  double tolerance_deg = 0.5;                 ///< Standard deviation of A's rotations.
+  /// Distance between nodes along A; they are closer where B departs from A by more than twice as much. 0: a 500th of
+  /// the way, at least 0.1 m.
   double spacing_m = 0.0;
-  double odometry_m = 0.03;   ///< Where B brings no covariance: standard deviation of its motion over 1 m; grows with
+  double odometry_m = 0.03;   ///< When B has no covariance: standard deviation of its motion over 1 m, which grows with
   double odometry_deg = 0.3;  ///< the square root of the way.
   double false_alarm_rate = 0.01;
 };
 
+/// How B differs from A.
 struct TrajectoryComparison {
   std::string name;
-  std::size_t poses = 0;   ///< Of B.
-  std::size_t paired = 0;  ///< Of these, with a pose of A.
-  double spacing_m = 0.0;  ///< As used.
-  double way_m = 0.0;      ///< Along A.
+  std::size_t poses = 0;   ///< Poses of B.
+  std::size_t paired = 0;  ///< Poses of B that have one of A.
+  double spacing_m = 0.0;  ///< As it was used.
+  double way_m = 0.0;      ///< Length along A.
   Trajectory judge;        ///< A at the nodes, in A's frame.
   Trajectory judged;       ///< B at the nodes, moved into A's frame by one rigid alignment.
-  Trajectory corrected;    ///< B with the constraints at the nodes, likewise.
+  Trajectory corrected;    ///< B at the nodes after optimising it with the constraints, moved likewise.
   consistency::Explanation explanation;
-  std::vector<consistency::Constraint> constraints;  ///< Relative poses of A that would fix B; the policy `adaptive`'s.
-  evaluation::AteResult before;                      ///< B's nodes against A's.
-  evaluation::AteResult after;                       ///< `corrected` against A's.
-  evaluation::Kink kink;                             ///< What correcting does to B's short motions.
+  /// Relative poses of A that would correct B, chosen by the policy `adaptive`.
+  std::vector<consistency::Constraint> constraints;
+  evaluation::AteResult before;  ///< ATE of B's nodes against A's.
+  evaluation::AteResult after;   ///< ATE of `corrected` against A's nodes.
+  evaluation::Kink kink;         ///< How much the correction changes B's short motions.
 };
 
 /// Fails when fewer than two poses of B have one of A at their time, or a covariance is not positive definite.

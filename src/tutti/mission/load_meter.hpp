@@ -6,16 +6,16 @@
 
 namespace tutti::mission {
 
-/// Processor and number of threads, in words, as far as the system tells.
+/// Processor and number of threads in words, as far as the system tells.
 std::string machine_description();
 
-/// The most memory this process ever held resident, in 10^6 bytes; 0 where the system does not tell.
+/// Largest resident memory of this process so far, in 10^6 bytes; 0 where the system does not tell.
 double peak_memory_mb();
 
-/// CPU seconds of the calling thread.
+/// CPU time of the calling thread so far, in seconds.
 double thread_cpu_s();
 
-/// Wall-clock milliseconds since it was made or last asked.
+/// Measures wall time in milliseconds, since it was made or last asked.
 class Stopwatch {
  public:
   double lap_ms() {

@@ -17,31 +17,31 @@
 
 namespace tutti::mission {
 
-/// One robot when its mission is over.
+/// One robot whose mission is over.
 struct FinishedRobot {
   RobotOutcome outcome;
   std::vector<UpdateRecord> updates;
   std::optional<consistency::Explanation> explanation;  ///< Of the last update.
   std::vector<std::string> troubles;
-  std::string refused_images;          ///< Why images were refused, the first time.
-  std::vector<TrafficRecord> traffic;  ///< Without bytes_per_s.
+  std::string refused_images;          ///< Why images were refused first; empty when none were.
+  std::vector<TrafficRecord> traffic;  ///< bytes_per_s is not set.
 };
 
-/// A mission that is over, however it was run.
+/// A mission that is over, whichever program ran it. The references must outlive it.
 struct FinishedMission {
   const MissionConfig& config;
   std::uint64_t seed = 1;
   std::string version;
-  std::string settings_yaml = {};  ///< RunOptions
+  std::string settings_yaml = {};  ///< RunOptions::settings_yaml
   double duration_s = 0.0;
   std::shared_ptr<const PointCloud> survey;
-  std::vector<FinishedRobot> robots;  ///< By their numbers, from 0.
+  std::vector<FinishedRobot> robots;  ///< By number, from 0.
   const node::ServerNode& server;
   const MissionEvents& events;
   std::map<bus::SimulatedRadio::Topic, std::size_t> undelivered;
 };
 
-/// Everything but the timing.
+/// The mission's record without its timing.
 MissionRecord make_record(const FinishedMission& mission);
 
 }  // namespace tutti::mission

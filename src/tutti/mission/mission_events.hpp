@@ -10,25 +10,25 @@
 
 namespace tutti::mission {
 
-/// What a mission's record says of its course, folded from the events of all nodes in their order. What becomes of each
-/// robot its RobotActor folds.
+/// The course of a mission for its record, collected from the events of all nodes in order. What becomes of each robot
+/// is collected by its RobotActor.
 class MissionEvents {
  public:
   void take(const node::Event& event);
   void take(const ChangeOfMindRecord& change);
-  /// Of the closures of the map update taken last.
+  /// Sets how many accepted closures of the latest map update are wrong.
   void set_wrong(std::size_t wrong) { updates_.back().wrong = wrong; }
 
   [[nodiscard]] const std::vector<MapUpdateRecord>& updates() const { return updates_; }
   [[nodiscard]] const std::vector<ChangeOfMindRecord>& changes_of_mind() const { return changes_of_mind_; }
-  /// One line that says how many messages were refused, and the first reason; none if none was.
+  /// Adds one note on how many messages were refused, with the first reason; none if none was.
   void note_refusals(MissionRecord& record) const;
 
  private:
   std::vector<MapUpdateRecord> updates_;
   std::vector<ChangeOfMindRecord> changes_of_mind_;
   std::vector<std::string> refusals_;
-  std::set<SubmapPair> failed_;  // pairs that could not be verified: they are tried again and again
+  std::set<SubmapPair> failed_;  // pairs that could not be verified and are tried repeatedly
 };
 
 }  // namespace tutti::mission

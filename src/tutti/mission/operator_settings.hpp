@@ -6,12 +6,13 @@
 
 namespace tutti::mission {
 
-/// What somebody sets who runs a mission on his own robots; all else is for tuning.
+/// A setting that people set who run missions on their own robots; all other settings are for tuning.
 struct OperatorSetting {
-  std::string_view key;      ///< As document_config lists it.
+  std::string_view key;      ///< Key in document_config()'s list.
   std::string_view meaning;  ///< One sentence.
 };
 
+/// All of these settings, in the order in which they are shown.
 std::span<const OperatorSetting> operator_settings();
 
 }  // namespace tutti::mission

@@ -11,10 +11,11 @@
 
 namespace tutti::mission {
 
-/// The pose graph's map of the same submaps and closures, made by a judge who knows the reference: closures that are
-/// wrong (ClosureCheckConfig) are not there, all others are right for certain, whatever they strain. A map's error over
-/// this one's is what judging costs; it is below 1 where closures that are off by less than that are better left out.
-/// Closures whose ends have no reference are judged as ever. Nothing where no closure can be checked.
+/// The map that a perfect judge of closures would make: the pose graph's map of the same submaps and closures, where
+/// wrong closures (ClosureCheckConfig, by the reference) are left out and all others are certain, whatever they
+/// contradict. The error of the actual map divided by this map's is the price of judging; it can be below 1, where
+/// closures within the limits are better left out. Closures whose ends have no reference are judged as usual. Nothing
+/// when no closure can be checked.
 std::optional<server::MapEstimate> judge_perfectly(const server::MapServer& server, const server::MapConfig& config,
                                                    const std::vector<const MissionRecording*>& robots,
                                                    const evaluation::AssociationConfig& association,

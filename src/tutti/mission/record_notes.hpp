@@ -11,21 +11,21 @@
 #include "tutti/server/map_estimate.hpp"
 #include "tutti/server/refinements.hpp"
 
-/// What a mission's reader has to know beside its figures, in plain words: appended to the record's notes. Its robots
-/// are there already.
+/// Appends to a record's notes, in plain words, what its readers must know besides its figures. The record's robots
+/// must be filled in already.
 namespace tutti::mission {
 
-/// Messages that the links still hold.
+/// Notes the messages that are still on the links.
 void note_undelivered(const std::map<bus::SimulatedRadio::Topic, std::size_t>& undelivered, MissionRecord& record);
-/// What refiners found out about robots' sensors, as the last refinement of the whole map has it.
+/// Notes what refiners found out about robots' sensors, as of the last refinement of the whole map.
 void note_remarks(const server::Refinements& refinements, MissionRecord& record);
-/// How often the map changed its mind about each robot, and the greatest change.
+/// Notes how often the map changed its mind about each robot, and the largest change.
 void note_changes_of_mind(MissionRecord& record);
-/// Submaps that are not in the map, and closures that were not judged.
+/// Notes submaps that are not in the map, and closures that were not judged.
 void note_what_the_map_lacks(const server::MapEstimate& map, MissionRecord& record);
 
-/// What makes a finished record's figures mean little: a map that no closure ties together and why, robots that are not
-/// in it. One plain sentence each.
+/// What makes the figures of a finished record mean little, one plain sentence each: a map that no closure ties
+/// together, with the reason, and robots that are not in it.
 std::vector<std::string> warnings_of(const MissionRecord& record);
 
 }  // namespace tutti::mission

@@ -17,37 +17,39 @@
 
 namespace tutti::mission {
 
-/// A robot's recording and what is known about it beside the mission (never shown to robots or server).
+/// A robot's recording, with what is known about it besides (and never shown to robots or server).
 struct MissionRecording {
   Recording recording;
-  Pose3 T_odom_recorded;  ///< The drawn frame: the replayed odom frame from the recorded one.
+  Pose3 T_odom_recorded;  ///< T_odom_recorded: the recorded odometry frame in the replayed one.
   double start_s = 0.0;   ///< Mission time of the first sample.
   bool score_against_reference = true;
-  /// Where this robot's odometry frame lies in the common reference frame, when the reference is the recorded odometry
-  /// itself (so it is exact up to the reference's own error).
+  /// T_common_odom, when the reference is the recorded odometry itself (so it is exact up to the reference's own
+  /// error).
   std::optional<Pose3> T_common_odom;
-  std::vector<std::string> notes;  ///< What was taken for granted of it, for the report.
+  std::vector<std::string> notes;  ///< Assumptions made about the recording, for the report.
 };
 
+/// The recordings of a mission.
 struct MissionInput {
   std::vector<MissionRecording> robots;
-  std::shared_ptr<const PointCloud> survey;  ///< What the place really looks like, reference frame; null when unknown.
+  std::shared_ptr<const PointCloud> survey;  ///< Points of the real surface, in the reference frame; null when unknown.
 };
 
-/// A recorded odometry, changed before it is replayed.
+/// Recorded odometry that was changed before it is replayed.
 struct ChangedOdometry {
-  Trajectory odometry;    ///< Of the same stamps.
-  Pose3 T_odom_recorded;  ///< MissionRecording
-  bool is_bent = false;   ///< Not only moved as a whole.
+  Trajectory odometry;    ///< With the same stamps.
+  Pose3 T_odom_recorded;  ///< As MissionRecording::T_odom_recorded.
+  bool is_bent = false;   ///< It was changed otherwise than by one rigid transform.
 };
 using ChangeOdometry = std::function<ChangedOdometry(Trajectory recorded)>;
 
-/// Reads the recording of every robot of the mission; `data` is the folder that their files' names are relative to.
-/// `changes`: to the robots by their places, for tests and experiments; those behind the last are replayed as they are.
+/// Reads the recording of every robot of the mission; `data` is the folder that their file names are relative to.
+/// `changes` apply to robots by position, for tests and experiments; robots beyond its end are replayed as they are.
+/// Fails when a file cannot be read or data do not fit together.
 Result<MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data, std::uint64_t seed,
                                 const std::vector<ChangeOdometry>& changes = {});
-/// What load_input() does last, and what recordings from elsewhere need, too: checks that references are by the clock
-/// of the odometry, and gives robots odometry at the mission's rate.
+/// The last part of load_input(), also for recordings from elsewhere: checks that references use the odometry's clock,
+/// and resamples odometry to the mission's rate.
 Status fit_input(const MissionConfig& config, std::uint64_t seed, std::vector<MissionRecording>& robots);
 
 }  // namespace tutti::mission

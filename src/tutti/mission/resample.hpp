@@ -6,9 +6,9 @@
 
 namespace tutti::mission {
 
-/// The recording with odometry at `rate_hz`, from `phase_s` after its first sample on, and with its first and its last
-/// sample: poses interpolated, each increment's covariance that of the old ones in proportion to time. Scans and images
-/// keep their stamps, which it need not meet. An error: fewer than two samples are left.
+/// Replaces a recording's odometry by samples at `rate_hz`, from `phase_s` after its first sample on; the first and the
+/// last sample stay. Poses are interpolated, and each step's covariance is that of the old steps in proportion to time.
+/// Scans and images keep their stamps, which need not be those of odometry. Fails when fewer than two samples are left.
 Status resample(Recording& recording, double rate_hz, double phase_s);
 
 }  // namespace tutti::mission

@@ -16,7 +16,7 @@
 
 namespace tutti::mission {
 
-/// Another finder, and how long it takes for each pair.
+/// Wraps a finder and measures how long it takes for each pair.
 class MeasuredFinder final : public server::ClosureFinder {
  public:
   explicit MeasuredFinder(std::shared_ptr<const server::ClosureFinder> finder) : finder_(std::move(finder)) {}
@@ -31,7 +31,8 @@ class MeasuredFinder final : public server::ClosureFinder {
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
 
-  [[nodiscard]] const std::vector<double>& took_ms() const { return took_ms_; }  ///< Not while it verifies.
+  /// Not to be called while it verifies.
+  [[nodiscard]] const std::vector<double>& took_ms() const { return took_ms_; }
   [[nodiscard]] double cpu_s() const { return cpu_s_; }
 
  private:
@@ -41,7 +42,7 @@ class MeasuredFinder final : public server::ClosureFinder {
   mutable double cpu_s_ = 0.0;
 };
 
-/// Another refiner, and how long it takes for each job.
+/// Wraps a refiner and measures how long it takes for each job.
 class MeasuredRefiner final : public server::MapRefiner {
  public:
   explicit MeasuredRefiner(std::shared_ptr<const server::MapRefiner> refiner) : refiner_(std::move(refiner)) {}
@@ -51,26 +52,28 @@ class MeasuredRefiner final : public server::MapRefiner {
   [[nodiscard]] Result<Refinement> refine(const RefinementJob& job, const server::SubmapSet& submaps,
                                           const server::PayloadStore& payloads) const override;
 
-  [[nodiscard]] const std::vector<RefinementTiming>& took() const { return took_; }  ///< Not while it refines.
+  /// Not to be called while it refines.
+  [[nodiscard]] const std::vector<RefinementTiming>& took() const { return took_; }
 
  private:
   std::shared_ptr<const server::MapRefiner> refiner_;
   mutable std::vector<RefinementTiming> took_;  // one job at a time
 };
 
-/// What server and workers take of the machine they run on: beside the nodes, which know no clock.
+/// Measures how much time server and workers take on this machine. It is separate from the nodes, because these know no
+/// clock.
 class ServerMeter {
  public:
-  /// No refiner: null.
+  /// `refiner` may be null.
   explicit ServerMeter(std::shared_ptr<const server::ClosureFinder> finder,
                        std::shared_ptr<const server::MapRefiner> refiner = nullptr)
       : finder_(std::make_shared<MeasuredFinder>(std::move(finder))),
         refiner_(refiner ? std::make_shared<MeasuredRefiner>(std::move(refiner)) : nullptr) {}
-  /// To be used by server and workers.
+  /// To be given to server and workers.
   [[nodiscard]] std::shared_ptr<const server::ClosureFinder> finder() const { return finder_; }
   [[nodiscard]] std::shared_ptr<const server::MapRefiner> refiner() const { return refiner_; }
 
-  /// Calls `step` of the server, which may store a submap, and returns what it makes.
+  /// Calls `step` of the server, which may store a submap, and returns its result.
   template <class F>
   node::Step serve(double time_s, F&& step) {
     const CpuScope cpu(map_cpu_s_);
@@ -78,7 +81,7 @@ class ServerMeter {
     note_submap(time_s, made);
     return made;
   }
-  /// Calls `step` of the server, which updates the map.
+  /// Calls `step` of the server, which updates the map, and returns its result.
   template <class F>
   node::Step update(double time_s, F&& step) {
     const CpuScope cpu(map_cpu_s_);
@@ -87,7 +90,7 @@ class ServerMeter {
     note_update(time_s, watch.lap_ms());
     return made;
   }
-  /// Calls `step` of a worker, whose input is this job.
+  /// Calls `step` of a worker for this job, and returns its result.
   template <class F>
   node::Step verify(const std::string& job, F&& step) {
     const double before_s = finder_->cpu_s();
@@ -96,7 +99,9 @@ class ServerMeter {
     return made;
   }
 
+  /// CPU time of everything measured so far.
   [[nodiscard]] double cpu_s() const { return map_cpu_s_ + finder_->cpu_s() + refinement_cpu_s(); }
+  /// Writes the figures of a mission that lasted `mission_s` into `timing`.
   void record(double mission_s, TimingRecord& timing) const;
 
  private:
@@ -113,7 +118,7 @@ class ServerMeter {
   std::shared_ptr<MeasuredRefiner> refiner_;
   double map_cpu_s_ = 0.0;
   std::vector<Unanswered> unanswered_;         // submaps that no broadcast contains yet
-  std::map<std::string, std::size_t> of_job_;  // which of them it verifies
+  std::map<std::string, std::size_t> of_job_;  // which of these the job verifies
   std::vector<double> optimisation_ms_;
   std::vector<double> update_latency_ms_;
 };

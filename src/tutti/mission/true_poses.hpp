@@ -11,17 +11,18 @@
 #include "tutti/mission/recordings.hpp"
 #include "tutti/server/map_estimate.hpp"
 
-/// Closures against the reference, where there is one (also when it does not score trajectories).
+/// Checks closures against the reference, where there is one (even if trajectories are not scored against it).
 namespace tutti::mission {
 
-/// Reference poses of the map's keyframes at which these closures end, of those that have one.
+/// The reference poses of the keyframes at which these closures end, for those that have one.
 std::map<KeyframeId, Pose3> true_ends(std::span<const LoopClosure> closures, const server::MapEstimate& map,
                                       const std::vector<const MissionRecording*>& robots,
                                       const evaluation::AssociationConfig& association);
 
-/// By how much a closure is off (right tangent; m, rad); nothing when an end has no reference.
+/// The error of a closure (right tangent; m, rad); nothing when an end has no reference.
 std::optional<Vector6d> closure_error(const LoopClosure& closure, const std::map<KeyframeId, Pose3>& truth);
 
+/// True if the error exceeds either limit of `check`.
 bool is_wrong(const Vector6d& error, const ClosureCheckConfig& check);
 
 }  // namespace tutti::mission

@@ -7,7 +7,7 @@
 
 namespace tutti {
 
-/// A grey image, row by row from the top, 8 bits a pixel.
+/// A grey image: rows from the top, 8 bits per pixel.
 struct Image {
   int width_px = 0;
   int height_px = 0;
@@ -20,7 +20,7 @@ struct Image {
   friend bool operator==(const Image&, const Image&) = default;
 };
 
-/// How far away what a camera's pixels see is, row by row from the top, in units of a DepthSensor; 0: not known.
+/// Depth along the optical axis per pixel of a camera: rows from the top, in units of DepthSensor::unit_m; 0: unknown.
 struct DepthImage {
   int width_px = 0;
   int height_px = 0;

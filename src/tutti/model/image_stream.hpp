@@ -12,22 +12,25 @@
 
 namespace tutti {
 
-/// What measures depth along a camera's optical axis, at its pixels (an RGB-D camera whose depth is registered).
+/// A sensor that measures depth along a camera's optical axis at the camera's pixels (an RGB-D camera with registered
+/// depth). The standard deviation at depth z is the root of the sum of squares of `sigma_m` and `sigma_per_m2` z^2.
 struct DepthSensor {
-  double unit_m = 0.001;               ///< Of a depth image's numbers.
-  double sigma_m = 0.0;                ///< Standard deviation: this, and beside it
-  double sigma_per_m2 = 0.0014;        ///< this at 1 m, growing with the square of the depth (a Kinect's).
-  double least_m = 0.3, most_m = 8.0;  ///< What is nearer or farther is not believed.
+  double unit_m = 0.001;               ///< Metres per unit of a DepthImage.
+  double sigma_m = 0.0;                ///< Part of the standard deviation that does not depend on depth.
+  double sigma_per_m2 = 0.0014;        ///< Part that grows with the square of the depth, at 1 m (a Kinect's value).
+  double least_m = 0.3, most_m = 8.0;  ///< Depths outside this range are ignored.
   friend bool operator==(const DepthSensor&, const DepthSensor&) = default;
 };
 
-/// The images of a robot: files, or a simulated camera. All its cameras are exposed at the same moments.
+/// The images of one robot, loaded on demand from files or rendered by a simulated camera. All its cameras are exposed
+/// at the same moments.
 struct ImageStream {
   std::vector<Camera> cameras;
   std::vector<Timestamp> stamps;  ///< Strictly increasing.
-  /// What a camera saw at a moment (an index into `stamps`); an empty image when it took none. Any order.
+  /// Loads the image of one camera at `stamps[moment]`; an empty image when the camera took none. Calls may be in any
+  /// order.
   std::function<Result<Image>(std::size_t moment, std::size_t camera)> load;
-  /// The depth of what the first camera saw; an empty image when there was none. Not set: there is no depth.
+  /// Loads the depth image aligned with the first camera's image; an empty one when there was none. Not set: no depth.
   std::function<Result<DepthImage>(std::size_t moment)> load_depth = {};
   DepthSensor depth = {};
 };

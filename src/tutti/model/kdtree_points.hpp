@@ -7,7 +7,7 @@
 
 namespace tutti {
 
-/// Points as nanoflann's trees want to see them.
+/// The adaptor through which nanoflann's trees read points (metres, in one frame).
 struct KdTreePoints {
   std::vector<Eigen::Vector3f> points;
   [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }

@@ -16,36 +16,37 @@
 
 namespace tutti {
 
-/// In front of every message; (robot, session, sequence) identifies it. Duplicates are recognised by what is inside:
-/// a submap's id, a proxy graph's epoch and revision.
+/// Precedes every message; (robot, session, sequence) identifies the message. Duplicates are detected by the content
+/// instead: a submap's id, a proxy graph's epoch and revision.
 struct MessageHeader {
-  RobotId robot;              ///< Sender; of a server's message: unused, 0.
-  std::uint64_t session = 0;  ///< Of a robot: of its chain of odometry. Of the server: its epoch.
+  RobotId robot;              ///< The sender; 0 when the server is.
+  std::uint64_t session = 0;  ///< From a robot: the session of its chain. From the server: its epoch.
   std::uint64_t sequence = 0;
   friend bool operator==(const MessageHeader&, const MessageHeader&) = default;
 };
 
-struct SubmapMessage {  ///< robot -> server
+struct SubmapMessage {  ///< From a robot to the server.
   MessageHeader header;
   Submap submap;
 };
 
-struct ProxyGraphMessage {  ///< server -> every robot
+struct ProxyGraphMessage {  ///< From the server to every robot.
   MessageHeader header;
   ProxyGraph graph;
 };
 
-/// server -> one robot: which of its submaps are stored, or refused for good, and need not be sent again.
-/// What a server that has started again names no more it has forgotten, as when an older map was put in its place.
+/// From the server to one robot: which of its submaps are stored or refused for good, and therefore need not be sent
+/// again. Submaps that a restarted server no longer names are lost to it (say, when an older map was restored), and the
+/// robot sends them again.
 struct Receipt {
-  /// One of two programs that call themselves the same robot.
+  /// Two programs claim to be the same robot, and this one is refused.
   struct Conflict {
-    std::uint64_t session = 0;  ///< That is refused, and
-    std::uint64_t start = 0;    ///< of it this start (NodeStatus): others need not mind.
+    std::uint64_t session = 0;  ///< The session that is refused,
+    std::uint64_t start = 0;    ///< and its start (NodeStatus::start): other programs are not meant.
     std::string why;
     friend bool operator==(const Conflict&, const Conflict&) = default;
   };
-  /// A submap that was refused, with the content_hash() of its bytes: others that come under its id are not.
+  /// A submap that was refused, identified by the content_hash() of its bytes: other content under the same id is not.
   struct Refusal {
     std::uint64_t session = 0;
     std::uint32_t index = 0;
@@ -54,25 +55,27 @@ struct Receipt {
   };
   RobotId robot;
   std::uint32_t incarnation = 0;               ///< ProxyGraph::incarnation
-  std::map<std::uint64_t, NumberSet> stored;   ///< Numbers of submaps, by session.
-  std::map<std::uint64_t, NumberSet> refused;  ///< Likewise, apart from those.
-  std::string why_refused;                     ///< The last of them.
-  /// Likewise: they have come in a version that the server does not read. A newer one will: the robot keeps them, and
-  /// sends them again when the server has started again.
+  std::map<std::uint64_t, NumberSet> stored;   ///< Indices of submaps, by session.
+  std::map<std::uint64_t, NumberSet> refused;  ///< Indices of refused submaps, by session; disjoint from `stored`.
+  std::string why_refused;                     ///< Reason for the latest refusal.
+  /// Submaps in a version of the format that this server cannot read. A newer server can, so the robot keeps them and
+  /// sends them again when the server has restarted.
   std::map<std::uint64_t, NumberSet> unread;
-  std::optional<std::uint64_t> owner_session;  ///< Whose name and number these are, as far as the server was told.
+  /// The session that owns this robot's name and number, as far as the server knows.
+  std::optional<std::uint64_t> owner_session;
   std::optional<Conflict> conflict;
-  std::vector<Refusal> refusals;  ///< Of those refused, the last ones; older servers do not say them.
+  std::vector<Refusal> refusals;  ///< The latest refusals by content; older servers do not send them.
 
   [[nodiscard]] bool contains(SubmapId id) const { return has(stored, id); }
   [[nodiscard]] bool refuses(SubmapId id) const { return has(refused, id); }
   [[nodiscard]] bool leaves_unread(SubmapId id) const { return has(unread, id); }
-  /// This content under this id; of an older server, which does not say contents, whatever comes under it.
+  /// True if this content was refused under this id. Older servers send no contents: then whatever has the id is
+  /// refused.
   [[nodiscard]] bool refuses(SubmapId id, std::uint64_t content) const;
-  /// One more; false: it was before. Of more than `most` contents the oldest are forgotten, and submaps with their
-  /// last.
+  /// Adds a refusal; false if it is known already. Keeps at most `most` contents: the oldest go first, and an id stops
+  /// being refused when its last content goes.
   bool refuse(SubmapId id, std::uint64_t content, std::size_t most);
-  /// As if nothing had ever come under this id that was refused.
+  /// Forgets everything that was refused under this id.
   void forget_refusals(SubmapId id);
   friend bool operator==(const Receipt&, const Receipt&) = default;
 
@@ -85,22 +88,23 @@ struct Receipt {
   void remove_refused(std::uint64_t session, std::uint32_t index);
 };
 
-/// server -> one of the workers: pairs of submaps to be verified.
+/// From the server to one worker: pairs of submaps to verify.
 struct Job {
   std::string id;
   std::vector<SubmapPair> pairs;
-  MethodId finder{};       ///< By this one and no other; without a name: of an older server, by any.
-  std::string settings{};  ///< Which make one (server::ClosureFinder::settings()); empty: only who has it can.
+  MethodId finder{};       ///< Only this finder may verify them. Without a name (from an older server) any finder may.
+  std::string settings{};  ///< Settings to make the finder with (server::ClosureFinder::settings()); empty: only a
+                           ///< worker that has the finder can.
   friend bool operator==(const Job&, const Job&) = default;
 };
 
-/// worker -> server: what became of a job's pairs.
+/// From a worker to the server: the outcome of a job's pairs.
 struct Verdicts {
   std::string job;
   std::vector<ClosureVerdict> verdicts;
-  std::vector<SubmapPair> failed;  ///< Without a verdict, as when a cloud could not be read.
-  std::string why;                 ///< The first of them failed.
-  bool cannot = false;             ///< All of them failed since this worker has not got the job's finder: another may.
+  std::vector<SubmapPair> failed;  ///< Pairs without a verdict, say because a cloud could not be read.
+  std::string why;                 ///< Why the first of `failed` has no verdict.
+  bool cannot = false;  ///< Every pair failed because this worker does not have the job's finder; another worker may.
   friend bool operator==(const Verdicts&, const Verdicts&) = default;
 };
 

@@ -8,19 +8,20 @@
 
 namespace tutti {
 
-/// Who computes: a finder of closures or a refiner of maps. Two of equal ids make the same of the same submaps, whoever
-/// runs them; of different ones nothing is said, and none is better than the other.
+/// Identifies a method, which is a closure finder or a map refiner. Methods with equal ids compute the same from the
+/// same submaps, on any machine. Ids that differ say nothing about which method is better.
 struct MethodId {
-  std::string name;            ///< "lidar", "visual", ...; empty: of a program that did not say.
-  std::uint32_t version = 0;   ///< Of its code: raised by hand in the commit that changes what it makes of its input.
-  std::uint64_t settings = 0;  ///< settings_hash(); 0: any, or it was not said.
+  std::string name;  ///< "lidar", "visual", ...; empty when a program did not say.
+  /// Version of the code; a commit that changes what the method computes raises it by hand.
+  std::uint32_t version = 0;
+  std::uint64_t settings = 0;  ///< settings_hash() of its settings; 0: any, or unknown.
   friend auto operator<=>(const MethodId&, const MethodId&) = default;
   friend bool operator==(const MethodId&, const MethodId&) = default;
 };
 
-/// Of all that a method's results depend on beside its code and the submaps, as text. Never 0.
+/// Hash of the text of all settings that a method's results depend on. Never 0.
 std::uint64_t settings_hash(std::string_view settings);
-/// "lidar 1 (settings 0123456789abcdef)".
+/// Text such as "lidar 1 (settings 0123456789abcdef)".
 std::string to_string(const MethodId& id);
 
 }  // namespace tutti

@@ -9,19 +9,19 @@
 
 namespace tutti {
 
-/// Points in metres, in the frame its owner names.
+/// Points in metres, in a frame that the owner of the cloud names.
 struct PointCloud {
   std::vector<Eigen::Vector3f> points;
   friend bool operator==(const PointCloud&, const PointCloud&) = default;
 };
 
-/// What a range sensor saw in one sweep that ends at `stamp`. Every point is in the body frame of the moment it was
-/// measured, `age_s` before the stamp; without ages all were measured (or undistorted to be) at the stamp. Clouds are
-/// large and immutable, so shared.
+/// One sweep of a range sensor, which ends at `stamp`. Every point is in the body frame at the moment at which it was
+/// measured, `age_s` before the stamp; without ages all points are in the body frame at the stamp (undistorted). Clouds
+/// are large and immutable, so they are shared.
 struct Scan {
   Timestamp stamp;
   std::shared_ptr<const PointCloud> cloud;
-  std::shared_ptr<const std::vector<float>> age_s;  ///< Null, or one per point, seconds, not negative.
+  std::shared_ptr<const std::vector<float>> age_s;  ///< Null, or one per point: seconds, not negative.
 };
 
 }  // namespace tutti

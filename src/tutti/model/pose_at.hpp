@@ -9,7 +9,8 @@
 
 namespace tutti {
 
-/// The pose at a moment: that of a sample, or interpolated between two at most `max_gap_s` apart; nothing elsewhere.
+/// The pose at `stamp`: a sample's, or interpolated between the two neighbouring samples when these are at most
+/// `max_gap_s` apart; else nothing. Logarithmic in the number of samples.
 std::optional<Pose3> pose_at(std::span<const StampedPose> trajectory, Timestamp stamp,
                              double max_gap_s = std::numeric_limits<double>::infinity());
 

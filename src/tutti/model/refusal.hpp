@@ -11,14 +11,14 @@
 
 namespace tutti {
 
-/// Why a pair of submaps, or a closure, was refused. The numbers travel and are stored: they are never reused.
+/// Why a pair of submaps, or a closure, was refused. The numbers are sent and stored, so they are never reused.
 enum class RefusalReason : std::uint8_t {
-  other = 0,  ///< It was not said.
-  // Of a submap, whatever it is compared with.
+  other = 0,  ///< No reason was given.
+  // About one submap, whatever it is compared with.
   too_small = 1,
   too_few_keyframes = 2,
-  too_short = 3,  ///< In time, and not far enough either.
-  // Of two clouds.
+  too_short = 3,  ///< Too short in time, and also in distance.
+  // About two clouds.
   unlike_from_above = 4,
   no_alignment = 5,
   overlap = 6,
@@ -31,35 +31,35 @@ enum class RefusalReason : std::uint8_t {
   contradicted = 13,
   ambiguous = 14,
   ambiguous_along = 15,
-  // Of reference closures.
+  // About reference closures.
   same_submap = 16,
   neighbours = 17,
   no_reference = 18,
   no_keyframes_near = 19,
   distant = 20,
-  // Of a closure that a finder found, by the joint map.
+  // A found closure that contradicts the joint map.
   inconsistent = 21,
-  // Of a submap's images, whatever they are compared with.
+  // About one submap's images, whatever they are compared with.
   no_images = 22,
   too_few_landmarks = 23,
   landmark_residual = 24,  ///< Landmarks miss their own pixels: the calibration is wrong.
-  // Of the images of two submaps.
+  // About the images of two submaps.
   descriptor_kinds = 25,
   too_few_matches = 26,
   too_few_inliers = 27,
   position_sigma = 28,
   image_spread = 29,
-  // Of a pair that every worker failed at, or ended at.
+  // A pair at which every worker failed or crashed.
   unverified = 30,
 };
 
-/// What is measured for a reason, and the words for people and for report.json.
+/// What is measured for a reason, and its words for people and for report.json.
 struct RefusalKind {
   enum class Bound { none, at_least, at_most };
   const char* words;
   Bound bound = Bound::none;
   const char* unit = "";
-  int digits = 0;  ///< Behind the point, in text.
+  int digits = 0;  ///< Decimals in text.
 };
 
 inline constexpr std::array<RefusalKind, 31> kRefusalKinds = {{
@@ -96,23 +96,25 @@ inline constexpr std::array<RefusalKind, 31> kRefusalKinds = {{
     {"no worker could verify it"},
 }};
 
+/// What is measured for a reason; numbers of newer versions count as `other`.
 constexpr const RefusalKind& kind_of(RefusalReason reason) {
   return kRefusalKinds[static_cast<std::size_t>(reason) < kRefusalKinds.size() ? static_cast<std::size_t>(reason) : 0];
 }
 
+/// A reason with the measured value.
 struct Refusal {
   RefusalReason reason = RefusalReason::other;
-  double value = 0.0;  ///< In the reason's unit; 0, as the limit, when nothing is measured.
+  double value = 0.0;  ///< In the unit of the reason; 0, like the limit, when nothing is measured.
   double limit = 0.0;
   friend bool operator==(const Refusal&, const Refusal&) = default;
 };
 
-/// A value on its limit is never refused.
+/// True if the refusal has a measured value. A value that equals its limit is never refused, so equality means "none".
 constexpr bool is_measured(const Refusal& refusal) {
   return kind_of(refusal.reason).bound != RefusalKind::Bound::none && refusal.value != refusal.limit;
 }
 
-/// The value is beyond its limit.
+/// True if the value violates its limit.
 constexpr bool misses(const Refusal& measured) {
   const auto bound = kind_of(measured.reason).bound;
   return bound == RefusalKind::Bound::at_least
@@ -120,7 +122,7 @@ constexpr bool misses(const Refusal& measured) {
              : bound == RefusalKind::Bound::at_most && measured.value > measured.limit;
 }
 
-/// "overlap: 0.16, at least 0.30 needed"
+/// Text such as "overlap: 0.16, at least 0.30 needed".
 inline std::string to_string(const Refusal& refusal) {
   const auto& [words, bound, unit, digits] = kind_of(refusal.reason);
   if (!is_measured(refusal)) return words;

@@ -13,13 +13,13 @@ struct RelativePose {
   friend bool operator==(const RelativePose&, const RelativePose&) = default;
 };
 
-/// T_a_c from independent measurements of its parts, to first order.
+/// T_a_c with covariance, from independent measurements of its two parts; to first order.
 RelativePose compound(const RelativePose& a_b, const RelativePose& b_c);
 
-/// T_b_a: (T Exp(xi))^-1 = T^-1 Exp(-Ad(T) xi), so the perturbation moves from frame b to frame a.
+/// T_b_a with its covariance: (T Exp(xi))^-1 = T^-1 Exp(-Ad(T) xi), which carries the perturbation from frame b to a.
 RelativePose inverse(const RelativePose& a_b);
 
-/// Squared Mahalanobis distance of two independent ways to know one relative pose.
+/// Squared Mahalanobis distance between two independent measurements of one relative pose (6 degrees of freedom).
 double squared_distance(const RelativePose& one, const RelativePose& other);
 
 }  // namespace tutti

@@ -11,41 +11,44 @@
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/method_id.hpp"
 
-/// What nodes know about each other. Every time is mission time of the sender, whose clock others do not share.
+/// What nodes tell each other about their state. Every time is mission time by the sender's clock, which others do not
+/// share.
 namespace tutti {
 
-/// robot or worker -> server, every two seconds: that it is there, and how it is. What its role has not is 0.
+/// From a robot or worker to the server, every two seconds: a sign of life and the state. Fields that a role does not
+/// have are 0.
 struct NodeStatus {
   std::string name;                   ///< 1 to 64 letters, digits, '_' and '-'.
-  std::uint64_t session = 0;          ///< Of a robot: of its chain of odometry.
-  std::uint64_t start = 0;            ///< Of a robot: how often it has started on its store; tells its programs apart.
-  std::string version;                ///< Of its program.
-  std::uint64_t backlog_submaps = 0;  ///< Which the server is not known to have stored.
+  std::uint64_t session = 0;          ///< A robot's session.
+  std::uint64_t start = 0;            ///< How often a robot has started on its store; tells two of its programs apart.
+  std::string version;                ///< Version of its program.
+  std::uint64_t backlog_submaps = 0;  ///< Submaps that the server is not known to have stored.
   std::uint64_t backlog_bytes = 0;
-  std::uint64_t heard_epoch = 0;  ///< Of the newest proxy graph (ProxyGraph::age()).
+  std::uint64_t heard_epoch = 0;  ///< Epoch of the newest proxy graph that it heard.
   std::uint64_t heard_revision = 0;
-  std::optional<double> update_age_s;  ///< Since it took that up; nothing: not since its start.
+  /// Time since it used that graph; nothing when it has used none since its start.
+  std::optional<double> update_age_s;
   std::uint64_t keyframes = 0;
-  Pose3 T_odom_body;  ///< At the newest sample.
+  Pose3 T_odom_body;  ///< Of a robot, at its newest sample.
   std::uint64_t alerts = 0;
   bool finished = false;        ///< Its recording has ended.
-  std::uint64_t jobs_done = 0;  ///< Of a worker, since it started.
-  std::string trouble;          ///< For people; empty: none.
-  std::vector<MethodId> can;    ///< Of a worker: its finders and refiners; without settings: with any.
+  std::uint64_t jobs_done = 0;  ///< A worker's jobs since it started.
+  std::string trouble;          ///< A problem, for people; empty: none.
+  std::vector<MethodId> can;    ///< A worker's finders and refiners; those without settings can be made with any.
   friend bool operator==(const NodeStatus&, const NodeStatus&) = default;
 };
 
-/// server -> whoever looks on, every two seconds: all that it knows of the mission.
+/// From the server to everybody who watches, every two seconds: all that it knows of the mission.
 struct MissionStatus {
   struct Robot {
     RobotId robot;
-    std::optional<Timestamp> last_seen;    ///< Nothing: not since the server started.
-    std::optional<Timestamp> last_update;  ///< When it last took up a proxy graph.
-    std::uint64_t submaps = 0;             ///< In the map, of all its sessions.
+    std::optional<Timestamp> last_seen;    ///< Nothing when the robot was not heard since the server started.
+    std::optional<Timestamp> last_update;  ///< When the robot last used a proxy graph.
+    std::uint64_t submaps = 0;             ///< Submaps in the map, over all sessions.
     std::uint64_t refused = 0;             ///< Submaps that the map does not take.
-    std::string conflict;      ///< Why another program that calls itself the same is refused; empty: there is none.
-    NodeStatus status;         ///< The last one of the session that owns name and number.
-    std::uint64_t unread = 0;  ///< Submaps of versions that the server does not read: the robot keeps them.
+    std::string conflict;  ///< Why another program that claims to be this robot is refused; empty when there is none.
+    NodeStatus status;     ///< The latest status of the session that owns the robot's name and number.
+    std::uint64_t unread = 0;  ///< Submaps in versions that the server cannot read, which the robot keeps.
     friend bool operator==(const Robot&, const Robot&) = default;
   };
   struct Worker {
@@ -54,7 +57,7 @@ struct MissionStatus {
     NodeStatus status;
     friend bool operator==(const Worker&, const Worker&) = default;
   };
-  /// Of one kind, from one role.
+  /// Refused messages of one kind from one role.
   struct Refusals {
     std::string from;  ///< "robot", "worker", ...
     std::string kind;  ///< wire::name()
@@ -63,33 +66,34 @@ struct MissionStatus {
     friend bool operator==(const Refusals&, const Refusals&) = default;
   };
 
-  /// An operator's (ClosureWord), answered: it is stored, as long as no later one takes its place.
+  /// The server's answer to an operator's ClosureWord: the word is stored, unless a later one replaces it.
   struct Word {
     std::uint64_t content = 0;  ///< content_hash() of its frame.
-    std::string why;            ///< It is not stored, since; empty: it is.
+    std::string why;            ///< Why the word is not stored; empty: it is.
     friend bool operator==(const Word&, const Word&) = default;
   };
 
   Timestamp time;
-  std::int64_t wall_ns = 0;  ///< Of the server's clock on the wall, since the Unix epoch; 0: unknown.
-  std::string version;       ///< Of its program.
+  std::int64_t wall_ns = 0;  ///< The server's wall clock, since the Unix epoch; 0: unknown.
+  std::string version;       ///< Version of its program.
   std::uint64_t epoch = 0;
   std::uint32_t incarnation = 0;  ///< ProxyGraph::incarnation
   std::uint64_t revision = 0;
   std::uint64_t submaps = 0;
-  std::uint64_t closures = 0;    ///< Accepted.
+  std::uint64_t closures = 0;    ///< Accepted ones.
   std::uint64_t components = 0;  ///< Parts of the map that nothing joins yet.
   std::uint64_t pending_jobs = 0;
   bool has_news = false;           ///< The next revision is due.
-  std::vector<Robot> robots;       ///< By number.
-  std::vector<Worker> workers;     ///< By number.
-  std::vector<Refusals> refusals;  ///< Messages.
-  std::string trouble;             ///< For people; empty: none.
-  std::string finder;              ///< Who is asked for closures: to_string(MethodId).
-  std::uint64_t former_pairs = 0;  ///< With closures of other finders, in the map until this one has answered.
-  std::uint64_t waiting = 0;       ///< Pairs and refinements that none of the workers that are there can compute,
-  std::string why_waiting;         ///< and what the last one that tried said.
-  std::vector<Word> words;         ///< The last ones.
+  std::vector<Robot> robots;       ///< Sorted by number.
+  std::vector<Worker> workers;     ///< Sorted by number.
+  std::vector<Refusals> refusals;  ///< Of messages.
+  std::string trouble;             ///< A problem, for people; empty: none.
+  std::string finder;              ///< to_string(MethodId) of the finder that verifies closures.
+  /// Pairs with closures of other finders, which stay in the map until the present finder has answered.
+  std::uint64_t former_pairs = 0;
+  std::uint64_t waiting = 0;  ///< Pairs and refinements that no present worker can compute,
+  std::string why_waiting;    ///< and what the last worker that tried said.
+  std::vector<Word> words;    ///< The latest words.
   friend bool operator==(const MissionStatus&, const MissionStatus&) = default;
 };
 

@@ -8,16 +8,16 @@
 
 namespace tutti {
 
-/// worker -> server: submaps that the worker's job names and that it has not got.
+/// From a worker to the server: asks for submaps that a job names and the worker does not have.
 struct SubmapRequest {
   std::vector<SubmapId> submaps;
   friend bool operator==(const SubmapRequest&, const SubmapRequest&) = default;
 };
 
-/// server -> worker: one of them.
+/// From the server to a worker: one submap that it asked for.
 struct SubmapCopy {
   SubmapId id;
-  std::string frame;  ///< As it came from the robot; who decodes it sees whether it is this submap.
+  std::string frame;  ///< The bytes as the robot sent them; decoding them shows whether they are this submap.
   friend bool operator==(const SubmapCopy&, const SubmapCopy&) = default;
 };
 

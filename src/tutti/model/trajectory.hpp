@@ -8,13 +8,14 @@
 
 namespace tutti {
 
+/// A pose at a moment.
 struct StampedPose {
   Timestamp stamp;
-  Pose3 pose;  ///< T_frame_body; the owner names the frame.
+  Pose3 pose;  ///< T_frame_body; the owner of the trajectory names the frame.
   friend bool operator==(const StampedPose&, const StampedPose&) = default;
 };
 
-/// Strictly increasing stamps.
+/// Poses with strictly increasing stamps.
 using Trajectory = std::vector<StampedPose>;
 
 }  // namespace tutti

@@ -22,13 +22,13 @@ struct Camera {
   friend bool operator==(const Camera&, const Camera&) = default;
 };
 
-/// What made the descriptors. Only descriptors of one kind can be compared.
+/// The algorithm that made descriptors. Only descriptors of one kind can be compared.
 enum class DescriptorKind : std::uint8_t { none = 0, orb = 1, brisk = 2, maplab = 3 };  // maplab: 384 bits, as imported
 
-/// Binary descriptors, one per row, bits padded with zeros to words of 64.
+/// Binary descriptors, one per row, padded with zero bits to words of 64 bits.
 struct Descriptors {
   DescriptorKind kind = DescriptorKind::none;
-  std::uint32_t words = 0;          ///< Per descriptor: 4 for ORB, 8 for BRISK, 6 for maplab's.
+  std::uint32_t words = 0;          ///< Words per descriptor: 4 for ORB, 8 for BRISK, 6 for maplab's.
   std::vector<std::uint64_t> bits;  ///< size() * words
   [[nodiscard]] std::size_t size() const { return words == 0 ? 0 : bits.size() / words; }
   [[nodiscard]] std::span<const std::uint64_t> row(std::size_t i) const { return {bits.data() + i * words, words}; }
@@ -37,24 +37,28 @@ struct Descriptors {
 
 inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFF;
 
-/// A keypoint of an image.
+/// A keypoint of a submap's image.
 struct Observation {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
-  float sigma_px = 1.0F;                ///< Standard deviation of each coordinate.
-  std::uint32_t landmark = kNoIndex;    ///< Index into VisualPayload::landmarks: what it is a view of.
-  std::uint32_t descriptor = kNoIndex;  ///< Row of VisualPayload::descriptors; a byte budget leaves many without.
+  float sigma_px = 1.0F;  ///< Standard deviation of each coordinate.
+  /// Index into VisualPayload::landmarks of the landmark that it is a view of, or kNoIndex.
+  std::uint32_t landmark = kNoIndex;
+  /// Row of VisualPayload::descriptors, or kNoIndex: a byte budget leaves many without.
+  std::uint32_t descriptor = kNoIndex;
   friend bool operator==(const Observation&, const Observation&) = default;
 };
 
-/// A keypoint as the tracker leaves it.
+/// A keypoint as the tracker gives it.
 struct TrackedKeypoint {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
   float sigma_px = 1.0F;
-  std::uint64_t track = 0;  ///< The same number in several images is the same point; 0: seen in this one alone.
+  /// Keypoints with the same number in several images are the same point; 0: seen in this image only.
+  std::uint64_t track = 0;
   friend bool operator==(const TrackedKeypoint&, const TrackedKeypoint&) = default;
 };
 
-/// What a robot's tracker (or a file) says of one image: the robot's input, as a scan is a LiDAR's.
+/// The keypoints of one image, from a robot's tracker or a file. This is the visual input of a robot, as a scan is its
+/// LiDAR's.
 struct TrackedImage {
   std::uint32_t camera = 0;  ///< Index into the robot's cameras.
   std::vector<TrackedKeypoint> keypoints;
@@ -62,11 +66,11 @@ struct TrackedImage {
   friend bool operator==(const TrackedImage&, const TrackedImage&) = default;
 };
 
-/// What the IMU said at a moment, in the body frame.
+/// One sample of the IMU, in the body frame.
 struct ImuSample {
   Timestamp stamp;
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();           ///< rad/s
-  Eigen::Vector3d accelerometer = Eigen::Vector3d::Zero();  ///< m/s^2, +9.81 upwards at rest.
+  Eigen::Vector3d accelerometer = Eigen::Vector3d::Zero();  ///< Specific force in m/s^2: +9.81 upwards at rest.
   friend bool operator==(const ImuSample&, const ImuSample&) = default;
 };
 
@@ -79,8 +83,8 @@ struct ImuNoise {
   friend bool operator==(const ImuNoise&, const ImuNoise&) = default;
 };
 
-/// Of samples by increasing stamps, those that say how a body moved from one moment to another: from the last one
-/// before or at `from` to the first one not before `until`, as far as there are any.
+/// The IMU samples that cover the motion from `from` to `until`: from the last one at or before `from` to the first one
+/// at or after `until`, as far as there are any. `samples` have increasing stamps.
 template <class Samples>
 std::vector<ImuSample> imu_over(const Samples& samples, Timestamp from, Timestamp until) {
   auto first = std::ranges::upper_bound(samples, from, {}, &ImuSample::stamp);
@@ -93,19 +97,20 @@ std::vector<ImuSample> imu_over(const Samples& samples, Timestamp from, Timestam
 /// The images of all cameras at one moment.
 struct TrackedImages {
   Timestamp stamp;
-  std::shared_ptr<const std::vector<Camera>> cameras;  ///< Never null, the same for all images of a robot.
+  std::shared_ptr<const std::vector<Camera>> cameras;  ///< Never null, and the same for all images of a robot.
   std::vector<TrackedImage> images;                    ///< At most one per camera.
-  /// What the IMU said since the images before, from its last sample before them to its first one not before these:
-  /// increasing stamps. None when there is no IMU.
+  /// The IMU samples since the previous images, from the last one before those to the first one not before these, with
+  /// increasing stamps. Empty without an IMU.
   std::vector<ImuSample> imu;
   ImuNoise imu_noise;
 };
 
-/// There are cameras, each sound; each image is of one of them, has finite keypoints with positive sigmas, no track
-/// twice, and as many descriptors as keypoints or none; what the IMU said is finite, with increasing stamps.
+/// Fails unless there are cameras, each valid; each image is of one of them and has finite keypoints with positive
+/// sigmas, no track twice, and either no descriptors or one per keypoint; and IMU samples are finite with increasing
+/// stamps.
 Status check_images(const TrackedImages& images);
 
-/// One image, at the stamp of a keyframe.
+/// The keypoints of one image, taken at the stamp of a keyframe.
 struct VisualFrame {
   std::uint32_t keyframe = 0;  ///< KeyframeId::index of a keyframe of the submap.
   std::uint32_t camera = 0;    ///< Index into VisualPayload::cameras.
@@ -113,37 +118,38 @@ struct VisualFrame {
   friend bool operator==(const VisualFrame&, const VisualFrame&) = default;
 };
 
-/// A point that several images saw, triangulated with the robot's odometry.
+/// A point seen in several images, triangulated with the robot's odometry.
 struct Landmark {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  ///< Submap frame, m.
-  float sigma_m = 0.0F;  ///< Standard deviation along its most uncertain direction, usually the viewing ray.
+  float sigma_m = 0.0F;  ///< Standard deviation along its most uncertain direction, which is usually the viewing ray.
   friend bool operator==(const Landmark&, const Landmark&) = default;
 };
 
 using Vector9d = Eigen::Matrix<double, 9, 1>;
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
-/// What the IMU measured from one keyframe to the next, preintegrated (Forster et al. 2017, eqs. 35 to 38, 44, 63),
-/// order everywhere [rotation; velocity; position], linearised at the biases given.
+/// The IMU's measurements from one keyframe to the next, preintegrated (Forster et al. 2017, eqs. 35 to 38, 44, 63) and
+/// linearised at the given biases. Vectors and matrices are ordered [rotation; velocity; position].
 struct ImuPreintegration {
-  std::uint32_t from_keyframe = 0;  ///< KeyframeId::index; to the one after it.
+  std::uint32_t from_keyframe = 0;  ///< KeyframeId::index of the first keyframe; the second is the one after it.
   double duration_s = 0.0;
   Eigen::Quaterniond delta_rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d delta_velocity = Eigen::Vector3d::Zero();  ///< m/s, in the frame of the first keyframe.
-  Eigen::Vector3d delta_position = Eigen::Vector3d::Zero();  ///< m
-  Matrix9d covariance = Matrix9d::Zero();                    ///< Of [rotation; velocity; position].
-  Eigen::Matrix<double, 9, 6> d_bias = Eigen::Matrix<double, 9, 6>::Zero();  ///< By [gyro bias; accelerometer bias].
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();                       ///< rad/s, at the linearisation.
-  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();              ///< m/s^2, at the linearisation.
+  Eigen::Vector3d delta_position = Eigen::Vector3d::Zero();  ///< m, in the frame of the first keyframe.
+  Matrix9d covariance = Matrix9d::Zero();                    ///< In rad, m/s, m.
+  /// Derivative by [gyro bias; accelerometer bias].
+  Eigen::Matrix<double, 9, 6> d_bias = Eigen::Matrix<double, 9, 6>::Zero();
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< Of the linearisation, rad/s.
+  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< Of the linearisation, m/s^2.
 };
 
-/// What the cameras of one robot saw along one submap.
+/// What one robot's cameras saw along one submap.
 struct VisualPayload {
   std::vector<Camera> cameras;
-  std::vector<VisualFrame> frames;  ///< By keyframe, then by camera.
+  std::vector<VisualFrame> frames;  ///< Sorted by keyframe, then by camera.
   std::vector<Landmark> landmarks;
   Descriptors descriptors;
-  std::vector<ImuPreintegration> imu;  ///< By keyframe; empty when there is no IMU.
+  std::vector<ImuPreintegration> imu;  ///< Sorted by keyframe; empty without an IMU.
 };
 
 }  // namespace tutti

@@ -7,7 +7,7 @@
 
 namespace tutti {
 
-/// Length of a path of such steps, metres.
+/// Length of the path that these steps make, in metres.
 inline double way_m(std::span<const RelativePose> steps) {
   double sum = 0.0;
   for (const RelativePose& step : steps) sum += step.T_a_b.translation.norm();

@@ -8,10 +8,11 @@
 
 namespace tutti::node {
 
-/// The last words of operators that the server has answered, as everybody is told who looks.
+/// The operators' words that the server answered last, as MissionStatus::words tells them.
 class AnsweredWords {
  public:
-  /// `frame`: the message as it came; `why` it does not hold, or empty.
+  /// Notes the answer to a word: `frame` is the message as it came, `why` says why the word is not stored (empty: it
+  /// is).
   void note(const std::string& frame, const std::string& why);
   [[nodiscard]] const std::vector<MissionStatus::Word>& all() const { return words_; }
 

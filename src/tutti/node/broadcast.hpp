@@ -14,38 +14,41 @@
 
 namespace tutti::node {
 
+/// A message from the server to one robot.
 bus::Envelope to_robot(RobotId robot, bus::MessageKind kind, std::shared_ptr<const std::string> bytes);
 
-/// What robots are sent of the server's maps: each its own part, in terms of what it was sent before, once the part is
-/// to be followed (ChangeWatch).
+/// Sends the server's maps to robots: each gets its own part (consistency::own_part) once that is to be followed
+/// (ChangeWatch), encoded as differences from what it was sent before where that saves bytes.
 class Broadcast {
  public:
-  /// `to_all`: every robot is sent all of the map, as in the paper (ServerConfig::broadcast).
+  /// With `to_all` every robot is sent the whole map, as in the paper (ServerConfig::broadcast).
   explicit Broadcast(bool to_all) : to_all_(to_all) {}
 
-  /// A new map, with what it believes. `wait`: a change of mind waits; otherwise every robot is sent the map.
+  /// Sends a new map, which holds `beliefs` for true. With `wait`, robots about which it changes its mind are not sent
+  /// it yet; otherwise every robot is sent it.
   void send(ProxyGraphMessage map, std::shared_ptr<const server::Beliefs> beliefs, const std::set<RobotId>& robots,
             bool wait, Timestamp now, Step& step);
-  /// Some robot was not sent the last map.
+  /// True while some robot was not sent the last map.
   [[nodiscard]] bool anything_waits() const { return watch_.anything_waits(); }
-  /// The last map, to the robots that wait for it: it has stood.
+  /// Sends the last map to the robots that wait for it, because it has stood.
   void send_waiting(const std::set<RobotId>& robots, Timestamp now, Step& step);
-  /// The last map; empty before.
+  /// The last map; empty before the first.
   [[nodiscard]] const ProxyGraph& last() const { return last_.graph; }
 
  private:
-  /// The last map, of which `own` is the robot's part. `whole`: all of it, encoded when it is first needed.
+  /// Sends `own`, the robot's part of the last map. `whole` is the whole map, encoded when it is first needed.
   void send_last(RobotId robot, ProxyGraph own, std::shared_ptr<const std::string>& whole, Step& step);
-  /// In full, or in terms of the last one that was, whichever makes fewer bytes in the long run.
+  /// The message with a robot's part: in full, or as differences from the last one sent in full, whichever is fewer
+  /// bytes in the long run.
   [[nodiscard]] bus::Envelope own_graph(RobotId robot, ProxyGraph own);
 
   bool to_all_;
   ProxyGraphMessage last_;
   ChangeWatch watch_;
-  /// What a robot was sent in full, as it knows it, and what has come in terms of it since.
+  /// What a robot was last sent in full, and what was sent as differences from it since.
   struct Base {
     ProxyGraph graph;
-    std::size_t messages = 0, bytes = 0;  // the full one among them
+    std::size_t messages = 0, bytes = 0;  // including the one sent in full
   };
   std::map<RobotId, Base> bases_;
 };

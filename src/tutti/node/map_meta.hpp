@@ -11,58 +11,58 @@
 #include "tutti/server/map_server.hpp"
 #include "tutti/storage/table_store.hpp"
 
-/// The rows of a map's table `meta`.
+/// The rows of table `meta` in a map's store.
 namespace tutti::node {
 
 inline constexpr const char* kMetaTable = "meta";
 
-/// The row `map`: what the server itself was about.
+/// The row `map`: the server's own counters.
 struct MapMeta {
   std::uint64_t epoch = 0;
   std::uint64_t revision = 0;
   bool news = false;        ///< Something has come since the last revision.
-  std::uint64_t start = 0;  ///< How often the map has been opened; names jobs.
+  std::uint64_t start = 0;  ///< How often the map has been opened; part of jobs' names.
 };
 storage::Write to_row(const MapMeta& meta);
-/// Nothing: no server has had this map yet.
+/// Nothing when no server has opened this map yet.
 Result<std::optional<MapMeta>> read_map_meta(const storage::TableStore& map);
 
-/// The row `counts`: what the last update made of the map, so that it can be told before it is computed again.
+/// The row `counts`: figures of the last update, so that they can be told after a start before the map is computed.
 struct MapCounts {
   std::uint64_t revision = 0;
   std::uint64_t keyframes = 0;
-  std::uint64_t closures = 0;  ///< Accepted.
+  std::uint64_t closures = 0;  ///< Accepted ones.
   std::uint64_t components = 0;
   friend bool operator==(const MapCounts&, const MapCounts&) = default;
 };
 storage::Write to_row(const MapCounts& counts);
-/// Nothing: no update has been made of this map, or none by a program that wrote them. A row that cannot be read is
-/// none.
+/// Nothing when no update was made, when the program that made it wrote no counts, or when the row cannot be read.
 Result<std::optional<MapCounts>> read_map_counts(const storage::TableStore& map);
 
-/// The row `settings`: what the server judges closures by, so that whoever reads the map sees it as the server does.
+/// The row `settings`: how the server judges closures, so that other readers of the map judge them alike.
 storage::Write to_row(const server::ServerConfig& settings);
-/// The defaults where there is none. Settings that only another version knows are left alone: its map may then be
-/// judged a little otherwise than by its own server. An error: the row is damaged.
+/// The stored settings, or the defaults when there are none. Settings that only another version knows are ignored, so
+/// this program may judge that map slightly differently than its own server does. Fails when the row is damaged.
 Result<server::ServerConfig> read_settings(const storage::TableStore& map);
 
-/// Rows `refinement/REVISION`: the refinements that hold, as they came. One that cannot be read is none: it is made
-/// again.
+/// Rows `refinement/REVISION`: the refinements that count, as they came. Rows that cannot be read are skipped, because
+/// the refinement is then made again.
 std::string refinement_key(std::uint64_t revision);
 Result<server::Refinements> read_refinements(const storage::TableStore& map);
 
-/// A row `robot/NUMBER` (RobotRegistry::key()): a robot's name, and the sessions that go by it. 8 bytes each: its
-/// session, how many it had before, how many others were refused, these; then the name.
+/// A row `robot/NUMBER` (RobotRegistry::key()): a robot's name and its sessions. It is encoded as numbers of 8 bytes
+/// (the session, the number of former sessions, the number of rivals, then those sessions), followed by the name.
 struct RobotRow {
-  static constexpr std::size_t kMostSessions = 100;  ///< Former ones and rivals each.
+  static constexpr std::size_t kMostSessions = 100;  ///< Limit on former sessions, and on rivals.
   std::string name;
   std::uint64_t session = 0;
   std::set<std::uint64_t> former;
   std::set<std::uint64_t> rivals;
 };
 std::string encode(const RobotRow& row);
-/// Nothing: the bytes are none.
+/// Nothing when the bytes are no such row.
 std::optional<RobotRow> decode_robot(std::string_view bytes);
+/// The names of all robots that have such a row. Fails when the table cannot be read.
 Result<std::map<RobotId, std::string>> read_robot_names(const storage::TableStore& map);
 
 }  // namespace tutti::node

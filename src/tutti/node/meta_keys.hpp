@@ -3,11 +3,12 @@
 
 #include <string_view>
 
-/// Keys of a map's table `meta`, of which map_meta.hpp has the rows.
+/// Keys of table `meta` in a map's store; map_meta.hpp has the rows.
 namespace tutti::node {
 
 inline constexpr std::string_view kCountsKey = "counts";              ///< MapCounts
 inline constexpr std::string_view kRefinementPrefix = "refinement/";  ///< refinement_key()
-inline constexpr std::string_view kRefusedPrefix = "refused/";        ///< Then a robot: what is never taken of it.
+/// Followed by a robot's number; its submaps that are refused for good.
+inline constexpr std::string_view kRefusedPrefix = "refused/";
 
 }  // namespace tutti::node

@@ -12,29 +12,31 @@
 
 namespace tutti::node {
 
-/// What the server has told, or is to tell, every robot of its submaps: the mission's robots, and others, who are none
-/// of it, or not yet. Bounded, whatever anybody sends.
+/// What the server has told each robot about its submaps, or is to tell: the mission's robots (members), and others
+/// (strangers). Memory is bounded, whatever anybody sends.
 class Receipts {
  public:
-  static constexpr double kStrangerIsGone_s = 60.0;  ///< A robot without submaps, after its last word.
+  /// A stranger's receipt may be dropped this long after its last message.
+  static constexpr double kStrangerIsGone_s = 60.0;
 
   Receipts() = default;
-  /// Of the mission's robots, as they were stored.
+  /// With the members' receipts as they were stored.
   explicit Receipts(std::map<RobotId, Receipt> members) : members_(std::move(members)) {}
 
   [[nodiscard]] const std::map<RobotId, Receipt>& members() const { return members_; }
-  /// Made where there is none yet.
+  /// The receipt of a member; made when there is none.
   Receipt& of_member(RobotId robot);
-  /// That of any robot, made where there is none yet. Null: too many strangers have one.
+  /// The receipt of any robot; made when there is none. Null when there are too many strangers.
   Receipt* of_anybody(RobotId robot, bool is_member, Timestamp now);
   [[nodiscard]] const Receipt* find(RobotId robot) const;
-  /// It is one of the mission's from now on; what it was told as a stranger stays.
+  /// The robot becomes a member, and keeps its receipt.
   void admit(RobotId robot);
-  /// It is none, after all.
+  /// The robot is a stranger after all, and keeps its receipt.
   void dismiss(RobotId robot, Timestamp now);
 
-  /// Whether the last receipt of a robot that has unconfirmed submaps is to be sent again: it may have been lost, with
-  /// a bus that was killed, and the submap does not come a second time, because the bus takes an id once a day.
+  /// True when the robot still has unconfirmed submaps some time after its last receipt, so that the receipt is to be
+  /// sent again. It may be lost with a bus that was killed, and the robot's submap cannot come a second time to ask for
+  /// it, because the bus accepts an id once a day.
   bool waits_too_long(RobotId robot, const NodeStatus& status, Timestamp now);
 
  private:
@@ -44,18 +46,19 @@ class Receipts {
   };
   std::map<RobotId, Receipt> members_;
   std::map<RobotId, Stranger> strangers_;
-  std::map<RobotId, Timestamp> waits_since_;  // robots with a backlog: since then without a receipt that was due
+  std::map<RobotId, Timestamp> waits_since_;  // since when a robot with a backlog waits for a receipt
 };
 
-/// Notes that a submap came in a version that is not read. Not stored: it is for the robot to keep it, which has the
-/// right one where this is garbage. Bounded as refusals are.
+/// Notes that a submap came in a version that this program cannot read. The note is not stored, because the robot keeps
+/// the submap; if the bytes were garbage, the robot still has the right ones. Bounded like refusals.
 void note_unread(SubmapId id, Receipt& receipt);
-/// It has come in a version that is read.
+/// The submap has come in a version that can be read.
 void forget_unread(SubmapId id, Receipt& receipt);
-/// Notes that this content was refused; only the last ones are kept, so that nobody's garbage fills the receipt, or
-/// keeps out the submap that a robot will send under this id. False: it was noted before, or is stored.
+/// Notes that this content was refused. Only the latest refusals are kept, so that garbage sent by anybody neither
+/// fills the receipt nor blocks the submap that the robot will send under this id. False when it was noted before, or a
+/// submap of this id is stored.
 bool note_refused(SubmapId id, const std::string& bytes, const std::string& why, Receipt& receipt);
-/// The row of the map's store that keeps what does not follow from the map.
+/// The row of table `meta` that stores a robot's refusals, which do not follow from the map.
 storage::Write refusals_row(const Receipt& receipt);
 
 }  // namespace tutti::node

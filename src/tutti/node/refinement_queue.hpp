@@ -9,22 +9,22 @@
 
 namespace tutti::node {
 
-/// Refinements of the map that are to be asked for again: later, because a worker has failed, or when a worker comes
-/// that can. The map wants one at a time, so there is at most one of each.
+/// The refinement that is to be asked for again later because a worker has failed, and the one that waits for a worker
+/// that can make it. The map wants one at a time, so there is at most one of each.
 class RefinementQueue {
  public:
-  /// As for pairs (FailedPairs); without a time for an answer a refinement is given up at once.
+  /// Timing and tries are as in FailedPairs, except that with `timeout_s` = 0 a refinement is given up at once.
   RefinementQueue(double timeout_s, unsigned most_tries) : timeout_s_(timeout_s), most_tries_(most_tries) {}
 
-  /// False: it is to be given up.
+  /// Notes a failure; false when the refinement is to be given up.
   bool note_failed(const RefinementJob& job, Timestamp now);
-  /// One has been taken, or given up: the next has all its tries.
+  /// The next refinement has all its tries, because this one was taken or given up.
   void start_anew() { failures_ = 0; }
-  /// What is to be asked for again now.
+  /// Takes the refinement that is to be asked for again now; nothing when none is due.
   std::optional<RefinementJob> take_due(Timestamp now);
   [[nodiscard]] std::optional<Timestamp> next_due() const { return again_ ? std::optional(again_->due) : std::nullopt; }
 
-  /// No worker that is there has the refiner.
+  /// No present worker has the refiner of this job.
   void wait(RefinementJob job) { waiting_ = std::move(job); }
   [[nodiscard]] const std::optional<RefinementJob>& waiting() const { return waiting_; }
   std::optional<RefinementJob> take_waiting() { return std::exchange(waiting_, std::nullopt); }

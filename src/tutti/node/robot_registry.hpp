@@ -12,62 +12,62 @@
 
 namespace tutti::node {
 
-/// Who is who: which session a robot's name and number belong to, as their statuses say. A session that has lost its
-/// place to another one never gets it back, whatever its number: what a robot is sent stays with the newest.
+/// Decides which session owns a robot's name and number, by the statuses that programs send. A session that has lost
+/// them to another never gets them back, whatever its number; robots' messages go to the newest owner.
 ///
-/// Anybody can say a status, so of a robot without submaps in the map a claim holds while it is there, is not stored,
-/// gives way to a session with submaps, and is forgotten when there are too many of them.
+/// Anybody can send a status. So the claim of a robot without submaps in the map counts only while the robot is heard;
+/// it is not stored, yields to a session with submaps, and is dropped when there are too many.
 class RobotRegistry {
  public:
-  /// An owner that was seen less than this ago is there.
+  /// An owner counts as present when it was heard less than this ago.
   static constexpr double kOwnerIsThere_s = 30.0;
-  static constexpr std::size_t kMostStrangers = 1000;  ///< Robots that have said a status and have no submaps.
+  static constexpr std::size_t kMostStrangers = 1000;  ///< Limit on robots that have sent a status and have no submaps.
 
   struct Robot {
-    bool is_claimed = false;         ///< A session owns it: that of `status`.
-    NodeStatus status;               ///< The last one of the owner; of nobody's, the last one that was refused.
-    std::set<std::uint64_t> former;  ///< Sessions that it belonged to before.
-    std::set<std::uint64_t> rivals;  ///< Sessions that were refused while the owner was there.
+    bool is_claimed = false;         ///< A session owns the robot; it is that of `status`.
+    NodeStatus status;               ///< The owner's latest status; without an owner, the latest that was refused.
+    std::set<std::uint64_t> former;  ///< Sessions that owned it before.
+    std::set<std::uint64_t> rivals;  ///< Sessions that were refused while the owner was present.
     std::optional<Timestamp> last_seen;
     std::optional<Timestamp> last_update;
     std::optional<Timestamp> last_conflict;
-    std::string conflict;  ///< The last one.
+    std::string conflict;  ///< Why a session was refused last.
   };
   struct Heard {
     bool accepted = false;
-    bool must_be_stored = false;  ///< row() has changed, of a robot with submaps.
-    std::string why;              ///< Refused. The same for as long as nothing changes.
+    bool must_be_stored = false;  ///< The robot has submaps, and row() has changed.
+    std::string why;              ///< Why the status is refused. The text stays the same while nothing changes.
   };
 
-  /// Owners that are known from before, and whose rivals too, count as seen now.
+  /// Owners and rivals that are known from the store count as heard at `now`.
   void start(Timestamp now) { started_ = now; }
-  /// It has submaps in the map. A robot that was never heard: its sessions in the map are former ones when one of
-  /// another number owns it. True: row() is to be stored from now on.
+  /// Notes that the chain has submaps in the map. If no program of this robot was heard yet and another session then
+  /// claims it, the robot's sessions in the map become former ones. True when row() must be stored from now on.
   bool note_session(const ChainId& chain);
-  /// It has submaps in the map.
+  /// True if the robot has submaps in the map.
   [[nodiscard]] bool is_mapped(RobotId robot) const { return mapped_.contains(robot); }
-  /// Whoever has none: after the rows of an older program, which stored every claim.
+  /// Forgets robots without submaps. Needed after reading the rows of an older program, which stored every claim.
   void forget_strangers();
-  /// What a program says that calls itself this robot.
+  /// Takes the status of a program that claims to be this robot.
   Heard hear(RobotId robot, const NodeStatus& status, Timestamp now);
 
   [[nodiscard]] const std::map<RobotId, Robot>& robots() const { return robots_; }
-  /// Whose the number is; nothing when no status has said so.
+  /// The chain that owns the robot's number; nothing when no status has claimed it.
   [[nodiscard]] std::optional<ChainId> owner(RobotId robot) const;
-  /// Where row() is kept in the table `meta` of a map: "robot/7".
+  /// Key of row() in table `meta` of a map's store: "robot/7".
   static std::string key(RobotId robot);
   static std::optional<RobotId> robot_of(std::string_view key);
-  /// What is to be stored: name and sessions.
+  /// The robot's name and sessions, encoded for the store.
   [[nodiscard]] std::string row(RobotId robot) const;
-  /// False: the bytes are none of row().
+  /// Restores what row() has encoded; false when the bytes are no such row.
   bool restore(RobotId robot, std::string_view row);
 
  private:
   [[nodiscard]] bool is_there(const Robot& robot, std::uint64_t rival, Timestamp now) const;
   [[nodiscard]] bool is_mapped(RobotId robot, std::uint64_t session) const;
-  /// For one more.
+  /// Removes a stranger when there is no room for one more.
   void make_room();
-  /// Why it is refused; empty: it is not.
+  /// Why the status is refused; empty when it is not.
   [[nodiscard]] std::string objection(RobotId id, const NodeStatus& status, Timestamp now) const;
   void take_over(RobotId id, Robot& robot, const NodeStatus& status) const;
 

@@ -28,75 +28,79 @@ namespace tutti::node {
 
 struct OpenedMap;
 
+/// How a server's node asks workers, and which robots it accepts.
 struct ServerNodeConfig {
   server::ServerConfig server;
-  std::size_t pairs_per_job = 256;  ///< At most: what one worker does before others can help.
-  /// When no answer has come for so long, in mission seconds, the pairs of a job are asked again, as a new job; every
-  /// further time the wait is twice as long. A job that waits behind others begins to count when the last of those
-  /// was answered. 0: pairs are never asked again.
+  std::size_t pairs_per_job = 256;  ///< At most this many, so that a queue can be shared between workers.
+  /// After so long without an answer, in mission seconds, the pairs of a job are asked again as a new job; each further
+  /// time after twice as long. A job's time begins when the last job before it was answered. 0: pairs are never asked
+  /// again.
   double job_timeout_s = 600.0;
   /// A pair that no worker can verify is refused after so many tries. The second try comes after a tenth of
-  /// job_timeout_s, every further one after twice as long; without a timeout it comes with the next submap.
+  /// job_timeout_s, each further one after twice as long; without a timeout it comes with the next submap.
   unsigned most_tries = 4;
-  std::shared_ptr<const server::MapRefiner> refiner;  ///< Null: the map is its pose graph's.
-  /// A random number of this start (ProxyGraph::incarnation), by which robots see that the map may be another one: they
-  /// send again what it lacks.
+  std::shared_ptr<const server::MapRefiner> refiner;  ///< Null: the map is not refined.
+  /// A random number of this start (ProxyGraph::incarnation). By it robots notice that the map may be another one, and
+  /// send again what the map lacks.
   std::uint32_t incarnation = 0;
-  /// Robots that the server was not told of become the mission's with their first submap, up to
-  /// ProxyGraph::kMostChains.
+  /// Robots that the server does not know join the mission with their first submap, up to ProxyGraph::kMostChains
+  /// robots.
   bool accepts_others = false;
 };
 
-/// The mapping server round MapServer: submaps, verdicts and operators' words in; receipts, jobs and proxy graphs out.
-/// Its store is the map (storage::map_schema()): submaps, verdicts and words as they came, and what became of the other
-/// pairs; all else is computed from these. What was sent is never ahead of what is stored, so a server that starts
-/// again on its own store keeps its epoch.
+/// The server as a node: MapServer with its store and messages. It takes submaps, verdicts and operators' words, and
+/// gives receipts, jobs and proxy graphs. The store is the map (storage::map_schema()): submaps, verdicts and words as
+/// they came, and the outcome for all other pairs; everything else is computed from these. What was sent is never newer
+/// than what is stored, so a server that starts again on its own store keeps its epoch.
 class ServerNode {
  public:
-  /// On an empty store a new map of this epoch, which is larger than any before (server::MapServer); otherwise the map
-  /// that is stored goes on. The store must outlive the node. An error: it holds something else than a map.
+  /// On an empty store, begins a new map of this epoch, which must be larger than any before (server::MapServer);
+  /// otherwise goes on with the stored map. Fails when the store has something other than a map. The store must outlive
+  /// the node.
   static Result<std::unique_ptr<ServerNode>> open(std::set<RobotId> robots,
                                                   std::shared_ptr<const server::ClosureFinder> finder,
                                                   const ServerNodeConfig& config, std::uint64_t epoch,
                                                   const storage::TableStore& store);
 
-  /// The first step after every start: receipts, and what is to be verified. The map is not computed yet; next_timer()
-  /// says when on_timer() does, which may be at once, and what comes before is taken.
+  /// The first step after every start: receipts, and the pairs that are to be verified. The map is not computed in it,
+  /// but by on_timer() at next_timer(), which may be at once; messages are accepted before.
   Step resume(Timestamp now);
-  /// What has come to the server. A submap that it will never take is in the robot's receipt as refused, one of a
-  /// version that it does not read as unread. A second robot with a name or number that is in use (RobotRegistry) is
-  /// told so by the receipt, and its submaps are taken, but what is sent to that number is the owner's.
+  /// Takes a message that was sent to the server. The receipt then lists a submap that is refused for good as refused,
+  /// and one of a version that cannot be read as unread. A second program with a name or number in use (RobotRegistry)
+  /// is told so in the receipt; its submaps are taken, but what is sent to the number is for the owner.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// In place of receive(), for what the host does not hand in (program/host.hpp): told, and counted as refused.
+  /// Instead of receive(), for messages that the host does not pass on (program/host.hpp): tells and counts them as
+  /// refused.
   Step put_aside(const bus::Envelope& envelope, const std::string& why, Timestamp now);
   /// When on_timer() is to be called next; nothing while there is no news and every job is answered.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
-  /// Optimises the map and asks again when it is time; otherwise does nothing.
+  /// Optimises the map and asks workers again, when it is time for either.
   Step on_timer(Timestamp now);
 
-  /// All that is known of the mission, but for what the host knows: version, wall_ns, trouble.
+  /// Everything known of the mission, without what only the host knows: version, wall_ns, trouble.
   [[nodiscard]] MissionStatus mission_status(Timestamp now) const;
-  /// Grows when it should be sent before its time.
+  /// A counter that grows when mission_status() should be sent before its time.
   [[nodiscard]] std::uint64_t changes() const { return changes_; }
 
   [[nodiscard]] const server::MapServer& map_server() const { return server_; }
-  /// False after a start, until the first update: mission_status() says what the last one before it made.
+  /// False after a start until the first update; mission_status() then has the figures of the last update before the
+  /// start.
   [[nodiscard]] bool has_map() const { return has_map_; }
-  [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_.last(); }  ///< The last one; empty before.
+  [[nodiscard]] const ProxyGraph& broadcast() const { return broadcast_.last(); }
 
  private:
   ServerNode(std::set<RobotId> robots, std::shared_ptr<const server::ClosureFinder> finder,
              const ServerNodeConfig& config, std::uint64_t epoch, std::shared_ptr<SubmapFrames> frames,
              OpenedMap opened);
 
-  /// Told, and counted.
+  /// Tells and counts a refused message.
   void refuse(const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
   void note_refusal(bus::Endpoint::Role from, bus::MessageKind kind, const std::string& why);
-  /// It is one of the mission's robots from now on. False: it was before.
+  /// The robot joins the mission; false if it is in it already.
   bool admit(RobotId robot);
-  /// admit() back: its first submap was none.
+  /// Undoes admit(), because the robot's first submap was invalid.
   void dismiss(RobotId robot, Timestamp now);
-  /// Why it cannot become one of the mission's robots; empty: it is one, or can.
+  /// Why the robot cannot join the mission; empty when it can, or has.
   [[nodiscard]] std::string objection_to(RobotId robot) const;
   void receive_status(const bus::Envelope& envelope, Timestamp now, Step& step);
   void refuse_robot(const bus::Envelope& envelope, const NodeStatus& status, const std::string& why, Timestamp now,
@@ -104,14 +108,14 @@ class ServerNode {
   [[nodiscard]] std::set<RobotId> strangers_there(Timestamp now) const;
   void receive_status_of_robot(RobotId robot, const NodeStatus& status, Timestamp now, Step& step);
   Status take_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
-  /// For good: the robot need not send it again.
+  /// Refuses a submap for good: the robot need not send it again.
   void note_refused(SubmapId id, const bus::Envelope& envelope, const std::string& why, Timestamp now, Step& step);
   /// Receipts::of_anybody()
   [[nodiscard]] Receipt* receipt_of(RobotId robot, Timestamp now);
   void send_receipt(Receipt receipt, Step& step) const;
-  /// The robot need not send it again before the next start, which may be of a newer version.
+  /// The robot need not send the submap again before the server's next start, which may be of a newer version.
   void note_unread(SubmapId id, Timestamp now, Step& step);
-  /// Says which rows of the map are left alone.
+  /// Tells which rows of the store were left as they are.
   void tell_unread_rows(Timestamp now, Step& step);
   void receive_submap(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step);
@@ -119,44 +123,44 @@ class ServerNode {
   void receive_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_word(const bus::Envelope& envelope, Timestamp now, Step& step);
-  /// True: another word on this pair, given later, holds over it.
+  /// True when a word on this pair that was given later counts instead.
   Result<bool> take_word(const bus::Envelope& envelope, const ClosureWord& word, Timestamp now, Step& step);
   void note_word(const std::string& frame, const std::string& why);
-  /// Those that are stored are answered.
+  /// Answers the words that are stored.
   void recall_words();
   [[nodiscard]] server::ClosureNames closure_names() const;
   void send_copies(const bus::Envelope& envelope, Timestamp now, Step& step);
-  /// Takes one verdict of these; a refusal that now holds is kept in `refused`.
+  /// Takes one verdict; a refusal that counts now is added to `refused`.
   Status take(const ClosureVerdict& verdict, Verdicts& refused, Step& step);
   void send_jobs(std::optional<SubmapId> newest, Timestamp now, unsigned asked, std::size_t most_pairs, Step& step);
-  /// What the last map wants, if anything.
+  /// Sends the refinement job that the last map wants, if any.
   void send_refinement_job(Timestamp now, Step& step);
   void ask_for_refinement(RefinementJob job, Timestamp now, unsigned asked, Step& step);
-  /// It is asked again later, or given up.
+  /// The refinement is asked for again later, or given up.
   void note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step);
   void give_up_refinement(std::uint64_t revision, const std::string& why, Timestamp now, Step& step);
-  /// The map has been updated: when all of it is to be refined, if nothing more comes.
+  /// After an update: sets when the whole map is to be refined if nothing more comes.
   void note_settling(Timestamp now);
   void settle(Timestamp now, Step& step);
   void set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, bool was_open,
                  Timestamp now, Step& step);
-  /// The worker that had them has not got the finder: they are asked again when there is one that has.
+  /// A worker did not have the finder for these pairs: they are asked again when a worker has it.
   void note_waiting(const std::vector<SubmapPair>& pairs, const std::string& why, Timestamp now, Step& step);
   void ask_waiting(Timestamp now, Step& step);
-  /// A worker says what it can.
+  /// A worker says which methods it has.
   void receive_status_of_worker(std::uint32_t number, const NodeStatus& status, Timestamp now, Step& step);
-  /// No worker could verify it this time: it is asked again later, or refused.
+  /// No worker could verify the pair this time: it is asked again later, or refused.
   void note_failed(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
   void give_up(const SubmapPair& pair, const std::string& why, Timestamp now, Verdicts& refused, Step& step);
   static void keep(const Verdicts& refused, Step& step);
   void ask_again(Timestamp now, Step& step);
-  /// False: a submap of it is not there.
+  /// False when one of the submaps is not in the map.
   bool give_back(const SubmapPair& pair);
   void send_receipt(RobotId robot, Step& step) const;
   [[nodiscard]] MapCounts counts() const;
-  /// The map has been computed.
+  /// Sends a map that has just been computed.
   void send_map(ProxyGraphMessage message, Timestamp now, Step& step);
-  /// Sets the timer when something new has come, and remembers in the store whether it has.
+  /// Sets the timer when something new has come, and stores whether it has.
   void note_news(Timestamp now, bool before, Step& step);
   [[nodiscard]] storage::Write meta() const;
 
@@ -170,7 +174,7 @@ class ServerNode {
   std::map<std::string, UnreadRows> unread_rows_;  // by table, until they are told
   WorkerRoster workers_;
   std::map<std::pair<bus::Endpoint::Role, bus::MessageKind>, MissionStatus::Refusals> refusals_;
-  std::uint64_t start_ = 0;  // of all on this store; names jobs
+  std::uint64_t start_ = 0;  // number of starts on this store; part of jobs' names
   JobBook jobs_;             // of this start
   FailedPairs failed_;
   std::set<SubmapPair> waiting_;  // for a worker that has the finder
@@ -180,7 +184,7 @@ class ServerNode {
   std::uint64_t changes_ = 0;
   bool had_news_ = false;  // when the store was opened
   std::optional<Timestamp> timer_;
-  std::optional<Timestamp> compute_at_;  // the map that was there when the store was opened
+  std::optional<Timestamp> compute_at_;  // when to compute the map that the store had when it was opened
   std::optional<MapCounts> stored_counts_;
   bool has_map_ = false;
   Broadcast broadcast_{config_.server.broadcast == "all"};

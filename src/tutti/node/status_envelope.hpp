@@ -6,11 +6,11 @@
 
 namespace tutti::node {
 
-/// A robot's or worker's status on its way to the server. Texts become plain (wire::plain_text()).
+/// The message with a robot's or worker's status for the server. Its texts are made plain (wire::plain_text()).
 bus::Envelope to_server(bus::Endpoint from, NodeStatus status);
-/// The server's on its way to whoever looks on.
+/// The message with the server's status for everybody who watches.
 bus::Envelope to_viewers(MissionStatus status);
-/// The name of a robot or worker that was given none: "robot_7".
+/// The name of a robot or worker that was given none, such as "robot_7".
 std::string default_name(bus::Endpoint endpoint);
 
 }  // namespace tutti::node

@@ -7,7 +7,7 @@
 
 namespace tutti::node {
 
-/// A table for people. `silent_s`: for how long the server has not been heard; 0: it is there.
+/// A table of the mission's status for people. `silent_s` is how long the server was not heard, 0 when it is there.
 std::string mission_status_text(const MissionStatus& status, double silent_s);
 
 }  // namespace tutti::node

@@ -12,16 +12,16 @@
 
 namespace tutti::node {
 
-/// All that one input makes, in the order in which the host does it; then it acknowledges the input. A program that is
-/// killed anywhere in between has lost nothing: the input comes again, does no harm twice, and what was never sent
-/// follows from what is stored (resume() of each node). When the writes cannot be committed the node must go, and be
-/// made again from its store: it is ahead of it.
+/// Everything that one input causes, in the order in which the host carries it out before it acknowledges the input. A
+/// program that is killed anywhere in between loses nothing: the input comes again and does no harm twice, and what was
+/// never sent follows from what is stored (resume() of each node). When the writes cannot be committed, the node knows
+/// more than its store; it must be destroyed and made again from the store.
 struct Step {
-  std::vector<storage::Write> writes;   ///< 1. Committed, in one transaction.
-  std::vector<bus::Envelope> messages;  ///< 2. Sent.
-  std::vector<Event> events;            ///< 3. Told.
+  std::vector<storage::Write> writes;   ///< 1. To be committed in one transaction.
+  std::vector<bus::Envelope> messages;  ///< 2. To be sent.
+  std::vector<Event> events;            ///< 3. To be told.
 
-  /// What another input makes, after this.
+  /// Appends what another input causes after this one.
   void add(Step other) {
     std::ranges::move(other.writes, std::back_inserter(writes));
     std::ranges::move(other.messages, std::back_inserter(messages));

@@ -13,18 +13,18 @@
 
 #include "tutti/storage/table_store.hpp"
 
-/// Rows of a map's store that a server finds when it starts.
+/// Reads the rows of a map's store when a server starts.
 namespace tutti::node {
 
-/// Of one table, left as they are: in versions that this program does not read, as those of a newer one that had the
-/// map before; or it threw at them.
+/// Rows of one table that are left as they are: because a newer program, which had the map before, wrote them in a
+/// version that this program cannot read, or because this program threw while reading them.
 struct UnreadRows {
   std::size_t count = 0;
-  std::string why;  ///< Of the last.
+  std::string why;  ///< Why the last one was left.
 };
 
-/// What the call threw, which is a defect of ours at what this row holds, and no reason to be without all others;
-/// nothing: it has not. Memory that is lacking is thrown on.
+/// What the call threw; nothing when it did not throw. An exception on one row is a defect of this program, and no
+/// reason to lose all other rows. std::bad_alloc is thrown on.
 template <class Call>
 std::optional<std::string> thrown_by(Call&& call) {
   try {
@@ -37,8 +37,8 @@ std::optional<std::string> thrown_by(Call&& call) {
   }
 }
 
-/// Rows of a table, decoded; `leave` gets the keys of those that are left as they are (UnreadRows), and why. Any other
-/// error ends it.
+/// Decodes the rows of a table. `leave` gets the key of each row that is left as it is (UnreadRows), with the reason.
+/// Any other error ends the reading.
 template <class Decode, class Take, class Leave>
 Status read_rows(const storage::TableStore& store, const char* table, Decode&& decode, Take&& take, Leave&& leave) {
   Status ok;

@@ -12,17 +12,17 @@
 
 namespace tutti::node {
 
-/// Says an operator's word to the server until it answers: the bus may lose what it had taken, with a stream that had
-/// to be made anew. What comes twice the server takes for one.
+/// Sends an operator's word to the server until it answers, because a bus whose stream had to be made anew loses what
+/// it had accepted. The server takes repetitions for one word.
 class WordSender {
  public:
   static constexpr double kAgain_s = 5.0;
 
   WordSender(bus::Endpoint self, const ClosureWord& word);
-  /// What is to be sent at this time, in seconds of any clock, if anything: at once, and every kAgain_s. Each has an id
-  /// of its own: a bus that has had one does not pass it on again.
+  /// The message to be sent at this time, in seconds of any clock: at once, and then every kAgain_s. Each has an id of
+  /// its own, because the bus does not pass on an id twice.
   std::optional<bus::Envelope> due(double now_s);
-  /// Why the word is not stored; empty: it is. Nothing: the server has not answered it.
+  /// The server's answer: why the word is not stored, or empty when it is. Nothing while there is no answer.
   [[nodiscard]] std::optional<std::string> answer(const MissionStatus& status) const;
 
  private:

@@ -12,16 +12,16 @@
 
 namespace tutti::node {
 
-/// The words of operators in a map's store; `leave` is told why one of them, of a version that this program does not
-/// read, is not among them. An error: the table is damaged.
+/// The operators' words in a map's store. `leave` is told why a word of a version that this program cannot read was
+/// left out. Fails when the table is damaged.
 Result<WordSet> read_words(const storage::TableStore& map, const std::function<void(const std::string&)>& leave);
 
-/// The key of the rows on a pair of submaps.
+/// Key of the rows about a pair of submaps.
 std::string key_of(const SubmapPair& pair);
-/// The pair of such a key; nothing when it is none.
+/// The pair of such a key; nothing when it is malformed.
 std::optional<SubmapPair> pair_of(std::string_view key);
 
-/// What the server judges by: for people is the rest.
+/// The verdict without what is only for people: it is what the server judges by.
 ClosureVerdict without_evidence(ClosureVerdict verdict);
 
 }  // namespace tutti::node

@@ -19,43 +19,47 @@
 
 namespace tutti::node {
 
-/// Verifies loop closures and refines maps for the server, with the finder or refiner that a job names: its own, or one
-/// that is made of the job's settings. A job for one that it cannot have goes back to the server; the next one is not
-/// taken for some time, so that others get it. Remembers nothing between jobs that it could not get again. One that has
-/// not all submaps at hand asks the server for those that a job names, and holds the job meanwhile.
+/// Verifies loop closures and refines maps for the server, with the finder or refiner that the job names: the worker's
+/// own, or one made from the job's settings. A job that it cannot do goes back to the server, and the worker then
+/// pauses so that other workers get the job. It keeps nothing between jobs that it could not get again. A worker that
+/// lacks submaps of a job asks the server for them, and holds the job until they are there.
 class WorkerNode {
  public:
-  /// Calls its argument with 0 ... count - 1, in any order, maybe on several threads, and returns when all have.
+  /// Calls its argument with 0 ... count - 1, in any order and possibly on several threads, and returns after the last
+  /// call.
   using ForEach = std::function<void(std::size_t count, const std::function<void(std::size_t)>&)>;
   static void one_by_one(std::size_t count, const std::function<void(std::size_t)>& call);
 
-  /// Submaps asked for at a time, after how long again, and how long without any until the job is answered without.
+  /// How many submaps are asked for at a time, after how long again, and after how long without any the job is answered
+  /// without them.
   static constexpr std::size_t kMostAsked = 16;
   static constexpr double kAskAgain_s = 2.0;
   static constexpr double kPatience_s = 60.0;
-  static constexpr double kRest_s = 10.0;  ///< After a job that it cannot do.
+  static constexpr double kRest_s = 10.0;  ///< Pause after a job that the worker cannot do.
 
-  /// With every submap at hand.
+  /// A worker that has all submaps.
   WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder,
              std::shared_ptr<const SubmapFrames> submaps, ForEach for_each = one_by_one);
-  /// With those that are in `cache`.
+  /// A worker that has the submaps in `cache`, and asks the server for others.
   WorkerNode(bus::Endpoint self, std::shared_ptr<const server::ClosureFinder> finder, std::shared_ptr<FrameCache> cache,
              ForEach for_each = one_by_one);
 
-  /// Tells the time, in nanoseconds since the Unix epoch, for the evidence of closures; without it they have none.
+  /// Sets the clock (nanoseconds since the Unix epoch) for the evidence of closures; without it there is no evidence.
   void set_clock(std::function<std::int64_t()> clock) { clock_ = std::move(clock); }
-  /// Its own refiner of maps.
+  /// Sets the worker's own refiner.
   void refine_with(std::shared_ptr<const server::MapRefiner> refiner) { refiner_ = std::move(refiner); }
-  /// Who makes finders and refiners that are not its own; without one it has none but these.
+  /// Sets what makes finders and refiners that are not the worker's own; without it the worker has only its own.
   void make_others_with(std::shared_ptr<const server::FinderMaker> maker) { maker_ = std::move(maker); }
-  /// How long after a job that it cannot do; 0 for the server's own worker: what that cannot do nobody waits for.
+  /// Sets the pause after a job that the worker cannot do. 0 is for the server's own worker, as nobody else waits for
+  /// its jobs.
   void rest_for(double seconds) { rest_s_ = seconds; }
-  /// Its finders and refiners, for its status.
+  /// The worker's finders and refiners, for its status.
   [[nodiscard]] std::vector<MethodId> can() const;
-  /// A job, and only when none is held; the same one twice gives the same verdicts. Or a submap that was asked for.
+  /// Takes a job, only when holds_job() is false, or a submap that was asked for. The same job gives the same verdicts.
   Step receive(const bus::Envelope& envelope, Timestamp now);
-  /// The job that came last is not answered yet, or another one is not to come yet; or it never is answered: it, or a
-  /// submap of it, is of a version that this program does not read. Such a one is to be left to another worker.
+  /// True while no further job may come: the last job is not answered, or the worker pauses, or the job (or a submap of
+  /// it) is of a version that this program cannot read. In the last case the job is never answered and must be left to
+  /// another worker.
   [[nodiscard]] bool holds_job() const { return held_.has_value() || leaves_job_ || rests_until_.has_value(); }
   /// When on_timer() is to be called next; nothing while no job is held.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
@@ -67,14 +71,14 @@ class WorkerNode {
     AnyJob job;
     std::set<SubmapId> missing;
     std::map<SubmapId, Timestamp> asked;
-    Timestamp last_came;  ///< Any of them, or the job.
+    Timestamp last_came;  ///< When the job, or any of its submaps, came last.
   };
 
   static Result<AnyJob> decode(const bus::Envelope& envelope);
   void receive_job(const bus::Envelope& envelope, Timestamp now, Step& step);
   void receive_copy(const bus::Envelope& envelope, Timestamp now, Step& step);
   void ask(Timestamp now, Step& step);
-  /// Whom the job asks for, from now on.
+  /// Sets the finder (refiner) that the job asks for.
   Status prepare(const Job& job);
   Status prepare(const RefinementJob& job);
   void decline(const Job& job, const std::string& why, Step& step) const;
@@ -89,14 +93,14 @@ class WorkerNode {
   void send(bus::MessageKind kind, const std::string& job, std::string bytes, Step& step) const;
 
   bus::Endpoint self_;
-  std::shared_ptr<const server::ClosureFinder> finder_;  // its own
-  std::shared_ptr<FrameCache> cache_;                    // null: nothing is missing
+  std::shared_ptr<const server::ClosureFinder> finder_;  // its own finder
+  std::shared_ptr<FrameCache> cache_;                    // null: all submaps are there
   std::shared_ptr<const SubmapFrames> submaps_;
   ForEach for_each_;
   std::function<std::int64_t()> clock_;
   std::shared_ptr<const server::MapRefiner> refiner_;  // its own; null: none
   std::shared_ptr<const server::FinderMaker> maker_;
-  std::shared_ptr<const server::ClosureFinder> asked_finder_;  // that the last job asks for, and so the refiner
+  std::shared_ptr<const server::ClosureFinder> asked_finder_;  // of the last job; likewise the refiner
   std::shared_ptr<const server::MapRefiner> asked_refiner_;
   std::optional<Held> held_;
   double rest_s_ = kRest_s;

@@ -8,19 +8,19 @@
 
 namespace tutti::node {
 
-/// The workers that a server has heard of, and what each says it can do.
+/// The workers that a server has heard, and the methods that each one has.
 class WorkerRoster {
  public:
   void hear(std::uint32_t number, const NodeStatus& status, Timestamp now);
-  /// Is a worker there that has this finder or refiner?
+  /// True if a worker that was heard recently has this finder or refiner.
   [[nodiscard]] bool any_can(const MethodId& id, Timestamp now) const;
   [[nodiscard]] const std::map<std::uint32_t, MissionStatus::Worker>& all() const { return workers_; }
 
  private:
-  std::map<std::uint32_t, MissionStatus::Worker> workers_;  // the last heard
+  std::map<std::uint32_t, MissionStatus::Worker> workers_;  // the latest status of each
 };
 
-/// Has this worker the finder or refiner, or can it make it of its settings?
+/// True if this worker has the finder or refiner, or can make it from its settings.
 bool can(const NodeStatus& worker, const MethodId& id);
 
 }  // namespace tutti::node

@@ -23,35 +23,37 @@ namespace tutti::program {
 using Json = nlohmann::ordered_json;
 
 enum class Level { debug, info, warning, error };
-/// "debug", "info", "warning", "error".
+/// The level called "debug", "info", "warning" or "error"; fails with any other word.
 Result<Level> level_of(const std::string& word);
 
+/// A suspected origin as JSON, in the units of its fields.
 Json to_json(const consistency::SuspectedOrigin& origin);
-/// "time_s", "event" (what happened, one word), then what it says.
+/// The event as JSON: "time_s", then "event" (what happened, in one word), then its fields.
 Json to_json(const node::Event& event);
 
-/// What a program tells: events for other programs in FOLDER/events.jsonl, one JSON object a line, and sentences for
-/// people in FOLDER/log.txt and, from a level on, on stderr. Both files begin anew when they are full: one older one of
-/// each is kept. Any thread may call at any time. What cannot be written, as on a full disk, is lost; the program goes
-/// on. What others can cause (refusals, and who says that he is here) is throttled, and the same sentence is said once
-/// in kSame_s.
+/// Writes what a program tells: events for other programs in FOLDER/events.jsonl, one JSON object per line; sentences
+/// for people in FOLDER/log.txt and, from `console` on, on stderr. Both files are begun anew when they are full, and
+/// one older file of each is kept. May be called from any thread.
+///
+/// What cannot be written, for example because the disk is full, is lost, and the program goes on. Events that others
+/// can cause at will (refusals, statuses) are throttled, and a sentence is repeated only after kSame_s.
 class EventLog {
  public:
   static constexpr std::uintmax_t kMaxEventBytes = std::uintmax_t{64} << 20U;
   static constexpr std::size_t kMaxLogBytes = std::size_t{10} << 20U;
   static constexpr double kSame_s = 60.0;
 
-  /// `name` stands in front of what people read. Goes on where an earlier program of this folder stopped.
+  /// Continues the files of `folder`; `name` precedes sentences for people. Fails when the files cannot be opened.
   static Result<std::unique_ptr<EventLog>> open(const std::filesystem::path& folder, const std::string& name,
                                                 Level console);
-  /// Only what people read on stderr: for a program without a folder.
+  /// Only writes sentences to stderr, for a program without a folder.
   static std::unique_ptr<EventLog> on_console(const std::string& name, Level console);
   ~EventLog();
 
   void write(const node::Event& event);
   void write(const Json& line);
   void say(Level level, const std::string& sentence);
-  /// How it stands, in one line, rewritten in place; nothing where stderr is no terminal.
+  /// Shows the program's state in one line, which the next call overwrites; does nothing when stderr is no terminal.
   void show(const std::string& line);
 
  private:
@@ -71,8 +73,8 @@ class EventLog {
   Level console_ = Level::warning;
 };
 
-/// The lines of an events.jsonl and of the older one beside it, in their order; a line that a kill has torn is left
-/// out. An error: it cannot be read.
+/// Reads the lines of events.jsonl, after those of the older file. A line that a kill has torn is skipped. Fails when a
+/// file cannot be read.
 Status read_events(const std::filesystem::path& folder, const std::function<void(const Json&)>& take);
 
 }  // namespace tutti::program

@@ -10,21 +10,21 @@
 
 namespace tutti::program {
 
-/// The eyes of a robot that is fed: images as they come, decoded, and points followed through them.
+/// Decodes the images that a robot is fed, and tracks points through them.
 class FedCamera {
  public:
   explicit FedCamera(const visual::TrackerConfig& config) : config_(config) {}
 
-  /// Images after those before, whose raw ones have their camera's size (check_images()); at a keyframe they are
-  /// described. None where there is nothing to see; take_errors() says why.
+  /// Tracks points in the next images, of which raw ones must have their camera's size (check_images()); at a keyframe
+  /// descriptors are computed. Empty when there is nothing to track; take_errors() says why.
   TrackedImages see(const FedImages& images, bool keyframe);
-  /// Told once.
+  /// The errors since the last call.
   std::vector<Error> take_errors() { return std::exchange(errors_, {}); }
 
  private:
   visual::TrackerConfig config_;
-  std::shared_ptr<const FeedSensors> sensors_;     // by which the tracker is made
-  std::unique_ptr<visual::ImageTracker> tracker_;  // null: of these there can be none
+  std::shared_ptr<const FeedSensors> sensors_;     // for which the tracker was made
+  std::unique_ptr<visual::ImageTracker> tracker_;  // null: these sensors allow none
   std::vector<Error> errors_;
 };
 

@@ -10,11 +10,11 @@
 
 namespace tutti::program {
 
-/// Who finds closures and refines maps for a program, and by which settings.
+/// Which closure finder and map refiner a program uses, with their settings.
 struct FinderSettings {
   finders::FinderConfig closures;
   bundle::RefinementConfig refinement;
-  std::shared_ptr<const server::ClosureFinder> other;  ///< Instead of that of `closures`; null: there is none.
+  std::shared_ptr<const server::ClosureFinder> other;  ///< Used in place of `closures`' finder; null: there is none.
 
   [[nodiscard]] std::shared_ptr<const server::ClosureFinder> finder() const {
     return other != nullptr ? other : finders::make_finder(closures);
@@ -24,7 +24,7 @@ struct FinderSettings {
     v.field("refinement", refinement);
     v.field("closures", closures);
   }
-  /// Null: none is needed.
+  /// The configured refiner; null when the finder does not use cameras.
   [[nodiscard]] std::shared_ptr<const server::MapRefiner> refiner() const {
     return finders::make_refiner(closures, refinement);
   }

@@ -22,69 +22,74 @@
 
 namespace tutti::program {
 
-/// A step, and the messages that are done with when it is carried out.
+/// A step, with the messages that can be acknowledged once it is carried out.
 struct Answer {
   node::Step step;
   std::vector<std::uint64_t> done;  ///< Tickets of the port.
 };
 
-/// A node as its host sees it. It is made from its store, and may have to go at any time.
+/// A node as its host sees it. It is made from its store, and may be destroyed at any time.
 class Hosted {
  public:
   virtual ~Hosted() = default;
-  /// The first step.
+  /// The first step after the node was made.
   virtual Answer start(Timestamp now) = 0;
   virtual Answer receive(const bus::Received& message, Timestamp now) = 0;
-  /// In place of receive(), for a message that has made the node throw too often: it is done with, and counted.
+  /// Called instead of receive() for a message that has made the node throw too often; it is acknowledged and counted.
   virtual Answer put_aside(const bus::Received& message, const std::string& /*why*/, Timestamp /*now*/) {
     return {{}, {message.ticket}};
   }
-  /// When there is something to do without a message; nothing: never.
+  /// When there is work to do without a message; nothing: never.
   [[nodiscard]] virtual std::optional<Timestamp> next_work() const { return std::nullopt; }
   virtual Answer work(Timestamp /*now*/) { return {}; }
-  /// Waits at most so many wall seconds: for what it hears otherwise than by the port, too. Its steps of then go to
-  /// Host::carry_out().
+  /// Waits at most `wall_s` wall seconds, also for input that does not come by the port. The steps of such input are
+  /// passed to Host::carry_out().
   virtual void wait(double wall_s);
-  /// The last step, before the host ends.
+  /// The last step before the host ends.
   virtual Answer end() { return {}; }
-  /// Every kReport_s: what others are told of it.
+  /// Called every kReport_s; returns what others are told about the node.
   virtual Answer report(Timestamp /*now*/) { return {}; }
-  /// How it stands, for STATE/status.json and, "line", for the console.
+  /// The node's state for STATE/status.json; its field "line" is for the console.
   [[nodiscard]] virtual Json status(Timestamp now) const = 0;
-  /// Nothing is left to be done: the host ends.
+  /// True when nothing is left to do, so the host ends.
   [[nodiscard]] virtual bool finished() const { return false; }
 };
 
+/// Counts of the messages of one kind and direction.
 struct Traffic {
   std::uint64_t messages = 0;
   std::uint64_t bytes = 0;
-  std::uint64_t largest = 0;  ///< Bytes.
+  std::uint64_t largest = 0;  ///< Size of the largest message, bytes.
 };
 
-/// Carries out what a node says, as node/step.hpp asks for: all steps of one turn in one transaction. When that cannot
-/// be committed the node goes and is made again from its store, every few seconds until it works; what had come to it
-/// comes again, since nothing was acknowledged. One thread.
+/// Carries out a node's steps as node/step.hpp demands, all steps of one turn in one transaction. When they cannot be
+/// committed, the node is destroyed and made again from its store, every few seconds until it works; its inputs come
+/// again, because none was acknowledged. A host uses one thread.
 ///
-/// What a node throws, which is a defect of ours, ends no program: the node is made again in the same way, since nobody
-/// knows how it stands. A message that has made it throw PutAside::kMostThrows times is put aside; a job is left to the
-/// bus, which gives it to others. Work that throws waits, longer every time, while messages are taken.
+/// When a node throws, which is a defect of ours, the program goes on: the node is made again in the same way, because
+/// its state is unknown. A message that has made it throw PutAside::kMostThrows times is put aside; a job is left to
+/// the bus, which gives it to other workers. Work that throws is tried again after growing pauses, while messages are
+/// still taken.
 class Host {
  public:
   static constexpr double kReport_s = 2.0;
   static constexpr double kStatus_s = 0.5;
   static constexpr double kReopen_s = 3.0;
-  static constexpr double kLongestPause_s = 600.0;  ///< Between two tries of work that throws.
+  static constexpr double kLongestPause_s = 600.0;  ///< Longest pause between two tries of work that throws.
   static constexpr double kLongestSleep_s = 0.05;
   static constexpr std::size_t kMostUncommitted = 8U << 20U;  ///< Bytes.
 
+  /// What a host is made of.
   struct Parts {
-    storage::TableStore* store = nullptr;  ///< Null: the node writes nothing.
+    storage::TableStore* store = nullptr;  ///< Null: the node stores nothing.
     std::function<Result<std::unique_ptr<bus::Port>>()> open_port;
     std::function<Result<std::unique_ptr<Hosted>>(bus::Port& port)> open_node;
-    std::function<void()> each_second;  ///< May be empty.
-    std::filesystem::path status_file;  ///< Empty: none.
-    std::string table_aside = {};  ///< Of the store: where messages that are put aside are remembered. Empty: nowhere.
-    std::string version = {};      ///< Of the program: what is put aside by one, another tries again.
+    std::function<void()> each_second;  ///< Called once a second; may be empty.
+    std::filesystem::path status_file;  ///< Empty: none is written.
+    /// Table of the store that remembers the messages put aside; empty: they are not remembered.
+    std::string table_aside = {};
+    /// Version of the program; another version tries messages again that this one has put aside.
+    std::string version = {};
   };
   Host(Parts parts, const Clock& clock, EventLog& log)
       : parts_(std::move(parts)), clock_(clock), log_(log), aside_(parts_.version) {}
@@ -92,33 +97,34 @@ class Host {
   Host(const Host&) = delete;
   Host& operator=(const Host&) = delete;
 
-  /// Opens port and node and carries out its first step. An error: it cannot be; run() and turn() are of no use.
+  /// Opens port and node, and carries out the node's first step. After an error run() and turn() must not be called.
   Status open();
-  /// What is there to be done now. Returns after how many wall seconds to call it again.
+  /// Does what is to be done now; returns after how many wall seconds it is to be called again.
   double turn();
-  /// Waits at most so many wall seconds, for what the node hears otherwise than by the port, too.
+  /// Waits at most `wall_s` wall seconds, also for input of the node that does not come by the port.
   void wait(double wall_s);
-  /// Turns until the node has finished or `stop`. Then all that it said is stored.
+  /// Turns until the node has finished, or until `stop`; then everything that the node wanted stored is stored.
   void run(const std::atomic<bool>& stop);
-  /// A step from within Hosted::wait() or end(). An error: it cannot be stored, and the node goes when it has waited.
+  /// Carries out a step from within Hosted::wait() or end(). An error means that it cannot be stored, and that the node
+  /// will be destroyed after its wait.
   Status carry_out(node::Step step);
 
-  /// Null while it cannot be committed.
+  /// Null while steps cannot be committed.
   [[nodiscard]] Hosted* hosted() const { return node_.get(); }
-  /// There is no node because nothing can be stored, or it has thrown: turn() makes it again.
+  /// True when there is no node, because nothing can be stored or it has thrown; turn() makes it again.
   [[nodiscard]] bool tries_again() const { return !node_ && reopen_s_ > 0.0; }
-  /// By direction (true: sent) and kind.
+  /// Traffic by direction (true: sent) and kind.
   using TrafficTable = std::map<std::pair<bool, bus::MessageKind>, Traffic>;
   [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }
-  /// What is wrong with the link to the bus; empty: nothing.
+  /// What is wrong with the link to the bus; empty when nothing is.
   [[nodiscard]] const std::string& link_trouble() const { return link_.trouble(); }
-  /// Why the node does not do all that it should; empty when it does.
+  /// Why the node cannot do all of its work; empty when it can.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
  private:
   Status open_parts();
   void add(Answer answer);
-  /// False: the node is gone.
+  /// False when the node is gone.
   bool hand_in(const bus::Received& message);
   bool work();
   bool report();
@@ -144,11 +150,11 @@ class Host {
   double reopen_s_ = 0.0;
   double report_s_ = 0.0, status_s_ = 0.0, second_s_ = 0.0;
   std::string trouble_;
-  bool lost_ = false;  // a step from within Hosted::wait()
+  bool lost_ = false;  // a step from within Hosted::wait() could not be stored
   PutAside aside_;
-  std::uint64_t thrown_ = 0;  // so often
+  std::uint64_t thrown_ = 0;  // how often the node has thrown
   std::string last_thrown_;
-  double pause_s_ = 0.0, work_again_s_ = 0.0;  // of work that throws
+  double pause_s_ = 0.0, work_again_s_ = 0.0;  // for work that throws
   TrafficTable traffic_;
   LinkWatch link_;
 };

@@ -16,10 +16,11 @@
 
 namespace tutti::program {
 
-/// A robot in its program: its samples come from its recording, or from a live feed.
+/// A robot in its program, whose samples come from its recording or from a live feed.
 class HostedRobot final : public Hosted {
  public:
-  static constexpr double kWaitsForMap_s = 60.0;  ///< After the server has stored everything.
+  /// For a map with all of its submaps, after the server has stored them.
+  static constexpr double kWaitsForMap_s = 60.0;
 
   HostedRobot(std::unique_ptr<RobotDriver> driver, double duration_s, const RobotOptions& options, const Clock& clock,
               const bus::NatsPort& port, EventLog& log, const std::string& alone)
@@ -31,7 +32,7 @@ class HostedRobot final : public Hosted {
         log_(log),
         alone_(alone),
         begin_s_(clock.wall_s()) {}
-  /// Its samples come from clients; `robot` is its driver.
+  /// From now on samples come from the clients of `feed`; `robot` is this robot's driver.
   void feed_live(LiveFeed& feed, LiveRobot& robot, Host& host, RobotView view) {
     feed_ = &feed;
     fed_.emplace(feed.front(), robot, host, clock_, std::move(view), options_.settings.tracking.tracker);
@@ -54,7 +55,7 @@ class HostedRobot final : public Hosted {
   [[nodiscard]] bool finished() const override;
   [[nodiscard]] Json status(Timestamp now) const override;
   [[nodiscard]] bool is_whole_in_map() const { return driver_->node().is_whole_in_map(); }
-  /// Why this program is not to be: another one is this robot.
+  /// Why this program must end: another program is this robot. Nothing when it need not.
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
 
  private:
@@ -76,9 +77,9 @@ class HostedRobot final : public Hosted {
   EventLog& log_;
   const std::string& alone_;  // why it hears no server
   double begin_s_;
-  LiveFeed* feed_ = nullptr;     // null: it replays
-  std::optional<FedRobot> fed_;  // of that feed
-  bool ended_ = false;           // the recording that it replays
+  LiveFeed* feed_ = nullptr;     // null: it replays a recording
+  std::optional<FedRobot> fed_;  // the robot's end of that feed
+  bool ended_ = false;           // the recording that it replays has ended
   bool warned_ = false;
   std::optional<std::string> refused_;
   mutable std::optional<double> settled_s_;

@@ -11,20 +11,20 @@
 
 namespace tutti::program {
 
-/// What a program says of its link to the bus, as that changes: that there is none, or none any more; that the bus
-/// stores nothing, as one does whose disk is full; that it had lost its streams.
+/// Reports changes of a program's link to the bus: there is no link, or none any more; the bus stores nothing, as when
+/// its disk is full; the bus had lost its streams.
 class LinkWatch {
  public:
-  static constexpr double kPatience_s = 5.0;  ///< Without a link.
+  static constexpr double kPatience_s = 5.0;  ///< A missing link is reported after this time.
   static constexpr double kStores_s = 25.0;   ///< Longer than a port waits for one confirmation.
 
   struct Said {
     Level level = Level::info;
     std::string sentence;
   };
-  /// To be called about once a second.
+  /// The sentences to report now. To be called about once a second.
   std::vector<Said> look(const bus::NatsState& state, double wall_s);
-  /// What is wrong now; empty: nothing.
+  /// What is wrong now; empty when nothing is.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
  private:

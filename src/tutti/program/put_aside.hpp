@@ -12,26 +12,26 @@
 
 namespace tutti::program {
 
-/// Which messages have made a node throw. That is a defect of ours, which no message may turn into the end of a
-/// program: who has done it kMostThrows times is put aside, by the hash of what it says, until another version of the
-/// program is there, which may know better.
+/// Remembers which messages have made a node throw. That is a defect of ours, and no message may end a program by it:
+/// after kMostThrows times a message is put aside, by the hash of its content, until the program has another version,
+/// which may handle it.
 class PutAside {
  public:
   static constexpr unsigned kMostThrows = 3;
-  static constexpr std::size_t kMost = 1000;  ///< Remembered of each kind; beyond, it begins anew.
+  static constexpr std::size_t kMost = 1000;  ///< Limit on either list; when it is reached, the list begins anew.
 
   explicit PutAside(std::string version) : version_(std::move(version)) {}
 
-  /// 16 hexadecimal digits over sender, kind, id and bytes. Of a status, each of which is another, over sender and
-  /// kind.
+  /// 16 hexadecimal digits, hashed from sender, kind, id and bytes; for statuses, which all differ, from sender and
+  /// kind only.
   static std::string hash_of(const bus::Envelope& message);
 
   [[nodiscard]] bool contains(const std::string& hash) const { return aside_.contains(hash); }
-  /// It has made the node throw. True: that was once too often, and from now on it is put aside.
+  /// Notes that the message has made the node throw. True when that was once too often, and the message is put aside.
   bool note(const std::string& hash);
   [[nodiscard]] std::size_t count() const { return aside_.size(); }
 
-  /// What is remembered in the rows "aside/HASH" of this table, of this version.
+  /// Reads the rows "aside/HASH" of this table that this version of the program has written.
   Status read(const storage::TableStore& store, const std::string& table);
   [[nodiscard]] storage::Write to_row(const std::string& table, const std::string& hash) const;
 

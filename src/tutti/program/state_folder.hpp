@@ -10,12 +10,14 @@
 
 namespace tutti::program {
 
-/// The folder of one server or robot: all that it knows, and what it does not share with a second program. The file
-/// `owner` in it says whose it is and since when.
+/// The folder of one server or robot, which holds everything that it knows and is not shared with a second program. The
+/// file `owner` in it says whose it is, and since when.
 class StateFolder {
  public:
-  /// Made if it is missing. `owner`: "server", "robot NAME". Errors: another program has it open; it is another
-  /// owner's; it holds other things; the disk. `brought`: a store that somebody may have put into a new one.
+  /// Opens the folder, and makes it if it is missing. Also sets the program's umask, so that files made from then on
+  /// have at most mode 0640 and folders 0750. `owner` is "server" or "robot NAME"; `brought` is a file that somebody
+  /// may have put into a new folder, such as a store. Fails when another program has the folder open, when it has
+  /// another owner or other contents, or when the disk fails.
   static Result<StateFolder> open(const std::filesystem::path& folder, const std::string& owner,
                                   const std::string& brought = "");
   ~StateFolder();
@@ -27,9 +29,9 @@ class StateFolder {
   StateFolder& operator=(StateFolder&&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// When it was made, nanoseconds since the Unix epoch: the number of a robot's session and of a map's epoch.
+  /// When the folder was made, in nanoseconds since the Unix epoch; used as a robot's session and as a map's epoch.
   [[nodiscard]] std::uint64_t made_ns() const { return made_ns_; }
-  /// Wall seconds since then.
+  /// Wall seconds since it was made.
   [[nodiscard]] double age_s() const;
   [[nodiscard]] bool is_new() const { return is_new_; }  ///< Made by this open().
 
@@ -44,7 +46,8 @@ class StateFolder {
   int lock_ = -1;
 };
 
-/// Written beside and put in its place, so that a reader sees all of the old or all of the new.
+/// Writes a file beside `file` and renames it, so that readers see either all of the old text or all of the new.
+/// `durable` syncs the new file to the disk before it is renamed.
 Status replace_file(const std::filesystem::path& file, const std::string& text, bool durable);
 
 }  // namespace tutti::program

@@ -7,8 +7,8 @@
 
 namespace tutti::program {
 
-/// So that what strangers can cause as often as they like fills no log: of each kind of line so many at once, then one
-/// every kPeriod_s, which says how many were left out.
+/// Limits log lines that strangers can cause at will: per kind, kBurst lines may come at once, then one every
+/// kPeriod_s, which says how many were left out.
 class Throttle {
  public:
   static constexpr double kBurst = 20.0;
@@ -16,8 +16,9 @@ class Throttle {
 
   struct Verdict {
     bool passes = false;
-    std::uint64_t left_out = 0;  ///< Of this kind, since the last that passed.
+    std::uint64_t left_out = 0;  ///< Lines of this kind since the last one that passed.
   };
+  /// Whether a line of this kind passes at `wall_s` (any clock).
   Verdict ask(const std::string& kind, double wall_s);
 
  private:

@@ -13,17 +13,18 @@
 
 namespace tutti::program {
 
-/// What a worker is told of its mission.
+/// What a worker is told about its mission.
 struct WorkerSettings {
-  std::string mission;  ///< Its name on the bus; empty: the one that has a server there.
+  std::string mission;  ///< Its name on the bus; empty: the mission that has a server there.
   FinderSettings finders;
-  /// Of these, what a mission file may say: needed only where closures are made up.
+  /// Describes the settings that a mission file may have, which a worker needs only when closures are made up.
   template <class V>
   void describe(V& v) {
     finders.describe(v);
   }
 };
 
+/// How a worker program runs.
 struct WorkerOptions {
   std::string bus;  ///< "nats://HOST:PORT"
   bool insecure = false;
@@ -33,15 +34,15 @@ struct WorkerOptions {
   std::string version;
 };
 
-/// Until `stop`. Any number of them, anywhere.
+/// Runs a worker until `stop`. Any number of workers may run, on any machine.
 Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop);
 
-/// A worker as its host sees it. While it has a job it says so on the bus every few seconds. When `stop` becomes true
-/// it leaves the job in hand, which another worker then gets.
+/// A worker as its host sees it. While it has a job, it tells the bus so every few seconds. When `stop` becomes true it
+/// abandons its job, which another worker then gets.
 class HostedWorker final : public Hosted {
  public:
   using Make = std::function<node::WorkerNode(node::WorkerNode::ForEach)>;
-  /// `port` and `stop` outlive it. `threads`: pairs verified at a time.
+  /// `port` and `stop` must outlive it. `threads` is the number of pairs verified at a time.
   HostedWorker(bus::Endpoint self, std::string version, const Make& make, std::size_t threads, bus::Port& port,
                const std::atomic<bool>& stop);
   Answer start(Timestamp /*now*/) override { return {}; }
@@ -53,7 +54,7 @@ class HostedWorker final : public Hosted {
 
  private:
   void for_each(std::size_t count, const std::function<void(std::size_t)>& call);
-  /// Calls `step` of the node; the job is done with when it holds none any more.
+  /// Calls `step` of the node, and acknowledges the job when the node no longer holds one.
   template <class F>
   Answer carry_on(F&& step);
 

@@ -9,10 +9,10 @@
 
 namespace tutti::robot {
 
-/// How far off T_map_body of the newest keyframe may be: a covariance, right tangent, of its pose as seen from the
-/// first keyframe, where `map` begins. Of what the ledger's links span, the map says how sure it is; of all else,
-/// before, between and behind them, odometry does (docs/math.md, "How sure a robot is"). `graph`: the whole map, before
-/// consistency::without_doubted(); `stamps`: of the smoother's nodes.
+/// The covariance of T_map_body of the newest keyframe: right tangent, as seen from the first keyframe, where `map`
+/// begins. Over the stretches that the ledger's constraints span, it is what the map says of its own accuracy; before,
+/// between and behind them it is odometry's (docs/math.md, "How sure a robot is"). `graph` is the whole map, before
+/// consistency::without_doubted(); `stamps` are those of the smoother's nodes.
 Matrix6d map_covariance(const ProxyGraph& graph, const ChainId& chain, std::span<const Timestamp> stamps,
                         const consistency::Ledger& ledger, const estimation::SmootherState& smoother);
 

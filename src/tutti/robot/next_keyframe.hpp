@@ -9,9 +9,10 @@
 
 namespace tutti::robot {
 
-/// When the next keyframe is due: after some travel, rotation or time since the last one.
+/// Tells when the next keyframe is due: after some travel, rotation or time since the last one.
 struct NextKeyframe {
-  std::optional<StampedPose> last;  ///< T_odom_body; nothing: the first one is due at once.
+  /// T_odom_body of the last keyframe; nothing when there is none, and one is due at once.
+  std::optional<StampedPose> last;
   double distance_m = 0.0;
   double angle_rad = 0.0;
   double time_s = 0.0;

@@ -7,18 +7,19 @@
 #include "tutti/base/result.hpp"
 #include "tutti/robot/sensor_timeline.hpp"
 
-/// What a robot takes of odometry, and what it refuses: for all that look at samples before it does, too.
+/// Which odometry a robot accepts, also for code that looks at samples before the robot does.
 namespace tutti::robot {
 
-/// A sample as it is taken: the quaternion normalised where it is off by rounding only (1e-3), the covariance with
-/// standard deviations of at most 10 m and 0.3 rad and an inverse (geometry/covariance.hpp). An error: it is refused.
+/// The sample as the robot uses it: the quaternion normalised where it is off by rounding (1e-3), the covariance given
+/// an inverse and standard deviations of at most 10 m and 0.3 rad (geometry/covariance.hpp). An error says why the
+/// sample is refused.
 Result<OdometryStep> usable_step(RobotId robot, Timestamp stamp, const Pose3& T_odom_body,
                                  const Matrix6d& increment_covariance);
-/// Of a step of which nothing is known, as sure as any may be.
+/// Covariance of a step of which nothing is known: the largest that a step may have.
 Matrix6d unknown_step();
-/// The pose is finite, of a unit quaternion, within kMaxCoordinate_m; the covariance what check_covariance() says.
+/// Fails unless the pose is finite, with a unit quaternion and within kMaxCoordinate_m, and check_covariance() passes.
 Status check_step(RobotId robot, const OdometryStep& step);
-/// Stamps increase.
+/// Fails unless `stamp` is after `newest`.
 Status check_follows(RobotId robot, Timestamp stamp, const std::optional<Timestamp>& newest);
 
 }  // namespace tutti::robot

@@ -9,9 +9,10 @@
 
 namespace tutti::robot {
 
+/// The fastest motion that any robot can make; faster steps are jumps of its odometry.
 struct OdometryWatchConfig {
-  double max_speed_mps = 100.0;       ///< Whatever the robot is, it is not faster,
-  double max_turn_rate_dps = 2000.0;  ///< nor does it turn faster.
+  double max_speed_mps = 100.0;
+  double max_turn_rate_dps = 2000.0;
   template <class V>
   void describe(V& v) {
     v.field(
@@ -22,30 +23,31 @@ struct OdometryWatchConfig {
   }
 };
 
-/// A step that no body makes: the front end began anew, or lost itself. How the robot moved is not known.
+/// A step that no body can make: the odometry's front end started again, or lost track. How the robot really moved is
+/// unknown.
 struct OdometryJump {
   Timestamp from, to;
-  double translation_m = 0.0, rotation_rad = 0.0;  ///< As the front end says.
+  double translation_m = 0.0, rotation_rad = 0.0;  ///< As the odometry says.
   friend bool operator==(const OdometryJump&, const OdometryJump&) = default;
 };
-/// "odometry jumps by 500.0 m and 0.0 degrees within 0.100 s at 1700000000000000000 ns"
+/// Text such as "odometry jumps by 500.0 m and 0.0 degrees within 0.100 s at 1700000000000000000 ns".
 std::string to_string(const OdometryJump& jump);
 
-/// Odometry that never jumps, of a front end that may. Where what is fed makes a step that no body makes, the robot is
-/// taken to stay, and goes on from there: `odom` is the frame of the first sample, always. As long as nothing jumps,
-/// what comes out is what went in, to the bit. Of what it has seen it is a function: the same samples, the same
-/// answers.
+/// Removes jumps from odometry. At a step that no body can make, the robot is assumed to stay where it is and to go on
+/// from there, so that `odom` is always the frame of the first sample. Before the first jump the output equals the
+/// input, bit for bit. The output is a function of the samples so far.
 ///
-/// What a body can do: at most a slack (1 m, 30 degrees: noise, and corrections of a front end), and beside it ten
-/// times the greatest speed so far and what an acceleration of 10 m/s^2 (50 rad/s^2) adds over the step, but no more
-/// than the settings say, which alone hold for the first step. A speed counts as seen as far as it can be reached so.
+/// What a body can do in a step of dt: a slack (1 m, 30 degrees: noise, and corrections by the front end), plus dt
+/// times the allowed speed. This is ten times the greatest speed so far, plus what an acceleration of 10 m/s^2 (50
+/// rad/s^2) adds within dt, but at most what the settings say; for the first step only the settings count. A step
+/// raises the greatest speed only as far as that acceleration allows.
 class OdometryWatch {
  public:
-  /// All that it knows.
+  /// All that the watch remembers.
   struct State {
-    std::optional<StampedPose> newest;                 ///< As fed.
-    std::optional<double> speed_mps, turn_rate_radps;  ///< The greatest so far; nothing: no step yet.
-    /// The last jump ended here, in either frame.
+    std::optional<StampedPose> newest;                 ///< As it was fed.
+    std::optional<double> speed_mps, turn_rate_radps;  ///< The greatest so far; nothing before the first step.
+    /// The body at the end of the last jump, in both frames.
     struct Anchor {
       Pose3 T_odom_body, T_fed_body;
       friend bool operator==(const Anchor&, const Anchor&) = default;
@@ -60,11 +62,11 @@ class OdometryWatch {
     Pose3 T_odom_body;
     std::optional<OdometryJump> jump;
   };
-  /// A sample that is finite, of a unit quaternion; after the newest one, otherwise it is no jump and nothing changes.
+  /// Adds a finite sample with a unit quaternion. One that is not after the newest is no jump and changes nothing.
   Step take(const StampedPose& fed);
   /// The newest sample in `odom`; the identity before the first.
   [[nodiscard]] Pose3 T_odom_body() const { return state_.newest ? in_odom(state_.newest->pose) : Pose3{}; }
-  /// From the front end's frame of now; the identity while nothing has jumped.
+  /// Maps the frame of what is fed now to `odom`; the identity before the first jump.
   [[nodiscard]] Pose3 T_odom_fed() const;
   [[nodiscard]] const State& state() const { return state_; }
 

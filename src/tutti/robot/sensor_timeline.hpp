@@ -13,52 +13,52 @@
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
 
-/// Odometry and sensors run at rates of their own and meet at no stamp; here they become one stream in the order of
-/// time, in which every sensor sample has an odometry sample at its very stamp.
+/// Merges odometry and sensor data, which come at rates of their own and never at the same stamps, into one stream in
+/// order of time. In it every sensor sample has an odometry sample at exactly its stamp.
 namespace tutti::robot {
 
-/// An odometry sample, and how sure its increment since the one before is.
+/// An odometry sample with the covariance of the step since the previous one.
 struct OdometryStep {
   Timestamp stamp;
   Pose3 T_odom_body;
   Matrix6d covariance = Matrix6d::Zero();  ///< Right tangent.
-  bool is_jump = false;                    ///< How the robot moved is not known (OdometryWatch).
+  bool is_jump = false;                    ///< How the robot moved in this step is unknown (OdometryWatch).
 };
 
-/// Two steps, the second of which follows the first, as one to the end of the second; neither is a jump.
+/// Two consecutive steps as one, to the end of the second; neither may be a jump.
 OdometryStep joined(const OdometryStep& first, const OdometryStep& second);
 
-/// The step from `from` to `to` in two, at a moment between them: the motion straight and of constant turn, the
-/// covariance in proportion to time. Their compound is the step as it was, to rounding.
+/// Divides the step from `from` to `to` at a moment between them: straight motion with a constant turn rate, covariance
+/// in proportion to time. Compounding the two gives the step again, up to rounding.
 std::pair<OdometryStep, OdometryStep> split(const StampedPose& from, const OdometryStep& to, Timestamp at);
 
-/// What sensors saw at a moment. Neither: a moment at which one saw something that nobody keeps.
+/// What sensors saw at one moment. With neither, it is a moment at which a sensor saw something that nobody keeps.
 struct SensorSample {
   Timestamp stamp;
   std::optional<Scan> scan;
   std::optional<TrackedImages> images;
 };
 
-/// What has been heard and waits for what may still come before it.
+/// Odometry and sensor data that were heard, and wait because something earlier may still come.
 struct SensorTimeline {
   std::deque<OdometryStep> odometry;  ///< Increasing stamps.
-  std::vector<SensorSample> sensors;  ///< Increasing stamps, each after the last step that was taken.
+  std::vector<SensorSample> sensors;  ///< Increasing stamps, all after the last step that was taken.
 
-  /// Of odometry faster than this, two steps become one: sensors need no finer motion, and what waits stays small.
+  /// Odometry steps closer together than this are joined: sensors need no finer motion, and the queue stays small.
   static constexpr double kFinest_s = 0.004;
 
-  /// A step after the newest one.
+  /// Adds a step after the newest one.
   void add(const OdometryStep& step);
-  /// Beside what another sensor saw at the same moment.
+  /// Adds sensor data, to what another sensor saw at the same moment if there is any.
   void add(SensorSample sample);
-  /// The pose at a moment from `last` on, which is the last step that was taken; nothing after the newest step.
+  /// The pose at a moment not before `last`, the last step that was taken; nothing after the newest step.
   [[nodiscard]] std::optional<Pose3> pose_at(const StampedPose& last, Timestamp at) const;
 
   struct Moment {
     OdometryStep step;
     std::optional<SensorSample> sensors;
   };
-  /// The next moment of the stream, if it is not after `until`. `last` as above.
+  /// Takes the next moment of the stream, unless it is after `until`. `last` is the last step that was taken.
   std::optional<Moment> take(const StampedPose& last, Timestamp until);
 };
 

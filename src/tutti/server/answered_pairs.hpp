@@ -11,28 +11,28 @@
 
 namespace tutti::server {
 
-/// Which pairs of submaps need not be asked any more, in memory that grows with the submaps, not with their pairs.
-/// Submaps are numbered in the order in which they came. Of every one it is known up to which number it has been
-/// compared with all (its watermark), and which stretches of numbers beyond have been answered out of turn. A pair
-/// belongs to the submap that came later, whose watermark ends at its own number.
+/// The pairs of submaps that need not be verified any more, in memory that grows with the submaps and not with their
+/// pairs. Submaps are numbered in order of arrival. For each one the set keeps up to which number it was compared with
+/// all others (its watermark), and the stretches of numbers beyond that were answered out of turn. A pair belongs to
+/// the submap that came later, so that submap's watermark ends at its own number.
 class AnsweredPairs {
  public:
-  /// Submaps that are there already stay where they are.
+  /// Adds a submap; one that is known already keeps its number.
   void add_submap(SubmapId id);
-  /// Both submaps have been added.
+  /// True if both submaps were added.
   [[nodiscard]] bool has_both(const SubmapPair& pair) const;
-  /// Both submaps have been added. False: it was there.
+  /// Adds a pair, of which both submaps must have been added. False when the set has it already.
   bool insert(const SubmapPair& pair);
   [[nodiscard]] bool contains(const SubmapPair& pair) const;
-  /// Those that are not in it, the smaller submap first, in the order of their ids. Takes time for these and for the
-  /// submaps, not for all pairs.
+  /// The pairs that are not in the set, smaller submap first, sorted. Takes time in proportion to these pairs and the
+  /// submaps, not to all pairs.
   [[nodiscard]] std::vector<SubmapPair> open() const;
-  /// No pair is answered any more; the submaps stay.
+  /// Removes all pairs; the submaps stay.
   void forget_answers();
 
-  /// How many submaps, counted from the first that came, this one has been compared with without a gap.
+  /// With how many submaps, counted in order of arrival, this one was compared without a gap.
   [[nodiscard]] std::size_t watermark(SubmapId id) const;
-  /// Stretches beyond the watermarks, of all submaps together.
+  /// Number of stretches beyond the watermarks, over all submaps.
   [[nodiscard]] std::size_t stretches_beyond() const;
   friend bool operator==(const AnsweredPairs&, const AnsweredPairs&) = default;
 
@@ -44,7 +44,7 @@ class AnsweredPairs {
   [[nodiscard]] Place place_of(const SubmapPair& pair) const;
 
   std::unordered_map<SubmapId, std::uint32_t> number_;
-  std::vector<NumberSet> answered_;  ///< By number.
+  std::vector<NumberSet> answered_;  ///< Per submap, by its number: the earlier ones that it was compared with.
 };
 
 }  // namespace tutti::server

@@ -11,26 +11,29 @@
 
 namespace tutti::server {
 
-/// What a map holds for true, without its poses: enough to say why the next map differs from it.
+/// What a map takes for true, without its poses: enough to tell why the next map differs from it.
 struct Beliefs {
   using Ends = std::pair<KeyframeId, KeyframeId>;
-  std::set<Ends> accepted, refused;  ///< Closures.
+  std::set<Ends> accepted, refused;  ///< Closures by their ends.
   std::vector<FailedOdometry> failed_odometry;
 };
+/// What this map takes for true.
 Beliefs beliefs_of(const MapEstimate& map);
 
 /// Why a newer map differs from an older one in one chain.
 struct ChangeReason {
-  std::size_t found = 0;      ///< Closures of the chain that are accepted and were not known.
-  std::size_t taken_up = 0;   ///< That are accepted and were refused.
-  std::size_t dropped = 0;    ///< That were accepted and are refused, or gone.
-  std::size_t failed = 0;     ///< Stretches of the chain's odometry that are taken to have failed and were not,
-  std::size_t recovered = 0;  ///< and the reverse. A stretch that only changes its ends is neither.
+  std::size_t found = 0;      ///< Closures of the chain that are accepted now and were unknown.
+  std::size_t taken_up = 0;   ///< Closures that are accepted now and were refused.
+  std::size_t dropped = 0;    ///< Closures that were accepted and are refused now, or gone.
+  std::size_t failed = 0;     ///< Stretches of the chain's odometry that count as failed now and did not before,
+  std::size_t recovered = 0;  ///< and the reverse. A stretch that only changes its ends counts as neither.
   std::size_t elsewhere = 0;  ///< Closures of other chains that were found, taken up or dropped.
   friend bool operator==(const ChangeReason&, const ChangeReason&) = default;
 };
+/// Compares what two maps take for true, as it concerns one chain.
 ChangeReason reason_of_change(const Beliefs& older, const Beliefs& newer, const ChainId& chain);
-/// "12 of its closures are new, 5 that were accepted are refused": the first letter small, no full stop.
+/// Text such as "12 of its closures are new, 5 that were accepted are refused": a clause, not capitalised, without full
+/// stop.
 std::string to_string(const ChangeReason& reason);
 
 }  // namespace tutti::server

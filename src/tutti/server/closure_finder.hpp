@@ -12,37 +12,40 @@
 
 namespace tutti::server {
 
-/// How loop closures are found: from scans, images, or a reference. Injected, so the server never knows the sensor (or
-/// the simulator). Both calls depend on the two submaps alone, never on the map or on the order of calls, may be called
-/// from several threads at once, and get the submaps in the order of their ids and without their payloads.
+/// Finds loop closures, from scans, images or a reference. It is injected, so that the server knows neither sensors nor
+/// the simulator. is_candidate() and verify() depend on the two submaps only, never on the map or on the order of
+/// calls, and may be called from several threads at once. They get the submaps in the order of their ids and without
+/// payloads.
 class ClosureFinder {
  public:
   virtual ~ClosureFinder() = default;
-  /// Names the finder; every verdict carries this id. The name is not empty, the version is at least 1 and is raised by
-  /// hand in the commit that changes gates, methods or candidates, and `settings` is a hash of the finder's settings. A
-  /// server that starts with another finder than before asks every pair again, and keeps the old closures until then.
+  /// Identifies the finder; every verdict carries this id. The name is not empty; the version is at least 1, and a
+  /// commit that changes gates, methods or candidates raises it by hand; `settings` is a hash of the finder's settings.
+  /// A server that starts with another finder than before has every pair verified again, and keeps the old closures
+  /// until then.
   [[nodiscard]] virtual MethodId id() const = 0;
-  /// All that a worker of the same program needs to make it (FinderMaker); empty: it cannot be made of this alone.
+  /// All that a worker of the same program needs to make this finder (FinderMaker); empty when text alone is not
+  /// enough.
   [[nodiscard]] virtual std::string settings() const { return {}; }
-  /// Do submaps that carry so much have what verify() looks at? Else they are no pair.
+  /// True if submaps with payloads of these sizes have what verify() needs. Other pairs are never verified.
   [[nodiscard]] virtual bool can_compare(const PayloadSize& first, const PayloadSize& second) const = 0;
-  /// Cheap: is the pair worth a verification?
+  /// Cheap test whether verifying the pair is worth its cost.
   [[nodiscard]] virtual bool is_candidate(const Submap& first, const Submap& second) const = 0;
-  /// Expensive: runs in a worker. What it needs of the payloads it gets from the store, when it needs it. An error,
-  /// never a verdict, when one cannot be read: the pair may be verified another time.
+  /// Verifies the pair; expensive, so it runs in a worker. Payloads are loaded from `payloads` when they are needed. An
+  /// error means that one could not be read: there is no verdict, and the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                       const PayloadStore& payloads) const = 0;
 };
 
 class MapRefiner;
 
-/// Makes finders and refiners of what a job says of them, so that a worker needs no settings of its own.
+/// Makes the finder or refiner that a job names, so that a worker needs no settings of its own.
 class FinderMaker {
  public:
   virtual ~FinderMaker() = default;
-  /// What it can make: without settings when it can with any.
+  /// The methods that it can make; an id without settings means any settings.
   [[nodiscard]] virtual std::vector<MethodId> can() const = 0;
-  /// One of exactly this id, or an error that says what is missing. Not null.
+  /// Makes a finder (a refiner) with exactly this id, never null; an error says what is missing.
   [[nodiscard]] virtual Result<std::shared_ptr<const ClosureFinder>> finder(const MethodId& id,
                                                                             const std::string& settings) const = 0;
   [[nodiscard]] virtual Result<std::shared_ptr<const MapRefiner>> refiner(const MethodId& id,

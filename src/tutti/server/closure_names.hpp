@@ -14,11 +14,11 @@
 
 namespace tutti::server {
 
-/// Names of submaps, and of pairs of them, that people can read and type: "alpha/12" of robot alpha's first session in
-/// the map, "alpha.2/12" of its second, and "alpha/12-bravo/7" for the closures between two. A robot without a name, or
-/// whose name is not 1 to 64 letters, digits and any of "_.-", or another's too, is called by its number. Names stay
-/// the same as the map grows, unless an older session joins it; "ROBOT:SESSION/SUBMAP", with numbers, always means the
-/// same.
+/// Names of submaps and pairs of submaps that people can read and type: "alpha/12" is in robot alpha's first session in
+/// the map, "alpha.2/12" in its second, and "alpha/12-bravo/7" are the closures between two submaps. A robot is called
+/// by its number if its name is empty, is not 1 to 64 letters, digits and any of "_.-", or is another robot's too.
+/// Names stay the same while the map grows, unless an older session joins it. "ROBOT:SESSION/SUBMAP", with numbers,
+/// always means the same submap.
 class ClosureNames {
  public:
   ClosureNames(const std::map<RobotId, std::string>& names, const std::set<ChainId>& chains);
@@ -26,14 +26,15 @@ class ClosureNames {
   [[nodiscard]] std::string of(const ChainId& chain) const;
   [[nodiscard]] std::string of(const SubmapId& submap) const;
   [[nodiscard]] std::string of(const SubmapPair& pair) const;
-  /// Of either order. That the submaps are in the map is not checked.
+  /// The pair of this name, whose two submaps may be in either order. Fails when the name is malformed or names an
+  /// unknown robot or session; whether the map has the submaps is not checked.
   [[nodiscard]] Result<SubmapPair> find(std::string_view name) const;
 
  private:
   [[nodiscard]] std::optional<SubmapId> submap(std::string_view name) const;
 
   std::map<ChainId, std::string> names_;
-  std::map<std::string, ChainId, std::less<>> chains_;  // by all of their names
+  std::map<std::string, ChainId, std::less<>> chains_;  // by all names that a chain has
 };
 
 }  // namespace tutti::server

@@ -10,29 +10,31 @@
 
 namespace tutti::server {
 
-/// Somebody's pose graph of one robot or several. An edge from a robot's vertex to its next one is odometry, the first
-/// such edge where there are several, whichever way round; every other edge is a closure.
+/// A pose graph of one or several robots, from anywhere. An edge from a robot's vertex to its next one (in either
+/// direction) is odometry, the first such edge if there are several; every other edge is a closure.
 struct RobotGraph {
-  PoseGraph graph;                   ///< Its poses are not used.
-  std::vector<KeyframeId> vertices;  ///< Of graph.poses, increasing; robots need no common frame or start.
-  std::vector<Timestamp> stamps;     ///< Of graph.poses, increasing along each chain.
+  PoseGraph graph;  ///< Its poses are not used.
+  /// Ids of the vertices of `graph`, increasing. Robots need no common frame or start.
+  std::vector<KeyframeId> vertices;
+  std::vector<Timestamp> stamps;  ///< Stamps of the vertices, increasing along each chain.
 };
 
-/// What has become of an edge.
+/// The verdict on one edge.
 struct JudgedEdge {
   bool odometry = false;
-  bool accepted = true;                                 ///< Of a closure; odometry is accepted, also where it failed.
+  bool accepted = true;                                 ///< Always true for odometry, even where it failed.
   judge::Objection objection = judge::Objection::none;  ///< Of a closure that is not accepted.
 };
 
+/// The result of judge_graph().
 struct JudgedGraph {
-  MapEstimate map;                ///< Its nodes are the vertices, but for chains that cannot be solved (left_out).
-  std::vector<JudgedEdge> edges;  ///< Of the graph's edges, in their order.
+  MapEstimate map;                ///< Its nodes are the vertices, without chains that cannot be solved (left_out).
+  std::vector<JudgedEdge> edges;  ///< One per edge of the graph, in the same order.
 };
 
-/// The server's map of a pose graph: decides which closures and which stretches of odometry are wrong (docs/math.md,
-/// "Who is wrong?") and optimises with the others. Each component of the map has a frame of its own: the first odometry
-/// frame in it.
+/// Makes a map from any pose graph as the server does: decides which closures and which stretches of odometry are wrong
+/// (docs/math.md, "Who is wrong?"), and optimises with the others. The frame of each component is its first robot's
+/// odometry frame.
 JudgedGraph judge_graph(const RobotGraph& graph, const MapConfig& config);
 
 }  // namespace tutti::server

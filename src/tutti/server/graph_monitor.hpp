@@ -10,17 +10,18 @@
 
 namespace tutti::server {
 
-/// What reading took.
+/// The cost of monitor_graph().
 struct MonitorWork {
-  std::size_t factorisations = 0;  ///< Of the whole graph, and of that of the closures' ends.
-  std::size_t products = 0;        ///< Columns of samples, times products with the graph's Laplacian.
+  std::size_t factorisations = 0;  ///< Of the whole graph, and of the graph of the closures' ends.
+  std::size_t products = 0;        ///< Columns of samples times products with the graph's Laplacian.
 };
 
-/// Reads the latest estimate of the representative nodes into a proxy graph, with each node's uncertainty relative to
-/// the robot's previous one. Of a robot's nodes only those of its component count (map_components.hpp);
-/// the others (submaps between them are missing) are left out until closures join them. Over failed odometry the
-/// covariances are equal shares of what the closures make of the whole stretch. Says how sure it is of each robot's
-/// shape (ChainUncertainty), unless the map does not determine its poses. `work`, unless null, counts up.
+/// The graph monitor: makes a proxy graph of the latest estimates of the representative nodes, with the covariance of
+/// each node relative to its chain's previous one. It takes the nodes of each chain's chosen component
+/// (map_components.hpp) and leaves the others out, which missing submaps separate from them, until closures join them.
+/// Over failed odometry the covariances are equal shares of what the closures make of the whole stretch. The graph says
+/// how sure the server is of each trajectory's shape (ChainUncertainty), unless the map does not determine its poses.
+/// `work`, unless null, is increased.
 ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const consistency::ProxyGraphConfig& config,
                          MonitorWork* work = nullptr);
 

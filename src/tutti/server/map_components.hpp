@@ -8,15 +8,16 @@
 
 namespace tutti::server {
 
-/// Which component of a map stands for whom. Where submaps are missing, a chain's way lies in several components until
-/// closures join them. The one with most representative nodes counts; of equals the one with most nodes, and of those
-/// the newest.
+/// The component of the map that stands for each chain and robot. Where submaps are missing, a chain is in several
+/// components until closures join them. Chosen is the component with the most representative nodes; among equals the
+/// one with the most nodes, then the one with the newest node.
 struct MapComponents {
-  std::map<ChainId, std::uint32_t> of_chain;  ///< Of the chain's own nodes, for every chain with a node.
-  std::map<RobotId, std::uint32_t> of_robot;  ///< Of the nodes of all its chains, for every robot with a node.
-  std::uint32_t largest = 0;                  ///< Of the nodes of all chains that lie in their chain's component.
+  std::map<ChainId, std::uint32_t> of_chain;  ///< Counting the chain's own nodes; for every chain with a node.
+  std::map<RobotId, std::uint32_t> of_robot;  ///< Counting the nodes of all its chains; for every robot with a node.
+  std::uint32_t largest = 0;                  ///< Counting the nodes of all chains that are in their chain's component.
 };
 
+/// Chooses the components of a map's chains and robots.
 MapComponents choose_components(const MapEstimate& map);
 
 }  // namespace tutti::server

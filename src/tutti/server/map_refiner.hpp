@@ -10,18 +10,20 @@
 
 namespace tutti::server {
 
-/// What knows more of the map than its pose graph does: bundle adjustment of what cameras saw. Injected, so the server
-/// never knows the sensor.
+/// Refines a map with more than its pose graph, such as bundle adjustment of what cameras saw. It is injected, so that
+/// the server knows no sensors.
 class MapRefiner {
  public:
   virtual ~MapRefiner() = default;
-  /// As a finder's (closure_finder.hpp); without a name: only who was given this one can do its jobs.
+  /// Identifies the refiner, as ClosureFinder::id() does a finder. Without a name, only a worker that was given this
+  /// very refiner can do its jobs.
   [[nodiscard]] virtual MethodId id() const { return {}; }
   [[nodiscard]] virtual std::string settings() const { return {}; }
-  /// Does a submap that carries so much have what refine() looks at? Else it takes no part.
+  /// True if a submap with a payload of this size has what refine() needs; other submaps take no part.
   [[nodiscard]] virtual bool can_refine(const PayloadSize& size) const = 0;
-  /// Expensive: runs in a worker. A pure function; may be called from any thread. `submaps`: those of the job, without
-  /// their payloads, which it gets from the store. An error when one cannot be read: it may be tried another time.
+  /// Answers a job; expensive, so it runs in a worker. A pure function that any thread may call. `submaps` are those of
+  /// the job, without payloads; these are loaded from `payloads`. An error means that one could not be read, and the
+  /// job may be done another time.
   [[nodiscard]] virtual Result<Refinement> refine(const RefinementJob& job, const SubmapSet& submaps,
                                                   const PayloadStore& payloads) const = 0;
 };

@@ -24,11 +24,12 @@
 
 namespace tutti::server {
 
+/// Settings of a server; `describe` explains each.
 struct ServerConfig {
   MapConfig map;
   consistency::ProxyGraphConfig proxy_graph;
   int refine_every = 5;
-  double update_period_s = 10.0;  ///< Mission time between two optimisations when something new has come.
+  double update_period_s = 10.0;
   std::string broadcast = "own";
   std::string change_of_mind = "wait";
   template <class V>
@@ -51,137 +52,137 @@ struct ServerConfig {
   }
 };
 
-/// Heavy work that leaves the server as a message; ClosureFinder::verify(*first, *second, payloads) answers it,
-/// anywhere that the payloads can be got at.
+/// Verification of one pair, heavy work that leaves the server as a message: the answer is
+/// ClosureFinder::verify(*first, *second, payloads), computed anywhere that has the payloads.
 struct VerificationJob {
   SubmapPair pair;
   std::shared_ptr<const Submap> first;
   std::shared_ptr<const Submap> second;
 };
 
-/// The server's whole state, by value, but for the payloads, which lie in its store: kill it, restore it with the same
-/// store, and it goes on with the same map.
+/// The server's whole state by value, except payloads, which are in its store. A server that is killed and restored
+/// from this with the same store goes on with the same map.
 struct MapServerState {
-  SubmapSet submaps;                              ///< Without their payloads.
-  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of those that carry any.
-  /// Those with closures: of `finder`, and of earlier ones where that has not answered. Refusals are only counted: a
-  /// pair that is answered and not among these is refused, or not to be asked.
+  SubmapSet submaps;                              ///< Without payloads.
+  std::map<SubmapId, PayloadSize> payload_sizes;  ///< Of the submaps that carry any.
+  /// The verdicts with closures: those of `finder`, and those of earlier finders on pairs that `finder` has not
+  /// answered. Refusals are only counted: a pair that is in `answered` and not here was refused, or is not to be
+  /// verified.
   VerdictSet verdicts;
   MethodId finder;
-  WordSet words;           ///< Of operators.
-  AnsweredPairs answered;  ///< By `finder`, or not to be asked.
-  RefusalCounts refused;   ///< By `finder`.
+  WordSet words;           ///< Words of operators.
+  AnsweredPairs answered;  ///< Pairs that `finder` has answered, or that are not to be verified.
+  RefusalCounts refused;   ///< Refusals by `finder`.
   Refinements refinements;
-  std::uint64_t epoch = 0;  ///< Of the server that this is the state of.
+  std::uint64_t epoch = 0;  ///< Epoch of the server whose state this is.
   std::uint64_t revision = 0;
 };
 
-/// What the server has done since it started. Deterministic, and so what a test can hold the cost to.
+/// Work done since the server started. The figures are deterministic, so that tests can bound the cost.
 struct ServerWork {
-  std::size_t pairs_looked_at = 0;  ///< Of submaps.
+  std::size_t pairs_looked_at = 0;  ///< Pairs of submaps.
   std::size_t pairs_verified = 0;   ///< Verdicts taken.
   std::size_t updates = 0;
-  judge::SearchWork search;  ///< Of all updates.
+  judge::SearchWork search;  ///< Over all updates.
   MonitorWork monitor;
 };
 
-/// Submaps in; attach, close loops, optimise; proxy graphs out. No threads, sockets or clocks inside.
+/// The map server: takes submaps, attaches them, closes loops, optimises, and gives proxy graphs. It has no threads,
+/// sockets or clocks, and is not for several threads at a time.
 class MapServer {
  public:
-  /// Whoever starts it gives the epoch: larger than at any start before, as the time of the start is. Robots drop what
-  /// an earlier epoch broadcast as late.
+  /// The starter gives the epoch, which must be larger than at any earlier start (such as the time of the start):
+  /// robots ignore late broadcasts of earlier epochs. `finder` and `payloads` must not be null.
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch);
-  /// Goes on from a saved state; verifications that had no verdict yet become jobs again. All of them when the finder
-  /// is another than the state's: what that found stays in the map until it is answered, for good where the new one has
-  /// nothing to compare. The epoch becomes larger
-  /// than the saved one if it is not; only the starter's number tells two starts from one saved state apart.
+  /// Goes on from a saved state. Verifications without a verdict become jobs again; all of them do when the finder is
+  /// another than the state's. What the former finder found stays in the map until the new one has answered, for good
+  /// on pairs that the new one cannot compare. The epoch is raised above the saved one if it is not larger; when two
+  /// servers start from one saved state, only the epochs that they are given tell them apart.
   MapServer(std::set<RobotId> robots, std::shared_ptr<const ClosureFinder> finder,
             std::shared_ptr<PayloadStore> payloads, const ServerConfig& config, std::uint64_t epoch,
             MapServerState state);
 
-  /// Asks for refinements that this can make, from now on (ServerConfig::refine_every); not null.
+  /// Asks for refinements by this refiner from now on (ServerConfig::refine_every); must not be null.
   void refine_with(std::shared_ptr<const MapRefiner> refiner) { refiner_ = std::move(refiner); }
 
-  /// One more that submaps may come from. Each has the less room for sessions, the more there are.
+  /// Accepts submaps of one more robot. Robots share the room for sessions equally.
   void add_robot(RobotId robot) { robots_.insert(robot); }
-  /// One without submaps in the map.
+  /// Removes a robot that has no submaps in the map.
   void remove_robot(RobotId robot) { robots_.erase(robot); }
 
   /// Takes a submap of any session of a known robot. Submaps may come in any order and any number of times; a repeated
-  /// one only puts its cloud back where the store has lost it. An error, and the map is as it was: the robot is
-  /// unknown, the submap is malformed, the robot has no room for another session (ProxyGraph::kMostChains), or the
-  /// store cannot keep the cloud, and then the submap may be sent again.
+  /// one only restores a payload that the store has lost. On an error the map is as it was: the robot is unknown or not
+  /// the sender; the submap is malformed, or differs from the one with its id in the map; the robot has no room for
+  /// another session (ProxyGraph::kMostChains); or the store cannot keep the payload, and the submap may be sent again.
   Status receive(const SubmapMessage& message);
   /// Takes the answer to a job; answers may come in any order and any number of times. Of two verdicts on one pair a
-  /// refusal holds, then the closures with the smaller numbers, so that the map is the same whichever came first. A
-  /// verdict that comes before its submaps waits for them and is judged then. An error, and nothing changes: the
-  /// verdict is of another finder than the server's, a closure joins anything else than a keyframe of pair.first to one
-  /// of pair.second, the finder would not ask for the pair, or kMostWaiting verdicts wait already; then the pair is
-  /// asked again.
+  /// refusal wins, then the closures with the smaller numbers, so that the order does not matter. A verdict that comes
+  /// before its submaps waits for them. On an error nothing changes: the verdict is of another finder than the
+  /// server's; a closure joins anything else than a keyframe of pair.first to one of pair.second; the finder would not
+  /// verify the pair; or kMostWaiting verdicts wait already, and the pair is verified again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
-  /// Takes what an operator says of the closures of a pair, any number of times; the map follows at the next
-  /// optimise(). Of two words on one pair the later one holds. A verdict whose closures an operator accepts stays as it
-  /// is, whatever other finders say. An error, and nothing changes: the pair's submaps are not in the map, or there are
-  /// no closures to accept.
+  /// Takes an operator's word on the closures of a pair, any number of times; the next optimise() follows it. Of two
+  /// words on one pair the later one counts. When an operator accepts closures, their verdict stays, whatever other
+  /// finders say. On an error nothing changes: the map lacks one of the submaps, or there are no closures to accept.
   Status receive(const SubmapPair& pair, const ClosureWord& word);
-  /// Takes the answer to a refinement job, in any order, any number of times, however late; the map follows at the next
-  /// optimise(). Of two refinements of one step that of the newer map holds (Refinements). An error, and the map stays
-  /// as it was: the refinement failed, or is of another map.
+  /// Takes the answer to a refinement job, in any order, any number of times, however late; the next optimise() follows
+  /// it. Where two refinements have one step, the one of the newer map counts (Refinements). On an error the map stays
+  /// as it was: the refinement failed, is of a later revision than the server's, or has invalid poses.
   Status receive(const Refinement& refinement);
-  /// Why verdicts that had waited were no good when their submaps came, since the last call.
+  /// The errors since the last call, of verdicts that had waited for submaps and proved invalid when these came.
   std::vector<Error> take_late_errors() { return std::exchange(late_errors_, {}); }
-  /// Verifications to be done; each is handed out once.
+  /// The verifications to be done; each is handed out once.
   std::vector<VerificationJob> take_jobs();
-  /// A job that had an error instead of an answer: the next take_jobs() hands it out again.
+  /// Returns a job that failed; the next take_jobs() hands it out again if it is still needed.
   void give_back(VerificationJob job);
-  /// The refinement that the last map wants, without a name; handed out once. There is no other before this one is
-  /// answered or given up, and none again for a map with nothing new.
+  /// The refinement that the latest map wants, handed out once and without a name. There is no further one until this
+  /// one is answered or given up, and none for a map with nothing new.
   std::optional<RefinementJob> take_refinement_job() { return std::exchange(refinement_job_, std::nullopt); }
-  /// True while parts were refined since all was: settle() is to be called when nothing new has come for some time.
+  /// True while parts were refined since the whole map was: call settle() when nothing new has come for some time.
   [[nodiscard]] bool is_unsettled() const { return refiner_ != nullptr && state_.refinements.parts() > 0; }
-  /// Makes the job of the whole map that is there, unless one is out.
+  /// Makes a job for the whole present map, unless a job is out.
   void settle();
-  /// There will be no answer to it.
+  /// The job that is out will never be answered.
   void give_up_refinement() { refining_.reset(); }
 
   /// True when something came since the last optimise().
   [[nodiscard]] bool has_news() const { return news_; }
-  /// Optimises the joint map and returns its whole proxy graph.
+  /// Optimises the joint map and returns its whole proxy graph, as a new revision.
   ProxyGraphMessage optimise();
-  /// The last revision's again: for a server that goes on from a state in which nothing has come since, as it is told
-  /// by nothing_is_new().
+  /// Computes the last revision again, for a server that goes on from a state to which nothing was added;
+  /// nothing_is_new() then tells the server so.
   ProxyGraphMessage rebuild();
   void nothing_is_new() { news_ = false; }
 
   [[nodiscard]] const MapEstimate& map() const { return map_; }
   [[nodiscard]] const ServerWork& work() const { return work_; }
   [[nodiscard]] const MapServerState& state() const { return state_; }
-  /// Pairs by the reason they were refused for.
+  /// Refused pairs, counted by reason.
   [[nodiscard]] const RefusalCounts& refusals() const { return state_.refused; }
   [[nodiscard]] const ClosureFinder& finder() const { return *finder_; }
   [[nodiscard]] const PayloadStore& payloads() const { return *payloads_; }
 
  private:
   [[nodiscard]] Status check_room_for(const ChainId& chain) const;
-  /// If it is the cloud that was there.
+  /// Restores the payload from a repeated submap, if the store has lost it and the sizes agree.
   Status replace_lost_payload(const Submap& duplicate);
   [[nodiscard]] PayloadSize size_of(SubmapId id) const;
-  /// Both submaps are there and the finder wants the pair.
+  /// True if both submaps are there and the finder wants the pair.
   [[nodiscard]] bool is_asked(const SubmapPair& pair) const;
-  /// By the server's finder, or by an operator's word.
+  /// True if the server's finder has answered the pair, or an operator's word stands instead.
   [[nodiscard]] bool is_answered(const SubmapPair& pair) const;
   void plan_verification(const SubmapPair& pair);
   [[nodiscard]] bool has_submaps_of(const ClosureVerdict& verdict) const;
   [[nodiscard]] Status check_against_submaps(const ClosureVerdict& verdict) const;
   Status wait_for_submaps(const ClosureVerdict& verdict);
   void judge_waiting();
-  /// Something has come that changes the pose graph.
+  /// Notes that something has come that changes the pose graph.
   void note_news();
-  /// Makes the job for the map that is there, if there is to be one.
+  /// Makes a refinement job for the present map, if one is due.
   void plan_refinement(bool settle);
-  /// What is good.
+  /// Takes a verdict that was checked.
   void take(const ClosureVerdict& verdict);
 
   std::set<RobotId> robots_;
@@ -190,18 +191,18 @@ class MapServer {
   ServerConfig config_;
   MapServerState state_;
   std::vector<VerificationJob> jobs_;
-  std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are asked when the submaps come
+  std::vector<ClosureVerdict> waiting_;  // not in the state: their pairs are verified again when the submaps come
   std::vector<Error> late_errors_;
-  std::optional<MapEstimate> estimate_;        // the pose graph's map; nothing: to be made
-  MapEstimate map_;                            // refined
-  std::shared_ptr<const MapRefiner> refiner_;  // null: of none
+  std::optional<MapEstimate> estimate_;        // of the pose graph alone; nothing when it must be made
+  MapEstimate map_;                            // with refinements
+  std::shared_ptr<const MapRefiner> refiner_;  // null: nothing is refined
   std::optional<RefinementJob> refinement_job_;
-  std::optional<std::uint64_t> refining_;  // the revision of the job that is out
+  std::optional<std::uint64_t> refining_;  // revision of the job that is out
   struct Asked {
     RefinementScope scope;
     bool whole = false;
   };
-  std::optional<Asked> asked_;  // last
+  std::optional<Asked> asked_;  // the last refinement asked for
   bool news_ = false;
   ServerWork work_;
 };

@@ -11,20 +11,21 @@
 
 namespace tutti::server {
 
-/// Where what submaps carry lies, kind by kind, so that the server's own memory does not grow with what its robots saw.
-/// Safe to call from several threads.
+/// Keeps what submaps carry, so that the server's own memory does not grow with what its robots saw. May be called from
+/// several threads.
 class PayloadStore {
  public:
   virtual ~PayloadStore() = default;
-  /// Keeps the submap's payloads; what was there is replaced. When put() has returned, they are safe.
+  /// Stores the submap's payloads, replacing earlier ones. When it has returned, they survive a crash if the store is
+  /// persistent.
   virtual Status put(const Submap& submap) = 0;
-  /// Null when the submap carries none; an error when what it carries cannot be read. An implementation may round
-  /// points; it returns the same ones every time.
+  /// The payload of one kind; null when the submap carries none, an error when it cannot be read. An implementation may
+  /// round points, but returns the same ones every time.
   [[nodiscard]] virtual Result<std::shared_ptr<const PointCloud>> cloud(SubmapId id) const = 0;
   [[nodiscard]] virtual Result<std::shared_ptr<const VisualPayload>> visual(SubmapId id) const = 0;
 };
 
-/// For small maps and tests.
+/// Keeps payloads in memory, for small maps and tests.
 class MemoryPayloadStore final : public PayloadStore {
  public:
   Status put(const Submap& submap) override;

@@ -13,24 +13,25 @@
 
 namespace tutti::server {
 
-/// What a refinement can go by, and what it has gone by.
+/// The submaps and closed pairs that a refinement can use, or has used.
 struct RefinementScope {
   std::set<SubmapId> submaps;
-  std::set<SubmapPair> closed;  ///< Of these; tied by accepted closures.
+  std::set<SubmapPair> closed;  ///< Pairs of these submaps with accepted closures.
   friend bool operator==(const RefinementScope&, const RefinementScope&) = default;
 };
 
-/// The refinements that hold: the newest one of the whole map, and those of parts of newer maps. The same set whatever
-/// order they come in, and however often.
+/// The refinements that count: the newest one of the whole map, and those of parts of newer maps. The result does not
+/// depend on the order of arrival or on repetitions.
 class Refinements {
  public:
   using ByRevision = std::map<std::uint64_t, std::shared_ptr<const Refinement>>;
-  /// False: nothing has changed; it is there, or one of a whole map as new.
+  /// Adds a refinement that succeeded (else throws). False when nothing changes, because it is known or older than the
+  /// one of the whole map.
   bool add(Refinement refinement);
   [[nodiscard]] const ByRevision& all() const { return all_; }
-  /// What they have taken into account.
+  /// What the refinements together have taken into account.
   [[nodiscard]] RefinementScope scope() const;
-  /// How many are there of parts, since the last of a whole map.
+  /// Number of refinements of parts since the last one of the whole map.
   [[nodiscard]] std::size_t parts() const;
   [[nodiscard]] bool has_whole() const { return !all_.empty() && all_.begin()->second->whole; }
 
@@ -38,31 +39,33 @@ class Refinements {
   ByRevision all_;
 };
 
-/// Puts the newest refined step in the place of each step of odometry, and solves the map again from where it stands.
-/// Returns the map as it was when the refined one cannot be solved.
+/// The map with each odometry step replaced by its newest refined step, solved again from its present poses. Returns
+/// `map` itself when there are no refined steps, or when the result cannot be solved.
 ///
-/// Closures that the newest refinement knew keep their covariance, but take the relative pose that the refinement found
-/// between their ends. Refined steps, taken one by one, hold less than the refinement as a whole, and what the closures
-/// measured before would draw the map back to where it was. A closure that no refinement knew keeps its measurement,
-/// because its ends may lie in two unrelated frames of the refinement. Odometry that failed takes no refined step.
+/// A closure whose pair a refinement has used keeps its covariance, but takes the relative pose that the newest such
+/// refinement found between its ends. Single refined steps are less certain than the refinement as a whole, so the
+/// closures' own measurements would draw the map back to where it was. A closure that no refinement used keeps its
+/// measurement, because its ends may be in unrelated frames of the refinement. Odometry that failed takes no refined
+/// step.
 MapEstimate refined(const MapEstimate& map, const SubmapSet& submaps, const Refinements& refinements);
 
-/// The submaps that the refiner can use and that are in the map, and the pairs of them with accepted closures.
+/// The submaps in the map that the refiner can use, and the pairs of them with accepted closures.
 RefinementScope refinable(const MapEstimate& map, const SubmapSet& submaps,
                           const std::map<SubmapId, PayloadSize>& sizes, const VerdictSet& verdicts,
                           const MapRefiner& refiner);
 
+/// When the whole map is refined rather than a part.
 struct RefinementCadence {
-  std::size_t every = 1;  ///< Job is of the whole map.
-  /// Also where nothing is new, but parts were refined last: then a map to which nothing is added ends as a function of
-  /// its submaps and closures.
+  std::size_t every = 1;  ///< Every so many refinements one is of the whole map.
+  /// Also refine the whole map when nothing is new but parts were refined last. A map that no longer grows thereby ends
+  /// as a function of its submaps and closures.
   bool settle = false;
 };
 
-/// The job that makes a map of this scope refined; nothing where the refinements have taken all of it into account. Of
-/// the whole map by the cadence, or where half of it is to be free anyway: its poses are then those of `estimate`, the
-/// pose graph's. Otherwise free are new submaps, older ones with pairs that are new or gone, and their neighbours in
-/// the chain; what is tied to these is held where it is in `map`, the refined one.
+/// The job that refines a map of this scope; nothing when the refinements have taken all of it into account. A job of
+/// the whole map (by the cadence, or because half of the map would be free anyway) has the poses of `estimate`, the
+/// pose graph's map. Any other job frees new submaps, older ones of which closed pairs are new or gone, and the
+/// neighbours of both in their chains; everything tied to these is held where it is in `map`, the refined map.
 std::optional<RefinementJob> plan_refinement(const RefinementScope& scope, const Refinements& refinements,
                                              const MapEstimate& estimate, const MapEstimate& map,
                                              const SubmapSet& submaps, const RefinementCadence& cadence,

@@ -10,16 +10,17 @@
 
 namespace tutti::server {
 
-/// Pairs refused for one reason.
+/// The pairs that were refused for one reason.
 struct RefusalCount {
-  std::size_t intra = 0;  ///< Both submaps of one robot.
-  std::size_t inter = 0;
-  Refusal nearest;  ///< Where something is measured: the one that missed its limit by least.
+  std::size_t intra = 0;  ///< Both submaps are of one robot.
+  std::size_t inter = 0;  ///< They are of two robots.
+  Refusal nearest;        ///< The refusal that missed its limit by least, where something is measured.
   friend bool operator==(const RefusalCount&, const RefusalCount&) = default;
 };
 
 using RefusalCounts = std::map<RefusalReason, RefusalCount>;
 
+/// Counts one more refusal, of a pair of submaps of robots `a` and `b`.
 inline void count_refusal(const Refusal& refusal, RobotId a, RobotId b, RefusalCounts& counts) {
   RefusalCount& entry = counts.try_emplace(refusal.reason, RefusalCount{.nearest = refusal}).first->second;
   ++(a == b ? entry.intra : entry.inter);

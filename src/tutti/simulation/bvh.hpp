@@ -11,25 +11,26 @@
 
 namespace tutti::simulation {
 
+/// Where a ray hits a mesh first.
 struct RayHit {
-  float distance = 0.0F;  ///< In lengths of the direction.
+  float distance = 0.0F;  ///< In multiples of the length of the ray's direction.
   std::uint32_t triangle = 0;
 };
 
-/// Closest-hit ray casting: bounding volume hierarchy split at the median, triangles by Moeller and Trumbore (1997).
-/// Single precision, immutable, safe to use from several threads.
+/// Closest-hit ray casting with a bounding volume hierarchy that is split at the median; triangles are intersected
+/// after Moeller and Trumbore (1997). Single precision, immutable, may be used from several threads.
 class Bvh {
  public:
   explicit Bvh(const TriangleMesh& mesh);
 
-  /// Nearest triangle, from either side, at 0 < distance <= max_distance. `direction` need not be of unit length; a
-  /// zero direction hits nothing.
+  /// The nearest triangle, hit from either side, at 0 < distance <= max_distance (in lengths of `direction`). A zero
+  /// direction hits nothing.
   [[nodiscard]] std::optional<RayHit> cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
                                            float max_distance) const;
 
-  /// Unit normal, to the side from which the triangle's corners run counter-clockwise; zero for a degenerate one.
+  /// Unit normal, on the side from which the triangle's corners are counter-clockwise; zero for a degenerate triangle.
   [[nodiscard]] Eigen::Vector3f normal(std::uint32_t triangle) const;
-  [[nodiscard]] std::size_t size() const { return place_.size(); }  ///< Triangles.
+  [[nodiscard]] std::size_t size() const { return place_.size(); }  ///< Number of triangles.
 
  private:
   static constexpr int kWidth = 4;                       ///< Boxes or triangles tested at once,
@@ -43,14 +44,14 @@ class Bvh {
   };
   struct Packet {
     Lanes corner[3], edge1[3], edge2[3];
-    std::uint32_t triangle[kWidth];  ///< Of the mesh.
+    std::uint32_t triangle[kWidth];  ///< Indices in the mesh.
   };
   struct Builder;
   struct Ray;
 
   std::vector<Node> nodes_;
   std::vector<Packet> packets_;
-  std::vector<std::uint32_t> place_;  ///< Of each triangle of the mesh: kWidth * packet + lane.
+  std::vector<std::uint32_t> place_;  ///< Position of each triangle of the mesh: kWidth * packet + lane.
 };
 
 }  // namespace tutti::simulation

@@ -16,11 +16,11 @@
 
 namespace tutti::simulation {
 
-/// How good the images of a camera are.
+/// Noise and exposure of a camera's images.
 struct ImageConfig {
-  double noise_sigma = 2.0;         ///< Noise of a pixel, of 255 grey values.
-  double exposure_swing = 0.15;     ///< Exposure is this share longer, and shorter,
-  double exposure_period_s = 20.0;  ///< once in this time.
+  double noise_sigma = 2.0;         ///< Standard deviation per pixel, of 255 grey values.
+  double exposure_swing = 0.15;     ///< The exposure varies by this share, up and down,
+  double exposure_period_s = 20.0;  ///< once in this period.
 };
 
 /// The same camera with images of half the width and height.
@@ -33,26 +33,26 @@ struct HallScene {
   Bvh surface;
 };
 
-/// Takes images of a hall. Immutable, safe to use from several threads.
+/// Renders images of a hall. Immutable, may be used from several threads.
 class SimulatedCamera {
  public:
   SimulatedCamera(std::shared_ptr<const HallScene> scene, const CameraModel& model, const ImageConfig& config);
 
-  /// What is seen from T_world_camera; `time_s` tells the exposure, `rng` the noise. One ray a pixel, through its
+  /// The image from T_world_camera. `time_s` sets the exposure, `rng` the noise. One ray is cast per pixel, through its
   /// centre; pixels that see nothing (no direction, or out of the hall) are black.
   [[nodiscard]] Image image(const Pose3& T_world_camera, double time_s, Rng rng) const;
-  /// What a depth sensor with the same pixels would measure from there, with its noise.
+  /// What a depth sensor with the same pixels would measure from T_world_camera, with its noise.
   [[nodiscard]] DepthImage depth(const Pose3& T_world_camera, const DepthSensor& sensor, Rng rng) const;
 
  private:
   std::shared_ptr<const HallScene> scene_;
   CameraModel model_;
   ImageConfig config_;
-  std::vector<Eigen::Vector3f> rays_;  ///< Unit, camera frame, by pixel; zero where there is none.
+  std::vector<Eigen::Vector3f> rays_;  ///< Per pixel a unit direction in the camera frame, or zero.
 };
 
-/// The images of a robot that moves along `truth` (T_world_body), one per camera and pose, made when asked for; with
-/// `depth`, depth images of the first camera, too.
+/// The images of a robot that moves along `truth` (T_world_body), one per camera and pose, rendered on demand; with
+/// `depth`, also depth images of the first camera.
 ImageStream simulate_images(std::shared_ptr<const HallScene> scene, const std::vector<Camera>& cameras,
                             Trajectory truth, const ImageConfig& config, Rng rng,
                             const std::optional<DepthSensor>& depth = {});

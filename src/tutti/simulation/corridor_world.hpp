@@ -10,7 +10,7 @@
 
 namespace tutti::simulation {
 
-/// A grid of junctions, each moved at random, with some corridors left out: loops, no dead ends.
+/// A grid of junctions, each moved at random, with some corridors left out: it has loops and no dead ends.
 struct CorridorWorldConfig {
   int rows = 4;
   int columns = 5;
@@ -31,12 +31,14 @@ struct CorridorWorldConfig {
   }
 };
 
-/// rough: something to see everywhere; featureless: straight, smooth and empty, a sensor cannot tell how far along it
-/// is; office: flat walls, doors and corners; open: under the sky, with almost nothing to see.
+/// What a corridor looks like. rough: there is something to see everywhere; featureless: straight, smooth and empty, so
+/// a sensor cannot tell the position along it; office: flat walls, doors and corners; open: under the sky, with almost
+/// nothing to see.
 enum class CorridorKind { rough, featureless, office, open };
 
+/// A straight corridor between two junctions.
 struct Corridor {
-  std::size_t a = 0;  ///< Junctions at its ends, a < b.
+  std::size_t a = 0;  ///< Junctions at its ends, as indices, a < b.
   std::size_t b = 0;
   double length_m = 0.0;
   CorridorKind kind = CorridorKind::rough;
@@ -46,17 +48,18 @@ struct Corridor {
 struct CorridorWorld {
   std::vector<Eigen::Vector3d> junctions;
   std::vector<Corridor> corridors;
-  std::vector<std::vector<std::size_t>> corridors_at;  ///< Per junction: its corridors.
+  std::vector<std::vector<std::size_t>> corridors_at;  ///< Indices of the corridors at each junction.
 
   [[nodiscard]] std::size_t other_end(std::size_t corridor, std::size_t junction) const {
     return corridors[corridor].a == junction ? corridors[corridor].b : corridors[corridor].a;
   }
 };
 
-/// Connected, every junction on at least two corridors.
+/// Makes a connected world in which every junction is on at least two corridors.
 CorridorWorld make_corridor_world(const CorridorWorldConfig& config, Rng rng);
 
-/// `count` junctions far from each other (greedy farthest point from a random first); repeats when count > junctions.
+/// `count` junctions far from each other (greedy farthest points from a random first one); they repeat when `count`
+/// exceeds the junctions.
 std::vector<std::size_t> spread_starts(const CorridorWorld& world, std::size_t count, Rng rng);
 
 }  // namespace tutti::simulation

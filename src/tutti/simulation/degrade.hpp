@@ -10,7 +10,7 @@
 
 namespace tutti::simulation {
 
-/// A bad front end put on given odometry. The signs make it differ from robot to robot.
+/// Errors of a bad front end that are added to given odometry. Their signs may differ from robot to robot.
 struct DegradeConfig {
   double yaw_deg_per_m = 0.0;
   double scale_percent = 0.0;
@@ -21,14 +21,15 @@ struct DegradeConfig {
   }
 };
 
-/// Every step is scaled and turned about the z axis of the odometry frame by the yaw drift of the metres travelled so
-/// far; roll and pitch keep their values. The first pose stays.
+/// Scales every step, and turns it about the z axis of the odometry frame by the yaw drift of the way so far. Roll and
+/// pitch keep their values, and so does the first pose.
 Trajectory degrade_odometry(const Trajectory& odometry, const DegradeConfig& config);
 
-/// Any yaw, a tilt of up to `max_tilt_deg` about a horizontal axis, a shift of up to `max_shift_m` along each axis.
+/// Draws a frame: any yaw, a tilt of up to `max_tilt_deg` about a horizontal axis, and a shift of up to `max_shift_m`
+/// along each axis.
 Pose3 random_frame(Rng& rng, double max_tilt_deg = 3.0, double max_shift_m = 50.0);
 
-/// T_new_body from T_odom_body. Increments, and so their covariances, stay what they are.
+/// The trajectory in another frame: T_new_odom T_odom_body. Steps and their covariances do not change.
 Trajectory move_frame(const Trajectory& trajectory, const Pose3& T_new_odom);
 
 }  // namespace tutti::simulation

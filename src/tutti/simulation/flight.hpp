@@ -9,18 +9,19 @@
 
 namespace tutti::simulation {
 
-/// Round and round a hall between the boxes in its middle and those along its walls, looking ahead and to the walls:
-/// every round sees the places of the one before, from a little elsewhere.
+/// A flight round a hall, between the boxes in its middle and those along its walls, looking ahead and towards the
+/// walls. Every round sees the places of the previous one from slightly different positions.
 struct FlightConfig {
   double duration_s = 60.0;
   double rate_hz = 10.0;
   double round_s = 40.0;       ///< Time for one round, counter-clockwise.
-  double semi_length_m = 6.0;  ///< Of the ellipse that is flown, x.
-  double semi_width_m = 4.0;   ///< Of the ellipse that is flown, y.
+  double semi_length_m = 6.0;  ///< Half axis of the flown ellipse along x.
+  double semi_width_m = 4.0;   ///< Half axis of the flown ellipse along y.
   double height_m = 1.8;
-  double wobble_m = 0.3;            ///< How far it strays from the ellipse, in every direction.
-  double tilt_deg = 5.0;            ///< Largest roll and pitch.
-  double look_outwards_deg = 35.0;  ///< From the direction of flight to the right, towards the walls.
+  double wobble_m = 0.3;  ///< Largest deviation from the ellipse, in every direction.
+  double tilt_deg = 5.0;  ///< Largest roll and pitch.
+  /// Direction of view, from the direction of flight to the right, towards the walls.
+  double look_outwards_deg = 35.0;
   double start_deg = 0.0;
   template <class V>
   void describe(V& v) {
@@ -31,18 +32,18 @@ struct FlightConfig {
   }
 };
 
-/// A moment of a smooth motion.
+/// The state of a smooth motion at one moment.
 struct Motion {
-  Pose3 T_world_body;                                          ///< Body x ahead, z up.
+  Pose3 T_world_body;                                          ///< Body frame: x ahead, z up.
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s, world frame.
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();      ///< m/s^2, world frame.
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s, body frame.
 };
 
-/// All derivatives exist and are exact: sums of sines in time.
+/// The state at a time of the flight. The motion is a sum of sines in time, so all derivatives are exact.
 Motion flight_motion(const FlightConfig& config, double time_s);
 
-/// The poses of a flight; the first stamp is `start`.
+/// The poses of a flight at rate_hz; the first stamp is `start`.
 Trajectory simulate_flight(const FlightConfig& config, Timestamp start);
 
 }  // namespace tutti::simulation

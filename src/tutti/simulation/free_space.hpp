@@ -14,64 +14,66 @@
 
 namespace tutti::simulation {
 
-/// A corridor, or with a == b the chamber at a junction: the same cross-section all along, round ends.
+/// A corridor, or the chamber at a junction (a == b): the same cross-section all along, with round ends.
 struct Passage {
-  Eigen::Vector3d a, b;  ///< Of the floor's middle.
+  Eigen::Vector3d a, b;  ///< Middle of the floor at the ends.
   double half_width = 0.0;
   double height = 0.0;
-  double top_radius = 0.0;  ///< Of the cross-section's corners.
-  double bottom_radius = 0.0;
-  double roughness = 0.0;  ///< How far walls stray from smooth.
-  double variation = 0.0;  ///< Share by which it widens and narrows.
+  double top_radius = 0.0;     ///< Of the upper corners of the cross-section.
+  double bottom_radius = 0.0;  ///< Of the lower corners.
+  double roughness = 0.0;      ///< How far walls deviate from smooth.
+  double variation = 0.0;      ///< Share by which the width varies.
 };
 
-/// Upright, turned about z.
+/// An upright box, rotated about z.
 struct Box {
   Eigen::Vector3d centre;
-  Eigen::Vector2d along;  ///< Unit, its x axis.
+  Eigen::Vector2d along;  ///< Unit vector of its x axis.
+  /// Half of each edge.
   Eigen::Vector3d half;
   double roughness = 0.0;
 };
 
-/// Open space above a level floor, nothing known outside of low..high.
+/// Open space above a level floor; nothing is known outside low..high.
 struct Roof {
   Eigen::Vector2d low, high;
   double floor = 0.0;
   std::vector<Box> solids;
 };
 
-/// What a world's free space is made of: passages, openings and roof joined, less the solids.
+/// The parts of a world's free space: the union of passages, openings and roof, without the solids.
 struct SpaceParts {
   std::vector<Passage> passages;
   std::vector<Box> openings;  ///< Alcoves, doors, rooms.
-  std::vector<Box> solids;    ///< Obstacles, furniture; not on the roof.
+  std::vector<Box> solids;    ///< Obstacles and furniture, except on the roof.
   std::optional<Roof> roof;
 };
 
-/// Puts alcoves, doors and things where the seed says.
+/// Adds alcoves, doors and objects at random.
 SpaceParts furnish(const CorridorWorld& world, const SurfaceConfig& config, Rng rng);
 
-/// An implicit function whose zero set is the surface of a world.
+/// Free space as an implicit function whose zero set is the surface of a world.
 class FreeSpace {
  public:
   FreeSpace(const CorridorWorld& world, const SurfaceConfig& config, Rng rng);
 
-  /// Negative where a sensor can be, positive in rock; near the surface about the distance to it, farther away only the
-  /// sign means something.
+  /// Negative where a sensor can be, positive in rock. Near the surface it is about the distance to it; farther away
+  /// only the sign is meaningful.
   [[nodiscard]] double value(const Eigen::Vector3d& position) const;
 
-  /// Cubes of block_m() that together hold all of the surface; what may matter within each.
+  /// Index of a cube with edges of block_m(); blocks() covers all of the surface with such cubes.
   using BlockIndex = std::array<int, 3>;
+  /// The parts of the world that may matter within one block.
   struct Nearby {
-    std::vector<std::uint32_t> passages, openings, solids;  ///< Of parts().
+    std::vector<std::uint32_t> passages, openings, solids;  ///< Indices into parts().
     bool roof = false;
   };
   [[nodiscard]] double block_m() const { return block_m_; }
   [[nodiscard]] const std::map<BlockIndex, Nearby>& blocks() const { return blocks_; }
-  /// As value(), for a position within or on the border of the block.
+  /// The same as value(), for a position within the block or on its border.
   [[nodiscard]] double value(const Nearby& nearby, const Eigen::Vector3d& position) const;
   /// False where a cell of the grid around the position reaches beyond the roof's edge, where open space and rock meet
-  /// without a wall between them.
+  /// without a wall.
   [[nodiscard]] bool is_known(const Nearby& nearby, const Eigen::Vector3d& position) const;
   [[nodiscard]] const SpaceParts& parts() const { return parts_; }
 

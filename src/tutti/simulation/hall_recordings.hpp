@@ -19,6 +19,7 @@
 
 namespace tutti::simulation {
 
+/// One robot in a hall: its sensors, flight and errors.
 struct FlyingRobotConfig {
   std::string name;
   std::string sensors = "visual";
@@ -41,7 +42,7 @@ struct HallMissionConfig {
   ImageConfig images;
   int cameras = 1;
   bool depth = false;
-  bool half_resolution = true;  ///< Images of 376 x 240 instead of 752 x 480 pixels: a quarter of the time.
+  bool half_resolution = true;  ///< Images of 376 x 240 pixels instead of 752 x 480, in a quarter of the time.
   bool imu = true;
   LidarConfig lidar;
   ImuConfig imu_noise;
@@ -59,17 +60,20 @@ struct HallMissionConfig {
   }
 };
 
+/// One robot's simulated run, with its images still untracked.
 struct FlownRecording {
-  Recording recording;  ///< Without `visual`: somebody is yet to follow points through the images.
-  ImageStream images;   ///< No stamps when there is no camera.
+  Recording recording;  ///< Without `visual`: the caller tracks points through `images`.
+  ImageStream images;   ///< Without stamps when there is no camera.
 };
 
+/// The recordings of a simulated hall, and the hall's surface.
 struct SimulatedHall {
-  std::vector<FlownRecording> robots;           ///< Robots 0, 1, ...
-  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would find.
+  std::vector<FlownRecording> robots;           ///< Of robots 0, 1, ...
+  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would measure.
 };
 
-/// The first sample of each robot is at `start` + start_s. An error when two robots have one name, or one has none.
+/// Simulates all robots of a hall; the first sample of each is at `start` + start_s. Fails when a robot has no name, or
+/// two have the same.
 Result<SimulatedHall> simulate_hall(const HallMissionConfig& config, Timestamp start, std::uint64_t seed);
 
 }  // namespace tutti::simulation

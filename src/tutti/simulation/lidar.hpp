@@ -17,7 +17,7 @@
 
 namespace tutti::simulation {
 
-/// A spinning multi-beam LiDAR, its axis along the body's z.
+/// A spinning multi-beam LiDAR whose axis is along the body's z.
 struct LidarConfig {
   int beams = 16;
   double lowest_deg = -15.0;
@@ -45,18 +45,17 @@ struct LidarConfig {
             "Below this cosine of the angle of incidence, echoes are lost in proportion; at 0 all of them.");
     v.field("mount_height_m", mount_height_m, between(-kLargestRoom_m, kLargestRoom_m), "Sensor above the body frame.");
   }
-  [[nodiscard]] Pose3 pose() const {
-    return {Eigen::Quaterniond::Identity(), {0.0, 0.0, mount_height_m}};
-  }  ///< T_body_lidar
+  /// T_body_lidar
+  [[nodiscard]] Pose3 pose() const { return {Eigen::Quaterniond::Identity(), {0.0, 0.0, mount_height_m}}; }
 };
 
-/// One turn that ends at `end` and begins 1 / rate_hz before, clockwise seen from above, starting and ending behind the
-/// body. `truth` (T_reference_body, the frame of `surface`) is interpolated at every firing; Scan::age_s says when it
-/// was. Nothing when `truth` does not cover the turn.
+/// One turn that begins 1 / rate_hz before `end`, clockwise seen from above, starting and ending behind the body.
+/// `truth` (T_reference_body, in the frame of `surface`) is interpolated at every firing; Scan::age_s tells its time.
+/// Nothing when `truth` does not cover the turn.
 std::optional<Scan> simulate_sweep(const Bvh& surface, const Trajectory& truth, Timestamp end,
                                    const LidarConfig& config, Rng rng);
 
-/// The scans of one robot, made when asked for: scan(k) is the sweep that ends at truth[k] and depends on nothing else.
+/// The scans of one robot, computed on demand: scan(k) is the sweep that ends at truth[k], and depends on nothing else.
 class SimulatedLidar : public ScanSource {
  public:
   SimulatedLidar(std::shared_ptr<const Bvh> surface, Trajectory truth, LidarConfig config, Rng rng);

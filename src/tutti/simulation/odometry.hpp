@@ -16,8 +16,8 @@
 
 namespace tutti::simulation {
 
-/// What happens along featureless corridors, where nothing tells how far along one is. The robot notices: the
-/// covariance is inflated along the corridor's axis.
+/// Errors along featureless corridors, where nothing tells the position along the axis. The robot notices: its
+/// covariance is inflated along the axis.
 struct DegeneracyConfig {
   double slide_percent = 3.0;
   double least_slide_percent = 0.0;
@@ -32,7 +32,7 @@ struct DegeneracyConfig {
   }
 };
 
-/// A localisation failure under the open sky, once per run, that the covariance does not know.
+/// A localisation failure under the open sky, once per run, which the covariance does not show.
 struct FailureConfig {
   double after_m = 5.0;
   double length_m = 20.0;
@@ -48,9 +48,9 @@ struct FailureConfig {
   }
 };
 
-/// One error at a given place of the run, that the covariance does not know: the odometry reports this move and turn
-/// beside the true ones. In the level frame of the robot; all at once, or evenly over a length of way. An error whose
-/// place is never reached does not happen.
+/// One error at a given place of the run, which the covariance does not show: odometry reports this move and turn in
+/// addition to the true ones. It is given in the robot's level frame, and happens at once or evenly over a length of
+/// way. If the place is never reached, it does not happen.
 struct ScriptedErrorConfig {
   double after_m = 0.0;
   bool at_start = false;
@@ -119,24 +119,27 @@ struct OdometryNoiseConfig {
 struct Surroundings {
   CorridorKind kind = CorridorKind::rough;
   std::size_t corridor = 0;
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< Of the corridor, unit, in the frame `reference`.
+  /// Direction of the corridor: unit vector in the frame `reference`.
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();
 };
 
-/// Per sample the nearest corridor.
+/// The nearest corridor of each sample.
 std::vector<Surroundings> surroundings_along(const CorridorWorld& world, const Trajectory& truth);
 
+/// Simulated odometry with the errors that were put into it.
 struct OdometrySimulation {
-  Trajectory odometry;                         ///< T_odom_body at the stamps of the truth, in an odom frame of its own.
-  std::vector<Matrix6d> increment_covariance;  ///< Of k -> k + 1, right tangent; one fewer than odometry.
-  std::vector<DriftOrigin> drift_origins;      ///< Slips, featureless corridors, failures; in time order.
+  Trajectory odometry;                         ///< T_odom_body at the stamps of the truth, in its own odom frame.
+  std::vector<Matrix6d> increment_covariance;  ///< Of the step k -> k + 1, right tangent; one fewer than odometry.
+  std::vector<DriftOrigin> drift_origins;      ///< Slips, featureless corridors and failures, in time order.
 };
 
-/// Measures the increments of a true trajectory with noise. `surroundings`: one per pose, or empty = rough everywhere.
-/// The covariances are meant for independent increments; correlated errors are therefore inflated so that stretches
-/// stay honest: a Gauss-Markov bias with standard deviation s per metre and length L turns by a variance of 2 s^2 L per
-/// metre in the long run, a constant error c by c^2 times `consistent_length_m` per metre, the slide along a
-/// featureless corridor by its square times the length of the visit. Shorter stretches are then overestimated, never
-/// underestimated.
+/// Odometry of a true trajectory: its steps, measured with noise. `surroundings` has one entry per pose, or is empty:
+/// rough everywhere.
+///
+/// Covariances are stated as if steps were independent, so correlated errors are inflated until long stretches are
+/// stated correctly. A Gauss-Markov bias with standard deviation s per metre and length L adds a variance of 2 s^2 L
+/// per metre; a constant error c adds c^2 times `consistent_length_m` per metre; the slide along a featureless corridor
+/// adds its square times the length of the visit. Shorter stretches are thereby overestimated, never underestimated.
 OdometrySimulation simulate_odometry(const Trajectory& truth, std::span<const Surroundings> surroundings,
                                      const OdometryNoiseConfig& config, Rng rng);
 

@@ -20,8 +20,9 @@
 
 namespace tutti::simulation {
 
+/// One robot, or several alike, in a simulated mission; `describe` explains the fields.
 struct SimulatedRobotConfig {
-  std::string name;  ///< Empty: "alpha", "bravo", ... by place in the list.
+  std::string name;  ///< Empty: "alpha", "bravo", ... by position in the list.
   int copies = 1;
   double start_s = 0.0;
   std::optional<int> start_junction;
@@ -39,6 +40,7 @@ struct SimulatedRobotConfig {
   }
 };
 
+/// A simulated mission in a network of corridors.
 struct SimulationConfig {
   std::string sensors = "none";
   WorldConfig world;
@@ -55,21 +57,23 @@ struct SimulationConfig {
   }
 };
 
-/// Every robot by itself, copies one after the other.
+/// One entry per robot: copies follow each other.
 std::vector<SimulatedRobotConfig> single_robots(const std::vector<SimulatedRobotConfig>& robots);
 
-/// What a simulated mission replays, and the world it took place in.
+/// The recordings of a simulated mission, and the world in which they were made.
 struct SimulatedWorld {
   CorridorWorld network;
-  std::vector<Recording> recordings;            ///< Robots 0, 1, ... in the order of single_robots().
-  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would find; null without sensors.
+  std::vector<Recording> recordings;            ///< Of robots 0, 1, ... in the order of single_robots().
+  std::shared_ptr<const TriangleMesh> surface;  ///< What a survey would measure; null without sensors.
 };
 
-/// The walls of the world that simulate_recordings() makes of the same configuration and seed; reference frame.
+/// The walls of the world that simulate_recordings() makes from the same configuration and seed; in the frame
+/// `reference`.
 TriangleMesh world_mesh(const SimulationConfig& config, std::uint64_t seed);
 
-/// Robots walking at the same time through one world; the first sample of each is at `start` + start_s. An error when
-/// the configuration asks for what the world has not (a junction, a corridor) or names two robots alike.
+/// Simulates robots that walk through one world at the same time; the first sample of each is at `start` + start_s.
+/// Fails when the configuration names a junction or corridor that the world does not have, or gives two robots one
+/// name.
 Result<SimulatedWorld> simulate_recordings(const SimulationConfig& config, Timestamp start, std::uint64_t seed);
 
 }  // namespace tutti::simulation

@@ -15,9 +15,10 @@
 
 namespace tutti::simulation {
 
-/// How far off closures are that are made wrong.
+/// Range of the errors of closures that are made wrong.
 inline constexpr double kWrongLeast_m = 2.0, kWrongMost_m = 8.0, kWrongTurn_deg = 60.0;
 
+/// When submaps count as overlapping, and the errors of their closures.
 struct ReferenceClosureConfig {
   double radius_m = 4.0;
   double max_heading_deg = 180.0;
@@ -47,21 +48,22 @@ struct ReferenceClosureConfig {
   }
 };
 
-/// The way to find closures when there is no sensor data: from the reference poses of two submaps, with noise and with
-/// wrong ones. A verdict depends on the reference, the seed and the two submaps only, never on what was asked before;
-/// all members are const and safe to call from several threads.
+/// Finds closures without sensor data: from the reference poses of two submaps, with noise, and with some wrong ones. A
+/// verdict depends on the reference, the seed and the two submaps only, never on earlier calls. All functions are const
+/// and may be called from several threads.
 class ReferenceClosures {
  public:
-  /// Raised by hand in the commit that changes what verify() makes of two submaps.
+  /// A commit that changes the verdict on two submaps raises it by hand.
   static constexpr std::uint32_t kVersion = 1;
-  /// `reference`: T_reference_body per robot, one frame for all of them.
+  /// `reference` has T_reference_body per robot, in one frame for all.
   ReferenceClosures(std::map<RobotId, Trajectory> reference, const ReferenceClosureConfig& config, std::uint64_t seed);
 
-  /// Would verify() report a closure? The order of the two does not matter.
+  /// True if verify() would report a closure. The order of the two submaps does not matter.
   [[nodiscard]] bool is_candidate(const Submap& a, const Submap& b) const;
-  /// The order of the two does not matter; refusals say why.
+  /// The verdict on two submaps, whose order does not matter; a refusal says why there are no closures.
   [[nodiscard]] ClosureVerdict verify(const Submap& a, const Submap& b) const;
-  /// True relative pose of a closure's keyframes at their stamps, for evaluation; nothing without reference there.
+  /// T_a_b, the true relative pose of two keyframes at their stamps, for evaluation; nothing where there is no
+  /// reference.
   [[nodiscard]] std::optional<Pose3> true_relative_pose(RobotId robot_a, Timestamp stamp_a, RobotId robot_b,
                                                         Timestamp stamp_b) const;
 
@@ -73,7 +75,7 @@ class ReferenceClosures {
   [[nodiscard]] Assessment assess(const PlacedSubmap& first, const PlacedSubmap& second) const;
   [[nodiscard]] std::vector<PlacedSubmap> cut_reference() const;
   void set_wrong_probabilities();
-  /// Is the pair reported wrong, and then by which error of the pose in first's anchor frame?
+  /// The error of the pose in first's anchor frame if the pair is to be reported wrong; nothing if it is not.
   [[nodiscard]] std::optional<Pose3> draw_error(const SubmapPair& pair, bool overlap) const;
 
   std::map<RobotId, Trajectory> reference_;

@@ -13,11 +13,11 @@ namespace tutti::simulation {
 
 class FreeSpace;
 
-inline constexpr double kHeight_m = 2.8;  ///< Of rough and featureless corridors,
+inline constexpr double kHeight_m = 2.8;  ///< Of rough and featureless corridors.
 inline constexpr double kOfficeHeight_m = 2.6;
-inline constexpr double kRoofMargin_m = 4.0;  ///< From the outermost open corridors to the roof's edge.
+inline constexpr double kRoofMargin_m = 4.0;  ///< Distance from the outermost open corridors to the roof's edge.
 
-/// What the walls of a world look like. Lengths across a corridor are those of its smooth shape.
+/// What the walls of a world look like. Widths and heights are those of the smooth shape.
 struct SurfaceConfig {
   double cell_m = 0.25;
   double body_height_m = 0.55;
@@ -41,17 +41,18 @@ struct SurfaceConfig {
   }
 };
 
-/// Is the grid of this world's surface small enough to be computed?
+/// Fails when the grid of this world's surface is too large to be computed.
 Status check_surface(const CorridorWorld& world, const SurfaceConfig& config);
 
-/// The walls, floors and ceilings around a world's corridors: zero set of FreeSpace by naive surface nets (Gibson,
-/// "Constrained Elastic Surface Nets", MICCAI 1998; without elasticity, each vertex then moved onto the zero set), on a
-/// grid that exists near the corridors only. Closed, except around the roof of open corridors, which ends on its
-/// parapet, under an open sky.
+/// The walls, floors and ceilings around a world's corridors: the zero set of FreeSpace, extracted by naive surface
+/// nets (Gibson, "Constrained Elastic Surface Nets", MICCAI 1998; without elasticity, and with each vertex then moved
+/// onto the zero set) on a grid that exists near corridors only. The surface is closed except above the roof of open
+/// corridors, which ends at its parapet.
 TriangleMesh world_surface(const CorridorWorld& world, const SurfaceConfig& config, Rng rng);
+/// The zero set of any free space on a grid of `cell_m`, by the same method.
 TriangleMesh extract_surface(const FreeSpace& space, double cell_m);
 
-/// A survey: points spread evenly over the surface, one per spacing_m^2 on average.
+/// A survey: points spread evenly over the surface, on average one per spacing_m^2.
 PointCloud sample_surface(const TriangleMesh& mesh, double spacing_m, Rng rng);
 
 }  // namespace tutti::simulation

@@ -14,6 +14,7 @@
 
 namespace tutti::simulation {
 
+/// How a robot walks; `describe` explains the fields.
 struct WalkConfig {
   double duration_s = 1200.0;
   double length_m = 0.0;
@@ -48,16 +49,18 @@ struct WalkConfig {
   }
 };
 
-/// Is `config.route` a closed walk along corridors of this world without U-turns, `start_junction` a junction, is there
-/// room for `lookahead_m`, and the walk not too long to be computed?
+/// Fails unless `config.route` is a closed walk along corridors of this world without U-turns, `start_junction` is a
+/// junction, there is room for `lookahead_m`, and the walk is short enough to be computed.
 Status check_walk(const CorridorWorld& world, const WalkConfig& config, std::optional<std::size_t> start_junction);
 
-/// A walk from junction to junction. Without a route: no U-turns, corridors seen least being preferred: covers the
-/// network, then revisits it, now and then in the other direction; the first junction is drawn when not given. With a
-/// route: round and round along it, from its first junction. Truth T_reference_body, body x ahead, z up; the first
-/// stamp is `start`. Heading, position and attitude are continuous: the robot steers towards a point ahead on the path
-/// (Coulter 1992, "Implementation of the Pure Pursuit Path Tracking Algorithm"). The gait fades out when it stands.
-/// What check_walk() refuses is our own mistake here.
+/// Simulates a walk from junction to junction. Without a route the robot makes no U-turns and prefers the corridors it
+/// has seen least: it covers the network, then revisits it, sometimes in the other direction. The first junction is
+/// drawn when none is given. With a route the robot repeats it, starting at its first junction.
+///
+/// The result is T_reference_body, body x ahead, z up, with `start` as its first stamp. Position, heading and attitude
+/// are continuous, because the robot steers towards a point ahead on the path (Coulter 1992, "Implementation of the
+/// Pure Pursuit Path Tracking Algorithm"). The gait fades out when the robot stands. Throws on what check_walk()
+/// refuses.
 Trajectory simulate_walk(const CorridorWorld& world, const WalkConfig& config, Timestamp start,
                          std::optional<std::size_t> start_junction, Rng rng);
 

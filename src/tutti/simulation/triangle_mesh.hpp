@@ -8,7 +8,7 @@
 
 namespace tutti::simulation {
 
-/// Counter-clockwise seen from where a sensor can be. Metres, in the frame `reference`.
+/// Triangles of vertices in metres, in the frame `reference`; counter-clockwise seen from where a sensor can be.
 struct TriangleMesh {
   std::vector<Eigen::Vector3f> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;

@@ -17,13 +17,13 @@ namespace tutti::simulation {
 
 inline constexpr double kLongestLoop_m = 1000.0;
 
-/// Where robots can go and what it is like there.
+/// Which world robots walk in; each field says for which `kind` it is.
 struct WorldConfig {
   std::string kind = "tunnel";
   CorridorWorldConfig network;      ///< tunnel
-  double featureless_share = 0.15;  ///< tunnel: of the corridors
-  std::vector<int> featureless;     ///< tunnel: and these, as pairs of junctions
-  double office_length_m = 30.0;    ///< terrace
+  double featureless_share = 0.15;  ///< tunnel: share of the corridors
+  std::vector<int> featureless;     ///< tunnel: further corridors, as pairs of junctions
+  double office_length_m = 30.0;    ///< terrace, like all that follow
   double office_width_m = 18.0;
   double roof_length_m = 45.0;
   double roof_width_m = 30.0;
@@ -49,17 +49,19 @@ struct WorldConfig {
   }
 };
 
-/// The network robots walk on, every corridor with its kind (Corridor::kind); no dead ends.
-/// tunnel: make_corridor_world; the longest corridors and the named ones are featureless, the others
-/// rough.
-/// terrace: junctions about every 10 m, counter-clockwise on both loops. Office first, from the corner at the origin
-/// (for the default size 0 to 9: corners 0, 3, 5, 8), with a cross-corridor (1 to 7); then the roof, level, from the
-/// end of the ramp on (10 to 24; the ramp is 4 to 10). Corridors of the roof are open, all others office.
+/// Makes the network that robots walk on, in which every corridor has its kind (Corridor::kind) and nothing is a dead
+/// end.
+///   tunnel: make_corridor_world(); the longest corridors and the named ones are featureless, the others
+///   rough.
+///   terrace: junctions about every 10 m, counter-clockwise on both loops. The office comes first, from the corner at
+///   the origin (with the default size 0 to 9, corners 0, 3, 5, 8), with a cross-corridor (1 to 7); then the roof,
+///   level, from the end of the ramp on (10 to 24; the ramp is 4 to 10). Corridors of the roof are open, all others are
+///   office.
 CorridorWorld make_world(const WorldConfig& config, Rng rng);
-/// Has the world that make_world() made every corridor that the configuration names?
+/// Fails when the configuration names a corridor that the world of make_world() does not have.
 Status check_world(const CorridorWorld& world, const WorldConfig& config);
 
-/// The corridor nearest to a position, which lies on it or within `max_distance_m` of its centre line.
+/// The corridor nearest to a position, if the position is within `max_distance_m` of its centre line; else nothing.
 std::optional<std::size_t> corridor_at(const CorridorWorld& world, const Eigen::Vector3d& position,
                                        double max_distance_m);
 

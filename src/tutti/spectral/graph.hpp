@@ -22,14 +22,14 @@ struct WeightedEdge {
 
 /// Adjacency of the proximity graph, eq. (1): w(n, m) = exp(-||v_n - v_m|| / (2 sigma^2)) (the norm is not squared)
 /// when the distance is at most `radius_m`, else no edge; zero diagonal. positions: one 3-vector per node, any frame,
-/// metres, finite; radius_m > 0, sigma_m > 0. A weight below the smallest positive double is no edge.
-/// `most_neighbours` > 0: two nodes are joined only if either is among the other's so many nearest (the smaller number
-/// of two as near), so that a thousand nodes in one room do not make a million edges.
+/// metres, finite; radius_m > 0, sigma_m > 0. A weight that underflows to 0 is no edge. With `most_neighbours` > 0 an
+/// edge stays only if it is among the `most_neighbours` shortest of at least one of its two nodes (of equally long
+/// ones, to the neighbour of smaller number), so that a thousand nodes in one room do not make a million edges.
 [[nodiscard]] SparseMatrix proximity_adjacency(std::span<const Eigen::Vector3d> positions, double radius_m,
                                                double sigma_m, int most_neighbours = 0);
 
-/// Symmetric adjacency of `nodes` nodes. Weights are finite and positive, ends differ; several edges between the same
-/// two nodes add up.
+/// Symmetric adjacency of a graph of `nodes` nodes. Every weight must be finite and positive and the two ends of an
+/// edge must differ; the weights of several edges between the same two nodes add up.
 [[nodiscard]] SparseMatrix adjacency_from_edges(int nodes, std::span<const WeightedEdge> edges);
 
 /// L = D - A, eq. (2), D the diagonal matrix of A's row sums. Every diagonal entry is stored, also an isolated node's

@@ -101,8 +101,9 @@ void eliminate(int node, const Eigen::VectorXd& degree, std::vector<Links>& grap
 
 }  // namespace
 
-/// Node by node, fewest neighbours first. Against a sparse Cholesky factor of L_bb: only sums of positive numbers, so
-/// every weight keeps nearly full relative accuracy and the result is a Laplacian by construction; nothing is singular.
+/// Node by node, fewest neighbours first. Unlike a sparse Cholesky factor of L_bb this takes only sums of positive
+/// numbers, so every weight keeps nearly full relative accuracy, the result is a Laplacian by construction, and nothing
+/// is singular.
 KronReduction kron_reduce(const SparseMatrix& laplacian, std::span<const int> keep) {
   const int nodes = static_cast<int>(laplacian.cols());
   const std::vector<char> kept = mask_of(nodes, keep);

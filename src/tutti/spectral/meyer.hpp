@@ -8,7 +8,8 @@ namespace tutti::spectral {
 /// the definition of PyGSP, which the paper's authors use. g_0 is 1 up to lambda_max / 2^(S-1); scale s > 0 lives on
 /// [lambda_max 2^(s-S), lambda_max 2^(s-S+2)). On [0, lambda_max] the squares sum to 1 (tight frame: the transform
 /// keeps the signal's energy). Above lambda_max the last band rolls off to 0 at 2 lambda_max and the frame is lost:
-/// build the bank with the largest eigenvalue of all graphs that it is to compare. One scale is the all-pass filter.
+/// build the bank with the largest eigenvalue of all graphs that it is to compare. A bank of one scale is the all-pass
+/// filter.
 class MeyerFilterBank {
  public:
   /// scales >= 1; lambda_max >= 0, where 0 (a graph without edges) makes scale 0 pass everything at 0.

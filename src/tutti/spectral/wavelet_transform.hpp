@@ -22,38 +22,42 @@ namespace tutti::spectral {
 
 struct ChebyshevConfig {
   double tolerance = 1e-3;  ///< Largest error allowed in any coefficient, in the signal's unit.
-  int max_order = 4000;     ///< Most products with the Laplacian to spend on one signal.
+  int max_order = 4000;     ///< Limit on the products with the Laplacian per signal.
 };
 
 struct ChebyshevResult {
   Eigen::MatrixXd coefficients;
-  int order = 0;             ///< Products with the Laplacian of the most expensive signal.
+  int order = 0;             ///< Products with the Laplacian that the most expensive signal took.
   double error_bound = 0.0;  ///< No coefficient is further than this from the exact one (rounding aside).
   bool converged = true;     ///< error_bound <= tolerance; false when max_order was too small.
 };
 
-/// Coefficients by polynomials of the Laplacian: sparse products only. The order follows from the requested tolerance.
-/// A constant per connected component passes scale 0 unchanged and the other scales not at all, exactly.
-/// bank.lambda_max() below the graph's largest eigenvalue is allowed (see MeyerFilterBank), only slower.
+/// Coefficients by Chebyshev polynomials of the Laplacian, which take sparse products only. The order follows from the
+/// requested tolerance. A signal that is constant on every connected component passes scale 0 unchanged and the other
+/// scales not at all, exactly. A bank.lambda_max() below the graph's largest eigenvalue is allowed (see
+/// MeyerFilterBank) and costs a higher order. Numerical failure is in the result (`converged`).
 [[nodiscard]] ChebyshevResult chebyshev_transform(const SparseMatrix& laplacian, const MeyerFilterBank& bank,
                                                   const Eigen::MatrixXd& signals, const ChebyshevConfig& config = {});
 
-/// The Meyer bank of one graph by polynomials whose degree depends on the bank alone, so that the transform is one
-/// linear map: what it does to samples of an error says what it does to the error. For many signals of one graph.
+/// The Meyer bank of one graph by Chebyshev polynomials whose degree depends on the bank alone, not on the signal. The
+/// transform is therefore one linear map, and the spread of transformed samples of an error is that of the transformed
+/// error. Prepared once for many signals of one graph; const calls may run in several threads.
 class WaveletFilter {
  public:
-  /// A Laplacian, scales >= 2. No kernel is off by more than `tolerance` anywhere, and in proportion to the frequency
-  /// less near zero; a constant per connected component passes exactly.
+  /// `scales` >= 2, `tolerance` > 0. At frequency x no kernel is off by more than tolerance * x / lambda_max; a signal
+  /// that is constant on every connected component passes exactly.
   WaveletFilter(const SparseMatrix& laplacian, int scales, double tolerance = 0.05);
   ~WaveletFilter();
   WaveletFilter(WaveletFilter&&) noexcept;
 
+  /// The bank, whose lambda_max is the graph's largest eigenvalue or up to about 1 % more.
   [[nodiscard]] const MeyerFilterBank& bank() const;
   [[nodiscard]] int degree() const;  ///< Products with the Laplacian per signal.
-  /// nodes x d -> nodes x (scales * d), ordered as above.
+  /// Coefficients, n x (scales * d), of n x d signals, ordered as at the top of this header.
   [[nodiscard]] Eigen::MatrixXd operator()(const Eigen::Ref<const Eigen::MatrixXd>& signals) const;
-  /// Of many samples of a vector at every node, three signals each, in single precision: per scale nodes x 6, the sums
-  /// over the samples of the products of their coefficients: xx, xy, yy, xz, yz, zz.
+  /// Second moments of transformed samples of a 3-vector at every node, in single precision. `samples`: n x 3k, the
+  /// columns 3j, 3j + 1, 3j + 2 being x, y, z of sample j. Per scale an n x 6 matrix: at every node the sums, over the
+  /// samples, of the products xx, xy, yy, xz, yz, zz of its coefficients.
   [[nodiscard]] std::vector<Eigen::MatrixXd> scatter(const Eigen::Ref<const Eigen::MatrixXd>& samples) const;
 
  private:

@@ -10,13 +10,13 @@
 
 namespace tutti::storage {
 
-/// In memory: survives the node that writes to it, not the process.
+/// A store in memory: what it holds survives the node that writes to it, but not the process.
 class MemoryStore final : public TableStore {
  public:
   using Rows = std::map<std::string, std::string, std::less<>>;
   using Tables = std::map<std::string, Rows, std::less<>>;
 
-  /// `content`: what tables() gave earlier.
+  /// `content`: rows to begin with, as tables() returns them; their tables must be in the schema.
   explicit MemoryStore(const Schema& schema, Tables content = {});
 
   Status commit(std::span<const Write> writes) override;
@@ -24,7 +24,7 @@ class MemoryStore final : public TableStore {
   [[nodiscard]] Status scan(std::string_view table, std::string_view from, const Visit& visit) const override;
   [[nodiscard]] Status sizes(std::string_view table, const VisitSize& visit) const override;
 
-  /// All there is; tables without rows are in it.
+  /// A copy of all rows; tables without rows are in it.
   [[nodiscard]] Tables tables() const;
 
  private:

@@ -11,18 +11,20 @@
 
 namespace tutti::storage {
 
-/// What could not be read of a damaged store.
+/// A row, or an unknown number of rows, that could not be read from a damaged store.
 struct LostRow {
   std::string table;
-  std::string key;  ///< Empty: not known either.
+  std::string key;  ///< Empty when the key is unknown, too.
   std::string why;
 };
 
-/// Hands every row of the schema's tables that is whole, by its hash, to `take`, whatever else of the SQLite file is
-/// damaged; returns the others, as far as anything still names them. The first error of `take` ends it. The file is
-/// changed: give it a copy, with its -wal. Errors: no SQLite file, another program's, of another kind, or not even its
-/// tables can be found.
+/// Is called with each whole row; an error ends the salvage.
 using TakeRow = std::function<Status(std::string_view table, std::string_view key, std::string_view bytes)>;
+
+/// Hands every row of the schema's tables whose bytes have their hash to `take`, whatever else of the SQLite file is
+/// damaged. Returns the lost rows, as far as anything still names them. The first error of `take` ends the salvage and
+/// is returned. The file is changed, so pass a copy, with its -wal. Errors: no SQLite file, one of another program,
+/// kind or newer version, or none of its tables can be found.
 Result<std::vector<LostRow>> salvage_sqlite_store(const std::filesystem::path& copy, const Schema& schema,
                                                   const TakeRow& take);
 

@@ -10,6 +10,7 @@
 
 namespace tutti::storage {
 
+/// Limits on what a store adds to the disk.
 struct SqliteOptions {
   std::uint64_t min_free_bytes = std::uint64_t{256} << 20U;
   std::uint64_t max_bytes = 0;
@@ -21,12 +22,13 @@ struct SqliteOptions {
   }
 };
 
-/// A store in one SQLite file, made if it is missing; beside it, while it is open and after a crash, lies FILE-wal,
-/// which is part of it. What commit() has taken is on the disk, also when the machine stops (synchronous=FULL). The
-/// file is this process's alone until the store is destroyed. docs/storage.md describes the file.
+/// Opens a store in one SQLite file, which is made if it is missing. While the store is open and after a crash FILE-wal
+/// beside the file is part of it. What commit() has accepted is on the disk and survives a power failure
+/// (synchronous=FULL). The file belongs to this process alone until the store is destroyed. docs/storage.md describes
+/// the file.
 ///
-/// Errors: not an SQLite file, another program's, of another kind or version, damaged, open elsewhere. Damage within a
-/// row is found when the row is read, by its hash.
+/// Errors: not an SQLite file, one of another program, another kind or a newer version, a damaged one, one that another
+/// process has open. Damage within a row is found by its hash when the row is read.
 Result<std::unique_ptr<TableStore>> open_sqlite_store(const std::filesystem::path& file, const Schema& schema,
                                                       const SqliteOptions& options = {});
 

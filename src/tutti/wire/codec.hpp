@@ -15,17 +15,17 @@
 #include "tutti/model/status.hpp"
 #include "tutti/wire/message_kind.hpp"
 
-/// Messages as bytes and back. Every message is one frame: "TU", version of the kind (2 bytes, little endian), kind (1
-/// byte), then one zstd frame (with content size and checksum) around a protobuf message of proto/tutti/v1.
+/// Messages as bytes and back. Every message is one frame (frame.hpp) around a protobuf message of proto/tutti/v1.
 ///
 /// Encoding expects a message that validate() accepts (else std::logic_error) and is deterministic. Decoding accepts
 /// any bytes, of every version in versions(kind): it returns an error or a message that validate() accepts, and never
-/// takes more memory than the limits of limits.hpp allow. Encoding what was decoded, with the same settings, and
-/// decoding that changes nothing.
+/// takes more memory than the limits of limits.hpp allow. Encoding a decoded message again, with the same settings,
+/// loses nothing more.
 namespace tutti::wire {
 
-/// Points are rounded to a grid of voxel_m / 2^offset_bits: an error of at most half a cell per axis (defaults: 4.7 mm,
-/// 8.2 mm in space). Their order is not kept: they come back sorted along a Morton curve.
+/// How a cloud is coded: points are rounded to a grid of cells of voxel_m / 2^offset_bits, an error of at most half a
+/// cell per axis (with the defaults 4.7 mm, in space 8.2 mm). Their order is not kept; decoded points are sorted along
+/// a Morton curve.
 struct CloudCodec {
   double voxel_m = 0.3;
   int offset_bits = 5;
@@ -36,27 +36,31 @@ struct CloudCodec {
   }
 };
 
-/// Exact: ids, stamps, flags, counts. Poses: 1e-5 m, 1e-6 rad. Odometry covariance: 1 % of the variance in every
-/// direction. Odometry that follows from the keyframe poses is not carried but computed from them. Cloud: see
-/// CloudCodec; an empty one comes back as null. Keypoints: 1/32 px; landmarks: 0.5 mm per axis; their sigmas: 0.6 %, at
-/// least 1e-6; the rest of what the cameras saw, and the IMU's: exact.
+/// Errors of coding a submap: ids, stamps, flags and counts are exact; poses 1e-5 m, 1e-6 rad; odometry covariance 1 %
+/// of the variance in every direction; keypoints 1/32 px; landmarks 0.5 mm per axis; the sigmas of both 0.6 %, at least
+/// 1e-6; the rest of the visual payload and the IMU's exact; fixes 0.1 mm, their antenna and covariance 7 digits; the
+/// cloud as CloudCodec says, an empty one comes back as null. Odometry that follows from the keyframe poses is not
+/// carried but computed from them.
 std::string encode(const SubmapMessage& message, const CloudCodec& cloud = {});
 Result<SubmapMessage> decode_submap(std::string_view bytes);
 
-/// Exact: ids, epoch, stamps, support, radius, sigma, edges' ends. Poses: 5e-4 m, 1e-4 rad. Covariance: 25 % of the
-/// variance in any direction, 10 % seen, 3 % root mean square. Reduced weights: relative 2.5e-4. Shape: 5 %.
+/// Errors of coding a proxy graph: ids, epoch, stamps, support, radius, sigma and the ends of edges are exact; poses
+/// 5e-4 m, 1e-4 rad; covariance at most 25 % of the variance in any direction (10 % seen, 3 % root mean square);
+/// weights of reduced graphs 2.5e-4 of the weight; uncertainties 5 %.
 std::string encode(const ProxyGraphMessage& message);
 Result<ProxyGraphMessage> decode_proxy_graph(std::string_view bytes);
-/// The same, to the bit, in fewer bytes for who has `base`, an earlier graph of the same incarnation, as decoded.
-/// Nothing: the delta is against another graph.
+/// The same message in fewer bytes, for a receiver that has `base`, an earlier decoded graph of the same incarnation:
+/// decode_delta() returns, to the bit, what decode_proxy_graph() would of encode(message). It returns no value when the
+/// delta refers to another graph than `base`.
 std::string encode_delta(const ProxyGraphMessage& message, const ProxyGraph& base);
 Result<std::optional<ProxyGraphMessage>> decode_delta(std::string_view bytes, const ProxyGraph& base);
 
-/// Exact (job results and snapshots must not depend on having travelled).
+/// Exact, because the map must not depend on whether a verdict has travelled.
 std::string encode(const ClosureVerdict& verdict);
 Result<ClosureVerdict> decode_verdict(std::string_view bytes);
 
-/// Exact, with names of jobs of 1 to kMaxIdBytes plain letters, and reasons in receipts as plain_text() makes them.
+/// Exact. Names of jobs must have 1 to kMaxIdBytes printable ASCII letters without blanks; reasons in receipts must be
+/// as plain_text() returns them.
 std::string encode(const Receipt& receipt);
 Result<Receipt> decode_receipt(std::string_view bytes);
 std::string encode(const Job& job);
@@ -64,26 +68,27 @@ Result<Job> decode_job(std::string_view bytes);
 std::string encode(const Verdicts& verdicts);
 Result<Verdicts> decode_verdicts(std::string_view bytes);
 
-/// Exact, with texts as plain_text() makes them.
+/// Exact; texts must be as plain_text() returns them.
 std::string encode(const NodeStatus& status);
 Result<NodeStatus> decode_status(std::string_view bytes);
 std::string encode(const MissionStatus& status);
 Result<MissionStatus> decode_mission_status(std::string_view bytes);
-/// At most kMaxReasonBytes of it, each that is no printable ASCII as '?': safe on any terminal.
+/// The first kMaxReasonBytes bytes of a text, with '?' for every byte that is no printable ASCII: safe on any terminal.
 std::string plain_text(std::string_view text);
 
 /// Exact. The closure's name has 1 to kMaxIdBytes bytes.
 std::string encode(const ClosureWord& word);
 Result<ClosureWord> decode_word(std::string_view bytes);
 
-/// A cloud alone, with points within kMaxCloudRange_m; an empty one stays empty.
+/// A cloud alone, with points within kMaxCloudRange_m along each axis; an empty one stays empty.
 std::string encode(const PointCloud& cloud, const CloudCodec& codec = {});
 Result<std::shared_ptr<const PointCloud>> decode_cloud(std::string_view bytes);
 
-/// What every message must fulfil, whoever made it: finite values, unit quaternions, consecutive indices, increasing
-/// stamps, symmetric positive semidefinite covariances, sorted nodes, edges of positive weight, indices in range,
-/// counts within limits, uncertainties of robots with nodes and of the size that those nodes give, robots last seen
-/// once and in a component.
+/// Accepts a message that fulfils what every message must, whoever made it: finite values, unit quaternions,
+/// consecutive indices, increasing stamps, symmetric positive semidefinite covariances, sorted nodes, edges of positive
+/// weight, indices in range, counts within limits; in proxy graphs also uncertainties only of robots with nodes and of
+/// the size that these nodes give, and each robot last seen once and in a component. The error names the first
+/// violation.
 Status validate(const SubmapMessage& message);
 Status validate(const ProxyGraphMessage& message);
 Status validate(const ClosureVerdict& verdict);

@@ -8,11 +8,11 @@
 #include "tutti/base/result.hpp"
 #include "tutti/wire/message_kind.hpp"
 
-/// A frame: "TU", version of the kind (2 bytes, little endian), kind (1 byte), one zstd frame with content size and
-/// checksum, nothing after it.
+/// The envelope of every message and stored row: "TU", version of the kind (2 bytes, little endian), kind (1 byte), one
+/// zstd frame with content size and checksum, nothing after it.
 namespace tutti::wire {
 
-/// Of the kind's current version. `payload` is at most kMaxMessageBytes, an agent's state kMaxStateBytes.
+/// A frame of the kind's current version. `payload` has at most kMaxMessageBytes, of an agent's state kMaxStateBytes.
 std::string pack_frame(MessageKind kind, std::string_view payload);
 
 struct Unpacked {
@@ -20,11 +20,12 @@ struct Unpacked {
   std::string payload;
 };
 
-/// What a frame of this kind holds. Wrong magic, kind, size, checksum, a version that cannot be read, or anything left
-/// over is an error; ErrorCode::unsupported is a version alone: the same bytes may be good for another program.
+/// The payload of a frame of this kind. Errors: wrong magic, kind, size or checksum, bytes left over, a version that
+/// this program does not read. Only the last is ErrorCode::unsupported: another version of the program may read the
+/// same bytes.
 Result<Unpacked> unpack_frame(MessageKind kind, std::string_view frame);
 
-/// The version that a frame which could be read is of.
+/// The version of a frame that unpack_frame() accepts; of other bytes std::logic_error.
 std::uint16_t version_of(std::string_view frame);
 
 }  // namespace tutti::wire

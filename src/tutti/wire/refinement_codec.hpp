@@ -7,7 +7,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/refinement.hpp"
 
-/// As wire/codec.hpp, for what leaves the server to be refined and comes back. Exact.
+/// As wire/codec.hpp, for refinement jobs and their results. Exact.
 namespace tutti::wire {
 
 std::string encode(const RefinementJob& job);
@@ -15,10 +15,11 @@ Result<RefinementJob> decode_refinement_job(std::string_view bytes);
 std::string encode(const Refinement& refinement);
 Result<Refinement> decode_refinement(std::string_view bytes);
 
-/// A name as of any job; parts and pairs sorted, valid poses, at most kMaxRefinedSubmaps and kMaxRefinedKeyframes.
+/// A job's name is as codec.hpp says of jobs; its parts and pairs are sorted, its poses valid, and it has at most
+/// kMaxRefinedSubmaps submaps with kMaxRefinedKeyframes keyframes.
 Status validate(const RefinementJob& job);
-/// Likewise; steps sorted, each from a keyframe that has a pose, with a covariance; finite counts; `why` of at most
-/// kMaxReasonBytes.
+/// As for the job; its steps are sorted, each from a keyframe that has a pose, with a valid covariance; numbers are
+/// finite, and `why` has at most kMaxReasonBytes.
 Status validate(const Refinement& refinement);
 
 }  // namespace tutti::wire

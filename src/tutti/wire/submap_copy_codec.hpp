@@ -7,7 +7,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/submap_copy.hpp"
 
-/// As wire/codec.hpp, for what workers and server say of submaps. Exact.
+/// As wire/codec.hpp, for workers' requests of submaps and the server's copies. Exact.
 namespace tutti::wire {
 
 std::string encode(const SubmapRequest& request);
@@ -15,9 +15,10 @@ Result<SubmapRequest> decode_submap_request(std::string_view bytes);
 std::string encode(const SubmapCopy& copy);
 Result<SubmapCopy> decode_submap_copy(std::string_view bytes);
 
-/// At most kMaxRequested submaps.
+/// A request names at most kMaxRequested submaps.
 Status validate(const SubmapRequest& request);
-/// A frame that is not empty and that a message has room for; what is in it is checked by who decodes it.
+/// A copy carries a frame that is not empty and for which a message has room. The content of the frame is checked by
+/// decode_submap(), not here.
 Status validate(const SubmapCopy& copy);
 
 }  // namespace tutti::wire

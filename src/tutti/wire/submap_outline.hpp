@@ -8,14 +8,15 @@
 
 namespace tutti::wire {
 
+/// A submap without its payloads, and how large these are.
 struct SubmapOutline {
   Submap submap;  ///< Without its payloads.
   PayloadSize size;
 };
 
-/// What decode_submap() says of a submap's way, and of its payloads how much they are, for a fraction of the time: the
-/// payloads are not decoded, nor validated. For frames that were decoded when they came and are known not to have
-/// changed since.
+/// Decodes keyframes and odometry as decode_submap() does, and of the payloads only their sizes, for a fraction of the
+/// time. The payloads are not validated: use it for frames that decode_submap() has accepted before and whose bytes are
+/// known not to have changed since. Errors as of decode_submap().
 Result<SubmapOutline> decode_outline(std::string_view bytes);
 
 }  // namespace tutti::wire

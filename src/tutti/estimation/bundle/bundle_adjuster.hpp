@@ -10,18 +10,18 @@
 namespace tutti::bundle {
 
 struct BundleConfig {
-  int max_iterations = 30;                ///< Steps at most.
+  int max_iterations = 30;                ///< Limit on the Levenberg-Marquardt steps.
   double relative_cost_tolerance = 1e-4;  ///< Converged when a step lowers the cost by less than this share of it.
   std::string loss = "cauchy";
-  double loss_scale = 2.0;           ///< Its scale, in standard deviations.
+  double loss_scale = 2.0;           ///< Scale of `loss`, in standard deviations of a view.
   double odometry_loss_scale = 5.0;  ///< Scale of the Cauchy loss on odometry, in standard deviations.
   double odometry_scale_sigma = 0.02;
-  double gyro_random_walk = 1e-4;           ///< Of the gyro's bias, rad/s^2/sqrt(Hz).
-  double accelerometer_random_walk = 4e-3;  ///< Of the accelerometer's bias, m/s^3/sqrt(Hz).
-  double max_bias_sigma = 0.05;  ///< IMU factors are held back where motion does not tell the accelerometer's bias this
-                                 ///< well, m/s^2 (a tenth of what is known beforehand),
-  double max_imu_scale_sigmas = 3.0;  ///< ... and where they make the way longer or shorter by more than so many of its
-                                      ///< standard deviations without them.
+  double gyro_random_walk = 1e-4;           ///< Random walk of the gyro's bias, rad/s^2/sqrt(Hz).
+  double accelerometer_random_walk = 4e-3;  ///< Random walk of the accelerometer's bias, m/s^3/sqrt(Hz).
+  double max_bias_sigma = 0.05;  ///< A run of IMU factors is held back when the accelerometer's bias stays less certain
+                                 ///< than this, m/s^2 (a tenth of its prior's standard deviation),
+  double max_imu_scale_sigmas = 3.0;  ///< ... or when it changes the length of the way by more than this many standard
+                                      ///< deviations of that length without IMU factors.
 
   template <class V>
   void describe(V& v) {
@@ -31,11 +31,12 @@ struct BundleConfig {
   }
 };
 
-/// Solves a bundle problem. Implementations differ in the library that they use.
+/// Solves a bundle problem. The interface keeps Ceres out of the headers.
 class BundleAdjuster {
  public:
   virtual ~BundleAdjuster() = default;
-  /// Refuses what is not finite, by name. Numerical failure is in the summary.
+  /// Refuses numbers that are not finite and indices out of range, by name. A numerical failure is no error but in the
+  /// summary, and the poses are then the given ones.
   [[nodiscard]] virtual Result<BundleSolution> adjust(const BundleProblem& problem) const = 0;
 };
 

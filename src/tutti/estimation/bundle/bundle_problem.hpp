@@ -19,13 +19,13 @@ namespace tutti::bundle {
 struct BundleKeyframe {
   KeyframeId id;
   Pose3 T_world_body;
-  bool is_constant = false;  ///< Keeps its pose.
+  bool is_constant = false;  ///< The adjustment must not move the pose.
 };
 
 /// A camera of a robot.
 struct BundleCamera {
   RobotId robot;
-  std::uint32_t index = 0;  ///< Its number on the robot, VisualFrame::camera.
+  std::uint32_t index = 0;  ///< VisualFrame::camera: the camera's number on its robot.
   Camera camera;
 };
 
@@ -52,6 +52,7 @@ struct BundleImu {
   ImuPreintegration measurement;
 };
 
+/// What is adjusted (keyframes, landmarks) and what is measured (observations, odometry, IMU).
 struct BundleProblem {
   std::vector<BundleKeyframe> keyframes;
   std::vector<BundleCamera> cameras;
@@ -61,17 +62,18 @@ struct BundleProblem {
   std::vector<BundleImu> imu;
 };
 
-/// How far a camera's pixels are from where its landmarks project to. A wrong calibration shows here.
+/// Reprojection errors of one camera: how far its pixels are from the projections of their landmarks. A wrong
+/// calibration shows here.
 struct CameraResiduals {
   RobotId robot;
   std::uint32_t camera = 0;
   std::size_t observations = 0;
-  std::size_t unseen = 0;  ///< Of them, how many no pixel sees: the landmark lies behind the camera.
-  double median_px = 0.0;  ///< Length of the residual.
+  std::size_t unseen = 0;  ///< Observations without an error because their landmark lies behind the camera.
+  double median_px = 0.0;  ///< Median length of the errors.
   double ninetieth_percentile_px = 0.0;
 };
 
-/// What an IMU factor estimates beside the pose of a keyframe.
+/// Variables of a keyframe, beside its pose, that IMU factors need.
 struct MotionState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();            ///< World frame, m/s.
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< Body frame, rad/s.
@@ -81,20 +83,21 @@ struct MotionState {
 struct AdjustmentSummary {
   estimation::Termination termination = estimation::Termination::not_run;
   int iterations = 0;
-  int components = 0;          ///< Sets of keyframes that nothing ties to each other; without constant ones each
-                               ///< has a gauge of its own.
+  /// Connected components of the keyframes; one without constant keyframes has a gauge of its own.
+  int components = 0;
   double initial_cost = -1.0;  ///< Sum of rho(r^T Omega r) / 2.
   double final_cost = -1.0;
-  std::string message;  ///< The solver's own words.
+  std::string message;  ///< From the solver, for logs.
 };
 
 struct BundleSolution {
-  std::vector<Pose3> T_world_body;  ///< Per keyframe. Constant ones have not moved, nor the first one of a component
-                                    ///< without any.
+  std::vector<Pose3> T_world_body;  ///< Per keyframe. Constant keyframes have not moved, nor has the first one of a
+                                    ///< component without constant keyframes.
   std::vector<Eigen::Vector3d> landmarks;  ///< World frame, m.
   std::vector<MotionState> motion;         ///< Per keyframe; meaningful where an IMU factor ends.
-  std::vector<Eigen::Vector3d> gravity;    ///< Per component, m/s^2, world frame; zero where there is no IMU factor.
-  std::vector<int> component;              ///< Per keyframe.
+  /// Per component, m/s^2, world frame; zero for a component without IMU factors.
+  std::vector<Eigen::Vector3d> gravity;
+  std::vector<int> component;  ///< Per keyframe.
   AdjustmentSummary summary;
 };
 

@@ -11,9 +11,10 @@
 namespace tutti::bundle {
 
 struct GuidedMatchConfig {
-  double radius_px = 40.0;  ///< How far from where the map's poses project it to a landmark is looked for.
+  double radius_px = 40.0;  ///< Search radius around the pixel that the map's poses project a landmark to.
   double max_hamming = 0.16;
-  double max_hamming_ratio = 0.9;  ///< Distance of a match over that of the nearest descriptor of another landmark.
+  /// Ratio test: Hamming distance of a match over that of the nearest descriptor of another landmark.
+  double max_hamming_ratio = 0.9;
 
   template <class V>
   void describe(V& v) {
@@ -21,10 +22,11 @@ struct GuidedMatchConfig {
   }
 };
 
-/// What is one thing in pairs of submaps that closures tie together: every landmark of the first is projected into the
-/// images of the second by the poses given, compared with the descriptors around, and matched with the landmark that
-/// most images name, if that one names it too. Pairs with a submap that is not here, or without descriptors of one
-/// kind, give nothing.
+/// Finds landmarks that two submaps have in common, where a loop closure ties the submaps together and the poses
+/// therefore say where to look. Every landmark of the first submap is projected into the images of the second and
+/// matched with the descriptors around; each image votes for one landmark, and two landmarks match when each has most
+/// of the other's votes. A pair gives no matches when `submaps` lacks one of the two or when their descriptors are of
+/// different kinds.
 std::vector<LandmarkMatch> guided_matches(std::span<const PosedSubmap> submaps, std::span<const SubmapPair> pairs,
                                           const GuidedMatchConfig& config);
 

@@ -8,8 +8,9 @@ namespace tutti::bundle {
 using Vector15d = Eigen::Matrix<double, 15, 1>;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
-/// Error of an IMU factor between keyframes i and j, 15x1, order [rotation; velocity; position; gyro bias;
-/// accelerometer bias], Forster et al. (2017), eq. (45), with gravity g a variable:
+/// Residual of an IMU factor between keyframes i and j, 15x1, order [rotation; velocity; position; gyro bias;
+/// accelerometer bias] (rad, m/s, m, rad/s, m/s^2), Forster et al. (2017), eq. (45), with gravity g, world frame, a
+/// variable:
 ///   r_R = Log((dR Exp(J_R db))^T R_i^T R_j)
 ///   r_v = R_i^T (v_j - v_i - g t) - (dv + J_v db)
 ///   r_p = R_i^T (p_j - p_i - v_i t - g t^2 / 2) - (dp + J_p db),   db = bias_i - bias of the linearisation
@@ -28,13 +29,13 @@ ImuLinearisation linearise_imu(const Pose3& T_w_i, const MotionState& motion_i, 
                                const MotionState& motion_j, const Eigen::Vector3d& gravity,
                                const ImuPreintegration& imu);
 
-/// W with W^T W the information of that residual: full, of the preintegration's covariance and of how far the biases
-/// walk meanwhile (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)). Zero when the covariance is not positive definite.
+/// W with W^T W the information of that residual, from the full covariance of the preintegration and the random walks
+/// of the biases (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)). Zero when the covariance is not positive definite.
 Matrix15d imu_root_information(const ImuPreintegration& imu, double gyro_random_walk, double accelerometer_random_walk);
 
-/// What is known beforehand, so that a robot that hangs in the air is determined too: standard deviations of the motion
-/// [velocity; gyro bias; accelerometer bias] where a run of IMU factors begins, around no velocity and the biases of
-/// the first linearisation, and of the length of gravity.
+/// Prior that keeps the problem determined when the motion does not, as of a robot that hovers: standard deviations of
+/// [velocity m/s; gyro bias rad/s; accelerometer bias m/s^2] where a run of IMU factors begins, around zero velocity
+/// and the biases of the first linearisation; and of the length of gravity.
 Vector9d motion_prior_sigma();
 inline constexpr double kGravity_mps2 = 9.81;
 inline constexpr double kGravitySigma_mps2 = 0.01;

@@ -15,11 +15,11 @@
 
 namespace tutti::bundle {
 
-/// A submap at its place in the pose graph's map.
+/// A submap with its keyframes' poses in the joint map.
 struct PosedSubmap {
   std::shared_ptr<const Submap> submap;
   std::vector<Pose3> T_world_body;  ///< Per keyframe of the submap.
-  bool is_constant = false;         ///< Its keyframes keep these poses, also those that it shares.
+  bool is_constant = false;         ///< The adjustment holds its keyframes, also one that a neighbouring submap shares.
 };
 
 /// A landmark, by the submap that carries it.
@@ -29,7 +29,7 @@ struct LandmarkId {
   friend auto operator<=>(const LandmarkId&, const LandmarkId&) = default;
 };
 
-/// Two landmarks that are one thing.
+/// Two landmarks that are views of one point of the scene.
 struct LandmarkMatch {
   LandmarkId one;
   LandmarkId other;
@@ -37,15 +37,16 @@ struct LandmarkMatch {
 };
 
 struct MergeConfig {
-  /// A view farther than this from where its landmark projects to, before the adjustment, is another thing.
+  /// A view with a larger reprojection error, before the adjustment, is taken for one of another point.
   double max_reprojection_px = 20.0;
-  double min_parallax_deg = 1.0;  ///< A landmark whose rays never differ by this much is too uncertain along them.
+  /// A landmark whose viewing rays differ by less is dropped: its depth is too uncertain.
+  double min_parallax_deg = 1.0;
   int landmarks_per_keyframe = 150;
   /// Thinning: a keyframe whose landmarks nearly all have this many other views gives up its own; 0 = never.
   int redundant_views = 0;
-  double odometry_sigma_m = 0.02;   ///< Added to the odometry's own covariance, per root of a second: odometry that is
-                                    ///< too sure of itself bends the map, one that is too modest costs little.
-  double odometry_sigma_deg = 0.3;  ///< The same of its rotation.
+  double odometry_sigma_m = 0.02;   ///< Added to the odometry's stated covariance, per square root of a second:
+                                    ///< overconfident odometry bends the map, modest odometry costs little.
+  double odometry_sigma_deg = 0.3;  ///< As odometry_sigma_m, for the rotation.
   bool use_imu = false;
 
   template <class V>
@@ -57,15 +58,16 @@ struct MergeConfig {
   }
 };
 
-/// What became of the submaps' landmarks on their way into one problem.
+/// Counts of what became of the submaps' landmarks in the merge.
 struct MergeSummary {
   std::size_t landmarks_in = 0, views_in = 0;  ///< Of all payloads.
   std::size_t neighbour_joins = 0;             ///< Landmarks of neighbouring submaps with a keypoint in common.
   std::size_t closure_joins = 0;               ///< Landmarks joined by matches.
-  std::size_t two_positions = 0;  ///< Joined landmarks that the submaps had apart by more than both claim (3 sigma).
-  std::size_t two_things = 0;     ///< Joined landmarks whose views contradict it: taken apart again.
+  std::size_t two_positions = 0;  ///< Joined landmarks whose positions in the submaps differ by more than 3 sigma.
+  std::size_t two_things = 0;     ///< Joined landmarks whose views contradict the join: separated again.
   std::size_t views_contradicting = 0;  ///< Views dropped by reprojection.
-  std::size_t views_doubled = 0;        ///< The shared keyframe's views, which both submaps bring.
+  /// Views of a shared keyframe, which both submaps bring: counted once in the problem.
+  std::size_t views_doubled = 0;
   std::size_t landmarks_uncertain = 0;  ///< Dropped: too few views, no parallax or behind a camera.
   std::size_t landmarks_thinned = 0;
   std::size_t redundant_keyframes = 0;
@@ -74,19 +76,20 @@ struct MergeSummary {
 
 struct MergedMap {
   BundleProblem problem;
-  std::vector<RelativePose> odometry;  ///< As the robots gave it, in the order of problem.odometry.
-  /// Of the submaps as they came, before anything is merged: each one's landmarks from its own odometry's poses. A
-  /// wrong calibration shows here.
+  /// The robots' odometry without the added sigmas, in the order of problem.odometry.
+  std::vector<RelativePose> odometry;
+  /// Reprojection errors before the merge: each submap's landmarks, seen from the poses of its own odometry.
   std::vector<CameraResiduals> residuals;
   MergeSummary summary;
 };
 
-/// One bundle problem from several submaps. Landmarks of neighbouring submaps of one chain become one when they have a
-/// keypoint of the shared keyframe in common (same camera, same pixel: one ray), those of other submaps when a match
-/// says so; what constant keyframes alone see is left out. What was joined is triangulated again along all its rays
-/// from `T_world_body`, never averaged: two submaps put a landmark apart along the viewing ray. Views that contradict
-/// are dropped; where most do, the join is undone. A pure function; the order of submaps and matches does not matter.
-/// Refuses what does not fit together (a pose for every keyframe, indices in range, finite numbers), by name.
+/// Makes one bundle problem of several submaps. Landmarks of neighbouring submaps of one chain are joined when they
+/// share a keypoint of the shared keyframe (same camera, same pixel: one ray), landmarks of other submaps when
+/// `matches` says so. Landmarks that only constant keyframes see are left out. A joined landmark is triangulated again
+/// along all its rays from `T_world_body`, never averaged, because two submaps disagree along the viewing ray. Views
+/// that contradict the new position are dropped; where most do, the join is undone. A pure function; the order of
+/// submaps and matches does not matter. Errors (ErrorCode::invalid) name input that does not fit together: a keyframe
+/// without pose, an index out of range, a number that is not finite.
 Result<MergedMap> merge_landmarks(std::span<const PosedSubmap> submaps, std::span<const LandmarkMatch> matches,
                                   const MergeConfig& config);
 

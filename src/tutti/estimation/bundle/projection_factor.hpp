@@ -15,19 +15,20 @@ struct ProjectionLinearisation {
   Eigen::Matrix<double, 2, 6> J_pose;
   Eigen::Matrix<double, 2, 3> J_landmark;
 };
-/// Nothing when no pixel sees the landmark (geometry/camera.hpp, project()).
+/// No value when no pixel sees the landmark (project() in geometry/camera.hpp).
 std::optional<ProjectionLinearisation> linearise_projection(const Camera& camera, const Pose3& T_world_body,
                                                             const Eigen::Vector3d& p_world,
                                                             const Eigen::Vector2d& pixel, double sigma_px);
 
-/// Pixel minus measured pixel, px; nothing when no pixel sees the landmark.
+/// Projected minus measured pixel, px; no value when no pixel sees the landmark.
 std::optional<Eigen::Vector2d> reprojection_error(const Camera& camera, const Pose3& T_world_body,
                                                   const Eigen::Vector3d& p_world, const Eigen::Vector2d& pixel);
 
-/// Statistics of the problem's reprojection errors by camera.
+/// Statistics of the problem's reprojection errors, per entry of problem.cameras.
 std::vector<CameraResiduals> camera_residuals(const BundleProblem& problem);
 
-/// Root mean square of their lengths, px; of those that a pixel sees. 0 without any.
+/// Root mean square of the lengths of the problem's reprojection errors, px, over the observations that have one; 0
+/// without any.
 double reprojection_rms_px(const BundleProblem& problem);
 
 }  // namespace tutti::bundle

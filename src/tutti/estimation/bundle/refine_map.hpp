@@ -28,26 +28,30 @@ struct RefinementConfig {
 };
 
 struct RefinementInput {
-  std::vector<PosedSubmap> submaps;    ///< Of any robots; those without a payload count by their odometry alone.
-  std::vector<SubmapPair> closed;      ///< Tied by accepted closures: guided_matches() says which landmarks are one.
-  std::vector<LandmarkMatch> matches;  ///< Further ones that are known to be one thing.
+  /// Of any robots; a submap without a visual payload contributes its odometry alone.
+  std::vector<PosedSubmap> submaps;
+  /// Pairs tied by accepted closures, in which guided_matches() looks for common landmarks.
+  std::vector<SubmapPair> closed;
+  std::vector<LandmarkMatch> matches;  ///< Further landmarks that are known to be common.
 };
 
-/// What takes the place of a pose graph's odometry factor.
+/// A factor that replaces an odometry factor of the pose graph.
 struct RelativeFactor {
   KeyframeId from;
-  KeyframeId to;             ///< The keyframe after it.
+  KeyframeId to;             ///< The keyframe after `from`.
   RelativePose measurement;  ///< T_from_to with the covariance of the joint posterior.
 };
 
+/// What refine_map() found. (tutti::Refinement of model/ is the message that carries the part of it that the server
+/// uses.)
 struct Refinement {
-  std::vector<BundleKeyframe> keyframes;          ///< By id.
-  std::vector<RelativeFactor> factors;            ///< By id: from every keyframe to the next one of its submap, where
-                                                  ///< not both are constant.
+  std::vector<BundleKeyframe> keyframes;  ///< Sorted by id.
+  /// From every keyframe to the next one of its submap, unless both are constant; sorted by id.
+  std::vector<RelativeFactor> factors;
   std::vector<Eigen::Vector3d> landmarks;         ///< World frame, m.
-  std::vector<CameraResiduals> residuals_before;  ///< MergedMap::residuals: of the submaps as they came.
+  std::vector<CameraResiduals> residuals_before;  ///< MergedMap::residuals.
   std::vector<CameraResiduals> residuals_after;
-  double rms_before_px = 0.0;  ///< Of the adjusted problem's views, without those that no pixel sees.
+  double rms_before_px = 0.0;  ///< Of the adjusted problem's views, without those of landmarks behind their camera.
   double rms_after_px = 0.0;
   std::vector<ImuRun> imu;
   std::vector<StereoScale> stereo;
@@ -55,10 +59,11 @@ struct Refinement {
   AdjustmentSummary adjustment;
 };
 
-/// The submaps' keyframes and landmarks in one bundle adjustment, starting from the poses given. Constant submaps hold
-/// the others: with such a neighbour a component has no other gauge, and covariances are those given its poses. A pure
-/// function; the order of submaps and matches does not matter. Non-finite and contradictory input is refused by name.
-/// Between keyframes that see nothing, and everywhere when the adjustment fails, factors are those of the odometry.
+/// Adjusts the submaps' keyframes and landmarks in one bundle adjustment that starts from the given poses. A component
+/// with constant submaps is held by them: it has no other gauge, and its covariances are conditional on their poses.
+/// Factors between keyframes that see no landmark, and all factors when the adjustment fails, are those of the
+/// odometry. A pure function; the order of submaps and matches does not matter. Errors (ErrorCode::invalid) name input
+/// that is not finite or contradicts itself.
 Result<Refinement> refine_map(const RefinementInput& input, const RefinementConfig& config);
 
 }  // namespace tutti::bundle

@@ -10,25 +10,27 @@
 
 namespace tutti::bundle {
 
-/// Variance of the views in units of what they claim (sigma_px), at the solution: their median squared residual over
-/// that of noise of which the landmarks have absorbed their share; 1 where they are as good as they say.
+/// Variance of the views over the variance that they claim (sigma_px^2), at the solution: 1 where they are as good as
+/// they say. It is the median squared residual over that of unit noise, less the degrees of freedom that the landmarks
+/// absorb.
 double view_variance(const BundleProblem& problem, const BundleSolution& solution);
 
 /// The joint Gauss-Newton posterior at the solution, landmarks eliminated (Schur complement). Views weigh as the robust
-/// loss left them, and less by view_variance() where that is above 1. A robot's odometry has one scale, known to
-/// odometry_scale_sigma and to what the rest of the problem says of it: without a second camera, depth or an IMU its
-/// steps are as unsure of their lengths as that.
+/// loss left them, and less by view_variance() where it is above 1. Each robot's odometry has an unknown common scale
+/// with the prior odometry_scale_sigma: without a second camera, depth or an IMU, nothing else tells how long the steps
+/// are.
 class Posterior {
  public:
-  /// Nothing when the problem does not determine every pose.
+  /// No value when the problem does not determine every pose.
   static std::optional<Posterior> of(const BundleProblem& problem, const BundleSolution& solution,
                                      const BundleConfig& config);
   Posterior(Posterior&&) noexcept;
   ~Posterior();
   /// Covariance of T_from_to (right tangent) between the ends of every odometry factor, in their order: blocks of the
-  /// inverse, computed on the pattern of its sparse Cholesky factor alone. Nothing when that lost its digits.
+  /// inverse, computed on the pattern of its sparse Cholesky factor alone. No value when the factorisation lost its
+  /// precision.
   [[nodiscard]] std::optional<std::vector<Matrix6d>> steps() const;
-  /// Of a number that depends on poses: its derivatives by the tangents of some keyframes.
+  /// Variance of a scalar function of the poses, from its derivatives by the right tangents of some keyframes.
   [[nodiscard]] double variance_of(const std::vector<std::pair<std::size_t, Vector6d>>& gradient) const;
 
   /// Covariance of the bias at a keyframe where an IMU factor ends.
@@ -40,7 +42,7 @@ class Posterior {
   std::unique_ptr<State> state_;
 };
 
-/// Posterior::steps(); nothing where there is none.
+/// Posterior::of() and then Posterior::steps(); no value when either has none.
 std::optional<std::vector<Matrix6d>> odometry_posterior(const BundleProblem& problem, const BundleSolution& solution,
                                                         const BundleConfig& config);
 

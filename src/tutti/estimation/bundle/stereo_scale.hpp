@@ -11,8 +11,8 @@
 namespace tutti::bundle {
 
 struct StereoConfig {
-  /// A robot's cameras are contradicted where together they make its way longer or shorter than its odometry by more
-  /// than so many standard deviations: their calibration may be wrong.
+  /// A robot's cameras are contradicted by its odometry when the length of the way that they see differs from that of
+  /// the odometry by more than this many standard deviations: their calibration may be wrong.
   double max_sigmas = 3.0;
   std::string contradicted = "one_camera";
   template <class V>
@@ -22,19 +22,19 @@ struct StereoConfig {
   }
 };
 
-/// A robot's way by what several cameras see at once, over that by its odometry.
+/// Length of a robot's way as its cameras see it together, over the length by its odometry.
 struct StereoScale {
   RobotId robot;
   double ratio = 1.0;
   double sigma = 0.0;       ///< Of the ratio: pixels, the odometry's covariance and BundleConfig::odometry_scale_sigma.
-  bool is_refused = false;  ///< Contradicted, and only the first camera is left.
-  bool is_corrected = false;  ///< Contradicted, and the baselines are divided by the ratio.
+  bool is_refused = false;  ///< Contradicted, and only the views of its first camera are left in the problem.
+  bool is_corrected = false;  ///< Contradicted, and the baselines in the problem are divided by the ratio.
 };
 
-/// Measures that of every robot with several cameras, by its own images alone: its odometry says how it turned, and
-/// nothing of how far it went. Where the two contradict each other, the views of all but the robot's first camera are
-/// dropped from the problem, or its cameras are moved towards the first one. `odometry`: as the robots gave it, in the
-/// order of problem.odometry.
+/// Measures the scale of every robot with several cameras, by its own images alone: its odometry contributes how it
+/// turned, but not how far it went. Where images and odometry contradict each other, StereoConfig::contradicted says
+/// how `problem` is changed. `odometry`: MergedMap::odometry. Errors are those of BundleAdjuster::adjust(); robots
+/// whose adjustment fails numerically are left out of the result.
 Result<std::vector<StereoScale>> judge_stereo(BundleProblem& problem, const std::vector<RelativePose>& odometry,
                                               const BundleConfig& config, const StereoConfig& stereo);
 

@@ -9,20 +9,22 @@
 
 namespace tutti::bundle {
 
-/// A step between two keyframes of a problem, and what it is compared with.
+/// A step between two keyframes of a problem, with the translation that another source expects of it.
 struct ComparedStep {
   std::size_t from = 0;
   std::size_t to = 0;
-  Eigen::Vector3d expected = Eigen::Vector3d::Zero();  ///< Translation of T_from_to by somebody else, m.
+  Eigen::Vector3d expected = Eigen::Vector3d::Zero();  ///< Translation of T_from_to by the other source, m.
   double weight = 1.0;
 };
 
-/// By how much a solution makes steps longer than expected: the least-squares factor between the two, long steps first,
-/// so that the noise of a robot that stands still is no way.
+/// How much longer a solution makes steps than expected: the factor of the least-squares fit of the solution's
+/// translations to the expected ones, in which long steps count most, so that the noise of a robot that stands still
+/// does not count as way.
 struct WayScale {
   double scale = 1.0;
-  double variance = 0.0;  ///< By the solution's posterior, of `scale`.
-  double way_m = 0.0;     ///< Root of the sum of the squared expected lengths; 0: there is no way, and no scale.
+  double variance = 0.0;  ///< Of `scale`, by the posterior.
+  double way_m = 0.0;     ///< Root of the weighted sum of squared expected lengths; 0 means that there is no way and
+                          ///< `scale` has no meaning.
 };
 WayScale way_scale(const std::vector<ComparedStep>& steps, const BundleSolution& solution, const Posterior& posterior);
 

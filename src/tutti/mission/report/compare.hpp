@@ -9,31 +9,32 @@
 
 namespace tutti::mission {
 
-/// What `tutti compare` tells; docs/compare.md defines every figure. Times are seconds after B's first node.
+/// The report of `tutti compare`; docs/compare.md defines every figure. Times are seconds after B's first node.
 struct CompareReport {
-  std::string a;  ///< As the user named it; judges.
-  std::string b;  ///< Is judged.
+  std::string a;  ///< The judge, as the user named it.
+  std::string b;  ///< What is judged.
   CompareTrajectoriesConfig config;
   std::vector<TrajectoryComparison> robots;
-  std::vector<std::string> notes;  ///< Plain words about what was left out.
+  std::vector<std::string> notes;  ///< What was left out, in plain words.
   std::string version;
 };
 
 std::string compare_text(const CompareReport& report);
-/// The same bytes for the same input.
+/// A function of its input, byte for byte.
 std::string compare_json(const CompareReport& report);
-/// One page: no script, no fonts, nothing fetched.
+/// One page without scripts, fonts or anything to fetch.
 std::string compare_html(const CompareReport& report);
 
-/// One row of the disagreement map in figures.
+/// One scale of the disagreement map in figures.
 struct ScaleSummary {
   double length_m = 0.0;      ///< Explanation::scale_length_m
-  double significance = 0.0;  ///< The largest at one node, over its threshold; at `worst`.
+  double significance = 0.0;  ///< The largest of any node, over its threshold; found at `worst`.
   Timestamp worst;
-  double position_m = 0.0;  ///< There.
+  double position_m = 0.0;  ///< At `worst`.
   double rotation_rad = 0.0;
-  std::optional<Timestamp> since;  ///< First node above the threshold.
+  std::optional<Timestamp> since;  ///< The first node above the threshold.
 };
+/// One summary per scale, the largest first.
 std::vector<ScaleSummary> scale_summaries(const consistency::Explanation& explanation);
 
 }  // namespace tutti::mission

@@ -6,17 +6,17 @@
 
 #include "tutti/mission/record.hpp"
 
-/// What the files of a report are called.
+/// The names of a report's files.
 namespace tutti::mission {
 
-/// "alpha_server.tum"; characters of the name other than letters, digits, '-' and '_' become '_'.
+/// Such as "alpha_server.tum"; characters of the robot's name other than letters, digits, '-' and '_' become '_'.
 std::string trajectory_file_name(const std::string& robot, const std::string& estimate);
 
-/// All that write_report() writes of this record; of a mission with clouds also the pictures of the map, which are left
-/// out when there is nothing to be seen.
+/// All files that write_report() writes for this record. For missions with clouds this includes the pictures of the
+/// map, which are not written when there is nothing to see.
 std::vector<std::string> report_file_names(const MissionRecord& record);
 
-/// A name that report_file_names() could give for some record.
+/// True if report_file_names() could give this name for some record.
 bool is_report_file_name(const std::string& name);
 
 }  // namespace tutti::mission

@@ -9,25 +9,26 @@
 #include "tutti/mission/report/geometry.hpp"
 #include "tutti/mission/report/plot.hpp"
 
-/// The page's sections, each a function of the record that gives HTML; empty when there is nothing to show.
+/// The sections of the page: each is a function of the record that returns HTML, empty when there is nothing to show.
 namespace tutti::mission {
 
-/// How much detail each robot's pictures may have: `total` shared among the robots, within [least, most].
+/// How many points each robot's pictures may have: the robots share `total`, but get at least `least` and at most
+/// `most`.
 std::size_t detail_per_robot(const MissionRecord& record, std::size_t total, std::size_t least, std::size_t most);
 
-/// Colour class of a robot's strokes: "r0", "r1", ... in the order of the record, repeating after 8.
+/// CSS class of a robot's colour: "r0", "r1", ... in the order of the record, repeating after 8.
 std::string robot_class(const MissionRecord& record, RobotId robot);
 std::string robot_name(const MissionRecord& record, RobotId robot);
-/// Its name beside a square of its colour; HTML.
+/// The robot's name beside a square of its colour; HTML.
 std::string robot_cell(const MissionRecord& record, const RobotRecord& robot);
 
-/// The whole page around `body` (HTML); `title` is text.
+/// A page with `body` (HTML) in it; `title` is text.
 std::string page(std::string_view title, const std::string& body);
-/// A titled part of the page. `lead`: one or two plain sentences (text, escaped here). `body`: HTML.
+/// A titled section. `lead` is one or two plain sentences (text, escaped here), `body` is HTML.
 std::string section(std::string_view title, std::string_view lead, const std::string& body);
-/// A picture under its name and a few words (text, may be empty); `wide` ones take the whole row.
+/// A picture with its name and a few words (text, may be empty); a `wide` one takes the whole row.
 std::string figure(const std::string& svg, std::string_view name, std::string_view words, bool wide);
-/// What a legend says about the kinds of drift there are; the CSS class is "drift" and the kind's name.
+/// Legend of the kinds of drift in the record; CSS classes are "drift" and the kind's name.
 std::vector<LegendEntry> drift_legend(const MissionRecord& record);
 
 /// Cells are HTML. The first `left` columns are left-aligned, the others right-aligned.
@@ -39,13 +40,13 @@ struct HtmlTable {
 std::string html(const HtmlTable& table);
 
 std::string headline_html(const MissionRecord& record);
-/// Suspected failures of localisation, by the robots and by the server; part of the headline.
+/// Suspected failures of localisation, found by the robots and by the server; part of the headline.
 std::string alerts_html(const MissionRecord& record);
 std::string explanation_html(const MissionRecord& record);
 std::string joint_map_html(const MissionRecord& record);
 std::string robot_maps_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
 std::string proxy_graph_html(const MissionRecord& record);
-/// Map clouds beside the survey.
+/// The map's clouds beside the survey.
 std::string clouds_html(const MissionRecord& record);
 std::string errors_html(const MissionRecord& record, const std::vector<RobotGeometry>& geometry);
 std::string policies_html(const MissionRecord& record);

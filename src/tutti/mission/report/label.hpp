@@ -8,11 +8,11 @@
 
 namespace tutti::mission {
 
-/// Paints a rectangle; what does not fit is cut off.
+/// Fills a rectangle; parts outside the image are cut off.
 void fill(Image& image, int left, int top, int width, int height, formats::Rgb colour);
 
-/// Writes lower-case words and numbers on an image in a small typeface of 5 x 7 squares, each `square` pixels wide.
-/// Characters it does not know are left blank; what does not fit is cut off.
+/// Writes lower-case words and numbers on an image, in a typeface of 5 x 7 squares that are `square` pixels wide.
+/// Unknown characters stay blank; parts outside the image are cut off.
 void draw_label(Image& image, int left, int top, std::string_view text, int square, formats::Rgb colour);
 
 }  // namespace tutti::mission

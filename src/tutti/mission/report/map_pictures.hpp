@@ -9,16 +9,17 @@
 #include "tutti/mission/report/plot.hpp"
 #include "tutti/mission/report/raster.hpp"
 
-/// What the robots saw, beside what is there: rasterised, because it is millions of points.
+/// Pictures of what the robots saw beside what is there, rasterised because they are of millions of points.
 namespace tutti::mission {
 
-/// One map; all panels of a picture show the same place at the same scale.
+/// One panel of a picture; all panels show the same place at the same scale.
 struct MapPanel {
-  std::string name;   ///< "onboard", "server", "survey", "distance"
-  std::string words;  ///< What is to be seen, one short sentence.
-  Image image;        ///< kPixelRatio times as fine as the view.
+  std::string name;   ///< "onboard", "server", "survey" or "distance"
+  std::string words;  ///< What it shows, in one short sentence.
+  Image image;        ///< With kPixelRatio times the view's resolution.
 };
 
+/// A picture of several panels, and the view that they share.
 struct MapPicture {
   PlanView view{{}, 1.0, 1.0};
   std::vector<MapPanel> panels;  ///< Empty when no robot of the largest component saw anything.
@@ -26,30 +27,31 @@ struct MapPicture {
 
 inline constexpr double kPixelRatio = 2.0;
 
-/// Onboard, server and, where there is one, survey and distance to the survey, from above.
+/// From above: onboard, server and, where there is a survey, survey and distance to it.
 MapPicture map_from_above(const MissionRecord& record);
-/// The same in a vertical slice, kSliceThickness_m thick, across the ways of the robots.
+/// The same in a vertical slice of kSliceThickness_m across the robots' routes.
 MapPicture map_section(const MissionRecord& record);
 inline constexpr double kSliceThickness_m = 1.0;
 
-/// All panels as one image with names and a scale bar, for use without the page.
+/// All panels as one image with names and a scale bar, for use outside the page.
 Image compose(const MapPicture& picture, std::size_t columns);
 
-/// A vertical plane: through `centre`, along the horizontal direction `along`, both in the view from above.
+/// A vertical plane through `centre` along the horizontal direction `along`, both in the view from above.
 struct Slice {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   Eigen::Vector2d along = Eigen::Vector2d::UnitX();
   double length_m = 0.0;
 };
-/// The slice of this length that the routes cross, as squarely as may be, at most places: a cut through several
-/// corridors or a junction shows more than one along a wall. Among equals, the one crossed most often.
+/// The slice of this length that the routes cross at most places and as squarely as possible, because a cut through
+/// several corridors or a junction shows more than one along a wall. Among equals, the one crossed most often.
 Slice busiest_slice(const std::vector<Points2d>& routes, double length_m);
 
-/// What the robots of one component saw, in the joint map.
+/// The clouds of the robots of one component, in the joint map.
 std::vector<CloudLayer> server_layers(const MissionRecord& record, std::uint32_t component);
 
-/// Two corners of the part of the clouds worth showing: all but the outermost 1 % on every side, and no farther from
-/// the routes than half their size (at least 4 m). A range sensor sees far more than where the robots were.
+/// Two opposite corners of the part of the clouds that is worth showing: without the outermost 1 % on every side, and
+/// no farther from the routes than half their extent (at least 4 m), because a range sensor sees much farther than
+/// robots go.
 Points2d cloud_corners(const std::vector<CloudLayer>& clouds, const GroundPlane& ground,
                        const std::vector<Points2d>& routes);
 

@@ -9,17 +9,17 @@
 
 namespace tutti::mission {
 
-/// Rows from above, four bytes a pixel: red, green, blue, opacity.
+/// An image with opacity: rows from the top, four bytes per pixel: red, green, blue, opacity.
 struct Image {
   std::size_t width = 0;
   std::size_t height = 0;
   std::vector<std::uint8_t> rgba;
 };
 
-/// The bytes of a PNG file; the image has at least one pixel.
+/// The bytes of a PNG file; the image must have at least one pixel.
 std::string encode_png(const Image& image);
 
-/// For pages that hold their pictures themselves: "data:image/png;base64,...".
+/// The text "data:image/png;base64,...", for pages that contain their pictures.
 std::string data_uri(std::string_view png);
 
 }  // namespace tutti::mission

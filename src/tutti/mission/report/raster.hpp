@@ -11,29 +11,30 @@
 #include "tutti/mission/report/png.hpp"
 #include "tutti/model/point_cloud.hpp"
 
-/// Clouds of millions of points as pictures: no place for SVG.
+/// Draws clouds of millions of points, which are too many for SVG.
 namespace tutti::mission {
 
-/// A cloud to draw. Does not own it.
+/// A cloud to be drawn; does not own it.
 struct CloudLayer {
   const PointCloud* cloud = nullptr;
   Pose3 T_display_cloud;
   formats::Rgb colour;
-  const std::vector<float>* distance_m = nullptr;  ///< Set: colours by distance_colour() instead; one per point.
+  /// If set, points have the colours of distance_colour() instead; one per point.
+  const std::vector<float>* distance_m = nullptr;
 };
 
-/// From a point of the display frame to pixels (y down); nothing when it is not to be seen.
+/// Maps a point of the display frame to pixels (y down); nothing when it is not shown.
 using Projection = std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>;
 
-/// Many points in one pixel shine: the mean of their colours, brighter with the logarithm of their number.
+/// Each pixel has the mean colour of its points, and is brighter with the logarithm of their number.
 class PointRaster {
  public:
   PointRaster(std::size_t width, std::size_t height);
-  /// Every point as a square of `point_px` pixels.
+  /// Draws every point as a square of `point_px` pixels.
   void add(const CloudLayer& layer, const Projection& project, int point_px);
-  /// On a dark ground: for pictures that stand alone.
+  /// The image on a dark ground, for pictures that stand alone.
   [[nodiscard]] Image on_dark() const;
-  /// Only the ink, more opaque where many points are: to lie under other shapes.
+  /// The points only, more opaque where there are many, to lie under other shapes.
   [[nodiscard]] Image transparent() const;
 
  private:
@@ -46,8 +47,8 @@ class PointRaster {
   std::vector<Pixel> pixels_;
 };
 
-inline constexpr double kWorstShown_m = 0.5;  ///< Distances from here on look the same.
-/// From calm blue (0) to red (kWorstShown_m and more).
+inline constexpr double kWorstShown_m = 0.5;  ///< From this distance on the colour is the same.
+/// From blue (0) to red (kWorstShown_m and more).
 formats::Rgb distance_colour(double distance_m);
 
 }  // namespace tutti::mission

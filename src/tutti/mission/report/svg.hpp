@@ -8,47 +8,50 @@
 #include <utility>
 #include <vector>
 
-/// Just enough SVG for the report: shapes with a CSS class (colours live in the page's style sheet, so that light and
-/// dark work) and an optional tooltip. Pixels, y down, 0.1 px resolution. Shapes with a NaN or infinity are left out.
+/// As much SVG as the report needs: shapes with a CSS class (colours are in the page's style sheet, which has a light
+/// and a dark version) and an optional tooltip. Coordinates are pixels, y down, rounded to 0.1. Shapes with a NaN or
+/// infinity are left out.
 namespace tutti::mission {
 
 using Points2d = std::vector<Eigen::Vector2d>;
 using Strokes = std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>;
 
-/// For text and attributes of XML and HTML: the five special characters; control characters become spaces.
+/// Escapes the five special characters for text and attributes of XML and HTML; control characters become spaces.
 std::string escape_xml(std::string_view text);
 
-/// Douglas-Peucker: a subset of the points, ends included, that stays within `tolerance` of all of them.
+/// Douglas-Peucker: a subset of the points, including both ends, that stays within `tolerance` of all of them.
 Points2d simplify(std::span<const Eigen::Vector2d> points, double tolerance);
 
-/// Evenly picked, at most a few thousand: more would only darken the picture and swell the page.
+/// Evenly chosen strokes, at most a few thousand, because more would only darken the picture and enlarge the page.
 Strokes thinned(const Strokes& strokes);
 
+/// One SVG picture; shapes that are added later are drawn on top.
 class Svg {
  public:
-  /// `label` says what the picture shows, for those who cannot see it.
+  /// `label` says what the picture shows, for people who cannot see it.
   Svg(double width, double height, std::string_view label);
 
-  /// Simplified to 0.15 px, coarser when more than 800 points remain; breaks at points that are not finite.
+  /// A line, simplified to 0.15 px (coarser while more than 800 points remain) and broken at points that are not
+  /// finite.
   void polyline(std::span<const Eigen::Vector2d> points, std::string_view css_class, std::string_view title = {});
   /// Many separate strokes as one shape.
   void segments(std::span<const std::pair<Eigen::Vector2d, Eigen::Vector2d>> strokes, std::string_view css_class,
                 std::string_view title = {});
-  /// The same, each bent to one side, so that parallel strokes stay apart.
+  /// The same, with each stroke bent to one side, so that parallel ones stay apart.
   void arcs(std::span<const std::pair<Eigen::Vector2d, Eigen::Vector2d>> strokes, std::string_view css_class,
             std::string_view title = {});
-  /// Many dots as one shape; their size is the class's stroke width.
+  /// Many dots as one shape; their size is the stroke width of the class.
   void dots(std::span<const Eigen::Vector2d> centers, std::string_view css_class);
   void circle(const Eigen::Vector2d& center, double radius, std::string_view css_class, std::string_view title = {});
-  /// `fill`: a colour that overrides the class, or empty.
+  /// `fill` is a colour that overrides the class, or empty.
   void rect(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::string_view css_class,
             std::string_view title = {}, std::string_view fill = {});
-  /// A picture, stretched; `uri` holds it all ("data:...").
+  /// A picture, stretched to `size`; `uri` contains it ("data:...").
   void image(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, std::string_view uri);
-  /// `anchor`: start, middle or end.
+  /// `anchor` is start, middle or end.
   void text(const Eigen::Vector2d& position, std::string_view text, std::string_view css_class,
             std::string_view anchor = "start");
-  /// Turned to be read from below to above, centred.
+  /// Centred text that reads from bottom to top.
   void vertical_text(const Eigen::Vector2d& position, std::string_view text, std::string_view css_class);
 
   [[nodiscard]] std::string str() const;

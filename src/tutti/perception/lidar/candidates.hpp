@@ -15,14 +15,14 @@ struct AlignmentGuess {
   double score = 0.0;  ///< Correlation of the two views from above, in [0, 1].
 };
 
-/// At most config.candidates.max_guesses distinct alignments, best first. Levelled submaps differ by yaw and a shift:
-/// main wall directions are laid on each other, the shift comes from correlating the oriented wall images by FFT, the
-/// height from the horizontal surfaces.
+/// At most config.candidates.max_guesses distinct rough alignments, best first. Levelled submaps differ by yaw and a
+/// shift: the yaw comes from laying main wall directions on each other, the shift from correlating the oriented wall
+/// images by FFT, the height from the horizontal surfaces. None when either submap is unusable.
 std::vector<AlignmentGuess> propose_alignments(const SubmapFeatures& a, const SubmapFeatures& b,
                                                const LidarClosureConfig& config);
 
-/// Cheap test, invariant to the pose of either: false only when the two can never be accepted, because one is unusable
-/// or shows hardly any walls. (Two submaps of one size cannot be told apart more cheaply than by propose_alignments.)
+/// Cheap test before propose_alignments(), invariant to the poses of both submaps: false only when the pair can never
+/// be accepted, because one submap is unusable or shows hardly any walls.
 bool plausible_pair(const SubmapFeatures& a, const SubmapFeatures& b);
 
 }  // namespace tutti::lidar

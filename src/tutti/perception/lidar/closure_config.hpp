@@ -8,9 +8,10 @@
 namespace tutti::lidar {
 
 struct NormalConfig {
-  int neighbours = 12;             ///< Points of the plane fit, the point itself included.
-  double max_radius_m = 1.0;       ///< Neighbours farther than this are not used.
-  double max_surface_ratio = 0.2;  ///< Smallest over middle eigenvalue of the scatter; above it: no normal.
+  int neighbours = 12;        ///< Points of a plane fit, the point itself included.
+  double max_radius_m = 1.0;  ///< Neighbours farther than this are not used.
+  /// Ratio of the smallest to the middle eigenvalue of their scatter above which a point gets no normal.
+  double max_surface_ratio = 0.2;
   template <class V>
   void describe(V& v) {
     v.field("neighbours", neighbours, between(4, 64), "Points of the plane fit.");
@@ -19,48 +20,57 @@ struct NormalConfig {
 
 /// One stage of the registration.
 struct RegistrationLevel {
-  double max_distance_m = 0.3;  ///< Correspondences farther apart are not used.
-  int max_points = 4000;        ///< Source points used, evenly spread.
-  int max_iterations = 15;      ///< Gauss-Newton steps at most.
+  double max_distance_m = 0.3;  ///< Points farther apart do not correspond.
+  int max_points = 4000;        ///< Limit on the source points used, which are evenly spread.
+  int max_iterations = 15;      ///< Limit on the Gauss-Newton steps.
 };
 
 struct RegistrationConfig {
   std::vector<RegistrationLevel> levels{{1.5, 500, 8}, {0.6, 1000, 8}, {0.3, 4000, 12}};  ///< Coarse to fine.
-  double overlap_distance_m = 0.3;  ///< A point overlaps when a target point with a like normal is this close.
+  /// A source point overlaps when a target point with a similar normal is this close.
+  double overlap_distance_m = 0.3;
 };
 
-inline constexpr double kDistinct_deg = 12.0;  ///< Two alignments differ by this yaw,
-inline constexpr double kDistinct_m = 2.0;     ///< or this far: beyond what the registration would bridge.
+inline constexpr double kDistinct_deg = 12.0;  ///< Two alignments are distinct when they differ by this angle,
+inline constexpr double kDistinct_m = 2.0;     ///< or by this distance: the registration would not bridge more.
 
 /// Search for the rough relative pose by correlating views from above.
 struct CandidateConfig {
-  double cell_m = 0.8;      ///< Cell of the 64 x 64 view from above.
-  int wall_directions = 2;  ///< Of each submap; any of one is laid on any of the other, either way round.
-  int max_guesses = 3;      ///< Best alignments handed to the registration.
+  double cell_m = 0.8;  ///< Cell of the 64 x 64 view from above.
+  /// Wall directions of each submap; each of one is laid on each of the other, either way round.
+  int wall_directions = 2;
+  int max_guesses = 3;  ///< Limit on the rough alignments that are registered.
   template <class V>
   void describe(V& v) {
     v.field("cell_m", cell_m, greater_than(0.0), "Cell of the 64 x 64 view from above.");
   }
 };
 
-/// From two submap clouds to a loop closure or a refusal. Every gate is a physical quantity.
+/// Settings of LiDAR closures, from two submap clouds to a loop closure or a refusal. Every gate is a physical
+/// quantity.
 struct LidarClosureConfig {
-  double min_duration_s = 5.0;  ///< Shorter submaps saw too little, on foot: they gave wrong closures.
-  double min_way_m = 10.0;      ///< But they are used when they come as far as this: by car that is 1.4 s.
-  int min_keyframes = 6;        ///< Submaps with fewer keyframes are not used.
+  /// Submaps shorter than this and than min_way_m are not used: they saw too little and gave wrong closures.
+  double min_duration_s = 5.0;
+  double min_way_m = 10.0;  ///< Travel from which a submap may be shorter than min_duration_s, as by car.
+  int min_keyframes = 6;    ///< Submaps with fewer keyframes are not used.
   int min_points = 500;
-  double voxel_m = 0.3;  ///< Clouds are thinned to this; denser ones cost time and gain nothing.
+  double voxel_m = 0.3;  ///< Voxels that clouds are thinned to; denser clouds cost time and gain nothing.
   NormalConfig normals;
   CandidateConfig candidates;
   RegistrationConfig registration;
-  double min_overlap = 0.3;                ///< Mean of both directions.
-  double max_viewpoint_distance_m = 25.0;  ///< Between the middles of the two ways; farther apart says little.
-  double max_misfit = 1.4;                 ///< Residuals over what noise, roughness and odometry explain.
-  double max_plane_rmse_m = 0.085;         ///< Point to plane, over the overlap.
-  double min_eigenvalue = 0.03;            ///< Of the normalised translation Hessian (trace 1): below it, clouds slide.
-  double sure_eigenvalue = 0.1;  ///< With less, max_misfit shrinks towards 1: little evidence must fit all the better.
-  double max_contradiction = 0.15;  ///< Share of the points in view that stand where the other looked through.
-  double max_rival_ratio = 0.75;    ///< A second, different alignment nearly as good: the place is ambiguous.
+  double min_overlap = 0.3;  ///< Least mean overlap of both directions.
+  /// Between the middle keyframes of the two submaps; closures from farther apart say little.
+  double max_viewpoint_distance_m = 25.0;
+  double max_misfit = 1.4;          ///< Largest ratio of the residuals to what noise, roughness and odometry explain.
+  double max_plane_rmse_m = 0.085;  ///< Point to plane, over the overlap.
+  /// Least eigenvalue of the normalised translation Hessian (trace 1): below it the clouds slide.
+  double min_eigenvalue = 0.03;
+  /// Below this eigenvalue max_misfit shrinks towards 1: little evidence must fit all the better.
+  double sure_eigenvalue = 0.1;
+  /// Largest share of the points in view that lie where the other submap looked through.
+  double max_contradiction = 0.15;
+  double max_rival_ratio = 0.75;  ///< Largest quality of a second, distinct alignment over that of the best: above it
+                                  ///< the place is ambiguous.
   template <class V>
   void describe(V& v) {
     v.field("min_duration_s", min_duration_s, at_least(0.0),

@@ -8,7 +8,7 @@ namespace tutti::lidar {
 
 inline constexpr int kImageSize = 64;
 
-/// Complex kImageSize x kImageSize image, also its spectrum. Both are periodic; index 0 is the origin.
+/// A complex kImageSize x kImageSize image, or its spectrum. Both are periodic; index 0 is the origin.
 using ComplexImage = Eigen::Array<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// X(k) = sum_x f(x) exp(-2 pi i k.x / N), not normalised.

@@ -23,27 +23,28 @@ class NeighbourIndex {
   NeighbourIndex& operator=(const NeighbourIndex&) = delete;
 
   [[nodiscard]] const std::vector<Eigen::Vector3f>& points() const;
-  /// Index of the point nearest to `query` and closer than `max_distance`, or kNone. `guess`: a point that may be it,
-  /// which makes the search shorter and changes nothing else.
+  /// Index of the point nearest to `query` and closer than `max_distance`, m, or kNone. `guess`: index of a point that
+  /// may be the nearest, which makes the search shorter and changes nothing else.
   [[nodiscard]] std::int32_t nearest(const Eigen::Vector3f& query, float max_distance,
                                      std::int32_t guess = kNone) const;
-  /// The (at most) out.size() nearest points, nearest first; returns how many there are.
+  /// Writes the indices of the nearest points, at most out.size(), nearest first; returns how many there are.
   std::size_t nearest_k(const Eigen::Vector3f& query, std::span<std::int32_t> out) const;
-  [[nodiscard]] std::size_t bytes() const;  ///< Of memory held.
+  [[nodiscard]] std::size_t bytes() const;  ///< Memory held.
 
  private:
   struct Tree;
   std::unique_ptr<Tree> tree_;
 };
 
-/// A surface: points, each with a unit normal that faces the place it was seen from (zero where there is none because
-/// the neighbourhood is not flat). Copies share the data.
+/// A cloud with normals: every point has a unit normal that faces the place it was seen from, or a zero one where its
+/// neighbourhood is not flat. Copies share the data.
 struct OrientedCloud {
   std::shared_ptr<const NeighbourIndex> index;
   std::shared_ptr<const std::vector<Eigen::Vector3f>> normals;
-  std::shared_ptr<const std::vector<std::uint32_t>> surface;  ///< The points that have a normal, in storage order.
-  /// How far each point may be off the plane of a point of another cloud of the same place, m; NaN where unknown. Null
-  /// when it was not computed.
+  /// Indices of the points that have a normal, in storage order.
+  std::shared_ptr<const std::vector<std::uint32_t>> surface;
+  /// How far each point may be off the plane of a point in another cloud of the same place, m; NaN where unknown. Null
+  /// when not computed.
   std::shared_ptr<const std::vector<float>> roughness;
 
   [[nodiscard]] std::size_t size() const { return normals ? normals->size() : 0; }
@@ -51,8 +52,8 @@ struct OrientedCloud {
   [[nodiscard]] const Eigen::Vector3f& normal(std::size_t i) const { return (*normals)[i]; }
 };
 
-/// Normals by principal components of the nearest neighbours, turned towards the nearest viewpoint. Points and
-/// viewpoints in one frame; no viewpoint: towards the origin. Deterministic.
+/// Gives points normals by principal components of their nearest neighbours, turned towards the nearest viewpoint, or
+/// towards the origin without viewpoints. Points and viewpoints are in one frame, m. Deterministic.
 OrientedCloud orient(std::vector<Eigen::Vector3f> points, std::span<const Eigen::Vector3f> viewpoints,
                      const NormalConfig& config);
 

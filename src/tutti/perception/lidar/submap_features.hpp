@@ -16,25 +16,27 @@
 
 namespace tutti::lidar {
 
-/// Everything about one submap that comparing it needs, computed once. Immutable; copies share the heavy parts.
+/// All that verifying pairs needs of one submap, computed once. Immutable; copies share the heavy parts.
 struct SubmapFeatures {
   SubmapId id;
   bool usable = false;
-  std::optional<Refusal> refusal;  ///< Why not usable.
+  std::optional<Refusal> refusal;  ///< Why the submap is not usable.
   OrientedCloud cloud;             ///< Submap frame, Morton order.
-  /// Turns the submap frame so that z points up, yaw left alone (a rotation about a horizontal axis).
+  /// Turns the submap frame about a horizontal axis so that z points up.
   Eigen::Quaterniond R_level_submap = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Where the robot was half way, submap frame.
+  /// Position of the middle keyframe (submap_middle.hpp), submap frame, m.
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   std::shared_ptr<const Bend> bend;
   BirdsEyeView view;
   std::shared_ptr<const std::vector<TurnedView>> turned_views;
   std::shared_ptr<const std::vector<DepthPanorama>> panoramas;  ///< Submap frame, from viewpoints along the way.
 };
 
-/// Pure and deterministic. A submap that is too short, too small or without a cloud comes back with usable = false.
+/// Computes the features; pure and deterministic. A submap that is too short, too small or without a cloud has usable =
+/// false and a refusal.
 SubmapFeatures extract_features(const Submap& submap, const LidarClosureConfig& config);
 
-/// Memory held, what copies share included.
+/// Memory held in bytes, with what copies share.
 std::size_t bytes_of(const SubmapFeatures& features);
 
 }  // namespace tutti::lidar

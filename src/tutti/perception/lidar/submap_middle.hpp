@@ -8,17 +8,17 @@
 
 namespace tutti::lidar {
 
-/// The keyframe in the middle of a submap, where the rigid fit of a bent submap is best, and its uncertainty against
-/// the submap's cloud as a whole. The middle by count: keyframes come with new views, which is what the cloud is made
-/// of. With 0.3 deg/m of drift the median error there is 6.4 cm, half way by distance 7.4 cm, by time 8.3 cm.
+/// The middle keyframe of a submap, where a rigid fit of a bent submap errs least, and its uncertainty against the
+/// submap's cloud as a whole. The middle is by count, because keyframes come with new views and the cloud is made of
+/// these: with 0.3 deg/m of drift the median error there is 6.4 cm, half way by distance 7.4 cm, by time 8.3 cm.
 struct Middle {
   std::size_t index = 0;
   Pose3 T_submap_keyframe;
-  Matrix6d covariance = Matrix6d::Zero();  ///< Of the keyframe against the cloud, right perturbation.
+  Matrix6d covariance = Matrix6d::Zero();  ///< Of the keyframe against the cloud, right tangent.
 };
 
-/// The shared surfaces may have been seen from any keyframe k, so the odometry from the middle to k is part of the
-/// error: mean over k of its covariance. A step counts for every keyframe beyond it.
+/// The covariance is the mean, over all keyframes k, of that of the odometry from the middle to k, because the shared
+/// surfaces may have been seen from any of them.
 Middle find_middle(const Submap& submap);
 
 }  // namespace tutti::lidar

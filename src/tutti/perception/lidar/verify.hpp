@@ -12,41 +12,42 @@
 
 namespace tutti::lidar {
 
-/// Of what extract_features, plausible_pair, verify_pair and to_verdict make of two submaps. Raised by hand in the
-/// commit that changes it, be it by a gate's default: servers then ask again what another version answered.
+/// Version of what extract_features(), plausible_pair(), verify_pair() and to_verdict() find. A commit that changes
+/// their results, if only by a gate's default, raises it by hand: servers then ask again what another version answered.
 inline constexpr std::uint32_t kFinderVersion = 2;
 
-/// What comparing two submaps found. The measured quantities are those of the best alignment, also when refused.
+/// What verify_pair() found. The measured quantities are those of the best alignment, also when it is refused; without
+/// any alignment they are 0.
 struct PairVerification {
   bool accepted = false;
-  std::optional<Refusal> refusal;  ///< When not accepted.
+  std::optional<Refusal> refusal;  ///< Set when not accepted.
   Pose3 T_a_b;                     ///< Between the submap frames.
-  /// Right perturbation of T_a_b as the middle keyframes see the submaps: of an accepted pair how far these may be bent
-  /// is in it.
+  /// Right tangent of T_a_b. For an accepted pair it includes how far both submaps may be bent, seen from their middle
+  /// keyframes.
   Matrix6d covariance = Matrix6d::Identity();
   double overlap = 0.0;               ///< Mean of both directions.
   double plane_rmse_m = 0.0;          ///< The larger of both directions.
   double misfit = 0.0;                ///< The larger of both directions (registration.hpp).
   double min_eigenvalue = 0.0;        ///< The smaller of both directions.
-  double viewpoint_distance_m = 0.0;  ///< Between the middles of the two ways.
-  double forward_backward_m = 0.0;    ///< At the centre of the overlap.
+  double viewpoint_distance_m = 0.0;  ///< Between the middle keyframes.
+  double forward_backward_m = 0.0;  ///< Difference between registering a on b and b on a, at the centre of the overlap.
   double forward_backward_deg = 0.0;
-  double contradiction = 0.0;  ///< Share of points in view that stand where the other submap looked through.
-  double rival_ratio = 0.0;    ///< Quality of the second best alignment over that of the best.
-  double slid_ratio = 0.0;     ///< The same, a few metres along the direction that is constrained least.
+  double contradiction = 0.0;  ///< Share of the points in view that lie where the other submap looked through.
+  double rival_ratio = 0.0;    ///< Quality of the second best, distinct alignment over that of the best.
+  double slid_ratio = 0.0;     ///< The same for alignments a few metres along the direction that is constrained least.
   double correlation_score = 0.0;
-  std::vector<Refusal> evidence;  ///< When accepted: every gate's value and limit.
+  std::vector<Refusal> evidence;  ///< Every gate's value and limit, when accepted.
 };
 
 /// Decides from the two submaps alone whether they show the same place. Computed in the order of the submap ids, so
 /// verify_pair(b, a) is exactly the inverse. config.registration.levels must not be empty.
 PairVerification verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const LidarClosureConfig& config);
 
-/// The other way round: T_b_a with its covariance.
+/// The same result for (b, a): T_b_a with its covariance.
 PairVerification inverse(PairVerification verification);
 
-/// The closure is expressed between the middle keyframes, where bent submaps agree best. pair.first < pair.second
-/// whatever the order of a and b. Whose verdict it is, is not said.
+/// The verdict of a pair. Its closure joins the middle keyframes, where bent submaps agree best; pair.first <
+/// pair.second whatever the order of a and b. ClosureVerdict::finder is left empty for the caller.
 ClosureVerdict to_verdict(const Submap& a, const Submap& b, const PairVerification& verification);
 
 }  // namespace tutti::lidar

@@ -16,7 +16,7 @@ struct PosedCloud {
   std::shared_ptr<const PointCloud> cloud;  ///< Body frame; null counts as empty.
 };
 
-/// Distance from the sensor, body frame, within which points are kept.
+/// Distances from the body's origin between which points are kept.
 struct RangeLimits {
   double min_m = 0.0;
   double max_m = std::numeric_limits<double>::infinity();
@@ -31,7 +31,7 @@ PointCloud voxel_downsample(const PointCloud& cloud, double voxel_m);
 /// The first point that voxel_downsample() skips; null when it keeps all.
 const Eigen::Vector3f* first_skipped(const PointCloud& cloud, double voxel_m);
 
-/// All clouds together in the submap frame, voxel-downsampled; points outside `limits` are skipped.
+/// All clouds together in the submap frame, as voxel_downsample() thins them; points outside `limits` are skipped.
 PointCloud merge_scans(std::span<const PosedCloud> scans, double voxel_m, RangeLimits limits = {});
 
 }  // namespace tutti::lidar

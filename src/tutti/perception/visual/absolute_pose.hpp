@@ -15,33 +15,34 @@
 namespace tutti::visual {
 
 struct AbsolutePoseConfig {
-  double max_reprojection_px = 3.0;  ///< Of an inlier.
-  int max_samples = 1000;            ///< Of RANSAC.
-  double confidence = 0.9999;        ///< That one of the samples drawn had inliers alone.
+  double max_reprojection_px = 3.0;  ///< Largest reprojection error of an inlier.
+  int max_samples = 1000;            ///< Limit on RANSAC's samples.
+  double confidence = 0.9999;        ///< RANSAC ends when one of its samples had inliers alone with this probability.
 };
 
-/// A pixel of one of the body's cameras that is thought to see a known point.
+/// A pixel of one of the body's cameras that presumably sees a known point.
 struct Sighting {
+  /// Index into the cameras.
   std::uint32_t camera = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double sigma_px = 1.0;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();          ///< Map frame, m.
-  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Of the point.
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Covariance of the point.
 };
 
 struct AbsolutePose {
   Pose3 T_map_body;
-  /// Right tangent. From the pixels' and the points' uncertainty, all independent, enlarged where the residuals are
-  /// larger than these.
+  /// Right tangent. From the uncertainty of pixels and points, taken as independent, and scaled up where the residuals
+  /// are larger than that.
   Matrix6d covariance = Matrix6d::Identity();
-  std::vector<std::uint32_t> inliers;  ///< Of the sightings, increasing.
+  std::vector<std::uint32_t> inliers;  ///< Indices of sightings, increasing.
 };
 
-/// Where the body is: P3P on three sightings of one camera in RANSAC, scored over the sightings of all cameras by the
-/// truncated squared error (Torr and Zisserman, MSAC, 2000), then Gauss-Newton on the inliers with Cauchy's loss.
-/// Nothing when fewer than four sightings agree; where fewer than `least_inliers` do, the search may end without them.
-/// Camera indices are of `cameras`. The samples drawn are added to
-/// `samples`, if asked for.
+/// The body's pose: P3P on three sightings of one camera in RANSAC, scored over the sightings of all cameras by the
+/// truncated squared error (MSAC, Torr and Zisserman 2000), then Gauss-Newton on the inliers with Cauchy's loss. No
+/// value when fewer than four sightings agree; poses with fewer than `least_inliers` may be missed, because the search
+/// ends when one with as many would have been found. The number of samples drawn is added to `samples` unless that is
+/// null. Deterministic for a given `rng`.
 std::optional<AbsolutePose> absolute_pose(std::span<const Sighting> sightings, const std::vector<Camera>& cameras,
                                           const AbsolutePoseConfig& config, Rng rng, std::size_t least_inliers = 4,
                                           std::size_t* samples = nullptr);

@@ -8,17 +8,19 @@
 
 namespace tutti::visual {
 
-/// From two visual payloads to loop closures or a refusal.
+/// Settings of visual closures, from two visual payloads to loop closures or a refusal.
 struct VisualClosureConfig {
-  double min_time_apart_s = 0.0;       ///< Between two submaps of any robots: for recordings cut from one.
-  int min_landmarks = 30;              ///< Of a submap, with descriptors.
-  double max_residual_px = 3.0;        ///< Of a submap's landmarks in its own images, RMS: its calibration.
-  double max_hamming = 0.16;           ///< Of a match, as a share of the bits.
-  double max_hamming_ratio = 0.9;      ///< To the nearest descriptor of another landmark.
-  int min_matches = 8;                 ///< And inliers: with fewer nothing is tried, or believed.
-  AbsolutePoseConfig pose;             ///< RANSAC.
-  double max_position_sigma_m = 0.02;  ///< Of the closure, in its most uncertain direction.
-  double min_spread = 0.1;             ///< Area of the box around the inliers, as a share of the image.
+  double min_time_apart_s = 0.0;  ///< Least time between two submaps of any robots, for robots cut from one recording.
+  int min_landmarks = 30;         ///< Least number of landmarks with descriptors in a submap.
+  /// Largest RMS error of a submap's landmarks in its own images: more shows a wrong calibration.
+  double max_residual_px = 3.0;
+  double max_hamming = 0.16;       ///< Largest Hamming distance of a match, as a share of the bits.
+  double max_hamming_ratio = 0.9;  ///< Ratio test with the nearest descriptor of another landmark.
+  int min_matches = 8;             ///< Least number of matches to try a keyframe, and of inliers to believe it.
+  AbsolutePoseConfig pose;         ///< RANSAC.
+  /// Largest standard deviation of the closure's position, in its most uncertain direction.
+  double max_position_sigma_m = 0.02;
+  double min_spread = 0.1;  ///< Least area of the box around the inliers, as a share of the image.
   std::uint64_t ransac_seed = 0;
   template <class V>
   void describe(V& v) {

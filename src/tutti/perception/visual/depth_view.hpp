@@ -11,31 +11,34 @@
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/visual.hpp"
 
-/// A depth that is measured at a pixel, as an observation like any other: what a second camera beside the first would
-/// see of the point. Its baseline is so wide that the noise of the depth is what this view tells, not that of the
-/// pixel.
+/// Turns a depth that is measured at a pixel into an observation like any other: what a virtual second camera beside
+/// the first one would see of the point. The baseline is wide enough that the view's uncertainty is that of the depth,
+/// not of the pixel.
 namespace tutti::visual {
 
-/// The camera of these views: an undistorted pinhole of the first one's focal length, to its right. `sigma_px` is of
-/// the first one's keypoints.
+/// The virtual camera: an undistorted pinhole with the first camera's focal length, to its right. `sigma_px`: standard
+/// deviation of the first camera's keypoints.
 Camera depth_camera(const Camera& first, const DepthSensor& sensor, double sigma_px);
 
-/// Is a depth image of the camera's size?
+/// Accepts a depth image of the camera's size; else ErrorCode::invalid.
 Status check_depth_size(const DepthImage& depth, const Camera& first);
 
-/// Of every keypoint of the first camera where depth is known, its view by depth_camera(), as image 1, with the same
-/// track and with the standard deviation that depth and pixel give it. A keypoint without a track gets one from
-/// `next_track` on, in `image`, too. None at an edge, where the depths around the pixel disagree: they may be of the
-/// thing behind. `depth` is along the optical axis and of the first camera's pixels (check_depth_size()).
+/// The image of camera 1, `by_depth` (made by depth_camera()), of the keypoints in `image` where depth is known: each
+/// with the same track and the standard deviation that depth and pixel give it. A keypoint without a track gets one,
+/// from `next_track` on, in both images. Keypoints at edges, where the depths around the pixel disagree, are left out,
+/// because their depth may be that of the background. `depth` is along the optical axis, for the first camera's pixels
+/// (check_depth_size()).
 TrackedImage view_by_depth(TrackedImage& image, const DepthImage& depth, const DepthSensor& sensor, const Camera& first,
                            const Camera& by_depth, std::uint64_t next_track);
 
-/// Looks at the first depth images of a robot: do they know depths that can be used?
+/// Checks that a robot's first depth images hold usable depths.
 class DepthWatch {
  public:
   static constexpr int kImages = 5;
-  static constexpr double kLeastShare = 0.05;  ///< Of the pixels; walls beyond the sensor's range are no fault.
-  /// Says so, once, where they do not: all holes, or numbers that are no depths in DepthSensor::unit_m.
+  /// Share of the pixels that must have one; walls beyond the sensor's range are no fault.
+  static constexpr double kLeastShare = 0.05;
+  /// What is wrong, told once, after kImages images: nearly all pixels are without depth, or the numbers are no depths
+  /// in units of DepthSensor::unit_m. Otherwise no value.
   std::optional<std::string> add(const DepthImage& depth, const DepthSensor& sensor);
 
  private:

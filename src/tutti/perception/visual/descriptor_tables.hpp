@@ -11,31 +11,32 @@
 
 namespace tutti::visual {
 
-/// More tables find more of the descriptors that differ, and cost as much more; with more bits fewer rows share a key.
+/// More tables find more near descriptors at proportional cost; with more bits fewer rows share a key.
 inline constexpr std::size_t kTables = 6, kKeyBits = 16;
 
-/// Of one descriptor, a key for every table.
+/// The keys of one descriptor, one for every table.
 using TableKeys = std::array<std::uint16_t, kTables>;
 
-/// Keys of every row: some of its bits, for every table others. Which ones depends on the number of words alone.
+/// The keys of every row: for every table some of its bits, chosen by the number of words alone.
 std::vector<TableKeys> table_keys(const Descriptors& rows);
 
-/// Which of a set of descriptors are near another one, found without looking at all: near descriptors have all bits of
-/// a key in common in one table or another, most likely (Indyk and Motwani 1998).
+/// Locality-sensitive hashing of descriptors (Indyk and Motwani 1998), to find near ones without comparing with all:
+/// near descriptors most likely have all bits of a key in common in some table.
 class DescriptorTables {
  public:
   DescriptorTables() = default;
   explicit DescriptorTables(std::span<const TableKeys> rows);
 
-  /// Is one of the rows with a key of the query's within `most` bits of it? `rows` are those that the keys are of.
+  /// True if some row that shares a key with the query is within `most` bits of it; near rows that share no key are
+  /// missed. `rows`: the descriptors that the tables were made of.
   [[nodiscard]] bool has_near(std::span<const std::uint64_t> query, const TableKeys& keys, const Descriptors& rows,
                               std::uint32_t most) const;
-  [[nodiscard]] std::size_t bytes() const;  ///< Held, beside itself.
+  [[nodiscard]] std::size_t bytes() const;  ///< Memory held beside the object itself.
 
  private:
   struct Table {
-    std::vector<std::uint64_t> taken;    // a bit for every key: few are, and most questions end here
-    std::vector<std::uint32_t> first;    // of each word of these, its first entry; and the end
+    std::vector<std::uint64_t> taken;    // a bit for every key: few are taken, so most queries end here
+    std::vector<std::uint32_t> first;    // of each word of `taken` its first entry; and the end
     std::vector<std::uint32_t> entries;  // by key: 64 times the row, and which bit of its word the key is
   };
   std::array<Table, kTables> tables_;

@@ -9,23 +9,23 @@
 
 namespace tutti::visual {
 
-/// Bits in which two descriptors of as many words differ. All of these count by the processor's own instruction where
-/// it has one, which is decided when the program runs.
+/// Number of bits in which two descriptors of as many words (checked) differ. This and the next two functions use the
+/// processor's popcnt where it has one, which is found out when the program runs.
 std::uint32_t hamming_distance(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b);
 
-inline constexpr std::uint32_t kNoDistance = 0xFFFF;  ///< More than any descriptor has bits.
+inline constexpr std::uint32_t kNoDistance = 0xFFFF;  ///< More bits than any descriptor has.
 
-/// The least of these over rows by their index, which exist; kNoDistance of none.
+/// Least distance of `query` to the rows `which` (valid indices); kNoDistance without any.
 std::uint32_t least_distance(std::span<const std::uint64_t> query, const Descriptors& rows,
                              std::span<const std::uint32_t> which);
 
-/// A row and its distance.
+/// Index of a row and its distance, bits.
 struct NearRow {
   std::uint32_t row = 0;
   std::uint32_t distance = 0;
 };
 
-/// The rows within `most` bits of the query, by their index, in place of what is in `out`.
+/// Replaces `out` by the rows within `most` bits of `query`, by increasing index.
 void rows_within(std::span<const std::uint64_t> query, const Descriptors& rows, std::uint32_t most,
                  std::vector<NearRow>& out);
 

@@ -9,34 +9,34 @@
 
 namespace tutti::visual {
 
-/// An observation of an image, and a landmark of another submap.
+/// An observation of an image that looks like a landmark of another submap, the map.
 struct Match {
   std::uint32_t observation = 0;  ///< Index into QueryFrame::observations.
   std::uint32_t landmark = 0;
 };
 
-/// Of a keyframe's observations, how many are near a landmark of the map in their descriptors (max_hamming): counted
-/// up to `enough`, and not all of them, for it costs a twentieth of match(), which hardly ever finds more.
+/// How many of a keyframe's observations have a descriptor near one of the map's landmarks (max_hamming), counted up to
+/// `enough`. Some near ones are missed (DescriptorTables), but the count takes a twentieth of the time of match().
 int count_near(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
                const VisualClosureConfig& config, int enough);
 
-/// Of how many landmarks of the map an observation of the keyframe looks like a view.
+/// The landmarks of the map that a keyframe's observations look like.
 struct Votes {
-  std::vector<std::vector<Match>> matches;  ///< Of each image of the keyframe.
-  int landmarks = 0;
-  int together = 0;           ///< Of these, the most that one keyframe of the map saw.
-  std::size_t distances = 0;  ///< Between descriptors: what it took.
+  std::vector<std::vector<Match>> matches;  ///< Per image of the keyframe.
+  int landmarks = 0;                        ///< Different landmarks among the matches.
+  int together = 0;                         ///< The most of these landmarks that one keyframe of the map saw.
+  std::size_t distances = 0;                ///< Descriptor distances that were computed.
 };
 
-/// match(), only of the observations that count_near() finds near a landmark: about half of a true place's matches for
-/// a tenth of the work where there is none. What happens to look alike in another place (corners of windows) is
-/// scattered over the map; what was seen again was seen together.
+/// As match(), for the observations alone that count_near() counts: about half of the matches at a true place, for a
+/// tenth of the work at others. Points of another place that look alike by chance (corners of windows) are scattered
+/// over the map; points that are seen again were seen together before.
 Votes votes(const QueryKeyframe& keyframe, const SubmapFeatures& query, const SubmapFeatures& map,
             const VisualClosureConfig& config);
 
-/// Observations of an image whose descriptor is near one of a landmark of the map (max_hamming), much nearer than to
-/// any other landmark (max_hamming_ratio), and the nearest of the image to that landmark. `query` has the rows that the
-/// image's observations name; both are of one kind.
+/// Matches of an image: observations whose descriptor is near one of a landmark of the map (max_hamming), much nearer
+/// than to any other landmark's (max_hamming_ratio), and the nearest of the image to that landmark. `query`: the
+/// descriptors that the image's observations refer to, of the same kind as the map's.
 std::vector<Match> match(const QueryFrame& image, const Descriptors& query, const SubmapFeatures& map,
                          const VisualClosureConfig& config);
 

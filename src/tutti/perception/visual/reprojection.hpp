@@ -8,15 +8,15 @@
 
 namespace tutti::visual {
 
-/// How far landmarks are from the pixels that are theirs.
+/// Reprojection errors of landmarks.
 struct ReprojectionError {
-  double sum_px2 = 0.0;   ///< Of squared distances.
-  std::size_t views = 0;  ///< Those that the camera cannot see where the pose has it are left out.
+  double sum_px2 = 0.0;   ///< Sum of squared errors.
+  std::size_t views = 0;  ///< Views counted; those that no pixel sees from the pose (project()) are left out.
   [[nodiscard]] double rms_px() const { return views > 0 ? std::sqrt(sum_px2 / static_cast<double>(views)) : 0.0; }
 };
 
-/// Of a submap's landmarks in its own images, by its own odometry; zero without images. Indices are valid
-/// (check_payload, where it came from outside).
+/// Errors of a submap's landmarks in its own images, at the poses of its own odometry; zero without images. The
+/// payload's indices must be valid: check_payload() where it came from outside.
 ReprojectionError reprojection_error(const Submap& submap);
 
 }  // namespace tutti::visual

@@ -10,29 +10,33 @@
 
 namespace tutti::visual {
 
-/// By how much the second of two cameras is turned against what its calibration says.
+/// By how much the second of two cameras is turned against its calibration.
 struct StereoTurn {
-  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< R_first_second = R_told Exp(turn_rad): of the second's axes.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2, by the points, and kTold_rad of any calibration.
-  double told_px = 0.0, turned_px = 0.0;  ///< Median distance from the epipolar lines, as told and turned.
-  bool is_wrong = false;                  ///< More than kMaxSigmas of it, or kMax_px left when turned.
-  bool is_turned = false;                 ///< ... and the turn explains most of it.
+  /// R_first_second = R_told Exp(turn_rad), about the second camera's axes.
+  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
+  /// rad^2; from the points, plus kTold_rad for any calibration.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  /// Median distance from the epipolar lines, with the calibration as told and turned.
+  double told_px = 0.0, turned_px = 0.0;
+  bool is_wrong = false;   ///< The turn exceeds kMaxSigmas, or more than kMax_px is left when turned.
+  bool is_turned = false;  ///< Wrong, and the turn explains more than half of the distance.
 };
 
-/// Points that two cameras see at one moment lie in one plane with both. Where the cameras are turned against each
-/// other they leave it, each at its place in the images, whatever the robot does and however far the points are:
-/// neither odometry nor landmarks are asked. A turn about the images' upright axis, which is what bends depths, shows
-/// towards the corners only.
+/// Finds out whether two cameras are turned against each other, by the epipolar constraint of points that both see at
+/// one moment. A turn moves points off their epipolar planes by amounts that depend on their place in the images, not
+/// on the robot's motion or the points' distance, so neither odometry nor landmarks are needed. A turn about the
+/// images' upright axis, which falsifies depths, shows towards the corners only.
 class StereoCheck {
  public:
-  static constexpr std::size_t kFew = 200;     ///< Points: fewer tell nothing.
-  static constexpr double kTold_rad = 0.0009;  ///< 0.05 degrees: EuRoC's cameras are 0.025 off, of all causes.
+  static constexpr std::size_t kFew = 200;  ///< Fewer points tell nothing.
+  /// Standard deviation of any calibration: 0.05 degrees (EuRoC's cameras are 0.025 off).
+  static constexpr double kTold_rad = 0.0009;
   static constexpr double kMaxSigmas = 4.0;
-  static constexpr double kMax_px = 1.0;  ///< Median: EuRoC's 0.07, simulated ones 0.2.
+  static constexpr double kMax_px = 1.0;  ///< Of the median distance (EuRoC 0.07, simulated cameras 0.2).
   StereoCheck(Camera first, Camera second) : first_(std::move(first)), second_(std::move(second)) {}
-  /// Keypoints of one moment; the same track is the same point.
+  /// Adds the keypoints of one moment; keypoints of one track are views of one point.
   void add(const TrackedImage& first, const TrackedImage& second);
-  /// Nothing of few points, and without a baseline.
+  /// No value with fewer than kFew points, or without a baseline.
   [[nodiscard]] std::optional<StereoTurn> turn() const;
 
  private:

@@ -16,47 +16,50 @@
 
 namespace tutti::visual {
 
-/// A landmark with what is known of its position.
+/// A landmark with the uncertainty of its position.
 struct MappedPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();       ///< Submap frame, m.
-  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Its largest standard deviation is the landmark's.
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< Its largest standard deviation is Landmark::sigma_m.
 };
 
-/// An image that asks where it was taken.
+/// An image to be localised in another submap.
 struct QueryFrame {
   std::uint32_t camera = 0;
-  std::vector<Observation> observations;  ///< All with a row of `descriptors`: their own, or else their landmark's.
+  std::vector<Observation> observations;  ///< All with a row of `descriptors`: their own, or one of their landmark.
 };
 
+/// A keyframe to be localised in another submap.
 struct QueryKeyframe {
   std::uint32_t index = 0;  ///< KeyframeId::index
-  std::size_t place = 0;    ///< In Submap::keyframes.
+  std::size_t place = 0;    ///< Position in Submap::keyframes.
   Pose3 T_submap_body;
   std::vector<QueryFrame> frames;
-  std::vector<std::uint32_t> landmarks;  ///< Seen by it; increasing, each once.
+  std::vector<std::uint32_t> landmarks;  ///< Landmarks that it saw; increasing, each once.
 };
 
-/// A submap's visual payload, ready to be compared.
+/// A submap's visual payload, prepared for verify_pair().
 struct SubmapFeatures {
   SubmapId id;
-  std::optional<Refusal> refusal;  ///< Why it cannot be compared with any other; then the rest is not to be used.
+  /// Why no pair with this submap can be verified; then the other fields are not to be used.
+  std::optional<Refusal> refusal;
   std::vector<Camera> cameras;
   std::vector<MappedPoint> points;                           ///< By landmark.
-  Descriptors descriptors;                                   ///< Of the payload.
-  std::vector<TableKeys> keys;                               ///< Of its rows.
-  Descriptors landmark_descriptors;                          ///< Those of landmarks alone.
-  std::vector<std::uint32_t> landmark_of_row;                ///< Of landmark_descriptors.
+  Descriptors descriptors;                                   ///< The payload's.
+  std::vector<TableKeys> keys;                               ///< Per row of `descriptors`.
+  Descriptors landmark_descriptors;                          ///< Those of landmarks' views alone.
+  std::vector<std::uint32_t> landmark_of_row;                ///< Per row of landmark_descriptors.
   std::vector<std::vector<std::uint32_t>> rows_of_landmark;  ///< The inverse.
-  DescriptorTables tables;                                   ///< Of landmark_descriptors.
+  DescriptorTables tables;                                   ///< Over landmark_descriptors.
   std::vector<QueryKeyframe> keyframes;
-  StretchCovariance odometry;  ///< Between Submap::keyframes.
+  StretchCovariance odometry;  ///< Odometry between Submap::keyframes.
   double residual_px = 0.0;    ///< RMS of the landmarks in the submap's own images.
 };
 
-/// submap.visual must be set where there is one; its indices are valid (check_payload, where it came from outside).
+/// Computes the features; a submap without images or with a poor payload gets a refusal. submap.visual must be loaded
+/// where there is one, and its indices valid: check_payload() where it came from outside.
 SubmapFeatures extract_features(const Submap& submap, const VisualClosureConfig& config);
 
-/// Memory held.
+/// Memory held, in bytes.
 std::size_t bytes_of(const SubmapFeatures& features);
 
 }  // namespace tutti::visual

@@ -12,12 +12,12 @@
 namespace tutti::visual {
 
 struct TriangulationConfig {
-  int min_views = 2;                 ///< That fit; the cameras of one keyframe count each.
-  double min_parallax_deg = 1.0;     ///< Between two of the rays that fit.
-  double max_reprojection_px = 3.0;  ///< A view farther off does not fit.
+  int min_views = 2;                 ///< Least number of views that fit; each camera of a keyframe counts.
+  double min_parallax_deg = 1.0;     ///< Least angle between two of the rays that fit.
+  double max_reprojection_px = 3.0;  ///< A view with a larger error does not fit.
 };
 
-/// A pixel that is thought to see the point.
+/// A pixel that presumably sees the point.
 struct View {
   const CameraModel* camera = nullptr;
   Pose3 T_camera_submap;
@@ -27,24 +27,25 @@ struct View {
 
 struct TriangulatedPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< Submap frame, m.
-  /// From the pixels' sigmas, enlarged where the residuals are larger than those: poses err, too.
+  /// From the pixels' sigmas, m^2; scaled up where the residuals are larger, because poses err, too.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  std::vector<bool> fits;  ///< Of every view: is it within max_reprojection_px?
+  std::vector<bool> fits;  ///< Per view whether it is within max_reprojection_px.
 };
 
+/// Why views give no point.
 enum class TriangulationFault {
-  parallax,  ///< Seen from nearly the same direction by all: nobody can say how far it is.
+  parallax,  ///< All views are from nearly the same direction, so the distance is open.
   behind,    ///< The rays meet behind a camera.
-  misfit,    ///< Fewer than min_views agree on a point.
+  misfit,    ///< Fewer than min_views views agree on a point.
 };
 
-/// The point that the views see: the midpoint of their rays (the least sum of squared distances to them), then
-/// Gauss-Newton on the reprojection errors with Cauchy's loss, and once more over those that fit without it.
+/// The point that the views see: the point nearest to their rays (nearest_point()), improved by Gauss-Newton on the
+/// reprojection errors with Cauchy's loss, and once more, without loss, over the views that fit.
 tl::expected<TriangulatedPoint, TriangulationFault> triangulate(std::span<const View> views,
                                                                 const TriangulationConfig& config);
 
-/// Information (inverse covariance, 1/m^2) that pixels of these standard deviations have of a point, submap frame.
-/// Views that cannot see it add nothing.
+/// Information (inverse covariance, 1/m^2) that the views have of a point at `position`, submap frame. Views that
+/// cannot see the point add nothing.
 Eigen::Matrix3d point_information(std::span<const View> views, const Eigen::Vector3d& position);
 
 }  // namespace tutti::visual

@@ -10,32 +10,32 @@
 
 namespace tutti::visual {
 
-/// Of what extract_features, is_candidate and verify_pair make of two submaps. Raised by hand in the commit that
-/// changes it, be it by a gate's default: servers then ask again what another version answered.
+/// Version of what extract_features(), is_candidate() and verify_pair() find. A commit that changes their results, if
+/// only by a gate's default, raises it by hand: servers then ask again what another version answered.
 inline constexpr std::uint32_t kFinderVersion = 3;
 
-/// What pairs cost, counted.
+/// Counts of what verifying pairs costs.
 struct VerificationWork {
-  std::size_t keyframes = 0;  ///< Asked for.
-  std::size_t looked_at = 0;  ///< Of these, among all landmarks of the other submap.
-  std::size_t distances = 0;  ///< Between two descriptors, nearly all of what a pair costs.
-  std::size_t samples = 0;    ///< Of three sightings, for a pose.
+  std::size_t keyframes = 0;  ///< Keyframes of both submaps.
+  std::size_t looked_at = 0;  ///< Of these, keyframes that were matched with all landmarks of the other submap.
+  std::size_t distances = 0;  ///< Descriptor distances, which are nearly all of the cost.
+  std::size_t samples = 0;    ///< RANSAC samples of three sightings.
   VerificationWork& operator+=(const VerificationWork& other);
 };
 
-/// Cheap, without payloads: far enough apart in their chain, if it is one, and in time. first < second.
+/// Cheap test that needs no payloads: true if the submaps are far enough apart in time and, on one chain, by at least
+/// `min_submap_gap` submaps. first.id < second.id.
 bool is_candidate(const Submap& first, const Submap& second, std::uint32_t min_submap_gap,
                   const VisualClosureConfig& config);
 
-/// Decides from the two submaps alone which keyframes of one see landmarks of the other, and where from: every keyframe
-/// of either of which enough landmarks of the other look like ones that it sees, some of them together (votes()), is
-/// looked for among its landmarks (matching.hpp,
-/// absolute_pose.hpp). A closure is from the
-/// keyframe that saw most of those landmarks, and is believed for what it measures: how sure its position is, and over
-/// how much of an image its inliers are spread; many inliers in one patch prove nothing. In the order of the submap
-/// ids, whatever the order of a and b. Refused for the reason that the keyframe which came farthest met.
-/// Whose verdict it is, is not said.
-/// `work`, if asked for, is added to.
+/// Decides from the two submaps alone which keyframes of one see landmarks of the other, and from where. A keyframe is
+/// tried when enough of its observations look like landmarks of the other submap, some of them seen together there
+/// (votes()); then it is matched with all of that submap's landmarks (match()) and localised among them
+/// (absolute_pose()). A closure joins it with the keyframe that saw most of these landmarks. It is believed for how
+/// certain its position is and over how much of an image its inliers are spread, not for their number, because many
+/// inliers in one patch prove nothing. A refusal gives the reason met by the keyframe that came farthest. The result
+/// does not depend on the order of a and b; ClosureVerdict::finder is left empty for the caller. The cost is added to
+/// `work` unless that is null.
 ClosureVerdict verify_pair(const SubmapFeatures& a, const SubmapFeatures& b, const VisualClosureConfig& config,
                            VerificationWork* work = nullptr);
 

@@ -13,13 +13,15 @@
 
 namespace tutti::visual {
 
-/// How the images of a submap become its payload.
+/// How the images of a submap become its visual payload.
 struct VisualSubmapConfig {
   TriangulationConfig triangulation;
-  double max_residual_px = 5.0;  ///< Or twice what the odometry explains: more, and calibration or odometry is wrong.
-  bool one_descriptor_per_landmark = false;  ///< The one most like its others; keypoints without landmark are dropped.
-  double budget_kb = 300.0;                  ///< Of a submap; the best-observed landmarks are kept.
-  bool send_imu = false;                     ///< What the IMU measured between keyframes, for who adjusts the map.
+  double max_residual_px = 5.0;  ///< Largest median residual of tracks, or twice what the odometry explains; above it
+                                 ///< calibration or odometry is wrong.
+  /// Keep the descriptor most like the landmark's others, and no keypoints without landmark.
+  bool one_descriptor_per_landmark = false;
+  double budget_kb = 300.0;  ///< Size of a payload, about; the best-observed landmarks are kept.
+  bool send_imu = false;     ///< Send what the IMU measured between keyframes, for refining the map.
   template <class V>
   void describe(V& v) {
     v.field("max_residual_px", max_residual_px, greater_than(0.0),
@@ -34,21 +36,22 @@ struct VisualSubmapConfig {
   }
 };
 
-/// What a keyframe's cameras saw.
+/// The images of a keyframe.
 struct KeyframeImages {
   std::uint32_t keyframe = 0;  ///< KeyframeId::index
   Pose3 T_submap_body;         ///< By the odometry.
   std::vector<TrackedImage> images;
-  /// What the odometry says of its own errors since the submap's begin, of each axis: growing.
+  /// Variances per axis that the odometry states for its errors since the submap's begin; they only grow.
   double turn_variance_rad2 = 0.0, shift_variance_m2 = 0.0;
 };
 
-/// Landmarks are the tracks that triangulate() accepts; views that do not fit them remain as keypoints. The budget
-/// keeps those that most images saw, but images that have few kept ones count more (the idea of Dymczyk et al. 2015,
-/// greedily), then as many of the other keypoints of every image as there is room for, in the tracker's order. The
-/// payload's imu stays empty. Fails on input that contradicts itself (which, and where), and where the median track
-/// misses its point by more than max_residual_px and twice what is expected (told, with the residual) or fits none:
-/// then calibration, extrinsics, stamps or odometry are wrong.
+/// Makes a payload of a submap's images. Landmarks are the tracks that triangulate() accepts; views that do not fit
+/// remain as keypoints. Within the budget the landmarks that most images saw are kept, where images with few kept
+/// landmarks count more (the idea of Dymczyk et al. 2015, done greedily); then, in the tracker's order, as many other
+/// keypoints of every image as there is room for. The payload's `imu` stays empty. Errors (ErrorCode::invalid): input
+/// that contradicts itself (the message says what and where); and a median track that fits no point, or misses its
+/// point by more than max_residual_px and twice what odometry and pixels explain, because then calibration, extrinsics,
+/// stamps or odometry are wrong.
 Result<VisualPayload> make_visual_payload(std::span<const KeyframeImages> images, const std::vector<Camera>& cameras,
                                           const VisualSubmapConfig& config);
 

@@ -8,29 +8,31 @@
 
 namespace tutti::program {
 
-/// The clock of whoever feeds a robot, where it is another one than the robot's. What is added to the client's stamps
-/// stays the same while it is connected, however its clock drifts: of its stamps only differences matter to a map, and
-/// these would be wrong where the offset changes. How it drifts is told.
+/// Converts the stamps of a client whose clock is not the robot's. The offset added to them stays the same for the
+/// whole connection, even if the client's clock drifts: a map uses only differences of stamps, and a changing offset
+/// would distort these. The drift is measured and reported instead.
 class FeedClock {
  public:
   enum class How { same, declared, measured };
-  /// One that comes again with nearly the offset of before has that of before: measuring takes the time that a message
-  /// takes, and stamps would seem to go back.
+  /// A client that reconnects and measures within this of its previous offset keeps the previous one: the measurement
+  /// errs by the time a message takes, and a smaller offset would make stamps seem to go back.
   static constexpr double kSame_s = 0.05;
-  static constexpr double kLeast_s = 10.0;  ///< Over less time a drift is not told.
+  static constexpr double kLeast_s = 10.0;  ///< No drift is reported before the clock was observed for this long.
 
-  /// What Hello says, at `robot_now` by the robot's clock. False: no such offset; nothing has changed.
+  /// Takes what Hello says of the client's clock, which arrived at `robot_now`. False when the offset is out of range;
+  /// nothing has changed then.
   bool begin(std::optional<std::int64_t> offset_ns, std::optional<std::int64_t> client_now_ns, Timestamp robot_now);
-  /// What the client's clock says now; the offset that is measured by that, nothing: there is none such.
+  /// Measures the offset again from what the client's clock says now, and returns it; nothing when it is out of range.
   std::optional<std::int64_t> check(std::int64_t client_now_ns, Timestamp robot_now);
 
   [[nodiscard]] How how() const { return how_; }
   [[nodiscard]] std::int64_t offset_ns() const { return offset_ns_; }
-  [[nodiscard]] std::optional<std::int64_t> measured_ns() const { return measured_ns_; }  ///< Last.
-  /// By how much faster the client's clock runs, parts per million.
+  /// By the latest measurement.
+  [[nodiscard]] std::optional<std::int64_t> measured_ns() const { return measured_ns_; }
+  /// By how much the client's clock runs faster than the robot's, in parts per million; nothing before kLeast_s.
   [[nodiscard]] std::optional<double> drift_ppm() const;
 
-  /// A stamp of the client by the robot's clock; nothing: there is no such time.
+  /// A stamp of the client by the robot's clock; nothing when it overflows.
   [[nodiscard]] std::optional<Timestamp> to_robot(Timestamp stamp) const;
 
  private:

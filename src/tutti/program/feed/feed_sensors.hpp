@@ -13,19 +13,21 @@
 
 namespace tutti::program {
 
-/// What a client of a live feed says that it has beside odometry.
+/// The sensors that a client of a live feed has beside odometry.
 struct FeedSensors {
   bool scans = false;
   std::vector<Camera> cameras;
-  std::optional<DepthSensor> depth;  ///< Beside the images of one camera.
+  std::optional<DepthSensor> depth;  ///< Aligned with the images of a single camera.
   std::optional<ImuNoise> imu;
   friend bool operator==(const FeedSensors&, const FeedSensors&) = default;
 };
 
-/// One or two cameras or none, with depth one; each sound and of a size that a message holds; noise that is finite.
+/// Fails unless there are at most two cameras (one where there is depth), each valid and small enough for a message,
+/// and the IMU's noise is finite.
 Status check_sensors(const FeedSensors& sensors);
 
-/// An image as it came: a PNG or JPEG file, or pixels row by row (grey: a byte each, depth: two, little endian).
+/// An image as it was sent: a PNG or JPEG file, or raw pixels row by row (grey: one byte each; depth: two, little
+/// endian).
 struct EncodedImage {
   std::uint32_t camera = 0;
   bool is_raw = false;
@@ -37,10 +39,11 @@ struct FedImages {
   Timestamp stamp;
   std::vector<EncodedImage> images;
   std::optional<EncodedImage> depth;
-  std::shared_ptr<const FeedSensors> sensors = nullptr;  ///< By which they were taken.
+  std::shared_ptr<const FeedSensors> sensors = nullptr;  ///< The sensors that took them.
 };
 
-/// They are of cameras that there are, each of one at most, and raw ones have the bytes of their camera's pixels.
+/// Fails unless every image is of a known camera, each camera has at most one, and raw images have the size of their
+/// camera's.
 Status check_images(const FedImages& images, const FeedSensors& sensors);
 
 std::size_t bytes_of(const FedImages& images);

@@ -10,25 +10,25 @@
 
 namespace tutti::program {
 
-/// Who may connect, beside root.
+/// Who may connect to a feed's socket, beside root.
 struct FeedAccess {
-  std::string group;     ///< Of the socket; empty: that of the program.
-  unsigned mode = 0600;  ///< Of its file.
+  std::string group;     ///< Group that owns the socket; empty: the program's own.
+  unsigned mode = 0600;  ///< File mode of the socket.
 };
 
-/// FeedSession on a Unix socket. Without a thread of its own: its program calls serve() again and again, which may be
-/// what it waits in.
+/// Serves a FeedSession on a Unix socket. It has no thread of its own: its program calls serve() repeatedly, which may
+/// be where the program waits.
 class FeedServer {
  public:
-  /// Only who has `access` may connect. A socket that a killed program left there is replaced; an error when somebody
-  /// listens on it, or it is another kind of file. `target` outlives the server.
+  /// Listens at `path` with `access`. A socket left there by a killed program is replaced; fails when another program
+  /// listens on it, or when the path is another kind of file. `target` must outlive the server.
   static Result<std::unique_ptr<FeedServer>> listen(const std::string& path, FeedTarget& target,
                                                     const FeedSettings& settings, const FeedAccess& access = {});
   ~FeedServer();
   FeedServer(const FeedServer&) = delete;
   FeedServer& operator=(const FeedServer&) = delete;
 
-  /// Waits for something to do, at most so long (0: not at all), and does what can be done without waiting.
+  /// Waits at most `timeout_ms` (0: not at all) for something to do, then does all that can be done without waiting.
   void serve(int timeout_ms);
   [[nodiscard]] FeedSession& session() { return session_; }
   [[nodiscard]] std::size_t clients() const { return files_.size(); }
@@ -36,9 +36,9 @@ class FeedServer {
  private:
   FeedServer(std::string path, int listener, FeedTarget& target, const FeedSettings& settings);
   void accept_one();
-  /// Of those that have not said who they are the one that came first; false: there is none.
+  /// Drops the oldest connection that has not sent Hello; false when there is none.
   bool drop_silent();
-  /// False: the connection has ended.
+  /// Each is false when the connection has ended.
   bool read_from(FeedSession::Client client, int file);
   bool write_to(FeedSession::Client client, int file);
   void drop(FeedSession::Client client);

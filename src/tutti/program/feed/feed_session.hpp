@@ -17,42 +17,43 @@
 
 namespace tutti::program {
 
-/// The live feed of one robot, without sockets: bytes of clients in, bytes to them out. One client feeds, the others
-/// listen. A client that does not read holds up nobody: beyond FeedSettings::max_queue_kb it loses the oldest
-/// corrections (and is told how many), and when what cannot be left out alone is more, its connection.
+/// The live feed of one robot, without sockets: takes bytes from clients and gives bytes for them. One client feeds,
+/// the others listen. A client that does not read holds up nobody: beyond FeedSettings::max_queue_kb it loses its
+/// oldest corrections (and is told how many); when the messages that must not be dropped alone exceed that, it is
+/// disconnected.
 class FeedSession {
  public:
   using Client = std::uint64_t;
-  /// The robot's time now, since the Unix epoch.
+  /// Returns the robot's time, since the Unix epoch.
   using Now = std::function<Timestamp()>;
-  /// `target` outlives it. Corrections begin with the target's T_map_odom of now.
+  /// `target` must outlive the session. Corrections start from the target's T_map_odom at this time.
   FeedSession(
       FeedTarget& target, const FeedSettings& settings, Now now = [] { return Timestamp{}; });
 
   void connect(Client client) { clients_[client]; }
-  /// Whoever feeds may come again, or another; the robot goes on where it stood.
+  /// A client that feeds may come again, or another one may take over; the robot goes on where it stood.
   void disconnect(Client client);
-  /// Carries out every message that is whole now.
+  /// Handles every message that `bytes` complete.
   void receive(Client client, std::string_view bytes);
-  /// The robot may have heard or done something: says so to those who listen, if it matters to them.
+  /// To be called when the robot may have heard or done something: tells clients what has changed for them.
   void refresh();
 
-  /// What is to be written next; empty: nothing.
+  /// The bytes to write to this client next; empty when there are none.
   [[nodiscard]] std::string_view output(Client client) const;
-  /// So many bytes of output() were.
+  /// Notes that the first `bytes` of output() were written.
   void sent(Client client, std::size_t bytes);
-  /// Nothing more is to be read from this client; with no output() left, the connection ends.
+  /// Nothing more is to be read from this client; once output() is empty, close its connection.
   [[nodiscard]] bool is_over(Client client) const { return clients_.at(client).over; }
-  /// It has said who it is.
+  /// The client has sent Hello.
   [[nodiscard]] bool is_greeted(Client client) const { return clients_.at(client).greeted; }
-  /// It has said all, and the answer to that is still to come.
+  /// The client has ended the recording, and the answer to that is still to come.
   [[nodiscard]] bool waits_for_end(Client client) const { return clients_.at(client).waits_for_end; }
   [[nodiscard]] bool has_feeder() const { return feeder_.has_value(); }
-  /// Of whoever feeds, or did last.
+  /// Of the client that feeds, or fed last.
   struct Feeder {
     std::string name;
     FeedClock clock;
-    std::uint64_t bytes = 0;  ///< That all who fed have said.
+    std::uint64_t bytes = 0;  ///< Received from all clients that fed.
   };
   [[nodiscard]] const Feeder& feeder() const { return last_; }
 
@@ -64,13 +65,13 @@ class FeedSession {
   struct Connection {
     FrameReader reader;
     std::deque<Frame> queue;
-    std::size_t queued = 0;     ///< Bytes, those of the first frame that were sent among them.
-    std::size_t sent = 0;       ///< Of the first frame.
-    std::uint64_t dropped = 0;  ///< Corrections.
+    std::size_t queued = 0;     ///< Bytes in the queue, including those of the first frame that were already sent.
+    std::size_t sent = 0;       ///< Bytes of the first frame that were sent.
+    std::uint64_t dropped = 0;  ///< Corrections that were dropped.
     bool greeted = false;
     bool over = false;
-    bool ended = false;          ///< It said that the recording has,
-    bool waits_for_end = false;  ///< and is not answered yet.
+    bool ended = false;          ///< It has ended the recording,
+    bool waits_for_end = false;  ///< and that is not answered yet.
     bool listens_only = false;
     bool wants_way = false;
   };
@@ -78,7 +79,7 @@ class FeedSession {
   void close(Client client, const std::string& why);
   void put(Connection& connection, std::string frame, bool is_correction = false);
   void make_room(Connection& connection);
-  /// To all that were greeted, by the clock of each (FeedClock::offset_ns()).
+  /// Sends a frame to every greeted client, with stamps by the clock of each (FeedClock::offset_ns()).
   void broadcast(const std::function<std::string(std::int64_t offset_ns)>& frame);
   [[nodiscard]] std::int64_t offset_ns(Client client) const { return feeder_ == client ? last_.clock.offset_ns() : 0; }
   void refuse(Client client, Timestamp stamp, const std::string& why);
@@ -92,8 +93,8 @@ class FeedSession {
   FeedTarget& target_;
   FeedSettings settings_;
   SmoothMap map_;
-  Pose3 T_odom_fed_;       ///< Of map_: changes where the client's odometry jumps.
-  std::string situation_;  ///< The frame that was last told.
+  Pose3 T_odom_fed_;       ///< FeedState::T_odom_fed as of `map_`; it changes where the client's odometry jumps.
+  std::string situation_;  ///< The situation's frame as sent last.
   std::map<Client, Connection> clients_;
   std::optional<Client> feeder_;
   Feeder last_;

@@ -13,11 +13,12 @@
 
 namespace tutti::program {
 
-/// The live feed of a robot: a socket with a thread of its own, which answers clients from the front whatever the robot
-/// behind it does, also while there is none because nothing can be stored.
+/// The live feed of a robot: a socket with a thread of its own. Clients are answered by a FeedFront whatever the robot
+/// behind it does, even while there is no robot because nothing can be stored.
 class LiveFeed {
  public:
-  /// FeedServer::listen(). `robot`: as it stands, all of it stored.
+  /// Listens as FeedServer::listen() does, with the same errors. `robot` is the robot's state now, all of which is
+  /// stored.
   static Result<std::unique_ptr<LiveFeed>> open(const std::string& socket, const FeedAccess& access, FeedState robot);
   ~LiveFeed();
   LiveFeed(const LiveFeed&) = delete;
@@ -25,11 +26,11 @@ class LiveFeed {
 
   [[nodiscard]] FeedFront& front() { return front_; }
   [[nodiscard]] const FeedFront& front() const { return front_; }
-  /// Somebody feeds.
+  /// A client that feeds is connected.
   [[nodiscard]] bool is_fed() const { return is_fed_; }
   [[nodiscard]] FeedSession::Feeder feeder() const;
-  /// What a client has made the thread throw, since the last call; empty: nothing. All clients lose their connection
-  /// then, and may come again.
+  /// What the thread has thrown since the last call; empty when nothing. All clients lose their connection when it
+  /// throws, and may connect again.
   std::string take_thrown();
 
  private:
@@ -44,7 +45,7 @@ class LiveFeed {
   FeedFront front_;
   std::unique_ptr<FeedServer> server_;
   std::atomic<bool> is_fed_ = false;
-  mutable std::mutex told_mutex_;  // of what follows
+  mutable std::mutex told_mutex_;  // guards what follows
   std::string thrown_;
   FeedSession::Feeder feeder_;
   std::jthread thread_;

@@ -14,25 +14,27 @@
 
 namespace tutti::program {
 
-/// Where a robot is in its odometry, and how sure it is of that on its map, while its agent is samples behind: what the
-/// agent said at its own newest sample, carried on by odometry. Takes and refuses samples, and sees them jump, as
+/// Where a robot is while its agent is samples behind: the pose and its uncertainty at the agent's newest sample,
+/// carried on by the odometry since. Accepts and refuses samples, and detects jumps of odometry, exactly as
 /// RobotAgent::add_odometry() does.
 class Localiser {
  public:
-  static constexpr std::size_t kMostSteps = 1024;  ///< Behind by more, the oldest are one step.
+  /// When the agent is further behind, the oldest steps are compounded to one.
+  static constexpr std::size_t kMostSteps = 1024;
 
   explicit Localiser(RobotId robot) : robot_(robot) {}
 
-  /// An error: it is refused, and why; nothing has changed. Otherwise whether odometry has jumped there.
+  /// Adds a sample; returns whether odometry has jumped at it. An error says why the sample was refused; nothing has
+  /// changed then.
   Result<bool> add(const node::OdometrySample& sample);
-  /// The agent has heard these samples, and is this sure.
+  /// Takes over what the agent knows at its newest sample: the samples up to it, and the covariance there.
   void correct(const robot::OdometryWatch& watch, const Matrix6d& covariance);
 
-  /// As fed.
+  /// T_odom_body in the client's frame, as it was fed.
   [[nodiscard]] const std::optional<StampedPose>& newest() const { return watch_.state().newest; }
   [[nodiscard]] const robot::OdometryWatch& watch() const { return watch_; }
   [[nodiscard]] const Matrix6d& covariance() const { return covariance_; }  ///< Of T_map_body, right tangent.
-  /// Samples that the agent has not said anything about yet; at most kMostSteps.
+  /// Number of samples since the agent's newest; at most kMostSteps.
   [[nodiscard]] std::size_t steps() const { return steps_.size(); }
 
  private:

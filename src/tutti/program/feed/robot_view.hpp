@@ -12,28 +12,28 @@
 
 namespace tutti::program {
 
-/// What a live feed tells of a robot, from its node and its node's events.
+/// Collects from a robot's node and its events what a live feed tells of the robot.
 class RobotView {
  public:
-  /// `names`: of the others, as far as they are known.
+  /// `names`: of the other robots, as far as they are known.
   explicit RobotView(std::string name, std::map<RobotId, std::string> names = {})
       : name_(std::move(name)), names_(std::move(names)) {}
 
-  /// Every event of the node's steps.
+  /// To be called with every event of the node's steps.
   void note(const node::Event& event, const node::RobotNode& node);
   [[nodiscard]] FeedState state(const node::RobotNode& node) const;
 
  private:
   std::string name_;
   std::map<RobotId, std::string> names_;
-  std::optional<Timestamp> first_;  ///< The newest sample at the first update; times of updates_ count from it.
+  std::optional<Timestamp> first_;  ///< The newest sample at the first update; the times in updates_ count from it.
   std::vector<consistency::Suspicion> updates_;
   std::vector<FeedAlert> alerts_;
   std::map<std::string, FeedAlert> missing_;  ///< By sensor.
-  std::optional<FeedAlert> jump_;             ///< The newest of odometry.
+  std::optional<FeedAlert> jump_;             ///< The latest jump of odometry.
 };
 
-/// An error when the node refused the sample or scan that this step is of.
+/// An error when the node refused the sample or scan that this step was about.
 Status taken(const node::Step& step);
 
 }  // namespace tutti::program

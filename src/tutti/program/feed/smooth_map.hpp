@@ -9,8 +9,9 @@
 
 namespace tutti::program {
 
-/// Corrections as a robot can drive by: T_map_odom follows the robot's own bit by bit, or jumps and says so. How far it
-/// moves is measured where the body is: far from where `odom` begins, a small turn of T_map_odom moves it by metres.
+/// Turns a robot's corrections into ones that it can drive by: T_map_odom follows the robot's own at a limited speed,
+/// or jumps and says so. The speed is measured at the body, because far from the origin of `odom` a small turn of
+/// T_map_odom moves the body by metres.
 class SmoothMap {
  public:
   SmoothMap(const FeedSettings& settings, const Pose3& T_map_odom) : settings_(settings), T_map_odom_(T_map_odom) {}
@@ -21,14 +22,14 @@ class SmoothMap {
   };
   struct Answer {
     Pose3 T_map_odom;
-    /// Right tangent. Of the robot's own, and what is left to go to it.
+    /// Of T_map_odom, right tangent: the robot's own uncertainty, plus what is left to go to its own correction.
     Matrix6d covariance = Matrix6d::Zero();
-    std::optional<Jump> jump;  ///< What this answer has done.
+    std::optional<Jump> jump;  ///< The jump that this answer makes.
   };
-  /// At a sample T_odom_body, where the robot's own T_map_odom is `target`; `covariance`: of target * T_odom_body,
-  /// right tangent.
+  /// Advances to `sample` (T_odom_body), where the robot's own T_map_odom is `target`. `covariance` is that of target *
+  /// T_odom_body, right tangent.
   Answer step(const StampedPose& sample, const Pose3& target, const Matrix6d& covariance);
-  /// `odom` is another frame from now on: its front end began anew. The body stays where it is on the map.
+  /// The client's odometry began anew: from now on `odom` is another frame. The body stays where it is on the map.
   Jump change_odom(const Pose3& T_old_new);
   [[nodiscard]] const Pose3& T_map_odom() const { return T_map_odom_; }
 

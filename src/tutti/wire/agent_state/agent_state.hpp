@@ -9,42 +9,45 @@
 #include "tutti/base/result.hpp"
 #include "tutti/robot/agent.hpp"
 
-/// A robot's own state and what it has heard, to the bit.
+/// A robot's own state, and the images in its journal, as bytes and back, exact to the bit. None of it is ever sent.
 namespace tutti::wire {
 
-/// A robot's whole state as one frame (frame.hpp) and back, every number to the bit: an agent that goes on from what
-/// was decoded does as the one that was encoded. Robots stored it so once (version 3), and tests compare by it. Larger
-/// ones than kMaxStateBytes cannot be encoded (std::logic_error).
+/// A robot's whole state as one frame (frame.hpp). An agent that goes on from the decoded state does the same as the
+/// one that was encoded. Robots of version 3 stored their state like this; today's store rows (below), and tests
+/// compare states by these bytes. A state above kMaxStateBytes is std::logic_error.
 std::string encode(const robot::AgentState& state);
-/// Of any bytes: an error, or a state that an agent can go on from.
+/// Accepts any bytes and returns an error or a state that an agent can go on from.
 Result<robot::AgentState> decode_agent_state(std::string_view bytes);
-/// A robot's state as it is stored: rows by key, of which those that change do not grow with the way (but for
-/// `corrections`, with the links to the map, after a graph was received). The keys:
+/// A robot's state as it is stored: rows by key. Rows that are written again do not grow with the length of the
+/// trajectory; `corrections`, which is written after a proxy graph was received, grows with the number of constraints.
+/// The keys:
 ///   "head"              AgentHead
-///   "chain/" FIRST      keyframes from FIRST (8 bytes) on, each with the odometry that leads to it; never changed
-///   "link/" FROM TO     a constraint of the ledger
-///   "corrections"       what of the smoother follows from nothing else
+///   "chain/" FIRST      keyframes from number FIRST (8 bytes) on, each with the odometry that leads to it; never
+///   changed "link/" FROM TO     a constraint of the ledger, by its two nodes "corrections"       the part of the
+///   smoother's state that does not follow from the other rows
 using StateRows = std::map<std::string, std::string, std::less<>>;
 
-/// What has been stored of an agent, so that what has not changed is not stored again.
+/// What has been stored of an agent, so that changed_rows() leaves out what has not changed since.
 struct StoredState {
   std::size_t keyframes = 0;
-  std::uint64_t comparisons = 0;  ///< Ledger and smoother were stored after so many.
-  bool has_corrections = false;   ///< They were stored at all.
+  std::uint64_t comparisons = 0;  ///< Number of comparisons with the map after which ledger and smoother were stored.
+  bool has_corrections = false;   ///< Whether they have been stored at all.
   std::vector<consistency::Constraint> links;
 };
 struct StateChange {
   StateRows put;
   std::vector<std::string> removed;  ///< Keys.
 };
-/// What is to be written and deleted so that the rows are those of `agent`, of which `stored` is; that is then of this
-/// agent.
+/// The rows to write and to delete so that the stored rows, described by `stored`, become those of `agent`. `stored` is
+/// updated to describe them.
 StateChange changed_rows(const robot::RobotAgent& agent, StoredState& stored);
-/// An error, or a state that an agent can go on from, to the bit. Rows of other keys are left alone.
+/// The state of these rows, to the bit, which an agent can go on from; or an error. Rows of other keys are ignored.
 Result<robot::AgentState> decode_state_rows(const StateRows& rows);
+/// What is stored of an agent after its state was read by decode_state_rows().
 StoredState stored_state(const robot::AgentState& state);
 
-/// Exact, as they are in the state; what is in them is checked by who hears them.
+/// Images of a moment for the journal, exact. Decoding checks that the bytes are complete, not what they mean:
+/// check_images() does.
 std::string encode(const TrackedImages& images);
 Result<TrackedImages> decode_tracked_images(std::string_view bytes);
 

@@ -10,7 +10,7 @@
 
 namespace tutti::visual {
 
-/// How images of keyframes are described, so that a place is recognised.
+/// How images of keyframes are described, so that places can be recognised.
 struct DescriptorConfig {
   std::string kind = "brisk";
   int keypoints = 600;
@@ -27,10 +27,10 @@ struct DescriptorConfig {
   }
 };
 
-/// Keypoints with descriptors, all of them seen in this image alone (track 0). `tracked`, which come first, are
-/// described where they are, at the finest scale; others are detected over all scales, away from them, until there
-/// are `config.keypoints`. An image without texture, or below 64 pixels a side, has none. Keypoints in the outermost
-/// pixels are described from the image as it is mirrored at its edge.
+/// Keypoints of an image with their descriptors. `tracked` come first, unchanged, and are described where they are, at
+/// the finest scale; others, of track 0, are detected over all scales, away from these, until there are
+/// `config.keypoints`. An image without texture, or below 64 pixels a side, has no keypoints. Near its edge the image
+/// is taken as mirrored there. Several threads may call at once.
 TrackedImage describe_image(const Image& image, const DescriptorConfig& config = {},
                             std::span<const TrackedKeypoint> tracked = {});
 

@@ -15,28 +15,29 @@
 
 namespace tutti::visual {
 
-/// What a robot's cameras saw at one moment.
+/// The images of a robot's cameras at one moment.
 struct SeenImages {
   Timestamp stamp;
-  std::uint64_t moment = 0;           ///< Larger than that of all images before; numbers of tracks are made of it.
-  std::vector<Result<Image>> images;  ///< One per camera; an empty one is missing.
-  std::function<Result<DepthImage>()> load_depth = {};  ///< Asked for at keyframes; not set: there is none.
+  std::uint64_t moment = 0;           ///< Larger than that of all images before; track numbers are derived from it.
+  std::vector<Result<Image>> images;  ///< One per camera; an empty image is a missing one.
+  std::function<Result<DepthImage>()> load_depth = {};  ///< Called at keyframes; empty without depth.
 };
 
-/// Follows points through the images of a robot, one moment after the other: of a recording or as they come.
+/// Follows points through the images of a robot, live or recorded, one moment after the other.
 class ImageTracker {
  public:
-  /// An error: not one or two cameras, or one with depth, that check_camera() accepts; or built without OpenCV.
+  /// One or two cameras, or one with depth, that check_camera() accepts. Errors: other cameras, or a program built
+  /// without OpenCV.
   static Result<std::unique_ptr<ImageTracker>> make(std::vector<Camera> cameras, std::optional<DepthSensor> depth,
                                                     const TrackerConfig& config);
-  /// VisualTracker::track(), and at a keyframe the view by depth (view_by_depth()). Images that cannot be read or are
-  /// of another size are an error each; without the first camera's nothing is seen.
+  /// VisualTracker::track(), and at a keyframe the view by depth (view_by_depth()). Each image that cannot be read or
+  /// has another size adds an error to take_errors(); without the first camera's image nothing is returned.
   std::vector<TrackedImage> track(const SeenImages& seen, bool keyframe);
-  /// Forgets all tracks; the next images are of this moment, and new tracks have other numbers than those before.
+  /// Forgets all tracks. The next images are of `moment`, and new tracks have other numbers than all before.
   void restart(std::uint64_t moment);
-  /// As images have them: those it was made with, and of depth the one by which its views are.
+  /// The cameras that returned images refer to: those of make(), and with depth the virtual one (depth_camera()).
   [[nodiscard]] const std::shared_ptr<const std::vector<Camera>>& cameras() const { return cameras_; }
-  /// Told once.
+  /// Errors since the last call.
   std::vector<Error> take_errors() { return std::exchange(errors_, {}); }
 
  private:

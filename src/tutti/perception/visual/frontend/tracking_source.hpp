@@ -31,14 +31,15 @@ struct TrackingConfig {
   }
 };
 
-/// Follows points through all images of a stream and serves those of the odometry's samples. Samples are asked for one
-/// after the other; after a jump forward (a restart) tracks begin anew, a sample asked for again has no images. Among
-/// the errors is, once, a clock of the images that is not the odometry's, a camera turned about its optical axis, or a
-/// second one that is turned against the first (StereoCheck).
+/// Follows points through all images of a recorded stream and returns those of the odometry's samples. Samples are
+/// asked for one after the other; after a jump forward (a restart) tracks begin anew, and a sample that is asked for
+/// again has no images. take_errors() also tells, once, of images that are not stamped by the odometry's clock, a
+/// camera turned about its optical axis (ClockCheck), or a second camera turned against the first (StereoCheck).
 class TrackingSource : public VisualSource {
  public:
-  /// Fails when the stream's stamps are not those of the odometry, saying by how much they differ: by the motion in the
-  /// images where that tells, as stamps alone know it up to whole gaps between images.
+  /// Fails when the stream's stamps do not match those of the odometry. The error says by how much they differ, by the
+  /// motion in the images where it tells; stamps alone know the offset only up to multiples of the time between images.
+  /// Fails also as ImageTracker::make() does.
   static Result<std::shared_ptr<TrackingSource>> open(ImageStream stream, Trajectory odometry,
                                                       const TrackingConfig& config);
 
