@@ -51,7 +51,7 @@ endfunction()
 # tutti_sources(<target> <group> a.cpp..) compiles them, with TUTTI_UNITY so many together: headers are read and templates
 # expanded once for all of these. Names in anonymous namespaces of one group must differ for that. The files that include
 # them lie below TUTTI_UNITY_DIR, which builds of one checkout share: ccache takes what no sanitizer looks at from the one
-# before, since a group is the same in all.
+# before. Their names say what they include, as builds with other options have other sources in a group.
 function(tutti_sources target group)
   set(files ${ARGN})
   if(TUTTI_UNITY)
@@ -71,7 +71,9 @@ function(tutti_sources target group)
         file(RELATIVE_PATH source "${folder}" "${source}")
         string(APPEND text "#include \"${source}\"\n")
       endforeach()
-      set(unit "${folder}/${group}_${number}.cpp")
+      string(SHA1 hash "${text}")
+      string(SUBSTRING "${hash}" 0 8 hash)
+      set(unit "${folder}/${group}_${number}_${hash}.cpp")
       file(CONFIGURE OUTPUT "${unit}" CONTENT "${text}") # leaves it alone when it says so already
       list(APPEND files "${unit}")
       math(EXPR number "${number} + 1")
@@ -117,6 +119,40 @@ function(tutti_add_library module)
   if(NOT component STREQUAL "program")
     tutti_install_library(${target} ${ARG_PUBLIC} ${ARG_PRIVATE})
   endif()
+endfunction()
+
+# tutti_link_opencv_statically(<target>): what this program or module links of OpenCV goes into it, where static libraries
+# are to be had. Of the shared ones Debian's libopencv-core406 brings OpenGL with its drivers and LLVM, and libopencv-video406
+# two modules more: 290 MB of packages for 6 MB of code.
+function(tutti_link_opencv_statically target)
+  if(NOT TARGET tutti_opencv_unused)
+    return()
+  endif()
+  if(NOT TARGET tutti_opencv_static)
+    set(libraries)
+    set(CMAKE_FIND_LIBRARY_SUFFIXES .a)
+    foreach(lib IN ITEMS opencv_features2d opencv_video opencv_imgproc opencv_flann opencv_core)
+      find_library(TUTTI_STATIC_${lib} ${lib})
+      mark_as_advanced(TUTTI_STATIC_${lib})
+      list(APPEND libraries "${TUTTI_STATIC_${lib}}")
+    endforeach()
+    set(CMAKE_FIND_LIBRARY_SUFFIXES .so)
+    find_library(TUTTI_TBB_LIBRARY tbb)
+    mark_as_advanced(TUTTI_TBB_LIBRARY)
+    if(NOT TUTTI_TBB_LIBRARY OR libraries MATCHES "NOTFOUND")
+      message(STATUS "OpenCV is linked dynamically: no static libraries of it here, or no TBB")
+      return()
+    endif()
+    tutti_find(ZLIB::ZLIB tutti::lapacke)
+    add_library(tutti_opencv_static INTERFACE)
+    target_link_libraries(tutti_opencv_static INTERFACE ${libraries} tutti_opencv_unused "${TUTTI_TBB_LIBRARY}" ZLIB::ZLIB tutti::lapacke ${CMAKE_DL_LIBS})
+    add_library(tutti_opencv_shared INTERFACE)
+    get_target_property(shared tutti::opencv INTERFACE_LINK_LIBRARIES)
+    target_link_libraries(tutti_opencv_shared INTERFACE ${shared})
+    set_property(TARGET tutti::opencv PROPERTY INTERFACE_LINK_LIBRARIES
+                 "$<IF:$<BOOL:$<TARGET_PROPERTY:TUTTI_STATIC_OPENCV>>,tutti_opencv_static,tutti_opencv_shared>")
+  endif()
+  set_target_properties(${target} PROPERTIES TUTTI_STATIC_OPENCV ON)
 endfunction()
 
 # tutti_add_proto(<target> <file below proto/, without .proto> FOR <module> [PYTHON] [LIBS libs..]) makes a library of the code

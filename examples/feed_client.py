@@ -38,6 +38,7 @@ for t, *pose in (line.split() for line in sys.stdin if not line.startswith("#"))
         say(odometry=Feed.Odometry(stamp_ns=ns, T_odom_body=Feed.Pose(**pose), increment_covariance=[1e-4] * 3 + [1e-6] * 3))
         answer = hear("correction", "refused").correction
         p = answer.T_map_body
+        # Of a receiver: say(fix=Feed.Fix(stamp_ns=ns, latitude_deg=46.5, longitude_deg=7.9, height_m=600, p_body_antenna=[0, 0, 1]))
         print(t, p.x, p.y, p.z, p.qx, p.qy, p.qz, p.qw)
 say(end_of_recording=Feed.EndOfRecording())
 hear("ended")

@@ -22,10 +22,11 @@ CONFINED = [
      "storage/sqlite_*.cpp and internal/sqlite.hpp, and bags/db3_reader.cpp, which only reads, and its tests"),
     (r"opencv2/", r"perception/visual/frontend/.*\.cpp$", "perception/visual/frontend/*.cpp"),
     (r"lz4|bzlib", r"(tests/support/)?bags/", "bags/"),
+    (r"dds/", r"program/ros/(dds|internal/raw_type)\.cpp$", "program/ros/dds.cpp and internal/raw_type.cpp"),
     (r"openssl/", r"bags/internal/sha256\.cpp$", "bags/internal/sha256.cpp"),
     (r"turbojpeg", r"formats/.*\.cpp$", "formats/*.cpp"),
-    (r"(oneapi/)?tbb/", r".*\.cpp$", ".cpp files"),
     (r"CLI/", r"(?!)", "apps/"),
+    (r"pybind11/", r"(?!)", "python/"),
     (r"support/", r"(.*_test\.cpp|tests/.*)$", "tests"),
 ]
 # A library returns what it has to say, never ends the program, and knows nothing but its arguments.

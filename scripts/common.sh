@@ -19,14 +19,14 @@ quietly() {
   return "$status"
 }
 
-# configure PRESET: quick when nothing changed.
+# configure PRESET [cmake options..]: quick when nothing changed.
 configure() {
   local build="$root/build/$1"
   # A checkout that was moved or copied cannot reuse its build folder.
   if [ -f "$build/CMakeCache.txt" ] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$build/CMakeCache.txt"; then
     rm -rf "$build"
   fi
-  quietly cmake -S "$root" --preset "$1"
+  quietly cmake -S "$root" --preset "$1" "${@:2}"
 }
 
 # build PRESET [ninja targets..]

@@ -1,23 +1,24 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Installs the Debian packages that are missing, and nothing when none is.
-#   scripts/install_dependencies.sh [--tests] [--bench]
+#   scripts/install_dependencies.sh [--tests] [--bench] [--python]
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 packages=(
   cmake ninja-build g++ ccache pkg-config
   libeigen3-dev libsuitesparse-dev libopenblas-dev liblapacke-dev libspectra-dev libnanoflann-dev libceres-dev
-  libprotobuf-dev protobuf-compiler libzstd-dev zlib1g-dev liblz4-dev libbz2-dev libssl-dev libpng-dev libturbojpeg0-dev libsqlite3-dev libnats-dev nats-server
+  libprotobuf-dev protobuf-compiler libzstd-dev zlib1g-dev liblz4-dev libbz2-dev libssl-dev libpng-dev libturbojpeg0-dev libsqlite3-dev libnats-dev nats-server cyclonedds-dev
   libexpected-dev libfmt-dev libspdlog-dev libsystemd-dev libcli11-dev libyaml-cpp-dev nlohmann-json3-dev
   libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-video-dev
 )
 for option in "$@"; do
   case "$option" in
-    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf python3-numpy mold) ;;
+    --tests) packages+=(libgtest-dev libgmock-dev librapidcheck-dev clang-format python3 python3-protobuf python3-numpy pybind11-dev python3-dev python3-venv mold dpkg-dev groff-base) ;;
+    --python) packages+=(pybind11-dev python3-dev python3-numpy python3-venv) ;;
     --bench) packages+=(libbenchmark-dev) ;;
     *)
-      echo "usage: $0 [--tests] [--bench]" >&2
+      echo "usage: $0 [--tests] [--bench] [--python]" >&2
       exit 2
       ;;
   esac

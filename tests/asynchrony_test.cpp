@@ -35,7 +35,7 @@ SmallMission make_mission() {
   EXPECT_TRUE(world.has_value());
   for (Recording& recording : world->recordings) {
     out.robots.insert(recording.robot);
-    robot::RobotAgent agent(recording.robot, 0, {}, Rng(1));
+    robot::RobotAgent agent(recording.robot, 0, {});
     for (std::size_t i = 0; i < recording.odometry.size(); ++i)
       EXPECT_TRUE(agent
                       .add_odometry(recording.odometry[i].stamp, recording.odometry[i].pose,

@@ -64,7 +64,6 @@ class CheckLayers(unittest.TestCase):
             ("wire/a.cpp", "#include <nats/nats.h>"),
             ("program/a.hpp", "#include <spdlog/spdlog.h>"),
             ("program/a.cpp", '  std::getenv("HOME");'),
-            ("base/a.hpp", "#include <tbb/parallel_for.h>"),
             ("base/a.cpp", "  std::cout << 1;"),
             ("base/a.cpp", '  printf("");'),
             ("base/a.cpp", "  std::abort();"),

@@ -183,7 +183,7 @@ class Mission {
   }
   std::unique_ptr<node::RobotNode> open(Program<node::RobotNode>& program) {
     program.store = std::make_unique<storage::MemoryStore>(storage::robot_schema(), std::move(program.saved));
-    auto node = node::RobotNode::open(*program.self.robot(), kSession, {}, Rng(1), *program.store);
+    auto node = node::RobotNode::open(*program.self.robot(), kSession, {}, *program.store);
     EXPECT_TRUE(node.has_value()) << node.error().message;
     return std::move(*node);
   }

@@ -37,7 +37,7 @@ struct Walker {
               .has_value());
   }
   void lose_state() {
-    agent = robot::RobotAgent(recording->robot, kSecondSession, {}, Rng(2));
+    agent = robot::RobotAgent(recording->robot, kSecondSession, {});
     first = next;
   }
   [[nodiscard]] double rmse_m(const Trajectory& estimate) const {
@@ -65,7 +65,7 @@ class Restart : public testing::Test {
     mission.closure_changes.reference.min_time_gap_s = 20.0;
     finder_ = lab::make_closure_finder(mission, recordings_, 5);
     for (const mission::MissionRecording& robot : recordings_)
-      walkers_.push_back({&robot.recording, robot::RobotAgent(robot.recording.robot, kFirstSession, {}, Rng(1))});
+      walkers_.push_back({&robot.recording, robot::RobotAgent(robot.recording.robot, kFirstSession, {})});
     server_ = std::make_unique<server::MapServer>(ids_, finder_, payloads_, server::ServerConfig{}, 1);
   }
 

@@ -80,7 +80,7 @@ struct Errors {
 };
 
 Errors errors_with(double sigma_m, double sigma_rad, double others) {
-  robot::RobotAgent agent(kRobot, 0, {}, Rng(1));
+  robot::RobotAgent agent(kRobot, 0, {});
   drive(agent, sigma_m, sigma_rad, others);
   const auto error = [](const Trajectory& estimate) {
     Trajectory truth;

@@ -12,6 +12,7 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "ros_commands.hpp"
 #include "tutti/bags/bag_info.hpp"
 
 namespace tutti::app {
@@ -85,6 +86,7 @@ void add_bag_command(CLI::App& app, int& exit_code) {
       ->required()
       ->type_name("BAG");
   info->callback([path, &exit_code] { exit_code = show_bag(*path); });
+  add_bag_play(*bag, exit_code);
 }
 
 }  // namespace tutti::app

@@ -5,8 +5,9 @@ namespace CLI {
 class App;
 }
 
-/// The subcommands, each as its --help says. When one has run, `exit_code` is 0; 1 with a message on stderr when the
-/// run failed; 2 when usage or configuration is wrong. `app` and `exit_code` must outlive the parse.
+/// The subcommands of `tutti`; each --help says what it does. A command that ran sets `exit_code` to 0; to 1, with a
+/// message on stderr, when it failed; to 2 when usage or configuration is wrong. `app` and `exit_code` must outlive the
+/// parsing.
 namespace tutti::app {
 
 void add_demo_command(CLI::App& app, int& exit_code);
@@ -25,5 +26,6 @@ void add_server_command(CLI::App& app, int& exit_code);
 void add_robot_command(CLI::App& app, int& exit_code);
 void add_worker_command(CLI::App& app, int& exit_code);
 void add_mission_command(CLI::App& app, int& exit_code);
+void add_manual_command(CLI::App& app, int& exit_code);
 
 }  // namespace tutti::app

@@ -190,59 +190,13 @@ Result<Robots> told_by_gaps(const GraphSource& source, const formats::G2oFile& f
 Result<NamedGraph> from_g2o(const GraphSource& source) {
   const auto file = formats::read_g2o(source.path);
   if (!file) return tl::unexpected(file.error());
-  NamedGraph out{.is_2d = file->is_2d, .replaced = file->indefinite_edges};
-  std::map<std::int64_t, formats::VertexStamp> stamps;
+  std::vector<formats::VertexStamp> stamps;
   if (const std::string beside = formats::stamps_beside(source.path); is_a_file(beside)) {
-    const auto read = formats::read_graph_stamps(beside);
+    auto read = formats::read_graph_stamps(beside);
     if (!read) return tl::unexpected(read.error());
-    for (const auto& stamp : *read) stamps[stamp.vertex_id] = stamp;
-    for (const std::int64_t id : file->vertex_ids)
-      if (!stamps.contains(id))
-        return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", beside, id, source.path);
+    stamps = std::move(*read);
   }
-  const bool has_letters = std::ranges::all_of(file->vertex_ids, [](auto id) { return letter_of(id).has_value(); });
-  Robots robots;
-  if (!source.robots.empty()) {
-    auto told = told_by_ranges(source, *file);
-    if (!told) return tl::unexpected(told.error());
-    robots = std::move(*told);
-    out.robots_from = "--robots";
-  } else if (!stamps.empty()) {
-    std::map<RobotId, std::uint32_t> number;
-    for (const auto& [id, stamp] : stamps) number.try_emplace(stamp.keyframe.chain.robot, 0);
-    for (auto& [robot, n] : number) {
-      n = static_cast<std::uint32_t>(robots.names.size());
-      robots.names.push_back(fmt::format("{}", robot.value));
-    }
-    for (const std::int64_t id : file->vertex_ids) robots.of.push_back(number.at(stamps.at(id).keyframe.chain.robot));
-    out.robots_from = formats::stamps_beside(source.path);
-  } else if (has_letters) {
-    robots = told_by_letters(*file);
-    out.robots_from = "symbol keys of the vertices";
-  } else {
-    auto told = told_by_gaps(source, *file);
-    if (!told) return tl::unexpected(told.error());
-    robots = std::move(*told);
-    out.robots_from = "gaps in odometry";
-  }
-  out.robot_names = std::move(robots.names);
-  std::vector<Loose> loose;
-  for (std::size_t v = 0; v < file->vertex_ids.size(); ++v)
-    loose.push_back({robots.of[v], stamps.empty() ? 0 : stamps.at(file->vertex_ids[v]).stamp.ns, v});
-  std::vector<Loose> ordered = loose;
-  std::ranges::sort(ordered, {}, [](const Loose& v) { return std::tuple(v.robot, v.order, v.position); });
-  for (const Loose& v : ordered) {
-    const std::int64_t id = file->vertex_ids[v.position];
-    out.ids.push_back(id);
-    out.names.push_back(name_of(id));
-    const bool is_fixed = std::ranges::binary_search(file->fixed, v.position);
-    out.held.push_back(is_fixed ? std::optional(file->graph.poses[v.position]) : std::nullopt);
-    if (!stamps.empty()) out.robots.stamps.push_back(stamps.at(id).stamp);
-  }
-  place(file->graph, std::move(loose), out);
-  out.stamps_from = formats::stamps_beside(source.path);
-  if (stamps.empty() || !are_times(out.robots.vertices, out.robots.stamps)) count_seconds(out);
-  return out;
+  return name_graph(source, *file, stamps);
 }
 
 std::string beside(const std::string& path, const char* ending) {
@@ -274,7 +228,7 @@ Result<Plain> read_plain(const std::string& path) {
     out.names.push_back(to_string(vertex.name));
     out.graph.poses.push_back(vertex.pose);
   }
-  for (const auto& edge : file->edges) out.graph.edges.push_back({edge.from, edge.to, edge.measurement.T_a_b, {}});
+  for (const auto& edge : file->edges) out.graph.edges.push_back({edge.from, edge.to, edge.measurement.T_a_b});
   return out;
 }
 
@@ -285,7 +239,91 @@ EdgeKey key_of(const std::vector<std::string>& names, const PoseGraphEdge& edge)
   return {names[edge.from], names[edge.to], std::lround(mm.x()), std::lround(mm.y()), std::lround(mm.z())};
 }
 
+/// Every component where its first held vertex, or else its first one, is in the file.
+Status put_in_place(const NamedGraph& graph, server::MapEstimate& map) {
+  std::map<std::uint32_t, std::size_t> anchors;
+  for (std::size_t v = 0; v < map.nodes.size(); ++v) {
+    const auto [anchor, is_first] = anchors.try_emplace(map.nodes[v].component, v);
+    if (is_first || !graph.held[v]) continue;
+    if (graph.held[anchor->second] && !graph.is_pyfg)
+      return fail(ErrorCode::unsupported,
+                  "FIX names vertices {} and {} of one component: --robust holds one, leave the others out",
+                  graph.names[anchor->second], graph.names[v]);
+    if (!graph.held[anchor->second]) anchor->second = v;
+  }
+  std::map<std::uint32_t, Pose3> moves;
+  for (const auto& [component, v] : anchors)
+    moves[component] = graph.held[v].value_or(graph.robots.graph.poses[v]) * map.nodes[v].T_world_body.inverse();
+  for (std::size_t v = 0; v < map.nodes.size(); ++v)
+    map.graph.poses[v] = map.nodes[v].T_world_body = moves.at(map.nodes[v].component) * map.nodes[v].T_world_body;
+  return {};
+}
+
 }  // namespace
+
+Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile& file,
+                              std::span<const formats::VertexStamp> stated) {
+  NamedGraph out{.is_2d = file.is_2d, .replaced = file.indefinite_edges};
+  std::map<std::int64_t, formats::VertexStamp> stamps;
+  for (const auto& stamp : stated) stamps[stamp.vertex_id] = stamp;
+  for (const std::int64_t id : file.vertex_ids)
+    if (!stamps.empty() && !stamps.contains(id))
+      return fail(ErrorCode::invalid, "{}: has no line for vertex {} of {}", formats::stamps_beside(source.path), id,
+                  source.path);
+  const bool has_letters = std::ranges::all_of(file.vertex_ids, [](auto id) { return letter_of(id).has_value(); });
+  Robots robots;
+  if (!source.robots.empty()) {
+    auto told = told_by_ranges(source, file);
+    if (!told) return tl::unexpected(told.error());
+    robots = std::move(*told);
+    out.robots_from = "--robots";
+  } else if (!stamps.empty()) {
+    std::map<RobotId, std::uint32_t> number;
+    for (const auto& [id, stamp] : stamps) number.try_emplace(stamp.keyframe.chain.robot, 0);
+    for (auto& [robot, n] : number) {
+      n = static_cast<std::uint32_t>(robots.names.size());
+      robots.names.push_back(fmt::format("{}", robot.value));
+    }
+    for (const std::int64_t id : file.vertex_ids) robots.of.push_back(number.at(stamps.at(id).keyframe.chain.robot));
+    out.robots_from = formats::stamps_beside(source.path);
+  } else if (has_letters) {
+    robots = told_by_letters(file);
+    out.robots_from = "symbol keys of the vertices";
+  } else {
+    auto told = told_by_gaps(source, file);
+    if (!told) return tl::unexpected(told.error());
+    robots = std::move(*told);
+    out.robots_from = "gaps in odometry";
+  }
+  out.robot_names = std::move(robots.names);
+  std::vector<Loose> loose;
+  for (std::size_t v = 0; v < file.vertex_ids.size(); ++v)
+    loose.push_back({robots.of[v], stamps.empty() ? 0 : stamps.at(file.vertex_ids[v]).stamp.ns, v});
+  std::vector<Loose> ordered = loose;
+  std::ranges::sort(ordered, {}, [](const Loose& v) { return std::tuple(v.robot, v.order, v.position); });
+  for (const Loose& v : ordered) {
+    const std::int64_t id = file.vertex_ids[v.position];
+    out.ids.push_back(id);
+    out.names.push_back(name_of(id));
+    const bool is_fixed = std::ranges::binary_search(file.fixed, v.position);
+    out.held.push_back(is_fixed ? std::optional(file.graph.poses[v.position]) : std::nullopt);
+    if (!stamps.empty()) out.robots.stamps.push_back(stamps.at(id).stamp);
+  }
+  place(file.graph, std::move(loose), out);
+  out.stamps_from = formats::stamps_beside(source.path);
+  if (stamps.empty() || !are_times(out.robots.vertices, out.robots.stamps)) count_seconds(out);
+  return out;
+}
+
+Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path) {
+  server::JudgedGraph judged = server::judge_graph(graph.robots, {});
+  if (!judged.map.left_out.empty())
+    return fail(ErrorCode::invalid, "{}: the edges of robot {} cannot be solved", path,
+                graph.robot_names[judged.map.left_out.front().chain.robot.value]);
+  if (!judged.map.converged) return fail(ErrorCode::invalid, "{}: cannot be solved", path);
+  if (auto ok = put_in_place(graph, judged.map); !ok) return in_context(path, ok.error());
+  return judged;
+}
 
 Result<NamedGraph> read_graph(const GraphSource& source) {
   const auto pyfg = is_pyfg(source.path);

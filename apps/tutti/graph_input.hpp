@@ -3,46 +3,61 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "tutti/base/result.hpp"
+#include "tutti/formats/g2o.hpp"
+#include "tutti/formats/graph_stamps.hpp"
 #include "tutti/server/graph_judge.hpp"
 
-/// Of `tutti optimise --robust`: pose graphs of several robots from g2o and PyFG files, and what is known of them.
+/// Reads pose graphs of several robots from g2o and PyFG files, with what is known about them; for `tutti optimise
+/// --robust` and for Python.
 namespace tutti::app {
 
+/// Which file to read, and what is known beside it.
 struct GraphSource {
   std::string path;
-  std::vector<std::int64_t> robots;  ///< g2o: the first vertex id of each robot; empty: as the file tells.
-  std::string truth;                 ///< A file whose vertices are the truth, "none", or empty: PyFG's own.
-  std::string right;                 ///< A file without the wrong closures; empty: *_no_outliers beside it, if any.
+  std::vector<std::int64_t> robots;  ///< For g2o: the first vertex id of each robot; empty: as the file tells.
+  std::string truth;                 ///< A file whose vertices are the truth, "none", or empty: PyFG's own truth.
+  std::string right;  ///< A file without the wrong closures; empty: *_no_outliers beside the graph, if there is one.
 };
 
+/// A pose graph with its robots' and vertices' names.
 struct NamedGraph {
-  server::RobotGraph robots;               ///< Its poses are those of the file.
-  std::vector<std::string> names;          ///< Of the vertices: their id, or "A12".
-  std::vector<std::int64_t> ids;           ///< Of the vertices in a g2o file; of "A12" GTSAM's symbol key.
+  server::RobotGraph robots;               ///< With the file's poses.
+  std::vector<std::string> names;          ///< Per vertex: its id, or "A12".
+  std::vector<std::int64_t> ids;           ///< Per vertex, its id in a g2o file; for "A12", GTSAM's symbol key.
   std::vector<std::string> robot_names;    ///< By RobotId::value.
-  std::vector<std::optional<Pose3>> held;  ///< Of the vertices: where FIX or a prior says that they are.
+  std::vector<std::optional<Pose3>> held;  ///< Per vertex: the pose that a FIX line or a prior states.
   bool is_pyfg = false;
   bool is_2d = false;
-  std::size_t replaced = 0;  ///< Information or covariance matrices that were not positive semidefinite.
+  std::size_t replaced = 0;  ///< Number of information or covariance matrices that were not positive semidefinite.
   std::string robots_from;   ///< For people: how robots were told apart,
-  std::string stamps_from;   ///< ... and where the times are from.
+  std::string stamps_from;   ///< and where the times are from.
 };
 
-/// What the score is against.
+/// The truth that results are scored against.
 struct GraphTruth {
-  std::vector<std::optional<Pose3>> poses;  ///< T_world_body of the vertices; empty: nothing is known.
-  std::vector<bool> right;                  ///< Of the edges; empty: nothing is known.
+  std::vector<std::optional<Pose3>> poses;  ///< T_world_body per vertex; empty: unknown.
+  std::vector<bool> right;                  ///< Per edge, whether it is right; empty: unknown.
 };
 
-/// Robots of g2o files are told apart by source.robots, by IN_stamps.csv beside the file, by GTSAM's symbol keys
-/// (letter << 56 | number), or else begin where no edge joins a vertex to the one before it. Times are those of
-/// IN_stamps.csv or of PyFG's vertices or odometry edges, where they increase along every robot; otherwise the n-th
-/// vertex of a robot counts as at n seconds.
+/// Reads a graph. Robots in g2o files are told apart by source.robots, by IN_stamps.csv beside the file, or by GTSAM's
+/// symbol keys (letter << 56 | number); failing these, a robot begins where no edge joins a vertex to the one before
+/// it. Times are from IN_stamps.csv, or from PyFG's vertices or odometry edges, if they increase along every robot;
+/// otherwise the n-th vertex of a robot counts as at n seconds. Fails when the file cannot be read.
 Result<NamedGraph> read_graph(const GraphSource& source);
+/// The same for a g2o graph that was read already; `stamps` are those of IN_stamps.csv, or empty.
+Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile& file,
+                              std::span<const formats::VertexStamp> stamps);
+/// The server's map of the graph (server::judge_graph). Each component is placed so that its first held vertex, or else
+/// its first vertex, is where the file has it. Fails when the graph cannot be solved, or a component has several
+/// vertices with FIX lines.
+Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path);
+/// Reads the truth that `source` names; empty when there is none. Fails when a file cannot be read or does not fit the
+/// graph.
 Result<GraphTruth> read_truth(const GraphSource& source, const NamedGraph& graph);
 
 }  // namespace tutti::app

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One program, one thin file per subcommand. Exit codes: 0 fine, 1 the run failed, 2 usage or configuration.
+// One program, one thin file per subcommand.
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
       "Start here:   tutti demo\n"
       "Your mission: tutti run MISSION.yaml --data FOLDER     (docs/report.md explains what comes out)",
       "tutti"};
+  app.footer("Exit codes: 0 fine, 1 the run failed, 2 usage or configuration is wrong.");
   app.require_subcommand(1);
   app.set_version_flag("--version", TUTTI_VERSION);
   app.get_formatter()->column_width(36);
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
   tutti::app::add_robot_command(app, exit_code);
   tutti::app::add_worker_command(app, exit_code);
   tutti::app::add_mission_command(app, exit_code);
+  tutti::app::add_manual_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -187,6 +187,12 @@ int show_map(const fs::path& file) {
   fmt::print("\nclosures     {} accepted, {} rejected, {} candidates; {} by an operator's word\n", states["accepted"],
              states["rejected"], states["candidate"], by_operator);
   fmt::print("joint map    {} keyframes, {} components\n", estimate.nodes.size(), estimate.components);
+  if (const auto& earth = estimate.fixes.georeference)
+    fmt::print(
+        "origin       latitude {:.9f}, longitude {:.9f}, height {:.3f} m (enu); fixes of {} of {} submaps count\n",
+        earth->origin.latitude_deg, earth->origin.longitude_deg, earth->origin.height_m,
+        std::ranges::count(estimate.fixes.judged, server::FixObjection::none, &server::JudgedFixes::objection),
+        estimate.fixes.judged.size());
   print_robots(*content, estimate);
   return 0;
 }

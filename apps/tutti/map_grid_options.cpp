@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -62,6 +63,17 @@ Status write_grid(const storage::TableStore& map, const mapfile::Content& conten
     notes.push_back(fmt::format("{}: {:.2f} m above the ground", content.closure_names().of(chain), height));
   notes.push_back(fmt::format("tilted from the map's world by {:.2f} deg, about its origin",
                               rotation_angle(made->T_level_world) / kRadPerDeg));
+  if (const auto& earth = estimate.fixes.georeference) {
+    const Eigen::Vector3d& t = earth->T_enu_world.translation;
+    const Pose3 T_enu_level = earth->T_enu_world * made->T_level_world.inverse();
+    const Eigen::Vector3d x = T_enu_level.rotation * Eigen::Vector3d::UnitX();
+    notes.push_back(fmt::format("enu origin: latitude {:.9f}, longitude {:.9f}, height {:.3f} m (WGS 84)",
+                                earth->origin.latitude_deg, earth->origin.longitude_deg, earth->origin.height_m));
+    notes.push_back(
+        fmt::format("the map's origin lies {:.3f} m east, {:.3f} m north, {:.3f} m up of it; its x axis {:.3f} "
+                    "deg north of east",
+                    t.x(), t.y(), t.z(), std::atan2(x.y(), x.x()) / kRadPerDeg));
+  }
   if (auto ok = grids::write_nav2_map(made->grid, options.grid, notes); !ok) return ok;
   const grids::OccupancyGrid& grid = made->grid;
   fmt::print("{}: {} x {} cells of {} m, {} free, {} occupied; of {} submaps{}{}\n", options.grid, grid.width,

@@ -83,7 +83,7 @@ void add_mission_options(CLI::App& command, MissionArguments& arguments) {
       ->check(CLI::Range(0, 1024));
   command
       .add_option("--set", arguments.assignments,
-                  "Change a setting, e.g. --set agent.policy.name=uniform or --set agent.submap.duration_s=5;\n"
+                  "Change a setting, e.g. --set agent.policy.name=spectral or --set agent.submap.duration_s=5;\n"
                   "may be given several times")
       ->type_name("KEY=VALUE")
       ->expected(1)

@@ -79,26 +79,6 @@ Score score(const NamedGraph& graph, const server::JudgedGraph& judged, const Gr
   return out;
 }
 
-/// Every component where its first held vertex, or else its first one, is in the file.
-Status put_in_place(const NamedGraph& graph, server::MapEstimate& map) {
-  std::map<std::uint32_t, std::size_t> anchors;
-  for (std::size_t v = 0; v < map.nodes.size(); ++v) {
-    const auto [anchor, is_first] = anchors.try_emplace(map.nodes[v].component, v);
-    if (is_first || !graph.held[v]) continue;
-    if (graph.held[anchor->second] && !graph.is_pyfg)
-      return fail(ErrorCode::unsupported,
-                  "FIX names vertices {} and {} of one component: --robust holds one, leave the others out",
-                  graph.names[anchor->second], graph.names[v]);
-    if (!graph.held[anchor->second]) anchor->second = v;
-  }
-  std::map<std::uint32_t, Pose3> moves;
-  for (const auto& [component, v] : anchors)
-    moves[component] = graph.held[v].value_or(graph.robots.graph.poses[v]) * map.nodes[v].T_world_body.inverse();
-  for (std::size_t v = 0; v < map.nodes.size(); ++v)
-    map.graph.poses[v] = map.nodes[v].T_world_body = moves.at(map.nodes[v].component) * map.nodes[v].T_world_body;
-  return {};
-}
-
 std::string closures_beside(const std::string& output) {
   std::filesystem::path path(output);
   path.replace_filename(path.stem().string() + "_closures.csv");
@@ -252,16 +232,6 @@ Status write_all(const RobustOptions& options, const NamedGraph& graph, const se
   return options.trajectories.empty() ? Status{} : write_trajectories(options.trajectories, graph, judged.map);
 }
 
-Result<server::JudgedGraph> judge(const NamedGraph& graph, const std::string& path) {
-  server::JudgedGraph judged = server::judge_graph(graph.robots, {});
-  if (!judged.map.left_out.empty())
-    return fail(ErrorCode::invalid, "{}: the edges of robot {} cannot be solved; nothing written", path,
-                graph.robot_names[judged.map.left_out.front().chain.robot.value]);
-  if (!judged.map.converged) return fail(ErrorCode::invalid, "{}: cannot be solved; nothing written", path);
-  if (auto ok = put_in_place(graph, judged.map); !ok) return in_context(path, ok.error());
-  return judged;
-}
-
 }  // namespace
 
 int optimise_robust(const RobustOptions& options) {
@@ -278,7 +248,7 @@ int optimise_robust(const RobustOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const auto judged = judge(*graph, options.source.path);
   const double time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (!judged) return complain("optimise", judged.error().message);
+  if (!judged) return complain("optimise", judged.error().message + "; nothing written");
   const Score scored = score(*graph, *judged, *truth);
   if (options.json)
     fmt::print("{}\n", to_json(*graph, *judged, scored, time_s).dump(2));

@@ -10,6 +10,7 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "program_options.hpp"
+#include "ros_commands.hpp"
 #include "tutti/program/robot_program.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/stop.hpp"
@@ -63,15 +64,18 @@ void add_server_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   add_rate_option(*command, options->rate,
                   "How fast mission time passes, for robots that replay faster than real time");
+  const auto ros = add_ros_server_options(*command);
   add_program_options(*command, *common);
   options->announce = [](const std::string& line) {
     fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  command->callback([options, common, &exit_code] {
+  command->callback([options, common, ros, &exit_code] {
     exit_code = run_program("server", *common, options->console, [&]() -> Status {
       auto settings = lab::server_settings(common->mission);
       if (!settings) return tl::unexpected(settings.error());
+      if (wants_ros(*ros))
+        if (Status shown = show_on_ros(*ros, *options); !shown) return shown;
       options->settings = std::move(*settings);
       return program::run_server(*options, program::stop_asked());
     });
@@ -136,14 +140,19 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   command->add_option("--session", options->session, "Number of its session; default: when STATE was made")
       ->check(whole_number())
       ->group("");
+  const auto ros = add_ros_robot_options(*command);
   add_program_options(*command, *common);
-  command->callback([options, common, &exit_code] {
+  command->callback([options, common, ros, &exit_code] {
+    if (wants_ros(*ros) && options->feed.empty()) options->feed = (options->state / "feed").string();
     if (options->feed.empty() && common->mission.file.empty()) {
-      exit_code = complain("robot", "expected a mission, whose recording is replayed, or --feed SOCKET", 2);
+      exit_code = complain("robot", "expected a mission, whose recording is replayed, --feed SOCKET or --ros", 2);
       return;
     }
     exit_code = run_program("robot", *common, options->console, [&]() -> Status {
       if (Status told = lab::tell_robot(common->mission, *options); !told) return told;
+      if (!wants_ros(*ros)) return program::run_robot(*options, program::stop_asked());
+      const auto on_ros = start_ros(*ros, *options);
+      if (!on_ros) return tl::unexpected(on_ros.error());
       return program::run_robot(*options, program::stop_asked());
     });
   });

@@ -106,7 +106,7 @@ class Speaker {
  private:
   robot::RobotAgent make(robot::AgentConfig& config) const {
     config.policy.name = "none";
-    return {robot_.recording.robot, 0, config, Rng(1)};
+    return {robot_.recording.robot, 0, config};
   }
   [[nodiscard]] double start_s() const {
     return robot_.start_s + (robot_.recording.odometry[next_].stamp - robot_.recording.odometry.front().stamp);

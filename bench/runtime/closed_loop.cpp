@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "tutti/base/config_io.hpp"
+#include "tutti/lab/policies.hpp"
 
 namespace {
 
@@ -63,19 +64,25 @@ void run(const ClosedLoopConfig& config, std::uint64_t seed) {
   mission.settling = config.settling;
   test::LoopConfig loop{
       config.compare, config.policy, config.proxy_graph, static_cast<std::size_t>(config.nodes_per_update), {}};
-  const auto row = [&] {
+  const auto row = [&](const std::string& policy) {
     const auto r = test::run_closed_loop(mission, loop);
-    fmt::print("{:5} {:14} {:8.3f} {:9.3f} {:9.3f} {:9.3f} {:7} {:8}\n", seed, loop.policy.name, r.onboard_m,
-               r.corrected_m, r.agreement_m, r.worst_agreement_m, r.constraints, r.replaced);
+    fmt::print("{:5} {:14} {:8.3f} {:9.3f} {:9.3f} {:9.3f} {:7} {:8}\n", seed, policy, r.onboard_m, r.corrected_m,
+               r.agreement_m, r.worst_agreement_m, r.constraints, r.replaced);
     std::fflush(stdout);
     return r;
   };
-  const auto first = row();
+  const auto first = row(config.policy.name);
   if (!config.competitors) return;
-  loop.budgets = first.ledger_sizes;
+  robot::AgentConfig agent;
+  agent.compare = config.compare;
   for (const char* name : {"every_node", "every_node_2", "uniform", "random", "skeleton"}) {
-    loop.policy.name = name;
-    row();
+    const auto policy = lab::make_policy(name, agent, Rng(seed));
+    auto* const spends = dynamic_cast<lab::BudgetedPolicy*>(policy->get());
+    loop.other_policy = [&](std::size_t update) -> const ConstraintPolicy& {
+      if (spends) spends->set_budget(first.ledger_sizes[update]);
+      return **policy;
+    };
+    row(name);
   }
 }
 

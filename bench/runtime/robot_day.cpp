@@ -72,7 +72,7 @@ int main(int argc, char** argv) {
   const auto file = folder / "robot_day.tutti";
   for (const char* end : {"", "-wal"}) std::filesystem::remove(file.string() + end);
   auto store = storage::open_sqlite_store(file, storage::robot_schema(), {.min_free_bytes = 0}).value();
-  auto node = node::RobotNode::open(kRobot, 1, {}, Rng(1), *store).value();
+  auto node = node::RobotNode::open(kRobot, 1, {}, *store).value();
 
   std::vector<Hour> day(1);
   const auto carry_out = [&](const node::Step& step) {
@@ -167,6 +167,6 @@ int main(int argc, char** argv) {
   const double begin = now_ms();
   static_cast<void>(node->store_all());
   node.reset();
-  node = node::RobotNode::open(kRobot, 1, {}, Rng(1), *store).value();
+  node = node::RobotNode::open(kRobot, 1, {}, *store).value();
   fmt::print("a start on this store: {:.0f} ms, {} keyframes\n", now_ms() - begin, node->agent().keyframes().size());
 }

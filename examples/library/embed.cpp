@@ -72,7 +72,7 @@ int main() {
   std::vector<robot::RobotAgent> robots;
   std::vector<Pose3> T_odom_body(2);
   std::vector<Trajectory> odometry(2);
-  for (std::uint32_t r = 0; r < 2; ++r) robots.emplace_back(RobotId{r}, 1, robot::AgentConfig{}, Rng(r));
+  for (std::uint32_t r = 0; r < 2; ++r) robots.emplace_back(RobotId{r}, 1, robot::AgentConfig{});
 
   const Pose3 too_much{so3_exp({0.0, 0.0, 0.0005}), {0.0, 0.0, 0.0}};
   Matrix6d covariance = 1e-6 * Matrix6d::Identity();  // of a step, m2 and rad2

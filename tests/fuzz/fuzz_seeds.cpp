@@ -34,7 +34,7 @@ std::vector<std::string> both(MessageKind kind, const std::string& frame) {
 }
 
 std::string agent_state(bool corrected) {
-  robot::RobotAgent agent(RobotId{1}, 7, {}, Rng(1));
+  robot::RobotAgent agent(RobotId{1}, 7, {});
   const Trajectory odometry = robot::test::drifting_odometry(30);
   for (std::size_t i = 0; i < odometry.size(); ++i) {
     static_cast<void>(agent.add_odometry(odometry[i].stamp, odometry[i].pose, robot::test::kStepCovariance));
@@ -149,9 +149,9 @@ std::map<std::string, std::vector<std::string>> seeds() {
                   std::make_shared<const PointCloud>(PointCloud{{{1, 2, 3}, {4, 5, 6}}}),
                   std::make_shared<const std::vector<float>>(2, 0.1F)};
   out["journal"] = {node::encode(node::OdometrySample{.stamp = {5}}), node::encode(scan),
-                    node::encode(node::HeardGraph{"frame", 7})};
+                    node::encode(node::HeardGraph{"frame"})};
 
-  // hello, odometry, scan, end, images, imu, time, and of a newer protocol (proto/tutti/v1/feed.proto)
+  // hello, odometry, scan, end, images, imu, time, fix, and of a newer protocol (proto/tutti/v1/feed.proto)
   const std::string one("\0\0\0\0\0\0\xf0\x3f", 8);
   const std::string hello("\x0a\x04\x08\x01\x12\x00", 6), end("\x22\x00", 2);
   const std::string of_sample = joined({"\x08\x05\x12\x09\x39", one, "\x1a\x30", one, one, one, one, one, one});
@@ -167,10 +167,12 @@ std::map<std::string, std::vector<std::string>> seeds() {
   const std::string seen = field('\x2a', joined({"\x08\x05", field('\x12', "\x10\x01\x1a\x04grey")}));
   const std::string three = joined({one, one, one});
   const std::string felt = field('\x32', joined({"\x0a\x01\x05", field('\x12', three), field('\x1a', three)}));
-  const std::string time("\x3a\x02\x08\x05", 4), later("\x42\x00", 2);
-  out["feed_message"] = {hello, sample, points, end, sees, seen, felt, time, later};
+  const std::string time("\x3a\x02\x08\x05", 4), later("\x4a\x00", 2);
+  const std::string fix = field(
+      '\x42', joined({"\x08\x05\x11", one, "\x19", one, "\x21", one, field('\x2a', three), field('\x32', three)}));
+  out["feed_message"] = {hello, sample, points, end, sees, seen, felt, time, fix, later};
   out["feed"] = {joined({fed(hello), fed(sample), fed(points), fed(end)}),
-                 joined({fed(sees), fed(sample), fed(seen), fed(felt), fed(time), fed(later)})};
+                 joined({fed(sees), fed(sample), fed(seen), fed(felt), fed(time), fed(fix), fed(later)})};
 
   out["tum"] = {"# t x y z qx qy qz qw\n1700000000.000000001 1 2 3 0 0 0 1\n1700000000.5 1.5 2 3 0 0 0.6 0.8\n"};
   out["euroc_csv"] = {"#timestamp, p, q\n1403636579758555392,4.6,-1.7,0.6,0.5,-0.5,0.5,0.5,0.1\n"};

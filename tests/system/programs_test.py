@@ -89,19 +89,8 @@ class Program:
         return self.process.returncode, out + err
 
 
-@unittest.skipUnless(HAS_NATS, "nats-server is not installed")
-class Programs(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.common = tempfile.TemporaryDirectory()
-        cls.expected = pathlib.Path(cls.common.name) / "run"
-        done = run("run", MISSION, "--out", cls.expected)
-        assert done.returncode == 0, done.stderr
-        assert report(cls.expected)["server"]["closures_accepted"] > 5
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.common.cleanup()
+class ProgramsTest(unittest.TestCase):
+    """A folder in which programs run, and what they say of themselves in it."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -112,17 +101,6 @@ class Programs(unittest.TestCase):
         program = Program(*arguments, env=env)
         self.addCleanup(lambda: program.process.poll() is None and program.kill())
         return program
-
-    def start_server(self, *more, rate=RATE, env=None):
-        server = self.start("server", "--state", self.path / "server", MISSION, *rate, *more, env=env)
-        line = server.line()
-        self.assertIn("tutti robot --name NAME --bus nats://127.0.0.1:", line, server.process.poll())
-        words = line.split()
-        return server, words[words.index("--bus") + 1]
-
-    def start_robot(self, name, bus, *more, rate=RATE):
-        return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, MISSION, *rate,
-                          "--session", "0", *more)
 
     def status(self, who):
         try:
@@ -136,9 +114,43 @@ class Programs(unittest.TestCase):
             self.assertLess(time.monotonic(), end, f"{what}: {self.status('server')} {self.status('alpha')}")
             time.sleep(0.02)
 
-    def expect_same_map(self, out):
-        self.assertEqual(edges(out), edges(self.expected))
-        expected, found = vertices(self.expected), vertices(out)
+    def wait_for_map(self, what="end"):
+        """Of a status that is written after this is asked: the one before may not know the last submaps yet."""
+        asked = time.time()
+        file = self.path / "server/status.json"
+        self.wait_for(lambda: file.stat().st_mtime > asked + 0.1 and self.status("server")["pending_jobs"] == 0 and
+                      not self.status("server")["has_news"], what)
+
+
+@unittest.skipUnless(HAS_NATS, "nats-server is not installed")
+class Programs(ProgramsTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.common = tempfile.TemporaryDirectory()
+        cls.expected = pathlib.Path(cls.common.name) / "run"
+        done = run("run", MISSION, "--out", cls.expected)
+        assert done.returncode == 0, done.stderr
+        assert report(cls.expected)["server"]["closures_accepted"] > 5
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.common.cleanup()
+
+    def start_server(self, *more, rate=RATE, env=None):
+        server = self.start("server", "--state", self.path / "server", MISSION, *rate, *more, env=env)
+        line = server.line()
+        self.assertIn("tutti robot --name NAME --bus nats://127.0.0.1:", line, server.process.poll())
+        words = line.split()
+        return server, words[words.index("--bus") + 1]
+
+    def start_robot(self, name, bus, *more, rate=RATE):
+        return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, MISSION, *rate,
+                          "--session", "0", *more)
+
+    def expect_same_map(self, out, expected=None):
+        expected = expected or self.expected
+        self.assertEqual(edges(out), edges(expected))
+        expected, found = vertices(expected), vertices(out)
         self.assertEqual(found.keys(), expected.keys())
         for number, position in expected.items():
             for a, b in zip(position, found[number]):
@@ -170,6 +182,25 @@ class Programs(unittest.TestCase):
         self.assertEqual(again.returncode, 1)
         self.assertIn("earlier mission", again.stderr)
 
+    def test_fixes_are_fed_like_the_rest(self):
+        mission = [SOURCE / "missions/apart_fixes.yaml", "--set", "simulation.robots.0.walk.duration_s=240",
+                   "--set", "simulation.robots.1.walk.duration_s=240"]
+        expected, out = self.path / "run", self.path / "up"
+        for words in (("run", *mission, "--out", expected, "--map", self.path / "run.tutti"),
+                      ("mission", "up", *mission, "--out", out, "--rate", "60")):
+            done = run(*words)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.expect_same_map(out, expected)
+        here, there = report(out)["server"], report(expected)["server"]
+        self.assertGreater(sum(robot["fixes"] for robot in there["fixes"]["robots"]), 400)
+        self.assertIsNotNone(there["fixes"]["origin"])
+        for key in ("closures_accepted", "rejections", "components", "fixes"):
+            self.assertEqual(here[key], there[key])
+        self.assertEqual(rows(out / "state/server/map.tutti", "submaps"), rows(self.path / "run.tutti", "submaps"))
+        told = json.loads((out / "state/robots/alpha/status.json").read_text())["feed"]
+        self.assertGreater(told["fixes"], 200)
+        self.assertEqual(told["fixes_left_out"], 0)
+
     def test_workers_elsewhere_find_the_same(self):
         out = self.mission_up("--workers", "2")
         told = [json.loads(line) for line in (out / "state/server/events.jsonl").read_text().splitlines()]
@@ -183,7 +214,7 @@ class Programs(unittest.TestCase):
         workers[0].kill()
         for robot in robots:
             self.assertEqual(robot.end(stop=False)[0], 0)
-        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "end")
+        self.wait_for_map()
         self.assertEqual(workers[1].end()[0], 0)
         self.assertEqual(server.end()[0], 0)
         self.expect_same_map_file()
@@ -202,7 +233,7 @@ class Programs(unittest.TestCase):
         proper = self.start("worker", "--bus", bus, MISSION)
         for robot in robots:
             self.assertEqual(robot.end(stop=False)[0], 0)
-        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "end")
+        self.wait_for_map()
         self.assertEqual(self.mission_status(bus)["waiting"], 0)
         for program in (bare, proper, server):
             code, said = program.end()
@@ -219,8 +250,8 @@ class Programs(unittest.TestCase):
         robots = [self.start_robot(name, bus, *settings) for name in ("alpha", "bravo")]
         for robot in robots:
             self.assertEqual(robot.end(stop=False)[0], 0)
-        self.wait_for(lambda: self.status("server").get("submaps", 0) >= 6 and
-                      self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "answers")
+        self.wait_for_map("answers")
+        self.assertGreaterEqual(self.status("server")["submaps"], 6)
         self.assertEqual(self.status("server")["closures"], 0)
         for program in (bare, server):
             code, said = program.end()
@@ -273,7 +304,7 @@ class Programs(unittest.TestCase):
             code, said = robot.end(stop=False)
             self.assertEqual(code, 0, f"{name}: {said}")
             self.assertEqual(self.status(name)["backlog"], 0)
-        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "end")
+        self.wait_for_map()
         code, said = server.end()
         self.assertEqual(code, 0, said)
         self.expect_same_map_file()
@@ -308,8 +339,7 @@ class Programs(unittest.TestCase):
                 others[name] = start(name)
         for name in ("alpha", "bravo"):
             self.wait_for(lambda: self.status(name).get("finished") and self.status(name)["backlog"] == 0, f"{name} {killed}")
-        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"],
-                      f"the map {killed}")
+        self.wait_for_map(f"the map {killed}")
         for program in (*others.values(), server):
             code, said = program.end()
             self.assertEqual(code, 0, said)

@@ -37,8 +37,10 @@ MISSION = """
 mission: fed
 input: simulated
 robots:
-  - {{name: alpha, odometry: {{file: alpha.tum}}, reference: {{file: alpha_reference.tum}}, covariance: {noise}}}
-  - {{name: bravo, odometry: {{file: bravo.tum}}, reference: {{file: bravo_reference.tum}}, covariance: {noise}}}
+  - {{name: alpha, odometry: {{file: alpha.tum}}, reference: {{file: alpha_reference.tum}}, covariance: {noise},
+     fixes: alpha.csv, antenna_m: [0.1, 0.0, 0.2]}}
+  - {{name: bravo, odometry: {{file: bravo.tum}}, reference: {{file: bravo_reference.tum}}, covariance: {noise},
+     fixes: bravo.csv, antenna_m: [0.1, 0.0, 0.2]}}
 closures:
   finder: reference
   reference: {{wrong_share: 0.2, min_time_gap_s: 20.0}}
@@ -67,6 +69,22 @@ def write(file, odometry):
     file.write_text(text)
 
 
+def fixes_of(reference):
+    """One a second of a receiver that is right, [Feed.Fix]."""
+    out = []
+    for stamp_ns, x, y, z, *_ in reference:
+        if not out or stamp_ns - out[-1].stamp_ns >= 10**9:
+            out.append(Feed.Fix(stamp_ns=stamp_ns, latitude_deg=46.5 + y / 111_170.0, longitude_deg=7.9 + x / 76_740.0,
+                                height_m=600.0 + z, covariance_m2=[2.25, 2.25, 9.0], p_body_antenna=[0.1, 0.0, 0.2]))
+    return out
+
+
+def write_fixes(file, fixes):
+    file.write_text("stamp_s,latitude_deg,longitude_deg,height_m,sigma_east_m,sigma_north_m,sigma_up_m\n" + "".join(
+        f"{f.stamp_ns // 10**9}.{f.stamp_ns % 10**9:09d},{f.latitude_deg!r},{f.longitude_deg!r},{f.height_m!r},1.5,1.5,3\n"
+        for f in fixes))
+
+
 def times(a, b):
     """T_a * T_b of feed poses, as [x, y, z]."""
     v, w, u = (a.qx, a.qy, a.qz), a.qw, (b.x, b.y, b.z)
@@ -76,10 +94,12 @@ def times(a, b):
 
 
 class Client(threading.Thread):
-    """Feeds odometry, and where wanted this scan, from where the robot stands on, until it is told all or killed."""
+    """Feeds odometry, fixes as they fall due, and where wanted this scan, from where the robot stands on, until it is told
+    all or killed."""
 
-    def __init__(self, path, odometry, xyz=(), ends=True, meets=False):
+    def __init__(self, path, odometry, xyz=(), ends=True, meets=False, fixes=()):
         super().__init__(daemon=True)
+        self.fixes = list(fixes)
         self.path, self.odometry, self.xyz, self.ends = str(path), odometry, xyz, ends
         self.meets = meets  # the last samples wait until the robot knows where another is
         self.heard = {}  # messages by kind
@@ -106,6 +126,7 @@ class Client(threading.Thread):
         for stamp_ns, *pose in self.odometry:
             if self.welcome.has_odometry and stamp_ns <= self.welcome.last_stamp_ns:
                 before_ns = stamp_ns
+                self.say_fixes(stamp_ns, stamp_ns < self.welcome.last_stamp_ns)  # of the last one it may have lost them
                 continue
             while self.meets and stamp_ns >= self.odometry[-50][0] and not self.knows_another():
                 self.hear("situation")
@@ -119,10 +140,17 @@ class Client(threading.Thread):
                 self.answers.append((stamp_ns, T_odom_body, answer))
                 if self.xyz and answer.wants_scan:
                     self.say(scan=Feed.Scan(stamp_ns=stamp_ns, xyz=self.xyz))
+            self.say_fixes(stamp_ns)
             time.sleep(SAMPLE_S)
         if self.ends:
             self.say(end_of_recording=Feed.EndOfRecording())
             self.hear("ended")
+
+    def say_fixes(self, until_ns, are_known=False):
+        while self.fixes and self.fixes[0].stamp_ns <= until_ns:
+            fix = self.fixes.pop(0)
+            if not are_known:
+                self.say(fix=fix)
 
     def knows_another(self):
         situations = self.heard.get("situation", [])
@@ -145,17 +173,7 @@ class Client(threading.Thread):
 
 @unittest.skipUnless(common.HAS_NATS, "nats-server is not installed")
 @unittest.skipUnless(Feed, "python3-protobuf is not installed")
-class LiveRobots(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = pathlib.Path(folder.name)
-
-    def start(self, *arguments):
-        program = common.Program(*arguments)
-        self.addCleanup(lambda: program.process.poll() is None and program.kill())
-        return program
-
+class LiveRobots(common.ProgramsTest):
     def start_server(self, *more):
         server = self.start("server", "--state", self.path / "server", *RATE, *more)
         words = server.line().split()
@@ -167,21 +185,9 @@ class LiveRobots(unittest.TestCase):
     def feed_robot(self, name, bus, *more, rate=RATE):
         return self.start_robot(name, bus, *rate, "--feed", self.path / (name + ".feed"), *more)
 
-    def status(self, who):
-        try:
-            return json.loads((self.path / who / "status.json").read_text())
-        except (OSError, ValueError):
-            return {}
-
     def seen(self, bus):
         done = common.run("status", "--bus", bus, "--json")
         return {robot["name"]: robot for robot in json.loads(done.stdout or "{}").get("robots", [])}
-
-    def wait_for(self, condition, what):
-        end = time.monotonic() + common.PATIENCE_S
-        while not condition():
-            self.assertLess(time.monotonic(), end, f"{what}: {self.status('server')} {self.status('alpha')}")
-            time.sleep(0.02)
 
     def joint_graph(self, file):
         exported = common.run("map", "export", file, "--g2o", self.path / "joint.g2o")
@@ -192,14 +198,16 @@ class LiveRobots(unittest.TestCase):
         """Recordings of a small simulated mission; the odometry of each robot."""
         done = common.run("run", common.MISSION, "--out", self.path / "simulated")
         self.assertEqual(done.returncode, 0, done.stderr)
-        out = {}
+        out, fixes = {}, {}
         for name in ("alpha", "bravo"):
             out[name] = halved(samples(self.path / "simulated" / f"{name}_onboard.tum"))
             write(self.path / f"{name}.tum", out[name])
             reference = self.path / "simulated" / f"{name}_reference.tum"
             (self.path / reference.name).write_text(reference.read_text())
+            fixes[name] = fixes_of(samples(reference))
+            write_fixes(self.path / f"{name}.csv", fixes[name])
         (self.path / "fed.yaml").write_text(MISSION)
-        return out, [self.path / "fed.yaml", "--data", self.path]
+        return out, fixes, [self.path / "fed.yaml", "--data", self.path]
 
     def check_answers(self, client, other):
         """That what the robot said while it was fed holds together."""
@@ -219,13 +227,14 @@ class LiveRobots(unittest.TestCase):
         self.assertNotIn("refused", client.heard)
 
     def test_fed_live_and_killed_makes_the_map_of_the_replay(self):
-        odometry, mission = self.make_mission()
+        odometry, fixes, mission = self.make_mission()
         up = common.run("mission", "up", *mission, "--out", self.path / "up", *RATE)
         self.assertEqual(up.returncode, 0, up.stdout + up.stderr)
         server, bus = self.start_server(*mission)
         words = [*mission, "--session", "0"]
         robots = {name: self.feed_robot(name, bus, *words) for name in odometry}
-        clients = {name: Client(self.path / f"{name}.feed", odometry[name], meets=True) for name in odometry}
+        client = lambda name: Client(self.path / f"{name}.feed", odometry[name], meets=True, fixes=fixes[name])
+        clients = {name: client(name) for name in odometry}
 
         self.wait_for(lambda: len(clients["alpha"].answers) > len(odometry["alpha"]) / 2, "half of it")
         code, said = self.start("robot", "--name", "charlie", "--bus", bus, "--state", self.path / "charlie", "--feed",
@@ -237,7 +246,7 @@ class LiveRobots(unittest.TestCase):
         before = clients["alpha"].answers
         self.assertTrue((self.path / "alpha.feed").is_socket())  # as a killed program leaves it
         robots["alpha"] = self.feed_robot("alpha", bus, *words)
-        clients["alpha"] = Client(self.path / "alpha.feed", odometry["alpha"], meets=True)
+        clients["alpha"] = client("alpha")
 
         for name, robot in robots.items():
             clients[name].join(common.PATIENCE_S)
@@ -253,8 +262,9 @@ class LiveRobots(unittest.TestCase):
         self.assertLessEqual(clients["alpha"].welcome.last_stamp_ns, said_ns)
         self.check_answers(clients["alpha"], "bravo")
         self.check_answers(clients["bravo"], "alpha")
-        self.wait_for(lambda: self.status("server")["pending_jobs"] == 0 and not self.status("server")["has_news"], "end")
+        self.wait_for_map()
         self.assertEqual(server.end()[0], 0)
+        self.assertGreater(sum(robot["fixes"] for robot in common.report(self.path / "up")["server"]["fixes"]["robots"]), 250)
         fed, replayed = self.path / "server/map.tutti", self.path / "up/state/server/map.tutti"
         self.assertGreater(len(common.rows(replayed, "submaps")), 5)
         self.assertEqual(common.rows(fed, "submaps"), common.rows(replayed, "submaps"))

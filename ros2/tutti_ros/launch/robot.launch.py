@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ros2 launch tutti_ros robot.launch.py namespace:=r1 odom:=odom points:=points bus:=nats://HOST:PORT"""
+"""ros2 launch tutti_ros robot.launch.py namespace:=r1 odom:=odom points:=points fix:=fix bus:=nats://HOST:PORT"""
 import os
 
 from ament_index_python.packages import get_package_share_directory
@@ -16,6 +16,7 @@ def generate_launch_description():
         "namespace": ("r1", "of the robot, and its name in the map"),
         "odom": ("odom", "topic of nav_msgs/Odometry, relative to the namespace"),
         "points": ("points", "topic of sensor_msgs/PointCloud2, relative to the namespace"),
+        "fix": ("fix", "topic of sensor_msgs/NavSatFix, relative to the namespace"),
         "bus": ("", "nats://HOST:PORT as the server prints it; empty: tutti robot is started by somebody else"),
         "mission": ("tutti", "name of the mission on the bus, as the server's"),
         "state": (["/tmp/tutti_", value("namespace")], "folder that the robot keeps what it knows in"),
@@ -34,5 +35,5 @@ def generate_launch_description():
         package="tutti_ros", executable="tutti_ros", name="tutti_ros", namespace=value("namespace"), output="screen",
         respawn=True, respawn_delay=2.0,
         parameters=[value("params"), {"socket": value("socket"), "use_sim_time": value("use_sim_time")}],
-        remappings=[("odom", value("odom")), ("points", value("points"))])
+        remappings=[("odom", value("odom")), ("points", value("points")), ("fix", value("fix"))])
     return LaunchDescription([*declared, robot, node])

@@ -10,7 +10,7 @@ import unittest
 import mcap_reader
 import numpy as np
 import ros_stub
-from made_messages import cloud, odometry
+from made_messages import cloud, fix, odometry
 from paths import SHARED, SOURCE, TUTTI
 from tutti_ros import from_ros, poses
 from tutti_ros.link import Link
@@ -27,6 +27,17 @@ class Conversion(unittest.TestCase):
         for bad in ((math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (0.0,) * 7):
             with self.assertRaisesRegex(ValueError, "that is none"):
                 from_ros.odometry_of(odometry(1, bad))
+
+    def test_fixes(self):
+        self.assertEqual(from_ros.fix_of(fix(7)), (7, (46.5, 7.9, 600.0), [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 4.0]))
+        self.assertIsNone(from_ros.fix_of(fix(7, math.nan, status=-1)))
+        for variances in ((0.0, 0.0, 0.0), (-1.0, 1.0, 1.0)):
+            self.assertEqual(from_ros.fix_of(fix(7, variances=variances))[2], [])
+        unknown = fix(7)
+        unknown.position_covariance_type = 0
+        self.assertEqual(from_ros.fix_of(unknown)[2], [])
+        with self.assertRaisesRegex(ValueError, "that is none"):
+            from_ros.fix_of(fix(7, math.nan))
 
     def test_noise_adds_up_along_the_way(self):
         turned = lambda a: (2.0 * a, 0.0, 0.0, 0.0, 0.0, math.sin(a / 2), math.cos(a / 2))
@@ -103,7 +114,8 @@ class RealBytes(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             done = subprocess.run([TUTTI, "simulate", SOURCE / "missions/demo.yaml", "-o", folder,
                                    "--set", "simulation.robots.0.walk.duration_s=1",
-                                   "--set", "simulation.robots.1.walk.duration_s=1"], capture_output=True, text=True)
+                                   "--set", "simulation.robots.1.walk.duration_s=1",
+                                   "--set", "receivers=[{rate_hz: 1.0, sigma_m: 0.5}]"], capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stderr)
             said = list(mcap_reader.messages((pathlib.Path(folder) / "alpha/alpha_0.mcap").read_bytes()))
         clouds = [ros_stub.decode("sensor_msgs/PointCloud2", cdr) for topic, cdr in said if topic == "/alpha/points"]
@@ -115,6 +127,11 @@ class RealBytes(unittest.TestCase):
             self.assertGreaterEqual(ages.min(), 0.0)
             self.assertLess(ages.max(), 0.2)
             self.assertLess(abs(stamp_ns - from_ros.nanoseconds(message.header.stamp)), 2 * 10**8)
+        fixes = [from_ros.fix_of(ros_stub.decode("sensor_msgs/NavSatFix", cdr)) for topic, cdr in said
+                 if topic == "/alpha/fix"]
+        self.assertEqual(len(fixes), 2)
+        self.assertAlmostEqual(fixes[0][1][0], 46.5, delta=0.01)
+        self.assertEqual(fixes[0][2][0], 0.25)  # m^2
         stamps = [from_ros.odometry_of(ros_stub.decode("nav_msgs/Odometry", cdr))[0] for topic, cdr in said
                   if topic == "/alpha/odom"]
         self.assertEqual(stamps, sorted(set(stamps)))

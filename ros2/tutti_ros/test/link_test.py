@@ -15,10 +15,10 @@ NOISE = from_ros.OdometryNoise()
 class Reconnecting(unittest.TestCase):
     """The state machine alone: what it says and says again."""
 
-    def welcome(self, link, last_ns=None):
+    def welcome(self, link, last_ns=None, takes=("hello", "odometry", "scan", "fix")):
         self.assertEqual(self.parse(link.connected())[0].WhichOneof("what"), "hello")
         self.assertEqual(link.next_frame(), b"")  # not before the robot's answer
-        said = frame(welcome=Feed.Welcome(has_odometry=last_ns is not None, last_stamp_ns=last_ns or 0,
+        said = frame(welcome=Feed.Welcome(takes=takes, has_odometry=last_ns is not None, last_stamp_ns=last_ns or 0,
                                           T_map_odom=feed_pose(poses.IDENTITY)))
         for byte in said:  # however it comes
             link.hear(bytes([byte]))
@@ -100,6 +100,23 @@ class Reconnecting(unittest.TestCase):
         link = self.filled(2)
         self.welcome(link, 500)
         self.assertEqual(self.said(link)[0].increment_covariance[0], 1.0)
+
+    def test_fixes_go_to_robots_that_take_them(self):
+        fix = (46.5, 7.9, 600.0), [1.0] * 9, (0.1, 0.2, 0.3)
+        link = self.filled(3)
+        link.add_fix(1000 + 10**8, *fix)
+        with self.assertRaisesRegex(ValueError, "expected stamps to increase"):
+            link.add_fix(1000 + 10**8, *fix)
+        self.welcome(link, takes=())
+        self.assertEqual(len(self.said(link)), 3)  # of before there were any
+        with self.assertRaisesRegex(ValueError, "it takes none"):
+            link.add_fix(1001 + 10**8, *fix)
+        link.lost("killed")
+        self.welcome(link)
+        said = self.said(link)[-1]
+        self.assertEqual((said.stamp_ns, said.latitude_deg, said.longitude_deg, said.height_m), (1000 + 10**8, *fix[0]))
+        self.assertEqual((list(said.covariance_m2), list(said.p_body_antenna)), (fix[1], [0.1, 0.2, 0.3]))
+        self.assertEqual(link.counts["fixes"], 1)
 
     def test_refusals_and_garbage(self):
         link = self.filled()

@@ -35,5 +35,16 @@ def cloud(columns, rows=1, order="<", padding=0, stamp_ns=10**9, frame_id="r1/li
     return ros_stub.decode("sensor_msgs/PointCloud2", ros_stub.encode("sensor_msgs/PointCloud2", out))
 
 
+def fix(stamp_ns, latitude=46.5, variances=(1.0, 1.0, 4.0), frame_id="r1/gnss", status=0):
+    out = ros_stub.TYPES["sensor_msgs/NavSatFix"]()
+    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+    out.header.frame_id, out.status.status = frame_id, status
+    out.latitude, out.longitude, out.altitude = latitude, 7.9, 600.0
+    east, north, up = variances
+    out.position_covariance = [east, 0.0, 0.0, 0.0, north, 0.0, 0.0, 0.0, up]
+    out.position_covariance_type = 2
+    return ros_stub.decode("sensor_msgs/NavSatFix", ros_stub.encode("sensor_msgs/NavSatFix", out))
+
+
 def pose_at(x):
     return (float(x), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node on a stub of rclpy, with programs at the other end: run by tutti_ros_test.py."""
+import json
 import os
 import pathlib
 import random
@@ -11,7 +12,7 @@ import time
 import unittest
 
 import ros_stub
-from made_messages import cloud, odometry, pose_at
+from made_messages import cloud, fix, odometry, pose_at
 from paths import SOURCE, TUTTI
 from tutti_ros import from_ros
 from tutti_ros.node import TuttiNode
@@ -45,6 +46,13 @@ class Programs(unittest.TestCase):
         self.addCleanup(node.destroy_node)
         return node
 
+    def fed(self, name):
+        """What its status says of its feed."""
+        try:
+            return json.loads((self.path / name / "status.json").read_text())["feed"]
+        except (OSError, ValueError):
+            return {}
+
     def wait_for(self, condition, what):
         end = time.monotonic() + PATIENCE_S
         while not condition():
@@ -64,6 +72,7 @@ class Programs(unittest.TestCase):
                 node.callbacks["odom"](odometry((1 + i) * 10**8, pose_at(0.05 * i)))
                 if i % 5 == 0:
                     node.callbacks["points"](cloud(columns, stamp_ns=(1 + i) * 10**8))
+                    node.callbacks["fix"](fix((1 + i) * 10**8))
                 time.sleep(0.002)
 
         drive(0, 50)  # nobody is there yet, and tf2 knows nothing
@@ -71,8 +80,11 @@ class Programs(unittest.TestCase):
         node.callbacks["publish_diagnostics"]()
         status = node.made["/diagnostics"].said[-1].status[0]
         self.assertEqual(status.level, b"\2")
-        self.assertIn("no transform from", "".join(pair.value for pair in status.values))
-        ros_stub.Tf.known["r1/base_link", "r1/lidar"] = lidar
+        said = "".join(pair.value for pair in status.values)
+        self.assertIn("points: no transform from 'r1/lidar'", said)
+        self.assertIn("fixes are taken as of an antenna at the body's origin: no transform from 'r1/gnss'", said)
+        for frame in ("r1/lidar", "r1/gnss"):
+            ros_stub.Tf.known["r1/base_link", frame] = lidar
         robot = self.start_robot("r1", bus)
         self.wait_for(lambda: node.link.counts["corrections"] == 50, "the first samples, said again")
         drive(50, 150)
@@ -82,6 +94,10 @@ class Programs(unittest.TestCase):
         self.assertEqual((sent.header.frame_id, sent.child_frame_id), ("r1/map", "r1/odom"))
         self.assertEqual(from_ros.nanoseconds(sent.header.stamp), 151 * 10**8 - 10**8 + 10**8)
         self.assertGreater(node.link.counts["scans"], 15)
+        self.assertEqual(node.link.counts["fixes"], 30)
+        self.wait_for(lambda: self.fed("r1").get("fixes") == 30, "fixes, counted by the robot")
+        self.assertEqual(self.fed("r1")["fixes_left_out"], 0)
+        self.assertEqual(node.antenna("r1/gnss"), (0.0, 0.0, 0.5))
         self.assertEqual(node.link.counts["refused"], 0, node.link.why)
 
         robot.kill()

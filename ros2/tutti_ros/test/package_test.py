@@ -41,7 +41,8 @@ class Package(unittest.TestCase):
                 made.append(self)
 
         modules = {"ament_index_python.packages": ["get_package_share_directory"], "launch": ["LaunchDescription"],
-                   "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess"], "launch.conditions": ["IfCondition"],
+                   "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess"],
+                   "launch.conditions": ["IfCondition", "UnlessCondition"],
                    "launch.substitutions": ["LaunchConfiguration", "PythonExpression"], "launch_ros.actions": ["Node"]}
         kinds = {name: type(name, (Any,), {}) for names in modules.values() for name in names}
         kinds["get_package_share_directory"] = lambda name: str(HERE.parent)

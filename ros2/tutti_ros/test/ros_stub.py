@@ -27,6 +27,9 @@ DEFINITIONS = {
     "sensor_msgs/PointField": "string name, uint32 offset, uint8 datatype, uint32 count",
     "sensor_msgs/PointCloud2": "std_msgs/Header header, uint32 height, uint32 width, sensor_msgs/PointField[] fields, "
                                "bool is_bigendian, uint32 point_step, uint32 row_step, uint8[] data, bool is_dense",
+    "sensor_msgs/NavSatStatus": "int8 status, uint16 service",
+    "sensor_msgs/NavSatFix": "std_msgs/Header header, sensor_msgs/NavSatStatus status, float64 latitude, float64 longitude, "
+                             "float64 altitude, float64[9] position_covariance, uint8 position_covariance_type",
     "diagnostic_msgs/KeyValue": "string key, string value",
     "diagnostic_msgs/DiagnosticStatus": "byte level, string name, string message, string hardware_id, "
                                         "diagnostic_msgs/KeyValue[] values",
@@ -35,7 +38,7 @@ DEFINITIONS = {
                                  "geometry_msgs/Pose pose, geometry_msgs/Vector3 scale, std_msgs/ColorRGBA color, string text",
     "visualization_msgs/MarkerArray": "visualization_msgs/Marker[] markers",
 }
-NUMBERS = {"int32": "i", "uint32": "I", "uint8": "B", "float32": "f", "float64": "d", "bool": "?"}
+NUMBERS = {"int8": "b", "uint16": "H", "int32": "i", "uint32": "I", "uint8": "B", "float32": "f", "float64": "d", "bool": "?"}
 CONSTANTS = {"visualization_msgs/Marker": {"SPHERE": 2, "TEXT_VIEW_FACING": 9, "ADD": 0, "DELETEALL": 3}}
 TYPES = {}
 
@@ -58,7 +61,7 @@ def check(kind, value, what):
         assert not length or len(value) == int(length) and all(isinstance(x, float) for x in value), what
     elif expected is None:
         expected = float if kind.startswith("float") else int
-        assert expected is float or value >= 0 or kind == "int32", what
+        assert expected is float or value >= 0 or kind in ("int8", "int32"), what
     assert isinstance(value, expected) and (expected is not int or not isinstance(value, bool)), (what, kind, value)
 
 

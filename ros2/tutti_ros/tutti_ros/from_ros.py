@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ROS messages say, as the live feed wants it. Messages are anything with the fields of nav_msgs/Odometry and
-sensor_msgs/PointCloud2; what is no sample is a ValueError that says why."""
+"""What ROS messages say, as the live feed wants it. Messages are anything with the fields of nav_msgs/Odometry,
+sensor_msgs/PointCloud2 and sensor_msgs/NavSatFix; what is no sample is a ValueError that says why."""
 import dataclasses
 import math
 
@@ -51,6 +51,19 @@ class OdometryNoise:
         return (add(self.translation_m_per_sqrt_m, self.translation_m_per_sqrt_deg, self.translation_m_per_sqrt_s),
                 add(self.rotation_deg_per_sqrt_m, self.rotation_deg_per_sqrt_deg, self.rotation_deg_per_sqrt_s)
                 * math.radians(1.0)**2)
+
+
+def fix_of(message):
+    """(stamp_ns, (latitude_deg, longitude_deg, height_m), covariance), or None: the receiver has no fix. The covariance is
+    9 numbers in m^2, east, north, up, row by row; none where it is not stated: of type 0, or 0 or -1 as with many drivers."""
+    if message.status.status < 0:
+        return None
+    place = (message.latitude, message.longitude, message.altitude)
+    if not all(map(math.isfinite, place)):
+        raise ValueError(f"a place {place} that is none, expected finite numbers")
+    covariance = [float(x) for x in message.position_covariance]
+    is_stated = message.position_covariance_type != 0 and all(x > 0.0 for x in covariance[::4])
+    return nanoseconds(message.header.stamp), place, covariance if is_stated else []
 
 
 def points_of(message):

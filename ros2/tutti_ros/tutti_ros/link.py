@@ -58,7 +58,8 @@ class Sample:
     stamp_ns: int
     pose: tuple = ()        # T_odom_body; of a scan empty
     spent: tuple = (0, 0)   # variances (m^2, rad^2) of the way so far: differences are those of increments
-    frame: bytes = b""      # of a scan
+    frame: bytes = b""      # of a scan or a fix
+    kind: str = "odometry"  # as it is counted
 
 
 class Link:
@@ -71,9 +72,10 @@ class Link:
         self.most_samples, self.most_scan_bytes = most_samples, most_scan_bytes
         self.state, self.why, self.wait_s = "away", "not connected yet", FIRST_WAIT_S
         self.counts = collections.Counter()
-        self.kept, self.scan_bytes = collections.deque(), 0
+        self.kept, self.scan_bytes = collections.deque(), 0  # bytes of fixes too
         self.waiting = collections.deque()  # those of `kept` that are to be said on this connection
         self.last = None           # the newest odometry sample
+        self.last_fix_ns = None
         self.known_spent = None    # of the newest that the robot has; None: one that this program did not see
         self.welcome, self.goodbye, self.received = None, False, b""
 
@@ -90,7 +92,18 @@ class Link:
         self._add(self.last)
 
     def add_scan(self, stamp_ns, points, ages):
-        self._add(Sample(stamp_ns, frame=scan_frame(stamp_ns, points, ages)))
+        self._add(Sample(stamp_ns, frame=scan_frame(stamp_ns, points, ages), kind="scans"))
+
+    def add_fix(self, stamp_ns, place, covariance, p_body_antenna):
+        """Of a robot that does not know of fixes (Welcome.takes) none is kept."""
+        if self.last_fix_ns is not None and stamp_ns <= self.last_fix_ns:
+            raise ValueError(f"a fix of {stamp_ns} ns after {self.last_fix_ns} ns, expected stamps to increase")
+        if self.welcome and "fix" not in self.welcome.takes:
+            raise ValueError("this robot's program is older than position fixes: it takes none")
+        self.last_fix_ns = stamp_ns
+        self._add(Sample(stamp_ns, kind="fixes", frame=frame(fix=Feed.Fix(
+            stamp_ns=stamp_ns, latitude_deg=place[0], longitude_deg=place[1], height_m=place[2],
+            covariance_m2=covariance, p_body_antenna=p_body_antenna))))
 
     def end_recording(self):
         self.goodbye = True
@@ -135,7 +148,7 @@ class Link:
             self.goodbye = False
             return frame(end_of_recording=Feed.EndOfRecording())
         sample = self.waiting.popleft()
-        self.counts["odometry" if sample.pose else "scans"] += 1
+        self.counts[sample.kind] += 1
         return sample.frame or self._odometry(sample)
 
     def _odometry(self, sample):
@@ -186,6 +199,8 @@ class Link:
         self.state, self.why, self.wait_s, self.welcome = "feeding", "", FIRST_WAIT_S, welcome
         self.known_spent = None if welcome.has_odometry else (0.0, 0.0)
         for sample in self.kept:
+            if sample.kind == "fixes" and "fix" not in welcome.takes:
+                continue
             if not welcome.has_odometry or sample.stamp_ns > welcome.last_stamp_ns:
                 self.waiting.append(sample)
             elif sample.stamp_ns == welcome.last_stamp_ns:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node: subscribes odometry and scans, feeds the robot program, publishes what it answers (docs/ros.md)."""
+"""The node: subscribes odometry, scans and position fixes, feeds the robot program, publishes what it answers (docs/ros.md)."""
 import collections
 import dataclasses
 
@@ -12,13 +12,13 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformS
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import NavSatFix, PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from tutti_ros import poses
 from tutti_ros.connection import Connection
-from tutti_ros.from_ros import OdometryNoise, odometry_of, pose_of, scan_of
+from tutti_ros.from_ros import OdometryNoise, fix_of, odometry_of, pose_of, scan_of
 from tutti_ros.link import Link, pose_from
 from tutti_ros.situation import OnMap, diagnosis
 from tutti_ros.to_ros import set_header, set_pose, set_transform, topic_part
@@ -30,7 +30,9 @@ PARAMETERS = {
     "odom_frame": "",          # empty: as odometry's header says
     "base_frame": "",          # empty: as odometry's child_frame_id says
     "T_body_lidar": "",        # "x y z qx qy qz qw"; empty: of tf2
+    "antenna_m": "",           # "x y z" of the receiver's antenna in the body frame; empty: of tf2
     "use_scans": True,
+    "use_fixes": True,
     "scans_deskewed": False,   # points' times are not looked at
     "transform_tolerance_s": 0.1,  # by which map -> odom is dated ahead
     "publish_tf": True,
@@ -48,7 +50,9 @@ class TuttiNode(Node):
         if not self.socket:
             raise ValueError("parameter 'socket' is empty, expected the SOCKET of tutti robot --feed SOCKET")
         self.frames = None  # map, odom, base
-        self.lidar_poses = {"": self._stated_lidar_pose()} if self.T_body_lidar else {}
+        self.stated_lidar = self._numbers("T_body_lidar", "x y z qx qy qz qw")
+        self.stated_antenna = self._numbers("antenna_m", "x y z")
+        self.sensor_poses = {}
         self.on_map, self.trouble = OnMap(), collections.deque(maxlen=5)
         self.mate_publishers, self.newest_tf_ns = {}, -1
         self.link = Link(noise, has_scans=self.use_scans)
@@ -63,6 +67,8 @@ class TuttiNode(Node):
         self.create_subscription(Odometry, "odom", self.take_odometry, qos_profile_sensor_data)
         if self.use_scans:
             self.create_subscription(PointCloud2, "points", self.take_points, qos_profile_sensor_data)
+        if self.use_fixes:
+            self.create_subscription(NavSatFix, "fix", self.take_fix, qos_profile_sensor_data)
         self.create_service(Trigger, "~/end_recording", self.end_recording)
         self.create_timer(self.path_period_s, self.publish_path)
         self.create_timer(1.0, self.publish_diagnostics)
@@ -72,11 +78,12 @@ class TuttiNode(Node):
         self.connection.stop()
         return super().destroy_node()
 
-    def _stated_lidar_pose(self):
-        numbers = [float(word) for word in self.T_body_lidar.split()]
-        if len(numbers) != 7:
-            raise ValueError(f"parameter 'T_body_lidar' is '{self.T_body_lidar}', expected 'x y z qx qy qz qw'")
-        return tuple(numbers)
+    def _numbers(self, parameter, expected):
+        text = getattr(self, parameter)
+        numbers = tuple(float(word) for word in text.split())
+        if numbers and len(numbers) != len(expected.split()):
+            raise ValueError(f"parameter '{parameter}' is '{text}', expected '{expected}'")
+        return numbers
 
     def _complain(self, what):
         if what not in self.trouble:
@@ -106,7 +113,7 @@ class TuttiNode(Node):
         if self.frames is None:
             return
         try:
-            T_body_lidar = self.lidar_pose(message.header.frame_id)
+            T_body_lidar = self.stated_lidar or self.sensor_pose(message.header.frame_id)
             stamp_ns, points, ages = scan_of(message, T_body_lidar, self.scans_deskewed)
             with self.connection.lock:
                 self.link.add_scan(stamp_ns, points, ages)
@@ -115,17 +122,38 @@ class TuttiNode(Node):
             return
         self.connection.wake()
 
-    def lidar_pose(self, frame_id):
-        """T_body_lidar, asked of tf2 once: sensors are bolted on."""
-        if "" in self.lidar_poses:
-            return self.lidar_poses[""]
+    def take_fix(self, message):
+        if self.frames is None:
+            return
+        try:
+            fix = fix_of(message)
+            if fix is None:
+                return
+            antenna = self.antenna(message.header.frame_id)
+            with self.connection.lock:
+                self.link.add_fix(*fix, antenna)
+        except ValueError as error:
+            self._complain(f"fixes: {error}")
+            return
+        self.connection.wake()
+
+    def antenna(self, frame_id):
+        """In the body frame. Its length is all that a fix is off by where nothing says where it is."""
+        try:
+            return self.stated_antenna or self.sensor_pose(frame_id)[:3]
+        except tf2_ros.TransformException as error:
+            self._complain(f"fixes are taken as of an antenna at the body's origin: {error}")
+            return (0.0, 0.0, 0.0)
+
+    def sensor_pose(self, frame_id):
+        """T_body_sensor, asked of tf2 once: sensors are bolted on."""
         base = self.frames[2]
         if frame_id == base:
             return poses.IDENTITY
-        if frame_id not in self.lidar_poses:
+        if frame_id not in self.sensor_poses:
             said = self.tf_buffer.lookup_transform(base, frame_id, rclpy.time.Time()).transform
-            self.lidar_poses[frame_id] = pose_of(said.translation, said.rotation)
-        return self.lidar_poses[frame_id]
+            self.sensor_poses[frame_id] = pose_of(said.translation, said.rotation)
+        return self.sensor_poses[frame_id]
 
     def end_recording(self, request, response):
         with self.connection.lock:

@@ -55,7 +55,7 @@ class OnMap:
 def diagnosis(link, on_map, trouble, is_alive=True):
     """(level, message, {key: value}) for /diagnostics. `trouble`: what kept messages from becoming samples, newest last."""
     values = {"connection": link.state, "reason": link.why, "waiting": len(link.waiting), "kept": len(link.kept),
-              **{key: link.counts[key] for key in ("odometry", "scans", "corrections", "refused", "jumps",
+              **{key: link.counts[key] for key in ("odometry", "scans", "fixes", "corrections", "refused", "jumps",
                                                    "odometry_left_out", "forgotten_while_away")}}
     if link.welcome:
         values["robot"] = f"{link.welcome.robot_name} ({link.welcome.robot}), session {link.welcome.session}"

@@ -140,6 +140,25 @@ TEST_F(BagFolders, SqliteFilesCutAnywhereAreSurvived) {
   EXPECT_TRUE(partial);
 }
 
+/// As recorders of ROS keep it while they record, and leave it when they are killed.
+TEST_F(BagFolders, ASqliteFileIsReadWithItsLogAndWithoutATrace) {
+  const fs::path closed = folder_ / "closed.db3", killed = folder_ / "killed.db3";
+  write_db3(closed, samples());
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(closed.c_str(), &db), SQLITE_OK);
+  sqlite3_exec(db,
+               "PRAGMA journal_mode=WAL; INSERT INTO messages(topic_id, timestamp, data) SELECT topic_id, timestamp, "
+               "data FROM messages LIMIT 5",
+               nullptr, nullptr, nullptr);
+  fs::copy_file(closed, killed);
+  fs::copy_file(closed.string() + "-wal", killed.string() + "-wal");
+  sqlite3_close(db);
+  const auto count = [](const fs::path& file) { return read_all(**open_bag(file.string())).messages.size(); };
+  EXPECT_EQ(count(closed), samples().size() + 5);
+  EXPECT_EQ(count(killed), samples().size() + 5);
+  for (const char* end : {"-wal", "-shm"}) EXPECT_FALSE(fs::exists(closed.string() + end)) << end;
+}
+
 TEST_F(BagFolders, PackedMessagesThatAreBrokenAreLostAlone) {
   std::vector<Sample> some = samples();
   some.resize(3);

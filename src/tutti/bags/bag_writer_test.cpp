@@ -71,10 +71,20 @@ TEST(BagWriter, OthersReadWhatIsWritten) {
     write("/lines", "visualization_msgs/msg/MarkerArray", encode(lines));
     const RosDiagnostic fine{.level = 1, .name = "alpha", .message = "all", .values = {{"key", "value"}}};
     write("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", encode({stamp, "map"}, std::span(&fine, 1)));
+    const std::array<std::int8_t, 3> cells{-1, 0, 100};
+    write("/grid", "nav_msgs/msg/OccupancyGrid",
+          encode(
+              RosOccupancyGrid{.header = {stamp, "map"}, .resolution_m = 0.5, .width = 3, .height = 1, .data = cells}));
+    const RosBall ball{.header = {stamp, "map"}, .name_space = "mates", .name = "bravo", .pose = {{1, 2, 3}}};
+    write("/balls", "visualization_msgs/msg/MarkerArray", encode(ball.header, std::span(&ball, 1)));
+    RosPoseWithCovariance sure{.header = {stamp, "map"}, .pose = {{4, 5, 6}}};
+    sure.covariance[35] = 9.0;
+    write("/sure", "geometry_msgs/msg/PoseWithCovarianceStamped", encode(sure));
+    write("/clock", "rosgraph_msgs/msg/Clock", encode_clock(stamp));
     ASSERT_TRUE(bag.close());
     const auto read = test::read_with_mcap_core(path.string());
     if (!read) GTEST_SKIP() << test::kNoMcapCore;
-    ASSERT_EQ(read->size(), 12U) << read->back();
+    ASSERT_EQ(read->size(), 16U) << read->back();
     const auto expect = [&](std::size_t i, const std::string& begin, const std::string& part) {
       const std::string& line = read->at(i);
       EXPECT_TRUE(line.starts_with(begin + " 7000000005 {")) << line;
@@ -96,6 +106,14 @@ TEST(BagWriter, OthersReadWhatIsWritten) {
     expect(10, "/lines", R"("ns":"","id":6,"type":5)");
     expect(11, "/diagnostics",
            R"("level":1,"name":"alpha","message":"all","hardware_id":"","values":[{"key":"key","value":"value"}])");
+    expect(12, "/grid", R"("resolution":0.5,"width":3,"height":1,"origin":{"position":{"x":0)");
+    expect(12, "/grid", R"("data":[-1,0,100]})");
+    expect(13, "/balls", R"("ns":"","id":0,"type":0,"action":3)");
+    expect(13, "/balls", R"("ns":"mates","id":0,"type":2,"action":0,"pose":{"position":{"x":1,"y":2,"z":3})");
+    expect(13, "/balls", R"("text":"bravo")");
+    expect(14, "/sure", R"("position":{"x":4,"y":5,"z":6})");
+    expect(14, "/sure", "0,0,0,9]}}");
+    expect(15, "/clock", R"({"clock":{"sec":7,"nanosec":5}})");
   }
   fs::remove(path);
 }

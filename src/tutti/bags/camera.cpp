@@ -109,4 +109,26 @@ Result<Image> to_image(const RosImage& message) {
   return out;
 }
 
+std::string camera_info_topic(std::string images, bool is_compressed) {
+  for (int steps = is_compressed ? 2 : 1; steps > 0; --steps) images = images.substr(0, images.rfind('/'));
+  return images + "/camera_info";
+}
+
+Result<ImuSample> to_imu_sample(const RosImu& message) {
+  if (!message.angular_velocity.allFinite() || !message.linear_acceleration.allFinite())
+    return fail(ErrorCode::invalid, "not all numbers are finite");
+  return ImuSample{message.header.stamp, message.angular_velocity, message.linear_acceleration};
+}
+
+ImuSample in_body(const ImuSample& sample, const Pose3& T_body_imu) {
+  return {sample.stamp, T_body_imu.rotation * sample.gyro, T_body_imu.rotation * sample.accelerometer};
+}
+
+Status check_imu_place(const Pose3& T_body_imu) {
+  constexpr double kSamePlace_m = 1e-3;
+  if (const double away_m = T_body_imu.translation.norm(); away_m > kSamePlace_m)
+    return fail(ErrorCode::unsupported, "is {:.3f} m from the body's origin, expected 0", away_m);
+  return {};
+}
+
 }  // namespace tutti::bags

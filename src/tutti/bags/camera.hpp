@@ -1,21 +1,39 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
+#include <string_view>
+
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/geometry/camera.hpp"
+#include "tutti/geometry/pose3.hpp"
 #include "tutti/model/image.hpp"
+#include "tutti/model/visual.hpp"
 
 namespace tutti::bags {
 
-/// Of unrectified images. Models: plumb_bob (4 or 5 numbers), rational_polynomial (8), equidistant or fisheye (4),
-/// double_sphere (2); no numbers: no distortion. The error says what it is and what was expected.
+/// The intrinsics of the unrectified images (K and D; R and P are not read). Models: plumb_bob (4 or 5 numbers),
+/// rational_polynomial (8), equidistant or fisheye (4), double_sphere (2); no numbers mean no distortion. Other models
+/// and binned images are errors that say what was expected.
 Result<CameraModel> to_camera(const RosCameraInfo& message);
 
-/// Grey: mono8, 8UC1, and by their luminance rgb8, bgr8, rgba8, bgra8, 8UC3; of a Bayer pattern each pixel is the mean
-/// of the two by two around it. Rows may be padded. Others are an error that names the encoding.
+/// The image as grey values: mono8 and 8UC1 as they are; rgb8, bgr8, rgba8, bgra8 and 8UC3 by their luminance; in a
+/// Bayer pattern of 8 bits each pixel becomes the mean of a square of two by two. Rows may be padded. Other encodings
+/// are an error that names them.
 Result<Image> to_image(const RosImage& message);
-/// Is it an encoding that to_image() takes?
+/// True for the encodings that to_image() takes.
 bool is_picture(std::string_view encoding);
+
+/// The topic of the CameraInfo that belongs to a topic of images: "/a/image_raw" and, compressed,
+/// "/a/image_raw/compressed" have "/a/camera_info" beside them.
+std::string camera_info_topic(std::string images, bool is_compressed);
+
+/// The sample in a message, in the IMU's own axes; fails unless all its numbers are finite.
+Result<ImuSample> to_imu_sample(const RosImu& message);
+/// The same sample in the axes of the body, about whose origin it was measured.
+ImuSample in_body(const ImuSample& sample, const Pose3& T_body_imu);
+/// Fails unless the IMU is in the body's origin within 1 mm: elsewhere it measures other accelerations.
+Status check_imu_place(const Pose3& T_body_imu);
 
 }  // namespace tutti::bags

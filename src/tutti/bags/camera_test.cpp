@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace tutti::bags {
 namespace camera_test {
 
@@ -52,6 +54,24 @@ TEST(BagCamera, ImagesBecomeGrey) {
   EXPECT_FALSE(grey("mono8", 0xffffffff, 0xffffffff, 0xffffffff, "abcd"));
   EXPECT_NE(grey("16UC1", 1, 1, 2, "ab").error().message.find("encoding '16UC1'"), std::string::npos);
   EXPECT_FALSE(is_picture("32FC1"));
+}
+
+TEST(BagCamera, CalibrationIsBesideImages) {
+  EXPECT_EQ(camera_info_topic("/a/image_raw", false), "/a/camera_info");
+  EXPECT_EQ(camera_info_topic("/a/image_raw/compressed", true), "/a/camera_info");
+}
+
+TEST(BagCamera, ImuSamplesAreTurnedIntoTheBodyAndMustBeFinite) {
+  RosImu message{.header = {{7}, "imu"}, .angular_velocity = {1, 2, 3}, .linear_acceleration = {4, 5, 6}};
+  const Pose3 turn{Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())), {0, 0, 0.0005}};
+  const ImuSample sample = in_body(to_imu_sample(message).value(), turn);
+  EXPECT_EQ(sample.stamp.ns, 7);
+  EXPECT_LT((sample.gyro - Eigen::Vector3d(-2, 1, 3)).norm(), 1e-12);
+  EXPECT_LT((sample.accelerometer - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
+  EXPECT_TRUE(check_imu_place(turn));
+  EXPECT_FALSE(check_imu_place({turn.rotation, {0, 0, 0.1}}));
+  message.linear_acceleration.z() = NAN;
+  EXPECT_FALSE(to_imu_sample(message));
 }
 
 }  // namespace camera_test

@@ -41,15 +41,19 @@ tl::unexpected<Error> Db3Reader::fail_sqlite() const {
 Result<Db3Reader> Db3Reader::open(const std::string& path) {
   std::error_code failure;
   if (!std::filesystem::exists(path, failure)) return fail(ErrorCode::io, "{}: cannot be opened", path);
-  // A file that was left with a write-ahead log wants its shared memory beside it, where nothing may be written: then
-  // it is taken as it stands.
-  for (const char* const how : {"?mode=ro", "?immutable=1"}) {
-    Db3Reader reader(path);
-    const Status ok = reader.start(uri_of(path, how));
-    if (ok) return reader;
-    if (std::string_view(how) == "?immutable=1") return tl::unexpected(ok.error());
-  }
-  return fail(ErrorCode::io, "{}: cannot be opened", path);
+  // What a recorder has left in a log beside the file belongs to it, and SQLite reads that only where it may write
+  // beside it too. A file without one is read without a trace.
+  const auto has = [&](const char* end) {
+    const auto size = std::filesystem::file_size(path + end, failure);
+    return !failure && size > 0;
+  };
+  const char* const log = has("-wal") ? "-wal" : has("-journal") ? "-journal" : nullptr;
+  Db3Reader reader(path);
+  const Status ok = reader.start(uri_of(path, log == nullptr ? "?immutable=1" : "?mode=ro"));
+  if (ok) return reader;
+  if (log == nullptr) return tl::unexpected(ok.error());
+  return fail(ok.error().code, "{}; {}{} beside it holds messages too: copy both to where files can be written",
+              ok.error().message, path, log);
 }
 
 Status Db3Reader::start(const std::string& uri) {

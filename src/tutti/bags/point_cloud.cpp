@@ -106,11 +106,32 @@ Result<formats::TimedCloud> to_timed_cloud(const RosPointCloud& message) {
         const RosPointField& field = xyz[static_cast<std::size_t>(i)];
         point[i] = static_cast<float>(number(at + field.offset, field.datatype, swapped));
       }
-      if (!point.allFinite()) continue;
+      const double when = time ? number(at + time->offset, time->datatype, swapped) : 0.0;
+      if (!point.allFinite() || !std::isfinite(when)) continue;
       out.cloud.points.push_back(point);
-      if (time) out.times.push_back(number(at + time->offset, time->datatype, swapped));
+      if (time) out.times.push_back(when);
     }
   return out;
+}
+
+RosPointCloud to_point_cloud(const RosHeader& header, const std::vector<std::string>& fields, std::string_view data) {
+  RosPointCloud out{.header = header, .height = 1};
+  for (const std::string& field : fields) {
+    out.fields.push_back({field, out.point_step, kFloat32, 1});
+    out.point_step += sizeof(float);
+  }
+  out.width = static_cast<std::uint32_t>(data.size() / out.point_step);
+  out.is_bigendian = std::endian::native == std::endian::big;
+  out.row_step = static_cast<std::uint32_t>(data.size());
+  out.data = data;
+  out.is_dense = true;
+  return out;
+}
+
+RosPointCloud to_point_cloud(const RosHeader& header, std::span<const Eigen::Vector3f> points) {
+  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+  return to_point_cloud(header, {"x", "y", "z"},
+                        {reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Eigen::Vector3f)});
 }
 
 }  // namespace tutti::bags

@@ -1,16 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/formats/pcd.hpp"
 
 namespace tutti::bags {
 
-/// Points in the message's frame, metres, and the time of each as it stands there (formats::is_time_field; int32,
-/// uint32 or float). x, y, z are float32 or float64 at any offset, in either byte order; rows may be padded; points of
-/// which not all numbers are finite are left out. An error says which field is missing, of another type or beyond its
-/// point, or how many bytes were expected.
+/// Points in the message's frame, m, and the unchanged times of the first field that formats::is_time_field() accepts
+/// (int32, uint32, float32 or float64). x, y, z are float32 or float64 at any offset, in either byte order; rows may be
+/// padded; points with a coordinate or a time that is not finite are left out. Errors say which field is missing, of
+/// another type or beyond its point, or how many bytes were expected.
 Result<formats::TimedCloud> to_timed_cloud(const RosPointCloud& message);
+
+/// A message of one row of points with these fields, each a float32 in this machine's byte order, packed in `data`. The
+/// message is a view of `data`.
+RosPointCloud to_point_cloud(const RosHeader& header, const std::vector<std::string>& fields, std::string_view data);
+/// A message with x, y and z, which is a view of `points`.
+RosPointCloud to_point_cloud(const RosHeader& header, std::span<const Eigen::Vector3f> points);
 
 }  // namespace tutti::bags

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
 
 #include "support/bags/robot_bag.hpp"
@@ -71,6 +72,23 @@ TEST(PointCloud, WhatIsWrongIsNamed) {
     bad.height = 1;
     EXPECT_FALSE(to_timed_cloud(bad));
   }
+}
+
+TEST(PointCloud, WhatIsMadeOfPointsIsReadAsTheyAre) {
+  const RosPointCloud message = to_point_cloud({Timestamp{5}, "lidar"}, kPoints);
+  const auto cloud = to_timed_cloud(message);
+  ASSERT_TRUE(cloud) << cloud.error().message;
+  EXPECT_EQ(cloud->cloud.points, kPoints);
+  EXPECT_TRUE(cloud->times.empty());
+  EXPECT_EQ(message.point_step, 12U);
+
+  constexpr float kNoTime = std::numeric_limits<float>::quiet_NaN();
+  const std::array<float, 12> timed{1, 2, 3, -0.5F, 7, 8, 9, kNoTime, 4, 5, 6, 0};
+  const auto with_times = to_timed_cloud(to_point_cloud({Timestamp{5}, "lidar"}, {"x", "y", "z", "time"},
+                                                        {reinterpret_cast<const char*>(timed.data()), sizeof timed}));
+  ASSERT_TRUE(with_times) << with_times.error().message;
+  EXPECT_EQ(with_times->cloud.points, (std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6}}));
+  EXPECT_EQ(with_times->times, (std::vector<double>{-0.5, 0}));
 }
 
 }  // namespace point_cloud_test

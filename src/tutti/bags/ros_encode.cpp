@@ -37,32 +37,71 @@ class Cdr {
     return number(static_cast<std::uint32_t>(list.size()));
   }
   /// Before 1970 the seconds are negative and the rest is not.
-  Cdr& header(const RosHeader& value) {
+  Cdr& time(Timestamp stamp) {
     constexpr std::int64_t kPerSecond = 1'000'000'000;
-    const std::int64_t rest = ((value.stamp.ns % kPerSecond) + kPerSecond) % kPerSecond;
-    number(static_cast<std::int32_t>((value.stamp.ns - rest) / kPerSecond));
-    return number(static_cast<std::uint32_t>(rest)).text(value.frame_id);
+    const std::int64_t rest = ((stamp.ns % kPerSecond) + kPerSecond) % kPerSecond;
+    number(static_cast<std::int32_t>((stamp.ns - rest) / kPerSecond));
+    return number(static_cast<std::uint32_t>(rest));
   }
+  Cdr& header(const RosHeader& value) { return time(value.stamp).text(value.frame_id); }
   std::string done() { return std::string("\0\1\0\0", 4) + out_.take(); }
 
  private:
   ByteWriter out_{ByteWriter::Layout::aligned};
 };
 
-void put(Cdr& out, const RosLines& lines) {
-  constexpr std::int32_t kLineList = 5, kAdd = 0;
-  out.header(lines.header).text(lines.name_space).number(lines.id).number(kLineList).number(kAdd);
-  out.pose({}).vector({lines.width_m, 0.0, 0.0});
-  for (const float channel : lines.rgba) out.number(channel);
+/// Of visualization_msgs/msg/Marker what is not the same in all that are written.
+struct Marker {
+  enum Type : std::int32_t { none = 0, sphere = 2, line_list = 5, text_view_facing = 9 };
+  enum Action : std::int32_t { add = 0, delete_all = 3 };
+  const RosHeader& header;
+  std::string_view name_space;
+  std::int32_t id = 0;
+  Type type = none;
+  Action action = add;
+  RosPose pose;
+  Eigen::Vector3d scale = Eigen::Vector3d::Zero();
+  std::array<float, 4> rgba{};
+  std::span<const Eigen::Vector3d> points;
+  std::string_view text;
+};
+
+void put(Cdr& out, const Marker& marker) {
+  out.header(marker.header).text(marker.name_space).number(marker.id).number<std::int32_t>(marker.type);
+  out.number<std::int32_t>(marker.action).pose(marker.pose).vector(marker.scale);
+  for (const float channel : marker.rgba) out.number(channel);
   out.number<std::int32_t>(0).number<std::uint32_t>(0).number<std::uint8_t>(0);  // for ever, not locked to the frame
-  out.count(lines.points);
-  for (const Eigen::Vector3d& point : lines.points) out.vector(point);
+  out.count(marker.points);
+  for (const Eigen::Vector3d& point : marker.points) out.vector(point);
   out.number<std::uint32_t>(0).text("");                       // colours, texture
   out.header({}).text("").bytes("").number<std::uint32_t>(0);  // which is no image
-  out.text("").text("").text("").bytes("").number<std::uint8_t>(0);
+  out.text(marker.text).text("").text("").bytes("").number<std::uint8_t>(0);
 }
 
 }  // namespace
+
+RosPose to_ros(const Pose3& T_frame_body) { return {T_frame_body.translation, T_frame_body.rotation}; }
+
+RosNavSatFix to_ros(const RosHeader& header, const Geodetic& place) {
+  RosNavSatFix out{.header = header};
+  out.latitude_deg = place.latitude_deg;
+  out.longitude_deg = place.longitude_deg;
+  out.altitude_m = place.height_m;
+  return out;
+}
+
+std::array<double, 36> to_ros(const Matrix6d& matrix) {
+  std::array<double, 36> out{};
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = matrix(static_cast<Eigen::Index>(i / 6), static_cast<Eigen::Index>(i % 6));
+  return out;
+}
+
+std::array<double, 36> pose_covariance(const Matrix6d& covariance, const Eigen::Quaterniond& R_frame_body) {
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R_frame_body.toRotationMatrix();
+  return to_ros(Matrix6d(turn * covariance * turn.transpose()));
+}
 
 std::string encode(const RosOdometry& message) {
   Cdr out;
@@ -126,6 +165,19 @@ std::string encode(const RosNavSatFix& message) {
 
 std::string encode(const RosPoseStamped& message) { return Cdr().header(message.header).pose(message.pose).done(); }
 
+std::string encode(const RosPoseWithCovariance& message) {
+  return Cdr().header(message.header).pose(message.pose).numbers(message.covariance).done();
+}
+
+std::string encode(const RosOccupancyGrid& message) {
+  Cdr out;
+  out.header(message.header).time(message.header.stamp).number(static_cast<float>(message.resolution_m));
+  out.number(message.width).number(message.height).pose(message.origin);
+  return out.bytes({reinterpret_cast<const char*>(message.data.data()), message.data.size()}).done();
+}
+
+std::string encode_clock(Timestamp now) { return Cdr().time(now).done(); }
+
 std::string encode(const RosPath& message) {
   Cdr out;
   out.header(message.header).count(message.poses);
@@ -136,7 +188,37 @@ std::string encode(const RosPath& message) {
 std::string encode(std::span<const RosLines> message) {
   Cdr out;
   out.count(message);
-  for (const RosLines& lines : message) put(out, lines);
+  for (const RosLines& lines : message)
+    put(out, {.header = lines.header,
+              .name_space = lines.name_space,
+              .id = lines.id,
+              .type = Marker::line_list,
+              .scale = {lines.width_m, 0.0, 0.0},
+              .rgba = lines.rgba,
+              .points = lines.points});
+  return out.done();
+}
+
+std::string encode(const RosHeader& header, std::span<const RosBall> message) {
+  Cdr out;
+  out.number(static_cast<std::uint32_t>(1 + 2 * message.size()));
+  put(out, {.header = header, .action = Marker::delete_all});
+  std::int32_t id = 0;
+  for (const RosBall& ball : message) {
+    Marker marker{.header = ball.header,
+                  .name_space = ball.name_space,
+                  .id = id++,
+                  .type = Marker::sphere,
+                  .pose = ball.pose,
+                  .scale = Eigen::Vector3d::Constant(ball.diameter_m),
+                  .rgba = ball.rgba};
+    put(out, marker);
+    marker.id = id++;
+    marker.type = Marker::text_view_facing;
+    marker.pose.position.z() += 1.6 * ball.diameter_m;
+    marker.text = ball.name;
+    put(out, marker);
+  }
   return out.done();
 }
 

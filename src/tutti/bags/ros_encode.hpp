@@ -10,9 +10,12 @@
 #include <vector>
 
 #include "tutti/bags/ros_messages.hpp"
+#include "tutti/geometry/geodesy.hpp"
+#include "tutti/geometry/pose3.hpp"
 
-/// The other way round of ros_messages.hpp: CDR (XCDR1), little endian, with its 4-byte header. What is decoded and
-/// encoded again has the same bytes, but for what decoders pass over (CameraInfo's region of interest, padding).
+/// Encodes ROS 2 messages, the inverse of ros_messages.hpp: CDR (XCDR1), little endian, with its 4-byte header. A
+/// message that is decoded and encoded again has the same bytes, except for parts that decoders skip (CameraInfo's
+/// region of interest, padding).
 namespace tutti::bags {
 
 std::string encode(const RosOdometry& message);
@@ -25,14 +28,43 @@ std::string encode(const RosCameraInfo& message);
 std::string encode(const RosNavSatFix& message);
 std::string encode(const RosPoseStamped& message);
 
-/// Written alone: what viewers show.
+RosPose to_ros(const Pose3& T_frame_body);
+/// A fix of unknown covariance.
+RosNavSatFix to_ros(const RosHeader& header, const Geodetic& place);
+/// The matrix row by row.
+std::array<double, 36> to_ros(const Matrix6d& matrix);
+/// From the covariance of T_frame_body's right perturbation [m; rad], which is in the body's axes, to ROS's covariance
+/// of a pose: of a shift along, and a turn about, the axes of the frame.
+std::array<double, 36> pose_covariance(const Matrix6d& covariance, const Eigen::Quaterniond& R_frame_body);
+
+/// Types from here on are written only, not read: they are for viewers and planners.
+struct RosPoseWithCovariance {
+  RosHeader header;
+  RosPose pose;
+  std::array<double, 36> covariance{};  ///< As RosOdometry::pose_covariance.
+};
+/// As geometry_msgs/msg/PoseWithCovarianceStamped.
+std::string encode(const RosPoseWithCovariance& message);
+
+struct RosOccupancyGrid {
+  RosHeader header;
+  double resolution_m = 0.0;
+  std::uint32_t width = 0, height = 0;
+  RosPose origin;                     ///< Pose of the corner of the first cell.
+  std::span<const std::int8_t> data;  ///< Row by row; -1 unknown, 0 free to 100 occupied.
+};
+std::string encode(const RosOccupancyGrid& message);
+
+/// rosgraph_msgs/msg/Clock
+std::string encode_clock(Timestamp now);
+
 struct RosPath {
   RosHeader header;
   std::vector<RosPoseStamped> poses;
 };
 std::string encode(const RosPath& message);
 
-/// Of visualization_msgs/msg/Marker, the kind that draws a line between every two points.
+/// A visualization_msgs/msg/Marker that draws a line between the points 2k and 2k + 1.
 struct RosLines {
   RosHeader header;
   std::string name_space;
@@ -44,9 +76,20 @@ struct RosLines {
 /// As visualization_msgs/msg/MarkerArray.
 std::string encode(std::span<const RosLines> message);
 
-/// Of diagnostic_msgs/msg/DiagnosticStatus.
+/// A ball with a name above it, drawn by markers.
+struct RosBall {
+  RosHeader header;
+  std::string name_space, name;
+  RosPose pose;
+  double diameter_m = 0.5;
+  std::array<float, 4> rgba{1.0F, 1.0F, 1.0F, 1.0F};
+};
+/// A visualization_msgs/msg/MarkerArray that replaces all markers shown on its topic before.
+std::string encode(const RosHeader& header, std::span<const RosBall> message);
+
+/// A diagnostic_msgs/msg/DiagnosticStatus.
 struct RosDiagnostic {
-  std::uint8_t level = 0;  ///< 0 fine, 1 a warning, 2 an error, 3 stale.
+  std::uint8_t level = 0;  ///< 0 OK, 1 warning, 2 error, 3 stale.
   std::string name, message, hardware_id;
   std::vector<std::pair<std::string, std::string>> values;
 };

@@ -17,7 +17,6 @@ struct Scene {
   std::vector<Pose3> server;
   std::vector<Pose3> increments;
   const WalkWithClosures* map = nullptr;
-  std::optional<std::size_t> budget;
   PolicyConfig config;
   Ledger ledger;
   std::uint64_t update = 0;
@@ -27,12 +26,11 @@ struct Scene {
     auto graph = build_proxy_graph(++update, server_nodes(kAlpha, server), {{kAlpha, 0}}, {});
     graph.uncertainties = {map->uncertainty(graph, kAlpha)};
     const auto nodes = robot_nodes(integrate({}, increments), increments);
-    const Comparison comparison{.pairs = synchronise(graph, kAlpha, nodes).pairs};  // all that it looks at
-    const auto policy = *make_policy("adaptive", config);
-    const DisagreementTest test(graph, kAlpha, comparison.pairs, update, {});
-    const Disagreement found = test(odometry_at(nodes, comparison.pairs));
-    const auto selection =
-        policy->choose({graph, kAlpha, nodes, comparison, budget, Rng(update), ledger, &test, &found});
+    const auto pairs = synchronise(graph, kAlpha, nodes).pairs;
+    const auto policy = *make_policy(config, {});
+    const DisagreementTest test(graph, kAlpha, pairs, update, {});
+    const Disagreement found = test(odometry_at(nodes, pairs));
+    const auto selection = policy->choose({graph, kAlpha, nodes, pairs, ledger, &test, &found});
     return ledger.update(selection.constraints, selection.replaces_all);
   }
 };
@@ -113,21 +111,6 @@ TEST(Adaptive, WithdrawsAllWhenTheMapComesBackToOdometry) {
   EXPECT_EQ(scene.ledger.size(), 0U);
   scene.receive();
   EXPECT_EQ(scene.ledger.size(), 0U);
-}
-
-TEST(Adaptive, RespectsTheBudgetAlsoWhenItFalls) {
-  for (const std::size_t budget : {0U, 1U, 3U, 7U}) {
-    Scene scene = drifting(2);
-    scene.receive();
-    ASSERT_GT(scene.ledger.size(), 7U);
-    scene.budget = budget;
-    scene.receive();
-    EXPECT_LE(scene.ledger.size(), budget);
-    Scene fresh = drifting(2);
-    fresh.budget = budget;
-    fresh.receive();
-    EXPECT_LE(fresh.ledger.size(), budget);
-  }
 }
 
 TEST(Adaptive, SameInputSameLinks) {

@@ -37,38 +37,12 @@ TEST(ClosedLoop, OnALongerRunSpectralTakesALinkPerNode) {
   }
 }
 
-TEST(ClosedLoop, EveryNodeReachesTheServersMapAndUniformWithFewer) {
-  const auto mission = corridor_mission(300, {}, 2);
+TEST(ClosedLoop, EveryNodeReachesTheServersMap) {
   LoopConfig config;
   config.policy.name = "every_node";
-  const auto all = run_closed_loop(mission, config);
+  const auto all = run_closed_loop(corridor_mission(300, {}, 2), config);
   EXPECT_EQ(all.constraints, 299U);
   EXPECT_LT(all.agreement_m, 0.015);
-  config.policy.name = "uniform";
-  config.policy.default_budget = 30;
-  const auto few = run_closed_loop(mission, config);
-  EXPECT_EQ(few.constraints, 30U);
-  EXPECT_LT(few.agreement_m, 0.038);
-}
-
-TEST(ClosedLoop, SkeletonAgreesWithAHandfulOfConstraints) {
-  LoopConfig config;
-  config.policy.name = "skeleton";
-  for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    config.policy.skeleton_tolerance_m = 0.02;
-    const auto close = run_closed_loop(short_mission(seed), config);
-    EXPECT_GT(close.onboard_m, 0.3);
-    EXPECT_LT(close.agreement_m, 0.015) << "seed " << seed;
-    config.policy.skeleton_tolerance_m = 0.06;
-    const auto rough = run_closed_loop(short_mission(seed), config);
-    EXPECT_LT(rough.agreement_m, 0.045) << "seed " << seed;
-    EXPECT_LE(rough.constraints, 12U) << "seed " << seed;
-    EXPECT_LT(rough.constraints, close.constraints);
-  }
-  config.policy.skeleton_tolerance_m = 0.1;
-  const auto longer = run_closed_loop(corridor_mission(400, {}, 1), config);
-  EXPECT_LT(longer.agreement_m, 0.07);
-  EXPECT_LE(longer.constraints, 20U);
 }
 
 TEST(ClosedLoop, WorksOnReducedProxyGraphs) {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "tutti/consistency/internal/drift_origins.hpp"
-#include "tutti/consistency/internal/time_chain.hpp"
+#include "tutti/consistency/time_chain.hpp"
 
 namespace tutti::consistency {
 namespace {
@@ -23,7 +23,7 @@ Explanation explain(const ProxyGraph& graph, const ChainId& id, std::span<const 
                     std::span<const NodePair> pairs, const DisagreementTest& test, Disagreement found,
                     double false_alarm_rate) {
   Explanation out;
-  const internal::TimeChain chain = internal::time_chain(graph, nodes, pairs);
+  const TimeChain chain = time_chain(graph, nodes, pairs);
   const ChainUncertainty* uncertainty = uncertainty_of(graph, id);
   const std::vector<Pose3> odometry = odometry_at(nodes, pairs);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -36,7 +36,7 @@ Explanation explain(const ProxyGraph& graph, const ChainId& id, std::span<const 
   out.position_m = std::move(found.position_m);
   out.rotation_rad = std::move(found.rotation_rad);
   out.significance = std::move(found.significance);
-  out.aligned_rmse_m = internal::aligned_rmse(chain.server, odometry);
+  out.aligned_rmse_m = aligned_rmse(chain.server, odometry);
   if (uncertainty != nullptr) out.expected_rmse_m = uncertainty->whole.position_m;
   if (!out.disagrees()) return out;  // nothing was born anywhere
   for (const internal::DriftStretch& stretch :

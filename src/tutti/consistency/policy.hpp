@@ -1,64 +1,59 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "tutti/base/config.hpp"
-#include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/consistency/compare.hpp"
 #include "tutti/consistency/constraint.hpp"
 #include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/ledger.hpp"
+#include "tutti/consistency/synchronise.hpp"
 
 namespace tutti::consistency {
 
-/// Everything a policy may look at. References live only for the call.
+/// Everything that a policy may look at. The references are valid during the call only.
 struct PolicyInput {
   const ProxyGraph& graph;
   ChainId chain;
   std::span<const RobotNode> nodes;
-  const Comparison& comparison;  ///< Only synchronised unless needs_disagreement().
-  /// How many constraints the robot may hold after this update; existing ones are counted, never taken away by a policy
-  /// that adds to them. None: the policy's own rule.
-  std::optional<std::size_t> budget;
-  Rng rng;
+  std::span<const NodePair> pairs;  ///< The synchronised nodes, in time order.
   const Ledger& ledger;
-  /// Of raw odometry against the server's map; null: fewer than two synchronised nodes, or nobody asked.
+  /// The test of raw odometry against the server's map. Null when there are fewer than two synchronised nodes, or when
+  /// nobody needs it.
   const DisagreementTest* test = nullptr;
-  const Disagreement* odometry_disagreement = nullptr;  ///< What it says.
+  const Disagreement* odometry_disagreement = nullptr;  ///< The result of the test; null with it.
 };
 
+/// The constraints that a policy chooses.
 struct Selection {
   std::vector<Constraint> constraints;
-  bool replaces_all = false;  ///< False: added to (or refreshing) the ledger. True: the ledger is to hold just these.
+  /// True: the ledger shall hold these and no others. False: they are added to the ledger, or refresh it.
+  bool replaces_all = false;
+  int order = 0;  ///< Polynomial order of the comparison that was made; 0: exact, or none was made.
 };
 
-/// How constraints are chosen. Implementations are immutable values; same input, same selection.
+/// Chooses which constraints the robot takes from the map: where, and at which scale. A function of its input only.
 class ConstraintPolicy {
  public:
   virtual ~ConstraintPolicy() = default;
   [[nodiscard]] virtual std::string name() const = 0;
-  /// Spends whatever it is given; the others know when to stop.
-  [[nodiscard]] virtual bool needs_budget() const { return false; }
-  /// Looks at PolicyInput::comparison.disagreement, which is costly: others go without.
-  [[nodiscard]] virtual bool needs_disagreement() const { return false; }
-  /// Looks at PolicyInput::test.
+  /// True if choose() uses PolicyInput::test.
   [[nodiscard]] virtual bool needs_test() const { return false; }
   [[nodiscard]] virtual Selection choose(const PolicyInput& input) const = 0;
 };
 
-/// The thresholds of `spectral` were set once, on simulated corridor missions (bench/runtime/closed_loop.cpp, five
-/// seeds: 1295 nodes in one hour, an update every 7 nodes, onboard error 1.1-2.3 m, server's own error 0.07 m), so that
-/// it adds the paper's share of constraints: 728-784, 2.6 % of 29,152 odometry factors, agreement with the server
-/// 0.04-0.07 m. The large group does the work (alone, at 0.1: 1300 links and 0.02 m; at 0.3: 540 and 0.06 m); the small
-/// group repairs bends within a submap (60 m with 0.3 degrees of yaw drift per metre: 0.7 m -> 0.010-0.016 m); the mid
-/// group hardly speaks unless something is badly wrong.
+/// Which policy, and its parameters. The thresholds of `spectral` were set once, on simulated corridor missions
+/// (bench/runtime/closed_loop.cpp; five seeds with 1295 nodes in one hour, an update every 7 nodes, onboard
+/// error 1.1-2.3 m, the server's own error 0.07 m), so that it adds the paper's share of constraints: 728-784, which
+/// is 2.6 % of 29,152 odometry factors, and agrees with the server to 0.04-0.07 m. Most of the effect is from the large
+/// group (alone, with a threshold of 0.1: 1300 constraints and 0.02 m; of 0.3: 540 and 0.06 m). The small group repairs
+/// bends within a submap (60 m with 0.3 degrees of yaw drift per metre: 0.7 m -> 0.010-0.016 m). The mid group rarely
+/// exceeds its threshold.
 struct PolicyConfig {
   std::string name = "adaptive";
   std::string classifier = "thresholds";
@@ -69,15 +64,11 @@ struct PolicyConfig {
   double top_threshold_m = 0.07;
   int mid_hops = 5;         ///< Mid-scale links go this many nodes back and forth in time.
   int nearest_submaps = 4;  ///< Large-scale links go to this many submaps.
-  int default_budget = 25;  ///< uniform and random: constraints held when no budget is given.
-  /// skeleton: links are split until every node is this close to the server's map.
-  double skeleton_tolerance_m = 0.01;
   double adaptive_error_share = 0.25;
 
   template <class V>
   void describe(V& v) {
-    v.field("name", name,
-            one_of({"none", "every_node", "every_node_2", "spectral", "uniform", "random", "skeleton", "adaptive"}),
+    v.field("name", name, one_of({"none", "every_node", "spectral", "adaptive"}),
             "How a robot chooses constraints; 'spectral' is the paper's, 'adaptive' the product's default, "
             "'none' leaves it alone.");
     v.field("classifier", classifier, one_of({"thresholds", "top"}),
@@ -96,7 +87,8 @@ struct PolicyConfig {
   }
 };
 
-/// Fails with ErrorCode::configuration when `name` is none of the above (config.name is not looked at).
-Result<std::unique_ptr<ConstraintPolicy>> make_policy(const std::string& name, const PolicyConfig& config);
+/// The policy named `config.name`; `compare` is used by `spectral`. Fails with ErrorCode::configuration when the
+/// product has no policy of this name.
+Result<std::unique_ptr<ConstraintPolicy>> make_policy(const PolicyConfig& config, const CompareConfig& compare);
 
 }  // namespace tutti::consistency

@@ -66,20 +66,22 @@ Pull pull_of(std::size_t e, const PoseGraphEdge& edge, std::span<const Pose3> po
 /// An edge in the units of its own standard deviations.
 struct Whitened {
   EdgeSlot slot;
+  int component = 0;  ///< Of the graph, that its ends are in.
   Vector6d residual;
   Matrix6d J_from;
   Matrix6d J_to;
 };
 
-Whitened whiten(const PoseGraphEdge& edge, const EdgeSlot& slot, std::span<const Pose3> poses) {
+Whitened whiten(const PoseGraphEdge& edge, const EdgeSlot& slot, int component, std::span<const Pose3> poses) {
   const BetweenLinearisation factor = linearise_between(poses[edge.from], poses[edge.to], edge.T_from_to);
   const Matrix6d upper = edge.information.llt().matrixU();
-  return {slot, upper * factor.residual, upper * factor.J_i, upper * factor.J_j};
+  return {slot, component, upper * factor.residual, upper * factor.J_i, upper * factor.J_j};
 }
 
-/// J_a H^-1 J_b^T of two edges.
+/// J_a H^-1 J_b^T of two edges; nothing joins those of two components, whose blocks are in no pattern.
 Matrix6d known_together(const Whitened& a, const Whitened& b, const SelectedInverse& inverse) {
   Matrix6d out = Matrix6d::Zero();
+  if (a.component != b.component) return out;
   for (const auto& [i, J_i] : {std::pair(a.slot.from, &a.J_from), std::pair(a.slot.to, &a.J_to)})
     for (const auto& [j, J_j] : {std::pair(b.slot.from, &b.J_from), std::pair(b.slot.to, &b.J_to)})
       if (i >= 0 && j >= 0) out += *J_i * inverse.block(i, j) * J_j->transpose();
@@ -187,8 +189,10 @@ std::vector<double> group_misfits(const PoseGraph& graph, std::span<const Pose3>
   const SelectedInverse inverse(equations.hessian().factor());
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<Whitened> group;
-    for (const std::size_t e : groups[g])
-      group.push_back(whiten(reduced.graph.edges[edge_of(e)], structure.edges[edge_of(e)], at));
+    for (const std::size_t e : groups[g]) {
+      const PoseGraphEdge& edge = reduced.graph.edges[edge_of(e)];
+      group.push_back(whiten(edge, structure.edges[edge_of(e)], structure.component[edge.from], at));
+    }
     if (!group.empty()) out[g] = misfit(group, inverse);
   }
   return out;

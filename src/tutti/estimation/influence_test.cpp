@@ -157,6 +157,20 @@ TEST(GroupMisfits, AGroupThatAloneHoldsItsEndsTogetherContradictsNothing) {
   EXPECT_TRUE(group_misfits(graph, optimum(graph), {}, {}).empty());
 }
 
+/// As of a robot whose way is in pieces: what lies in another piece is no witness.
+TEST(GroupMisfits, EdgesOfAnotherComponentSayNothing) {
+  Rng rng(3);
+  PoseGraph graph = random_graph(rng, 20, 5, 0.3).graph;
+  std::erase_if(graph.edges, [](const PoseGraphEdge& e) { return (e.from < 10) != (e.to < 10); });
+  const std::size_t first = graph.edges.size();
+  graph.edges.push_back({2, 7, random_pose(rng)});
+  graph.edges.push_back({12, 17, random_pose(rng)});
+  const Groups groups = {{first, first + 1}, {first + 1}};
+  const auto misfits = group_misfits(graph, optimum(graph), {}, groups);
+  EXPECT_GT(misfits[1], 0.0);
+  EXPECT_NEAR(misfits[0], misfits[1], 1e-9 * misfits[1]);
+}
+
 TEST(Influence, NothingToSay) {
   Rng rng(3);
   PoseGraph graph = random_graph(rng, 20, 2, 0.1).graph;

@@ -115,18 +115,7 @@ std::vector<Matrix6d> JointPosterior::relative_covariances() const {
       out[k].setZero();
       continue;
     }
-    const int u = structure.variable[a];
-    const int v = structure.variable[b];
-    // delta_a_b = delta_b - Ad(T_a_b^-1) delta_a; anchored poses do not move.
-    const Matrix6d A = adjoint(poses[b].inverse() * poses[a]);
-    Matrix6d covariance = Matrix6d::Zero();
-    if (v >= 0) covariance += inverse.block(v, v);
-    if (u >= 0) covariance += A * inverse.block(u, u) * A.transpose();
-    if (u >= 0 && v >= 0) {
-      const Matrix6d cross = A * inverse.block(u, v);
-      covariance -= cross + cross.transpose();
-    }
-    out[k] = 0.5 * (covariance + covariance.transpose());
+    out[k] = inverse.relative(structure.variable[a], structure.variable[b], poses[b].inverse() * poses[a]);
   }
   return out;
 }

@@ -92,6 +92,8 @@ Result<Scene> scene_of_map(const storage::TableStore& store, const mapfile::Cont
                             "odometry failed",
                             {{"off_m", fmt::format("{:.3f}", failed.jump_m)},
                              {"off_deg", fmt::format("{:.2f}", 1.0 / kRadPerDeg * failed.jump_rad)}}});
+  if (const auto& earth = map.fixes.georeference)
+    out.earth = {earth->origin, worlds.of(earth->component), earth->T_enu_world};
   return out;
 }
 

@@ -91,6 +91,7 @@ class Run {
     if (auto ok = read_robots(); !ok) return tl::unexpected(ok.error());
     if (const auto T = pose(member(member(report_, "server"), "T_reference_world")))
       out_.still.push_back({"world", "reference", T->inverse()});
+    add_earth();
     for (const Robot& robot : robots_) add(robot);
     for (std::size_t i = 0; i < robots_.size(); ++i) add_findings(i);
     for (const Json& row : member(member(report_, "server"), "course"))
@@ -104,6 +105,15 @@ class Run {
 
  private:
   [[nodiscard]] Timestamp at(double mission_s) const { return begin_ + mission_s; }
+
+  /// Of the largest component, whose frame the ways of all have in a run's files.
+  void add_earth() {
+    const Json& fixes = member(member(report_, "server"), "fixes");
+    const Json& origin = member(fixes, "origin");
+    const auto T_enu_world = pose(member(fixes, "T_enu_world"));
+    const Geodetic place{number(origin, "latitude_deg"), number(origin, "longitude_deg"), number(origin, "height_m")};
+    if (T_enu_world && check_geodetic(place)) out_.earth = {place, "world", *T_enu_world};
+  }
 
   /// All that the report names: their places in it are their numbers.
   Status read_robots() {

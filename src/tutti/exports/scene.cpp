@@ -10,6 +10,7 @@
 #include <span>
 
 #include "tutti/bags/bag_writer.hpp"
+#include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_encode.hpp"
 
 namespace tutti::exports {
@@ -22,8 +23,6 @@ struct Message {
   std::string topic, type, data, schema;  ///< Without a schema it is ROS's.
   bags::Durability durability = bags::Durability::volatile_;
 };
-
-bags::RosPose to_ros(const Pose3& pose) { return {pose.translation, pose.rotation}; }
 
 std::pair<Timestamp, Timestamp> span_of(const Scene& scene) {
   std::pair out{kLastTimestamp, kFirstTimestamp};
@@ -47,6 +46,7 @@ class Messages {
   std::vector<Message> all() {
     add_transforms();
     for (const Scene::Track& track : scene_.tracks) add(track);
+    add_earth();
     for (const Scene::Cloud& cloud : scene_.clouds) add(cloud);
     add_closures();
     for (const Scene::Alert& alert : scene_.alerts) add(alert);
@@ -70,6 +70,8 @@ class Messages {
     std::vector<bags::RosTransform> still;
     for (const auto& [parent, child, T] : scene_.still)
       still.push_back({{begin_, parent}, child, T.translation, T.rotation});
+    if (const auto& earth = scene_.earth)
+      still.push_back({{begin_, "enu"}, earth->frame, earth->T_enu_frame.translation, earth->T_enu_frame.rotation});
     if (!still.empty()) add_for_ever("tf_static", "tf2_msgs/msg/TFMessage", encode(still));
     for (const Scene::Motion& motion : scene_.motions)
       for (const auto& [stamp, T] : motion.poses) {
@@ -78,26 +80,31 @@ class Messages {
       }
   }
 
+  /// The origin of enu, and where on the earth a way leads.
+  void add_earth() {
+    if (!scene_.earth) return;
+    const Scene::Earth& earth = *scene_.earth;
+    add_for_ever("origin", "sensor_msgs/msg/NavSatFix", encode(bags::to_ros({begin_, "enu"}, earth.origin)));
+    const Pose3 T_ecef_frame = enu_in_ecef(earth.origin) * earth.T_enu_frame;
+    for (const Scene::Track& track : scene_.tracks)
+      for (const StampedPose& pose : track.poses)
+        if (track.frame == earth.frame)
+          add(shifted(pose.stamp), track.topic + "/fix", "sensor_msgs/msg/NavSatFix",
+              encode(bags::to_ros({shifted(pose.stamp), "enu"}, geodetic_of(T_ecef_frame * pose.pose.translation))));
+  }
+
   void add(const Scene::Track& track) {
     bags::RosPath path{.header = {begin_, track.frame}, .poses = {}};
     for (const StampedPose& pose : track.poses) {
-      path.poses.push_back({{shifted(pose.stamp), track.frame}, to_ros(pose.pose)});
+      path.poses.push_back({{shifted(pose.stamp), track.frame}, bags::to_ros(pose.pose)});
       add(shifted(pose.stamp), track.topic + "/pose", "geometry_msgs/msg/PoseStamped", encode(path.poses.back()));
     }
     add_for_ever(track.topic, "nav_msgs/msg/Path", encode(path));
   }
 
   void add(const Scene::Cloud& cloud) {
-    const std::vector<Eigen::Vector3f>& points = cloud.cloud.points;
-    constexpr std::uint8_t kFloat32 = 7;
-    bags::RosPointCloud out{.header = {begin_, cloud.frame}, .height = 1};
-    out.width = static_cast<std::uint32_t>(points.size());
-    out.fields = {{"x", 0, kFloat32, 1}, {"y", 4, kFloat32, 1}, {"z", 8, kFloat32, 1}};
-    out.point_step = sizeof(Eigen::Vector3f);
-    out.row_step = out.point_step * out.width;
-    out.data = {reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Eigen::Vector3f)};
-    out.is_dense = true;
-    add_for_ever(cloud.topic, "sensor_msgs/msg/PointCloud2", encode(out));
+    add_for_ever(cloud.topic, "sensor_msgs/msg/PointCloud2",
+                 encode(bags::to_point_cloud({begin_, cloud.frame}, cloud.cloud.points)));
   }
 
   void add_closures() {

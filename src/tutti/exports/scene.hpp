@@ -3,19 +3,22 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tutti/base/result.hpp"
+#include "tutti/geometry/geodesy.hpp"
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// What is known of a mission or a map, as viewers of robots' recordings show it.
+/// A mission or a map as an MCAP file for viewers of robots' recordings.
 namespace tutti::exports {
 
-/// One file for all: names are ROS's, without a leading slash ("alpha/server"); stamps are of one clock.
+/// What the file is to show. Names of topics and frames are ROS's, without a leading slash ("alpha/server"); all stamps
+/// are of one clock.
 struct Scene {
   struct Track {
     std::string topic, frame;
@@ -35,12 +38,12 @@ struct Scene {
     PointCloud cloud;
   };
   struct Closure {
-    std::string name, state, reason;  ///< State: accepted, rejected, candidate.
+    std::string name, state, reason;  ///< `state`: accepted, rejected or candidate.
     bool between_robots = false;
     std::string frame;
-    Timestamp stamp;  ///< Of its later end.
+    Timestamp stamp;  ///< Stamp of its later end.
     Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
-    std::vector<std::pair<std::string, double>> numbers;  ///< Of a kind that all have, or none.
+    std::vector<std::pair<std::string, double>> numbers;  ///< Either all closures have the same names or none has any.
   };
   struct Alert {
     Timestamp stamp;
@@ -48,11 +51,18 @@ struct Scene {
     std::string name, message;
     std::vector<std::pair<std::string, std::string>> values;
   };
-  /// Numbers of a moment; those of one topic have the same names.
+  /// Numbers that belong to a moment; all of one topic have the same names.
   struct Numbers {
     std::string topic;
     Timestamp stamp;
     std::vector<std::pair<std::string, double>> values;
+  };
+
+  /// Where the origin of the frame `enu` is on the earth, and where the map is in `enu`.
+  struct Earth {
+    Geodetic origin;
+    std::string frame;  ///< A frame of the map.
+    Pose3 T_enu_frame;  ///< Pose of that frame in `enu`.
   };
 
   std::vector<Track> tracks;
@@ -62,19 +72,23 @@ struct Scene {
   std::vector<Closure> closures;
   std::vector<Alert> alerts;
   std::vector<Numbers> numbers;
+  std::optional<Earth> earth;
 };
 
+/// What write_scene() has written.
 struct WrittenScene {
   std::size_t messages = 0, topics = 0;
 };
 
-/// As an MCAP file that Foxglove, Rerun and PlotJuggler open. What holds for all the time (ways as nav_msgs/Path,
-/// clouds, closures as lines of MarkerArrays by their state, /tf_static) stands at the first stamp, what moves (/tf,
-/// each way once more as PoseStamped, numbers and closures as JSON, alerts in /diagnostics) at its own. Nothing in the
-/// scene has a stamp: an error. Stamps before 1970 are moved, all by the same, to begin there.
+/// Writes an MCAP file that Foxglove, Rerun and PlotJuggler open. What holds all the time (trajectories as
+/// nav_msgs/Path, clouds, closures as lines of one MarkerArray per state, /tf_static, the origin of `enu`) is written
+/// at the first stamp; what moves (/tf, each trajectory once more as PoseStamped and, in the earth's frame, as
+/// NavSatFix, numbers and closures as JSON, alerts in /diagnostics) at its own. If there are stamps before 1970, all
+/// stamps are moved so that the first is at 1970. A scene without any stamp is an error.
 Result<WrittenScene> write_scene(const Scene& scene, const std::string& path);
 
-/// A part of a topic's or frame's name: what ROS does not allow in it becomes '_'.
+/// A part of a topic's or frame's name that ROS allows: other letters become '_', and a name that is empty or begins
+/// with a digit gets "robot_" in front.
 std::string ros_name(std::string name);
 
 }  // namespace tutti::exports

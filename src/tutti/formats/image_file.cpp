@@ -142,17 +142,27 @@ std::string encode_png(const Image& image) {
   return encode(image.width_px, image.height_px, PNG_FORMAT_GRAY, image.grey.data());
 }
 
+namespace {
+
+/// The one that is nearest to a stamp in time, and not farther than that; null: none is.
+const ImageFile* nearest(const std::vector<ImageFile>& files, Timestamp stamp, double max_difference_s) {
+  const auto away_s = [&](const ImageFile& file) { return std::abs(file.stamp - stamp); };
+  const auto after = std::ranges::lower_bound(files, stamp, {}, &ImageFile::stamp);
+  const ImageFile* found = after == files.end() ? nullptr : &*after;
+  if (after != files.begin() && (found == nullptr || away_s(*(after - 1)) < away_s(*found))) found = &*(after - 1);
+  return found != nullptr && away_s(*found) <= max_difference_s ? found : nullptr;
+}
+
+}  // namespace
+
 ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s) {
   TUTTI_CHECK(!cameras.empty());
   ImageStream out;
   for (const CameraImages& camera : cameras) out.cameras.push_back(camera.camera);
   for (const ImageFile& file : cameras[0].images) out.stamps.push_back(file.stamp);
   out.load = [cameras = std::move(cameras), max_difference_s](std::size_t moment, std::size_t camera) -> Result<Image> {
-    const Timestamp stamp = cameras[0].images.at(moment).stamp;
-    const auto& files = cameras.at(camera).images;
-    const auto file = std::ranges::lower_bound(files, stamp - max_difference_s, {}, &ImageFile::stamp);
-    if (file == files.end() || file->stamp - stamp > max_difference_s) return Image();
-    return read_image(file->path);
+    const auto* file = nearest(cameras.at(camera).images, cameras[0].images.at(moment).stamp, max_difference_s);
+    return file == nullptr ? Image() : read_image(file->path);
   };
   return out;
 }
@@ -161,12 +171,8 @@ std::size_t add_depth(ImageStream& stream, const std::vector<ImageFile>& files, 
                       double max_difference_s) {
   std::map<std::size_t, std::string> path;  // by moment
   for (std::size_t moment = 0; moment < stream.stamps.size(); ++moment) {
-    const Timestamp stamp = stream.stamps[moment];
-    const auto away_s = [&](const ImageFile& file) { return std::abs(file.stamp - stamp); };
-    const auto after = std::ranges::lower_bound(files, stamp, {}, &ImageFile::stamp);
-    auto nearest = after == files.end() && after != files.begin() ? after - 1 : after;
-    if (after != files.begin() && away_s(*(after - 1)) < away_s(*nearest)) nearest = after - 1;
-    if (nearest != files.end() && away_s(*nearest) <= max_difference_s) path.emplace(moment, nearest->path);
+    const auto* file = nearest(files, stream.stamps[moment], max_difference_s);
+    if (file != nullptr) path.emplace(moment, file->path);
   }
   stream.depth = sensor;
   const std::size_t found = path.size();

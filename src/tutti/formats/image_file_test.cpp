@@ -112,6 +112,7 @@ TEST(ImageFile, AStreamReadsTheImagesOfAMoment) {
     cameras[camera].images.push_back({Timestamp{0} + time_s, path});
   };
   for (int i = 1; i <= 4; ++i) add(0, 0.1 * i, i);
+  add(1, 0.096, 10);  // the next one is nearer
   add(1, 0.101, 11);  // a millisecond later,
   add(1, 0.299, 13);  // before; and none at the second and fourth moments
   add(1, 0.450, 14);

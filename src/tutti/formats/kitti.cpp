@@ -55,6 +55,13 @@ Result<PointCloud> parse_kitti_scan(std::string_view bytes, const std::string& n
   return PointCloud{internal::binary_points(bytes, bytes.size() / layout.stride, layout).points};
 }
 
+std::string to_kitti_scan(std::span<const Eigen::Vector3f> points) {
+  std::string out;
+  for (const Eigen::Vector3f& point : points)
+    for (const float value : {point.x(), point.y(), point.z(), 0.0F}) internal::put(out, value);
+  return out;
+}
+
 Result<PointCloud> read_kitti_scan(const std::string& path) {
   return read_file(path).and_then([&](const std::string& bytes) { return parse_kitti_scan(bytes, path); });
 }

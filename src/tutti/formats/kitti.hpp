@@ -10,10 +10,11 @@
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/trajectory.hpp"
 
-/// What lies beside KITTI's poses (trajectory_file.hpp).
+/// Reads the other files of a KITTI recording: transforms, stamps and scans. Its poses are in trajectory_file.hpp.
+/// Errors name file and line.
 namespace tutti::formats {
 
-/// A rigid motion as a 4x4 matrix, four rows of four; R as in poses, the last row 0 0 0 1, and nothing after it.
+/// A rigid transform as four rows of four numbers: R as in KITTI's poses, the last row 0 0 0 1, and nothing after it.
 Result<Pose3> parse_transform(std::string_view text, const std::string& name);
 Result<Pose3> read_transform(const std::string& path);
 
@@ -21,12 +22,14 @@ Result<Pose3> read_transform(const std::string& path);
 Result<std::vector<Timestamp>> parse_times(std::string_view text, const std::string& name);
 Result<std::vector<Timestamp>> read_times(const std::string& path);
 
-/// KITTI's scans: x, y, z and intensity of every point as little-endian floats, nothing else. Points with a non-finite
-/// coordinate are dropped.
+/// A scan: x, y, z (sensor frame, m) and intensity of every point as little-endian floats, nothing else. Points with a
+/// non-finite coordinate are dropped.
 Result<PointCloud> parse_kitti_scan(std::string_view bytes, const std::string& name);
 Result<PointCloud> read_kitti_scan(const std::string& path);
+/// A scan's bytes, with intensities of 0.
+std::string to_kitti_scan(std::span<const Eigen::Vector3f> points);
 
-/// The same poses with other stamps; as many stamps as poses, strictly increasing.
+/// The poses with other stamps, of which there must be one per pose, strictly increasing; else ErrorCode::invalid.
 Result<Trajectory> with_times(Trajectory poses, std::span<const Timestamp> times);
 
 }  // namespace tutti::formats

@@ -36,6 +36,21 @@ RC_GTEST_PROP(Kitti, RowsOfFewDigitsAreStillRotations, ()) {
   RC_ASSERT((read->front().pose.translation - pose.translation).norm() <= tolerance * (1.0 + pose.translation.norm()));
 }
 
+RC_GTEST_PROP(Kitti, WrittenPosesReadBackButForRounding, ()) {
+  const Trajectory trajectory = internal::any_trajectory();
+  const auto read = parse_kitti_poses(to_kitti_poses(trajectory), "k", 10.0, {});
+  RC_ASSERT(read.has_value() && read->size() == trajectory.size());
+  for (std::size_t i = 0; i < read->size(); ++i) {
+    RC_ASSERT((*read)[i].pose.translation == trajectory[i].pose.translation);
+    RC_ASSERT(rotation_angle(trajectory[i].pose.inverse() * (*read)[i].pose) < 1e-7);
+  }
+}
+
+TEST(Kitti, WrittenScansReadBackBitForBit) {
+  const PointCloud cloud{{{1.5F, -2.0F, 3e-7F}, {0.1F, 1e9F, -0.0F}}};
+  EXPECT_EQ(parse_kitti_scan(to_kitti_scan(cloud.points), "k").value(), cloud);
+}
+
 TEST(Kitti, RowMajorAndStampsFromTheRate) {
   const auto poses = parse_kitti_poses("0 -1 0 5 1 0 0 6 0 0 1 7\n1 0 0 1 0 1 0 2 0 0 1 3\n", "k", 10.0, {1'000});
   ASSERT_TRUE(poses);

@@ -195,4 +195,18 @@ Result<TimedCloud> read_timed_pcd(const std::string& path) {
   return read_file(path).and_then([&](const std::string& bytes) { return parse_timed_pcd(bytes, path); });
 }
 
+std::string to_pcd(std::span<const Eigen::Vector3f> points) {
+  std::string out = fmt::format(
+      "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+      "WIDTH {0}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA binary\n",
+      points.size());
+  for (const Eigen::Vector3f& point : points)
+    for (int axis = 0; axis < 3; ++axis) internal::put(out, point[axis]);
+  return out;
+}
+
+Status write_pcd(const std::string& path, std::span<const Eigen::Vector3f> points) {
+  return write_file(path, to_pcd(points));
+}
+
 }  // namespace tutti::formats

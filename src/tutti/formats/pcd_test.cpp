@@ -32,13 +32,7 @@ std::string header(const std::string& fields, const std::string& sizes, const st
       fields, sizes, types, counts, points, points, data);
 }
 
-/// Binary, fields x y z, float.
-std::string to_pcd(const PointCloud& cloud) {
-  std::string out = header("x y z", "4 4 4", "F F F", "1 1 1", cloud.points.size(), "binary");
-  for (const Eigen::Vector3f& p : cloud.points)
-    for (int axis = 0; axis < 3; ++axis) internal::put(out, p[axis]);
-  return out;
-}
+std::string to_pcd(const PointCloud& cloud) { return formats::to_pcd(cloud.points); }
 
 Result<PointCloud> parse_pcd(std::string_view bytes, const std::string& name) {
   return parse_timed_pcd(bytes, name).map([](TimedCloud&& timed) { return std::move(timed.cloud); });

@@ -90,6 +90,21 @@ Result<Trajectory> parse_euroc_csv(std::string_view text, const std::string& nam
   return read_euroc(text, name, nullptr);
 }
 
+std::string to_euroc_csv(const Trajectory& trajectory) {
+  std::string out = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []\n";
+  for (const auto& [stamp, pose] : trajectory) {
+    const Eigen::Vector3d& t = pose.translation;
+    const Eigen::Quaterniond& q = pose.rotation;
+    fmt::format_to(std::back_inserter(out), "{},{},{},{},{},{},{},{}\n", stamp.ns, t.x(), t.y(), t.z(), q.w(), q.x(),
+                   q.y(), q.z());
+  }
+  return out;
+}
+
+Status write_euroc_csv(const std::string& path, const Trajectory& trajectory) {
+  return write_file(path, to_euroc_csv(trajectory));
+}
+
 Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& name, double rate_hz, Timestamp start) {
   constexpr double kLowestRate = 1e-2;
   constexpr double kHighestRate = 1e6;
@@ -112,6 +127,19 @@ Result<Trajectory> parse_kitti_poses(std::string_view text, const std::string& n
     if (auto ok = append(line, trajectory, {stamp, {q.normalized(), m.col(3)}}); !ok) return tl::unexpected(ok.error());
   }
   return trajectory;
+}
+
+std::string to_kitti_poses(const Trajectory& trajectory) {
+  std::string out;
+  for (const StampedPose& at : trajectory) {
+    const Eigen::Matrix4d T = at.pose.matrix();
+    for (int i = 0; i < 12; ++i) fmt::format_to(std::back_inserter(out), "{}{}", T(i / 4, i % 4), i < 11 ? ' ' : '\n');
+  }
+  return out;
+}
+
+Status write_kitti_poses(const std::string& path, const Trajectory& trajectory) {
+  return write_file(path, to_kitti_poses(trajectory));
 }
 
 Result<Trajectory> read_trajectory(const std::string& path, std::string_view format, double kitti_rate_hz,

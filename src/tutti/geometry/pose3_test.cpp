@@ -44,7 +44,7 @@ RC_GTEST_PROP(Pose3, ActsLikeItsMatrix, (std::uint64_t seed)) {
 TEST(Pose3, LongChainsStayOnTheManifold) {
   Rng rng(1);
   Pose3 T;
-  for (int i = 0; i < 100'000; ++i) T = T * Pose3{test::random_rotation(rng, 0.1), {}};
+  for (int i = 0; i < 100'000; ++i) T = T * Pose3{test::random_rotation(rng, 0.1), Eigen::Vector3d::Zero()};
   EXPECT_NEAR(T.rotation.norm(), 1.0, 1e-15);
 }
 

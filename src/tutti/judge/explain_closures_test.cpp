@@ -43,7 +43,7 @@ struct Laps {
     for (std::size_t k = 0; k + 1 < kNodes; ++k) {
       truth.push_back(truth.back() * step);
       Pose3 measured = retract(step, noise(rng, 0.01, 0.001));
-      if (k == failed_at) measured = measured * Pose3{so3_exp({0.0, 0.0, missed_rad}), {}};
+      if (k == failed_at) measured = measured * Pose3{so3_exp({0.0, 0.0, missed_rad}), Eigen::Vector3d::Zero()};
       graph.poses.push_back(graph.poses.back() * measured);
       graph.edges.push_back({k, k + 1, measured, information(0.01, 0.001)});
     }
@@ -121,7 +121,7 @@ TEST(WhoIsWrong, WrongClosuresAreWrongAndHonestOdometryIsNot) {
 
 TEST(WhoIsWrong, ALoneClosureIsWrongItselfAndManyBlameTheOdometry) {
   Laps lone;
-  lone.close(20, 120, Pose3{so3_exp({0.0, 0.0, 0.3}), {}});
+  lone.close(20, 120, Pose3{so3_exp({0.0, 0.0, 0.3}), Eigen::Vector3d::Zero()});
   EXPECT_FALSE(lone.explain().accepted[0]);
   EXPECT_TRUE(lone.explain().failed.empty());
 

@@ -189,6 +189,8 @@ const char* to_string(Objection objection) {
       return "";
     case Objection::operators:
       return "by an operator";
+    case Objection::fixes:
+      return "position fixes contradict it";
     case Objection::contradicted:
       return "odometry and other closures contradict it";
     case Objection::too_few:

@@ -16,52 +16,58 @@ namespace tutti::judge {
 
 /// Why a closure is not in the map.
 enum class Objection {
-  none,          ///< It is.
+  none,          ///< The closure is in the map.
   operators,     ///< An operator has rejected it.
-  contradicted,  ///< Odometry and the other closures tell otherwise (explain_closures.hpp).
+  fixes,         ///< Fixes of both robots contradict it (server/refuted_closures.hpp).
+  contradicted,  ///< Odometry and other closures contradict it (explain_closures.hpp).
   too_few,       ///< Too few closures join these two pieces of odometry.
   misfit,        ///< It does not fit the map that the others make.
-  lone,          ///< With those of its place it contradicts all the rest of the map.
+  lone,          ///< With the other closures of its pair of places it contradicts all the rest of the map.
   no_map         ///< The map could not be solved.
 };
-const char* to_string(Objection objection);  ///< For people; empty for none.
+const char* to_string(Objection objection);  ///< A sentence's end for people; empty for none.
 
 using NodeIndex = std::unordered_map<KeyframeId, std::size_t>;
 
-/// Closures of all verdicts on submaps in the map, in a fixed order.
+/// The closures of all verdicts on submaps in the map, in a fixed order.
 struct Closures {
   std::vector<LoopClosure> judged;
-  std::vector<bool> certain;          ///< Of those: an operator has accepted it.
-  std::vector<LoopClosure> rejected;  ///< By an operator.
+  std::vector<bool> certain;          ///< Per judged closure whether an operator has accepted it.
+  std::vector<LoopClosure> rejected;  ///< Rejected by an operator.
+  std::vector<LoopClosure> refuted;   ///< Refuted by position fixes.
 };
 
-/// What an explanation of the closures makes of the map.
+/// The map that follows from a judgement of the closures.
 struct Optimum {
   std::vector<FailedStretch> failed;
-  PoseGraph graph;                           ///< Odometry, let go where it failed, and the closures not rejected.
-  std::vector<std::size_t> closure_of_edge;  ///< Of the edges beyond odometry.
+  PoseGraph graph;  ///< Odometry, weakened where it failed, and the closures without objection before the solution.
+  std::vector<std::size_t> closure_of_edge;  ///< Per edge beyond odometry its position in Closures::judged.
   estimation::GncResult robust;
-  std::vector<std::size_t> fitting;   ///< Edges of closures that fit the map.
-  std::vector<Objection> objections;  ///< To each closure.
-  SearchWork work;                    ///< What it took, with the optima before this one.
+  std::vector<std::size_t> fitting;   ///< Edges of graph: the closures that fit the map.
+  std::vector<Objection> objections;  ///< Per judged closure.
+  SearchWork work;                    ///< The cost, with that of the optima before this one.
 };
 
-/// A map without closures. References live only for the call.
+/// A map without closures, as input of judge_closures(), which keeps no references.
 struct OdometryGraph {
   const std::vector<MapNode>& nodes;
-  const PoseGraph& graph;  ///< Of the nodes: odometry in its first edges.
+  const PoseGraph& graph;  ///< Over the nodes; its first odometry_edges edges are odometry.
   std::size_t odometry_edges = 0;
 };
 
-/// Which closures the map is made with, and which odometry is let go. `index`: of each keyframe among the nodes.
-/// Closures that an operator is certain of are never refused.
+/// Decides which closures the map is made with and which odometry has failed: explain_closures(), then, up to five
+/// times, refusal of the group of closures that alone contradicts the rest of the map (docs/math.md, "Lone witnesses").
+/// `index`: of each keyframe its position among the nodes. Closures that are certain are never refused. Numerical
+/// failures are in Optimum::robust.
 Optimum judge_closures(const OdometryGraph& map, const NodeIndex& index, const Closures& closures,
                        const WhoIsWrongConfig& config, const estimation::GncConfig& gnc);
 
-/// The inverse of a covariance, with a floor: stiffer normal equations tell nothing.
+/// The inverse of a covariance to which the variances of kLeastTranslation_m and kLeastRotation_rad were added: tighter
+/// measurements would only make the normal equations stiff.
 Matrix6d information_of(const Matrix6d& covariance);
 
-/// Adds a variance (m, rad) to failed odometry between two nodes, in equal shares to the steps of the stretch.
+/// Adds the variances sigma_m^2 and sigma_rad^2 to failed odometry between the nodes `from` and `to`, in equal shares
+/// to the steps of the stretch.
 void weaken(PoseGraph& graph, std::size_t odometry_edges, std::size_t from, std::size_t to, double sigma_m,
             double sigma_rad);
 

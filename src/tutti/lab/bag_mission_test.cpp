@@ -4,14 +4,16 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <string>
 
 #include "tutti/finders/sensor_finder_maker.hpp"
 #include "tutti/lab/mission_input.hpp"
 #include "tutti/lab/write_bags.hpp"
 #include "tutti/mapfile/content.hpp"
-#include "tutti/mission/odometry_covariance.hpp"
 #include "tutti/mission/runner.hpp"
+#include "tutti/robot/odometry_covariance.hpp"
 
 namespace tutti::lab {
 namespace bag_mission_test {
@@ -26,14 +28,17 @@ class MapOf {
     out.keep_map = [this](const storage::TableStore& store) -> Status {
       const auto content = mapfile::read(store);
       if (!content) return tl::unexpected(content.error());
+      names_ = content->names;
       map_ = mapfile::estimate(*content);
       return {};
     };
     return out;
   }
   const server::MapEstimate& operator*() const { return *map_; }
+  [[nodiscard]] const std::map<RobotId, std::string>& names() const { return names_; }
 
  private:
+  std::map<RobotId, std::string> names_;
   std::optional<server::MapEstimate> map_;
 };
 
@@ -50,7 +55,7 @@ TEST(BagMission, FromSimulatedBagsIsTheMission) {
   mission::MissionParts parts{
       .input = load_input(config, {}, 1).value(), .finder = nullptr, .refiner = nullptr, .companions = {}};
   for (mission::MissionRecording& robot : parts.input.robots)
-    robot.recording.increment_covariance = mission::increment_covariances(robot.recording.odometry, {});
+    robot.recording.increment_covariance = robot::increment_covariances(robot.recording.odometry, {});
   parts.finder = finders::make_finder(config.closures);
   MapOf simulated, recorded;
   ASSERT_TRUE(mission::run_mission(config, std::move(parts), simulated.options()));
@@ -65,6 +70,7 @@ TEST(BagMission, FromSimulatedBagsIsTheMission) {
   fs::remove_all(folder);
   ASSERT_TRUE(run) << run.error().message;
 
+  EXPECT_EQ(recorded.names().at(RobotId{1}), from_bags.robots[1].name);
   const server::MapEstimate &expected = *simulated, &actual = *recorded;
   ASSERT_EQ(actual.nodes.size(), expected.nodes.size());
   double worst = 0.0;  // m and rad

@@ -52,6 +52,7 @@ class Troubles {
       {"odometry_jumped", "steps of odometry that no body makes"},
       {"scan_refused", "wanted scans that are not there or no good"},
       {"images_refused", "times images refused"},
+      {"fix_refused", "fixes refused"},
       {"sensor_missing", "times a sensor was missing"}};
   std::map<std::string, std::pair<std::size_t, std::string>> seen_;
 };
@@ -124,21 +125,21 @@ consistency::Explanation explain_again(const mission::RobotActor& actor, const M
   robot::AgentState state = actor.node().agent().state();
   state.epoch = state.revision = 0;                // as if it had not heard it,
   if (state.comparisons > 0) --state.comparisons;  // nor compared it
-  robot::RobotAgent again(actor.id(), config.agent, Rng(1), std::move(state));
+  robot::RobotAgent again(actor.id(), config.agent, std::move(state));
   const ProxyGraphMessage own{{}, consistency::own_part(map, actor.id())};
   const auto sent = wire::decode_proxy_graph(wire::encode(own));
   return again.receive(sent ? *sent : own).explanation;
 }
 
-Result<Robot> read_robot(const MissionConfig& config, const MissionSource& source,
-                         const mission::MissionRecording& recording, const fs::path& folder, const fs::path& scores) {
+Result<Robot> read_robot(const MissionConfig& config, const mission::MissionRecording& recording,
+                         const fs::path& folder, const fs::path& scores) {
   const std::string& name = recording.recording.name;
   Robot robot;
   auto store = storage::open_sqlite_store(folder / program::kRobotFile, storage::robot_schema());
   if (!store) return tl::unexpected(store.error());
   robot.store = std::move(*store);
-  auto actor = mission::RobotActor::open(recording, {.agent = config.agent, .name = name}, config.association,
-                                         mission::agent_randomness(source.seed, name), 0, *robot.store);
+  auto actor =
+      mission::RobotActor::open(recording, {.agent = config.agent, .name = name}, config.association, 0, *robot.store);
   if (!actor) return in_context((folder / program::kRobotFile).string(), actor.error());
   robot.actor = std::move(*actor);
   robot.timing = {.robot = name, .policy = config.agent.policy.name};
@@ -196,7 +197,7 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   std::vector<Robot> robots;
   std::set<RobotId> ids;
   for (const mission::MissionRecording& recording : input->robots) {
-    auto robot = read_robot(config, source, recording, state / "robots" / recording.recording.name,
+    auto robot = read_robot(config, recording, state / "robots" / recording.recording.name,
                             state / "players" / recording.recording.name);
     if (!robot) return tl::unexpected(robot.error());
     robots.push_back(std::move(*robot));

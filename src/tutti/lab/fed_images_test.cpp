@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A robot that is fed what its cameras, LiDAR and IMU saw makes the submaps that it makes of a recording of them.
+// A robot that is fed what its cameras, LiDAR, receiver and IMU saw makes the submaps that it makes of a recording of
+// them.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -16,7 +17,9 @@
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/program/feed/feed_session.hpp"
 #include "tutti/simulation/hall_recordings.hpp"
+#include "tutti/simulation/receiver.hpp"
 #include "tutti/storage/memory_store.hpp"
+#include "tutti/wire/codec.hpp"
 
 namespace tutti::lab {
 namespace fed_images_test {
@@ -69,7 +72,7 @@ Submaps replayed(simulation::FlownRecording flown) {
   }
   const storage::MemoryStore store{storage::robot_schema()};
   const evaluation::AssociationConfig association;
-  auto actor = mission::RobotActor::open(recording, {.agent = agent()}, association, Rng(1), 7, store).value();
+  auto actor = mission::RobotActor::open(recording, {.agent = agent()}, association, 7, store).value();
   Submaps out;
   for (actor->resume({}); actor->next_time() < 1e9;) {
     actor->replay_next({});
@@ -84,9 +87,8 @@ class Fed {
  public:
   explicit Fed(const FeedSensors& sensors) {
     const auto open = [this] {
-      const Rng rng = Rng(1).fork(agent().policy.name);
       return std::make_unique<LiveRobot>(
-          std::move(node::RobotNode::open(RobotId{0}, 7, {.agent = agent()}, rng, store_).value()));
+          std::move(node::RobotNode::open(RobotId{0}, 7, {.agent = agent()}, store_).value()));
     };
     front_ = std::make_unique<FeedFront>(RobotView("alpha").state(open()->node()), FeedFront::Limits{});
     session_ = std::make_unique<FeedSession>(*front_, FeedSettings{.max_queue_kb = 100'000});
@@ -160,7 +162,7 @@ FedImages images_of(const ImageStream& stream, std::size_t moment, bool as_files
 Submaps fed(const simulation::FlownRecording& flown, bool as_files) {
   const Recording& recording = flown.recording;
   Fed robot(sensors_of(flown));
-  std::size_t imu = 0, scan = 0, images = 0;
+  std::size_t imu = 0, scan = 0, images = 0, fix = 0;
   for (std::size_t i = 0; i < recording.odometry.size(); ++i) {
     const Timestamp now = recording.odometry[i].stamp;
     robot.say(test::odometry(recording.odometry[i], i == 0 ? Matrix6d::Zero() : recording.increment_covariance[i - 1]));
@@ -168,6 +170,8 @@ Submaps fed(const simulation::FlownRecording& flown, bool as_files) {
     while (imu < recording.imu.size() && (imu == 0 || recording.imu[imu - 1].stamp < now))
       samples.push_back(recording.imu[imu++]);
     if (!samples.empty()) robot.say(test::imu(samples));
+    for (; fix < recording.fixes.size() && recording.fixes[fix].stamp <= now; ++fix)
+      robot.say(test::fix(recording.fixes[fix]));
     const auto scan_is_due = [&] {
       return moment(recording, recording.scan_stamps, scan).value_or(kLastTimestamp) <= now;
     };
@@ -202,6 +206,20 @@ TEST(FedImages, OfALidarAndAnImuMakeTheSubmapsOfTheRecording) {
   simulation::FlownRecording flown = simulate(hall("lidar", 1, false));
   for (std::int64_t i = 0; i < 700; ++i) flown.recording.imu.push_back({{i * 5000000}, {}, {0.0, 0.0, 9.81}});
   expect_same(flown, false);
+}
+
+/// Twenty fixes a second, of which two are used.
+TEST(FedImages, OfALidarAndAReceiverMakeTheSubmapsOfTheRecording) {
+  simulation::FlownRecording flown = simulate(hall("lidar", 1, false));
+  simulation::ReceiverConfig receiver;
+  receiver.rate_hz = 20.0;
+  receiver.antenna_m = {0.1, 0.0, 0.3};
+  flown.recording.fixes = simulation::simulate_fixes(flown.recording.reference, receiver, {}, Rng(1));
+  expect_same(flown, false);
+  std::size_t fixes = 0;
+  for (const std::string& bytes : fed(flown, false)) fixes += wire::decode_submap(bytes)->submap.fixes.size();
+  EXPECT_GE(fixes, 5U);
+  EXPECT_LE(fixes, 7U);
 }
 
 class SlowScans final : public ScanSource {

@@ -50,6 +50,7 @@ class Player {
   Status hear_until(const std::atomic<bool>& stop, const IsIt& is_it);
   Status say_sample(std::size_t i, const std::atomic<bool>& stop);
   Status say_sensors(Timestamp now);
+  Status say_fixes(Timestamp now, bool is_known);
   Status say_images(Timestamp now);
   void note_said(Timestamp stamp, std::size_t bytes);
   void note_stored(const std::optional<Timestamp>& stored);
@@ -67,7 +68,7 @@ class Player {
   bool wants_scan_ = false;
   std::deque<std::pair<Timestamp, std::size_t>> said_;  // stamps and bytes of what the robot has not stored yet
   std::size_t said_bytes_ = 0;
-  std::size_t imu_ = 0, scan_ = 0, images_ = 0;
+  std::size_t imu_ = 0, scan_ = 0, images_ = 0, fix_ = 0;
 };
 
 Status Player::connect(const std::atomic<bool>& stop) {
@@ -157,6 +158,7 @@ Status Player::say_sensors(Timestamp now) {
     samples.push_back(recording.imu[imu_++]);
   if (recording.images && !samples.empty() && !is_known)
     if (Status ok = client_->say(samples); !ok) return ok;
+  if (Status ok = say_fixes(now, is_known); !ok) return ok;
   const auto is_due = [&] { return moment(recording, recording.scan_stamps, scan_).value_or(kLastTimestamp) <= now; };
   for (; recording.scans && is_due(); ++scan_) {
     if (!wants_scan_ || is_known) continue;
@@ -167,6 +169,18 @@ Status Player::say_sensors(Timestamp now) {
     note_said(now, (*scan)->cloud->points.size() * sizeof(Eigen::Vector3f));
   }
   return recording.images && !is_known ? say_images(now) : Status();
+}
+
+/// As RobotActor does: none from before the first odometry.
+Status Player::say_fixes(Timestamp now, bool is_known) {
+  const Recording& recording = robot_.recording;
+  for (; fix_ < recording.fixes.size() && recording.fixes[fix_].stamp <= now; ++fix_) {
+    const PositionFix& fix = recording.fixes[fix_];
+    if (is_known || fix.stamp < recording.odometry.front().stamp) continue;
+    if (Status ok = client_->say(fix); !ok) return ok;
+    note_said(now, 0);
+  }
+  return {};
 }
 
 /// Of those that are taken at odometry's samples, the stamps are odometry's (TrackingSource).

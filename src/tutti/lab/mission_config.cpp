@@ -9,8 +9,8 @@
 #include <memory>
 #include <utility>
 
-#include "tutti/consistency/policy.hpp"
 #include "tutti/lab/demo_missions.hpp"
+#include "tutti/lab/policies.hpp"
 
 namespace tutti::lab {
 namespace {
@@ -42,6 +42,16 @@ void check_closures(const MissionConfig& config, std::vector<std::string>& probl
                     config.simulation.sensors));
 }
 
+void check_receivers(const MissionConfig& config, std::vector<std::string>& problems) {
+  for (std::size_t i = 0; i < config.receivers.size(); ++i) {
+    const simulation::ReceiverConfig& receiver = config.receivers[i];
+    if (receiver.outage_s.size() != 0 && receiver.outage_s.size() != 2)
+      problems.push_back(fmt::format("receivers.{}.outage_s: {} numbers, expected 2", i, receiver.outage_s.size()));
+    if (receiver.antenna_m.size() != 0 && receiver.antenna_m.size() != 3)
+      problems.push_back(fmt::format("receivers.{}.antenna_m: {} numbers, expected 3", i, receiver.antenna_m.size()));
+  }
+}
+
 Status check_mission(const MissionConfig& config, const std::string& name) {
   std::vector<std::string> problems;
   if (config.source == "recordings" && config.robots.empty())
@@ -50,8 +60,9 @@ Status check_mission(const MissionConfig& config, const std::string& name) {
   check_names(config.simulation.robots, "simulation.robots", problems);
   check_names(config.hall.robots, "hall.robots", problems);
   check_closures(config, problems);
+  check_receivers(config, problems);
   for (const std::string& policy : config.compare_policies)
-    if (const auto known = consistency::make_policy(policy, config.agent.policy); !known)
+    if (const auto known = make_policy(policy, config.agent, Rng(1)); !known)
       problems.push_back("compare_policies: " + known.error().message);
   for (std::string& problem : problems) problem.insert(0, ": ");
   return config_internal::to_status(name, problems);

@@ -11,14 +11,15 @@
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/simulation/degrade.hpp"
 #include "tutti/simulation/hall_recordings.hpp"
+#include "tutti/simulation/receiver.hpp"
 #include "tutti/simulation/recordings.hpp"
 #include "tutti/simulation/reference_closures.hpp"
 
 namespace tutti::lab {
 
-/// What is done to a recorded odometry before it is replayed.
+/// How recorded odometry is changed before it is replayed.
 struct RobotChanges {
-  bool random_frame = false;  ///< Draw the odometry frame from the seed: any yaw, tilt, shift.
+  bool random_frame = false;  ///< Any yaw, tilt and shift, drawn from the seed.
   simulation::DegradeConfig degrade;
   template <class V>
   void describe(V& v) {
@@ -27,7 +28,7 @@ struct RobotChanges {
   }
 };
 
-/// Closures that are made up, and those found by sensors that are made wrong.
+/// Closures that are made up from the reference, and ways to make found closures wrong.
 struct ClosureChanges {
   std::string finder = mission::MissionConfig().closures.finder;
   simulation::ReferenceClosureConfig reference;
@@ -48,16 +49,18 @@ struct ClosureChanges {
   [[nodiscard]] bool are_made_up() const { return finder == "reference"; }
 };
 
-/// A mission file: robots whose recordings are replayed, or a simulation, and what the laboratory does to either.
+/// A mission file: robots with recordings, or a simulation, and what the laboratory does to either.
 struct MissionConfig : mission::MissionConfig {
-  std::string source = "recordings";  ///< recordings (`robots`) | simulation | hall
+  std::string source = "recordings";  ///< "recordings" (of `robots`), "simulation" or "hall"
   simulation::SimulationConfig simulation;
   simulation::HallMissionConfig hall;
-  std::vector<RobotChanges> robot_changes;    ///< To `robots`, by their places; those behind the last have none.
-  ClosureChanges closure_changes;             ///< Unless these are made up, `closures` finds them.
-  std::vector<std::string> compare_policies;  ///< Beside the one the robots follow.
+  std::vector<RobotChanges> robot_changes;  ///< For `robots`, by position; those beyond its end are not changed.
+  ClosureChanges closure_changes;           ///< If these are not made up, `closures` says how closures are found.
+  std::vector<simulation::ReceiverConfig> receivers;
+  simulation::PlaceConfig place;
+  std::vector<std::string> compare_policies;  ///< In addition to the one that the robots follow.
 
-  /// All but what is of mission::MissionConfig.
+  /// Describes the fields that are not in mission::MissionConfig.
   template <class V>
   void describe(V& v) {
     v.field("source", source, one_of({"recordings", "simulation", "hall"}),
@@ -66,28 +69,31 @@ struct MissionConfig : mission::MissionConfig {
     v.field("hall", hall);
     v.field("robots", robot_changes, any(), "The robots whose recordings are replayed.");
     v.field("closures", closure_changes);
+    v.field("receivers", receivers, any(), "Simulated receivers of robots whose true poses are known.");
+    v.field("place", place, any(), "Where on the earth these robots are.");
     v.field("compare_policies", compare_policies, any(),
             "Further policies, run beside the robots' own on the same broadcasts.");
   }
 };
 
-/// Reads a mission's document; `name` is the document's. Checks nothing that a single field cannot know.
+/// Reads a mission from a document; `name` is the document's. Checks single fields only.
 Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& name);
-/// Loads a mission file, then applies --set assignments; checks what a single field cannot (unique names, files given).
+/// Loads a mission file, applies --set assignments, and checks what concerns several fields (unique names, files
+/// given).
 Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments);
-/// The same of text; `name` is for the errors.
+/// The same for a mission's text; `name` is used in errors.
 Result<MissionConfig> parse_mission(const std::string& text, const std::string& name,
                                     const std::vector<std::string>& assignments);
-/// What the robots of `tutti demo` carry: two with LiDAR in a tunnel (missions/demo.yaml), three with cameras in a hall
-/// (hall.yaml), or one with a LiDAR, one with a camera and one with both there (hall_mixed.yaml).
+/// The sensors in `tutti demo`: two robots with LiDAR in a tunnel (missions/demo.yaml); three with cameras in a hall
+/// (hall.yaml); or three in the hall with a LiDAR, a camera and both (hall_mixed.yaml).
 enum class DemoSensors { lidar, visual, both };
-/// The mission of `tutti demo`: nothing needed but the program.
+/// The built-in mission of `tutti demo`, which needs no files.
 Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments,
                                    DemoSensors sensors = DemoSensors::lidar);
 
-/// A mission file with every setting in it.
+/// The text of a mission file with every setting in it.
 std::string to_yaml(const MissionConfig& config);
-/// Every setting of a mission file.
+/// The documentation of every setting of a mission file.
 std::vector<config_internal::FieldDoc> document_mission();
 
 }  // namespace tutti::lab

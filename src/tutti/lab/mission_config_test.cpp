@@ -126,7 +126,8 @@ TEST(MissionConfig, WhereTheLidarSitsIsAPose) {
 }
 
 TEST(MissionConfig, AssignmentsAreCheckedLikeTheFile) {
-  EXPECT_EQ(problem_with(kGood, {"agent.policy.name=uniform", "robots.0.start_s=5"}), "");
+  EXPECT_EQ(problem_with(kGood, {"agent.policy.name=every_node", "compare_policies=[uniform]", "robots.0.start_s=5"}),
+            "");
   EXPECT_NE(problem_with(kGood, {"robots.0.from_share=0.7", "robots.0.to_share=0.7"}).find("from_share 0.7"),
             std::string::npos);
   EXPECT_NE(problem_with(kGood, {"compare_policies=[oracle]"}).find("oracle"), std::string::npos);

@@ -81,6 +81,23 @@ Status check_planted(const MissionConfig& config, const std::vector<mission::Mis
 
 }  // namespace
 
+/// Fixes of a receiver that nobody has would silently be none.
+Status add_fixes(const MissionConfig& config, std::uint64_t seed, const std::vector<Recording*>& robots) {
+  for (const simulation::ReceiverConfig& receiver : config.receivers) {
+    bool any = false;
+    for (Recording* robot : robots) {
+      if (!receiver.robot.empty() && receiver.robot != robot->name) continue;
+      any = true;
+      if (robot->reference.empty())
+        return fail(ErrorCode::configuration, "receivers: robot {} has no reference to make fixes of", robot->name);
+      robot->fixes = simulation::simulate_fixes(robot->reference, receiver, config.place,
+                                                Rng(seed).fork("receiver/" + robot->name));
+    }
+    if (!any) return fail(ErrorCode::configuration, "receivers: no robot is called '{}'", receiver.robot);
+  }
+  return {};
+}
+
 Result<mission::MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data,
                                          std::uint64_t seed) {
   const bool is_replayed = config.source == "recordings";
@@ -90,6 +107,9 @@ Result<mission::MissionInput> load_input(const MissionConfig& config, const std:
   if (!input) return input;
   if (!is_replayed)
     if (auto ok = mission::fit_input(config, seed, input->robots); !ok) return tl::unexpected(ok.error());
+  std::vector<Recording*> recordings;
+  for (mission::MissionRecording& robot : input->robots) recordings.push_back(&robot.recording);
+  if (auto ok = add_fixes(config, seed, recordings); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_planted(config, input->robots); !ok) return tl::unexpected(ok.error());
   return input;
 }

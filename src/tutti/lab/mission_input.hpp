@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "tutti/base/result.hpp"
 #include "tutti/lab/mission_config.hpp"
@@ -11,8 +12,13 @@
 namespace tutti::lab {
 
 /// Simulates every robot of the mission, or reads its recording and changes it as the mission says. `data` is the
-/// --data folder (may be empty for simulated robots). Planted closures name robots of the mission, or it is an error.
+/// --data folder (empty for simulated robots). Fails when a recording cannot be read, or a planted closure names a
+/// robot that the mission does not have.
 Result<mission::MissionInput> load_input(const MissionConfig& config, const std::filesystem::path& data,
                                          std::uint64_t seed);
+
+/// Adds the position fixes of the mission's simulated receivers to `robots`, by their references. Fails when a robot
+/// has no reference, or a receiver names no robot.
+Status add_fixes(const MissionConfig& config, std::uint64_t seed, const std::vector<Recording*>& robots);
 
 }  // namespace tutti::lab

@@ -104,6 +104,28 @@ Result<program::WorkerSettings> worker_settings(const MissionSource& source) {
   return out;
 }
 
+namespace {
+
+/// What the file says of the robot's messages, if it is a robot with a recording.
+Status tell_driver(const MissionConfig& config, program::RobotOptions& options) {
+  const auto robot = std::ranges::find(config.robots, options.name, &mission::RobotConfig::name);
+  if (config.source != "recordings" || robot == config.robots.end()) return {};
+  program::DriverSettings& driver = options.settings.driver;
+  driver.covariance = robot->covariance;
+  driver.scan_times = robot->scan_times_config();
+  driver.with_images = config.closures.finder != "lidar";
+  driver.most_cameras = robot->images.most_cameras;
+  driver.images_offset_s = robot->images.time_offset_s;
+  if (!robot->antenna_m.empty()) driver.p_body_antenna = Eigen::Vector3d(robot->antenna_m.data());
+  if (!mission::is_given(robot->T_body_lidar)) return {};
+  const auto T_body_lidar = mission::to_pose(robot->T_body_lidar);
+  if (!T_body_lidar) return in_context("robot " + robot->name, T_body_lidar.error());
+  driver.T_body_lidar = *T_body_lidar;
+  return {};
+}
+
+}  // namespace
+
 Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
   const auto config = load(source);
   if (!config) return tl::unexpected(config.error());
@@ -113,19 +135,19 @@ Status tell_robot(const MissionSource& source, program::RobotOptions& options) {
                       .robots = robot_names(*config),
                       .agent = config->agent,
                       .tracking = config->tracking,
-                      .randomness = mission::agent_randomness(source.seed, options.name)};
-  if (!options.feed.empty()) return {};
+                      .driver = {}};
+  if (!options.feed.empty()) return tell_driver(*config, options);
   const auto number = program::number_of(options.name, options.settings.robots, false);
   if (!number) return tl::unexpected(number.error());
   auto input = load_input(*config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
   options.duration_s = mission::duration_of(*config, input->robots);
   const auto recording = std::make_shared<const mission::MissionRecording>(std::move(input->robots.at(number->value)));
-  options.replay = [recording, association = std::make_shared<const evaluation::AssociationConfig>(config->association),
-                    randomness = options.settings.randomness](
+  options.replay = [recording,
+                    association = std::make_shared<const evaluation::AssociationConfig>(config->association)](
                        const node::RobotNodeConfig& node, std::uint64_t session,
                        const storage::TableStore& store) -> Result<std::unique_ptr<program::RobotDriver>> {
-    auto actor = mission::RobotActor::open(*recording, node, *association, randomness, session, store);
+    auto actor = mission::RobotActor::open(*recording, node, *association, session, store);
     if (!actor) return tl::unexpected(actor.error());
     return std::make_unique<ReplayedRobot>(std::move(*actor));
   };

@@ -17,8 +17,8 @@ Result<mission::MissionRecord> run_mission(const MissionConfig& config, mission:
   mission::MissionParts parts{.input = std::move(*input),
                               .finder = nullptr,
                               .refiner = finders::make_refiner(config.closures, config.refinement),
-                              .companions = [&config](const Recording& recording, const Rng& rng) {
-                                return make_shadows(recording, config.agent, config.compare_policies, rng);
+                              .companions = [&config, &options](const Recording& recording) {
+                                return make_shadows(recording, config.agent, config.compare_policies, options.seed);
                               }};
   parts.finder = make_closure_finder(config, parts.input.robots, options.seed);
   return mission::run_mission(config, std::move(parts), options);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tutti/base/check.hpp"
+
 namespace tutti::lab {
 namespace {
 
@@ -11,16 +13,20 @@ constexpr const char* kBudgetPolicy = "spectral";
 }  // namespace
 
 Shadows::Shadows(const Recording& recording, const robot::AgentConfig& config, const std::vector<std::string>& policies,
-                 const Rng& rng)
+                 std::uint64_t seed)
     : own_policy_(config.policy.name) {
-  for (const std::string& policy : policies) {
-    if (policy == own_policy_) continue;
-    robot::AgentConfig of_shadow = mission::with_sensors(config, recording);
-    of_shadow.policy.name = policy;
-    of_shadow.explain = false;  // shadows are not shown
-    shadows_.push_back({policy,
-                        std::make_unique<robot::RobotAgent>(recording.robot, 0, of_shadow, rng.fork(policy)),
-                        {.robot = recording.name, .policy = policy}});
+  const Rng rng = Rng(seed).fork("agent/" + recording.name);
+  robot::AgentConfig of_shadow = mission::with_sensors(config, recording);
+  of_shadow.explain = false;  // shadows are not shown
+  for (const std::string& name : policies) {
+    if (name == own_policy_) continue;
+    auto policy = make_policy(name, config, rng.fork(name));
+    TUTTI_CHECK(policy.has_value(), "{}", policy.error().message);
+    auto* const spends = dynamic_cast<BudgetedPolicy*>(policy->get());
+    shadows_.push_back({name,
+                        spends,
+                        std::make_unique<robot::RobotAgent>(recording.robot, 0, of_shadow, std::move(*policy)),
+                        {.robot = recording.name, .policy = name}});
   }
 }
 
@@ -33,27 +39,24 @@ void Shadows::add_moment(Timestamp stamp) {
   for (const Shadow& shadow : shadows_) shadow.agent->add_moment(stamp);
 }
 
-void Shadows::update(Shadow& shadow, const ProxyGraphMessage& message, std::optional<std::size_t> budget) {
+void Shadows::update(Shadow& shadow, const ProxyGraphMessage& message) {
   mission::UpdateStopwatch stopwatch(shadow.timing);
   const auto stage_ended = [&](robot::UpdateStage stage) { stopwatch.stage_ended(stage); };
-  if (!shadow.agent->policy().needs_budget()) budget.reset();
-  if (shadow.agent->receive(message, budget, stage_ended).synchronised > 0) stopwatch.update_ended();
+  if (shadow.agent->receive(message, stage_ended).synchronised > 0) stopwatch.update_ended();
 }
 
-std::optional<std::size_t> Shadows::before(const ProxyGraphMessage& message) {
-  const auto spectral = std::ranges::find(shadows_, kBudgetPolicy, &Shadow::policy);
-  if (spectral == shadows_.end()) return std::nullopt;
-  update(*spectral, message, std::nullopt);
-  return spectral->agent->ledger().size();
-}
-
-void Shadows::after(const ProxyGraphMessage& message, const robot::RobotAgent& own) {
-  std::optional<std::size_t> budget;
-  if (own_policy_ == kBudgetPolicy) budget = own.ledger().size();
-  for (const Shadow& shadow : shadows_)
-    if (shadow.policy == kBudgetPolicy) budget = shadow.agent->ledger().size();
-  for (Shadow& shadow : shadows_)
-    if (shadow.policy != kBudgetPolicy) update(shadow, message, budget);
+void Shadows::receive(const ProxyGraphMessage& message, const robot::RobotAgent& own) {
+  const robot::RobotAgent* gives = own_policy_ == kBudgetPolicy ? &own : nullptr;
+  for (Shadow& shadow : shadows_) {
+    if (shadow.policy != kBudgetPolicy) continue;
+    update(shadow, message);
+    gives = shadow.agent.get();
+  }
+  for (Shadow& shadow : shadows_) {
+    if (shadow.policy == kBudgetPolicy) continue;
+    if (gives && shadow.spends) shadow.spends->set_budget(gives->ledger().size());
+    update(shadow, message);
+  }
 }
 
 std::vector<std::pair<std::string, const robot::RobotAgent*>> Shadows::agents() const {
@@ -69,10 +72,10 @@ std::vector<mission::PolicyTiming> Shadows::timing() const {
 }
 
 std::unique_ptr<mission::Companions> make_shadows(const Recording& recording, const robot::AgentConfig& config,
-                                                  const std::vector<std::string>& policies, const Rng& rng) {
+                                                  const std::vector<std::string>& policies, std::uint64_t seed) {
   const auto is_other = [&](const std::string& policy) { return policy != config.policy.name; };
   if (std::ranges::none_of(policies, is_other)) return nullptr;
-  return std::make_unique<Shadows>(recording, config, policies, rng);
+  return std::make_unique<Shadows>(recording, config, policies, seed);
 }
 
 }  // namespace tutti::lab

@@ -11,8 +11,10 @@
 #include <utility>
 
 #include "tutti/bags/bag_writer.hpp"
+#include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_encode.hpp"
 #include "tutti/base/random.hpp"
+#include "tutti/lab/mission_input.hpp"
 #include "tutti/mission/resample.hpp"
 #include "tutti/simulation/hall_recordings.hpp"
 
@@ -21,13 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using bags::Durability;
-
-std::array<double, 36> rows_of(const Matrix6d& matrix) {
-  std::array<double, 36> out{};
-  for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = matrix(static_cast<Eigen::Index>(i / 6), static_cast<Eigen::Index>(i % 6));
-  return out;
-}
 
 std::array<double, 9> isotropic(double variance) { return {variance, 0, 0, 0, variance, 0, 0, 0, variance}; }
 
@@ -54,9 +49,10 @@ class RobotWriter {
   Status write_all() {
     if (auto ok = write_static(); !ok) return ok;
     // In the order of which comes first at one stamp: who has a scan has the odometry up to it.
-    std::array<Stream, 5> streams{{
+    std::array<Stream, 6> streams{{
         {[&](std::size_t i) { return stamp_of(recording_.odometry, i); }, [&](std::size_t i) { return odometry(i); }},
         {[&](std::size_t i) { return stamp_of(recording_.imu, i); }, [&](std::size_t i) { return imu(i); }},
+        {[&](std::size_t i) { return stamp_of(recording_.fixes, i); }, [&](std::size_t i) { return fix(i); }},
         {[&](std::size_t i) { return image_stamp(i); }, [&](std::size_t i) { return images(i); }},
         {[&](std::size_t i) { return scan_stamp(i); }, [&](std::size_t i) { return scan(i); }},
         {[&](std::size_t i) { return stamp_of(recording_.reference, i); }, [&](std::size_t i) { return truth(i); }},
@@ -112,6 +108,9 @@ class RobotWriter {
     if (recording_.scans) still.push_back(transform(stamp, "base_link", "lidar", robot_.T_body_lidar));
     for (std::size_t i = 0; i < robot_.images.cameras.size(); ++i)
       still.push_back(transform(stamp, "base_link", camera_name(i), robot_.images.cameras[i].T_body_camera));
+    if (!recording_.fixes.empty())
+      still.push_back(transform(stamp, "base_link", "gnss",
+                                {Eigen::Quaterniond::Identity(), recording_.fixes.front().p_body_antenna}));
     if (still.empty()) return {};
     return bag_.write("/tf_static", "tf2_msgs/msg/TFMessage", shifted(stamp), encode(still), Durability::latched);
   }
@@ -119,7 +118,7 @@ class RobotWriter {
   Status odometry(std::size_t i) {
     const StampedPose& sample = recording_.odometry[i];
     bags::RosOdometry out{.header = header(sample.stamp, "odom"), .child_frame_id = frame("base_link")};
-    out.pose = {sample.pose.translation, sample.pose.rotation};
+    out.pose = bags::to_ros(sample.pose);
     if (i > 0) {
       const StampedPose& before = recording_.odometry[i - 1];
       const double seconds = sample.stamp - before.stamp;
@@ -128,12 +127,10 @@ class RobotWriter {
       out.linear = twist.head<3>();
       out.angular = twist.tail<3>();
       const Matrix6d& increment = recording_.increment_covariance[i - 1];
-      out.twist_covariance = rows_of(increment / (seconds * seconds));
+      out.twist_covariance = bags::to_ros(increment / (seconds * seconds));
       covariance_ = compound_covariance(T_before_now, covariance_, increment);
     }
-    Matrix6d turn = Matrix6d::Zero();
-    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = sample.pose.rotation.toRotationMatrix();
-    out.pose_covariance = rows_of(turn * covariance_ * turn.transpose());
+    out.pose_covariance = bags::pose_covariance(covariance_, sample.pose.rotation);
     if (auto ok = put("odom", "nav_msgs/msg/Odometry", sample.stamp, encode(out)); !ok) return ok;
     const bags::RosTransform moved = transform(sample.stamp, "odom", "base_link", sample.pose);
     return bag_.write("/tf", "tf2_msgs/msg/TFMessage", shifted(sample.stamp), encode(std::span(&moved, 1)));
@@ -154,16 +151,10 @@ class RobotWriter {
       const std::array<float, 4> values{point.x(), point.y(), point.z(), timed ? -(*sweep.age_s)[k] : 0.0F};
       std::memcpy(data.data() + k * step, values.data(), step);
     }
-    constexpr std::uint8_t kFloat32 = 7;
-    bags::RosPointCloud out{.header = header(sweep.stamp, "lidar"), .height = 1};
-    out.fields = {{"x", 0, kFloat32, 1}, {"y", 4, kFloat32, 1}, {"z", 8, kFloat32, 1}};
-    if (timed) out.fields.push_back({"time", 12, kFloat32, 1});
-    out.width = static_cast<std::uint32_t>(points.size());
-    out.point_step = static_cast<std::uint32_t>(step);
-    out.row_step = static_cast<std::uint32_t>(data.size());
-    out.data = data;
-    out.is_dense = true;
-    return put("points", "sensor_msgs/msg/PointCloud2", sweep.stamp, encode(out));
+    std::vector<std::string> fields{"x", "y", "z"};
+    if (timed) fields.emplace_back("time");
+    return put("points", "sensor_msgs/msg/PointCloud2", sweep.stamp,
+               encode(bags::to_point_cloud(header(sweep.stamp, "lidar"), fields, data)));
   }
 
   Status imu(std::size_t i) {
@@ -177,6 +168,15 @@ class RobotWriter {
     out.linear_acceleration = sample.accelerometer;
     out.linear_acceleration_covariance = isotropic(std::pow(noise.accelerometer_noise_density, 2) * rate_hz);
     return put("imu", "sensor_msgs/msg/Imu", sample.stamp, encode(out));
+  }
+
+  Status fix(std::size_t i) {
+    const PositionFix& fix = recording_.fixes[i];
+    bags::RosNavSatFix out = bags::to_ros(header(fix.stamp, "gnss"), fix.antenna);
+    out.service = 1;  // GPS
+    for (int k = 0; k < 9; ++k) out.position_covariance[static_cast<std::size_t>(k)] = fix.covariance(k / 3, k % 3);
+    out.position_covariance_type = 3;  // known
+    return put("fix", "sensor_msgs/msg/NavSatFix", fix.stamp, encode(out));
   }
 
   Status images(std::size_t i) {
@@ -248,7 +248,11 @@ Result<std::vector<RobotToWrite>> flying_robots(const MissionConfig& config, std
 /// As mission::load_input() does, but with the images themselves and without a survey.
 Result<std::vector<RobotToWrite>> simulated_robots(const MissionConfig& config, std::uint64_t seed) {
   auto robots = config.source == "hall" ? flying_robots(config, seed) : walking_robots(config, seed);
-  if (!robots || config.odometry_hz <= 0.0) return robots;
+  if (!robots) return robots;
+  std::vector<Recording*> recordings;
+  for (RobotToWrite& robot : *robots) recordings.push_back(&robot.recording);
+  if (auto ok = add_fixes(config, seed, recordings); !ok) return tl::unexpected(ok.error());
+  if (config.odometry_hz <= 0.0) return robots;
   for (auto& [recording, images, T_body_lidar] : *robots) {
     Rng rng = Rng(seed).fork("odometry/" + recording.name);
     const auto ok = mission::resample(recording, config.odometry_hz, rng.uniform(0.0, 1.0 / config.odometry_hz));

@@ -7,6 +7,8 @@
 
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/node/words.hpp"
+#include "tutti/server/georeference.hpp"
+#include "tutti/server/refuted_closures.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -111,8 +113,11 @@ Result<Content> read(const storage::TableStore& map) {
 }
 
 server::MapEstimate estimate(const Content& content) {
-  return server::refined(server::estimate_map(content.submaps, content.verdicts, content.settings.map, content.words),
-                         content.submaps, content.refinements);
+  const server::MapConfig& config = content.settings.map;
+  return server::georeferenced(
+      server::refined(server::estimate_map_with_fixes(content.submaps, content.verdicts, config, content.words),
+                      content.submaps, content.refinements),
+      content.submaps, config.georeference, config.gnc);
 }
 
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file) {

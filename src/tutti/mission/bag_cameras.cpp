@@ -14,12 +14,8 @@
 namespace tutti::mission {
 namespace {
 
-constexpr double kSamePlace_m = 1e-3;
-
-/// "/a/image_raw" and "/a/image_raw/compressed" have "/a/camera_info" beside them.
-const bags::RosCameraInfo* info_of(const BagIndex& index, std::string topic, bool is_compressed) {
-  for (int steps = is_compressed ? 2 : 1; steps > 0; --steps) topic = topic.substr(0, topic.rfind('/'));
-  const auto at = index.cameras.find(topic + "/camera_info");
+const bags::RosCameraInfo* info_of(const BagIndex& index, const std::string& topic, bool is_compressed) {
+  const auto at = index.cameras.find(bags::camera_info_topic(topic, is_compressed));
   return at == index.cameras.end() ? nullptr : &at->second;
 }
 
@@ -53,14 +49,10 @@ void take_imu(const BagIndex& index, const std::string& body, const RobotConfig&
   const auto& [topic, track] = *at;
   const auto T_body_imu = index.tree.find(body, track.frame);
   if (!T_body_imu) return said(fmt::format("{}: no transform from '{}' to '{}'", topic, track.frame, body));
-  if (T_body_imu->translation.norm() > kSamePlace_m)
-    return said(
-        fmt::format("{}: is {:.3f} m from the body's origin, expected 0", topic, T_body_imu->translation.norm()));
+  if (const Status ok = bags::check_imu_place(*T_body_imu); !ok)
+    return said(fmt::format("{}: {}", topic, ok.error().message));
   out.imu = track.samples;
-  for (ImuSample& sample : out.imu) {
-    sample.gyro = T_body_imu->rotation * sample.gyro;
-    sample.accelerometer = T_body_imu->rotation * sample.accelerometer;
-  }
+  for (ImuSample& sample : out.imu) sample = bags::in_body(sample, *T_body_imu);
   out.notes.push_back(fmt::format("IMU of {} ({} samples, {} refused)", topic, out.imu.size(), track.refused.count));
 }
 

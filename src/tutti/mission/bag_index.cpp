@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include "tutti/bags/bag_info.hpp"
+#include "tutti/bags/camera.hpp"
+#include "tutti/bags/ros_fix.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
 namespace tutti::mission {
@@ -52,6 +54,8 @@ class Indexer {
         return take_transforms(message, topic.ends_with(kStatic));
       case bags::Use::scans:
         return take_scan(index.scans[topic], message);
+      case bags::Use::fixes:
+        return take_fix(index.fixes[topic], message);
       default:
         if (with_images_) take_sight(message);
         return;
@@ -113,6 +117,25 @@ class Indexer {
       track.refused.add(track.messages, ok.error().message);
   }
 
+  /// A receiver without a fix, or one that does not say how sure it is, is none that fails.
+  static void take_fix(FixTrack& track, const BagMessage& message) {
+    ++track.messages;
+    const auto heard = bags::decode_nav_sat_fix(message.data, encoding_of(message));
+    if (!heard) return track.refused.add(track.messages, heard.error().message);
+    const auto said = bags::to_fix(*heard);
+    if (!said) return track.refused.add(track.messages, said.error().message);
+    if (!*said) {
+      ++track.without;
+      return;
+    }
+    const auto& [fix, frame, is_stated] = **said;
+    const Status ok = track.fixes.empty() ? Status() : check_stamp(fix.stamp, track.fixes.back().stamp);
+    if (!ok) return track.refused.add(track.messages, ok.error().message);
+    if (track.fixes.empty()) track.frame = frame;
+    track.unsure += is_stated ? 0 : 1;
+    track.fixes.push_back(fix);
+  }
+
   void take_sight(const BagMessage& message) {
     const std::string& topic = message.channel->topic;
     const bags::RosEncoding encoding = encoding_of(message);
@@ -151,14 +174,13 @@ class Indexer {
     ++track.messages;
     const auto imu = bags::decode_imu(message.data, encoding_of(message));
     if (!imu) return track.refused.add(track.messages, imu.error().message);
-    const ImuSample sample{imu->header.stamp, imu->angular_velocity, imu->linear_acceleration};
     if (track.samples.empty()) track.frame = bags::frame_name(imu->header.frame_id);
-    if (!sample.gyro.allFinite() || !sample.accelerometer.allFinite())
-      return track.refused.add(track.messages, "not all numbers are finite");
+    const auto sample = bags::to_imu_sample(*imu);
+    if (!sample) return track.refused.add(track.messages, sample.error().message);
     if (!track.samples.empty())
-      if (auto ok = check_stamp(sample.stamp, track.samples.back().stamp); !ok)
+      if (auto ok = check_stamp(sample->stamp, track.samples.back().stamp); !ok)
         return track.refused.add(track.messages, ok.error().message);
-    track.samples.push_back(sample);
+    track.samples.push_back(*sample);
   }
 
   const std::string& pair_;

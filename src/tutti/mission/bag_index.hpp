@@ -11,33 +11,34 @@
 #include "tutti/bags/bag_reader.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/model/position_fix.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
 
 namespace tutti::mission {
 
-/// Messages of a topic that were not taken.
+/// The messages of one topic that were refused.
 struct Refusals {
   std::uint64_t count = 0;
-  std::string first;  ///< "message 17: stamp 5 ns, expected after 7 ns"; messages are numbered from 1.
+  std::string first;  ///< Such as "message 17: stamp 5 ns, expected after 7 ns"; messages are numbered from 1.
   void add(std::uint64_t message, const std::string& why);
 };
 
-/// Poses of one topic, or of one pair of frames of /tf.
+/// The poses of one topic, or of one pair of frames of /tf.
 struct OdometryTrack {
-  Trajectory poses;  ///< Of stamps that increase; what does not is refused.
+  Trajectory poses;  ///< Stamps increase; poses that would break this are refused.
   std::string frame, body;
   std::uint64_t messages = 0;
   Refusals refused;
 };
 
-/// Of a scan or an image.
+/// Where one scan or image is in the bag.
 struct ScanPlace {
   Timestamp stamp;
   bags::BagPosition position;
   std::uint64_t message = 0;  ///< Number in its topic, from 1.
 };
-/// Where the scans of a topic stand in the bag: 48 bytes each.
+/// The scans of one topic: only their places in the bag are kept, 48 bytes each.
 struct ScanTrack {
   std::vector<ScanPlace> scans;
   std::string frame;
@@ -45,7 +46,7 @@ struct ScanTrack {
   Refusals refused;
 };
 
-/// Images of one topic; `encoding` is "jpeg" and the like of compressed ones.
+/// The images of one topic, by their places in the bag. `encoding` is "jpeg" and the like for compressed ones.
 struct ImageTrack {
   std::vector<ScanPlace> images;
   std::string frame, encoding;
@@ -53,30 +54,42 @@ struct ImageTrack {
   std::uint64_t messages = 0;
   Refusals refused;
 };
+/// The samples of one IMU.
 struct ImuTrack {
-  std::vector<ImuSample> samples;  ///< In `frame`.
+  std::vector<ImuSample> samples;  ///< In the frame `frame`.
   std::string frame;
   std::uint64_t messages = 0;
   Refusals refused;
 };
 
-/// What a mission wants to know of a bag before it reads scans one by one. Poses of all topics that may be odometry's
-/// are held, of /tf those in frames called odom.
+/// The position fixes of one receiver.
+struct FixTrack {
+  std::vector<PositionFix> fixes;
+  std::string frame;
+  std::uint64_t messages = 0;
+  std::uint64_t without = 0;  ///< Messages that report no fix.
+  std::uint64_t unsure = 0;   ///< Fixes that do not state their uncertainty.
+  Refusals refused;
+};
+
+/// What a mission needs to know of a bag before it reads scans one by one. It has the poses of all topics that may be
+/// odometry, and of /tf the frames whose name says that they are.
 struct BagIndex {
-  std::map<std::string, OdometryTrack> odometry;    ///< nav_msgs/Odometry, by topic;
-  std::map<std::string, OdometryTrack> poses;       ///< geometry_msgs/PoseStamped;
-  std::map<std::string, OdometryTrack> transforms;  ///< "odom->base_link".
+  std::map<std::string, OdometryTrack> odometry;    ///< nav_msgs/Odometry, by topic
+  std::map<std::string, OdometryTrack> poses;       ///< geometry_msgs/PoseStamped, by topic
+  std::map<std::string, OdometryTrack> transforms;  ///< By pair of frames: "odom->base_link".
   std::map<std::string, ScanTrack> scans;
   std::map<std::string, ImageTrack> images;
   std::map<std::string, bags::RosCameraInfo> cameras;  ///< The first message of each topic.
   std::map<std::string, ImuTrack> imu;
+  std::map<std::string, FixTrack> fixes;
   bags::TransformTree tree;
   Refusals bad_transforms, bad_records;
-  std::vector<std::string> notes;  ///< The bag's own.
+  std::vector<std::string> notes;  ///< Remarks of the bag's reader.
 };
 
-/// Reads all of it once. `pair`: "map->base" is held too, whatever it is called. Images, cameras and IMUs only
-/// `with_images`.
+/// Reads the whole bag once. `pair`, such as "map->base", is kept whatever its frames are called. Images, cameras and
+/// IMUs are only indexed `with_images`.
 BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_images);
 
 }  // namespace tutti::mission

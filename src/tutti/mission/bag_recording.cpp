@@ -15,10 +15,6 @@ namespace fs = std::filesystem;
 
 const std::string kOfTransforms = "->";
 
-bool is_given(const LidarPoseConfig& pose) {
-  return !pose.translation_m.empty() || !pose.quaternion_xyzw.empty() || !pose.rpy_deg.empty();
-}
-
 std::string in_words(const OdometryTrack& track) {
   return fmt::format("{} -> {}, {} poses", track.frame.empty() ? "?" : track.frame,
                      track.body.empty() ? "?" : track.body, track.poses.size());
@@ -120,6 +116,38 @@ std::string note_refused(const std::string& topic, const Refusals& refused, std:
   return fmt::format("{}: {} of {} messages refused, the first because: {}", topic, refused.count, of, refused.first);
 }
 
+/// Of several topics that have fixes none is taken unless it is said which: mostly all but one are made of that one.
+Status take_fixes(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
+  const std::string& wanted = robot.topics.fixes;
+  std::vector<std::string> topics;
+  for (const auto& [topic, track] : index.fixes)
+    if (wanted.empty() ? !track.fixes.empty() : topic == wanted) topics.push_back(topic);
+  if (topics.empty() && wanted.empty()) return {};
+  if (topics.empty())
+    return fail(ErrorCode::invalid, "topics.fixes: '{}' is not in the bag, or no sensor_msgs/NavSatFix", wanted);
+  if (topics.size() > 1) {
+    out.notes.push_back(fmt::format("no fixes are used: several topics have some, {}; say which: {}",
+                                    fmt::join(topics, ", "), flag(robot, "fixes", topics.front())));
+    return {};
+  }
+  const FixTrack& track = index.fixes.at(topics.front());
+  out.fix_topic = topics.front();
+  out.fixes = track.fixes;
+  if (track.refused.count > 0) out.notes.push_back(note_refused(out.fix_topic, track.refused, track.messages));
+  if (track.without > 0) out.fix_note += fmt::format("; {} messages without a fix", track.without);
+  if (track.unsure > 0)
+    out.fix_note += fmt::format("; {} do not say how sure they are, taken as {:g} m and {:g} m up", track.unsure,
+                                kUnknownFix_m, kUnknownFixUp_m);
+  if (!robot.antenna_m.empty() || track.frame == body) return {};
+  const auto antenna = body.empty() ? std::nullopt : index.tree.find(body, track.frame);
+  if (antenna)
+    for (PositionFix& fix : out.fixes) fix.p_body_antenna = antenna->translation;
+  else
+    out.fix_note += fmt::format(
+        "; where the antenna is is not known (no transform from '{}' to '{}'): robots[].antenna_m", track.frame, body);
+  return {};
+}
+
 /// Scans by another clock would silently be none.
 Status check_clock(const BagRecording& bag) {
   const auto inside = [&](const ScanPlace& scan) {
@@ -155,6 +183,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   out.odometry = track.poses;
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
   if (track.refused.count > 0) out.notes.push_back(note_refused(source, track.refused, track.messages));
+  if (auto ok = take_fixes(index, track.body, robot, out); !ok) return in_context(out.file, ok.error());
   if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
     if (robot.topics.scans.empty() && index.scans.empty()) what += ", no scans (sensor_msgs/PointCloud2)";

@@ -14,7 +14,7 @@
 
 namespace tutti::mission {
 
-/// A camera of a bag with its images.
+/// A camera in a bag, with its images.
 struct BagCamera {
   std::string topic;
   Camera camera;
@@ -22,39 +22,40 @@ struct BagCamera {
   bool is_compressed = false;
 };
 
-/// What a mission takes of a bag.
+/// What a mission uses of a bag.
 struct BagRecording {
   std::string file;
   Trajectory odometry;           ///< T_odom_body
-  std::string scan_topic;        ///< Empty: it has no scans.
+  std::string scan_topic;        ///< Empty: the bag has no scans.
   std::vector<ScanPlace> scans;  ///< Stamps increase.
   Pose3 T_body_lidar;
-  std::vector<BagCamera> cameras;  ///< None, one or two;
-  std::string no_images;           ///< of none: why.
-  std::vector<ImuSample> imu;      ///< In the body frame.
-  std::vector<std::string> notes;  ///< What was taken, what was refused and why; for the report.
+  std::vector<BagCamera> cameras;   ///< None, one or two.
+  std::string no_images;            ///< Why there are no cameras.
+  std::vector<ImuSample> imu;       ///< In the body frame.
+  std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and remarks on them.
+  std::vector<PositionFix> fixes;
+  std::vector<std::string> notes;  ///< What was used, what was refused and why, for the report.
 };
 
-/// Reads `robot.bag` once. Topics are found by their types: nav_msgs/Odometry, else a pair of frames of /tf called odom
-/// and something, else geometry_msgs/PoseStamped; and sensor_msgs/PointCloud2. Where several would do, or one that
-/// `robot.topics` names is not there, the error lists them. The LiDAR is where `robot.T_body_lidar` says, else where
-/// /tf_static (and what never moves of /tf) has it; where nothing says it that is an error, which says how to. Messages
-/// that are no good are left out and counted among the notes.
-/// `with_images`: cameras are the topics of images that are pictures and have a CameraInfo beside them and a place on
-/// the body by the bag's transforms; the IMU must be in the body's origin. What lacks something of these is not used,
-/// and said.
+/// Reads `robot.bag` once. Topics are found by type. Odometry is nav_msgs/Odometry, else a pair of frames of /tf called
+/// odom and something, else geometry_msgs/PoseStamped; scans are sensor_msgs/PointCloud2. When several topics would do,
+/// or `robot.topics` names one that does not exist, the error lists them. The LiDAR's pose is `robot.T_body_lidar`,
+/// else from /tf_static (and frames of /tf that never move); having neither is an error that says what to do. Invalid
+/// messages are left out and counted in the notes. With `with_images`, cameras are the image topics that show pictures,
+/// have a CameraInfo beside them, and have a pose on the body by the bag's transforms. The IMU must be in the body's
+/// origin. Sensors that lack any of this are not used, and the notes say so.
 Result<BagRecording> read_bag(const std::filesystem::path& data, const RobotConfig& robot, bool with_images = false);
 
-/// Its scans, each read from the bag when it is asked for, so that no more than one chunk of it is in memory; in the
-/// body frame, deskewed by `odometry` where points carry times. The error names topic and message.
+/// The bag's scans, each read when it is asked for, so that at most one chunk of the bag is in memory. They are in the
+/// body frame, deskewed by `odometry` where points have times. Errors name topic and message.
 Result<std::shared_ptr<const ScanSource>> open_scans(const BagRecording& bag, const Trajectory& odometry,
                                                      const RobotConfig& robot, std::string& note);
 
-/// Points followed through its images, each read when it is asked for; of a bag with cameras.
+/// Points tracked through the bag's images, each read when it is needed; for bags with cameras.
 Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odometry, const RobotConfig& robot,
                                 const visual::TrackingConfig& tracking);
 
-/// What read_bag() takes of cameras and IMU: of bag_cameras.cpp.
+/// The part of read_bag() that deals with cameras and IMU (bag_cameras.cpp).
 void take_cameras(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out);
 
 }  // namespace tutti::mission

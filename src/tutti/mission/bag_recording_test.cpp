@@ -11,6 +11,7 @@
 #include "support/bags/robot_bag.hpp"
 #include "support/bags/ros1_writer.hpp"
 #include "support/shared_data.hpp"
+#include "tutti/bags/ros_encode.hpp"
 #include "tutti/base/config_io.hpp"
 #include "tutti/base/random.hpp"
 #include "tutti/formats/kitti.hpp"
@@ -143,6 +144,69 @@ TEST_F(Bags, ScansAreDeskewedByWhateverTimesPointsHave) {
     EXPECT_EQ(input->robots.front().recording.scan_stamps.size(), kScans);
     EXPECT_LT(error_of(*input), 1e-3) << said;
   }
+}
+
+/// With the antenna's place, without what is no fix, and with what no covariance is given for as unknown.
+TEST_F(Bags, FixesAreTakenWithTheirAntenna) {
+  constexpr const char* kFix = "sensor_msgs/msg/NavSatFix";
+  const auto samples_with = [&](const std::vector<std::string>& topics) {
+    std::vector<Sample> out = robot({});
+    out.push_back(sample_of("/tf_static", kTf, kStart,
+                            tf_of(kStart, {{"base_link", "gnss", {Eigen::Quaterniond::Identity(), {0.5, 0.1, 1.2}}}})));
+    for (const std::string& topic : topics)
+      for (int i = 0; i < 20; ++i) {
+        bags::RosNavSatFix fix{.header = {kStart + 0.2 * i, "gnss"}};
+        fix.status = i == 3 ? -1 : 0;
+        fix.latitude_deg = i == 4 ? std::numeric_limits<double>::quiet_NaN() : 46.5;
+        fix.longitude_deg = 7.9;
+        fix.altitude_m = i;
+        fix.position_covariance = {4, 0, 0, 0, 4, 0, 0, 0, 9};
+        fix.position_covariance_type = i < 10 ? 2 : 0;
+        out.push_back(sample_of(topic, kFix, fix.header.stamp, bags::encode(fix)));
+      }
+    std::ranges::stable_sort(out, {}, &Sample::ns);
+    return out;
+  };
+  write(samples_with({"/gnss/fix"}));
+  const auto input = load();
+  ASSERT_TRUE(input) << input.error().message;
+  const std::vector<PositionFix>& fixes = input->robots.front().recording.fixes;
+  ASSERT_EQ(fixes.size(), 18U);
+  EXPECT_EQ(fixes[0].p_body_antenna, Eigen::Vector3d(0.5, 0.1, 1.2));
+  EXPECT_EQ(fixes[0].covariance.diagonal(), Eigen::Vector3d(4, 4, 9));
+  EXPECT_EQ(fixes.back().covariance, unknown_fix_covariance());
+  EXPECT_EQ(fixes.back().antenna, (Geodetic{46.5, 7.9, 19}));
+  for (const char* const said : {"18 fixes of /gnss/fix, antenna at [0.50 0.10 1.20] m", "1 messages without a fix",
+                                 "10 do not say how sure", "/gnss/fix: 1 of 20 messages refused"})
+    EXPECT_NE(notes_of(*input).find(said), std::string::npos) << said << "\n" << notes_of(*input);
+
+  write(samples_with({"/gnss/fix", "/gnss/filtered"}));
+  const auto several = load();
+  ASSERT_TRUE(several) << several.error().message;
+  EXPECT_TRUE(several->robots.front().recording.fixes.empty());
+  EXPECT_NE(notes_of(*several).find("--topic alpha.fixes=/gnss/filtered"), std::string::npos) << notes_of(*several);
+  EXPECT_EQ(load({"alpha.fixes=/gnss/fix"})->robots.front().recording.fixes.size(), 18U);
+  EXPECT_NE(problem({"alpha.fixes=/nothing"}).find("'/nothing' is not in the bag"), std::string::npos);
+  const auto told = load({"alpha.fixes=/gnss/fix"}, {"robots.0.antenna_m=[1,2,3]"});
+  EXPECT_EQ(told->robots.front().recording.fixes[0].p_body_antenna, Eigen::Vector3d(1, 2, 3));
+}
+
+/// A file of fixes instead; of another clock it is refused.
+TEST_F(Bags, FixesOfAFileCountInsteadOfTheBags) {
+  write(robot({}));
+  const std::string file = (folder_ / "fixes.csv").string();
+  const auto load_with = [&](double offset_s) {
+    std::string text = "stamp_s,latitude_deg,longitude_deg,height_m\n";
+    for (int i = 0; i < 5; ++i) text += fmt::format("{:.1f},46.5,7.9,{}\n", 1'700'000'000.0 + offset_s + i, i);
+    write_bytes(file, text);
+    return load({}, {"robots.0.fixes=" + file});
+  };
+  const auto input = load_with(0.0);
+  ASSERT_TRUE(input) << input.error().message;
+  EXPECT_EQ(input->robots.front().recording.fixes.size(), 5U);
+  const auto wrong = load_with(3600.0);
+  ASSERT_FALSE(wrong);
+  EXPECT_NE(wrong.error().message.find("another clock"), std::string::npos) << wrong.error().message;
 }
 
 TEST_F(Bags, OfRos1AreRunAlike) {

@@ -9,7 +9,7 @@
 
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/mission/bag_recording.hpp"
-#include "tutti/mission/deskewed_scan.hpp"
+#include "tutti/perception/lidar/deskewed_scan.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -24,7 +24,7 @@ class BagScans final : public ScanSource {
         topic_(bag.scan_topic),
         places_(bag.scans),
         T_body_lidar_(bag.T_body_lidar),
-        odometry_(with_ends(odometry)) {}
+        odometry_(lidar::with_ends(odometry)) {}
 
   Result<std::string> look_into(const RobotConfig& robot, const Trajectory& odometry) {
     const auto from = [&](Timestamp stamp) {
@@ -33,7 +33,7 @@ class BagScans final : public ScanSource {
     };
     const std::size_t first = std::min(from(odometry.front().stamp), places_.size() - 1);
     const std::size_t last = std::max(first + 1, from(odometry.back().stamp));
-    Result<std::optional<PointTimes>> found;
+    Result<std::optional<lidar::PointTimes>> found;
     for (std::size_t i = first; i < std::min(first + kTried, last); ++i) {
       auto times = times_of(i, robot);
       if (times || i == first) found = std::move(times);
@@ -43,13 +43,13 @@ class BagScans final : public ScanSource {
     // Half way a clock that starts with the odometry at 0 can be told from the time after the stamp.
     const auto later = times_of(first + (last - first) / 2, robot);
     times_ = later ? *later : *found;
-    return in_words(times_);
+    return lidar::in_words(times_);
   }
 
   [[nodiscard]] Result<std::optional<Scan>> scan(std::size_t sample) const override {
     auto measured = read(places_.at(sample));
     if (!measured) return tl::unexpected(measured.error());
-    auto scan = deskewed(std::move(*measured), places_[sample].stamp, times_, T_body_lidar_, odometry_);
+    auto scan = lidar::deskewed(std::move(*measured), places_[sample].stamp, times_, T_body_lidar_, odometry_);
     if (!scan) return in_context(name_of(places_[sample]), scan.error());
     return std::optional(std::move(*scan));
   }
@@ -76,10 +76,10 @@ class BagScans final : public ScanSource {
     return cloud;
   }
 
-  [[nodiscard]] Result<std::optional<PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const {
+  [[nodiscard]] Result<std::optional<lidar::PointTimes>> times_of(std::size_t sample, const RobotConfig& robot) const {
     const auto cloud = read(places_.at(sample));
     if (!cloud) return tl::unexpected(cloud.error());
-    auto times = find_message_times(*cloud, places_[sample].stamp, robot);
+    auto times = lidar::find_message_times(*cloud, places_[sample].stamp, robot.scan_times_config());
     if (!times) return in_context(name_of(places_[sample]), times.error());
     return times;
   }
@@ -90,7 +90,7 @@ class BagScans final : public ScanSource {
   std::vector<ScanPlace> places_;
   Pose3 T_body_lidar_;
   Trajectory odometry_;
-  std::optional<PointTimes> times_;
+  std::optional<lidar::PointTimes> times_;
 };
 
 }  // namespace

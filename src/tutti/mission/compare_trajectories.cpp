@@ -202,21 +202,17 @@ Result<TrajectoryComparison> compare_trajectories(const NamedTrajectory& a, cons
   }
   const ProxyGraph graph = proxy_graph(nodes, out.spacing_m, config);
   const auto robot = robot_nodes(b, nodes, config);
-  consistency::Comparison comparison;
-  comparison.pairs = consistency::synchronise(graph, kRobot, robot).pairs;
-  const consistency::DisagreementTest test(graph, kRobot, comparison.pairs, 1,
-                                           {.false_alarm_rate = config.false_alarm_rate});
-  const consistency::Disagreement found = test(consistency::odometry_at(robot, comparison.pairs));
+  const std::vector<consistency::NodePair> pairs = consistency::synchronise(graph, kRobot, robot).pairs;
+  const consistency::DisagreementTest test(graph, kRobot, pairs, 1, {.false_alarm_rate = config.false_alarm_rate});
+  const consistency::Disagreement found = test(consistency::odometry_at(robot, pairs));
   const consistency::Ledger nothing_held;
   const auto choose = [&](double error_share) {
-    const auto policy = consistency::make_policy("adaptive", {.adaptive_error_share = error_share});
+    const auto policy = consistency::make_policy({.name = "adaptive", .adaptive_error_share = error_share}, {});
     TUTTI_CHECK(policy.has_value());
-    return (*policy)
-        ->choose({graph, kRobot, robot, comparison, std::nullopt, Rng(0), nothing_held, &test, &found})
-        .constraints;
+    return (*policy)->choose({graph, kRobot, robot, pairs, nothing_held, &test, &found}).constraints;
   };
   fix(robot, config, choose, out);
-  out.explanation = consistency::explain(graph, kRobot, robot, comparison.pairs, test, found, config.false_alarm_rate);
+  out.explanation = consistency::explain(graph, kRobot, robot, pairs, test, found, config.false_alarm_rate);
 
   out.before = lay_on(out.judge, out.judged);
   return out;

@@ -111,7 +111,7 @@ TEST(CompareTrajectories, WhatBDoesWhileAStandsStillCounts) {
       const double phase =
           2.0 * M_PI * std::max(0.0, static_cast<double>(i + 300) - static_cast<double>(a.size())) / 300;
       walks[i].pose = a[i].pose * Pose3{Eigen::Quaterniond::Identity(), {1.0 - std::cos(phase), std::sin(phase), 0.0}};
-      turns[i].pose = a[i].pose * Pose3{so3_exp({0.0, 0.0, std::sin(phase)}), {}};
+      turns[i].pose = a[i].pose * Pose3{so3_exp({0.0, 0.0, std::sin(phase)}), Eigen::Vector3d::Zero()};
       trembles[i].pose.translation += test::random_vector(rng, 0.003);
     }
     for (const Trajectory& b : {walks, turns}) {  // and come back to where A is

@@ -54,7 +54,7 @@ class EvaluateRobots : public ::testing::Test {
   }
 
   MissionRecording recording_;
-  robot::RobotAgent agent_{RobotId{0}, 0, robot::AgentConfig{}, Rng(1)};
+  robot::RobotAgent agent_{RobotId{0}, 0, robot::AgentConfig{}};
   server::MapEstimate map_;
   MissionRecord record_;
   std::size_t replayed_ = kSamples;

@@ -60,7 +60,7 @@ class EvaluateServer : public ::testing::Test {
 
  private:
   struct Run {
-    explicit Run(RobotId id) : agent(id, 1, robot::AgentConfig{}, Rng(1)) {}
+    explicit Run(RobotId id) : agent(id, 1, robot::AgentConfig{}) {}
     MissionRecording recording;
     robot::RobotAgent agent;
   };

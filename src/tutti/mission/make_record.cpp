@@ -61,6 +61,7 @@ MissionRecord make_record(const FinishedMission& mission) {
   note_remarks(server.state().refinements, record);
   evaluate_server(outcomes, server, config.association, config.closure_check, record);
   evaluate_images(server, record);
+  evaluate_fixes(server.map(), config.server.map.georeference.mode, record);
   record.server.proxy = broadcast;
   record.server.updates = mission.events.updates();
   record.server.changes_of_mind = mission.events.changes_of_mind();

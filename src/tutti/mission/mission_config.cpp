@@ -71,6 +71,8 @@ void check_robots(const MissionConfig& config, const Problem& problem) {
     check_images(robot, path, problem);
     if (!robot.reference_offset_m.empty() && robot.reference_offset_m.size() != 3)
       problem(fmt::format("{}.reference_offset_m: {} numbers, expected 3", path, robot.reference_offset_m.size()));
+    if (!robot.antenna_m.empty() && robot.antenna_m.size() != 3)
+      problem(fmt::format("{}.antenna_m: {} numbers, expected 3", path, robot.antenna_m.size()));
     if (const auto T_body_lidar = to_pose(robot.T_body_lidar); !T_body_lidar)
       problem(fmt::format("{}.T_body_lidar.{}", path, T_body_lidar.error().message));
     if (robot.from_share >= robot.to_share)

@@ -12,20 +12,21 @@
 #include "tutti/estimation/bundle/refine_map.hpp"
 #include "tutti/evaluation/association.hpp"
 #include "tutti/finders/finder_config.hpp"
-#include "tutti/mission/odometry_covariance.hpp"
+#include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/robot/agent.hpp"
+#include "tutti/robot/odometry_covariance.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::mission {
 
 inline constexpr double kLongestMission_s = 7.0 * 86400.0;
 
-/// A trajectory file below the --data folder.
+/// A trajectory file in the --data folder.
 struct TrajectoryFile {
-  std::string file;            ///< Empty = none.
-  std::string format = "tum";  ///< tum | euroc | kitti (12 numbers a line, stamps from `times` or `rate_hz`)
-  std::string times;           ///< kitti: one stamp in seconds per line; empty = index / rate_hz.
+  std::string file;            ///< Empty: none.
+  std::string format = "tum";  ///< tum, euroc or kitti (12 numbers per line, stamps from `times` or `rate_hz`)
+  std::string times;           ///< For kitti: file with one stamp in seconds per line; empty: index / rate_hz.
   double rate_hz = 10.0;
   template <class V>
   void describe(V& v) {
@@ -36,11 +37,12 @@ struct TrajectoryFile {
   }
 };
 
-/// Where the LiDAR sits on the robot's body: its points times this are in the body frame.
+/// T_body_lidar, the pose of the LiDAR on the robot's body.
 struct LidarPoseConfig {
-  std::vector<double> translation_m;    ///< x, y, z; empty = zero.
-  std::vector<double> quaternion_xyzw;  ///< Hamilton; empty = none.
-  std::vector<double> rpy_deg;          ///< Instead: roll, pitch, yaw about the body's fixed x, y, z, as ROS has them.
+  std::vector<double> translation_m;    ///< x, y, z; empty: zero.
+  std::vector<double> quaternion_xyzw;  ///< Hamilton; empty: no rotation.
+  /// Instead of the quaternion: roll, pitch, yaw about the body's fixed x, y, z, as in ROS.
+  std::vector<double> rpy_deg;
   template <class V>
   void describe(V& v) {
     v.field("translation_m", translation_m, any(), "x, y, z of the LiDAR in the body frame.");
@@ -48,12 +50,15 @@ struct LidarPoseConfig {
     v.field("rpy_deg", rpy_deg, any(), "Instead: roll, pitch, yaw about the body's fixed axes, as ROS has them.");
   }
 };
-/// The pose, or what is wrong with it.
+inline bool is_given(const LidarPoseConfig& pose) {
+  return !pose.translation_m.empty() || !pose.quaternion_xyzw.empty() || !pose.rpy_deg.empty();
+}
+/// T_body_lidar; fails with what is wrong in the configuration.
 Result<Pose3> to_pose(const LidarPoseConfig& config);
 
-/// Depth images beside those of one camera.
+/// The depth images that belong to the images of one camera.
 struct DepthConfig {
-  std::string list;  ///< Empty: there are none.
+  std::string list;  ///< Empty: none.
   double scale = 5000.0;
   double max_difference_s = 0.02;
   DepthSensor sensor;
@@ -73,17 +78,17 @@ struct DepthConfig {
   }
 };
 
-/// Where a robot's images, or what a tracker made of them, come from: a folder, a list or submaps, or nothing. Paths
-/// are below the --data folder.
+/// Where a robot's images, or tracks made from them, are: in a folder, a list, or submaps; or nowhere. Paths are
+/// relative to the --data folder.
 struct ImagesConfig {
-  std::string euroc_folder;                 ///< mav0, or what holds it.
-  std::string list;                         ///< With `cameras`.
-  std::string cameras;                      ///< formats::read_cameras()
-  std::vector<std::string> maplab_submaps;  ///< Consecutive folders; the odometry is theirs, too.
+  std::string euroc_folder;                 ///< mav0, or the folder that holds it.
+  std::string list;                         ///< Needs `cameras`.
+  std::string cameras;                      ///< Read by formats::read_cameras().
+  std::vector<std::string> maplab_submaps;  ///< Consecutive folders; the odometry is from these, too.
   int most_cameras = 2;
   double time_offset_s = 0.0;
   bool own_stamps = false;
-  std::string imu;  ///< Empty: none, or that of `euroc_folder`.
+  std::string imu;  ///< Empty: none, or the one in `euroc_folder`.
   DepthConfig depth;
   template <class V>
   void describe(V& v) {
@@ -107,17 +112,18 @@ struct ImagesConfig {
     v.field("depth", depth, any(), "Depth images of an RGB-D camera, with list.");
     v.field("imu", imu, any(), "EuRoC's csv of raw IMU samples, with list or maplab_submaps.");
   }
-  /// Are there images to follow points through?
+  /// True if there are images in which to track points.
   [[nodiscard]] bool has_files() const { return !euroc_folder.empty() || !list.empty(); }
   [[nodiscard]] bool is_given() const { return has_files() || !maplab_submaps.empty(); }
 };
 
-/// Which of a bag's topics a robot's recording is of, where their types alone do not tell.
+/// Which of a bag's topics to use, where types alone do not tell.
 struct BagTopicsConfig {
   std::string odometry;
   std::string scans;
   std::string images;
   std::string imu;
+  std::string fixes;
   template <class V>
   void describe(V& v) {
     v.field("odometry", odometry, any(),
@@ -126,30 +132,37 @@ struct BagTopicsConfig {
     v.field("images", images, any(),
             "Topics of sensor_msgs/Image or CompressedImage: of one camera, or of two with a comma between them.");
     v.field("imu", imu, any(), "A topic of sensor_msgs/Imu.");
+    v.field("fixes", fixes, any(), "A topic of sensor_msgs/NavSatFix.");
   }
 };
 
-/// One robot whose recording is replayed.
+/// One robot with a recording that is replayed.
 struct RobotConfig {
   std::string name;
-  std::string bag;  ///< Instead of odometry and scans: bags::open_bag(). Empty = none.
+  std::string bag;  ///< Instead of odometry and scans (bags::open_bag()); empty: none.
   BagTopicsConfig topics;
   TrajectoryFile odometry;
   TrajectoryFile reference;
-  std::string reference_transform;         ///< File with the 4x4 T_common_reference of this robot; empty = identity.
-  std::vector<double> reference_offset_m;  ///< x, y, z; recordings of different places share no frame: put them apart.
-  bool score_against_reference = true;     ///< false: the reference only judges closures and transforms.
-  std::string scans;                       ///< Folder of NNNNNN.pcd, one per odometry pose; empty = no scans.
-  std::string scan_times;                  ///< Of each scan, when it is not one per pose.
+  std::string reference_transform;  ///< File with this robot's T_common_reference, 4x4; empty: identity.
+  /// x, y, z; sets recordings of different places apart, which share no frame.
+  std::vector<double> reference_offset_m;
+  bool score_against_reference = true;  ///< False: the reference only judges closures and transforms.
+  std::string scans;                    ///< Folder of NNNNNN.pcd, one per odometry pose; empty: no scans.
+  std::string scan_times;               ///< File with the scans' stamps, when they are not one per pose.
   LidarPoseConfig T_body_lidar;
   std::string scans_deskewed = "auto";
   std::string scan_time_unit = "auto";
   std::string scan_pose_at = "end";
   ImagesConfig images;
-  double start_s = 0.0;     ///< Mission time of its first sample.
-  double from_share = 0.0;  ///< Part of the recording to replay.
+  std::string fixes;              ///< Read by formats::read_fixes(); empty: the fixes of the bag, if it has any.
+  std::vector<double> antenna_m;  ///< Empty: as the bag says, or at the body.
+  double start_s = 0.0;           ///< Mission time of the first sample.
+  double from_share = 0.0;        ///< Part of the recording that is replayed.
   double to_share = 1.0;
-  OdometryCovarianceConfig covariance;
+  robot::OdometryCovarianceConfig covariance;
+  [[nodiscard]] lidar::ScanTimesConfig scan_times_config() const {
+    return {scans_deskewed, scan_time_unit, scan_pose_at};
+  }
   template <class V>
   void describe(V& v) {
     v.field("name", name, any(), "Unique name.");
@@ -178,6 +191,11 @@ struct RobotConfig {
     v.field("scan_pose_at", scan_pose_at, one_of({"end", "begin"}),
             "Of which moment of a sweep its odometry pose is, unless points have times of the odometry's clock.");
     v.field("images", images);
+    v.field("fixes", fixes, any(),
+            "csv of a receiver's fixes: stamp_s,latitude_deg,longitude_deg,height_m and, all or none, sigma_east_m, "
+            "sigma_north_m, sigma_up_m; of a bag: its NavSatFix.");
+    v.field("antenna_m", antenna_m, any(),
+            "x, y, z of the receiver's antenna in the body frame; by default the body, of a bag what /tf_static says.");
     v.field("start_s", start_s, between(0.0, kLongestMission_s), "Mission time of the first sample.");
     v.field("from_share", from_share, between(0.0, 1.0), "First part of the recording to replay.");
     v.field("to_share", to_share, between(0.0, 1.0), "Last part of the recording to replay.");
@@ -185,7 +203,7 @@ struct RobotConfig {
   }
 };
 
-/// From where on an accepted closure counts as wrong in the report: off by more than either of these.
+/// Beyond either limit, an accepted closure counts as wrong in the report.
 struct ClosureCheckConfig {
   double wrong_m = 0.5;
   double wrong_deg = 2.0;
@@ -196,7 +214,7 @@ struct ClosureCheckConfig {
   }
 };
 
-/// The radio of one robot, instead of the common `link`.
+/// The radio of one robot, in place of the common `link`.
 struct RobotLinkConfig {
   std::string robot;
   bus::LinkConfig link;
@@ -207,14 +225,14 @@ struct RobotLinkConfig {
   }
 };
 
-/// Robots whose recordings are replayed, the server that joins their maps, and the radio between them.
+/// A mission: robots with recordings to replay, the server that joins their maps, and the radio between them.
 struct MissionConfig {
   std::string mission = "unnamed";
   std::string description;
   std::string input;                          ///< In plain words: real, replayed or simulated.
   std::vector<std::string> notes;             ///< Shown in the report.
-  double duration_s = 0.0;                    ///< 0 = until the last sample.
-  double odometry_hz = 0.0;                   ///< 0 = as recorded or simulated.
+  double duration_s = 0.0;                    ///< 0: until the last sample.
+  double odometry_hz = 0.0;                   ///< 0: as recorded or simulated.
   evaluation::AssociationConfig association;  ///< Of estimates with the reference.
   ClosureCheckConfig closure_check;           ///< Of accepted closures against the reference.
   std::vector<RobotConfig> robots;
@@ -248,11 +266,12 @@ struct MissionConfig {
   }
 };
 
-/// What a single field cannot know: unique names, files given. A line each, "path: what is wrong".
+/// Problems that concern several fields (unique names, files given): one line each, "path: what is wrong".
 std::vector<std::string> problems_of(const MissionConfig& config);
-/// The same of what config.closures needs of the robots; for missions whose closures it finds.
+/// Problems of robots' data with config.closures, in the same form; for missions whose closures the configured finder
+/// finds.
 std::vector<std::string> problems_of_finder(const MissionConfig& config);
-/// Files are named after robots: why one cannot be called so; empty when it can.
+/// Why files cannot be named after a robot of this name; empty when they can.
 std::string problem_of_name(const std::string& name);
 
 }  // namespace tutti::mission

@@ -88,7 +88,8 @@ std::vector<std::string> warnings_of(const MissionRecord& record) {
       out.push_back(fmt::format("{}: none of its submaps reached the server", robot.name));
   }
   const bool tied = !record.server.closures.empty();
-  if (!tied && submaps > 1)
+  const bool follows_fixes = record.server.fixes && record.server.fixes->georeference;
+  if (!tied && submaps > 1 && !follows_fixes)
     out.push_back(fmt::format("the server's map is odometry alone: {}", why_odometry_alone(record.server.rejections)));
   for (const RobotRecord& robot : record.robots)
     if (tied && !robot.server_estimate.empty() && robot.component != record.server.largest_component)
@@ -122,10 +123,10 @@ void note_changes_of_mind(MissionRecord& record) {
     const auto greatest = std::ranges::max_element(
         changes, {}, [](const ChangeOfMindRecord& change) { return change.change.translation_m; });
     record.notes.push_back(fmt::format(
-        "{}: the map changed its mind {} times, and changed it back {} of these; {} waits for a change to stand before "
+        "{}: the map changed its mind {}, and changed it back {} of these; {} waits for a change to stand before "
         "it follows. The greatest was {:.2f} m at {:.0f} s ({}): {}",
-        robot.name, changes.size(), gone, robot.name, greatest->change.translation_m, greatest->since_s,
-        greatest->outcome, greatest->reason));
+        robot.name, changes.size() == 1 ? "once" : fmt::format("{} times", changes.size()), gone, robot.name,
+        greatest->change.translation_m, greatest->since_s, greatest->outcome, greatest->reason));
   }
 }
 

@@ -16,6 +16,7 @@
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/bag_recording.hpp"
 #include "tutti/mission/resample.hpp"
+#include "tutti/mission/robot_fixes.hpp"
 #include "tutti/mission/robot_images.hpp"
 #include "tutti/mission/scan_folder.hpp"
 
@@ -169,6 +170,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   }
   if (bag)
     if (auto ok = take_bag(*bag, raw, robot, tracking, out); !ok) return tl::unexpected(ok.error());
+  if (auto ok = take_fixes(robot, data, bag ? &*bag : nullptr, raw, out); !ok) return tl::unexpected(ok.error());
   if (robot.images.is_given()) {
     auto images =
         maplab ? listed_images(*maplab, robot.images, data, raw, from) : open_images(robot.images, data, raw, tracking);
@@ -176,7 +178,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     out.notes.push_back(fmt::format("{}: {}", robot.name, images->note));
     take_images(std::move(*images), out.recording);
   }
-  out.recording.increment_covariance = increment_covariances(raw, robot.covariance);
+  out.recording.increment_covariance = robot::increment_covariances(raw, robot.covariance);
   out.recording.odometry = std::move(raw);
   return out;
 }

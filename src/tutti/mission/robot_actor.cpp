@@ -24,30 +24,28 @@ robot::AgentConfig with_sensors(robot::AgentConfig config, const Recording& reco
 
 void UpdateStopwatch::stage_ended(robot::UpdateStage stage) {
   const double ms = stage_.lap_ms();
-  if (stage == robot::UpdateStage::compare) timing_.comparison_ms.push_back(ms);
+  if (stage == robot::UpdateStage::choose) timing_.comparison_ms.push_back(ms);
   if (stage == robot::UpdateStage::optimise) timing_.optimisation_ms.push_back(ms);
 }
 
 RobotActor::RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-                       const evaluation::AssociationConfig& association, const Rng& rng,
-                       std::unique_ptr<Companions> companions)
+                       const evaluation::AssociationConfig& association, std::unique_ptr<Companions> companions)
     : RobotActor(recording, association, config.policy.name) {
   companions_ = std::move(companions);
   nothing_ = std::make_unique<const storage::MemoryStore>(storage::robot_schema());
   node_ = node::RobotNode::open(recording.recording.robot, 0,
-                                {.agent = with_sensors(config, recording.recording), .keeps_state = false},
-                                rng.fork(policy_), *nothing_)
+                                {.agent = with_sensors(config, recording.recording), .keeps_state = false}, *nothing_)
               .value();
 }
 
 Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& recording,
                                                      const node::RobotNodeConfig& config,
-                                                     const evaluation::AssociationConfig& association, const Rng& rng,
+                                                     const evaluation::AssociationConfig& association,
                                                      std::uint64_t session, const storage::TableStore& store) {
   std::unique_ptr<RobotActor> actor(new RobotActor(recording, association, config.agent.policy.name));
   node::RobotNodeConfig own = config;
   own.agent = with_sensors(config.agent, recording.recording);
-  auto node = node::RobotNode::open(recording.recording.robot, session, own, rng.fork(actor->policy_), store);
+  auto node = node::RobotNode::open(recording.recording.robot, session, own, store);
   if (!node) return tl::unexpected(node.error());
   actor->node_ = std::move(*node);
   if (const auto newest = actor->node_->agent().newest_sample()) {
@@ -62,6 +60,8 @@ Result<std::unique_ptr<RobotActor>> RobotActor::open(const MissionRecording& rec
     };
     skip(from.scan_stamps, actor->next_scan_);
     skip(from.image_stamps, actor->next_images_);
+    actor->next_fix_ = static_cast<std::size_t>(std::ranges::lower_bound(from.fixes, settled, {}, &PositionFix::stamp) -
+                                                from.fixes.begin());
   }
   return actor;
 }
@@ -104,13 +104,23 @@ void RobotActor::note_event(const node::Event& event) {
   if (const auto* jumped = std::get_if<node::OdometryJumped>(&event.what)) note(jumps_, to_string(jumped->jump));
   if (const auto* scan = std::get_if<node::ScanRefused>(&event.what)) note(refused_scans_, scan->why);
   if (const auto* images = std::get_if<node::ImagesRefused>(&event.what)) note(refused_images_, images->why);
+  if (const auto* fix = std::get_if<node::FixRefused>(&event.what)) note(refused_fixes_, fix->why);
   if (const auto* missing = std::get_if<node::SensorMissing>(&event.what); missing != nullptr && missing->keyframes > 0)
     note(missing_sensors_, fmt::format("from {:.0f} s on {} keyframes had no {}", event.time - kMissionStart,
                                        missing->keyframes, missing->sensor));
   if (const auto* update = std::get_if<node::RobotUpdated>(&event.what)) note_update(*update, event.time);
 }
 
+void RobotActor::feed_fixes(Timestamp now) {
+  const Recording& recording = recording_.recording;
+  for (; next_fix_ < recording.fixes.size() && recording.fixes[next_fix_].stamp <= recording.odometry[next_ - 1].stamp;
+       ++next_fix_)
+    if (recording.fixes[next_fix_].stamp >= recording.odometry.front().stamp)
+      take(node_->add_fix(recording.fixes[next_fix_], now));
+}
+
 void RobotActor::feed_sensors(Timestamp now) {
+  feed_fixes(now);
   const Recording& recording = recording_.recording;
   const Timestamp newest = recording.odometry[next_ - 1].stamp;
   while (true) {
@@ -187,10 +197,9 @@ void RobotActor::receive(const bus::Envelope& envelope, Timestamp now) {
   const auto graph = node_->graph_in(envelope);
   if (!graph || !*graph) return take(node_->receive(envelope, now));  // which refuses it, or keeps it
   const ProxyGraphMessage& message = **graph;
-  const std::optional<std::size_t> budget = companions_ ? companions_->before(message) : std::nullopt;
   const std::size_t updates = updates_.size();
-  update(envelope, node_->agent().policy().needs_budget() ? budget : std::nullopt, now);
-  if (companions_) companions_->after(message, node_->agent());
+  update(envelope, now);
+  if (companions_) companions_->receive(message, node_->agent());
   if (updates_.size() > updates) score(trajectory_of(message.graph, node_->agent().chain()), updates_.back());
 }
 
@@ -212,12 +221,12 @@ void RobotActor::score(const Trajectory& map, UpdateRecord& update) const {
     update.answers.push_back({policy, agent->ledger().size(), rmse(agent->corrected())});
 }
 
-void RobotActor::update(const bus::Envelope& envelope, std::optional<std::size_t> budget, Timestamp now) {
+void RobotActor::update(const bus::Envelope& envelope, Timestamp now) {
   const CpuScope cpu(cpu_s_);
   UpdateStopwatch stopwatch(timing_);
   const std::size_t before = updates_.size();
   node_->observe([&](robot::UpdateStage stage) { stopwatch.stage_ended(stage); });
-  take(node_->receive(envelope, now, budget));
+  take(node_->receive(envelope, now));
   node_->observe({});
   if (updates_.size() > before) stopwatch.update_ended();
 }
@@ -267,6 +276,7 @@ std::vector<std::string> RobotActor::troubles() const {
   add(jumps_, "steps of odometry that no body makes");
   add(refused_scans_, "wanted scans that are not there or no good");
   add(refused_images_, "times images refused");
+  add(refused_fixes_, "fixes refused");
   add(missing_sensors_, "times a sensor was missing");
   for (const std::string& line : sight_.notes()) out.push_back(fmt::format("{}: {}", recording_.recording.name, line));
   add(failed_updates_, "updates without a correction");

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/mission/evaluate.hpp"
 #include "tutti/mission/image_tally.hpp"
@@ -20,29 +19,28 @@
 
 namespace tutti::mission {
 
-/// Virtual time; robots' own stamps are never compared with it.
+/// Time zero of virtual time, which is never compared with robots' own stamps.
 inline constexpr Timestamp kMissionStart{0};
 
-/// Agents that hear what a robot's node hears, and are never heard: what other policies make of the same.
+/// Agents that hear what a robot's node hears and are never heard: they show what other policies make of the same
+/// broadcasts.
 class Companions {
  public:
   virtual ~Companions() = default;
   virtual void add_odometry(const StampedPose& sample, const Matrix6d& covariance) = 0;
-  /// The robot's node made a keyframe of a moment between two samples.
+  /// The robot's node has made a keyframe at a moment between two samples.
   virtual void add_moment(Timestamp stamp) = 0;
-  /// Before the node hears a broadcast: how many constraints its policy may then hold, if it needs a budget.
-  virtual std::optional<std::size_t> before(const ProxyGraphMessage& message) = 0;
-  /// After it; `own` is the node's agent.
-  virtual void after(const ProxyGraphMessage& message, const robot::RobotAgent& own) = 0;
-  /// By policy.
+  /// Called after the node has received the graph; `own` is the node's agent.
+  virtual void receive(const ProxyGraphMessage& message, const robot::RobotAgent& own) = 0;
+  /// The agents (timings), by policy.
   [[nodiscard]] virtual std::vector<std::pair<std::string, const robot::RobotAgent*>> agents() const = 0;
   [[nodiscard]] virtual std::vector<PolicyTiming> timing() const = 0;
 };
 
-/// The settings of an agent that is fed a recording: with what that is known to have.
+/// The settings of an agent that replays a recording: `config`, with the sensors that the recording has.
 robot::AgentConfig with_sensors(robot::AgentConfig config, const Recording& recording);
 
-/// What of an update takes how long.
+/// Measures how long the stages of an update take.
 class UpdateStopwatch {
  public:
   explicit UpdateStopwatch(PolicyTiming& timing) : timing_(timing) {}
@@ -55,34 +53,34 @@ class UpdateStopwatch {
 };
 
 /// One robot of a mission: replays its recording into a node, which talks to the server. What becomes of the robot is
-/// folded from its node's events.
+/// collected from its node's events.
 class RobotActor {
  public:
-  /// `companions`: may be null.
+  /// `companions` may be null.
   RobotActor(const MissionRecording& recording, const robot::AgentConfig& config,
-             const evaluation::AssociationConfig& association, const Rng& rng, std::unique_ptr<Companions> companions);
-  /// A robot that may be killed: its node keeps its state in `store`, which outlives it, and goes on where the
-  /// recording stood. `rng` as above; alone.
+             const evaluation::AssociationConfig& association, std::unique_ptr<Companions> companions);
+  /// A robot that may be killed: its node keeps its state in `store`, which must outlive the actor, and goes on where
+  /// the recording stopped. It has no companions.
   static Result<std::unique_ptr<RobotActor>> open(const MissionRecording& recording,
                                                   const node::RobotNodeConfig& config,
-                                                  const evaluation::AssociationConfig& association, const Rng& rng,
+                                                  const evaluation::AssociationConfig& association,
                                                   std::uint64_t session, const storage::TableStore& store);
-  /// Of one that was opened: before anything else, what its node has to say first.
+  /// To be called first on an actor made by open(): takes the node's first step.
   void resume(Timestamp now);
   /// RobotNode::on_timer()
   void on_timer(Timestamp now) { take(node_->on_timer(now)); }
 
-  /// Mission time of the next sample; infinity when there is none left.
+  /// Mission time of the next sample; infinity when none is left.
   [[nodiscard]] double next_time() const;
-  /// Is its next sample more work than a pose is?
+  /// True if the next sample may be more work than a pose.
   [[nodiscard]] bool has_sensors() const { return recording_.recording.scans || recording_.recording.visual; }
-  /// Replays one odometry sample and its scan; after the last one the node closes its last submap.
+  /// Replays one odometry sample with the sensor data up to it; after the last one the node ends its last submap.
   void replay_next(Timestamp now);
   void store_all() { take(node_->store_all()); }
-  /// Closes the last submap before the recording ends.
+  /// Ends the last submap before the recording ends.
   void finish(Timestamp now) { take(node_->finish(now)); }
   void receive(const bus::Envelope& envelope, Timestamp now);
-  /// What the node has to send, and what others are to be told, since the last call.
+  /// What the node has to send and tell since the last call.
   node::Step take_step() { return std::exchange(step_, {}); }
 
   [[nodiscard]] const MissionRecording& recording() const { return recording_; }
@@ -90,16 +88,16 @@ class RobotActor {
   [[nodiscard]] RobotId id() const { return recording_.recording.robot; }
   [[nodiscard]] RobotOutcome outcome() const;
   [[nodiscard]] const std::vector<UpdateRecord>& updates() const { return updates_; }
-  /// Of the node's last update: its raw odometry against the map.
+  /// Of the node's last update: raw odometry against the map.
   [[nodiscard]] const std::optional<consistency::Explanation>& explanation() const { return explanation_; }
   [[nodiscard]] std::vector<PolicyTiming> timing() const;
   [[nodiscard]] double cpu_s() const { return cpu_s_; }  ///< Of the node.
-  /// What went wrong (bad samples or scans refused, updates without a correction): one line per kind with a count and
-  /// the first case.
+  /// What went wrong (samples or scans refused, updates without a correction): one line per kind, with a count and the
+  /// first case.
   [[nodiscard]] std::vector<std::string> troubles() const;
   /// Fails when scans were asked for and all of them failed.
   [[nodiscard]] Status check_scans() const;
-  /// Why images were refused, the first time; empty when none were.
+  /// Why images were refused first; empty when none were.
   [[nodiscard]] const std::string& refused_images() const { return refused_images_.first; }
 
  private:
@@ -119,15 +117,16 @@ class RobotActor {
   void take(node::Step step);
   void note_event(const node::Event& event);
   void note_update(const node::RobotUpdated& update, Timestamp time);
-  /// Times the stages of an update, and the whole if there is anything to compare.
-  void update(const bus::Envelope& envelope, std::optional<std::size_t> budget, Timestamp now);
-  /// How far every estimate is from the reference at the nodes of the broadcast.
+  /// Measures the stages of an update, and the whole if there is anything to compare.
+  void update(const bus::Envelope& envelope, Timestamp now);
+  /// Scores every estimate against the reference at the nodes of the broadcast.
   void score(const Trajectory& map, UpdateRecord& update) const;
-  /// What sensors saw until the last sample that was fed.
+  /// Feeds sensor data up to the last odometry sample.
   void feed_sensors(Timestamp now);
   void feed_moment(Timestamp stamp, bool has_scan, bool has_images, Timestamp now);
   void feed_scan(Timestamp now);
   void feed_images(Timestamp stamp, bool keyframe, Timestamp now);
+  void feed_fixes(Timestamp now);
   void refuse_images(const std::vector<Error>& errors, Timestamp now);
   void tell_refused(const std::string& why, Timestamp now);
   [[nodiscard]] std::vector<ImuSample> imu_since_keyframe(Timestamp stamp) const;
@@ -135,14 +134,14 @@ class RobotActor {
 
   const MissionRecording& recording_;
   const evaluation::AssociationConfig& association_;
-  std::unique_ptr<const storage::TableStore> nothing_;  // of one whom nobody kills
+  std::unique_ptr<const storage::TableStore> nothing_;  // for a robot that nobody kills
   std::unique_ptr<node::RobotNode> node_;
   node::Step step_;
   std::unique_ptr<Companions> companions_;
   std::string policy_;  // the node's
   PolicyTiming timing_;
   std::size_t next_ = 0;  // odometry sample
-  std::size_t next_scan_ = 0, next_images_ = 0;
+  std::size_t next_scan_ = 0, next_images_ = 0, next_fix_ = 0;
   std::vector<UpdateRecord> updates_;
   std::optional<consistency::Explanation> explanation_;
   double cpu_s_ = 0.0;
@@ -152,6 +151,7 @@ class RobotActor {
   std::size_t taken_scans_ = 0;
   Trouble refused_images_;
   Trouble missing_sensors_;
+  Trouble refused_fixes_;
   bool images_fail_ = false;  // at the last sample
   ImageTally sight_;
   Trouble failed_updates_;

@@ -19,6 +19,8 @@
 #include "tutti/mission/recordings.hpp"
 #include "tutti/mission/robot_actor.hpp"
 #include "tutti/mission/server_meter.hpp"
+#include "tutti/node/map_meta.hpp"
+#include "tutti/node/robot_registry.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/storage/memory_store.hpp"
@@ -79,10 +81,9 @@ class MissionRun {
         pace_(options.rate) {
     worker_.refine_with(meter_.refiner());
     for (const MissionRecording& recording : recordings_) {
-      const Rng rng = agent_randomness(options.seed, recording.recording.name);
       robots_.push_back(
-          {std::make_unique<RobotActor>(recording, config.agent, config.association, rng,
-                                        parts.companions ? parts.companions(recording.recording, rng) : nullptr),
+          {std::make_unique<RobotActor>(recording, config.agent, config.association,
+                                        parts.companions ? parts.companions(recording.recording) : nullptr),
            network_.connect(bus::Endpoint::of(recording.recording.robot))});
     }
     duration_s_ = duration_of(config, recordings_);
@@ -120,7 +121,19 @@ class MissionRun {
       if (auto ok = robot.actor->check_scans(); !ok) return ok;
     return {};
   }
-  [[nodiscard]] const storage::TableStore& map_store() const { return store_; }
+  /// The server's map, with the names that robots tell in statuses, which a mission in virtual time does not send.
+  [[nodiscard]] const storage::TableStore& named_map() {
+    std::vector<storage::Write> rows;
+    for (const MissionRecording& recording : recordings_) {
+      const std::string key = node::RobotRegistry::key(recording.recording.robot);
+      const auto stored = store_.read(node::kMetaTable, key).value();
+      node::RobotRow row = stored ? node::decode_robot(*stored).value() : node::RobotRow{};
+      row.name = recording.recording.name;
+      rows.push_back({node::kMetaTable, key, node::encode(row)});
+    }
+    TUTTI_CHECK(store_.commit(rows).has_value(), "a store in memory");
+    return store_;
+  }
   MissionRecord record() const;
 
  private:
@@ -329,8 +342,6 @@ Status check_links(const MissionConfig& config, const std::vector<MissionRecordi
 
 }  // namespace
 
-Rng agent_randomness(std::uint64_t seed, const std::string& robot) { return Rng(seed).fork("agent/" + robot); }
-
 double duration_of(const MissionConfig& config, const std::vector<MissionRecording>& recordings) {
   double duration_s = 0.0;
   for (const MissionRecording& recording : recordings) {
@@ -357,7 +368,7 @@ Result<MissionRecord> run_mission(const MissionConfig& config, MissionParts part
   mission.run();
   if (const auto ok = mission.check_scans(); !ok) return tl::unexpected(ok.error());
   if (options.keep_map)
-    if (const auto ok = options.keep_map(mission.map_store()); !ok) return tl::unexpected(ok.error());
+    if (const auto ok = options.keep_map(mission.named_map()); !ok) return tl::unexpected(ok.error());
   return mission.record();
 }
 

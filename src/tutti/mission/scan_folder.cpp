@@ -10,7 +10,7 @@
 
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/pcd.hpp"
-#include "tutti/mission/deskewed_scan.hpp"
+#include "tutti/perception/lidar/deskewed_scan.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -42,7 +42,7 @@ ScanFolder::ScanFolder(fs::path folder, ScanMoments moments, const Trajectory& o
     moments_.first = 0;
     moments_.recorded = moments_.stamps.size();
   }
-  odometry_ = with_ends(odometry);
+  odometry_ = lidar::with_ends(odometry);
 }
 
 Result<std::shared_ptr<const ScanFolder>> ScanFolder::open(fs::path folder, ScanMoments moments,
@@ -81,7 +81,7 @@ Status ScanFolder::check_numbers() const {
 }
 
 Status ScanFolder::look_into(const RobotConfig& robot) {
-  Result<std::optional<PointTimes>> found = no_scans();
+  Result<std::optional<lidar::PointTimes>> found = no_scans();
   std::size_t tried = 0;
   for (std::size_t sample = 0; sample < moments_.stamps.size() && tried < kTried; ++sample) {
     if (!file_of(sample)) continue;
@@ -99,12 +99,12 @@ Status ScanFolder::look_into(const RobotConfig& robot) {
   return {};
 }
 
-Result<std::optional<PointTimes>> ScanFolder::times_of(std::size_t sample, const RobotConfig& robot) const {
+Result<std::optional<lidar::PointTimes>> ScanFolder::times_of(std::size_t sample, const RobotConfig& robot) const {
   const auto file = file_of(sample);
   if (!file) return no_scans();
   const auto scan = read(*file);
   if (!scan) return tl::unexpected(scan.error());
-  auto times = find_point_times(*scan, moments_.stamps[sample], robot);
+  auto times = lidar::find_point_times(*scan, moments_.stamps[sample], robot.scan_times_config());
   if (!times) return in_context(file->string(), times.error());
   return times;
 }
@@ -129,11 +129,11 @@ Result<std::optional<Scan>> ScanFolder::scan(std::size_t sample) const {
     return fail(ErrorCode::io, "{}.pcd (or .bin): is not there", (folder_ / stem_of(moments_.first + sample)).string());
   auto read_scan = read(*file);
   if (!read_scan) return tl::unexpected(read_scan.error());
-  auto scan = deskewed(std::move(*read_scan), moments_.stamps.at(sample), times_, T_body_lidar_, odometry_);
+  auto scan = lidar::deskewed(std::move(*read_scan), moments_.stamps.at(sample), times_, T_body_lidar_, odometry_);
   if (!scan) return in_context(file->string(), scan.error());
   return std::optional(std::move(*scan));
 }
 
-std::string ScanFolder::note() const { return in_words(times_); }
+std::string ScanFolder::note() const { return lidar::in_words(times_); }
 
 }  // namespace tutti::mission

@@ -12,35 +12,34 @@
 #include "tutti/geometry/pose3.hpp"
 #include "tutti/model/image_stream.hpp"
 #include "tutti/model/point_cloud.hpp"
+#include "tutti/model/position_fix.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/model/visual.hpp"
 
 namespace tutti {
 
-/// Where a recording's scans come from: files, or a simulated sensor. Safe to call from several threads.
+/// The scans of a recording, from files or a simulated sensor. May be called from several threads.
 class ScanSource {
  public:
   virtual ~ScanSource() = default;
-  /// The sweep that ends at this moment (Recording::scan_stamps); nothing when there is none.
+  /// The sweep that ends at moment number `sample` (moment() of Recording::scan_stamps); nothing when there is none.
   [[nodiscard]] virtual Result<std::optional<Scan>> scan(std::size_t sample) const = 0;
 };
 
-/// Where a recording's tracked images come from: a file, or a tracker over images. It has a state, the tracks: one
-/// thread asks, sample after sample.
+/// The tracked images of a recording, from a file or from a tracker run over images. A source is stateful because of
+/// its tracks: one thread must ask for moments in increasing order.
 class VisualSource {
  public:
   virtual ~VisualSource() = default;
-  /// The images taken at this moment (Recording::image_stamps), with its stamp; none when there are none. At a
-  /// keyframe, what is
-  /// seen will be kept: only there descriptors are needed, which cost most. Tracks that begin after a
-  /// restart in the middle have other numbers than those before.
+  /// The images taken at moment number `sample` (moment() of Recording::image_stamps), with their stamp; empty when
+  /// there are none. Descriptors, which cost most, are computed only for a `keyframe`. After starting in the middle,
+  /// tracks have other numbers than a run from the beginning would give them.
   [[nodiscard]] virtual TrackedImages images(std::size_t sample, bool keyframe) = 0;
-  /// What went wrong since the last call: images that are missing or corrupt, one error each, of samples and between
-  /// them. They are lost alone.
+  /// Errors since the last call, one per image that is missing or corrupt; other images are not affected.
   virtual std::vector<Error> take_errors() { return {}; }
 };
 
-/// Where simulated odometry really went wrong. Known to the evaluation only.
+/// A stretch where simulated odometry really went wrong. Only the evaluation may use it.
 struct DriftOrigin {
   enum class Kind { slip, degeneracy, failure };
   Kind kind = Kind::slip;
@@ -50,24 +49,28 @@ struct DriftOrigin {
   double rotation_rad = 0.0;
 };
 
-/// One robot's recorded or simulated run: everything a mission replays.
+/// One robot's recorded or simulated run: all inputs that a mission replays.
 struct Recording {
   RobotId robot;
   std::string name;
-  Trajectory odometry;                         ///< T_odom_body, raw, drifting.
-  std::vector<Matrix6d> increment_covariance;  ///< Of odometry k -> k + 1; one fewer than odometry.
-  Trajectory reference;                       ///< T_reference_body, one frame for all robots; empty when there is none.
-  std::shared_ptr<const ScanSource> scans;    ///< Null when there is no range sensor.
-  std::shared_ptr<VisualSource> visual;       ///< Null when there is no camera.
-  std::shared_ptr<const ImageStream> images;  ///< That `visual` follows points through; null: it has other sources.
-  /// The moments of scans and of images, increasing; none: those of the odometry samples.
+  Trajectory odometry;  ///< T_odom_body, raw, drifting.
+  /// Covariance of the step from odometry sample k to k + 1; one fewer than odometry.
+  std::vector<Matrix6d> increment_covariance;
+  Trajectory reference;                     ///< T_reference_body, one frame for all robots; empty when there is none.
+  std::shared_ptr<const ScanSource> scans;  ///< Null when there is no range sensor.
+  std::shared_ptr<VisualSource> visual;     ///< Null when there is no camera.
+  /// The images in which `visual` tracks points; null when it has other sources.
+  std::shared_ptr<const ImageStream> images;
+  /// Moments of scans and of images, increasing; when empty, they are the stamps of odometry.
   std::vector<Timestamp> scan_stamps, image_stamps;
   std::vector<ImuSample> imu;  ///< Increasing stamps; empty when there is no IMU.
   ImuNoise imu_noise;
+  std::vector<PositionFix> fixes;          ///< Increasing stamps; empty when there is no receiver.
   std::vector<DriftOrigin> drift_origins;  ///< In time order; empty when unknown.
 };
 
-/// A moment of scans or images (`stamps`: Recording::scan_stamps or image_stamps); nothing after the last.
+/// The stamp of moment number `i` of scans or images (`stamps` is Recording::scan_stamps or image_stamps); nothing
+/// after the last.
 inline std::optional<Timestamp> moment(const Recording& recording, const std::vector<Timestamp>& stamps,
                                        std::size_t i) {
   if (!stamps.empty()) return i < stamps.size() ? std::optional(stamps[i]) : std::nullopt;

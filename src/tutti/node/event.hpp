@@ -15,104 +15,125 @@
 #include "tutti/node/change_watch.hpp"
 #include "tutti/robot/agent.hpp"
 
-/// What has happened at a node, for whoever keeps a record. How long it took is not in it: that is the host's to
-/// measure, and the same inputs give the same events.
+/// What has happened at a node, for those who keep a record. Durations are not in it, because the same inputs must give
+/// the same events; the host measures them.
 namespace tutti::node {
 
-struct SubmapStored {  ///< By the server, for the first time.
+/// Told by the server, once per submap.
+struct SubmapStored {
   SubmapId id;
 };
-struct VerdictsTaken {  ///< By the server; of those refused there are MessageRefused beside.
+/// Told by the server; each refused verdict of the job has a MessageRefused beside.
+struct VerdictsTaken {
   std::string job;
   std::size_t pairs = 0;
 };
-struct WordTaken {  ///< By the server, from an operator.
+/// Told by the server: an operator's word.
+struct WordTaken {
   SubmapPair pair;
   Wish wish = Wish::withdraw;
 };
-struct VerificationFailed {  ///< The pair is asked again (ServerNodeConfig::most_tries).
+/// No worker could verify the pair; it is asked again (ServerNodeConfig::most_tries).
+struct VerificationFailed {
   SubmapPair pair;
   std::string why;
-  bool given_up = false;  ///< No more: it is refused.
+  bool given_up = false;  ///< The pair was refused instead.
 };
-struct RefinementTaken {  ///< By the server.
+/// Told by the server.
+struct RefinementTaken {
   std::string job;
-  std::uint64_t revision = 0;  ///< Of the map that was refined.
+  std::uint64_t revision = 0;  ///< Revision of the map that was refined.
   bool whole = false;
   std::size_t steps = 0;
   std::vector<RefinementRemark> remarks;
 };
-struct RefinementFailed {  ///< It is asked for again (ServerNodeConfig::most_tries).
+/// A refinement failed; it is asked for again (ServerNodeConfig::most_tries).
+struct RefinementFailed {
   std::uint64_t revision = 0;
   std::string why;
-  bool given_up = false;  ///< No more, until something new has come; the map stands.
+  bool given_up = false;  ///< There is no further try until something new has come; the map stays as it is.
 };
+/// Told by the server: an update of the map has ended.
 struct MapUpdated {
   std::uint64_t revision = 0;
   std::size_t submaps = 0;
-  std::size_t accepted = 0;  ///< Closures.
+  std::size_t accepted = 0;  ///< Number of accepted closures.
 };
+/// Told by a robot: it has used a proxy graph.
 struct RobotUpdated {
   RobotId robot;
   robot::UpdateSummary summary;
 };
-struct MessageRefused {  ///< It was no good, or what was to be sent was not.
+/// A message was invalid, either one received or one to be sent.
+struct MessageRefused {
   bus::Endpoint from;
   bus::MessageKind kind = bus::MessageKind::submap;
   std::string why;
 };
-struct RobotJoined {  ///< The server takes this session as the owner of name and number from now on.
+/// Told by the server: from now on this session owns the robot's name and number.
+struct RobotJoined {
   RobotId robot;
   std::string name;
   std::uint64_t session = 0;
 };
-struct RobotRefused {  ///< Another program with a name or number that is in use: told by the server, and by the robot.
+/// Another program uses this name or number; told by the server and by the robot.
+struct RobotRefused {
   RobotId robot;
   std::uint64_t session = 0;
   std::string why;
 };
-struct StateLost {  ///< What was stored of the robot cannot be read: a new session; submaps that wait are kept.
+/// The robot's stored state cannot be read, so it begins a new session; its unsent submaps are kept.
+struct StateLost {
   RobotId robot;
-  std::uint64_t session = 0;  ///< The new one.
+  std::uint64_t session = 0;  ///< The new session.
   std::string why;
 };
-struct SubmapsForgotten {  ///< By the server's map, which is another than before: told by the robot, which sends them
-                           ///< again.
+/// Told by the robot: the server's map is another one than before and lacks these submaps, which are sent again.
+struct SubmapsForgotten {
   RobotId robot;
   std::size_t submaps = 0;
 };
+/// Told by a robot: an odometry sample was refused.
 struct SampleRefused {
   RobotId robot;
   std::string why;
 };
-/// A step of odometry that no body makes: the robot is taken to stay, and goes on from there.
+/// A step of odometry that no body can make; the robot is assumed to stay where it is.
 struct OdometryJumped {
   RobotId robot;
   robot::OdometryJump jump;
 };
+/// Told by a robot: a scan was refused.
 struct ScanRefused {
   RobotId robot;
   std::string why;
-  bool later = false;  ///< Not by the step that took it: its odometry came after it.
+  bool later = false;  ///< Refused after the step that took it, because odometry came later than the scan.
 };
+/// Told by a robot: images were refused.
 struct ImagesRefused {
   RobotId robot;
   std::string why;
-  bool later = false;  ///< Not by the step that took them.
+  bool later = false;  ///< Refused after the step that took them.
 };
-/// Keyframe after keyframe without what a sensor of the robot sees: it is broken, or comes too late. Then no closures
-/// are found.
+/// Told by a robot: a position fix was refused.
+struct FixRefused {
+  RobotId robot;
+  std::string why;
+};
+/// Many keyframes in a row lack what one of the robot's sensors sees, because the sensor is broken or its data come too
+/// late. Without it no closures are found.
 struct SensorMissing {
   RobotId robot;
-  std::string sensor;           ///< scan, images
-  std::uint64_t keyframes = 0;  ///< So many; 0: it is back.
+  std::string sensor;           ///< "scan" or "images".
+  std::uint64_t keyframes = 0;  ///< How many keyframes; 0: the sensor is back.
 };
 
+/// One event, at mission time `time`.
 struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
                MapUpdated, ChangeOfMind, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost,
-               SubmapsForgotten, SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing>
+               SubmapsForgotten, SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing, FixRefused>
       what;
 };
 

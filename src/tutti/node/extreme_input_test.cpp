@@ -69,7 +69,7 @@ struct Robot {
   Status open() {
     store = std::make_unique<storage::MemoryStore>(storage::robot_schema(),
                                                    store ? store->tables() : storage::MemoryStore::Tables{});
-    auto opened = RobotNode::open(kRobot, 7, config, Rng(1), *store);
+    auto opened = RobotNode::open(kRobot, 7, config, *store);
     if (!opened) return tl::unexpected(opened.error());
     node = std::move(*opened);
     done(node->resume(now));

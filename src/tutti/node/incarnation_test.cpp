@@ -20,7 +20,7 @@ TEST(Incarnation, AnOlderMapThatIsPutBackGetsWhatItLacksAndIsHeardAtOnce) {
   ASSERT_GE(before, 2U);
   ASSERT_GE(all, before + 4);
   ASSERT_EQ(site.in_map(), all);
-  const auto heard = site.robot().agent().newest_heard();
+  const auto heard = site.robot().agent().map_age();
   const std::size_t swallowed = site.swallowed();
 
   site.put_back(monday);
@@ -32,7 +32,7 @@ TEST(Incarnation, AnOlderMapThatIsPutBackGetsWhatItLacksAndIsHeardAtOnce) {
   EXPECT_EQ(site.swallowed(), swallowed);
   site.pass(20.0);
   EXPECT_LT(site.server().map_server().state().revision, heard.second);
-  EXPECT_EQ(site.robot().agent().newest_heard().second, site.server().map_server().state().revision);
+  EXPECT_EQ(site.robot().agent().map_age().second, site.server().map_server().state().revision);
   EXPECT_EQ(site.told<SubmapsForgotten>().size(), 1U);
   EXPECT_TRUE(site.told<MessageRefused>().empty()) << site.told<MessageRefused>().front().why;
 }
@@ -46,13 +46,13 @@ TEST(Incarnation, AStateThatIsLostWithoutAClockComesBack) {
   site.put_back({});
   EXPECT_EQ(site.in_map(), all);
   site.pass(20.0);
-  EXPECT_EQ(site.robot().agent().newest_heard(), std::pair(std::uint64_t{5}, std::uint64_t{1}));
+  EXPECT_EQ(site.robot().agent().map_age(), std::pair(std::uint64_t{5}, std::uint64_t{1}));
   EXPECT_TRUE(site.robot().backlog().empty());
   site.start_robot();  // which hears what the bus has kept, and knows it
-  EXPECT_EQ(site.robot().agent().newest_heard(), std::pair(std::uint64_t{5}, std::uint64_t{1}));
+  EXPECT_EQ(site.robot().agent().map_age(), std::pair(std::uint64_t{5}, std::uint64_t{1}));
   site.walk(100);
   EXPECT_EQ(site.in_map(), site.made());
-  EXPECT_GT(site.robot().agent().newest_heard().second, 1U);
+  EXPECT_GT(site.robot().agent().map_age().second, 1U);
 }
 
 TEST(Incarnation, ThatHasTheWholeMapGetsNothingAgain) {

@@ -17,7 +17,7 @@ constexpr double kFailedAgain = 0.1;  // of the time for an answer
 }  // namespace
 
 double try_again_after_s(double timeout_s, unsigned failures) {
-  return kFailedAgain * timeout_s * static_cast<double>(1U << (failures - 1));
+  return kFailedAgain * timeout_s * static_cast<double>(1U << std::min(failures - 1, kMostDoubled));
 }
 
 std::string JobBook::next_name() const { return fmt::format("{}{}", prefix_, given_); }

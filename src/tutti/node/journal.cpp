@@ -13,7 +13,7 @@
 namespace tutti::node {
 namespace {
 
-constexpr std::uint64_t kNoBudget = std::numeric_limits<std::uint64_t>::max();
+constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();
 
 template <class T>
 void put(std::string& out, const T& value) {
@@ -33,7 +33,7 @@ class Bytes {
   void take_all(T* values, std::size_t count) {
     static_assert(std::is_arithmetic_v<T>);
     if (count > left_.size() / sizeof(T)) {
-      short_ = true;
+      is_right_ = false;
       return;
     }
     if (count > 0) std::memcpy(values, left_.data(), count * sizeof(T));  // of no values there may be no address
@@ -49,16 +49,17 @@ class Bytes {
   template <class T>
   std::vector<T> take_list(std::uint64_t count) {
     std::vector<T> list(count > left_.size() / sizeof(T) ? 0 : static_cast<std::size_t>(count));
-    short_ = short_ || list.size() != count;
+    is_right_ = is_right_ && list.size() == count;
     take_all(list.data(), list.size());
     return list;
   }
+  void refuse() { is_right_ = false; }
   std::string take_rest() { return std::string(std::exchange(left_, {})); }
-  [[nodiscard]] bool is_done() const { return !short_ && left_.empty(); }
+  [[nodiscard]] bool is_done() const { return is_right_ && left_.empty(); }
 
  private:
   std::string_view left_;
-  bool short_ = false;
+  bool is_right_ = true;
 };
 
 /// The first byte of an entry; of another kind than odometry it is the entry's index. Odometry comes hundreds of times
@@ -66,6 +67,7 @@ class Bytes {
 constexpr char kOdometry = 0;           // all 36 numbers: what robots wrote once, and of any matrix
 constexpr char kDiagonalOdometry = 4;   // the 6 of a diagonal matrix
 constexpr char kSymmetricOdometry = 5;  // the 21 of a symmetric one
+constexpr char kFix = 6;                // the index is diagonal odometry's
 
 bool is_same(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }  // to the bit
 
@@ -107,7 +109,8 @@ Result<JournalEntry> read_odometry(Bytes in, char kind) {
     each_of_upper(sample.increment_covariance, [&](double& upper, double& lower, bool on_diagonal) {
       if (on_diagonal || kind == kSymmetricOdometry) upper = lower = in.take<double>();
     });
-  if (!in.is_done()) return fail(ErrorCode::parse, "journal: an entry is not as long as it says");
+  if (!in.is_done())
+    return fail(ErrorCode::parse, "journal: an entry is not as long as it says, or of another version");
   if (kind != kOdometry && kind_of(sample) != kind)
     return fail(ErrorCode::parse, "journal: odometry of kind {}, expected {}", int{kind}, int{kind_of(sample)});
   return JournalEntry(sample);
@@ -117,37 +120,53 @@ void write(const Scan& scan, std::string& out) {
   put(out, scan.stamp.ns);
   put(out, std::uint64_t{scan.cloud->points.size()});
   for (const Eigen::Vector3f& point : scan.cloud->points) put_all(out, point.data(), 3);
-  put(out, scan.age_s ? scan.age_s->size() : kNoBudget);
+  put(out, scan.age_s ? scan.age_s->size() : kNone);
   if (scan.age_s) put_all(out, scan.age_s->data(), scan.age_s->size());
 }
 void read(Bytes& in, Scan& scan) {
   scan.stamp.ns = in.take<std::int64_t>();
   const auto points = in.take<std::uint64_t>();
-  const auto numbers = in.take_list<float>(points > kNoBudget / 3 ? kNoBudget : 3 * points);
+  const auto numbers = in.take_list<float>(points > kNone / 3 ? kNone : 3 * points);
   PointCloud cloud;
   for (std::size_t i = 0; i + 2 < numbers.size(); i += 3)
     cloud.points.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
   scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
-  if (const auto ages = in.take<std::uint64_t>(); ages != kNoBudget)
+  if (const auto ages = in.take<std::uint64_t>(); ages != kNone)
     scan.age_s = std::make_shared<const std::vector<float>>(in.take_list<float>(ages));
 }
 
 void write(const HeardGraph& graph, std::string& out) {
-  put(out, graph.budget ? std::uint64_t{*graph.budget} : kNoBudget);
+  put(out, kNone);  // a limit that nothing has set
   out += graph.frame;
 }
 void read(Bytes& in, HeardGraph& graph) {
-  if (const auto budget = in.take<std::uint64_t>(); budget != kNoBudget) graph.budget = budget;
+  if (in.take<std::uint64_t>() != kNone) in.refuse();
   graph.frame = in.take_rest();
 }
 
 void write(const TrackedImages& images, std::string& out) { out += wire::encode(images); }
 
+void write(const PositionFix& fix, std::string& out) {
+  out.back() = kFix;
+  put(out, fix.stamp.ns);
+  for (const double x : {fix.antenna.latitude_deg, fix.antenna.longitude_deg, fix.antenna.height_m}) put(out, x);
+  put_all(out, fix.covariance.data(), 9);
+  put_all(out, fix.p_body_antenna.data(), 3);
+}
+void read(Bytes& in, PositionFix& fix) {
+  fix.stamp.ns = in.take<std::int64_t>();
+  for (double* x : {&fix.antenna.latitude_deg, &fix.antenna.longitude_deg, &fix.antenna.height_m})
+    *x = in.take<double>();
+  in.take_all(fix.covariance.data(), 9);
+  in.take_all(fix.p_body_antenna.data(), 3);
+}
+
 template <class Entry>
 Result<JournalEntry> read_entry(Bytes in) {
   Entry entry;
   read(in, entry);
-  if (!in.is_done()) return fail(ErrorCode::parse, "journal: an entry is not as long as it says");
+  if (!in.is_done())
+    return fail(ErrorCode::parse, "journal: an entry is not as long as it says, or of another version");
   return JournalEntry(std::move(entry));
 }
 
@@ -171,6 +190,8 @@ Result<JournalEntry> decode_entry(std::string_view bytes) {
       return read_entry<Scan>(rest);
     case 2:
       return read_entry<HeardGraph>(rest);
+    case kFix:
+      return read_entry<PositionFix>(rest);
     case 3: {
       auto images = wire::decode_tracked_images(bytes.substr(1));
       if (!images) return tl::unexpected(images.error());

@@ -13,8 +13,12 @@ namespace tutti::node {
 namespace journal_test {
 
 JournalEntry any_entry(Rng& rng) {
-  if (rng.bernoulli(0.3))
-    return HeardGraph{"a frame\0of bytes", rng.bernoulli(0.5) ? std::optional(7UL) : std::nullopt};
+  if (rng.bernoulli(0.3)) return HeardGraph{"a frame\0of bytes"};
+  if (rng.bernoulli(0.1))
+    return PositionFix{.stamp = {5},
+                       .antenna = {rng.normal(), rng.normal(), rng.normal()},
+                       .covariance = rng.normal() * Eigen::Matrix3d::Ones(),
+                       .p_body_antenna = {rng.normal(), 2.0, 3.0}};
   if (rng.bernoulli(0.5)) {
     OdometrySample sample{.stamp = {static_cast<std::int64_t>(rng.index(1'000'000))}};
     for (double& x : sample.T_odom_body.rotation.coeffs()) x = rng.normal();

@@ -13,10 +13,10 @@ namespace tutti::node {
 
 using namespace robot_tables;  // NOLINT
 
-Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget) {
+Step RobotNode::receive(const bus::Envelope& envelope, Timestamp now) {
   Step step;
   if (envelope.kind == bus::MessageKind::proxy_graph || envelope.kind == bus::MessageKind::proxy_graph_delta)
-    receive_graph(envelope, now, budget, step);
+    receive_graph(envelope, now, step);
   else if (envelope.kind == bus::MessageKind::receipt)
     receive_receipt(envelope, now, step);
   else
@@ -40,8 +40,7 @@ void RobotNode::remember_incarnations(Step& step) const {
 /// A server that has started again counts on from where its map was: an older one than the robot has heard of is
 /// another map. The newest of a kind comes last (bus::Delivery::retained), so that no start is heard after a later one
 /// for long.
-void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std::optional<std::size_t> budget,
-                              Step& step) {
+void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto graph = graph_in(envelope);
   if (!graph) return refuse(envelope, graph.error(), now, step);
   unread_.erase(envelope.kind);
@@ -54,7 +53,7 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std:
   if (heard.incarnation != graph_incarnation_) {
     graph_incarnation_ = heard.incarnation;
     remember_incarnations(step);
-    if (heard.age() < agent_.newest_heard()) agent_.forget_map_age();
+    if (heard.age() < agent_.map_age()) agent_.forget_map_age();
     mapped_age_ = {};
   }
   if (heard.age() >= mapped_age_) {
@@ -63,9 +62,9 @@ void RobotNode::receive_graph(const bus::Envelope& envelope, Timestamp now, std:
     mapped_until_ = own.empty() ? kFirstTimestamp : own.back().stamp;
   }
   if (!agent_.is_news(heard)) return;
-  if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph), budget}, now, step);
+  if (config_.keeps_state) remember(HeardGraph{wire::encode(**graph)}, now, step);
   write_journal(step);  // what is told of it holds
-  step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, budget, observer_)});
+  step.tell(now, RobotUpdated{agent_.robot(), agent_.receive(**graph, observer_)});
   note(std::get<RobotUpdated>(step.events.back().what).summary);
   updated_ = now;
 }

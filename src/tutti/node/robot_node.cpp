@@ -15,7 +15,7 @@ namespace tutti::node {
 using namespace robot_tables;  // NOLINT
 
 Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t session, const RobotNodeConfig& config,
-                                                   Rng rng, const storage::TableStore& store) {
+                                                   const storage::TableStore& store) {
   const auto whose = store.read(kMeta, kRobot);
   if (!whose) return tl::unexpected(whose.error());
   if (*whose && **whose != storage::key_of({robot.value}))
@@ -30,7 +30,7 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
   if (auto scanned = store.scan(kCheckpoint, {}, keep); !scanned) return tl::unexpected(scanned.error());
 
   const auto make = [&](robot::AgentState state) {
-    return std::unique_ptr<RobotNode>(new RobotNode(robot, config, rng, std::move(state), store));
+    return std::unique_ptr<RobotNode>(new RobotNode(robot, config, std::move(state), store));
   };
   std::unique_ptr<RobotNode> node;
   Status readable;
@@ -123,11 +123,12 @@ Status RobotNode::hear_again(const JournalEntry& entry) {
   }
   if (const auto* scan = std::get_if<Scan>(&entry)) return agent_.add_scan(*scan);
   if (const auto* images = std::get_if<TrackedImages>(&entry)) return agent_.add_images(*images);
+  if (const auto* fix = std::get_if<PositionFix>(&entry)) return agent_.add_fix(*fix);
   const auto& heard = std::get<HeardGraph>(entry);
   const auto message = wire::decode_proxy_graph(heard.frame);
   if (!message) return tl::unexpected(message.error());
   agent_.forget_map_age();  // it was news when it was heard
-  note(agent_.receive(*message, heard.budget));
+  note(agent_.receive(*message));
   return {};
 }
 
@@ -182,6 +183,15 @@ Step RobotNode::add_images(const TrackedImages& images, Timestamp now) {
   }
   remember(images, now, step);
   settle(now, step);
+  return step;
+}
+
+Step RobotNode::add_fix(const PositionFix& fix, Timestamp now) {
+  Step step;
+  if (auto ok = agent_.add_fix(fix); !ok)
+    step.tell(now, FixRefused{agent_.robot(), ok.error().message});
+  else
+    remember(fix, now, step);
   return step;
 }
 
@@ -320,8 +330,8 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .version = {},
                     .backlog_submaps = uplink_.submaps().size(),
                     .backlog_bytes = uplink_.bytes(),
-                    .heard_epoch = agent_.newest_heard().first,
-                    .heard_revision = agent_.newest_heard().second,
+                    .heard_epoch = agent_.map_age().first,
+                    .heard_revision = agent_.map_age().second,
                     .update_age_s = {},
                     .keyframes = agent_.keyframes().size(),
                     .T_odom_body = agent_.T_odom_body(),

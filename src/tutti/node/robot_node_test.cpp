@@ -32,7 +32,7 @@ class RobotNodeTest : public testing::Test {
   void restart() {
     store_ = std::make_unique<storage::MemoryStore>(storage::robot_schema(),
                                                     store_ ? store_->tables() : storage::MemoryStore::Tables{});
-    node_ = RobotNode::open(kRobot, 100 + ++starts_, config_, Rng(1), *store_).value();
+    node_ = RobotNode::open(kRobot, 100 + ++starts_, config_, *store_).value();
     resumed_ = done(node_->resume(now_));
   }
   Step done(Step step) {
@@ -391,11 +391,11 @@ TEST_F(RobotNodeTest, WithoutAStoreToWriteToItWritesNothing) {
 
 TEST_F(RobotNodeTest, AnotherRobotsStoreOrADamagedOneIsRefused) {
   walk(0, 50);
-  EXPECT_FALSE(RobotNode::open(RobotId{2}, 1, config_, Rng(1), *store_).has_value());
+  EXPECT_FALSE(RobotNode::open(RobotId{2}, 1, config_, *store_).has_value());
   auto tables = store_->tables();
   tables.at("meta").at("robot").pop_back();
   const storage::MemoryStore damaged(storage::robot_schema(), tables);
-  EXPECT_FALSE(RobotNode::open(kRobot, 1, config_, Rng(1), damaged).has_value());
+  EXPECT_FALSE(RobotNode::open(kRobot, 1, config_, damaged).has_value());
 }
 
 TEST_F(RobotNodeTest, ADeltaIsHeardAsSoonAsItsBaseIsThere) {

@@ -23,7 +23,7 @@ class RobotOdometry : public testing::Test {
   void restart() {
     store_ = std::make_unique<storage::MemoryStore>(storage::robot_schema(),
                                                     store_ ? store_->tables() : storage::MemoryStore::Tables{});
-    node_ = RobotNode::open(RobotId{1}, 100, config_, Rng(1), *store_).value();
+    node_ = RobotNode::open(RobotId{1}, 100, config_, *store_).value();
     resumed_ = done(node_->resume(now_));
   }
   Step done(Step step) {

@@ -31,7 +31,7 @@ std::size_t bytes_of(const Step& step) {
 
 struct Robot {
   explicit Robot(const storage::TableStore& of, std::uint64_t session = 101)
-      : node(RobotNode::open(kRobot, session, {}, Rng(1), of).value()) {}
+      : node(RobotNode::open(kRobot, session, {}, of).value()) {}
   /// A sample of a robot that walks on and on, half a metre and half a second each.
   Step walk(int i) {
     const Timestamp stamp = robot::test::at(i);

@@ -103,6 +103,18 @@ TEST_F(ServerNodeTest, ASubmapThatComesAgainIsOnlyConfirmed) {
   EXPECT_TRUE(step.events.empty());
 }
 
+TEST_F(ServerNodeTest, ASubmapThatComesAgainBeforeItIsStoredIsOnItsWay) {
+  const bus::Envelope first = test::envelope(test::submap(kAlpha, 0));
+  bus::Envelope again = first;  // as a robot sends what it has sent to an earlier server
+  again.id = message_id({kAlpha, 0}, 5);
+  const Step step = node_->receive(first, now_);
+  EXPECT_EQ(of_kind(step, MessageKind::receipt).size(), 1U);
+  const Step nothing = node_->receive(again, now_);
+  EXPECT_TRUE(nothing.messages.empty() && nothing.writes.empty() && nothing.events.empty());
+  ASSERT_TRUE(store_->commit(step.writes));
+  EXPECT_EQ(of_kind(node_->receive(again, now_), MessageKind::receipt).size(), 1U);
+}
+
 TEST_F(ServerNodeTest, RefusesWhatIsNoGoodAndStoresNothingOfIt) {
   const auto before = store_->tables();
   bus::Envelope forged = test::envelope(test::submap(kAlpha, 0));

@@ -40,16 +40,18 @@ std::optional<SubmapId> submap_of(std::string_view message_id) {
 }
 
 std::shared_ptr<SubmapFrames> SubmapFrames::of(const storage::TableStore& map) {
-  return std::make_shared<SubmapFrames>([&map](SubmapId id) -> Result<std::string> {
-    auto row = map.read("submaps", key_of(id));
-    if (!row) return tl::unexpected(row.error());
-    if (!*row) return fail(ErrorCode::io, "submap {} is not in the map", to_string(id));
-    return std::move(**row);
-  });
+  return std::make_shared<SubmapFrames>([&map](SubmapId id) { return map.read("submaps", key_of(id)); });
+}
+
+Result<std::string> SubmapFrames::frame(SubmapId id) const {
+  auto found = fetch_(id);
+  if (!found) return tl::unexpected(found.error());
+  if (!*found) return fail(ErrorCode::io, "submap {} is not in the map", to_string(id));
+  return std::move(**found);
 }
 
 Result<Submap> SubmapFrames::decode(SubmapId id) const {
-  const auto frame = fetch_(id);
+  const auto frame = this->frame(id);
   if (!frame) return tl::unexpected(frame.error());
   auto message = wire::decode_submap(*frame);
   if (!message) return in_context("submap " + to_string(id), message.error());

@@ -94,7 +94,7 @@ TEST(Upgrade, AnUnreadFrameTakesNobodysPlace) {
 TEST(Upgrade, AnOlderRobotSaysWhatItCannotReadAndGoesOn) {
   Site site;
   site.walk(100);
-  const auto heard = site.robot().agent().newest_heard();
+  const auto heard = site.robot().agent().map_age();
   const std::string receipt = wire::encode(Receipt{.robot = Site::kRobot});
   const std::string graph = wire::encode(ProxyGraphMessage{.graph = {.epoch = heard.first, .revision = 99}});
   const auto hear = [&](MessageKind kind, const std::string& bytes) {
@@ -204,7 +204,7 @@ TEST(Upgrade, ARobotsFileOfVersionOneKeepsItsOutbox) {
   }
   for (int start = 5; start < 7; ++start) {
     const auto store = storage::open_sqlite_store(file, storage::robot_schema(), {.min_free_bytes = 0}).value();
-    const auto node = RobotNode::open(Site::kRobot, 78, {}, Rng(1), *store);
+    const auto node = RobotNode::open(Site::kRobot, 78, {}, *store);
     ASSERT_TRUE(node.has_value()) << node.error().message;
     EXPECT_TRUE((*node)->backlog().contains(id));
     const Step step = (*node)->resume({});

@@ -200,6 +200,11 @@ Told tell(const node::SensorMissing& missing) {
                             missing.sensor == "scan" ? "scans" : missing.sensor),
           missing.keyframes > 0 ? Level::warning : Level::info};
 }
+Told tell(const node::FixRefused& refused) {
+  return {{{"event", "fix_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
+          "a fix was refused: " + refused.why,
+          Level::warning};
+}
 Told tell(const node::ImagesRefused& refused) {
   return {{{"event", "images_refused"}, {"robot", refused.robot.value}, {"why", refused.why}},
           "images were refused: " + refused.why,
@@ -225,6 +230,7 @@ std::string throttled_kind(const node::Event& event) {
   if (std::holds_alternative<node::OdometryJumped>(event.what)) return "jump";
   if (std::holds_alternative<node::ScanRefused>(event.what)) return "scan";
   if (std::holds_alternative<node::ImagesRefused>(event.what)) return "images";
+  if (std::holds_alternative<node::FixRefused>(event.what)) return "fix";
   return {};
 }
 

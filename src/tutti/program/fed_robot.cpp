@@ -9,16 +9,16 @@ namespace tutti::program {
 void LiveRobot::receive(const bus::Envelope& envelope, Timestamp now) {
   const double begin_s = Clock::steady_s();
   double stage_s = begin_s, compare_s = 0.0, optimise_s = 0.0;
-  bool has_compared = false;
+  bool is_update = false;
   node_->observe([&](robot::UpdateStage ended) {
     const double lap_s = Clock::steady_s() - std::exchange(stage_s, Clock::steady_s());
-    has_compared = true;
-    if (ended == robot::UpdateStage::compare) compare_s = lap_s;
+    is_update = true;
+    if (ended == robot::UpdateStage::choose) compare_s = lap_s;
     if (ended == robot::UpdateStage::optimise) optimise_s = lap_s;
   });
   take(node_->receive(envelope, now));
   node_->observe({});
-  if (!has_compared) return;
+  if (!is_update) return;
   notes_.push_back({{"event", kUpdateTimed},
                     {"update_ms", 1e3 * (Clock::steady_s() - begin_s)},
                     {"comparison_ms", 1e3 * compare_s},

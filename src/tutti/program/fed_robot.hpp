@@ -13,15 +13,15 @@
 
 namespace tutti::program {
 
-/// The robot's end of a live feed: takes what waits at the front in its order, lets the host carry out what the robot
-/// says to it, and tells the front what the robot knows. It goes with its node; the front stays, and what it still
-/// holds comes to the next one.
+/// The robot's end of a live feed: takes the inputs that wait at the front, in order; lets the host carry out the steps
+/// that the robot makes of them; and tells the front what the robot knows. It is destroyed with its node, while the
+/// front stays: inputs that the front still holds go to the next node.
 class FedRobot {
  public:
-  static constexpr double kLongest_s = 0.05;  ///< Of work at a time, unless one input takes longer.
-  static constexpr double kPublish_s = 0.05;  ///< At least so often, while it is behind.
+  static constexpr double kLongest_s = 0.05;  ///< Longest work at a time, unless one input takes longer.
+  static constexpr double kPublish_s = 0.05;  ///< The front is told at least this often while the robot is behind.
 
-  /// All that it is given outlives it.
+  /// All arguments must outlive it.
   FedRobot(FeedFront& front, LiveRobot& robot, Host& host, const Clock& clock, RobotView view,
            const visual::TrackerConfig& tracker = {})
       : front_(front), robot_(robot), host_(host), clock_(clock), view_(std::move(view)), camera_(tracker) {
@@ -29,19 +29,20 @@ class FedRobot {
     front_.begin_again(robot_.node().agent().newest_sample());
   }
 
-  /// Of the robot's steps that come from elsewhere.
+  /// Notes a step that the robot made of other input, such as messages.
   void note(const node::Step& step);
-  /// Waits at most so many wall seconds for what is fed, and takes it. All steps of before are carried out.
+  /// Waits at most `wall_s` wall seconds for inputs, and takes them. Earlier steps must be carried out before.
   void wait(double wall_s);
-  /// Takes what has come until now, and clients nothing more.
+  /// Takes everything that was fed until now; the front accepts nothing more.
   void end();
 
  private:
-  /// False: it cannot be stored, and the robot goes.
+  /// False when the input cannot be stored, and the robot is destroyed.
   bool take(const FeedInput& input);
   void hear(const node::OdometrySample& sample, Timestamp now) { robot_.add_odometry(sample, now); }
   void hear(const Scan& scan, Timestamp now);
   void hear(const FedImages& images, Timestamp now);
+  void hear(const PositionFix& fix, Timestamp now) { robot_.add_fix(fix, now); }
   void hear(const std::shared_ptr<const FeedSensors>& sensors, Timestamp /*now*/) { expect(*sensors); }
   void hear(FeedEnded, Timestamp now) { robot_.finish(now); }
   void expect(const FeedSensors& sensors) { robot_.expect_sensors(sensors.scans, !sensors.cameras.empty()); }
@@ -54,7 +55,7 @@ class FedRobot {
   const Clock& clock_;
   RobotView view_;
   FedCamera camera_;
-  bool images_fail_ = false;  // the last ones
+  bool images_fail_ = false;  // the last images could not be used
   double publish_s_ = 0.0;
 };
 

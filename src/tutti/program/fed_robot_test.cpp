@@ -41,8 +41,7 @@ class FedRobotTest : public testing::Test {
     host_ = std::make_unique<Host>(std::move(parts), clock_, *log_);
   }
   std::unique_ptr<LiveRobot> open_robot() {
-    return std::make_unique<LiveRobot>(
-        std::move(node::RobotNode::open(kRobot, 7, {}, Rng(1).fork(robot::AgentConfig{}.policy.name), disk_).value()));
+    return std::make_unique<LiveRobot>(std::move(node::RobotNode::open(kRobot, 7, {}, disk_).value()));
   }
   void feed(std::size_t from, std::size_t until) {
     for (std::size_t i = from; i < until; ++i) {
@@ -63,7 +62,7 @@ class FedRobotTest : public testing::Test {
     return dynamic_cast<test::Hosting*>(host_->hosted())->agent();
   }
   void expect_the_robot_of_all_that_was_fed() {
-    robot::RobotAgent alone(kRobot, 7, {}, Rng(1));
+    robot::RobotAgent alone(kRobot, 7, {});
     for (std::size_t i = 0; i < kOdometry.size(); ++i) {
       ASSERT_TRUE(alone.add_odometry(sample(i).stamp, sample(i).T_odom_body, sample(i).increment_covariance));
       if (i % 5 != 0 || !alone.wants_scan()) continue;

@@ -120,7 +120,9 @@ Json HostedRobot::feed_status() const {
           {"images_left_out", of.images_left_out},
           {"image_bytes_waiting", of.image_bytes},
           {"imu_samples", of.imu},
-          {"imu_samples_left_out", of.imu_left_out}};
+          {"imu_samples_left_out", of.imu_left_out},
+          {"fixes", of.fixes},
+          {"fixes_left_out", of.fixes_left_out}};
 }
 
 Json HostedRobot::status(Timestamp now) const {

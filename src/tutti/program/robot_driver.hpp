@@ -14,32 +14,33 @@
 
 namespace tutti::program {
 
-/// The robot of a robot program: its node, and, where it replays, what comes next.
+/// The robot in a robot program: its node, and the recording that it replays, if any.
 class RobotDriver {
  public:
   virtual ~RobotDriver() = default;
   [[nodiscard]] virtual const node::RobotNode& node() const = 0;
-  // RobotNode's functions of these names. What they make waits for take_step().
+  // As RobotNode's functions with these names; the steps that they make wait for take_step().
   virtual void resume(Timestamp now) = 0;
   virtual void on_timer(Timestamp now) = 0;
   virtual void receive(const bus::Envelope& envelope, Timestamp now) = 0;
   virtual void finish(Timestamp now) = 0;
   virtual void store_all() = 0;
   virtual node::Step take_step() = 0;
-  /// Mission time of its next sample, s; infinity when it has none, or its samples come from elsewhere.
+  /// Mission time of the next recorded sample, s; infinity when there is none, or samples are fed.
   [[nodiscard]] virtual double next_time() const { return std::numeric_limits<double>::infinity(); }
   virtual void replay_next(Timestamp /*now*/) {}
-  /// Events beside those of the steps, since the last call.
+  /// The events since the last call that are not in steps.
   virtual std::vector<Json> take_notes() { return {}; }
 };
 
-inline constexpr const char* kUpdateTimed = "update_timed";  ///< How long an update of the map took.
+inline constexpr const char* kUpdateTimed = "update_timed";  ///< An event: how long an update of the map took.
 
-/// Makes the driver of a robot that replays, on its store; called again when the store could not be written.
+/// Makes the driver of a robot that replays a recording, on its store. It is called again when the store could not be
+/// written.
 using ReplayMaker = std::function<Result<std::unique_ptr<RobotDriver>>(
     const node::RobotNodeConfig& config, std::uint64_t session, const storage::TableStore& store)>;
 
-/// One whose samples are fed.
+/// The driver of a robot whose samples are fed.
 class LiveRobot final : public RobotDriver {
  public:
   explicit LiveRobot(std::unique_ptr<node::RobotNode> node) : node_(std::move(node)) {}
@@ -54,7 +55,8 @@ class LiveRobot final : public RobotDriver {
   void add_odometry(const node::OdometrySample& sample, Timestamp now) { take(node_->add_odometry(sample, now)); }
   void add_scan(const Scan& scan, Timestamp now) { take(node_->add_scan(scan, now)); }
   void add_images(const TrackedImages& images, Timestamp now) { take(node_->add_images(images, now)); }
-  /// What became of its samples before they came to the node.
+  void add_fix(const PositionFix& fix, Timestamp now) { take(node_->add_fix(fix, now)); }
+  /// Tells what became of samples before they reached the node.
   void tell(Timestamp now, const node::ImagesRefused& what) { step_.tell(now, what); }
   void expect_sensors(bool scans, bool images) { node_->expect_sensors(scans, images); }
 

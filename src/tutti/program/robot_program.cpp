@@ -104,8 +104,7 @@ Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
   }
   const std::uint64_t session = options_.session.value_or(folder_->made_ns());
   if (options_.feed.empty()) return options_.replay(config, session, *store_);
-  const std::string& policy = config.agent.policy.name;
-  auto node = node::RobotNode::open(robot_, session, config, Rng(options_.settings.randomness).fork(policy), *store_);
+  auto node = node::RobotNode::open(robot_, session, config, *store_);
   if (!node) return tl::unexpected(node.error());
   return std::make_unique<LiveRobot>(std::move(*node));
 }

@@ -10,25 +10,39 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/feed/feed_server.hpp"
 #include "tutti/program/robot_driver.hpp"
 #include "tutti/robot/agent.hpp"
+#include "tutti/robot/odometry_covariance.hpp"
 
 namespace tutti::program {
 
 inline constexpr const char* kRobotFile = "robot.tutti";  ///< In a robot's state folder.
-inline constexpr const char* kEnded = "ended";            ///< Its last event, with its traffic.
+inline constexpr const char* kEnded = "ended";            ///< The program's last event, which has its traffic.
 
-/// What a robot is told of its mission.
+/// How a client that feeds a robot's raw messages is to interpret them.
+struct DriverSettings {
+  robot::OdometryCovarianceConfig covariance;
+  lidar::ScanTimesConfig scan_times;
+  std::optional<Pose3> T_body_lidar;  ///< Nothing: the messages tell it.
+  /// The receiver's antenna in the body frame, m; nothing: the messages tell it.
+  std::optional<Eigen::Vector3d> p_body_antenna;
+  bool with_images = false;  ///< Closures are found from images, so images and IMU samples are wanted.
+  int most_cameras = 2;
+  double images_offset_s = 0.0;  ///< Added to the images' stamps gives the odometry's time.
+};
+
+/// What a robot is told about its mission.
 struct RobotSettings {
   std::string mission;              ///< Its name on the bus (bus::check_mission_name).
-  std::vector<std::string> robots;  ///< By their number; empty: nobody has told.
+  std::vector<std::string> robots;  ///< By number; empty: unknown.
   robot::AgentConfig agent;
   visual::TrackingConfig tracking;
-  Rng randomness{1};  ///< Of its agent.
-  /// Of these, what a mission file may say.
+  DriverSettings driver;
+  /// Describes the settings that a mission file may have.
   template <class V>
   void describe(V& v) {
     v.field("agent", agent);
@@ -36,32 +50,34 @@ struct RobotSettings {
   }
 };
 
+/// How a robot program runs.
 struct RobotOptions {
-  std::string name;  ///< One of the mission's; any, when it is fed.
+  std::string name;  ///< One of the mission's robots; any name when the robot is fed.
   std::string bus;   ///< "nats://HOST:PORT"
   bool insecure = false;
   std::filesystem::path state;
   RobotSettings settings;
-  std::string feed;         ///< Samples come on this Unix socket; empty: from a recording.
-  ReplayMaker replay;       ///< Of that.
-  double duration_s = 0.0;  ///< Of its mission; not of one that is fed.
+  std::string feed;         ///< Path of the Unix socket on which samples are fed; empty: they are from a recording.
+  ReplayMaker replay;       ///< Makes the robot that replays the recording.
+  double duration_s = 0.0;  ///< Duration of the mission; not used when the robot is fed.
   FeedAccess feed_access;
-  double rate = 1.0;                                          ///< Times real time.
-  double uplink_bytes_per_s = 0.0;                            ///< Of mission time, for submaps; 0: no limit.
-  std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;  ///< Of submaps that the server has.
-  bool stay = false;                                          ///< After the recording, to hear later maps.
-  std::optional<std::uint64_t> session;                       ///< Nothing: when the state folder was made.
+  double rate = 1.0;                                          ///< Mission time per wall time.
+  double uplink_bytes_per_s = 0.0;                            ///< Per second of mission time, for submaps; 0: no limit.
+  std::uint64_t max_archive_bytes = std::uint64_t{1} << 30U;  ///< Size of the archive of submaps that the server has.
+  bool stay = false;                                          ///< Go on after the recording, to hear later maps.
+  std::optional<std::uint64_t> session;                       ///< Nothing: the time when the state folder was made.
   Level console = Level::warning;
   std::string version;
 };
 
-/// Its number: the place of its name among the mission's, or, of one that is fed and is in no mission, of its name
-/// alone, the same everywhere and none that a mission gives. An error: no name for a robot, or none of the mission's.
+/// The robot's number: its name's position among the mission's `names`. A robot that is fed and in no mission has a
+/// number made from its name, which is the same everywhere and differs from all numbers that missions give. Fails when
+/// the name cannot be a robot's, or the mission does not have it.
 Result<RobotId> number_of(const std::string& name, const std::vector<std::string>& names, bool is_fed);
 
 /// Replays the robot's recording, or takes what clients feed, from where an earlier program of this state folder
-/// stopped. Ends at `stop`; or, unless it is to stay, when the recording has ended, the server has stored all its
-/// submaps, and the robot has heard a map that contains them or waited 60 s for it.
+/// stopped. Returns at `stop`; also, unless options.stay, when the recording has ended, the server has stored all
+/// submaps, and the robot has heard a map that contains them or has waited 60 s for one.
 Status run_robot(const RobotOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace tutti::program

@@ -54,6 +54,18 @@ class HostedServer final : public Hosted {
   Answer report(Timestamp now) override { return {{.messages = {mission_status(now)}}, {}}; }
   [[nodiscard]] Json status(Timestamp now) const override;
   [[nodiscard]] bool finished() const override { return is_over_; }
+  /// A new map is shown, if the viewer has time for it.
+  void show(MapViewer& viewer) const {
+    const server::MapServer& map = node_->map_server();
+    const server::MapServerState& state = map.state();
+    if (!node_->has_map() || !viewer.wants(state.revision)) return;
+    auto shown = std::make_shared<ShownMap>();
+    shown->revision = state.revision;
+    shown->content.submaps = state.submaps;
+    shown->content.payload_sizes = state.payload_sizes;
+    shown->map = map.map();
+    viewer.show(std::move(shown));
+  }
 
  private:
   bus::Envelope mission_status(Timestamp now) {
@@ -219,6 +231,7 @@ class ServerProgram {
   std::optional<Clock> clock_;
   std::optional<Host> host_;
   std::optional<OwnWorker> worker_;
+  std::unique_ptr<MapViewer> viewer_;
   std::string trouble_;  // of the bus
 };
 
@@ -262,6 +275,8 @@ Status ServerProgram::take_lease() {
 void ServerProgram::tend() {
   tend_bus();
   is_over_ = !check_lease(lease_->state());
+  if (const auto* server = dynamic_cast<const HostedServer*>(host_->hosted()); server != nullptr && viewer_)
+    server->show(*viewer_);
 }
 
 /// The bus may have ended, or its disk may be full.
@@ -312,6 +327,11 @@ Status ServerProgram::start() {
                             .version = options_.version},
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
+  if (options_.view) {
+    auto viewer = options_.view(*store_);
+    if (!viewer) return tl::unexpected(viewer.error());
+    viewer_ = std::move(*viewer);
+  }
   if (options_.threads == 0) return {};
   worker_.emplace(bus_, finder_, settings_.finders.refiner(), *store_, options_.version,
                   static_cast<std::size_t>(options_.threads), *clock_, *log_);

@@ -2,30 +2,34 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "tutti/base/result.hpp"
+#include "tutti/mapfile/content.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/finder_settings.hpp"
 #include "tutti/server/map_server.hpp"
 
 namespace tutti::program {
 
-inline constexpr const char* kMapFile = "map.tutti";       ///< In a server's state folder.
-inline constexpr const char* kStatusFile = "status.json";  ///< In both: Hosted::status() of the last half second.
+inline constexpr const char* kMapFile = "map.tutti";  ///< In a server's state folder.
+/// In a server's and in a robot's: Hosted::status(), at most half a second old.
+inline constexpr const char* kStatusFile = "status.json";
 
-/// What a server is told of its mission.
+/// What a server is told about its mission.
 struct ServerSettings {
   std::string mission;                            ///< Its name on the bus (bus::check_mission_name).
-  std::vector<std::string> robots;                ///< By their number; empty: nobody has told, and any is welcome.
-  bool accepts_others = true;                     ///< Robots that are none of these, from their first submap on.
-  std::string robot_arguments = "--feed SOCKET";  ///< The last ones of the command that starts a robot.
+  std::vector<std::string> robots;                ///< By number; empty: unknown, and every robot is welcome.
+  bool accepts_others = true;                     ///< Other robots join with their first submap.
+  std::string robot_arguments = "--feed SOCKET";  ///< The last arguments of the command that starts a robot.
   server::ServerConfig server;
   FinderSettings finders;
-  /// Of these, what a mission file may say.
+  /// Describes the settings that a mission file may have.
   template <class V>
   void describe(V& v) {
     v.field("server", server);
@@ -33,21 +37,48 @@ struct ServerSettings {
   }
 };
 
+/// A map as the server has it; its clouds are in the server's store.
+struct ShownMap {
+  std::uint64_t revision = 0;
+  mapfile::Content content;  ///< Submaps, with the sizes of their payloads only.
+  server::MapEstimate map;
+};
+
+/// Shows the map to others while the server makes it. It has a thread of its own; the server's thread calls these
+/// functions, which must not block.
+class MapViewer {
+ public:
+  virtual ~MapViewer() = default;
+  /// True if it has time for this revision and does not show it yet.
+  [[nodiscard]] virtual bool wants(std::uint64_t revision) const = 0;
+  virtual void show(std::shared_ptr<const ShownMap> map) = 0;
+
+ protected:
+  MapViewer() = default;
+  MapViewer(const MapViewer&) = default;
+  MapViewer(MapViewer&&) = default;
+  MapViewer& operator=(const MapViewer&) = default;
+  MapViewer& operator=(MapViewer&&) = default;
+};
+
+/// How a server program runs.
 struct ServerOptions {
   std::filesystem::path state;
-  std::string bus;     ///< "nats://HOST:PORT"; empty: a nats-server of its own,
-  std::string listen;  ///< at this "HOST" or "HOST:PORT"; empty: this machine only, any free port.
+  std::string bus;     ///< "nats://HOST:PORT"; empty: the program starts its own nats-server,
+  std::string listen;  ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
   bool insecure = false;
   ServerSettings settings;
-  int threads = 1;  ///< That verify closures here; 0: workers do.
-  double rate = 1.0;
+  int threads = 1;    ///< Threads that verify closures in this program; 0: workers do it.
+  double rate = 1.0;  ///< Mission time per wall time.
   Level console = Level::warning;
   std::string version;
-  /// Called once, with the command that starts a robot of this server.
+  /// Makes the viewer of the map's store, which outlives it; empty: there is none.
+  std::function<Result<std::unique_ptr<MapViewer>>(const storage::TableStore& map)> view;
+  /// Called once with the command that starts a robot of this server.
   std::function<void(const std::string&)> announce;
 };
 
-/// Until `stop`. Errors of kind configuration are of the options.
+/// Runs a server until `stop`. Errors of kind configuration are about the options.
 Status run_server(const ServerOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace tutti::program

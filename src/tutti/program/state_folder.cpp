@@ -32,9 +32,12 @@ double StateFolder::age_s() const {
 Status replace_file(const fs::path& file, const std::string& text, bool durable) {
   const fs::path beside = beside_of(file);
   if (Status written = write_file(beside.string(), text); !written) return written;
-  if (const int written = durable ? ::open(beside.c_str(), O_RDONLY | O_CLOEXEC) : -1; written >= 0) {
-    fsync(written);
-    close(written);
+  if (durable) {
+    const int written = ::open(beside.c_str(), O_RDONLY | O_CLOEXEC);
+    const bool is_on_disk = written >= 0 && fsync(written) == 0;
+    const int why = errno;
+    if (written >= 0) close(written);
+    if (!is_on_disk) return fail(ErrorCode::io, "{}: cannot be written: {}", beside.string(), std::strerror(why));
   }
   std::error_code error;
   fs::rename(beside, file, error);

@@ -16,21 +16,26 @@
 namespace tutti::robot {
 namespace {
 
-std::unique_ptr<consistency::ConstraintPolicy> known_policy(const consistency::PolicyConfig& config) {
-  auto policy = consistency::make_policy(config.name, config);
+std::unique_ptr<const consistency::ConstraintPolicy> known_policy(const AgentConfig& config) {
+  auto policy = consistency::make_policy(config.policy, config.compare);
   TUTTI_CHECK(policy.has_value(), "{}", policy.error().message);
   return std::move(*policy);
 }
 
 }  // namespace
 
-RobotAgent::RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng)
-    : RobotAgent(robot, config, std::move(rng), AgentState{{.session = session}}) {}
-RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentState state)
+RobotAgent::RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config)
+    : RobotAgent(robot, session, config, known_policy(config)) {}
+RobotAgent::RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config,
+                       std::unique_ptr<const consistency::ConstraintPolicy> policy)
+    : RobotAgent(robot, config, std::move(policy), AgentState{{.session = session}}) {}
+RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config, AgentState state)
+    : RobotAgent(robot, config, known_policy(config), std::move(state)) {}
+RobotAgent::RobotAgent(RobotId robot, const AgentConfig& config,
+                       std::unique_ptr<const consistency::ConstraintPolicy> policy, AgentState state)
     : chain_(robot, state.session),
       config_(config),
-      rng_(std::move(rng)),
-      policy_(known_policy(config.policy)),
+      policy_(std::move(policy)),
       submaps_(chain_, config.submap, std::move(state.submaps)),
       smoother_(config.smoother, std::move(state.smoother)),
       state_(std::move(state)) {
@@ -146,8 +151,7 @@ std::vector<consistency::RobotNode> RobotAgent::nodes() const {
 }
 
 // The method of the paper, one step a line (docs/math.md, "Comparison and constraints").
-UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget,
-                                  const StageObserver& stage_ended) {
+UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, const StageObserver& stage_ended) {
   UpdateSummary summary{.revision = message.graph.revision, .constraints = state_.ledger.size()};
   if (!is_news(message.graph)) return summary;  // late or repeated
   std::tie(state_.epoch, state_.revision) = message.graph.age();
@@ -157,26 +161,21 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
 
   const ProxyGraph graph = consistency::without_doubted(message.graph, chain_);
   const std::vector<consistency::RobotNode> own = nodes();
-  const auto comparison = policy_->needs_disagreement()
-                              ? consistency::compare(graph, chain_, own, config_.compare)
-                              : consistency::Comparison{consistency::synchronise(graph, chain_, own).pairs};
-  ended(UpdateStage::compare);
+  const std::vector<consistency::NodePair> pairs = consistency::synchronise(graph, chain_, own).pairs;
 
   std::optional<consistency::DisagreementTest> test;
   consistency::Disagreement odometry_disagreement;
   ++state_.comparisons;
-  if (comparison.pairs.size() >= 2 && (config_.explain || policy_->needs_test())) {
-    test.emplace(graph, chain_, comparison.pairs, state_.comparisons, config_.disagreement);
-    odometry_disagreement = (*test)(consistency::odometry_at(own, comparison.pairs));
+  if (pairs.size() >= 2 && (config_.explain || policy_->needs_test())) {
+    test.emplace(graph, chain_, pairs, state_.comparisons, config_.disagreement);
+    odometry_disagreement = (*test)(consistency::odometry_at(own, pairs));
   }
   const std::size_t withdrawn = state_.ledger.withdraw_unknown(graph, chain_);
   const consistency::Ledger held = state_.ledger;
   const auto selection = policy_->choose({.graph = graph,
                                           .chain = chain_,
                                           .nodes = own,
-                                          .comparison = comparison,
-                                          .budget = budget,
-                                          .rng = rng_.fork(state_.revision),
+                                          .pairs = pairs,
                                           .ledger = state_.ledger,
                                           .test = test ? &*test : nullptr,
                                           .odometry_disagreement = &odometry_disagreement});
@@ -197,16 +196,16 @@ UpdateSummary RobotAgent::receive(const ProxyGraphMessage& message, std::optiona
       state_.ledger.size() == 0 ? Pose3{} : smoother_.poses().back() * state_.keyframes.back().T_odom_body.inverse();
   state_.covariance = covariance_by(message.graph);
   state_.component = component_of(message.graph, chain_);
-  locate_others(message.graph, own, comparison.pairs);
+  locate_others(message.graph, own, pairs);
   ended(UpdateStage::optimise);
 
   if (config_.explain && test)
-    summary.explanation = consistency::explain(graph, chain_, own, comparison.pairs, *test,
-                                               std::move(odometry_disagreement), config_.disagreement.false_alarm_rate);
-  summary.synchronised = comparison.pairs.size();
+    summary.explanation = consistency::explain(graph, chain_, own, pairs, *test, std::move(odometry_disagreement),
+                                               config_.disagreement.false_alarm_rate);
+  summary.synchronised = pairs.size();
   summary.proposed = selection.constraints.size();
   summary.constraints = state_.ledger.size();
-  summary.order = comparison.order;
+  summary.order = selection.order;
   return summary;
 }
 

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "tutti/base/random.hpp"
 #include "tutti/consistency/compare.hpp"
+#include "tutti/consistency/disagreement.hpp"
 #include "tutti/consistency/explanation.hpp"
 #include "tutti/consistency/ledger.hpp"
 #include "tutti/consistency/policy.hpp"
@@ -23,13 +23,14 @@
 
 namespace tutti::robot {
 
+/// Settings of a robot; `describe` explains each.
 struct AgentConfig {
   SubmapConfig submap;
   consistency::CompareConfig compare;
   consistency::DisagreementConfig disagreement;
   consistency::PolicyConfig policy;
-  estimation::OnboardSmootherConfig smoother{.polishing_steps =
-                                                 1};  ///< Few links, long runs: one step gives them back millimetres.
+  /// One polishing step, because few constraints over long runs leave millimetres without it.
+  estimation::OnboardSmootherConfig smoother{.polishing_steps = 1};
   bool explain = true;
   OdometryWatchConfig jumps;
   template <class V>
@@ -51,75 +52,90 @@ struct Whereabouts {
   Pose3 T_map_body;
 };
 
-/// What one proxy graph changed.
+/// What one proxy graph changed on the robot.
 struct UpdateSummary {
   std::uint64_t revision = 0;
-  std::size_t synchronised = 0;      ///< Pairs of nodes compared.
-  std::size_t proposed = 0;          ///< Constraints the policy chose.
-  std::size_t constraints = 0;       ///< In the ledger afterwards.
-  int order = 0;                     ///< Of the Chebyshev transform; 0 = exact or not computed.
-  consistency::LedgerUpdate ledger;  ///< What became of the constraints.
-  /// How the optimisation with them ended.
+  std::size_t synchronised = 0;      ///< Pairs of nodes that were compared.
+  std::size_t proposed = 0;          ///< Constraints that the policy chose.
+  std::size_t constraints = 0;       ///< Constraints in the ledger afterwards.
+  int order = 0;                     ///< Selection::order
+  consistency::LedgerUpdate ledger;  ///< What the update did to the ledger.
+  /// How the optimisation with the new constraints ended.
   estimation::Termination optimised = estimation::Termination::not_run;
-  /// They could not be solved: the ledger holds what it held before, or nothing.
+  /// The optimisation failed. The ledger then holds what it held before, without withdrawn constraints; or nothing if
+  /// that fails too.
   bool taken_back = false;
-  consistency::Explanation explanation;  ///< Of raw odometry against the server's map.
+  /// Of raw odometry against the server's map; empty unless AgentConfig::explain.
+  consistency::Explanation explanation;
 };
 
-/// The steps of an update, in order. An observer is told when each ends, so that whoever owns a clock can time them.
-enum class UpdateStage { compare, choose, optimise };
+/// The stages of an update, in order: to choose constraints by where robot and map disagree, and to optimise with them.
+/// An observer is called when each one ends, so that a caller with a clock can time them.
+enum class UpdateStage { choose, optimise };
 using StageObserver = std::function<void(UpdateStage)>;
 
-/// What of an agent's state changes as it goes on; it does not grow with the way.
+/// The part of an agent's state whose size does not grow with the length of the run.
 struct AgentHead {
-  std::uint64_t session = 0;   ///< ChainId::session; goes on with the state.
+  std::uint64_t session = 0;   ///< ChainId::session; a restored state goes on with it.
   std::uint64_t sequence = 0;  ///< Of the next message.
-  std::uint64_t epoch = 0;     ///< Of the newest proxy graph seen: ProxyGraph::age().
+  std::uint64_t epoch = 0;     ///< ProxyGraph::age() of the newest graph heard.
   std::uint64_t revision = 0;
-  std::uint64_t comparisons = 0;  ///< Proxy graphs compared.
+  std::uint64_t comparisons = 0;  ///< Number of proxy graphs that were compared.
   SubmapBuilderState submaps;
   RelativePose since_node{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  OdometryWatch::State watch;  ///< What was fed.
-  Pose3 T_odom_body;           ///< Newest sample.
+  OdometryWatch::State watch;  ///< The odometry as it was fed.
+  Pose3 T_odom_body;           ///< At the newest sample, in the frame of the first one.
   Pose3 T_map_odom;
   Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance().
   std::vector<Whereabouts> whereabouts;
-  /// Of the map, by the newest proxy graph; nothing: it does not know this chain.
+  /// The chain's component in the newest proxy graph; nothing when the graph does not know the chain.
   std::optional<std::uint32_t> component;
 };
 
-/// An agent's whole state, by value: restart it from this and it goes on as if nothing had happened.
+/// An agent's whole state, by value. An agent made from it goes on as if it had never stopped.
 struct AgentState : AgentHead {
-  estimation::SmootherState smoother;  ///< Its odometry is only added to; the rest changes when a graph is received.
-  consistency::Ledger ledger;          ///< The same.
-  // These are only added to.
-  std::vector<Keyframe> keyframes;          ///< Nodes of the smoother's chain.
-  std::vector<std::uint32_t> submap_of;     ///< Of each keyframe: the submap it was first in.
-  std::vector<RelativePose> node_odometry;  ///< Raw, between representative keyframes; [k] ends at the k-th.
+  estimation::SmootherState smoother;  ///< Its odometry only grows; the rest changes when a graph is received.
+  consistency::Ledger ledger;          ///< Changes when a graph is received.
+  // These only grow.
+  std::vector<Keyframe> keyframes;  ///< The nodes of the smoother's chain.
+  /// SubmapId::index, per keyframe, of the first submap that the keyframe is in.
+  std::vector<std::uint32_t> submap_of;
+  /// Raw odometry between representative keyframes; entry k ends at the k-th.
+  std::vector<RelativePose> node_odometry;
 };
 
-/// One robot: odometry and scans in, submaps out; proxy graphs in, corrected trajectory out. No threads, sockets or
-/// clocks inside; works the same whether or not a server is ever heard.
+/// One robot: takes odometry and sensor data and gives submaps; takes proxy graphs and gives a corrected trajectory. It
+/// has no threads, sockets or clocks, and works whether or not a server is ever heard. Not for several threads at a
+/// time.
 class RobotAgent {
  public:
-  /// `config.policy.name` must be a known policy (checked: throws on our own mistake; validate user input before).
-  /// `session` is larger than in any start of this robot before, such as the time of the start (ChainId).
-  RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config, Rng rng);
-  /// Goes on from a saved state and its session, with the same configuration and randomness as then.
-  RobotAgent(RobotId robot, const AgentConfig& config, Rng rng, AgentState state);
+  /// Throws on an unknown `config.policy.name`, so validate user input first. `session` must be larger than at any
+  /// earlier start of this robot, such as the time of the start (ChainId).
+  RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config);
+  /// With a policy of the caller's own; config.policy is ignored.
+  RobotAgent(RobotId robot, std::uint64_t session, const AgentConfig& config,
+             std::unique_ptr<const consistency::ConstraintPolicy> policy);
+  /// Goes on from a saved state and its session. `config` must be the same as when the state was saved.
+  RobotAgent(RobotId robot, const AgentConfig& config, AgentState state);
   ~RobotAgent();
   RobotAgent(RobotAgent&&) noexcept;
   RobotAgent& operator=(RobotAgent&&) noexcept;
 
-  /// Raw odometry, see SubmapBuilder::add_odometry; a bad sample is refused and nothing changes. Quaternions are
-  /// normalised where they are off by rounding only (1e-3). Covariances may lack a coordinate (odometry in the plane)
-  /// or call one unknown; what is used and uploaded has standard deviations of at most 10 m and 0.3 rad and an inverse
-  /// (geometry/covariance.hpp). Where it jumps (OdometryWatch) the robot is taken to stay, as unsure as a step may be,
-  /// and a submap of its own leads across: what sensors see before and after is never in one.
+  /// Adds a sample of raw odometry; a bad one is refused and nothing changes (SubmapBuilder::add_odometry()).
+  /// `increment_covariance` (right tangent) is of the step since the previous sample, and ignored for the first.
+  ///
+  /// Quaternions that are off by rounding (1e-3) are normalised. Covariances may lack a coordinate (odometry in the
+  /// plane) or call one unknown; what is used and uploaded has an inverse, and standard deviations of at most 10 m and
+  /// 0.3 rad (geometry/covariance.hpp).
+  ///
+  /// Where odometry jumps (OdometryWatch), the robot is assumed to stay where it is, with the largest covariance that a
+  /// step may have. A submap of its own bridges the jump, so that no submap has what sensors saw on both sides.
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance);
   Status add_scan(const Scan& scan);
   /// SubmapBuilder::add_images()
   Status add_images(const TrackedImages& images);
+  /// SubmapBuilder::add_fix()
+  Status add_fix(const PositionFix& fix) { return submaps_.add_fix(fix); }
   /// SubmapBuilder::add_moment()
   void add_moment(Timestamp stamp);
   /// SubmapBuilder's functions of these names
@@ -127,46 +143,45 @@ class RobotAgent {
   [[nodiscard]] bool wants_scan(Timestamp stamp) const { return submaps_.wants_scan(stamp); }
   [[nodiscard]] bool wants_images(Timestamp stamp) const { return submaps_.wants_images(stamp); }
   [[nodiscard]] NextKeyframe next_keyframe() const { return submaps_.next_keyframe(); }
-  /// Of the newest keyframe before this moment; nothing: there is none.
+  /// Stamp of the newest keyframe before this moment; nothing when there is none.
   [[nodiscard]] std::optional<Timestamp> keyframe_before(Timestamp stamp) const;
-  /// SubmapConfig::has_scans and has_images, of a robot of which that becomes known later.
+  /// Sets SubmapConfig::has_scans and has_images, for a robot of which they become known after its start.
   void expect_sensors(bool scans, bool images);
   /// Stamp of the latest odometry sample.
   [[nodiscard]] std::optional<Timestamp> newest_sample() const { return submaps_.newest_sample(); }
-  /// The newest; nothing: none yet.
+  /// Stamp of the newest images heard; nothing before the first.
   [[nodiscard]] std::optional<Timestamp> heard_images() const { return submaps_.state().heard_images; }
   /// SubmapBuilder::settled()
   [[nodiscard]] std::optional<Timestamp> settled() const { return submaps_.settled(); }
-  /// Since the last one that was taken; nothing: the robot is not known to have that sensor.
+  /// Keyframes since the last one with a scan (with images); nothing when the robot is not known to have that sensor.
   [[nodiscard]] std::optional<std::uint64_t> keyframes_without_scan() const;
   [[nodiscard]] std::optional<std::uint64_t> keyframes_without_images() const;
   /// Ends the run: the last, shorter submap becomes an outgoing message.
   void finish();
-  /// Submaps ready to be sent, oldest first; taken once. Their scans are merged here, which add_odometry() and
-  /// add_scan() need not wait for: until then they are kept whole, so ask regularly.
+  /// The submaps that are ready to be sent, oldest first, each one once. This is where scans are merged, so that
+  /// add_odometry() and add_scan() return quickly; until then scans are kept whole, so call it regularly.
   std::vector<SubmapMessage> take_outgoing();
   /// SubmapBuilder::take_image_errors()
   std::vector<Error> take_image_errors() { return submaps_.take_image_errors(); }
-  /// Told once.
+  /// The jumps since the last call.
   std::vector<OdometryJump> take_odometry_jumps() { return std::exchange(jumps_, {}); }
   /// SubmapBuilder::take_scan_errors()
   std::vector<Error> take_scan_errors() { return submaps_.take_scan_errors(); }
 
-  /// Compares the server's map with the own one and adds the constraints it takes. An older revision than the newest
-  /// seen changes nothing (synchronised = 0). `budget` limits policies that need one.
-  UpdateSummary receive(const ProxyGraphMessage& message, std::optional<std::size_t> budget = std::nullopt,
-                        const StageObserver& stage_ended = {});
+  /// Compares the server's map with the robot's own, and takes the constraints that the policy chooses. A graph that is
+  /// no news changes nothing (synchronised = 0).
+  UpdateSummary receive(const ProxyGraphMessage& message, const StageObserver& stage_ended = {});
 
-  /// The next graph is news, whatever its age: the map is another one.
+  /// Makes the next graph news whatever its age is, because it is of another map.
   void forget_map_age() { state_.epoch = state_.revision = 0; }
-  /// Newer than any that was received; another one changes nothing.
-  [[nodiscard]] bool is_news(const ProxyGraph& graph) const { return graph.age() > newest_heard(); }
+  /// True if the graph is newer than any that was received.
+  [[nodiscard]] bool is_news(const ProxyGraph& graph) const { return graph.age() > map_age(); }
 
-  /// ProxyGraph::age() of the newest; (0, 0): none.
-  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> newest_heard() const { return {state_.epoch, state_.revision}; }
+  /// ProxyGraph::age() of the newest graph received; (0, 0) before the first.
+  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> map_age() const { return {state_.epoch, state_.revision}; }
 
   [[nodiscard]] AgentState state() const;
-  // The parts of state(), which takes the longer the longer the way is.
+  // The parts of state(), which as a whole takes time in proportion to the run.
   [[nodiscard]] AgentHead head() const;
   [[nodiscard]] const estimation::SmootherState& smoother() const { return smoother_.state(); }
   [[nodiscard]] const std::vector<std::uint32_t>& submap_of() const { return state_.submap_of; }
@@ -176,32 +191,32 @@ class RobotAgent {
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return state_.keyframes; }
   [[nodiscard]] const consistency::Ledger& ledger() const { return state_.ledger; }
   [[nodiscard]] const consistency::ConstraintPolicy& policy() const { return *policy_; }
-  /// Of the own chain: one per keyframe but the first.
+  /// Odometry factors of the own chain: one per keyframe but the first.
   [[nodiscard]] std::size_t odometry_factors() const { return smoother_.size() - 1; }
-  /// T_map_body at the keyframes; `map` starts where `odom` does.
+  /// T_map_body at the keyframes; `map` begins where `odom` does.
   [[nodiscard]] Trajectory corrected() const;
-  /// Takes odometry into the corrected map. Only receive() changes it; the identity while nothing is corrected.
+  /// Maps odometry into the corrected map. Only receive() changes it; the identity while nothing is corrected.
   [[nodiscard]] const Pose3& T_map_odom() const { return state_.T_map_odom; }
-  /// The newest sample, in the frame of the first one, whatever has jumped since.
+  /// The newest sample in the frame of the first one, whatever has jumped since.
   [[nodiscard]] const Pose3& T_odom_body() const { return state_.T_odom_body; }
   [[nodiscard]] OdometryWatch watch() const { return {config_.jumps, state_.watch}; }
-  /// From the frame of what is fed now, which is another one after each jump; the identity while there was none.
-  [[nodiscard]] const std::optional<StampedPose>& newest_fed() const {
-    return state_.watch.newest;
-  }  ///< As it was fed.
+  /// The newest sample as it was fed (before jumps are removed).
+  [[nodiscard]] const std::optional<StampedPose>& newest_fed() const { return state_.watch.newest; }
+  /// Maps the frame of what is fed now, which is another one after each jump, to `odom`; the identity before the first
+  /// jump.
   [[nodiscard]] Pose3 T_odom_fed() const { return watch().T_odom_fed(); }
   /// The corrected pose at the newest odometry sample: T_map_odom * T_odom_body. It jumps when receive() corrects.
   [[nodiscard]] Pose3 T_map_body() const { return state_.T_map_odom * state_.T_odom_body; }
-  /// Newest proxy graph heard; zeros: none.
-  [[nodiscard]] std::pair<std::uint64_t, std::uint64_t> map_age() const { return {state_.epoch, state_.revision}; }
-  /// Of T_map_body(), right tangent: how far the body may be from there, seen from where `map` begins (the first
-  /// sample). It grows with odometry, and is what the map allows for when receive() corrects (map_covariance.hpp).
+  /// Covariance of T_map_body(), right tangent, as seen from the first sample, where `map` begins. It grows with
+  /// odometry; receive() sets it to what the map and the ledger allow for (map_covariance.hpp).
   [[nodiscard]] const Matrix6d& covariance() const { return state_.covariance; }
-  /// Of the newest proxy graph; nothing: it does not know this chain, or none was heard.
+  /// The chain's component in the newest proxy graph; nothing when that does not know the chain, or none was received.
   [[nodiscard]] std::optional<std::uint32_t> component() const { return state_.component; }
   [[nodiscard]] const std::vector<Whereabouts>& whereabouts() const { return state_.whereabouts; }
 
  private:
+  RobotAgent(RobotId robot, const AgentConfig& config, std::unique_ptr<const consistency::ConstraintPolicy> policy,
+             AgentState state);
   void add_keyframes();
   void add_keyframe(const KeyframeStep& step, std::uint32_t submap);
   [[nodiscard]] std::vector<consistency::RobotNode> nodes() const;
@@ -212,11 +227,10 @@ class RobotAgent {
 
   ChainId chain_;
   AgentConfig config_;
-  Rng rng_;
-  std::unique_ptr<consistency::ConstraintPolicy> policy_;
+  std::unique_ptr<const consistency::ConstraintPolicy> policy_;
   SubmapBuilder submaps_;
   estimation::OnboardSmoother smoother_;
-  AgentState state_;  // but for what submaps_ and smoother_ hold
+  AgentState state_;  // without what submaps_ and smoother_ hold
   std::vector<OdometryJump> jumps_;
 };
 

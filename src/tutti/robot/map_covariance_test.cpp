@@ -111,7 +111,7 @@ TEST(MapCovariance, WhatIsDoubtedIsInIt) {
 
 // The agent's own: the map's at the newest node, odometry's from there, and both again after the next graph.
 TEST(MapCovariance, OfAnAgentGrowsWithOdometryAndShrinksWithTheMap) {
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  RobotAgent agent(RobotId{1}, 1, {});
   const Trajectory odometry = test::drifting_odometry(260);
   test::feed(agent, {odometry.begin(), odometry.begin() + 1});
   EXPECT_EQ(agent.covariance(), Matrix6d(Matrix6d::Zero()));

@@ -56,7 +56,7 @@ class Jumps : public testing::TestWithParam<std::tuple<double, bool, Case>> {};
 TEST_P(Jumps, AreToldAndTheRobotGoesOnFromWhereItIs) {
   const auto& [rate_hz, with_scans, jump] = GetParam();
   const auto& [what, at_s, offset_m, jump_m] = jump;
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1)), undisturbed(RobotId{1}, 1, {}, Rng(1));
+  RobotAgent agent(RobotId{1}, 1, {}), undisturbed(RobotId{1}, 1, {});
   const auto off = [&, at = at_s, by = offset_m](double t) { return t < at ? 0.0 : by; };
   const Fed fed = feed(agent, rate_hz, with_scans, off),
             plain = feed(undisturbed, rate_hz, with_scans, [](double) { return 0.0; });
@@ -98,14 +98,14 @@ INSTANTIATE_TEST_SUITE_P(All, Jumps,
                                                           Case{"near", 31.0, -5.0, 5.0})));
 
 TEST(OdometryJumps, AnOutlierIsTwo) {
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  RobotAgent agent(RobotId{1}, 1, {});
   const Fed fed = feed(agent, 10.0, true, [](double t) { return t > 29.95 && t < 30.05 ? 500.0 : 0.0; });
   EXPECT_EQ(fed.jumps.size(), 2U);
   EXPECT_NEAR(agent.T_odom_body().translation.x(), 59.7, 0.01);
 }
 
 TEST(OdometryJumps, AStampTwiceOrOfBeforeIsRefusedAndTheRobotGoesOn) {
-  RobotAgent agent(RobotId{1}, 1, {}, Rng(1));
+  RobotAgent agent(RobotId{1}, 1, {});
   const auto add = [&](double t, double x_m) { return agent.add_odometry(at(0) + t, ahead(x_m), kCovariance); };
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(add(0.1 * i, 0.1 * i));
   const AgentHead before = agent.head();
@@ -124,7 +124,7 @@ TEST(OdometryJumps, AStampTwiceOrOfBeforeIsRefusedAndTheRobotGoesOn) {
 /// What the server says takes the uncertainty away, and the robot's own answers go on from there.
 TEST(OdometryJumps, TheMapSaysWhereTheRobotIsAfterwards) {
   AgentConfig config;
-  RobotAgent agent(RobotId{1}, 1, config, Rng(1));
+  RobotAgent agent(RobotId{1}, 1, config);
   const Trajectory odometry = drifting_odometry(240);
   const Pose3 anew = odometry[120].pose.inverse();
   int jumps = 0;

@@ -117,6 +117,7 @@ void SubmapBuilder::drop_between(Timestamp before, Timestamp after, const std::s
                                            chain_.robot.value, sample.stamp.ns, before.ns, after.ns, why)});
     return is_between;
   });
+  std::erase_if(state_.waiting_fixes, [&](const PositionFix& fix) { return fix.stamp > before && fix.stamp < after; });
 }
 
 Status SubmapBuilder::add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance,
@@ -188,6 +189,7 @@ void SubmapBuilder::take(SensorTimeline::Moment moment) {
       state_.since_keyframe = compound(state_.since_keyframe, {step, covariance});
     }
     remember(stamp, T_odom_body);
+    place_fixes();
     if (!state_.finished.empty()) state_.finished.back().awaits_images = false;
     if (makes_keyframe(moment)) add_keyframe(stamp, T_odom_body);
   }
@@ -358,10 +360,8 @@ bool SubmapBuilder::is_full() const {
 }
 
 void SubmapBuilder::close_submap() {
-  state_.finished.push_back(
-      {{.id = {chain_, state_.next_submap++}, .keyframes = state_.keyframes, .odometry = state_.odometry},
-       std::move(state_.scans),
-       std::move(state_.images)});
+  Submap submap{{chain_, state_.next_submap++}, state_.keyframes, state_.odometry, take_fixes(), nullptr, nullptr};
+  state_.finished.push_back({std::move(submap), std::move(state_.scans), std::move(state_.images)});
 }
 
 void SubmapBuilder::change_submap() {

@@ -11,6 +11,7 @@
 #include "tutti/base/result.hpp"
 #include "tutti/model/submap.hpp"
 #include "tutti/model/trajectory.hpp"
+#include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/lidar/voxel_filter.hpp"
 #include "tutti/perception/visual/visual_payload.hpp"
 #include "tutti/robot/next_keyframe.hpp"
@@ -18,18 +19,19 @@
 
 namespace tutti::robot {
 
+/// When submaps and keyframes are made, and what clouds keep.
 struct SubmapConfig {
-  double duration_s = 10.0;                ///< A submap is closed at the first keyframe this long after its start,
-  double distance_m = 20.0;                ///< or this much travel, whichever comes first: odometry bends over both.
+  double duration_s = 10.0;  ///< A submap ends at the first keyframe this long after its start,
+  double distance_m = 20.0;  ///< or after this much travel, whichever comes first, because odometry bends over both.
   double keyframe_distance_m = 0.3;        ///< A keyframe after this much travel,
   double keyframe_angle_deg = 15.0;        ///< or this much rotation,
   double keyframe_time_s = 1.0;            ///< or this much time, whichever comes first.
   double representative_distance_m = 1.0;  ///< Travel between representative keyframes.
   double voxel_m = 0.3;                    ///< Edge of the voxels a submap cloud is reduced to.
-  double min_range_m = 0.5;                ///< Scan points nearer than this are the robot itself.
-  double max_range_m = 60.0;               ///< Scan points farther than this are not used.
+  double min_range_m = 0.5;                ///< Nearer scan points are on the robot itself, and dropped.
+  double max_range_m = 60.0;               ///< Farther scan points are dropped.
   visual::VisualSubmapConfig visual;
-  /// Which sensors the robot has, as far as it is known before they are heard. Not a setting.
+  /// Which sensors the robot has, as far as that is known before they are heard. These are no settings.
   bool has_scans = false, has_images = false;
   template <class V>
   void describe(V& v) {
@@ -47,116 +49,138 @@ struct SubmapConfig {
   }
 };
 
-/// A keyframe, and the raw odometry that leads to it from the previous one (the identity, exactly, for the first).
+/// A keyframe with the raw odometry from the previous one to it (exactly the identity for the first).
 struct KeyframeStep {
   Keyframe keyframe;
   RelativePose odometry{.T_a_b = {}, .covariance = Matrix6d::Zero()};
 };
 
-/// A keyframe as soon as there is one, and the submap that was open then.
+/// A new keyframe, and the submap that was open when it was made.
 struct NewKeyframe {
   KeyframeStep step;
   std::uint32_t submap = 0;
 };
 
-/// A submap that has ended, and the scans that are still to be merged into its cloud.
+/// A submap that has ended, and the sensor data still to be merged into it.
 struct FinishedSubmap {
   Submap submap;
   std::vector<lidar::PosedCloud> scans;
   std::vector<TrackedImages> images;
-  bool awaits_images = false;  ///< Those of its last keyframe, which come after the odometry sample that ended it.
+  /// It waits for the images of its last keyframe, which arrive after the odometry sample that ended it.
+  bool awaits_images = false;
 };
 
-/// All that a builder knows.
+/// A position fix with the antenna's position by raw odometry.
+struct PlacedFix {
+  Timestamp stamp;
+  Eigen::Vector3d p_odom_antenna = Eigen::Vector3d::Zero();
+  Geodetic antenna;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+/// All that a builder remembers.
 struct SubmapBuilderState {
   std::uint32_t next_submap = 0;
   std::vector<Keyframe> keyframes;     ///< Of the open submap.
-  std::vector<RelativePose> odometry;  ///< Between them.
+  std::vector<RelativePose> odometry;  ///< Between those keyframes.
   std::vector<lidar::PosedCloud> scans;
   std::vector<TrackedImages> images;     ///< At keyframes.
   std::vector<FinishedSubmap> finished;  ///< Not taken yet, oldest first.
   RelativePose since_keyframe{.T_a_b = {}, .covariance = Matrix6d::Zero()};
-  Trajectory recent;                           ///< Raw odometry that covers the longest sweep ending now.
+  Trajectory recent;                           ///< Raw odometry over the longest sweep that can end now.
   double distance_m = 0.0;                     ///< Travelled so far.
-  double representative_distance_m = 0.0;      ///< At the last representative keyframe.
-  SensorTimeline waiting;                      ///< What comes after recent.back().
-  std::optional<Timestamp> heard_scan;         ///< The newest.
-  std::optional<Timestamp> heard_images;       ///< The newest.
-  std::optional<Timestamp> due;                ///< Since then a keyframe only lacks what a sensor sees.
-  bool is_blind = false;                       ///< The sensor that keyframes wait for has not been heard for long.
-  std::uint64_t keyframes_without_scan = 0;    ///< Since the last one that was taken.
-  std::uint64_t keyframes_without_images = 0;  ///< Since the last ones that were taken.
+  double representative_distance_m = 0.0;      ///< Value of distance_m at the last representative keyframe.
+  SensorTimeline waiting;                      ///< Everything after recent.back().
+  std::optional<Timestamp> heard_scan;         ///< Stamp of the newest.
+  std::optional<Timestamp> heard_images;       ///< Stamp of the newest.
+  std::optional<Timestamp> due;                ///< Since then a keyframe is due, and waits for a sensor.
+  bool is_blind = false;                       ///< The sensor that keyframes wait for was not heard for kPatience_s.
+  std::uint64_t keyframes_without_scan = 0;    ///< Keyframes since the last one with a scan.
+  std::uint64_t keyframes_without_images = 0;  ///< Keyframes since the last one with images.
+  std::vector<PositionFix> waiting_fixes;      ///< Increasing stamps, all after recent.back().
+  std::vector<PlacedFix> fixes;                ///< Fixes that no finished submap has.
+  std::optional<Timestamp> heard_fix;          ///< Stamp of the newest one that was kept.
 };
 
-/// Turns raw odometry and scans into keyframes and overlapping submaps. Only raw odometry goes in, so a submap never
-/// carries what the server said before.
+/// Turns raw odometry and sensor data into keyframes and overlapping submaps. It never gets corrections, so a submap
+/// cannot carry what the server said before.
 ///
-/// Odometry and sensors have rates of their own. The keyframes of a robot with sensors are where its sensors see: at
-/// the first images (of a robot without a camera: the first scan) at which a keyframe is due, with the odometry
-/// interpolated to that moment. At a plain sample there is one only when no sensor is heard for `kPatience_s` from when
-/// it is due. For that the robot looks back: what is `kLag_s` old is settled, or older than what that sensor said last.
-/// A scan that comes later than that is put where it belongs all the same, images are refused. Where every sample has
-/// its scan or images, nothing waits, and a robot that was never heard to have a sensor has its keyframes at once.
+/// Odometry and sensors have rates of their own. A robot with sensors has its keyframes where they see: at the first
+/// images (without a camera, the first scan) at which a keyframe is due, with odometry interpolated to that moment. A
+/// plain odometry sample becomes a keyframe only when no sensor is heard for `kPatience_s` after one is due.
+///
+/// For this the builder works with a delay: moments are settled when they are `kLag_s` old, or older than what the
+/// sensor sent last. A scan that arrives after its moment was settled is still merged where it belongs; such images are
+/// refused. Where every sample has its scan or images, nothing is delayed; a robot that is not known to have a sensor
+/// has its keyframes at once.
 class SubmapBuilder {
  public:
   SubmapBuilder(const ChainId& chain, const SubmapConfig& config, SubmapBuilderState state = {});
 
-  /// Raw pose with the covariance of the increment since the previous one (ignored for the first). Stamps must
-  /// increase; poses must be within kMaxCoordinate_m with unit quaternions, covariances what check_covariance() says
-  /// (geometry/covariance.hpp): otherwise an error, and nothing changes.
-  /// Across a jump there is a submap of its own, from the sample before to this one: it sees nothing.
+  /// Adds a raw pose with the covariance of the step since the previous one (ignored for the first). Fails, and changes
+  /// nothing, unless stamps increase, the pose is within kMaxCoordinate_m with a unit quaternion, and
+  /// check_covariance() (geometry/covariance.hpp) passes. A jump is bridged by a submap of its own, from the previous
+  /// sample to this one, in which no sensor sees anything.
   Status add_odometry(Timestamp stamp, const Pose3& T_odom_body, const Matrix6d& increment_covariance,
                       bool is_jump = false);
-  /// A scan that ends at its stamp, which may lie between odometry samples, up to `kLongestGap_s` before the next one;
-  /// points in the body frame. A sweep with ages is undistorted by the odometry; it must not begin before the first
-  /// sample, nor more than `kSweepHistoryS` ago. One that shows nothing new is left out.
+  /// Adds a scan that ends at its stamp, which may be between odometry samples and up to `kLongestGap_s` before the
+  /// next one; points are in the body frame. A sweep with ages is undistorted by odometry; it fails when it begins
+  /// before the first sample, or more than `kSweepHistoryS` ago. A scan at a keyframe is not required: one that shows
+  /// nothing new is left out.
   Status add_scan(const Scan& scan);
-  /// The images of a keyframe, as a scan: one is due at their stamp. Cameras are checked and stay the
-  /// same; keypoints are finite, tracks no two keypoints of one image, descriptors one per keypoint or none.
+  /// Adds the images of a moment; they are used when a keyframe is due at their stamp. Fails unless check_images()
+  /// passes and cameras are the same as before.
   Status add_images(const TrackedImages& images);
-  /// As of a scan or images that are not given: it makes the keyframe that they would make.
+  /// Adds a position fix; its stamp may be as that of a scan. The fix belongs to the submap that is open at its stamp,
+  /// or to the one open now if it arrives up to kHistory_s late. A fix less than kFinestFix_s after the previous one,
+  /// or older, is skipped, because the errors of neighbouring fixes are the same.
+  Status add_fix(const PositionFix& fix);
+  /// Like a scan or images that are not given: makes the keyframe that these would make.
   void add_moment(Timestamp stamp);
-  /// SubmapConfig::has_scans and has_images, where that becomes known later.
+  /// Sets SubmapConfig::has_scans and has_images when these become known later.
   void expect_sensors(bool scans, bool images) {
     config_.has_scans = scans;
     config_.has_images = images;
   }
-  /// Would a scan of this stamp be taken? Also yes when only more odometry can tell, or add_scan() has something to
-  /// say.
+  /// True if a scan with this stamp would be used. Also true when only later odometry can tell, or when add_scan()
+  /// would fail.
   [[nodiscard]] bool wants_scan(Timestamp stamp) const;
-  /// The same of images, but no where add_images() would say why not.
+  /// The same for images, but false when add_images() would fail.
   [[nodiscard]] bool wants_images(Timestamp stamp) const;
-  /// A scan from now on would be taken.
+  /// True if a scan from now on would be used.
   [[nodiscard]] bool wants_scan() const;
-  /// As of all that is settled.
+  /// As of everything that is settled.
   [[nodiscard]] NextKeyframe next_keyframe() const;
 
-  /// Those made since the last call.
+  /// The keyframes since the last call.
   std::vector<NewKeyframe> take_keyframes() { return std::exchange(keyframes_, {}); }
   /// Stamp of the latest odometry sample.
   [[nodiscard]] std::optional<Timestamp> newest_sample() const;
-  /// From the last keyframe to the latest odometry sample.
+  /// Raw odometry from the last keyframe to the newest odometry sample.
   [[nodiscard]] RelativePose since_keyframe() const;
-  /// Before this moment all is settled.
+  /// Everything before this moment is settled.
   [[nodiscard]] std::optional<Timestamp> settled() const;
 
-  /// The oldest finished submap that was not taken yet. Merges its scans and triangulates its landmarks, which takes
-  /// long: adding odometry, a scan or images never does.
+  /// The oldest finished submap that was not taken yet. It is here that scans are merged and landmarks triangulated,
+  /// which takes long; adding data never does.
   std::optional<Submap> take_submap();
-  /// Why submaps that were taken go without what their cameras saw: it contradicts itself or the odometry. Told once.
+  /// Errors since the last call, of submaps that lost what their cameras saw, because it contradicts itself or
+  /// odometry.
   std::vector<Error> take_image_errors() { return std::exchange(image_errors_, {}); }
-  /// Of scans that came before their odometry, and are of no use with it. Told once.
+  /// Errors since the last call, of scans that arrived before their odometry and turned out to be unusable with it.
   std::vector<Error> take_scan_errors() { return std::exchange(scan_errors_, {}); }
 
-  /// Settles everything and ends the last, shorter submap; nothing ends when no keyframe was added since the previous
-  /// one.
+  /// Settles everything and ends the last, shorter submap. No submap is ended when it has no keyframe of its own.
   void finish();
 
-  static constexpr double kSweepHistoryS = 0.5;  ///< Longest sweep that can be undistorted.
-  static constexpr double kLag_s = 0.5;          ///< So much later than odometry a sensor may be heard.
-  static constexpr double kHistory_s = 1.0;      ///< Of odometry that is settled, for sweeps and late scans.
-  static constexpr double kPatience_s = 1.0;     ///< Slower sensors make their keyframes no more.
-  static constexpr double kLongestGap_s = 1.0;   ///< Between samples nobody knows how the robot moved.
+  static constexpr double kSweepHistoryS = lidar::kLongestSweep_s;  ///< Longest sweep that can be undistorted.
+  static constexpr double kLag_s = 0.5;      ///< A sensor may be heard this long after odometry of its stamp.
+  static constexpr double kHistory_s = 1.0;  ///< Settled odometry is kept this long, for sweeps and late scans.
+  /// A little less than 0.5 s, so that a receiver of 2 Hz whose clock is fast loses none.
+  static constexpr double kFinestFix_s = 0.45;
+  static constexpr std::size_t kMostFixes = 200;  ///< Per submap; when there are more, some are dropped.
+  static constexpr double kPatience_s = 1.0;    ///< When a sensor is silent for longer, keyframes are made without it.
+  static constexpr double kLongestGap_s = 1.0;  ///< Over longer gaps between samples nobody knows how the robot moved.
 
   [[nodiscard]] const SubmapBuilderState& state() const { return state_; }
 
@@ -173,6 +197,8 @@ class SubmapBuilder {
   Result<Scan> undistorted(const Scan& scan) const;
   void merge(const Scan& scan, const Pose3& T_odom_body);
   void keep(const TrackedImages& images);
+  void place_fixes();
+  [[nodiscard]] std::vector<SubmapFix> take_fixes();
   void remember(Timestamp stamp, const Pose3& T_odom_body);
   void start_submap(const Keyframe& first);
   [[nodiscard]] bool is_keyframe(Timestamp stamp, const Pose3& T_odom_body) const;

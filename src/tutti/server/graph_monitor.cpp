@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -16,6 +17,7 @@
 #include "tutti/estimation/influence.hpp"
 #include "tutti/estimation/marginals.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/server/georeference.hpp"
 #include "tutti/server/map_components.hpp"
 
 namespace tutti::server {
@@ -65,13 +67,13 @@ constexpr double kFalseHinge = 0.01;
 
 /// By how much the nodes would move without the one or the other accepted closure on which the map hinges, for those
 /// that move it most: (6 nodes) x closures, right tangents.
-Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const std::vector<std::size_t>& nodes,
-                                         std::size_t count) {
+Eigen::MatrixXd shifts_without_a_closure(const MapEstimate& map, const PoseGraph& on_earth,
+                                         const std::vector<std::size_t>& nodes, std::size_t count) {
   std::vector<std::size_t> closures(map.graph.edges.size() - map.odometry_edges);
   std::iota(closures.begin(), closures.end(), map.odometry_edges);
   if (closures.empty()) return Eigen::MatrixXd(static_cast<Eigen::Index>(6 * nodes.size()), 0);
   const double probability = 1.0 - kFalseHinge / static_cast<double>(closures.size());
-  const auto influences = estimation::largest_influences(map.graph, map.graph.poses, closures, count,
+  const auto influences = estimation::largest_influences(on_earth, on_earth.poses, closures, count,
                                                          std::sqrt(chi_square_quantile(probability, 6.0)));
   Eigen::MatrixXd out(static_cast<Eigen::Index>(6 * nodes.size()), static_cast<Eigen::Index>(influences.size()));
   for (Eigen::Index c = 0; c < out.cols(); ++c)
@@ -110,7 +112,7 @@ std::vector<Matrix6d> spread_odometry(const MapEstimate& map, std::span<const st
 
 /// How sure the map is of every chain in the graph. The random numbers are always the same: the result is a function of
 /// the map. The posterior goes when it is not needed any more: it is as large as what the closures' influence takes.
-std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyGraph& graph,
+std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const PoseGraph& on_earth, const ProxyGraph& graph,
                                             const std::map<ChainId, std::vector<std::size_t>>& chosen,
                                             std::unique_ptr<const estimation::JointPosterior> posterior,
                                             std::span<const double> weights,
@@ -141,7 +143,8 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyG
   }
   posterior.reset();
   ++work.factorisations;
-  const Eigen::MatrixXd shifts = shifts_without_a_closure(map, kept, static_cast<std::size_t>(config.shape_deletions));
+  const Eigen::MatrixXd shifts =
+      shifts_without_a_closure(map, on_earth, kept, static_cast<std::size_t>(config.shape_deletions));
   for (Chain& chain : chains) {
     const auto first = static_cast<Eigen::Index>(6 * chain.begin);
     const auto rows = static_cast<Eigen::Index>(6 * (chain.end - chain.begin));
@@ -156,8 +159,8 @@ std::vector<ChainUncertainty> uncertainties(const MapEstimate& map, const ProxyG
 }
 
 /// Per edge: odometry counts as much as its closures show that it is worth.
-std::vector<double> honest_weights(const MapEstimate& map) {
-  std::vector<double> out(map.graph.edges.size(), 1.0);
+std::vector<double> honest_weights(const MapEstimate& map, std::size_t edges) {
+  std::vector<double> out(edges, 1.0);
   for (std::size_t e = 0; e < map.odometry_edges; ++e)
     if (const auto found = map.overstated.find(map.nodes[map.graph.edges[e].from].id.chain);
         found != map.overstated.end() && !map.odometry_of_steps.contains(e))
@@ -177,8 +180,11 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
     for (std::size_t k = 1; k < nodes.size(); ++k) stretches.emplace_back(nodes[k - 1], nodes[k]);
     for (const auto& [first, last] : repairs(map, chain, nodes)) stretches.emplace_back(nodes[first], nodes[last]);
   }
-  const std::vector<double> weights = honest_weights(map);
-  auto posterior = std::make_unique<const estimation::JointPosterior>(map.graph, map.graph.poses, stretches, weights);
+  std::optional<PoseGraph> with_fixes;
+  if (!map.fixes.edges.empty()) with_fixes = graph_on_earth(map);
+  const PoseGraph& on_earth = with_fixes ? *with_fixes : map.graph;
+  const std::vector<double> weights = honest_weights(map, on_earth.edges.size());
+  auto posterior = std::make_unique<const estimation::JointPosterior>(on_earth, on_earth.poses, stretches, weights);
   ++counted.factorisations;
   const std::vector<Matrix6d> covariances = posterior->relative_covariances();
 
@@ -218,7 +224,7 @@ ProxyGraph monitor_graph(const MapEstimate& map, std::uint64_t revision, const c
   }
   ProxyGraph graph = consistency::build_proxy_graph(revision, std::move(nodes), std::move(components), config);
   if (config.shape_samples > 0)
-    graph.uncertainties = uncertainties(map, graph, chosen, std::move(posterior), weights, config, counted);
+    graph.uncertainties = uncertainties(map, on_earth, graph, chosen, std::move(posterior), weights, config, counted);
   return graph;
 }
 

@@ -70,7 +70,9 @@ std::vector<std::optional<Matrix6d>> stated_steps(const SubmapSet& submaps, cons
 }
 
 judge::Closures collect_closures(const VerdictSet& verdicts, const WordSet& words, const SubmapSet& submaps,
-                                 const judge::NodeIndex& index, const std::set<SubmapPair>& spare) {
+                                 const judge::NodeIndex& index, const std::set<SubmapPair>& spare,
+                                 const std::set<SubmapPair>& refuted) {
+  judge::Closures out;
   std::vector<std::pair<LoopClosure, std::optional<Wish>>> all;
   for (const auto& [pair, verdict] : verdicts) {
     if (!has_both(submaps, pair)) continue;
@@ -82,12 +84,14 @@ judge::Closures collect_closures(const VerdictSet& verdicts, const WordSet& word
         all.emplace_back(closure, wish);
         LoopClosure& added = all.back().first;
         added.measurement.covariance = bounded_covariance(closure.measurement.covariance);
+        if (!refuted.contains(pair) || wish == Wish::reject) continue;
+        out.refuted.push_back(added);
+        all.pop_back();
       }
   }
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
     return std::tie(a.first.from, a.first.to) < std::tie(b.first.from, b.first.to);
   });
-  judge::Closures out;
   for (auto& [closure, wish] : all) {
     if (wish == Wish::reject) {
       out.rejected.push_back(std::move(closure));
@@ -207,12 +211,12 @@ bool raise_understated(const std::map<ChainId, judge::OdometryHonesty>& honesty,
 
 /// Of submaps that do not contradict each other.
 MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
-                              const WordSet& words) {
+                              const WordSet& words, const std::set<SubmapPair>& refuted) {
   MapEstimate map;
   const judge::NodeIndex index = attach_submaps(submaps, map);
   const auto spare = spare_pairs(verdicts, submaps, static_cast<std::size_t>(config.most_closed_pairs));
   map.spare_pairs = spare.size();
-  judge::Closures closures = collect_closures(verdicts, words, submaps, index, spare);
+  judge::Closures closures = collect_closures(verdicts, words, submaps, index, spare, refuted);
   const std::vector<LoopClosure> stated = closures.judged;
   const std::vector<judge::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
   if (config.judge_closures) raise_understated(chains, closures, map);
@@ -239,6 +243,8 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   if (map.converged) adopt(optimum, map);
   for (const LoopClosure& closure : closures.rejected)
     map.closures.push_back({closure, false, true, judge::Objection::operators});
+  for (const LoopClosure& closure : closures.refuted)
+    map.closures.push_back({closure, false, false, judge::Objection::fixes});
   std::ranges::stable_sort(
       map.closures, {}, [](const JudgedClosure& judged) { return std::pair(judged.closure.from, judged.closure.to); });
   label_components(map);
@@ -253,17 +259,17 @@ const MapNode* find_node(const MapEstimate& map, const KeyframeId& id) {
 }
 
 MapEstimate estimate_map(const SubmapSet& all_submaps, const VerdictSet& verdicts, const MapConfig& config,
-                         const WordSet& words) {
+                         const WordSet& words, const std::set<SubmapPair>& refuted) {
   std::vector<SubmapId> left_out;
   const SubmapSet submaps = without_contradictions(all_submaps, left_out);
-  MapEstimate best = estimate_together(submaps, verdicts, config, words);
+  MapEstimate best = estimate_together(submaps, verdicts, config, words, refuted);
   // One chain's numbers may be what cannot be solved; the others keep their map. The largest counts, then the first.
   std::vector<SubmapId> unsolvable;
   for (auto chain = best.converged ? submaps.end() : submaps.begin(); chain != submaps.end();) {
     const auto next = submaps.upper_bound({chain->first.chain, std::numeric_limits<std::uint32_t>::max()});
     SubmapSet others(submaps.begin(), chain);
     others.insert(next, submaps.end());
-    MapEstimate without = estimate_together(others, verdicts, config, words);
+    MapEstimate without = estimate_together(others, verdicts, config, words, refuted);
     if (without.converged && (!best.converged || without.nodes.size() > best.nodes.size())) {
       best = std::move(without);
       unsolvable.clear();

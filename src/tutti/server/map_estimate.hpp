@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "tutti/base/config.hpp"
@@ -20,68 +21,76 @@
 #include "tutti/model/pose_graph.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/model/submap.hpp"
+#include "tutti/server/fixes.hpp"
 
 namespace tutti::server {
 
-/// Everything the map is made from; kept sorted by id, so the map is a function of the set.
+/// The submaps that a map is made from; sorted by id, so that the map is a function of the set. Never null.
 using SubmapSet = std::map<SubmapId, std::shared_ptr<const Submap>>;
 
+/// True if the set has both submaps of the pair.
 inline bool has_both(const SubmapSet& submaps, const SubmapPair& pair) {
   return submaps.contains(pair.first) && submaps.contains(pair.second);
 }
 using VerdictSet = std::map<SubmapPair, ClosureVerdict>;
 
+/// A closure with the verdict on it.
 struct JudgedClosure {
   LoopClosure closure;
   bool accepted = false;
-  bool by_operator = false;  ///< By an operator's word, whatever the map says.
-  judge::Objection objection = judge::Objection::none;
+  bool by_operator = false;                             ///< An operator's word decided, whatever the map says.
+  judge::Objection objection = judge::Objection::none;  ///< Why it is not accepted.
 };
 
-/// Odometry that the closures show to have failed: between these two keyframes of one chain it is not believed.
+/// Odometry that failed, as closures show: between these two keyframes of one chain it is not used.
 struct FailedOdometry {
   ChainId chain;
   std::uint32_t from = 0;  ///< KeyframeId::index
   std::uint32_t to = 0;
-  double jump_m = 0.0;  ///< By how much the map differs from the odometry between the two.
+  double jump_m = 0.0;  ///< Difference between the map's and the odometry's relative pose over the stretch.
   double jump_rad = 0.0;
   friend bool operator==(const FailedOdometry&, const FailedOdometry&) = default;
 };
 
-/// One joint map.
+/// The joint map of all robots.
 struct MapEstimate {
-  std::vector<MapNode> nodes;                   ///< Sorted by id.
-  PoseGraph graph;                              ///< Same order as nodes: odometry, then the accepted closures.
-  std::size_t odometry_edges = 0;               ///< graph.edges[0 .. odometry_edges) are odometry.
-  std::vector<JudgedClosure> closures;          ///< Sorted by (from, to).
+  std::vector<MapNode> nodes;           ///< Sorted by id.
+  PoseGraph graph;                      ///< Nodes in the order of `nodes`; edges: odometry, then the accepted closures.
+  std::size_t odometry_edges = 0;       ///< graph.edges[0 .. odometry_edges) are odometry.
+  std::vector<JudgedClosure> closures;  ///< Sorted by (from, to).
   std::vector<FailedOdometry> failed_odometry;  ///< Sorted by (chain, from).
-  /// By which the variances of closures between two chains count, where they err by more than they say
-  /// (closure_honesty.hpp); `graph` has them so, `closures` as stated.
+  /// Factor on the variances of the closures between two chains, where these err by more than they say
+  /// (closure_honesty.hpp). It is applied in `graph` but not in `closures`.
   std::map<std::pair<ChainId, ChainId>, judge::ClosureHonesty> closure_factors;
-  /// By which the variances of each chain's odometry count, in rotation (odometry_honesty.hpp); `graph` has them so.
+  /// Factor on the variances of rotation of each chain's odometry (odometry_honesty.hpp); applied in `graph`.
   std::map<ChainId, double> rotation_factors;
-  /// Of chains whose odometry is far worse than it says: by which all its variances count; `graph` has them so.
+  /// Factor on all variances of a chain's odometry, where that is far worse than it says; applied in `graph`.
   std::map<ChainId, double> understated;
-  /// By which the map shows the variances of each chain's odometry, as in `graph`, to be overstated still, in (0, 1].
+  /// Factor by which the variances of each chain's odometry in `graph` are still too large, as the map shows; in (0,
+  /// 1].
   std::map<ChainId, double> overstated;
-  /// Of odometry edges whose place a refined step has taken (map_refiner.hpp), by edge: the covariance of the odometry.
+  /// The covariance of the odometry, by edge, where a refined step replaces an odometry edge (map_refiner.hpp).
   std::map<std::size_t, Matrix6d> odometry_of_steps;
   std::uint32_t components = 0;  ///< Connected components that contain a node.
-  /// Submaps that contradict earlier ones of their chain: keyframes that are there already, at other moments or out of
-  /// order. And all of a chain without which the map can be solved, and with which it cannot.
+  /// Submaps that contradict earlier ones of their chain: they have keyframes that exist already, at other moments or
+  /// out of order. Also all submaps of a chain with which the map cannot be solved, and without which it can.
   std::vector<SubmapId> left_out;
-  std::size_t spare_pairs = 0;  ///< Of submaps whose closures were not judged (MapConfig::most_closed_pairs).
-  judge::SearchWork work;       ///< What judging the closures took.
-  bool converged = false;       ///< Otherwise no closure is accepted, and every robot's odometry stands alone.
+  /// Number of pairs of submaps whose closures were not judged (MapConfig::most_closed_pairs).
+  std::size_t spare_pairs = 0;
+  Fixes fixes;             ///< What became of position fixes, and where on the earth the map lies.
+  judge::SearchWork work;  ///< The cost of judging the closures.
+  bool converged = false;  ///< False: no closure is accepted, and every robot's odometry stands alone.
 };
 
+/// How the joint map is made.
 struct MapConfig {
   judge::WhoIsWrongConfig who_is_wrong;
   estimation::GncConfig gnc;
-  /// Closures that err by more than they say count as their neighbours show (off: as they say).
+  /// Factors for closures that err by more than they say (closure_honesty.hpp); off: they count as they say.
   bool judge_closures = true;
   bool judge_odometry = true;
   int most_closed_pairs = 40;
+  GeoreferenceConfig georeference;
   template <class V>
   void describe(V& v) {
     v.field("who_is_wrong", who_is_wrong);
@@ -91,20 +100,22 @@ struct MapConfig {
     v.field("most_closed_pairs", most_closed_pairs, at_least(1),
             "A submap that closures tie to more submaps of one robot than this does not have all judged "
             "(spare_pairs.hpp).");
+    v.field("georeference", georeference);
   }
 };
 
-/// Raw odometry of nodes sorted by id, one chain per piece without a gap. `step_to`: per node the covariance of the
-/// step that ends there, nothing where odometry begins.
+/// The raw odometry of nodes that are sorted by id, as one chain per piece without a gap. `step_to` has, per node, the
+/// covariance of the step that ends there, and nothing where odometry begins.
 std::vector<judge::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
                                                   const std::vector<std::optional<Matrix6d>>& step_to);
 
-/// Null when the map does not have it.
+/// The node with this id, null when the map does not have it; logarithmic.
 const MapNode* find_node(const MapEstimate& map, const KeyframeId& id);
 
-/// The map of a set of submaps, verdicts and words: attaches submaps by their shared keyframes, judges closures and
-/// odometry, optimises. Pure: the same sets give the same map, whatever the order they came in.
+/// The map of a set of submaps, verdicts and operators' words: attaches submaps by their shared keyframes, judges
+/// closures and odometry, and optimises. A pure function, so the order in which the inputs arrived does not matter.
+/// `refuted` are pairs whose closures fixes have shown to be wrong (refuted_closures.hpp).
 MapEstimate estimate_map(const SubmapSet& submaps, const VerdictSet& verdicts, const MapConfig& config,
-                         const WordSet& words = {});
+                         const WordSet& words = {}, const std::set<SubmapPair>& refuted = {});
 
 }  // namespace tutti::server

@@ -8,7 +8,9 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/covariance.hpp"
+#include "tutti/server/georeference.hpp"
 #include "tutti/server/graph_monitor.hpp"
+#include "tutti/server/refuted_closures.hpp"
 
 namespace tutti::server {
 namespace {
@@ -343,10 +345,11 @@ ProxyGraphMessage MapServer::rebuild() {
   news_ = false;
   ++work_.updates;
   if (!estimate_) {
-    estimate_ = estimate_map(state_.submaps, state_.verdicts, config_.map, state_.words);
+    estimate_ = estimate_map_with_fixes(state_.submaps, state_.verdicts, config_.map, state_.words);
     work_.search += estimate_->work;
   }
-  map_ = refined(*estimate_, state_.submaps, state_.refinements);
+  map_ = georeferenced(refined(*estimate_, state_.submaps, state_.refinements), state_.submaps,
+                       config_.map.georeference, config_.map.gnc);
   plan_refinement(false);
   if (refiner_ == nullptr) estimate_.reset();  // nobody asks for it
   ProxyGraphMessage message{.header = {.robot = {}, .session = state_.epoch, .sequence = state_.revision},

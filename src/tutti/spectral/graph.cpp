@@ -44,6 +44,28 @@ struct Positions {
 };
 using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Positions>, Positions, 3, int>;
 
+/// nanoflann result set: all points nearer than a radius, in the tree's order. Its own one has another type of results
+/// from version 1.5 on.
+class AllWithin {
+ public:
+  using DistanceType = double;
+  explicit AllWithin(double squared_distance) : squared_distance_(squared_distance) {}
+  bool addPoint(double, int index) {
+    indices_.push_back(index);
+    return true;
+  }
+  [[nodiscard]] double worstDist() const { return squared_distance_; }
+  [[nodiscard]] bool full() const { return true; }
+  [[nodiscard]] std::size_t size() const { return indices_.size(); }
+  void sort() {}  ///< Asked for from 1.5 on.
+  void clear() { indices_.clear(); }
+  [[nodiscard]] const std::vector<int>& indices() const { return indices_; }
+
+ private:
+  double squared_distance_;
+  std::vector<int> indices_;
+};
+
 /// Calls visit(n, m, distance) once for every pair n < m at most radius_m apart.
 template <class Visit>
 void for_each_close_pair(std::span<const Eigen::Vector3d> positions, double radius_m, const Visit& visit) {
@@ -53,11 +75,12 @@ void for_each_close_pair(std::span<const Eigen::Vector3d> positions, double radi
   if (positions.empty()) return;
   const Positions source{positions};
   const KdTree tree(3, source, {});
-  std::vector<std::pair<int, double>> found;
+  AllWithin found(radius_m * radius_m * kSlack);
   for (int n = 0; n < static_cast<int>(positions.size()); ++n) {
     const Eigen::Vector3d& position = positions[static_cast<std::size_t>(n)];
-    tree.radiusSearch(position.data(), radius_m * radius_m * kSlack, found, nanoflann::SearchParams(0, 0.0F, false));
-    for (const auto& [m, squared] : found) {
+    found.clear();
+    tree.findNeighbors(found, position.data(), {});
+    for (const int m : found.indices()) {
       const double distance = (positions[static_cast<std::size_t>(m)] - position).norm();
       if (n < m && distance <= radius_m) visit(n, m, distance);
     }

@@ -3,21 +3,22 @@
 
 #include <cstddef>
 
-/// What the decoders accept at most. Checked before memory is taken.
+/// Limits of what the decoders accept, checked before memory is allocated.
 namespace tutti::wire {
 
 inline constexpr std::size_t kMaxMessageBytes = 16U << 20U;  ///< Of the protobuf message, before compression.
 inline constexpr std::size_t kMaxStateBytes = 256U << 20U;   ///< Of an agent's state, which only its robot reads.
 inline constexpr std::size_t kMaxKeyframes = 10'000;         ///< Per submap.
 inline constexpr std::size_t kMaxCloudPoints = 1'000'000;
+inline constexpr std::size_t kMaxFixes = 1'000;  ///< Per submap.
 inline constexpr std::size_t kMaxCameras = 8;
 inline constexpr std::size_t kMaxImageSide_px = 65'535;
-inline constexpr std::size_t kMaxImages = 20'000;  ///< These and the next: per submap.
+inline constexpr std::size_t kMaxImages = 20'000;  ///< This and the next four: per submap.
 inline constexpr std::size_t kMaxObservations = 200'000;
 inline constexpr std::size_t kMaxLandmarks = 50'000;
 inline constexpr std::size_t kMaxDescriptorWords = 8;
 inline constexpr std::size_t kMaxDescriptorBytes = 4U << 20U;
-inline constexpr std::size_t kMaxProxyNodes = 200'000;  ///< Also of eliminated ones.
+inline constexpr std::size_t kMaxProxyNodes = 200'000;  ///< Of eliminated nodes as many.
 inline constexpr std::size_t kMaxProxyEdges = 1'000'000;
 inline constexpr std::size_t kMaxClosures = 1'000;           ///< Per verdict.
 inline constexpr std::size_t kMaxPairs = 10'000;             ///< Of submaps, per job.
@@ -26,8 +27,8 @@ inline constexpr std::size_t kMaxRefinedKeyframes = 40'000;  ///< What one messa
 inline constexpr std::size_t kMaxIdBytes = 200;
 inline constexpr std::size_t kMaxReasonBytes = 1'000;
 inline constexpr std::size_t kMaxSettingsBytes = 64U << 10U;  ///< Of a finder, in a job.
-inline constexpr std::size_t kMaxMethods = 100;               ///< That a worker can.
-inline constexpr std::size_t kMaxRequested = 1'000;           ///< Submaps, per request.
+inline constexpr std::size_t kMaxMethods = 100;               ///< Of closure finding that a worker offers.
+inline constexpr std::size_t kMaxRequested = 1'000;           ///< Submaps per request.
 inline constexpr std::size_t kMaxNameBytes = 64;              ///< Of a robot or a worker.
 inline constexpr std::size_t kMaxRobots = 10'000;             ///< Per mission status; of workers as many.
 inline constexpr std::size_t kMaxRefusalKinds = 1'000;        ///< Per mission status.

@@ -49,7 +49,7 @@ TEST(QuantisePose, HalfTurnsStayUnique) {
     Eigen::Vector3d axis(rng.normal(), rng.normal(), rng.normal());
     if (i % 4 == 0) axis = Eigen::Vector3d::Unit(i / 4 % 3);
     const double angle = std::numbers::pi + rng.normal(1e-7) * (i % 3);
-    const Pose3 T{so3_exp(angle * axis.normalized()).normalized(), {}};
+    const Pose3 T{so3_exp(angle * axis.normalized()).normalized(), Eigen::Vector3d::Zero()};
     const PoseCode code = quantise(T, kKeyframePoseSteps);
     const auto back = dequantise(code, kKeyframePoseSteps);
     ASSERT_TRUE(back.has_value());

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -80,6 +81,56 @@ Status read_odometry(const In& in, Submap& submap) {
   return {};
 }
 
+// Divided by, not multiplied with, so that 90 degrees come back as 90.
+constexpr double kFixAnglesPerDegree = 1e9;  // 0.1 mm on the ground
+constexpr double kFixHeightsPerMetre = 1e4;
+
+void write_fixes(const Submap& submap, v1::Fixes& out) {
+  std::vector<std::array<std::int64_t, 1>> keyframes;
+  std::vector<std::array<std::int64_t, 3>> positions;
+  for (const SubmapFix& fix : submap.fixes) {
+    keyframes.push_back({std::int64_t{fix.keyframe} - submap.keyframes.front().index});
+    positions.push_back({std::llround(fix.antenna.latitude_deg * kFixAnglesPerDegree),
+                         std::llround(fix.antenna.longitude_deg * kFixAnglesPerDegree),
+                         std::llround(fix.antenna.height_m * kFixHeightsPerMetre)});
+    for (const double x : fix.p_keyframe_antenna) out.add_antenna(static_cast<float>(x));
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column <= row; ++column) out.add_covariance(static_cast<float>(fix.covariance(row, column)));
+  }
+  write_columns(keyframes, *out.mutable_keyframe());
+  write_columns(positions, *out.mutable_position());
+}
+
+/// Of any number, before memory is taken for them; their values are checked with the message.
+Status read_fixes(const v1::Fixes& in, Submap& submap) {
+  const auto count = static_cast<std::size_t>(in.keyframe_size());
+  if (count > kMaxFixes) return fail(ErrorCode::invalid, "{} fixes, at most {} are accepted", count, kMaxFixes);
+  const auto keyframes = read_columns<1>(in.keyframe(), count);
+  const auto positions = read_columns<3>(in.position(), count);
+  if (!keyframes || !positions || static_cast<std::size_t>(in.antenna_size()) != 3 * count ||
+      static_cast<std::size_t>(in.covariance_size()) != 6 * count)
+    return fail(ErrorCode::parse, "{} numbers of positions, {} of antennas and {} of covariances for {} fixes",
+                in.position_size(), in.antenna_size(), in.covariance_size(), count);
+  const std::int64_t first = submap.keyframes.front().index;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int64_t offset = (*keyframes)[i][0];
+    if (offset < 0 || offset >= std::ssize(submap.keyframes))
+      return fail(ErrorCode::invalid, "fix {} is at keyframe {} of {}", i, offset, submap.keyframes.size());
+    SubmapFix fix{.keyframe = static_cast<std::uint32_t>(first + offset)};
+    const auto& [latitude, longitude, height] = (*positions)[i];
+    fix.antenna = {static_cast<double>(latitude) / kFixAnglesPerDegree,
+                   static_cast<double>(longitude) / kFixAnglesPerDegree,
+                   static_cast<double>(height) / kFixHeightsPerMetre};
+    int antenna = 3 * static_cast<int>(i), covariance = 6 * static_cast<int>(i);
+    for (double& x : fix.p_keyframe_antenna) x = in.antenna(antenna++);
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column <= row; ++column)
+        fix.covariance(row, column) = fix.covariance(column, row) = in.covariance(covariance++);
+    submap.fixes.push_back(fix);
+  }
+  return {};
+}
+
 /// All but the payloads.
 template <class In>
 Result<SubmapMessage> read_way(const In& in, std::uint16_t version) {
@@ -91,6 +142,7 @@ Result<SubmapMessage> read_way(const In& in, std::uint16_t version) {
   const std::string where = "submap " + to_string(message.submap.id);
   if (auto ok = read_keyframes(in, message.submap); !ok) return in_context(where, ok.error());
   if (auto ok = read_odometry(in, message.submap); !ok) return in_context(where, ok.error());
+  if (auto ok = read_fixes(in.fixes(), message.submap); !ok) return in_context(where, ok.error());
   return message;
 }
 
@@ -115,6 +167,7 @@ std::string encode(const SubmapMessage& message, const CloudCodec& cloud) {
   write_columns(stamps, *out.mutable_stamp_ns());
   write_columns(poses, *out.mutable_pose());
   write_odometry(submap, out);
+  if (!submap.fixes.empty()) write_fixes(submap, *out.mutable_fixes());
   if (submap.cloud && !submap.cloud->points.empty()) encode_cloud(*submap.cloud, cloud, *out.mutable_cloud());
   if (submap.visual) encode_visual(*submap.visual, submap.keyframes.front().index, *out.mutable_visual());
   return pack_frame(MessageKind::submap, out.SerializeAsString());

@@ -59,6 +59,15 @@ Status check_submap(const Submap& submap) {
     if (auto ok = check_coded_covariance(odometry.covariance); !ok)
       return in_context("odometry to " + where(), ok.error());
   }
+  if (auto ok = at_most(submap.fixes.size(), kMaxFixes, "fixes"); !ok) return ok;
+  for (std::size_t i = 0; i < submap.fixes.size(); ++i) {
+    const SubmapFix& fix = submap.fixes[i];
+    if (fix.keyframe < submap.keyframes.front().index || fix.keyframe > submap.keyframes.back().index)
+      return fail(ErrorCode::invalid, "fix {} is at keyframe {}, expected one of {} to {}", i, fix.keyframe,
+                  submap.keyframes.front().index, submap.keyframes.back().index);
+    if (auto ok = check_fix(fix.antenna, fix.covariance, fix.p_keyframe_antenna); !ok)
+      return in_context("fix " + std::to_string(i), ok.error());
+  }
   if (submap.visual != nullptr)
     if (auto ok = check_visual(submap); !ok) return in_context("visual", ok.error());
   return submap.cloud == nullptr ? Status() : validate(*submap.cloud);

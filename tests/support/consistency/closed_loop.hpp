@@ -3,12 +3,13 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
+#include <functional>
 #include <vector>
 
 #include "support/consistency/uncertainty.hpp"
 #include "tutti/base/check.hpp"
 #include "tutti/consistency/policy.hpp"
+#include "tutti/consistency/synchronise.hpp"
 #include "tutti/estimation/onboard_smoother.hpp"
 #include "tutti/geometry/alignment.hpp"
 
@@ -80,8 +81,8 @@ struct LoopConfig {
   PolicyConfig policy{.name = "spectral"};
   ProxyGraphConfig proxy_graph;
   std::size_t nodes_per_update = 7;  ///< 20 s at 0.33 m/s.
-  /// Per update; empty: none.
-  std::vector<std::size_t> budgets;
+  /// In place of that policy; is told the number of the update, from 0, before it chooses.
+  std::function<const ConstraintPolicy&(std::size_t update)> other_policy;
 };
 
 struct LoopResult {
@@ -95,8 +96,8 @@ struct LoopResult {
 
 inline LoopResult run_closed_loop(const Mission& mission, const LoopConfig& config) {
   constexpr std::size_t kSteps = 3;  // odometry factors per node
-  const auto policy = make_policy(config.policy.name, config.policy);
-  TUTTI_CHECK(policy.has_value(), "{}", policy.error().message);
+  const auto of_config = make_policy(config.policy, config.compare);
+  TUTTI_CHECK(of_config.has_value(), "{}", of_config.error().message);
   estimation::OnboardSmoother smoother;
   Ledger ledger;
   LoopResult out;
@@ -120,17 +121,15 @@ inline LoopResult run_closed_loop(const Mission& mission, const LoopConfig& conf
     if (!mission.settling && !mission.late_closures && !graph.reduced)
       graph.uncertainties = {uncertainty_by(mission.server_noise, graph, kAlpha)};
     const auto nodes = robot_nodes(estimate(count), mission.increments);
-    const auto comparison = compare(graph, kAlpha, nodes, config.compare);
-    std::optional<std::size_t> budget;
-    if (!config.budgets.empty()) budget = config.budgets[out.updates - 1];
+    const auto pairs = synchronise(graph, kAlpha, nodes).pairs;
+    const ConstraintPolicy& policy = config.other_policy ? config.other_policy(out.updates - 1) : **of_config;
     std::optional<DisagreementTest> test;
     Disagreement found;
-    if (comparison.pairs.size() >= 2) {
-      test.emplace(graph, kAlpha, comparison.pairs, out.updates, DisagreementConfig{});
-      found = (*test)(odometry_at(nodes, comparison.pairs));
+    if (pairs.size() >= 2) {
+      test.emplace(graph, kAlpha, pairs, out.updates, DisagreementConfig{});
+      found = (*test)(odometry_at(nodes, pairs));
     }
-    const auto selection = (*policy)->choose(
-        {graph, kAlpha, nodes, comparison, budget, Rng(out.updates), ledger, test ? &*test : nullptr, &found});
+    const auto selection = policy.choose({graph, kAlpha, nodes, pairs, ledger, test ? &*test : nullptr, &found});
     out.replaced += ledger.update(selection.constraints, selection.replaces_all).replaced;
     std::vector<estimation::ChainConstraint> constraints;
     for (const Constraint& c : ledger.constraints()) constraints.push_back({c.from, c.to, c.measurement});

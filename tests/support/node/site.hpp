@@ -63,7 +63,7 @@ class Site {
   void start_robot() {
     robot_store_ = std::make_unique<storage::MemoryStore>(
         storage::robot_schema(), robot_store_ ? robot_store_->tables() : storage::MemoryStore::Tables{});
-    auto opened = RobotNode::open(kRobot, 77, robot_config_, Rng(1), *robot_store_);
+    auto opened = RobotNode::open(kRobot, 77, robot_config_, *robot_store_);
     ASSERT_TRUE(opened.has_value()) << opened.error().message;
     robot_ = std::move(*opened);
     robot_does(robot_->resume(now_));

@@ -3,10 +3,10 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
-#include "tutti/consistency/internal/links.hpp"
 #include "tutti/consistency/internal/odometry_drift.hpp"
 #include "tutti/consistency/internal/policies.hpp"
-#include "tutti/consistency/internal/time_chain.hpp"
+#include "tutti/consistency/links.hpp"
+#include "tutti/consistency/time_chain.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::consistency::internal {
@@ -24,8 +24,9 @@ std::vector<Pose3> displaced(std::span<const Pose3> server, const Eigen::MatrixX
   return out;
 }
 
-/// Splits every run between two joints at the node with the largest value above 1, while there is room. False: none.
-bool split(Joints& joints, const Eigen::VectorXd& value, std::size_t most_links) {
+/// Splits every run between two joints at the node with the largest value above 1. False: none.
+bool split(Joints& joints, const Eigen::VectorXd& value) {
+  const std::size_t before = joints.size();
   Joints added;
   for (std::size_t j = 1; j < joints.size(); ++j) {
     const std::size_t inner = joints[j] - joints[j - 1] - 1;
@@ -35,34 +36,28 @@ bool split(Joints& joints, const Eigen::VectorXd& value, std::size_t most_links)
     if (value.segment(first, static_cast<Eigen::Index>(inner)).maxCoeff(&at) > 1.0)
       added.push_back(static_cast<std::size_t>(first + at));
   }
-  const auto larger = [&](std::size_t a, std::size_t b) {
-    return value(static_cast<Eigen::Index>(a)) > value(static_cast<Eigen::Index>(b));
-  };
-  std::ranges::stable_sort(added, larger);
-  added.resize(std::min(added.size(), most_links + 1 - std::min(most_links + 1, joints.size())));
   joints.insert(joints.end(), added.begin(), added.end());
   std::ranges::sort(joints);
-  return !added.empty();
+  return joints.size() > before;
 }
 
 }  // namespace
 
 Selection AdaptivePolicy::choose(const PolicyInput& input) const {
   LinkCollector collector(input, true);
-  const std::size_t nodes = input.comparison.pairs.size();
+  const std::size_t nodes = input.pairs.size();
   if (nodes < 2 || input.test == nullptr || !input.test->is_informed()) return std::move(collector).take();
   TUTTI_CHECK(input.odometry_disagreement != nullptr, "a test without what it says");
   const bool corrects = input.ledger.size() > 0;
   if (input.odometry_disagreement->largest() <= (corrects ? kLetGo : 1.0)) return std::move(collector).take();
 
-  const TimeChain chain = time_chain(input.graph, input.nodes, input.comparison.pairs);
+  const TimeChain chain = time_chain(input.graph, input.nodes, input.pairs);
   const OdometryDrift drift(chain.server, chain.odometry);
-  const std::size_t most = std::min(input.budget.value_or(nodes - 1), nodes - 1);
   const Eigen::VectorXd allowed = (config_.adaptive_error_share * input.test->sigma_m()).cwiseMax(kLeastError_m);
   Joints joints{0, nodes - 1};
   Eigen::MatrixXd rest = drift.held(joints);
   const auto split_at = [&](const Eigen::VectorXd& value) {
-    if (!split(joints, value, most)) return false;
+    if (!split(joints, value)) return false;
     rest = drift.held(joints);
     return true;
   };

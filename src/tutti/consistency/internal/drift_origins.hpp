@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "tutti/consistency/internal/time_chain.hpp"
+#include "tutti/consistency/time_chain.hpp"
 
 namespace tutti::consistency::internal {
 

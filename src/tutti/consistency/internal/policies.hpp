@@ -14,72 +14,31 @@ class NonePolicy final : public ConstraintPolicy {
   [[nodiscard]] Selection choose(const PolicyInput&) const override { return {}; }
 };
 
-/// The paper's baseline: node i linked to i + 1, ..., i + reach (reach 1 or 2), whatever the comparison says. The
-/// budget is not looked at.
+/// The paper's baseline: every node linked to the next, whatever the two maps say.
 class EveryNodePolicy final : public ConstraintPolicy {
  public:
-  EveryNodePolicy(int reach, const PolicyConfig& config) : reach_(reach), config_(config) {}
-  [[nodiscard]] std::string name() const override { return reach_ == 1 ? "every_node" : "every_node_2"; }
+  [[nodiscard]] std::string name() const override { return "every_node"; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
-
- private:
-  int reach_;
-  PolicyConfig config_;
 };
 
-/// The paper's: per node, the disagreement summed over a group of scales against the group's threshold; small-scale ->
-/// links to the direct neighbours, mid-scale -> mid_hops away, large-scale -> to the nearest submaps. Adds to what is
-/// there. The largest disagreement over its threshold comes first within a group, groups take turns; this decides what
-/// a budget buys.
+/// The paper's: compare() says how much the two maps disagree at every node and scale, links_where() what is done about
+/// it.
 class SpectralPolicy final : public ConstraintPolicy {
  public:
-  explicit SpectralPolicy(const PolicyConfig& config) : config_(config) {}
+  SpectralPolicy(const PolicyConfig& config, const CompareConfig& compare) : config_(config), compare_(compare) {}
   [[nodiscard]] std::string name() const override { return "spectral"; }
-  [[nodiscard]] bool needs_disagreement() const override { return true; }
   [[nodiscard]] Selection choose(const PolicyInput& input) const override;
 
  private:
   PolicyConfig config_;
+  CompareConfig compare_;
 };
 
-/// A chain of equally long links (in nodes) from the first node to the last: min(budget, nodes - 1) of them.
-class UniformPolicy final : public ConstraintPolicy {
- public:
-  explicit UniformPolicy(const PolicyConfig& config) : config_(config) {}
-  [[nodiscard]] std::string name() const override { return "uniform"; }
-  [[nodiscard]] bool needs_budget() const override { return true; }
-  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
-
- private:
-  PolicyConfig config_;
-};
-
-/// Draws node and kind with replacement, takes the links of that kind there, until `budget` different links are found
-/// (or, on a small graph, no new ones turn up).
-class RandomPolicy final : public ConstraintPolicy {
- public:
-  explicit RandomPolicy(const PolicyConfig& config) : config_(config) {}
-  [[nodiscard]] std::string name() const override { return "random"; }
-  [[nodiscard]] bool needs_budget() const override { return true; }
-  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
-
- private:
-  PolicyConfig config_;
-};
-
-/// Links that span runs of nodes, as long as the disagreement allows: one link over the whole run first; where the
-/// robot's raw chain, spread between the links' ends, is farthest from the server's map, a link is split in two; worst
-/// run first, until every node is within `skeleton_tolerance_m` (or the budget is used up). Chosen anew from raw
-/// odometry at every update, so it replaces all; a robot that agrees as it is gets none.
-class SkeletonPolicy final : public ConstraintPolicy {
- public:
-  explicit SkeletonPolicy(const PolicyConfig& config) : config_(config) {}
-  [[nodiscard]] std::string name() const override { return "skeleton"; }
-  [[nodiscard]] Selection choose(const PolicyInput& input) const override;
-
- private:
-  PolicyConfig config_;
-};
+/// Step 6 of the paper. `disagreement`: pairs x scales, m (Comparison). Per node, summed over a group of scales,
+/// against the group's threshold; small-scale -> links to the direct neighbours, mid-scale -> mid_hops away,
+/// large-scale -> to the nearest submaps. Adds to what is there. The largest disagreement over its threshold comes
+/// first within a group, groups take turns.
+Selection links_where(const PolicyInput& input, const Eigen::MatrixXd& disagreement, const PolicyConfig& config);
 
 /// Nothing while raw odometry differs from the server's map only within the server's uncertainty (DisagreementTest).
 /// Once it has been told otherwise: a chain of links over the whole run, held where the server has its ends; a run is

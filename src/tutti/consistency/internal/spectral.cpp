@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "tutti/base/check.hpp"
-#include "tutti/consistency/internal/links.hpp"
 #include "tutti/consistency/internal/policies.hpp"
+#include "tutti/consistency/links.hpp"
 
 namespace tutti::consistency::internal {
 namespace {
@@ -72,20 +72,26 @@ Labels label_top(const Eigen::MatrixX3d& sums, const PolicyConfig& config) {
 
 }  // namespace
 
-Selection SpectralPolicy::choose(const PolicyInput& input) const {
-  const auto rows = static_cast<std::size_t>(input.comparison.disagreement.rows());
-  TUTTI_CHECK(rows == input.comparison.pairs.size(), "disagreement of {} of {} pairs", rows,
-              input.comparison.pairs.size());
+Selection links_where(const PolicyInput& input, const Eigen::MatrixXd& disagreement, const PolicyConfig& config) {
+  const auto rows = static_cast<std::size_t>(disagreement.rows());
+  TUTTI_CHECK(rows == input.pairs.size(), "disagreement of {} of {} pairs", rows, input.pairs.size());
   LinkCollector collector(input, false);
-  const Eigen::MatrixX3d sums = group_sums(input.comparison.disagreement);
-  const Labels labels = config_.classifier == "top" ? label_top(sums, config_) : label_by_thresholds(sums, config_);
+  const Eigen::MatrixX3d sums = group_sums(disagreement);
+  const Labels labels = config.classifier == "top" ? label_top(sums, config) : label_by_thresholds(sums, config);
 
-  const Neighbourhood neighbourhood(input, config_);
+  const Neighbourhood neighbourhood(input, config);
   const std::size_t ranks = std::max({labels[0].size(), labels[1].size(), labels[2].size()});
-  for (std::size_t rank = 0; rank < ranks && !collector.full(); ++rank)
+  for (std::size_t rank = 0; rank < ranks; ++rank)
     for (std::size_t g = 0; g < 3; ++g)
       if (rank < labels[g].size()) collector.add(neighbourhood.links(labels[g][rank].node, kKinds[g]), kKinds[g]);
   return std::move(collector).take();
+}
+
+Selection SpectralPolicy::choose(const PolicyInput& input) const {
+  const Comparison comparison = compare(input.graph, input.chain, input.nodes, compare_);
+  Selection out = links_where(input, comparison.disagreement, config_);
+  out.order = comparison.order;
+  return out;
 }
 
 }  // namespace tutti::consistency::internal

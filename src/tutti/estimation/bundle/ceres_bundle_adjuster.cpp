@@ -21,9 +21,7 @@ namespace {
 using estimation::RobustLoss;
 using internal::minus_jacobian;
 using internal::pose_of;
-using internal::PoseBlock;
 using MotionBlock = std::array<double, 9>;
-using VectorBlock = std::array<double, 3>;
 template <int Rows, int Columns>
 using RowMajor = Eigen::Matrix<double, Rows, Columns, Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
 
@@ -150,7 +148,9 @@ class ImuCost final : public ceres::SizedCostFunction<15, 7, 9, 7, 9, 3> {
 
 class MotionPrior final : public ceres::SizedCostFunction<9, 9> {
  public:
-  explicit MotionPrior(const MotionBlock& mean) : mean_(mean) { mean_[0] = mean_[1] = mean_[2] = 0.0; }
+  explicit MotionPrior(const double* mean) {
+    std::copy(mean + 3, mean + 9, mean_.begin() + 3);  // the biases; velocity's is 0
+  }
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const Vector9d weight = motion_prior_sigma().cwiseInverse();
     Eigen::Map<Vector9d>{residual} =
@@ -160,7 +160,7 @@ class MotionPrior final : public ceres::SizedCostFunction<9, 9> {
   }
 
  private:
-  MotionBlock mean_;
+  MotionBlock mean_{};
 };
 
 class GravityCost final : public ceres::SizedCostFunction<1, 3> {
@@ -173,28 +173,33 @@ class GravityCost final : public ceres::SizedCostFunction<1, 3> {
   }
 };
 
-/// The problem as Ceres sees it, over blocks of its own.
+/// The problem as Ceres sees it, over blocks of its own. They lie in one array, since Ceres sorts the blocks of a group
+/// by their addresses: in arrays of their own, the allocator would decide the order of poses and motion, and with it
+/// the last digits.
 class CeresProblem {
  public:
   CeresProblem(const BundleProblem& problem, const internal::ProblemStructure& structure, const BundleConfig& config,
                const BundleSolution& start)
       : view_loss_({estimation::loss_kind(config.loss), config.loss_scale}),
         odometry_loss_({estimation::LossKind::cauchy, config.odometry_loss_scale}),
+        poses_(start.T_world_body.size()),
+        gravities_(start.gravity.size()),
+        values_(16 * poses_ + 3 * (gravities_ + start.landmarks.size())),
+        reduced_size_(6 * poses_),
         ceres_(options()) {
-    poses_.resize(start.T_world_body.size());
-    reduced_size_ = 6 * poses_.size();
-    for (std::size_t k = 0; k < poses_.size(); ++k) {
-      internal::write_pose(start.T_world_body[k], poses_[k].data());
-      motion_.push_back(block_of(start.motion[k]));
+    for (std::size_t k = 0; k < poses_; ++k) {
+      internal::write_pose(start.T_world_body[k], pose(k));
+      std::ranges::copy(block_of(start.motion[k]), motion(k));
     }
-    for (const auto& p : start.landmarks) landmarks_.push_back({p.x(), p.y(), p.z()});
-    for (const auto& g : start.gravity) gravity_.push_back({g.x(), g.y(), g.z()});
-    for (auto& pose : poses_) ceres_.AddParameterBlock(pose.data(), 7, &manifold_);
-    for (const std::size_t k : structure.anchors) ceres_.SetParameterBlockConstant(poses_[k].data());
+    for (std::size_t c = 0; c < gravities_; ++c) Eigen::Map<Eigen::Vector3d>{gravity(c)} = start.gravity[c];
+    for (std::size_t l = 0; l < start.landmarks.size(); ++l)
+      Eigen::Map<Eigen::Vector3d>{landmark(l)} = start.landmarks[l];
+    for (std::size_t k = 0; k < poses_; ++k) ceres_.AddParameterBlock(pose(k), 7, &manifold_);
+    for (const std::size_t k : structure.anchors) ceres_.SetParameterBlockConstant(pose(k));
     add_views(problem, config);
     for (const auto& odometry : problem.odometry)
-      ceres_.AddResidualBlock(new OdometryCost(odometry.measurement), &odometry_loss_, poses_[odometry.from].data(),
-                              poses_[odometry.to].data());
+      ceres_.AddResidualBlock(new OdometryCost(odometry.measurement), &odometry_loss_, pose(odometry.from),
+                              pose(odometry.to));
     add_imu(problem, structure, config);
   }
 
@@ -211,24 +216,20 @@ class CeresProblem {
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     std::vector<double*> blocks;
     ceres_.GetParameterBlocks(&blocks);
-    const double* first = landmarks_.empty() ? nullptr : landmarks_.front().data();
-    const double* last = landmarks_.empty() ? nullptr : landmarks_.back().data();
-    for (double* block : blocks)
-      options.linear_solver_ordering->AddElementToGroup(block, first && block >= first && block <= last ? 0 : 1);
+    for (double* block : blocks) options.linear_solver_ordering->AddElementToGroup(block, block >= landmark(0) ? 0 : 1);
     ceres::Solver::Summary summary;
     ceres::Solve(options, &ceres_, &summary);
     return summary;
   }
 
-  void read(BundleSolution& out) const {
-    for (std::size_t k = 0; k < poses_.size(); ++k) {
-      out.T_world_body[k] = pose_of(poses_[k].data());
-      out.motion[k] = motion_of(motion_[k].data());
+  void read(BundleSolution& out) {
+    for (std::size_t k = 0; k < poses_; ++k) {
+      out.T_world_body[k] = pose_of(pose(k));
+      out.motion[k] = motion_of(motion(k));
     }
-    for (std::size_t l = 0; l < landmarks_.size(); ++l)
-      out.landmarks[l] = Eigen::Map<const Eigen::Vector3d>(landmarks_[l].data());
-    for (std::size_t c = 0; c < gravity_.size(); ++c)
-      out.gravity[c] = Eigen::Map<const Eigen::Vector3d>(gravity_[c].data());
+    for (std::size_t l = 0; l < out.landmarks.size(); ++l)
+      out.landmarks[l] = Eigen::Map<const Eigen::Vector3d>(landmark(l));
+    for (std::size_t c = 0; c < gravities_; ++c) out.gravity[c] = Eigen::Map<const Eigen::Vector3d>(gravity(c));
   }
 
  private:
@@ -245,30 +246,32 @@ class CeresProblem {
   void add_views(const BundleProblem& problem, const BundleConfig& config) {
     ceres::LossFunction* loss = config.loss == "none" ? nullptr : &view_loss_;
     for (const auto& view : problem.observations)
-      ceres_.AddResidualBlock(new ProjectionCost(problem.cameras[view.camera].camera, view), loss,
-                              poses_[view.keyframe].data(), landmarks_[view.landmark].data());
+      ceres_.AddResidualBlock(new ProjectionCost(problem.cameras[view.camera].camera, view), loss, pose(view.keyframe),
+                              landmark(view.landmark));
   }
 
   void add_imu(const BundleProblem& problem, const internal::ProblemStructure& structure, const BundleConfig& config) {
     reduced_size_ += 9 * static_cast<std::size_t>(std::ranges::count(structure.has_motion, true));
-    for (const auto& imu : problem.imu) {
-      auto& gravity = gravity_[static_cast<std::size_t>(structure.component[imu.from])];
-      ceres_.AddResidualBlock(new ImuCost(imu.measurement, config), nullptr, poses_[imu.from].data(),
-                              motion_[imu.from].data(), poses_[imu.to].data(), motion_[imu.to].data(), gravity.data());
-    }
-    for (std::size_t k = 0; k < motion_.size(); ++k)
-      if (structure.begins_motion[k]) ceres_.AddResidualBlock(new MotionPrior(motion_[k]), nullptr, motion_[k].data());
-    for (std::size_t c = 0; c < gravity_.size(); ++c)
-      if (structure.has_gravity[c]) ceres_.AddResidualBlock(new GravityCost, nullptr, gravity_[c].data());
+    for (const auto& imu : problem.imu)
+      ceres_.AddResidualBlock(new ImuCost(imu.measurement, config), nullptr, pose(imu.from), motion(imu.from),
+                              pose(imu.to), motion(imu.to),
+                              gravity(static_cast<std::size_t>(structure.component[imu.from])));
+    for (std::size_t k = 0; k < poses_; ++k)
+      if (structure.begins_motion[k]) ceres_.AddResidualBlock(new MotionPrior(motion(k)), nullptr, motion(k));
+    for (std::size_t c = 0; c < gravities_; ++c)
+      if (structure.has_gravity[c]) ceres_.AddResidualBlock(new GravityCost, nullptr, gravity(c));
   }
+
+  [[nodiscard]] double* pose(std::size_t k) { return values_.data() + 7 * k; }
+  [[nodiscard]] double* motion(std::size_t k) { return values_.data() + 7 * poses_ + 9 * k; }
+  [[nodiscard]] double* gravity(std::size_t c) { return values_.data() + 16 * poses_ + 3 * c; }
+  [[nodiscard]] double* landmark(std::size_t l) { return gravity(gravities_ + l); }
 
   PoseManifold manifold_;
   Loss view_loss_, odometry_loss_;
-  std::vector<PoseBlock> poses_;
-  std::vector<VectorBlock> landmarks_;
-  std::vector<MotionBlock> motion_;
-  std::vector<VectorBlock> gravity_;
-  std::size_t reduced_size_ = 0;  ///< Numbers of poses and motion.
+  std::size_t poses_, gravities_;
+  std::vector<double> values_;  ///< Poses, motion, gravity, landmarks.
+  std::size_t reduced_size_;    ///< Numbers of poses and motion.
   ceres::Problem ceres_;
 };
 

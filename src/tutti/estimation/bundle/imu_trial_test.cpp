@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "support/estimation/bundle/scene.hpp"
+#include "tutti/base/random.hpp"
 
 namespace tutti::bundle {
 namespace imu_trial_test {
@@ -37,6 +40,22 @@ TEST(ImuTrial, AFlightLongEnoughIsBelieved) {
   EXPECT_FALSE(out.imu[0].is_held_back);
   EXPECT_LT(out.imu[0].bias_sigma_mps2, 0.05);
   EXPECT_LT(std::abs(out.imu[0].scale - 1.0), 3.0 * out.imu[0].scale_sigma);
+}
+
+/// Poses and motion are blocks of a solver that sorts them by their addresses, and other threads' memory is what
+/// decides where a vector of them begins.
+TEST(ImuTrial, TheLastDigitsAreTheSameWhereverTheMemoryIs) {
+  const Refinement expected = refined(6, with_imu());
+  Rng rng(1);
+  std::vector<std::vector<char>> taken;
+  for (int trial = 0; trial < 5; ++trial) {
+    for (int i = 0; i < 2000; ++i) taken.emplace_back(1 + rng.index(1000));
+    for (int i = 0; i < 1000; ++i) std::vector<char>().swap(taken[rng.index(taken.size())]);
+    const Refinement out = refined(6, with_imu());
+    ASSERT_EQ(out.factors.size(), expected.factors.size());
+    for (std::size_t i = 0; i < out.factors.size(); ++i)
+      ASSERT_EQ(out.factors[i].measurement.T_a_b, expected.factors[i].measurement.T_a_b) << trial;
+  }
 }
 
 /// Three seconds do not tell the bias from gravity: the map is what it is without an IMU.

@@ -243,20 +243,9 @@ std::optional<std::vector<Matrix6d>> Posterior::steps() const {
   if (factor.start.size() != static_cast<std::size_t>(6 * slots.variables + 1)) return std::nullopt;
   const estimation::internal::SelectedInverse inverse(factor);
   std::vector<Matrix6d> out;
-  for (const auto& [from, to] : state_->steps) {
-    // delta_from_to = delta_to - Ad(T_from_to^-1) delta_from; anchored poses do not move.
-    const int u = slots.variable[from];
-    const int v = slots.variable[to];
-    const Matrix6d A = adjoint(state_->T_world_body[to].inverse() * state_->T_world_body[from]);
-    Matrix6d covariance = Matrix6d::Zero();
-    if (v >= 0) covariance += inverse.block(v, v);
-    if (u >= 0) covariance += A * inverse.block(u, u) * A.transpose();
-    if (u >= 0 && v >= 0) {
-      const Matrix6d cross = A * inverse.block(u, v);
-      covariance -= cross + cross.transpose();
-    }
-    out.push_back(0.5 * (covariance + covariance.transpose()));
-  }
+  for (const auto& [from, to] : state_->steps)
+    out.push_back(inverse.relative(slots.variable[from], slots.variable[to],
+                                   state_->T_world_body[to].inverse() * state_->T_world_body[from]));
   return out;
 }
 

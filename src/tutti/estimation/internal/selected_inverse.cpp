@@ -90,4 +90,17 @@ Matrix6d SelectedInverse::block(int row_variable, int column_variable) const {
   return panel.values.block<6, 6>(found - panel.rows.begin(), 6 * column_variable - panel.first);
 }
 
+// delta_a_b = delta_b - Ad(T_a_b^-1) delta_a; anchored poses do not move.
+Matrix6d SelectedInverse::relative(int a, int b, const Pose3& T_b_a) const {
+  const Matrix6d A = adjoint(T_b_a);
+  Matrix6d covariance = Matrix6d::Zero();
+  if (b >= 0) covariance += block(b, b);
+  if (a >= 0) covariance += A * block(a, a) * A.transpose();
+  if (a >= 0 && b >= 0) {
+    const Matrix6d cross = A * block(a, b);
+    covariance -= cross + cross.transpose();
+  }
+  return 0.5 * (covariance + covariance.transpose());
+}
+
 }  // namespace tutti::estimation::internal

@@ -17,6 +17,8 @@ class SelectedInverse {
   explicit SelectedInverse(const BlockCholesky::Columns& factor);
   /// 6 x 6 block of two block variables; it must be in the pattern of L.
   [[nodiscard]] Matrix6d block(int row_variable, int column_variable) const;
+  /// Covariance of T_a_b, right tangent, of two poses whose block variables are `a` and `b`; -1: that pose is anchored.
+  [[nodiscard]] Matrix6d relative(int a, int b, const Pose3& T_b_a) const;
 
  private:
   struct Panel {

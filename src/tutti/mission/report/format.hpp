@@ -9,22 +9,23 @@
 
 #include "tutti/mission/record.hpp"
 
-/// How the report's figures are worded; shared by console and page.
+/// Turns the report's figures into text, for console and page.
 namespace tutti::mission {
 
-/// Three decimals with the unit, "-" when not measured or not finite: "0.013 m".
+/// Three decimals with the unit: "0.013 m"; "-" when not measured or not finite.
 std::string format_metres(std::optional<double> value_m);
-/// An error and the share of the way that it was scored on; in brackets when that makes it partial: "(0.013 m)".
+/// An error; in brackets, "(0.013 m)", when the share of the way that it was scored on makes it partial.
 std::string format_error(std::optional<double> value_m, std::optional<double> scored_share);
-/// "100 %"; a partial share is rounded down; "-" when nothing was scored.
+/// Such as "100 %"; a partial share is rounded down, and "-" means that nothing was scored.
 std::string format_scored(std::optional<double> scored_share);
-/// An RMSE in a sentence: "0.013 m"; partial: "(0.013 m, partial: on 62 %)".
+/// An RMSE for a sentence: "0.013 m"; partial: "(0.013 m, partial: on 62 %)".
 std::string format_rmse(const Accuracy& accuracy);
-/// The same error, unless it is partial: then nothing, for a headline.
+/// The value for a headline: nothing when it is partial.
 std::optional<double> for_headline(std::optional<double> value_m, std::optional<double> scored_share);
-/// What the server's figures of a robot were scored on; without a reference, what the robot's distance to it was.
+/// The share on which the server's figures of a robot were scored; without a reference, the share for the distance
+/// between the robot and the server.
 std::optional<double> server_share(const RobotRecord& robot);
-/// Whether a figure of the report is in brackets.
+/// True if the report has figures in brackets.
 bool has_partial_figures(const MissionRecord& record);
 /// Long distances: "46 m", "1.21 km".
 std::string format_distance(double value_m);
@@ -39,20 +40,20 @@ std::string format_rate(std::uint64_t bytes, double seconds);
 /// "2.6 %"; "-" when the whole is 0.
 std::string format_share(std::size_t part, std::size_t whole);
 
-/// Middle and largest of some samples; none without samples. An even number of samples: mean of the two middle ones.
+/// The median and largest of some samples, for an even number the mean of the two middle ones.
 struct Spread {
   std::size_t count = 0;
   double median = 0.0;
   double max = 0.0;
 };
 std::optional<Spread> spread(std::span<const double> samples);
-/// "12.3 / 45.0" (median / max); "-" without samples.
+/// Such as "12.3 / 45.0" (median / max); "-" without samples.
 std::string format_spread(std::span<const double> samples);
 
-/// "slip", "degeneracy", "failure".
+/// "slip", "degeneracy" or "failure".
 std::string_view drift_name(DriftOrigin::Kind kind);
 
-/// Sums of what the tables repeat.
+/// Counts that several tables use.
 struct ClosureCounts {
   std::size_t accepted_intra = 0;
   std::size_t accepted_inter = 0;
@@ -62,12 +63,15 @@ struct ClosureCounts {
   [[nodiscard]] std::size_t rejected() const { return rejected_intra + rejected_inter; }
 };
 ClosureCounts count_closures(const ServerRecord& server);
-/// Whom the figures of the joint map speak of: "all robots", or of several maps those of the largest: "alpha and
-/// bravo".
+/// The robots that the figures of the joint map are about: "all robots", or when there are several maps those in the
+/// largest: "alpha and bravo".
 std::string format_mapped_robots(const MissionRecord& record);
-/// Whose odometry turns better than it says, in standard deviations, as a sentence; empty when nobody's does.
+/// A sentence on the robots whose odometry turns better than it states, in standard deviations; empty when there are
+/// none.
 std::string format_surer_turns(std::span<const RobotRecord> robots);
-/// What bundle adjustment made of the map, as sentences.
+/// Sentences on what bundle adjustment did to the map.
 std::string format_refinement(const RefinementCounts& counts);
+/// Sentences on where on the earth the map lies, and what became of each robot's fixes.
+std::string format_fixes(const FixesRecord& fixes);
 
 }  // namespace tutti::mission

@@ -196,7 +196,7 @@ std::string timing_html(const MissionRecord& record) {
   for (const auto& policy : timing.policies) {
     if (policy.policy != record.default_policy) continue;
     const std::string name = escape_xml(policy.robot);
-    add("comparison of two proxy graphs", name, policy.comparison_ms);
+    add("comparison with the map", name, policy.comparison_ms);
     add("onboard optimisation", name, policy.optimisation_ms);
     add("whole update", name, policy.update_ms);
   }

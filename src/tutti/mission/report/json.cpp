@@ -280,6 +280,7 @@ Json server_json(const MissionRecord& record) {
            {"refinement", refinement_json(server.refinement)},
            {"course", std::move(course)}};
   add_scored(out, "", server.joint.scored_share);
+  if (server.fixes) out["fixes"] = fixes_json(*server.fixes);
   return out;
 }
 

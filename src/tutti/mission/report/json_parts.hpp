@@ -5,17 +5,19 @@
 #include <optional>
 
 #include "tutti/geometry/pose3.hpp"
+#include "tutti/mission/record.hpp"
 
-/// What the JSON files of a mission and of `tutti compare` write alike.
+/// Conversions to JSON that the files of missions and of `tutti compare` share.
 namespace tutti::mission {
 
 using Json = nlohmann::ordered_json;
 
-/// Rounded, so that the shortest text that reads back the same is also short; null unless finite.
+/// Rounded to 1 / per_unit, so that the shortest text that reads back the same is short; null unless finite.
 Json number(std::optional<double> value, double per_unit = 1e6);
 /// [x, y, z]
 Json vector_json(const Eigen::Vector3d& v);
 /// {"translation_m", "quaternion_xyzw"}
 Json pose_json(const Pose3& T);
+Json fixes_json(const FixesRecord& fixes);
 
 }  // namespace tutti::mission

@@ -124,6 +124,7 @@ std::string server_lines(const MissionRecord& record) {
         check->wrong_deg, format_metres(check->max_error_m), check->max_error_deg);
   std::string out = wrap(text + ".", "  server   ");
   if (server.refinement) out += wrap(format_refinement(*server.refinement), "  cameras  ");
+  if (server.fixes) out += wrap(format_fixes(*server.fixes), "  earth    ");
   if (const std::string surer = format_surer_turns(record.robots); !surer.empty()) out += wrap(surer, "  odometry ");
   for (const auto& transform : record.transforms) {
     const Eigen::Vector3d& t = transform.T_from_to.translation;

@@ -30,6 +30,7 @@ class NearestWithin {
   [[nodiscard]] float worstDist() const { return squared_distance_; }
   [[nodiscard]] bool full() const { return true; }
   [[nodiscard]] std::size_t size() const { return index_ == NeighbourIndex::kNone ? 0 : 1; }
+  void sort() {}  ///< Asked for from nanoflann 1.5 on.
   [[nodiscard]] std::int32_t index() const { return index_; }
 
  private:

@@ -35,7 +35,8 @@ TEST(ExtractFeatures, levelsATiltedBodyInATiltedOdometryFrame) {
 }
 
 TEST(ExtractFeatures, believesTheBodyWhereTheOdometryFrameIsTippedOver) {
-  const Walk walk{.tilt_rad = 4.0 * kDegree, .T_odom_world = {so3_exp({35.0 * kDegree, 0, 0}), {}}};
+  const Walk walk{.tilt_rad = 4.0 * kDegree,
+                  .T_odom_world = {so3_exp({35.0 * kDegree, 0, 0}), Eigen::Vector3d::Zero()}};
   const auto features = extract_features(make_submap(kId, furnished_room(), walk, Rng(1)), {});
   EXPECT_LT(tilt_error_deg(features, walk), 0.2);
 }

@@ -120,6 +120,28 @@ FromClient read(v1::Feed::Images& in) {
   return out;
 }
 
+/// What it says is checked where it is taken (check_fix()).
+FromClient read(const v1::Feed::Fix& in) {
+  PositionFix out{.stamp = {in.stamp_ns()}, .antenna = {in.latitude_deg(), in.longitude_deg(), in.height_m()}};
+  const auto& numbers = in.covariance_m2();
+  if (numbers.size() != 0 && numbers.size() != 3 && numbers.size() != 9)
+    return BadSample{
+        out.stamp,
+        fmt::format("a fix with covariance_m2 of {} numbers, expected 9, 3 of its diagonal, or none", numbers.size())};
+  if (in.p_body_antenna_size() != 0 && in.p_body_antenna_size() != 3)
+    return BadSample{out.stamp, fmt::format("a fix with p_body_antenna of {} numbers, expected 3 or none",
+                                            in.p_body_antenna_size())};
+  if (!numbers.empty()) out.covariance.setZero();
+  for (int i = 0; i < numbers.size(); ++i) {
+    if (numbers.size() == 3)
+      out.covariance(i, i) = numbers.Get(i);
+    else
+      out.covariance(i / 3, i % 3) = numbers.Get(i);
+  }
+  for (int i = 0; i < in.p_body_antenna_size(); ++i) out.p_body_antenna[i] = in.p_body_antenna(i);
+  return out;
+}
+
 FromClient read(const v1::Feed::Imu& in) {
   const int samples = in.stamp_ns_size();
   const Timestamp first{samples > 0 ? in.stamp_ns(0) : 0};
@@ -179,6 +201,8 @@ Result<FromClient> decode_from_client(std::string_view payload) {
       return read(*message.mutable_images());
     case v1::Feed::kImu:
       return read(message.imu());
+    case v1::Feed::kFix:
+      return read(message.fix());
     case v1::Feed::kTime:
       return FeedTime{message.time().clock_now_ns()};
     default:

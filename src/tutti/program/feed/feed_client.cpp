@@ -7,6 +7,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -26,19 +27,48 @@ Trajectory trajectory(const Stamps& stamps, const Numbers& numbers) {
   return out;
 }
 
+Pose3 pose(const v1::Feed::Pose& said) {
+  return {Eigen::Quaterniond(said.qw(), said.qx(), said.qy(), said.qz()), {said.x(), said.y(), said.z()}};
+}
+
+FeedAnswer answer(const v1::Feed::Correction& said) {
+  FeedAnswer out{.stamp = {said.stamp_ns()},
+                 .wants_scan = said.wants_scan(),
+                 .stored = said.has_stored() ? std::optional(Timestamp{said.stored_stamp_ns()}) : std::nullopt,
+                 .T_map_body = pose(said.t_map_body()),
+                 .T_map_odom = pose(said.t_map_odom()),
+                 .map_age = {said.map_epoch(), said.map_revision()},
+                 .in_map = said.in_map()};
+  for (int i = 0; i < std::min(36, said.t_map_odom_covariance_size()); ++i)
+    out.covariance(i / 6, i % 6) = said.t_map_odom_covariance(i);
+  return out;
+}
+
+FeedSituation situation(const v1::Feed::Situation& said) {
+  FeedSituation out{.in_map = said.in_map(), .team_mates = {}, .alerts = {}};
+  for (const auto& mate : said.team_mate())
+    out.team_mates.push_back({RobotId{mate.robot()},
+                              mate.name(),
+                              {mate.stamp_ns()},
+                              mate.same_component() ? std::optional(pose(mate.t_map_body())) : std::nullopt});
+  for (const auto& alert : said.alert()) out.alerts.push_back(alert.text());
+  return out;
+}
+
 FromRobot read(const v1::Feed& message) {
   switch (message.what_case()) {
     case v1::Feed::kWelcome: {
       const auto& welcome = message.welcome();
       return FeedWelcome{welcome.robot_name(),
-                         welcome.has_odometry() ? std::optional(Timestamp{welcome.last_stamp_ns()}) : std::nullopt};
+                         welcome.has_odometry() ? std::optional(Timestamp{welcome.last_stamp_ns()}) : std::nullopt,
+                         pose(welcome.t_map_odom())};
     }
-    case v1::Feed::kCorrection: {
-      const auto& said = message.correction();
-      return FeedAnswer{{said.stamp_ns()},
-                        said.wants_scan(),
-                        said.has_stored() ? std::optional(Timestamp{said.stored_stamp_ns()}) : std::nullopt};
-    }
+    case v1::Feed::kCorrection:
+      return answer(message.correction());
+    case v1::Feed::kJump:
+      return FeedJump{message.jump().translation_m(), message.jump().why()};
+    case v1::Feed::kSituation:
+      return situation(message.situation());
     case v1::Feed::kTimeAnswer: {
       const auto& said = message.time_answer();
       return FeedProgress{said.has_stored() ? std::optional(Timestamp{said.stored_stamp_ns()}) : std::nullopt};
@@ -107,6 +137,8 @@ Status FeedClient::say(const Scan& scan) { return send(internal::message_of(scan
 Status FeedClient::say(const FedImages& images) { return send(internal::message_of(images)); }
 
 Status FeedClient::say(const std::vector<ImuSample>& samples) { return send(internal::message_of(samples)); }
+
+Status FeedClient::say(const PositionFix& fix) { return send(internal::message_of(fix)); }
 
 Status FeedClient::say_time() {
   v1::Feed message;

@@ -41,6 +41,7 @@ node::OdometrySample joined(const node::OdometrySample& first, const node::Odome
 Timestamp stamp_of(const FeedInput& input) {
   if (const auto* sample = std::get_if<node::OdometrySample>(&input)) return sample->stamp;
   if (const auto* images = std::get_if<FedImages>(&input)) return images->stamp;
+  if (const auto* fix = std::get_if<PositionFix>(&input)) return fix->stamp;
   const auto* scan = std::get_if<Scan>(&input);
   return scan != nullptr ? scan->stamp : Timestamp{};
 }
@@ -94,94 +95,6 @@ Status FeedFront::finish() {
   push(FeedEnded{});
   fed_.notify_one();
   return {};
-}
-
-void FeedFront::set_sensors(const FeedSensors& sensors) {
-  const std::scoped_lock lock(mutex_);
-  if (sensors == *sensors_) return;
-  release_images(true);
-  sensors_ = std::make_shared<const FeedSensors>(sensors);
-  push(sensors_);
-  fed_.notify_one();
-}
-
-bool FeedFront::is_ahead(Timestamp stamp) const {
-  return !localiser_.newest() || stamp - localiser_.newest()->stamp > kAhead_s;
-}
-
-Status FeedFront::may_wait(const FedImages& images) const {
-  if (auto ok = check_images(images, *sensors_); !ok) return ok;
-  if (newest_images_ && images.stamp <= *newest_images_)
-    return fail(ErrorCode::invalid, "images at {} ns: there were some at {} ns, stamps must increase", images.stamp.ns,
-                newest_images_->ns);
-  if (is_ahead(images.stamp))
-    return fail(ErrorCode::invalid, "images at {} ns: no odometry within {} s before", images.stamp.ns, kAhead_s);
-  if (image_bytes_ + bytes_of(images) > limits_.image_bytes || waiting() + images_.size() >= limits_.inputs / 2)
-    return fail(ErrorCode::io,
-                "the map is behind: {} inputs and {} bytes of images wait, at most {} with {}; the images at {} ns are "
-                "left out",
-                waiting() + images_.size(), image_bytes_, limits_.inputs / 2, limits_.image_bytes, images.stamp.ns);
-  return {};
-}
-
-Status FeedFront::add_images(FedImages images) {
-  const std::scoped_lock lock(mutex_);
-  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  if (Status ok = may_wait(images); !ok) {
-    ++images_refused_;
-    if (ok.error().code == ErrorCode::io) {
-      note_behind(images.stamp);
-      ++images_left_out_;
-    }
-    return ok;
-  }
-  ++images_taken_;
-  newest_images_ = images.stamp;
-  image_bytes_ += bytes_of(images);
-  images.sensors = sensors_;
-  images_.push_back(std::move(images));
-  release_images();
-  fed_.notify_one();
-  return {};
-}
-
-/// Those whose odometry and IMU have come, or all: what has not come yet will not help them any more.
-void FeedFront::release_images(bool all) {
-  const auto is_due = [&](Timestamp stamp) {
-    if (all) return true;
-    if (localiser_.newest()->stamp < stamp) return false;
-    return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= stamp) ||
-           localiser_.newest()->stamp - stamp >= kImuPatience_s;
-  };
-  for (; !images_.empty() && is_due(images_.front().stamp); images_.pop_front()) push(std::move(images_.front()));
-}
-
-Status FeedFront::add_imu(const std::vector<ImuSample>& samples) {
-  const std::scoped_lock lock(mutex_);
-  if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  if (!sensors_->imu)
-    return fail(ErrorCode::unsupported, "{} IMU samples: Hello said of no IMU (Sensors.imu)", samples.size());
-  std::size_t backwards = 0, ahead = 0;
-  for (const ImuSample& sample : samples) {
-    const bool is_backwards = !imu_.empty() && sample.stamp <= imu_.back().stamp;
-    if (is_backwards)
-      ++backwards;
-    else if (is_ahead(sample.stamp))
-      ++ahead;
-    else
-      imu_.push_back(sample);
-  }
-  imu_taken_ += samples.size() - backwards - ahead;
-  imu_refused_ += backwards + ahead;
-  while (imu_.size() > limits_.imu) imu_.pop_front();
-  release_images();
-  fed_.notify_one();
-  if (backwards + ahead == 0) return {};
-  return fail(
-      ErrorCode::invalid,
-      "of {} IMU samples from {} ns on {} are not after the one before, and of {} there is no odometry within {} s "
-      "before",
-      samples.size(), samples.front().stamp.ns, backwards, ahead, kAhead_s);
 }
 
 void FeedFront::note_behind(Timestamp stamp) {
@@ -378,7 +291,7 @@ FeedFront::Load FeedFront::load() const {
 
 FeedFront::Figures FeedFront::figures() const {
   const std::scoped_lock lock(mutex_);
-  return {images_taken_, images_refused_, imu_taken_, imu_refused_, image_bytes_};
+  return {images_taken_, images_refused_, imu_taken_, imu_refused_, fixes_taken_, fixes_refused_, image_bytes_};
 }
 
 }  // namespace tutti::program

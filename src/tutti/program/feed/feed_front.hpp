@@ -19,29 +19,34 @@
 namespace tutti::program {
 
 struct FeedEnded {};
-/// What is fed to a robot; sensors: what is fed from here on.
-using FeedInput = std::variant<node::OdometrySample, Scan, FeedEnded, FedImages, std::shared_ptr<const FeedSensors>>;
+/// An input for the robot. Sensors mean that later inputs are of these sensors.
+using FeedInput =
+    std::variant<node::OdometrySample, Scan, FeedEnded, FedImages, std::shared_ptr<const FeedSensors>, PositionFix>;
 
-/// Zero where it has none.
+/// The input's stamp; zero for kinds that have none.
 Timestamp stamp_of(const FeedInput& input);
 
-/// Between a feed and its robot, which are a thread each: samples are answered at once, by odometry from what the robot
-/// said last, and wait in their order for the robot, which merges, packs, stores and updates behind. No call waits for
-/// the other side but take(). What waits is bounded: first scans are refused, then odometry is taken together, which
-/// an alert says; the way is never lost. What the robot has taken is kept until it is stored, and comes again to a
-/// robot that had to be made again.
-/// Images wait for odometry and the IMU to reach their stamp, and come to the robot when it knows where it was then;
-/// IMU samples wait for the images that they belong to, the newest of them.
+/// Stands between a live feed and its robot, each of which runs in a thread of its own; every call may be made from
+/// either. It answers samples at once, by carrying the robot's last correction on with odometry, and queues them in
+/// order for the robot, which merges, packs, stores and updates behind. Only take() blocks.
+///
+/// The queue is bounded. When the robot falls behind, scans are refused first; then neighbouring odometry samples are
+/// joined, so that the way becomes coarser but stays whole. An alert says either. Inputs that the robot has taken are
+/// kept until they are stored, and are handed out again when the robot had to be made anew from its store.
+///
+/// Images wait until odometry and the IMU have reached their stamp, so that the robot knows where it was then; of IMU
+/// samples the newest are kept for the images that need them.
 class FeedFront final : public FeedTarget {
  public:
   struct Limits {
-    std::size_t inputs = 8'000;            ///< That wait: 40 s at 200 Hz. Of half as many on no scan is taken.
-    std::size_t scan_bytes = 128U << 20U;  ///< In scans that wait.
-    std::size_t image_bytes = 64U << 20U;  ///< In images: 9 s of EuRoC's stereo pairs at 20 Hz.
-    std::size_t imu = 30'000;              ///< Samples that are kept: half a minute at 1 kHz.
-    int tries = 3;                         ///< Of an input with which the robot goes; then it is left out.
+    std::size_t inputs = 8'000;  ///< Odometry is joined beyond this many queued inputs (40 s at 200 Hz); scans and
+                                 ///< images are refused from half of it on.
+    std::size_t scan_bytes = 128U << 20U;  ///< Bytes of queued scans.
+    std::size_t image_bytes = 64U << 20U;  ///< Bytes of queued images: 9 s of EuRoC's stereo pairs at 20 Hz.
+    std::size_t imu = 30'000;              ///< IMU samples that are kept: half a minute at 1 kHz.
+    int tries = 3;                         ///< An input that makes the robot's program fail this often is left out.
   };
-  /// `robot`: as it stands, all of it stored.
+  /// `robot` is the robot's state now, all of which is stored.
   FeedFront(FeedState robot, const Limits& limits);
 
   // For the feed.
@@ -50,6 +55,7 @@ class FeedFront final : public FeedTarget {
   void set_sensors(const FeedSensors& sensors) override;
   Status add_images(FedImages images) override;
   Status add_imu(const std::vector<ImuSample>& samples) override;
+  Status add_fix(const PositionFix& fix) override;
   Status finish() override;
   [[nodiscard]] FeedState state() const override;
   std::vector<FeedRefusal> take_refusals() override;
@@ -57,50 +63,51 @@ class FeedFront final : public FeedTarget {
   std::vector<FeedWay> take_ways() override;
 
   // For the robot.
-  /// The next input, waiting for it so many wall seconds; nothing: there is none. Until note_heard() the robot has not
-  /// got through it.
+  /// The next input, or nothing when none came within `wall_s` of wall time. Until note_heard() it counts as being
+  /// worked on, so that an input that makes the robot fail can be told.
   std::optional<FeedInput> take(double wall_s);
   void note_heard();
-  /// Of what is fed; never null.
+  /// What inputs from now on come from; never null.
   [[nodiscard]] std::shared_ptr<const FeedSensors> sensors() const;
-  /// imu_over() of what is kept.
+  /// imu_over() the IMU samples that are kept.
   [[nodiscard]] std::vector<ImuSample> imu(Timestamp from, Timestamp until) const;
-  /// Everything was taken.
+  /// The robot has taken every input.
   [[nodiscard]] bool is_drained() const;
-  /// What was taken is stored.
+  /// All inputs that the robot took are stored, and need not be kept.
   void note_stored();
-  /// The robot was made again from its store, which ends at this sample: what it took after that comes again.
+  /// The robot was made again from its store, whose newest sample is `stored`: inputs taken after that are handed out
+  /// again.
   void begin_again(const std::optional<Timestamp>& stored);
-  /// What the robot refused that was taken from the client.
+  /// Tells the client that an input already accepted was refused by the robot.
   void refuse(Timestamp stamp, std::string why);
-  /// What the robot knows now.
+  /// Sets what the robot knows now; ignored while a robot made again has not caught up with what it knew before.
   void publish(FeedState robot);
   [[nodiscard]] bool wants_ways() const;
-  /// Kept are the newest kWays that were not taken.
+  /// Queues a way for the client; only the newest kWays wait.
   void say(FeedWay way);
   static constexpr std::size_t kWays = 4;
-  /// Told to clients as an alert, until it is empty.
+  /// Shows `trouble` to clients as an alert until it is called with an empty text.
   void say_trouble(std::string trouble);
-  /// Nothing is taken from clients any more: the program ends.
+  /// From now on everything from clients is refused, because the program ends.
   void close();
-  /// The client said so, it is stored, and nothing was fed since.
+  /// The client has ended the recording, its end is stored, and nothing was fed since.
   [[nodiscard]] bool has_ended() const;
 
   struct Load {
     std::size_t waiting = 0;                             ///< Inputs that the robot has not taken yet.
-    std::size_t scans_left_out = 0, samples_joined = 0;  ///< Since it had caught up last.
-    std::size_t images_left_out = 0;                     ///< The same, moments.
+    std::size_t scans_left_out = 0, samples_joined = 0;  ///< Since the robot had last caught up.
+    std::size_t images_left_out = 0;                     ///< Moments of images, since the robot had last caught up.
     friend bool operator==(const Load&, const Load&) = default;
   };
   [[nodiscard]] Load load() const;
-  /// Since it was made: moments of images, and IMU samples.
+  /// Totals since the front was made; images are counted as moments.
   struct Figures {
-    std::uint64_t images = 0, images_left_out = 0, imu = 0, imu_left_out = 0;
-    std::size_t image_bytes = 0;  ///< That wait now.
+    std::uint64_t images = 0, images_left_out = 0, imu = 0, imu_left_out = 0, fixes = 0, fixes_left_out = 0;
+    std::size_t image_bytes = 0;  ///< Bytes of the images that wait now.
   };
   [[nodiscard]] Figures figures() const;
-  static constexpr double kAhead_s = 1.0;        ///< Images and IMU are at most so far ahead of odometry.
-  static constexpr double kImuPatience_s = 0.2;  ///< So long images wait for the IMU behind odometry.
+  static constexpr double kAhead_s = 1.0;  ///< Images, IMU samples and fixes farther ahead of odometry are refused.
+  static constexpr double kImuPatience_s = 0.2;  ///< Images wait for the IMU until odometry is this far past them.
 
  private:
   [[nodiscard]] std::size_t waiting() const { return inputs_.size() - taken_; }
@@ -108,11 +115,12 @@ class FeedFront final : public FeedTarget {
   void note_behind(Timestamp stamp);
   [[nodiscard]] bool is_ahead(Timestamp stamp) const;
   Status may_wait(const FedImages& images) const;
+  Status may_wait(const PositionFix& fix) const;
   void release_images(bool all = false);
   void thin();
   void leave_out_what_fails();
 
-  /// An input with which the robot has gone, and how often.
+  /// The input with which the robot's program failed last, and how often.
   struct Failed {
     std::size_t kind = 0;  ///< FeedInput::index()
     Timestamp stamp;
@@ -130,9 +138,10 @@ class FeedFront final : public FeedTarget {
   std::shared_ptr<const FeedSensors> sensors_ = std::make_shared<const FeedSensors>();
   std::deque<FedImages> images_;  // that wait for odometry or the IMU
   std::size_t image_bytes_ = 0;   // in them and in inputs_
-  std::optional<Timestamp> newest_images_;
+  std::optional<Timestamp> newest_images_, newest_fix_;
   std::deque<ImuSample> imu_;
-  std::uint64_t images_taken_ = 0, images_refused_ = 0, imu_taken_ = 0, imu_refused_ = 0;
+  std::uint64_t images_taken_ = 0, images_refused_ = 0, imu_taken_ = 0, imu_refused_ = 0, fixes_taken_ = 0,
+                fixes_refused_ = 0;
   bool in_hand_ = false;  // the last one taken, and not got through
   Failed failed_;
   std::optional<Timestamp> stored_;

@@ -26,7 +26,7 @@ FeedSensors eyes() {
   return out;
 }
 FedImages images(Timestamp stamp) { return {stamp, {{0, true, std::string(32, 'x')}}, {}}; }
-std::vector<ImuSample> imu(Timestamp stamp) { return {{stamp, {}, {}}}; }
+std::vector<ImuSample> imu(Timestamp stamp) { return {{.stamp = stamp}}; }
 
 /// What the robot is given next: o, i, s (what is fed), or nothing.
 char next(FeedFront& front) {

@@ -22,6 +22,7 @@ std::optional<Timestamp> to_robot(const FeedClock& clock, FromClient& message) {
   if (auto* sample = std::get_if<node::OdometrySample>(&message)) return shift(sample->stamp);
   if (auto* scan = std::get_if<Scan>(&message)) return shift(scan->stamp);
   if (auto* images = std::get_if<FedImages>(&message)) return shift(images->stamp);
+  if (auto* fix = std::get_if<PositionFix>(&message)) return shift(fix->stamp);
   if (auto* imu = std::get_if<FeedImu>(&message))
     for (ImuSample& sample : imu->samples)
       if (const auto wrong = shift(sample.stamp)) return wrong;
@@ -83,15 +84,18 @@ void FeedSession::take_fed(Client client, FromClient message) {
         refused_frame(
             *stamp, fmt::format("with the clock's offset of {} ns there is no such time", last_.clock.offset_ns()), 0));
   if (const auto* sample = std::get_if<node::OdometrySample>(&message)) return take_odometry(client, *sample);
-  const auto* imu = std::get_if<FeedImu>(&message);
-  auto* images = std::get_if<FedImages>(&message);
-  const auto* scan = std::get_if<Scan>(&message);
-  const Timestamp stamp = imu != nullptr ? imu->samples.front().stamp : images != nullptr ? images->stamp : scan->stamp;
-  if (connection.ended) return refuse(client, stamp, "the recording has ended");
-  const Status taken = imu != nullptr      ? target_.add_imu(imu->samples)
-                       : images != nullptr ? target_.add_images(std::move(*images))
-                                           : target_.add_scan(*scan);
-  if (!taken) refuse(client, stamp, taken.error().message);
+  const auto take = [&](Timestamp stamp, const auto& add) {
+    if (connection.ended) return refuse(client, stamp, "the recording has ended");
+    if (const Status taken = add(); !taken) refuse(client, stamp, taken.error().message);
+  };
+  if (const auto* imu = std::get_if<FeedImu>(&message))
+    return take(imu->samples.front().stamp, [&] { return target_.add_imu(imu->samples); });
+  if (auto* images = std::get_if<FedImages>(&message))
+    return take(images->stamp, [&] { return target_.add_images(std::move(*images)); });
+  if (const auto* fix = std::get_if<PositionFix>(&message))
+    return take(fix->stamp, [&] { return target_.add_fix(*fix); });
+  const Scan& scan = std::get<Scan>(message);
+  take(scan.stamp, [&] { return target_.add_scan(scan); });
 }
 
 void FeedSession::take_time(Client client, const FeedTime& time) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Images, IMU samples and clocks, as clients of a live feed say them.
+// Images, IMU samples, position fixes and clocks, as clients of a live feed say them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,12 +91,45 @@ TEST_F(FeedSessionSensors, SensorsThatCannotBeAreToldAndEndTheConnection) {
   join(2);
 }
 
+TEST_F(FeedSessionSensors, FixesComeAsTheyWereSaid) {
+  join(1);
+  PositionFix fix{.stamp = {5}, .antenna = {46.5, -7.9, 612.5}, .p_body_antenna = {0.3, 0.1, 1.2}};
+  fix.covariance << 2.0, 0.5, 0.1, 0.5, 3.0, 0.2, 0.1, 0.2, 9.0;
+  EXPECT_TRUE(say(1, test::fix(fix)).empty());  // as of scans nothing is answered
+  Feed brief;                                   // a receiver that says no more than where it is
+  brief.mutable_fix()->set_stamp_ns(6);
+  brief.mutable_fix()->set_latitude_deg(46.5);
+  EXPECT_TRUE(say(1, test::framed(brief)).empty());
+  for (const double variance : {1.0, 4.0, 9.0}) brief.mutable_fix()->add_covariance_m2(variance);
+  EXPECT_TRUE(say(1, test::framed(brief)).empty());
+  ASSERT_EQ(target_.fixes.size(), 3U);
+  EXPECT_EQ(target_.fixes[0].stamp, fix.stamp);
+  EXPECT_EQ(target_.fixes[0].antenna, fix.antenna);
+  EXPECT_EQ(target_.fixes[0].covariance, fix.covariance);
+  EXPECT_EQ(target_.fixes[0].p_body_antenna, fix.p_body_antenna);
+  EXPECT_EQ(target_.fixes[1].covariance, unknown_fix_covariance());
+  EXPECT_EQ(target_.fixes[1].p_body_antenna, Eigen::Vector3d::Zero());
+  EXPECT_EQ(target_.fixes[2].covariance, Eigen::Matrix3d(Eigen::Vector3d(1, 4, 9).asDiagonal()));
+  for (int spoilt = 0; spoilt < 2; ++spoilt) {
+    Feed bad = brief;
+    if (spoilt == 0) bad.mutable_fix()->add_covariance_m2(1.0);
+    if (spoilt == 1) bad.mutable_fix()->add_p_body_antenna(1.0);
+    const auto answer = say(1, test::framed(bad));
+    ASSERT_EQ(answer.size(), 1U);
+    EXPECT_NE(answer[0].refused().why().find(spoilt == 0 ? "covariance_m2 of 4" : "p_body_antenna of 1"),
+              std::string::npos)
+        << answer[0].refused().why();
+  }
+  EXPECT_EQ(target_.fixes.size(), 3U);
+  EXPECT_EQ(say(1, sample(20)).size(), 1U);  // the connection stays
+}
+
 TEST_F(FeedSessionSensors, AMessageOfANewerProtocolIsRefusedByItsNumber) {
   join(1);
-  const std::string newer("\x0a\x00\x00\x00\x42\x08\x12\x06 later", 14);  // field 8
+  const std::string newer("\x0a\x00\x00\x00\x4a\x08\x12\x06 later", 14);  // field 9
   const auto answer = say(1, newer);
   ASSERT_EQ(answer.size(), 1U);
-  EXPECT_NE(answer[0].refused().why().find("number 8"), std::string::npos) << answer[0].refused().why();
+  EXPECT_NE(answer[0].refused().why().find("number 9"), std::string::npos) << answer[0].refused().why();
   EXPECT_NE(answer[0].refused().why().find("images"), std::string::npos);
   EXPECT_EQ(say(1, sample(20)).size(), 1U);
 }
@@ -130,6 +163,8 @@ TEST_F(FeedSessionSensors, AClockThatIsNotTheRobots) {
   ASSERT_EQ(answer.size(), 1U);
   EXPECT_EQ(answer[0].correction().stamp_ns(), stamp);  // by its own clock
   EXPECT_EQ(target_.known.newest->stamp.ns, now_.ns + 7);
+  EXPECT_TRUE(say(1, test::fix({.stamp = {stamp}, .antenna = {46.5, 7.9, 0.0}})).empty());
+  EXPECT_EQ(target_.fixes.at(0).stamp.ns, now_.ns + 7);
   const auto other = read(2);
   ASSERT_EQ(other.size(), 1U);
   EXPECT_EQ(other[0].correction().stamp_ns(), now_.ns + 7);  // by the robot's

@@ -10,6 +10,7 @@
 
 #include "tutti/base/ids.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/model/position_fix.hpp"
 #include "tutti/model/trajectory.hpp"
 #include "tutti/node/journal.hpp"
 #include "tutti/program/feed/feed_sensors.hpp"
@@ -21,16 +22,17 @@ namespace tutti::program {
 struct TeamMate {
   RobotId robot;
   std::string name;
-  Timestamp stamp;                  ///< When it was last seen, in its own time.
-  std::optional<Pose3> T_map_body;  ///< Where, in this robot's map; nothing in another component.
+  Timestamp stamp;  ///< When the team-mate was last seen, in its robot's own time.
+  /// Where, in this robot's map; nothing when it is in another component of the server's map.
+  std::optional<Pose3> T_map_body;
   friend bool operator==(const TeamMate&, const TeamMate&) = default;
 };
 
-/// A stretch of odometry where localisation failed, or the map is wrong; or a sensor that is not heard.
+/// Tells of a stretch of odometry where localisation failed or the map is wrong, or of a sensor that is not heard.
 struct FeedAlert {
   std::string text;
-  Timestamp since;  ///< The newest sample when it was first raised.
-  Timestamp from, until;
+  Timestamp since;        ///< The newest sample when the alert was first raised.
+  Timestamp from, until;  ///< The stretch that the alert is about.
   friend bool operator==(const FeedAlert&, const FeedAlert&) = default;
 };
 
@@ -38,59 +40,64 @@ struct FeedAlert {
 struct FeedState {
   ChainId chain;
   std::string name;
-  // `odom` is the client's here, and begins anew where that does.
+  // The frame `odom` is the client's here; it begins anew where the client's odometry jumps.
   std::optional<StampedPose> newest;       ///< T_odom_body of the newest sample taken.
   Pose3 T_map_odom;                        ///< Jumps with every correction, and where the client's odometry jumps.
   Pose3 T_odom_fed;                        ///< RobotAgent::T_odom_fed(): changes where the client's odometry jumps.
   Matrix6d covariance = Matrix6d::Zero();  ///< RobotAgent::covariance(): of T_map_odom * newest, right tangent.
-  std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age() of the newest one heard; zeros: none yet.
-  std::optional<std::uint32_t> component;           ///< Nothing: the map does not know this chain.
-  bool wants_scan = false;                          ///< A scan from now on would be used.
+  std::pair<std::uint64_t, std::uint64_t>
+      map_age;                             ///< ProxyGraph::age() of the newest graph heard; zeros before the first.
+  std::optional<std::uint32_t> component;  ///< Of the server's map; nothing while the map does not know this chain.
+  bool wants_scan = false;                 ///< A scan from now on would be used.
   std::vector<TeamMate> team_mates;
   std::vector<FeedAlert> alerts;
   std::optional<Timestamp> stored;    ///< The newest sample that a kill would not lose.
-  robot::NextKeyframe next_keyframe;  ///< A scan of a later sample would be used when one is due there.
+  robot::NextKeyframe next_keyframe;  ///< Tells at which later sample a scan would be wanted.
   robot::OdometryWatch watch;         ///< RobotAgent::watch()
-  bool ended = false;                 ///< The client has said so, and all before is stored.
+  bool ended = false;                 ///< The client has ended the recording, and everything before that is stored.
 };
 
-/// After an update of the map.
+/// The robot's way and what the map says of it, as of one update of the map.
 struct FeedWay {
   std::pair<std::uint64_t, std::uint64_t> map_age;  ///< ProxyGraph::age()
   std::size_t constraints = 0;                      ///< RobotAgent::ledger()
   Trajectory corrected;                             ///< RobotAgent::corrected()
-  Trajectory map;                                   ///< trajectory_of() the graph that was heard.
+  Trajectory map;                                   ///< trajectory_of() the proxy graph that was heard.
 };
 
-/// A sample or scan that was taken from the client and turned out to be no good.
+/// A sample or scan that was accepted from the client and turned out to be unusable.
 struct FeedRefusal {
   Timestamp stamp;
   std::string why;
 };
 
-/// The robot behind a live feed.
+/// The robot behind a live feed, as a session sees it. Every call returns at once.
 class FeedTarget {
  public:
   virtual ~FeedTarget() = default;
-  /// An error: it was refused, and why; nothing has changed.
+  /// An error says why the sample was refused; nothing has changed then.
   virtual Status add_odometry(const node::OdometrySample& sample) = 0;
   virtual Status add_scan(const Scan& scan) = 0;
-  /// What its client has, from its next input on.
+  /// Sets what the client's later inputs come from.
   virtual void set_sensors(const FeedSensors& /*sensors*/) {}
   virtual Status add_images(FedImages images) {
     return fail(ErrorCode::unsupported, "images at {} ns: this robot takes none", images.stamp.ns);
   }
-  /// An error where any of them was left out.
+  /// An error when any of the samples was left out.
   virtual Status add_imu(const std::vector<ImuSample>& samples) {
     return fail(ErrorCode::unsupported, "{} IMU samples: this robot takes none", samples.size());
   }
-  /// FeedState::ended says when it is done.
+  /// An error means that the fix was left out, and says why.
+  virtual Status add_fix(const PositionFix& fix) {
+    return fail(ErrorCode::unsupported, "fix at {} ns: this robot takes none", fix.stamp.ns);
+  }
+  /// Ends the recording; FeedState::ended tells when that is done.
   virtual Status finish() = 0;
-  /// From now on there are ways to take.
+  /// From now on take_ways() has something to return.
   virtual void want_ways() {}
-  /// Since the last call, as far as they are kept.
+  /// The ways since the last call, as far as they were kept.
   virtual std::vector<FeedWay> take_ways() { return {}; }
-  /// Since the last call.
+  /// The refusals since the last call.
   virtual std::vector<FeedRefusal> take_refusals() { return {}; }
   [[nodiscard]] virtual FeedState state() const = 0;
 };

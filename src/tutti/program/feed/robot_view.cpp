@@ -80,6 +80,7 @@ Status taken(const node::Step& step) {
       return fail(ErrorCode::invalid, "{}", scan->why);
     if (const auto* images = std::get_if<node::ImagesRefused>(&event.what); images != nullptr && !images->later)
       return fail(ErrorCode::invalid, "{}", images->why);
+    if (const auto* fix = std::get_if<node::FixRefused>(&event.what)) return fail(ErrorCode::invalid, "{}", fix->why);
   }
   return {};
 }

@@ -39,6 +39,7 @@ inline std::string hello(const v1::Feed::Sensors& sensors) {
 }
 inline std::string images(const FedImages& of) { return framed(internal::message_of(of)); }
 inline std::string imu(const std::vector<ImuSample>& samples) { return framed(internal::message_of(samples)); }
+inline std::string fix(const PositionFix& of) { return framed(internal::message_of(of)); }
 
 inline std::string odometry(const StampedPose& at, const Matrix6d& covariance) {
   return framed(internal::message_of(node::OdometrySample{at.stamp, at.pose, covariance}));

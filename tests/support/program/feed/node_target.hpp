@@ -17,7 +17,7 @@ class NodeTarget final : public FeedTarget {
  public:
   explicit NodeTarget(RobotId robot = RobotId{1}, const robot::AgentConfig& config = {})
       : store_(storage::robot_schema()),
-        node_(node::RobotNode::open(robot, 7, {.agent = config}, Rng(1), store_).value()),
+        node_(node::RobotNode::open(robot, 7, {.agent = config}, store_).value()),
         view_("alpha") {
     carry_out(node_->resume({}));
   }
@@ -26,6 +26,7 @@ class NodeTarget final : public FeedTarget {
     return carry_out(node_->add_odometry(sample, {}));
   }
   Status add_scan(const Scan& scan) override { return carry_out(node_->add_scan(scan, {})); }
+  Status add_fix(const PositionFix& fix) override { return carry_out(node_->add_fix(fix, {})); }
   Status finish() override {
     ended_ = true;
     return carry_out(node_->finish({}));

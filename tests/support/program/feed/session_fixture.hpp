@@ -40,11 +40,16 @@ class ScriptedTarget final : public FeedTarget {
     for (const ImuSample& sample : samples) felt.push_back(sample.stamp);
     return {};
   }
+  Status add_fix(const PositionFix& fix) override {
+    fixes.push_back(fix);
+    return {};
+  }
   [[nodiscard]] FeedState state() const override { return known; }
   std::vector<FeedRefusal> take_refusals() override { return std::exchange(refusals, {}); }
 
   FeedState known{.chain = {RobotId{4}, 77}, .name = "alpha", .newest = {}};
   std::vector<Timestamp> scans, seen, felt;
+  std::vector<PositionFix> fixes;
   FeedSensors sensors;
   int finished = 0;
   bool ends_at_once = true;

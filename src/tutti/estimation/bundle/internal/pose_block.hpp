@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
-
 #include "tutti/geometry/pose3.hpp"
 
 /// A pose as a solver's parameter block [tx ty tz qx qy qz qw] with retract() and local() of geometry/pose3.hpp.
 namespace tutti::bundle::internal {
 
-using PoseBlock = std::array<double, 7>;
 using PlusJacobian = Eigen::Matrix<double, 7, 6, Eigen::RowMajor>;
 using MinusJacobian = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
 

@@ -7,7 +7,8 @@ namespace tutti::visual {
 
 Result<std::shared_ptr<TrackingSource>> TrackingSource::open(ImageStream, Trajectory, const TrackingConfig&) {
   return fail(ErrorCode::unsupported,
-              "images cannot be tracked: this program was built without OpenCV (TUTTI_BUILD_VISUAL=OFF)");
+              "images cannot be tracked: this program is without OpenCV (package tutti-server, or built with "
+              "TUTTI_BUILD_VISUAL=OFF)");
 }
 
 TrackedImages TrackingSource::images(std::size_t, bool) { TUTTI_CHECK(false, "there is no such source"); }
@@ -15,7 +16,8 @@ TrackedImages TrackingSource::images(std::size_t, bool) { TUTTI_CHECK(false, "th
 Result<std::unique_ptr<ImageTracker>> ImageTracker::make(std::vector<Camera>, std::optional<DepthSensor>,
                                                          const TrackerConfig&) {
   return fail(ErrorCode::unsupported,
-              "images cannot be tracked: this program was built without OpenCV (TUTTI_BUILD_VISUAL=OFF)");
+              "images cannot be tracked: this program is without OpenCV (package tutti-server, or built with "
+              "TUTTI_BUILD_VISUAL=OFF)");
 }
 
 std::vector<TrackedImage> ImageTracker::track(const SeenImages&, bool) {

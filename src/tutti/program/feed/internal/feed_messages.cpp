@@ -90,6 +90,18 @@ v1::Feed message_of(const std::vector<ImuSample>& samples) {
   return message;
 }
 
+v1::Feed message_of(const PositionFix& fix) {
+  v1::Feed message;
+  auto& out = *message.mutable_fix();
+  out.set_stamp_ns(fix.stamp.ns);
+  out.set_latitude_deg(fix.antenna.latitude_deg);
+  out.set_longitude_deg(fix.antenna.longitude_deg);
+  out.set_height_m(fix.antenna.height_m);
+  for (int i = 0; i < 9; ++i) out.add_covariance_m2(fix.covariance(i / 3, i % 3));
+  for (const double x : fix.p_body_antenna) out.add_p_body_antenna(x);
+  return message;
+}
+
 std::string framed(const v1::Feed& message) {
   const std::string payload = message.SerializeAsString();
   TUTTI_CHECK(payload.size() <= kMaxFeedBytes, "a feed message of {} bytes", payload.size());

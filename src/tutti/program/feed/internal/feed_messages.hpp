@@ -18,6 +18,7 @@ v1::Feed message_of(const node::OdometrySample& sample);
 v1::Feed message_of(const Scan& scan);
 v1::Feed message_of(const FedImages& images);
 v1::Feed message_of(const std::vector<ImuSample>& samples);
+v1::Feed message_of(const PositionFix& fix);
 
 inline constexpr std::size_t kHeaderBytes = 4;
 /// As bytes on the socket: so many of the length, little endian, and the message. At most kMaxFeedBytes.

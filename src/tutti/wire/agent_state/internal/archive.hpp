@@ -300,6 +300,48 @@ void pass_watch(A& a, AgentState& state) {
   for (robot::OdometryStep& step : state.submaps.waiting.odometry) pass(a, step.is_jump);
 }
 template <class A>
+void pass(A& a, Eigen::Matrix3d& matrix) {
+  for (double& x : matrix.reshaped()) a.number(x);
+}
+template <class A>
+void pass(A& a, Eigen::Vector3d& vector) {
+  for (double& x : vector) a.number(x);
+}
+template <class A>
+void pass(A& a, Geodetic& position) {
+  for (double* x : {&position.latitude_deg, &position.longitude_deg, &position.height_m}) a.number(*x);
+}
+template <class A>
+void pass(A& a, PositionFix& fix) {
+  pass(a, fix.stamp);
+  pass(a, fix.antenna);
+  pass(a, fix.covariance);
+  pass(a, fix.p_body_antenna);
+}
+template <class A>
+void pass(A& a, robot::PlacedFix& fix) {
+  pass(a, fix.stamp);
+  pass(a, fix.p_odom_antenna);
+  pass(a, fix.antenna);
+  pass(a, fix.covariance);
+}
+template <class A>
+void pass(A& a, SubmapFix& fix) {
+  pass(a, fix.keyframe);
+  pass(a, fix.p_keyframe_antenna);
+  pass(a, fix.antenna);
+  pass(a, fix.covariance);
+}
+/// Of a receiver: after pass_watch(), and as that not in older states.
+template <class A>
+void pass_fixes(A& a, robot::SubmapBuilderState& builder) {
+  if (!a.has_more()) return;
+  pass(a, builder.waiting_fixes);
+  pass(a, builder.fixes);
+  pass(a, builder.heard_fix);
+  for (robot::FinishedSubmap& finished : builder.finished) pass(a, finished.submap.fixes);
+}
+template <class A>
 void pass(A& a, AgentState& state) {
   pass(a, state.session);
   pass(a, state.sequence);
@@ -329,6 +371,7 @@ void pass(A& a, AgentState& state) {
   state.component = has_component ? std::optional(component) : std::nullopt;
   pass_waiting(a, state.submaps);
   pass_watch(a, state);
+  pass_fixes(a, state.submaps);
 }
 
 }  // namespace tutti::wire::archive

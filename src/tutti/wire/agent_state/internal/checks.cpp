@@ -18,6 +18,13 @@ bool is_sound(const RelativePose& measured) { return is_sound(measured.T_a_b) &&
 bool is_sound(const lidar::PosedCloud& scan) { return is_sound(scan.T_submap_body); }
 bool is_sound(const TrackedImages& images) { return check_images(images).has_value(); }
 bool is_sound(const robot::Whereabouts& other) { return is_sound(other.T_map_body); }
+bool is_sound(const SubmapFix& fix) {
+  return check_fix(fix.antenna, fix.covariance, fix.p_keyframe_antenna).has_value();
+}
+bool is_sound(const PositionFix& fix) { return check_fix(fix.antenna, fix.covariance, fix.p_body_antenna).has_value(); }
+bool is_sound(const robot::PlacedFix& fix) {
+  return check_fix(fix.antenna, fix.covariance, Eigen::Vector3d::Zero()).has_value() && fix.p_odom_antenna.allFinite();
+}
 template <class T>
 bool all_sound(const std::vector<T>& list) {
   return std::ranges::all_of(list, [](const T& element) { return is_sound(element); });
@@ -52,10 +59,15 @@ bool is_sound(const robot::SensorTimeline& waiting, const Trajectory& taken) {
          });
 }
 
+template <class Fix>
+bool is_in_order(const std::vector<Fix>& fixes) {
+  return all_sound(fixes) && std::ranges::is_sorted(fixes, {}, &Fix::stamp);
+}
+
 bool is_sound(const robot::SubmapBuilderState& builder) {
   const auto is_whole = [](const robot::FinishedSubmap& finished) {
     return !finished.submap.keyframes.empty() && is_chain(finished.submap.keyframes, finished.submap.odometry) &&
-           all_sound(finished.scans) && all_sound(finished.images);
+           all_sound(finished.scans) && all_sound(finished.images) && all_sound(finished.submap.fixes);
   };
   const auto follows = [](const StampedPose& a, const StampedPose& b) { return a.stamp >= b.stamp; };
   return is_chain(builder.keyframes, builder.odometry) && all_sound(builder.scans) && all_sound(builder.images) &&
@@ -63,7 +75,8 @@ bool is_sound(const robot::SubmapBuilderState& builder) {
          std::ranges::all_of(builder.recent, [](const StampedPose& at) { return is_sound(at.pose); }) &&
          std::ranges::adjacent_find(builder.recent, follows) == builder.recent.end() &&
          builder.keyframes.empty() == builder.recent.empty() && std::isfinite(builder.distance_m) &&
-         std::isfinite(builder.representative_distance_m) && is_sound(builder.waiting, builder.recent);
+         std::isfinite(builder.representative_distance_m) && is_sound(builder.waiting, builder.recent) &&
+         is_in_order(builder.waiting_fixes) && is_in_order(builder.fixes);
 }
 
 bool is_sound(const robot::OdometryWatch::State& watch) {

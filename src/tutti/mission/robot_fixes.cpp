@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mission/robot_fixes.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tutti/formats/fix_file.hpp"
+
+namespace tutti::mission {
+namespace {
+
+bool is_by_this_clock(const std::vector<PositionFix>& fixes, const Trajectory& odometry) {
+  return std::ranges::any_of(fixes, [&](const PositionFix& fix) {
+    return odometry.front().stamp <= fix.stamp && fix.stamp <= odometry.back().stamp;
+  });
+}
+
+}  // namespace
+
+Status take_fixes(const RobotConfig& robot, const std::filesystem::path& data, const BagRecording* bag,
+                  const Trajectory& odometry, MissionRecording& out) {
+  std::vector<PositionFix>& fixes = out.recording.fixes;
+  std::string source;
+  if (!robot.fixes.empty()) {
+    source = (data / robot.fixes).string();
+    auto read = formats::read_fixes(source);
+    if (!read) return tl::unexpected(read.error());
+    fixes = std::move(*read);
+  } else if (bag != nullptr) {
+    source = bag->fix_topic;
+    fixes = bag->fixes;
+  }
+  if (fixes.empty()) return {};
+  if (robot.antenna_m.size() == 3)
+    for (PositionFix& fix : fixes) fix.p_body_antenna = Eigen::Vector3d(robot.antenna_m.data());
+  const bool fits = is_by_this_clock(fixes, odometry);
+  const std::string stamps = fmt::format(
+      "of its {} stamps, {} to {} ns, none is within the odometry's, {} to {} ns: are they by another clock?",
+      fixes.size(), fixes.front().stamp.ns, fixes.back().stamp.ns, odometry.front().stamp.ns, odometry.back().stamp.ns);
+  if (!fits && !robot.fixes.empty()) return fail(ErrorCode::invalid, "{}: {}", source, stamps);
+  const Eigen::Vector3d& antenna = fixes.front().p_body_antenna;
+  out.notes.push_back(fits ? fmt::format("{}: {} fixes of {}, antenna at [{:.2f} {:.2f} {:.2f}] m of the body{}",
+                                         robot.name, fixes.size(), source, antenna.x(), antenna.y(), antenna.z(),
+                                         bag != nullptr && robot.fixes.empty() ? bag->fix_note : "")
+                           : fmt::format("{}: no fixes of {}: {}", robot.name, source, stamps));
+  if (!fits) fixes.clear();
+  return {};
+}
+
+}  // namespace tutti::mission

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/model/position_fix.hpp"
+
+#include <Eigen/Eigenvalues>
+
+namespace tutti {
+namespace {
+
+/// Of rounding, as a share of the largest variance.
+constexpr double kRounding = 1e-5;
+
+}  // namespace
+
+Eigen::Matrix3d unknown_fix_covariance() {
+  return Eigen::Vector3d(kUnknownFix_m * kUnknownFix_m, kUnknownFix_m * kUnknownFix_m,
+                         kUnknownFixUp_m * kUnknownFixUp_m)
+      .asDiagonal();
+}
+
+Status check_fix(const Geodetic& antenna, const Eigen::Matrix3d& covariance, const Eigen::Vector3d& p_antenna) {
+  if (auto ok = check_geodetic(antenna); !ok) return ok;
+  constexpr double kLeast = kLeastFixSigma_m * kLeastFixSigma_m, kMost = kLargestFixSigma_m * kLargestFixSigma_m;
+  for (int axis = 0; axis < 3; ++axis)
+    if (const double variance = covariance(axis, axis); !(variance >= kLeast && variance <= kMost))
+      return fail(ErrorCode::invalid, "variance {} m^2 {}, expected {} to {}", variance,
+                  axis == 0   ? "east"
+                  : axis == 1 ? "north"
+                              : "up",
+                  kLeast, kMost);
+  const double largest = covariance.diagonal().maxCoeff();
+  const double least = covariance.allFinite() && (covariance - covariance.transpose()).norm() <= kRounding * largest
+                           ? Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()(0)
+                           : -largest;
+  if (!(least >= -kRounding * largest))
+    return fail(ErrorCode::invalid, "a covariance that is not symmetric and positive semidefinite");
+  if (!(p_antenna.norm() <= kFarthestAntenna_m))
+    return fail(ErrorCode::invalid, "antenna {} m from the body, expected at most {} m", p_antenna.norm(),
+                kFarthestAntenna_m);
+  return {};
+}
+
+}  // namespace tutti

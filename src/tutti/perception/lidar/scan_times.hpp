@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/base/result.hpp"
+#include "tutti/base/timestamp.hpp"
+#include "tutti/formats/pcd.hpp"
+
+/// Finds out when the points of a recorded sweep were measured. Files give times in one of four units, and since the
+/// sweep's begin, until its end or by a clock, without saying which; but a sweep is short, so the numbers show it.
+namespace tutti::lidar {
+
+/// Limits on a sweep's duration; they tell units apart that differ by a factor of a thousand.
+inline constexpr double kShortestSweep_s = 0.001;
+inline constexpr double kLongestSweep_s = 0.5;
+/// No point is measured farther in time from its scan's pose than this, before or after it.
+inline constexpr double kLongestAge_s = 1.0;
+
+/// What a mission file says of a robot's scans: robots[].scans_deskewed (auto, yes, no), scan_time_unit (auto, s, ms,
+/// us, ns) and scan_pose_at (end, begin).
+struct ScanTimesConfig {
+  std::string deskewed = "auto";
+  std::string unit = "auto";
+  std::string pose_at = "end";
+};
+
+/// What the numbers of a file's time field mean.
+struct PointTimes {
+  enum class Zero { sweep_begin, sweep_end, odometry_clock, message, unknown };
+  std::string field;
+  std::string unit;  ///< s, ms, us or ns
+  double unit_s = 1.0;
+  Zero zero = Zero::unknown;
+  bool pose_at_begin = false;  ///< The scan's odometry pose is of the sweep's begin, not its end; with odometry_clock
+                               ///< and message the times say it.
+};
+
+/// What the times of a robot's scans mean, judged by one scan whose odometry pose is of `stamp`. No value: the robot's
+/// scans are taken as deskewed. Errors: the settings want times that are missing, or the numbers are not those of a
+/// sweep.
+Result<std::optional<PointTimes>> find_point_times(const formats::TimedCloud& scan, Timestamp stamp,
+                                                   const ScanTimesConfig& config);
+/// As find_point_times(), for a ROS message: drivers give times relative to the message's stamp, or by its clock, and
+/// scan_pose_at does not matter.
+Result<std::optional<PointTimes>> find_message_times(const formats::TimedCloud& scan, Timestamp stamp,
+                                                     const ScanTimesConfig& config);
+
+/// Per point the seconds from its measurement to `stamp`, negative for points measured after it. Error: the times are
+/// not those of one sweep around that stamp.
+Result<std::vector<float>> point_ages(const formats::TimedCloud& scan, Timestamp stamp, const PointTimes& times);
+
+/// A sentence for the report's notes: "scans are ...".
+std::string in_words(const std::optional<PointTimes>& times);
+
+}  // namespace tutti::lidar

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/ros/ros_answers.hpp"
+
+#include <fmt/format.h>
+
+#include "tutti/geometry/so3.hpp"
+
+namespace tutti::ros {
+namespace {
+
+constexpr std::array<float, 4> kOrange{1.0F, 0.6F, 0.1F, 1.0F};
+
+std::string map_of(const std::string& odom) {
+  constexpr std::string_view kOdom = "odom";
+  return odom.ends_with(kOdom) ? odom.substr(0, odom.size() - kOdom.size()) + "map" : "map";
+}
+
+}  // namespace
+
+std::array<double, 36> ros_covariance(const Matrix6d& of_T_map_odom, const Pose3& T_map_odom, const Pose3& T_map_body) {
+  const Matrix6d J = adjoint(T_map_body.inverse() * T_map_odom);
+  return bags::pose_covariance(J * of_T_map_odom * J.transpose(), T_map_body.rotation);
+}
+
+std::string topic_part(const std::string& name) {
+  std::string out;
+  bool was_allowed = true;
+  for (const char c : name) {
+    const bool is_allowed = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+    if (is_allowed || was_allowed) out += is_allowed ? c : '_';
+    was_allowed = is_allowed;
+  }
+  const bool begins_with_letter =
+      !out.empty() && ((out[0] >= 'a' && out[0] <= 'z') || (out[0] >= 'A' && out[0] <= 'Z'));
+  return begins_with_letter ? out : "robot_" + out;
+}
+
+bags::RosDiagnostic diagnosis(const RosSituation& situation) {
+  constexpr std::uint8_t kFine = 0, kWarning = 1, kError = 2;
+  bags::RosDiagnostic out{.level = kFine, .name = situation.name, .message = {}, .hardware_id = {}, .values = {}};
+  const auto add = [&](const std::string& key, const auto& value) {
+    out.values.emplace_back(key, fmt::format("{}", value));
+  };
+  add("connection", situation.is_connected ? "feeding" : "away");
+  add("odometry", situation.counts.odometry);
+  add("scans", situation.counts.scans);
+  add("fixes", situation.counts.fixes);
+  add("refused", situation.counts.refused);
+  add("in_map", situation.in_map);
+  for (std::size_t i = 0; i < situation.alerts.size(); ++i) add(fmt::format("alert {}", i), situation.alerts[i]);
+  for (std::size_t i = 0; i < situation.troubles.size(); ++i) add(fmt::format("trouble {}", i), situation.troubles[i]);
+  const auto say = [&](std::uint8_t level, const std::string& message) {
+    out.level = level;
+    out.message = message;
+  };
+  say(kFine, situation.in_map ? "fed, and on the map" : "fed, not in a map yet");
+  if (situation.counts.odometry == 0) say(kWarning, "no odometry yet");
+  if (!situation.troubles.empty()) say(kWarning, situation.troubles.back());
+  if (!situation.alerts.empty()) say(kWarning, situation.alerts.back());
+  if (!situation.is_connected) say(kError, "no robot program");
+  return out;
+}
+
+RosAnswers::RosAnswers(const std::string& odom, const std::string& map, double tolerance_s)
+    : odom_(odom), map_(map.empty() ? map_of(odom) : map), tolerance_s_(tolerance_s) {}
+
+void RosAnswers::hear(const program::FeedAnswer& answer, const Pose3& T_odom_body) {
+  last_ = answer;
+  if (!tail_.empty()) {
+    const Pose3 step = tail_.back().pose.inverse() * T_odom_body;
+    if (step.translation.norm() < kTailStep_m && rotation_angle(step) < kTailStep_rad) return;
+  }
+  tail_.push_back({answer.stamp, T_odom_body});
+  if (tail_.size() > kLongestTail) tail_.pop_front();
+}
+
+void RosAnswers::hear(const program::FeedWay& way) {
+  way_ = way.corrected;
+  if (way_.empty()) return;
+  while (!tail_.empty() && tail_.front().stamp <= way_.back().stamp) tail_.pop_front();
+}
+
+std::optional<std::string> RosAnswers::transform() {
+  if (!last_ || (said_ && last_->stamp <= *said_)) return std::nullopt;
+  said_ = last_->stamp;
+  const bags::RosTransform out{.header = {last_->stamp + tolerance_s_, map_},
+                               .child_frame_id = odom_,
+                               .translation = last_->T_map_odom.translation,
+                               .rotation = last_->T_map_odom.rotation};
+  return bags::encode(std::span(&out, 1));
+}
+
+std::string RosAnswers::pose() const {
+  return bags::encode(bags::RosPoseWithCovariance{
+      .header = {last_->stamp, map_},
+      .pose = bags::to_ros(last_->T_map_body),
+      .covariance = ros_covariance(last_->covariance, last_->T_map_odom, last_->T_map_body)});
+}
+
+std::string RosAnswers::path() const {
+  bags::RosPath out{.header = {{}, map_}, .poses = {}};
+  const auto add = [&](Timestamp stamp, const Pose3& T_map_body) {
+    out.poses.push_back({{stamp, map_}, bags::to_ros(T_map_body)});
+    out.header.stamp = stamp;
+  };
+  for (const auto& [stamp, pose] : way_) add(stamp, pose);
+  for (const auto& [stamp, pose] : tail_) add(stamp, (last_ ? last_->T_map_odom : Pose3{}) * pose);
+  return bags::encode(out);
+}
+
+std::string RosAnswers::team_mates() const {
+  std::vector<bags::RosBall> balls;
+  for (const program::TeamMate& mate : situation_.team_mates)
+    if (mate.T_map_body)
+      balls.push_back({.header = {{}, map_},  // stamp 0: the newest transform
+                       .name_space = "team_mates",
+                       .name = mate.name,
+                       .pose = bags::to_ros(*mate.T_map_body),
+                       .diameter_m = 0.5,
+                       .rgba = kOrange});
+  return bags::encode(bags::RosHeader{{}, map_}, balls);
+}
+
+std::vector<std::pair<std::string, std::string>> RosAnswers::team_mate_poses() const {
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const program::TeamMate& mate : situation_.team_mates)
+    if (mate.T_map_body)
+      out.emplace_back(
+          topic_part(mate.name),
+          bags::encode(bags::RosPoseStamped{.header = {mate.stamp, map_}, .pose = bags::to_ros(*mate.T_map_body)}));
+  return out;
+}
+
+}  // namespace tutti::ros

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tutti/bags/ros_encode.hpp"
+#include "tutti/model/trajectory.hpp"
+#include "tutti/program/feed/feed_client.hpp"
+#include "tutti/program/ros/ros_intake.hpp"
+
+namespace tutti::ros {
+
+/// Turns a robot's answers into messages of ROS 2 (CDR), for the topics and frames of ros2/tutti_ros (docs/ros.md).
+class RosAnswers {
+ public:
+  static constexpr double kTailStep_m = 0.1, kTailStep_rad = 0.1;
+  static constexpr std::size_t kLongestTail = 20'000;
+
+  /// `odom` is the odometry's frame. `map` is the map's; when empty it follows from `odom`: "r1/odom" gives "r1/map".
+  /// The stamp of map -> odom is set ahead by `tolerance_s`.
+  RosAnswers(const std::string& odom, const std::string& map, double tolerance_s);
+
+  void hear(const program::FeedAnswer& answer, const Pose3& T_odom_body);
+  void hear(const program::FeedWay& way);
+  void hear(program::FeedSituation situation) { situation_ = std::move(situation); }
+
+  /// TFMessage with map -> odom as of the last answer; nothing when that stamp was published already, because tf2 warns
+  /// of repeated ones.
+  std::optional<std::string> transform();
+  /// PoseWithCovarianceStamped: where the body is on the map.
+  [[nodiscard]] std::string pose() const;
+  /// Path: the way as the map corrects it, followed by the odometry since.
+  [[nodiscard]] std::string path() const;
+  /// MarkerArray of the team-mates whose place is known.
+  [[nodiscard]] std::string team_mates() const;
+  /// A PoseStamped for each of these team-mates, keyed by the part of the topic's name that stands for the team-mate.
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> team_mate_poses() const;
+
+  [[nodiscard]] const std::string& map_frame() const { return map_; }
+  [[nodiscard]] const std::optional<program::FeedAnswer>& last() const { return last_; }
+  [[nodiscard]] const program::FeedSituation& situation() const { return situation_; }
+
+ private:
+  std::string odom_, map_;
+  double tolerance_s_;
+  std::optional<program::FeedAnswer> last_;
+  std::optional<Timestamp> said_;
+  Trajectory way_;                ///< T_map_body
+  std::deque<StampedPose> tail_;  ///< T_odom_body since the end of way_.
+  program::FeedSituation situation_;
+};
+
+/// The covariance of T_map_body as ROS states it (6x6 by rows; position, then rotation; about the axes of the map),
+/// from that of T_map_odom in the right tangent: docs/protocol.md, "The covariance".
+std::array<double, 36> ros_covariance(const Matrix6d& of_T_map_odom, const Pose3& T_map_odom, const Pose3& T_map_body);
+
+/// The state of a robot on ROS's topics.
+struct RosSituation {
+  std::string name;
+  bool is_connected = false;  ///< To the robot's live feed.
+  RosIntake::Counts counts;
+  bool in_map = false;
+  std::vector<std::string> alerts, troubles;  ///< The robot's alerts, and problems with its messages, the newest last.
+};
+/// The message for /diagnostics.
+bags::RosDiagnostic diagnosis(const RosSituation& situation);
+
+/// A robot's name, changed to what may be a part of a topic's name.
+std::string topic_part(const std::string& name);
+
+}  // namespace tutti::ros

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/ros/ros_intake.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tutti/bags/point_cloud.hpp"
+#include "tutti/bags/ros_messages.hpp"
+#include "tutti/perception/lidar/deskewed_scan.hpp"
+
+namespace tutti::ros {
+namespace {
+
+constexpr double kUnseen_m2 = 1.0, kUnseen_rad2 = 0.03;  // as ros2/tutti_ros states it
+
+Matrix6d unseen() {
+  return (Vector6d() << Eigen::Vector3d::Constant(kUnseen_m2), Eigen::Vector3d::Constant(kUnseen_rad2))
+      .finished()
+      .asDiagonal();
+}
+
+/// Names are anybody's, and go to a terminal.
+std::string plain(std::string text) {
+  constexpr std::size_t kLongest = 80;
+  text.resize(std::min(text.size(), kLongest));
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+Status check_increases(Timestamp stamp, const std::optional<Timestamp>& before) {
+  if (!before || stamp > *before) return {};
+  return fail(ErrorCode::invalid, "stamp {} ns, expected after {} ns: two publishers, or a clock that began anew?",
+              stamp.ns, before->ns);
+}
+
+}  // namespace
+
+void RosIntake::begin_behind(const std::optional<Timestamp>& newest) {
+  known_ = newest;
+  unseen_ = newest && (!last_ || last_->stamp != *newest);
+  if (newest) std::erase_if(samples_, [&](const StampedPose& sample) { return sample.stamp <= *newest; });
+}
+
+Status RosIntake::counted(Status taken) {
+  if (!taken) ++counts_.refused;
+  return taken;
+}
+
+Status RosIntake::add_odometry(std::string_view cdr) { return counted(take_odometry(cdr)); }
+Status RosIntake::add_points(std::string_view cdr) { return counted(take_points(cdr)); }
+Status RosIntake::add_fix(std::string_view cdr) { return counted(take_fix(cdr)); }
+
+Status RosIntake::take_odometry(std::string_view cdr) {
+  const auto message = bags::decode_odometry(cdr);
+  if (!message) return tl::unexpected(message.error());
+  const auto pose = bags::to_pose(message->pose.position, message->pose.orientation);
+  if (!pose) return tl::unexpected(pose.error());
+  return add_sample(message->header.stamp, *pose, message->header.frame_id, message->child_frame_id);
+}
+
+Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const std::string& odom,
+                             const std::string& body) {
+  const OdometryFrames said{bags::frame_name(odom), bags::frame_name(body)};
+  if (!frames_) frames_ = said;
+  if (said.odom != frames_->odom || said.body != frames_->body)
+    return fail(ErrorCode::invalid,
+                "frames '{}' -> '{}', expected '{}' -> '{}' as of the first message: two publishers?", plain(said.odom),
+                plain(said.body), plain(frames_->odom), plain(frames_->body));
+  if (known_ && stamp <= *known_) return {};
+  const bool is_said_again = !config_.odometry_frames.empty() && newest_ && stamp == *newest_;  // as many do on /tf
+  if (is_said_again) return {};
+  if (Status ok = check_increases(stamp, newest_); !ok) return ok;
+  newest_ = stamp;
+  samples_.push_back({stamp, T_odom_body});
+  ++counts_.odometry;
+  return {};
+}
+
+Status RosIntake::add_tf(std::string_view cdr, bool is_static) {
+  const auto transforms = bags::decode_tf(cdr);
+  if (!transforms) return counted(tl::unexpected(transforms.error()));
+  Status first;
+  for (const bags::RosTransform& transform : *transforms)
+    if (Status ok = take_transform(transform, is_static); !ok) {
+      ++counts_.refused;
+      if (first) first = std::move(ok);
+    }
+  return first;
+}
+
+Status RosIntake::take_transform(const bags::RosTransform& transform, bool is_static) {
+  const std::string parent = bags::frame_name(transform.header.frame_id),
+                    child = bags::frame_name(transform.child_frame_id);
+  if (!config_.odometry_frames.empty() && !is_static && parent + "->" + child == config_.odometry_frames) {
+    const auto pose = bags::to_pose(transform.translation, transform.rotation);
+    if (!pose) return tl::unexpected(pose.error());
+    return add_sample(transform.header.stamp, *pose, parent, child);
+  }
+  if (!known_frames_.contains(child) && known_frames_.size() >= kMostFrames)
+    return fail(ErrorCode::invalid, "frame '{}' is one more than {}", plain(child), kMostFrames);
+  known_frames_.insert(child);
+  return tree_.add(transform, is_static);
+}
+
+Status RosIntake::check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const {
+  if (Status ok = check_increases(stamp, before); !ok) return ok;
+  if (newest_ && std::abs(stamp - *newest_) > kAnotherClock_s)
+    return fail(ErrorCode::invalid, "stamp {} ns is {:.1f} s from odometry's newest, {} ns: are they by another clock?",
+                stamp.ns, stamp - *newest_, newest_->ns);
+  return {};
+}
+
+Status RosIntake::take_fix(std::string_view cdr) {
+  const auto message = bags::decode_nav_sat_fix(cdr);
+  if (!message) return tl::unexpected(message.error());
+  const Timestamp stamp = message->header.stamp;
+  if (known_ && stamp <= *known_) return {};
+  auto received = bags::to_fix(*message);
+  if (!received) return tl::unexpected(received.error());
+  if (!*received) return {};
+  if (Status ok = check_stamp(stamp, newest_fix_); !ok) return ok;
+  if (fixes_.size() >= kMostFixes) fixes_.pop_front();  // odometry has ended
+  newest_fix_ = stamp;
+  fixes_.push_back(std::move(**received));
+  ++counts_.fixes;
+  return {};
+}
+
+Status RosIntake::take_points(std::string_view cdr) {
+  const auto message = bags::decode_point_cloud(cdr);
+  if (!message) return tl::unexpected(message.error());
+  const Timestamp stamp = message->header.stamp;
+  if (known_ && stamp <= *known_) return {};
+  if (Status ok = check_stamp(stamp, newest_scan_); !ok) return ok;
+  auto cloud = bags::to_timed_cloud(*message);
+  if (!cloud) return tl::unexpected(cloud.error());
+  if (cloud->cloud.points.empty()) return fail(ErrorCode::invalid, "holds no points");
+  auto times = lidar::find_message_times(*cloud, stamp, config_.scan_times);
+  if (!times) return tl::unexpected(times.error());
+  double after_s = 0.0;  // of the last point
+  if (*times) {
+    const auto ages = lidar::point_ages(*cloud, stamp, **times);
+    if (!ages) return tl::unexpected(ages.error());
+    after_s = std::max(0.0, -double{std::ranges::min(*ages)});
+  }
+  if (scans_.size() >= kMostScans) scans_.pop_front();  // odometry has ended
+  newest_scan_ = stamp;
+  scans_.push_back({stamp, stamp + after_s, message->header.frame_id, std::move(*cloud), std::move(*times)});
+  ++counts_.scans;
+  return {};
+}
+
+std::optional<node::OdometrySample> RosIntake::next_odometry(bool wait_for_scans) {
+  if (samples_.empty()) return std::nullopt;
+  const StampedPose sample = samples_.front();
+  if (wait_for_scans && !(newest_scan_ && *newest_scan_ >= sample.stamp)) return std::nullopt;
+  samples_.pop_front();
+  node::OdometrySample out{sample.stamp, sample.pose, Matrix6d::Zero()};
+  if (last_) out.increment_covariance = robot::increment_covariances({*last_, sample}, config_.covariance).front();
+  if (std::exchange(unseen_, false)) out.increment_covariance = unseen();
+  last_ = sample;
+  history_.push_back(sample);
+  const auto kept =
+      std::ranges::find_if(history_, [&](const StampedPose& old) { return sample.stamp - old.stamp <= kHistory_s; });
+  if (kept != history_.begin()) has_whole_history_ = false;
+  history_.erase(history_.begin(), kept);
+  return out;
+}
+
+Result<Pose3> RosIntake::pose_on_body(const std::string& frame) const {
+  if (!frames_) return fail(ErrorCode::invalid, "no odometry has said yet which frame is the body");
+  const std::string from = bags::frame_name(frame), &body = frames_->body;
+  if (from == body) return Pose3{};
+  if (const auto found = tree_.find(body, from)) return *found;
+  const std::string frames = tree_.frames();
+  return fail(ErrorCode::invalid, "no transform from '{}' to '{}' on /tf_static, frames that do not move are: {}",
+              plain(from), plain(body), frames.empty() ? "none" : frames.substr(0, 500));
+}
+
+Result<Pose3> RosIntake::lidar_pose(const std::string& frame) const {
+  if (config_.T_body_lidar) return *config_.T_body_lidar;
+  if (frames_->body.empty()) return Pose3{};
+  const auto found = pose_on_body(frame);
+  if (found) return found;
+  return fail(ErrorCode::invalid,
+              "where the LiDAR is on the robot is not known: {}; a mission file's robots[].T_body_lidar may say it",
+              found.error().message);
+}
+
+Result<std::optional<Scan>> RosIntake::to_scan(const std::string& frame, formats::TimedCloud cloud, Timestamp stamp,
+                                               const std::optional<lidar::PointTimes>& times) const {
+  const auto T_body_lidar = lidar_pose(frame);
+  if (!T_body_lidar) return tl::unexpected(T_body_lidar.error());
+  if (!times)
+    return lidar::deskewed(std::move(cloud), stamp, times, *T_body_lidar, {}).map([](Scan scan) {
+      return std::optional(std::move(scan));
+    });
+  const double oldest_s = history_.empty() ? 0.0 : stamp - history_.front().stamp;
+  if (!has_whole_history_ && oldest_s < lidar::kLongestAge_s)
+    return fail(ErrorCode::invalid, "scan at {} ns comes too late, {:.1f} s after odometry of its time", stamp.ns,
+                last_->stamp - stamp);
+  auto scan = lidar::deskewed(std::move(cloud), stamp, times, *T_body_lidar, lidar::with_ends(history_));
+  if (!scan) return tl::unexpected(scan.error());
+  return std::optional(std::move(*scan));
+}
+
+Result<std::optional<Scan>> RosIntake::next_scan(bool is_wanted) {
+  while (!scans_.empty() && last_ && last_->stamp >= scans_.front().until) {
+    Waiting waiting = std::move(scans_.front());
+    scans_.pop_front();
+    if (!is_wanted || is_before_all(waiting.stamp)) continue;
+    if (std::string how = lidar::in_words(waiting.times); how != how_) note_ = how_ = std::move(how);
+    auto scan = to_scan(waiting.frame, std::move(waiting.cloud), waiting.stamp, waiting.times);
+    if (!scan) ++counts_.refused;
+    return scan;
+  }
+  return std::optional<Scan>{};
+}
+
+std::optional<Eigen::Vector3d> RosIntake::antenna_of(const std::string& frame) const {
+  if (config_.p_body_antenna) return config_.p_body_antenna;
+  const auto T_body_antenna = pose_on_body(frame);
+  return T_body_antenna ? std::optional(T_body_antenna->translation) : std::nullopt;
+}
+
+std::optional<PositionFix> RosIntake::next_fix() {
+  while (!fixes_.empty() && last_ && last_->stamp >= fixes_.front().fix.stamp) {
+    auto [fix, frame, is_stated] = std::move(fixes_.front());
+    fixes_.pop_front();
+    if (is_before_all(fix.stamp)) continue;
+    const auto p_body_antenna = antenna_of(frame);
+    fix.p_body_antenna = p_body_antenna.value_or(Eigen::Vector3d::Zero());
+    is_unsure_ = is_unsure_ || !is_stated;
+    std::string how =
+        p_body_antenna ? fmt::format("fixes are of an antenna at [{:.2f} {:.2f} {:.2f}] m of the body",
+                                     fix.p_body_antenna.x(), fix.p_body_antenna.y(), fix.p_body_antenna.z())
+                       : fmt::format(
+                             "fixes are taken as of an antenna at the body's origin: no transform from '{}' to '{}' on "
+                             "/tf_static; a mission file's robots[].antenna_m may say where it is",
+                             plain(frame), plain(frames_->body));
+    if (is_unsure_)
+      how += fmt::format("; those that do not say how sure they are count as {:g} m and {:g} m up", kUnknownFix_m,
+                         kUnknownFixUp_m);
+    if (how != how_fixed_) note_ = how_fixed_ = std::move(how);
+    return fix;
+  }
+  return std::nullopt;
+}
+
+}  // namespace tutti::ros

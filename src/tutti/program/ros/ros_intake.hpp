@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tutti/bags/ros_fix.hpp"
+#include "tutti/bags/transform_tree.hpp"
+#include "tutti/base/result.hpp"
+#include "tutti/formats/pcd.hpp"
+#include "tutti/model/point_cloud.hpp"
+#include "tutti/model/trajectory.hpp"
+#include "tutti/node/journal.hpp"
+#include "tutti/perception/lidar/scan_times.hpp"
+#include "tutti/robot/odometry_covariance.hpp"
+
+namespace tutti::ros {
+
+struct IntakeConfig {
+  std::string odometry_frames;  ///< Two frames of /tf, "odom->base_link"; empty: odometry is from Odometry messages.
+  robot::OdometryCovarianceConfig covariance;
+  lidar::ScanTimesConfig scan_times;
+  std::optional<Pose3> T_body_lidar;  ///< Nothing: taken from /tf_static, and from frames of /tf that never move.
+  std::optional<Eigen::Vector3d> p_body_antenna;  ///< In the body frame, m. Nothing: taken from /tf_static like
+                                                  ///< T_body_lidar, or else the body's origin.
+};
+
+/// Frames of odometry, from its first message.
+struct OdometryFrames {
+  std::string odom, body;
+};
+
+/// Turns messages of ROS 2 into inputs of a robot's live feed: odometry samples with the covariance of their
+/// increments, scans in the body frame with the motion of their sweeps removed, and position fixes with their antenna's
+/// place, in the same way as from a bag (mission/bag_recording.hpp). It needs neither a clock nor DDS. Bytes are
+/// untrusted: an error says what is wrong with a message, which then has no effect.
+class RosIntake {
+ public:
+  static constexpr double kHistory_s = 2.0;         ///< How long fed odometry is kept, to undistort sweeps.
+  static constexpr double kAnotherClock_s = 10.0;   ///< Scans and fixes farther than this from odometry are refused.
+  static constexpr std::size_t kMostScans = 40;     ///< Scans that wait for odometry; beyond it the oldest is dropped.
+  static constexpr std::size_t kMostFixes = 200;    ///< Fixes that wait for odometry; beyond it the oldest is dropped.
+  static constexpr std::size_t kMostFrames = 1000;  ///< Limit on the frames of /tf.
+  explicit RosIntake(IntakeConfig config) : config_(std::move(config)) {}
+
+  /// The robot already has everything up to `newest` (FeedWelcome::newest): older samples are skipped, and the first
+  /// step after it gets a large covariance when nobody has observed the way there.
+  void begin_behind(const std::optional<Timestamp>& newest);
+
+  Status add_odometry(std::string_view cdr);
+  Status add_points(std::string_view cdr);
+  /// Adds a fix; ignores messages in which the receiver reports that it has none.
+  Status add_fix(std::string_view cdr);
+  /// Adds the transforms of one message, and returns the first of their errors.
+  Status add_tf(std::string_view cdr, bool is_static);
+
+  /// The next odometry sample to feed, in order of arrival. With `wait_for_scans` it is held back until a scan with its
+  /// stamp or a later one has arrived.
+  std::optional<node::OdometrySample> next_odometry(bool wait_for_scans);
+  /// The next scan that can be fed, because the way up to the newest sample that next_odometry() returned covers its
+  /// sweep. Nothing when none is due; an error when the scan is left out. When the scan is not wanted it is skipped,
+  /// which costs nothing.
+  Result<std::optional<Scan>> next_scan(bool is_wanted);
+
+  /// The next fix whose stamp next_odometry() has reached; nothing when there is none. Where nothing tells the
+  /// antenna's pose, the fix is taken as of the body's origin, and take_note() says so.
+  std::optional<PositionFix> next_fix();
+
+  [[nodiscard]] const std::optional<OdometryFrames>& frames() const { return frames_; }
+  /// T_body_frame by transforms that do not move; an error names those that are known.
+  [[nodiscard]] Result<Pose3> pose_on_body(const std::string& frame) const;
+  /// Fails for a stamp of a sensor's message that is not after `before`, the stamp of the message before, or that is by
+  /// another clock than odometry's.
+  [[nodiscard]] Status check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const;
+  /// True for stamps from before the first odometry.
+  [[nodiscard]] bool is_before_all(Timestamp stamp) const {
+    return has_whole_history_ && !history_.empty() && stamp < history_.front().stamp;
+  }
+  /// The stamps of the next sample that is to be fed, and of the newest; nothing when none is waiting.
+  [[nodiscard]] std::optional<std::pair<Timestamp, Timestamp>> waiting() const {
+    return samples_.empty() ? std::nullopt : std::optional(std::pair(samples_.front().stamp, samples_.back().stamp));
+  }
+  /// How points' times ("scans are ..") and the antenna's place ("fixes are ..") are obtained, once after each change;
+  /// else empty.
+  std::string take_note() { return std::exchange(note_, {}); }
+  struct Counts {
+    std::uint64_t odometry = 0, scans = 0, fixes = 0, refused = 0;
+  };
+  [[nodiscard]] const Counts& counts() const { return counts_; }
+
+ private:
+  Status add_sample(Timestamp stamp, const Pose3& T_odom_body, const std::string& odom, const std::string& body);
+  Status take_odometry(std::string_view cdr);
+  Status take_points(std::string_view cdr);
+  Status take_fix(std::string_view cdr);
+  [[nodiscard]] std::optional<Eigen::Vector3d> antenna_of(const std::string& frame) const;
+  Status take_transform(const bags::RosTransform& transform, bool is_static);
+  Status counted(Status taken);
+  [[nodiscard]] Result<Pose3> lidar_pose(const std::string& frame) const;
+  Result<std::optional<Scan>> to_scan(const std::string& frame, formats::TimedCloud cloud, Timestamp stamp,
+                                      const std::optional<lidar::PointTimes>& times) const;
+
+  struct Waiting {
+    Timestamp stamp, until;  ///< Stamp of the last point.
+    std::string frame;
+    formats::TimedCloud cloud;
+    std::optional<lidar::PointTimes> times;
+  };
+  IntakeConfig config_;
+  std::optional<OdometryFrames> frames_;
+  bags::TransformTree tree_;
+  std::set<std::string> known_frames_;
+  std::deque<StampedPose> samples_;  ///< Samples that are not fed yet.
+  Trajectory history_;               ///< Samples that were fed, over the last kHistory_s.
+  bool has_whole_history_ = true;    ///< history_ begins with the very first sample.
+  std::deque<Waiting> scans_;
+  std::deque<bags::ReceivedFix> fixes_;
+  std::optional<Timestamp> newest_, newest_scan_, newest_fix_, known_;
+  std::optional<StampedPose> last_;  ///< The sample fed last.
+  bool unseen_ = false;              ///< Nobody has observed the way to the next sample.
+  bool is_unsure_ = false;           ///< A fix did not say how sure it is.
+  std::string how_, how_fixed_, note_;
+  Counts counts_;
+};
+
+}  // namespace tutti::ros

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/program/ros/ros_intake.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "support/program/ros/messages.hpp"
+
+namespace tutti::ros {
+namespace ros_intake_test {
+
+using test::fix, test::kAtOnce, test::kPeriod, test::kStart, test::kSweepAfter, test::kSweepBefore, test::odometry,
+    test::points, test::transform;
+
+std::string why(const Status& status) { return status ? "" : status.error().message; }
+
+/// All that is ready, one after the other as the robot is told.
+struct Fed {
+  std::vector<node::OdometrySample> samples;
+  std::vector<Scan> scans;
+  std::vector<std::string> errors;
+};
+Fed feed(RosIntake& intake, bool wait_for_scans = false) {
+  Fed out;
+  while (auto sample = intake.next_odometry(wait_for_scans)) {
+    out.samples.push_back(*sample);
+    for (auto scan = intake.next_scan(true); !scan || *scan; scan = intake.next_scan(true)) {
+      if (scan)
+        out.scans.push_back(**scan);
+      else
+        out.errors.push_back(scan.error().message);
+    }
+  }
+  return out;
+}
+
+TEST(RosIntake, IncrementsAreAsSureAsOfABag) {
+  RosIntake intake({});
+  Trajectory expected;
+  for (int i = 0; i < 5; ++i) {
+    expected.push_back({{kStart + i * kPeriod}, {Eigen::Quaterniond::Identity(), {0.3 * i, 0, 0}}});
+    ASSERT_TRUE(intake.add_odometry(odometry(expected.back().stamp.ns, 0.3 * i)));
+  }
+  const auto covariances = robot::increment_covariances(expected, {});
+  const Fed fed = feed(intake);
+  ASSERT_EQ(fed.samples.size(), 5U);
+  EXPECT_EQ(fed.samples[0].increment_covariance, Matrix6d::Zero());
+  for (std::size_t i = 1; i < 5; ++i) {
+    EXPECT_EQ(fed.samples[i].T_odom_body, expected[i].pose);
+    EXPECT_EQ(fed.samples[i].increment_covariance, covariances[i - 1]);
+  }
+  EXPECT_EQ(intake.frames()->odom, "odom");
+  EXPECT_EQ(intake.frames()->body, "base_link");
+}
+
+TEST(RosIntake, ScansWaitForTheOdometryOfTheirSweepAndLoseItsMotion) {
+  for (const auto& times : {kSweepBefore, kSweepAfter}) {
+    RosIntake intake({});
+    const std::int64_t stamp = kStart + 2 * kPeriod;
+    ASSERT_TRUE(intake.add_points(points(stamp, times)));
+    const bool ends_after = times.back() > 0.0F;
+    std::size_t scans = 0;
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod, 1.0 * i)));  // 10 m/s
+      for (const Scan& scan : feed(intake).scans) {
+        EXPECT_EQ(i, ends_after ? 3 : 2);
+        EXPECT_EQ(scan.stamp.ns, stamp);
+        EXPECT_EQ(scan.age_s, nullptr);
+        ASSERT_EQ(scan.cloud->points.size(), 3U);
+        for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(scan.cloud->points[k].x(), 5.0 + 10.0 * times[k], 1e-4);
+        ++scans;
+      }
+    }
+    EXPECT_EQ(scans, 1U);
+    EXPECT_NE(intake.take_note().find("'time' is taken as s after the message's stamp"), std::string::npos);
+    EXPECT_EQ(intake.take_note(), "");
+  }
+}
+
+TEST(RosIntake, TheLidarIsWhereStaticTransformsSay) {
+  RosIntake intake({});
+  const Pose3 T_base_mast{Eigen::Quaterniond::Identity(), {0, 0, 1}},
+      T_mast_lidar{Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())), {0, 0, 0.5}};
+  ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "mast", T_base_mast), true));
+  ASSERT_TRUE(intake.add_points(points(kStart, kAtOnce, "lidar")));
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
+  const Fed early = feed(intake);
+  ASSERT_EQ(early.errors.size(), 1U);
+  EXPECT_NE(early.errors[0].find("no transform from 'lidar' to 'base_link' on /tf_static, frames that do not move are: "
+                                 "base_link, mast"),
+            std::string::npos)
+      << early.errors[0];
+  ASSERT_TRUE(intake.add_tf(transform(0, "mast", "lidar", T_mast_lidar), true));
+  ASSERT_TRUE(intake.add_points(points(kStart + kPeriod, kAtOnce, "lidar")));
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart + kPeriod)));
+  const Fed fed = feed(intake);
+  ASSERT_EQ(fed.scans.size(), 1U);
+  EXPECT_LT((fed.scans[0].cloud->points[0] - Eigen::Vector3f(0, 5, 1.5F)).norm(), 1e-5F);
+}
+
+TEST(RosIntake, FixesWaitForTheirOdometryAndTheirAntennaIsWhereStaticTransformsSay) {
+  RosIntake intake({});
+  ASSERT_TRUE(intake.add_fix(fix(kStart - kPeriod, "gnss")));
+  ASSERT_TRUE(intake.add_fix(fix(kStart + kPeriod / 2, "gnss")));
+  EXPECT_FALSE(intake.next_fix());
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
+  feed(intake);
+  EXPECT_FALSE(intake.next_fix());  // the first is from before all odometry
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart + kPeriod)));
+  feed(intake);
+  const auto early = intake.next_fix();
+  ASSERT_TRUE(early);
+  EXPECT_EQ(early->stamp.ns, kStart + kPeriod / 2);
+  EXPECT_EQ(early->antenna, (Geodetic{46.5, 7.9, 600.0}));
+  EXPECT_EQ(early->covariance, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(early->p_body_antenna, Eigen::Vector3d::Zero());
+  EXPECT_NE(intake.take_note().find("no transform from 'gnss' to 'base_link' on /tf_static"), std::string::npos);
+  EXPECT_FALSE(intake.next_fix());
+
+  const Pose3 T_base_gnss{Eigen::Quaterniond::Identity(), {0.5, 0.1, 1.2}};
+  ASSERT_TRUE(intake.add_tf(transform(0, "base_link", "gnss", T_base_gnss), true));
+  for (int i = 2; i < 4; ++i) {
+    ASSERT_TRUE(intake.add_fix(fix(kStart + i * kPeriod, "/gnss")));
+    ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
+  }
+  feed(intake);
+  for (int i = 2; i < 4; ++i) EXPECT_EQ(intake.next_fix()->p_body_antenna, T_base_gnss.translation);
+  EXPECT_EQ(intake.take_note(), "fixes are of an antenna at [0.50 0.10 1.20] m of the body");
+  bags::RosNavSatFix unsure = bags::to_ros({{kStart + 4 * kPeriod}, "gnss"}, {46.5, 7.9, 600.0});
+  ASSERT_TRUE(intake.add_fix(bags::encode(unsure)));
+  unsure.header.stamp.ns += kPeriod / 2;
+  unsure.status = -1;
+  ASSERT_TRUE(intake.add_fix(bags::encode(unsure)));  // none
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart + 5 * kPeriod)));
+  feed(intake);
+  EXPECT_EQ(intake.next_fix()->covariance, unknown_fix_covariance());
+  EXPECT_NE(intake.take_note().find("count as 5 m and 10 m up"), std::string::npos);
+  EXPECT_FALSE(intake.next_fix());
+  EXPECT_EQ(intake.counts().fixes, 5U);
+}
+
+TEST(RosIntake, AMissionMaySayWhereTheAntennaIs) {
+  RosIntake intake({.odometry_frames = {},
+                    .covariance = {},
+                    .scan_times = {},
+                    .T_body_lidar = {},
+                    .p_body_antenna = Eigen::Vector3d(1, 2, 3)});
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
+  ASSERT_TRUE(intake.add_fix(fix(kStart, "gnss")));
+  feed(intake);
+  EXPECT_EQ(intake.next_fix()->p_body_antenna, Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(RosIntake, OdometryMayBeTwoFramesOfTf) {
+  RosIntake intake({.odometry_frames = "odom->base_link",
+                    .covariance = {},
+                    .scan_times = {},
+                    .T_body_lidar = {},
+                    .p_body_antenna = {}});
+  for (int i = 0; i < 3; ++i) {
+    const Pose3 T{Eigen::Quaterniond::Identity(), {0.1 * i, 0, 0}};
+    ASSERT_TRUE(intake.add_tf(transform(kStart + i * kPeriod, "odom", "base_link", T), false));
+    ASSERT_TRUE(intake.add_tf(transform(kStart + i * kPeriod, "odom", "base_link", T), false));  // said again
+    ASSERT_TRUE(intake.add_tf(transform(kStart + i * kPeriod, "base_link", "wheel", T), false));
+  }
+  EXPECT_EQ(feed(intake).samples.size(), 3U);
+  EXPECT_EQ(intake.counts().refused, 0U);
+}
+
+TEST(RosIntake, WhereNothingMayBeLostOdometryWaitsForScans) {
+  RosIntake intake({});
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
+  EXPECT_EQ(feed(intake, true).samples.size(), 0U);
+  ASSERT_TRUE(intake.add_points(points(kStart + 2 * kPeriod, kAtOnce)));
+  const Fed fed = feed(intake, true);
+  EXPECT_EQ(fed.samples.size(), 3U);
+  EXPECT_EQ(fed.scans.size(), 1U);
+  EXPECT_EQ(feed(intake, false).samples.size(), 1U);
+}
+
+TEST(RosIntake, WhatTheRobotHasIsPassedOverAndTheWaySinceIsUnseen) {
+  RosIntake intake({});
+  intake.begin_behind(Timestamp{kStart + kPeriod});
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
+  const Fed fed = feed(intake);
+  ASSERT_EQ(fed.samples.size(), 2U);
+  EXPECT_EQ(fed.samples[0].increment_covariance(0, 0), 1.0);
+  EXPECT_LT(fed.samples[1].increment_covariance(0, 0), 0.01);
+  intake.begin_behind(Timestamp{kStart + 3 * kPeriod});  // the same connection's end and another one's begin
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart + 4 * kPeriod)));
+  EXPECT_LT(feed(intake).samples.at(0).increment_covariance(0, 0), 0.01);
+}
+
+TEST(RosIntake, WhatIsWrongIsSaid) {
+  RosIntake intake({});
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
+  const auto expect = [](const std::string& said, const std::string& part) {
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+  };
+  expect(why(intake.add_odometry(odometry(kStart))), "expected after 1700000000000000000 ns: two publishers");
+  expect(why(intake.add_odometry(odometry(kStart + 1, 0.0, "map"))),
+         "frames 'map' -> 'base_link', expected 'odom' -> 'base_link' as of the first message");
+  expect(why(intake.add_odometry(odometry(kStart + 1, 1e12))), "position");
+  expect(why(intake.add_odometry(odometry(kStart + 1, 0.0, std::string("\x1b[2J")))), "frames '?[2J'");
+  expect(why(intake.add_points(points(0, kAtOnce))),
+         "from odometry's newest, 1700000000000000000 ns: are they by "
+         "another clock?");
+  expect(why(intake.add_points(points(kStart, {}))), "holds no points");
+  expect(why(intake.add_points(odometry(kStart))), "sensor_msgs/msg/PointCloud2: ");
+  expect(why(intake.add_odometry("")), "nav_msgs/msg/Odometry");
+  ASSERT_TRUE(intake.add_points(points(kStart, kAtOnce)));
+  expect(why(intake.add_points(points(kStart, kAtOnce))), "two publishers");
+  expect(why(intake.add_fix(fix(kStart, "gnss", 91.0))), "latitude 91 degrees, expected -90 to 90");
+  expect(why(intake.add_fix(fix(0))), "are they by another clock?");
+  expect(why(intake.add_fix(odometry(kStart))), "sensor_msgs/msg/NavSatFix: ");
+  ASSERT_TRUE(intake.add_fix(fix(kStart)));
+  expect(why(intake.add_fix(fix(kStart - 1))), "two publishers");
+  EXPECT_EQ(intake.counts().refused, 13U);
+  EXPECT_EQ(intake.counts().odometry, 1U);
+}
+
+TEST(RosIntake, FramesOfStrangersHaveAnEnd) {
+  RosIntake intake({});
+  std::string said;
+  for (std::size_t i = 0; i <= RosIntake::kMostFrames; ++i)
+    said += why(intake.add_tf(transform(0, "world", fmt::format("frame_{}", i), {}), false));
+  EXPECT_EQ(said, "frame 'frame_1000' is one more than 1000");
+}
+
+TEST(RosIntake, ScansAndFixesWithoutOdometryHaveAnEnd) {
+  RosIntake intake({});
+  for (std::size_t i = 0; i < 2 * RosIntake::kMostFixes; ++i)
+    ASSERT_TRUE(intake.add_fix(fix(kStart + static_cast<std::int64_t>(i))));
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(intake.add_points(points(kStart + i * kPeriod, kAtOnce)));
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(intake.add_odometry(odometry(kStart + (99 * i) * kPeriod)));
+  EXPECT_EQ(feed(intake).scans.size(), RosIntake::kMostScans);
+  std::size_t fixes = 0;
+  while (intake.next_fix()) ++fixes;
+  EXPECT_EQ(fixes, RosIntake::kMostFixes);
+}
+
+/// Any byte of any message may be wrong, and any message cut.
+TEST(RosIntake, BytesOfStrangersDoNoHarm) {
+  RosIntake intake({});
+  std::mt19937 rng(1);
+  const std::vector<std::string> good{odometry(kStart), points(kStart, kSweepBefore),
+                                      transform(kStart, "base_link", "lidar", {}), fix(kStart)};
+  std::size_t refused = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    std::string bytes = good[rng() % good.size()];
+    for (std::size_t k = rng() % 4; k > 0; --k) bytes[rng() % bytes.size()] = static_cast<char>(rng());
+    if (rng() % 3 == 0) bytes.resize(rng() % bytes.size());
+    const std::size_t kind = rng() % 4;
+    const Status taken = kind == 0   ? intake.add_odometry(bytes)
+                         : kind == 1 ? intake.add_points(bytes)
+                         : kind == 2 ? intake.add_fix(bytes)
+                                     : intake.add_tf(bytes, i % 2 == 0);
+    refused += taken ? 0 : 1;
+    if (i % 10 == 0) feed(intake);
+    while (intake.next_fix()) continue;
+  }
+  EXPECT_GT(refused, 15'000U);
+}
+
+}  // namespace ros_intake_test
+}  // namespace tutti::ros

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A robot's live feed on ROS's topics, between participants of one process; tests/system/ros_test.cpp has programs.
+#include "tutti/program/ros/ros_robot.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <functional>
+#include <map>
+#include <mutex>
+
+#include "support/bus/nats_network.hpp"
+#include "support/program/ros/loopback.hpp"
+#include "support/program/ros/messages.hpp"
+#include "tutti/bags/ros_messages.hpp"
+#include "tutti/program/feed/live_feed.hpp"
+
+namespace tutti::ros {
+namespace ros_robot_test {
+
+using test::fix, test::kAtOnce, test::kPeriod, test::kStart, test::odometry, test::points, test::taken;
+
+constexpr double kPatience_s = 20.0;
+constexpr const char *kOdometry = "nav_msgs/msg/Odometry", *kPoints = "sensor_msgs/msg/PointCloud2",
+                     *kFix = "sensor_msgs/msg/NavSatFix", *kTf = "tf2_msgs/msg/TFMessage";
+
+/// A live feed without a robot behind it: it answers by odometry alone.
+class RosRobots : public ::testing::Test {
+ protected:
+  void start(RosRobotOptions options = {}) {
+    program::FeedState state{.chain = {RobotId{0}, 1}, .name = "alpha"};
+    state.wants_scan = true;
+    feed_ = program::LiveFeed::open(socket_, {}, state).value();
+    options.socket = socket_;
+    options.name_space = "alpha";
+    options.patience_s = 0.2;
+    options.say = [this](program::Level, const std::string& text) {
+      const std::scoped_lock lock(mutex_);
+      said_ += text + "\n";
+    };
+    robot_ = RosRobot::open(std::move(options), test::join_loopback()).value();
+  }
+  bool is_said(const std::string& part) {
+    return ::tutti::test::within(kPatience_s, [&] {
+      const std::scoped_lock lock(mutex_);
+      return said_.find(part) != std::string::npos;
+    });
+  }
+  bool is_said_already(const std::string& part) { return said().find(part) != std::string::npos; }
+  std::string said() {
+    const std::scoped_lock lock(mutex_);
+    return said_;
+  }
+  std::unique_ptr<Writer> publisher(const std::string& topic, const std::string& type, const Qos& qos = kSensorQos) {
+    auto out = me_->writer(topic, type, qos, "").value();
+    return out;
+  }
+  static bool is_heard(const Writer& writer) {
+    return ::tutti::test::within(kPatience_s, [&] { return writer.readers() > 0; });
+  }
+
+  const std::string socket_ = ::testing::TempDir() + "ros_robot_" + std::to_string(getpid());
+  std::shared_ptr<Participant> me_ = test::join_loopback();
+  std::mutex mutex_;
+  std::string said_;
+  std::unique_ptr<program::LiveFeed> feed_;
+  std::unique_ptr<RosRobot> robot_;
+};
+
+TEST_F(RosRobots, IsFedByTopicsAndAnswersOnTopics) {
+  const auto tf = me_->reader("/tf", kTf, test::kKeepAll, "").value();
+  const auto pose =
+      me_->reader("/alpha/corrected_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", test::kKeepAll, "").value();
+  const auto path = me_->reader("/alpha/corrected_path", "nav_msgs/msg/Path", kLatchedQos, "").value();
+  const auto diagnostics = me_->reader("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", {}, "").value();
+  start();
+  const auto odom = publisher("/alpha/odom", kOdometry);
+  const auto cloud = publisher("/alpha/points", kPoints);
+  const auto receiver = publisher("/alpha/fix", kFix);
+  ASSERT_TRUE(is_heard(*odom) && is_heard(*cloud) && is_heard(*receiver));
+  const auto camera = publisher("/alpha/image_raw", kImageType),
+             info = publisher("/alpha/camera_info", kCameraInfoType);
+  std::size_t scans = 0, samples = 0, fixes = 0, transforms = 0, poses = 0;
+  const auto look = [&] {
+    while (const auto input = feed_->front().take(0.0)) {
+      samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
+      scans += std::holds_alternative<Scan>(*input) ? 1 : 0;
+      fixes += std::holds_alternative<PositionFix>(*input) ? 1 : 0;
+      feed_->front().note_heard();
+    }
+    for (const std::string& cdr : taken(*tf)) {
+      const auto said = bags::decode_tf(cdr).value();
+      EXPECT_EQ(said.at(0).header.frame_id, "alpha/map");
+      EXPECT_EQ(said.at(0).child_frame_id, "alpha/odom");
+      EXPECT_EQ(said.at(0).header.stamp.ns, kStart + static_cast<std::int64_t>(transforms++) * kPeriod + 100'000'000);
+    }
+    poses += taken(*pose).size();
+  };
+  constexpr std::size_t kSamples = 20;
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    const std::int64_t stamp = kStart + static_cast<std::int64_t>(i) * kPeriod;
+    ASSERT_TRUE(cloud->write(points(stamp, kAtOnce, "alpha/base_link")));
+    ASSERT_TRUE(receiver->write(fix(stamp, "alpha/gnss")));
+    ASSERT_TRUE(odom->write(odometry(stamp, 0.1 * static_cast<double>(i), "alpha/odom", "alpha/base_link")));
+    ASSERT_TRUE(::tutti::test::within(kPatience_s, [&] {
+      look();
+      return transforms == i + 1;
+    }));
+  }
+  EXPECT_TRUE(::tutti::test::within(kPatience_s,
+                                    [&] {
+                                      look();
+                                      return samples == kSamples && poses == kSamples && scans == kSamples &&
+                                             fixes == kSamples;
+                                    }))
+      << samples << " " << poses << " " << scans << " " << fixes;
+  EXPECT_TRUE(is_said("no transform from 'alpha/gnss' to 'alpha/base_link'")) << said();
+  EXPECT_TRUE(::tutti::test::within(kPatience_s, [&] { return !taken(*path).empty(); }));
+  EXPECT_TRUE(::tutti::test::within(kPatience_s, [&] {
+    const auto all = taken(*diagnostics);
+    return std::ranges::any_of(
+        all, [](const std::string& cdr) { return cdr.find("fed, not in a map yet") != std::string::npos; });
+  }));
+  EXPECT_EQ(camera->readers() + info->readers(), 0U);  // nobody wants images
+}
+
+/// Cameras are found by type; until their place is known, odometry is answered without them.
+TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
+  start({.images = ImagesConfig{}, .intake = {}});
+  const auto odom = publisher("/alpha/odom", kOdometry), camera = publisher("/alpha/front/image_raw", kImageType),
+             info = publisher("/alpha/front/camera_info", kCameraInfoType), imu = publisher("/alpha/imu", kImuType);
+  const auto still = publisher("/tf_static", kTf, kStaticTfQos);
+  ASSERT_TRUE(is_heard(*odom) && is_heard(*camera) && is_heard(*info) && is_heard(*imu)) << said();
+  std::size_t samples = 0, images = 0, sensors = 0;
+  const auto look = [&] {
+    while (const auto input = feed_->front().take(0.0)) {
+      samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
+      if (const auto* seen = std::get_if<program::FedImages>(&*input)) {
+        ++images;
+        EXPECT_EQ(seen->images.at(0).bytes, "abcdefghijkl");
+        EXPECT_EQ(seen->sensors->cameras.size(), 1U);
+        sensors += seen->sensors->imu ? 1 : 0;
+      }
+      feed_->front().note_heard();
+    }
+  };
+  std::int64_t stamp = kStart;
+  const auto go = [&](const std::function<bool()>& done) {
+    return ::tutti::test::within(kPatience_s, [&] {
+      stamp += kPeriod;
+      EXPECT_TRUE(imu->write(test::imu(stamp)) && camera->write(bags::encode(test::grey_image(stamp))) &&
+                  info->write(bags::encode(test::calibration())) && odom->write(odometry(stamp)));
+      look();
+      return done();
+    });
+  };
+  EXPECT_TRUE(go([&] { return is_said_already("no transform from 'camera' to 'base_link' on /tf_static"); })) << said();
+  EXPECT_GT(samples, 0U);
+  EXPECT_EQ(images, 0U);
+  for (const char* frame : {"camera", "imu"}) ASSERT_TRUE(still->write(test::transform(0, "base_link", frame, {})));
+  EXPECT_TRUE(go([&] { return sensors > 5; })) << images << " " << said();
+  EXPECT_GT(feed_->front().imu({kStart}, {stamp}).size(), 5U);
+}
+
+TEST_F(RosRobots, WhyThereIsNoOdometryIsSaid) {
+  const auto other = publisher("/bravo/odom", kOdometry);
+  start();
+  EXPECT_TRUE(
+      is_said("no odometry on /alpha/odom for 0.2 s: nobody publishes it; topics of nav_msgs/msg/Odometry here "
+              "are: /bravo/odom"))
+      << said();
+}
+
+TEST_F(RosRobots, AnotherTypeOrQosIsSaid) {
+  const auto wrong = publisher("/alpha/odom", "geometry_msgs/msg/PoseStamped");
+  start();
+  EXPECT_TRUE(
+      is_said("it is published as geometry_msgs/msg/PoseStamped, expected nav_msgs/msg/Odometry; topics of "
+              "nav_msgs/msg/Odometry here are: none"))
+      << said();
+}
+
+TEST_F(RosRobots, PublishersThatAreNotReliableAreSaid) {
+  const auto sensor = publisher("/alpha/odom", kOdometry);
+  start({.lossless = true});
+  EXPECT_TRUE(is_said("1 publishers of /alpha/odom offer another reliability (best effort) than is asked for"))
+      << said();
+}
+
+TEST_F(RosRobots, TwoPublishersAndNonsenseAreSaidAndDoNoHarm) {
+  const auto tf = me_->reader("/tf", kTf, test::kKeepAll, "").value();
+  start();
+  const auto odom = publisher("/alpha/odom", kOdometry), again = publisher("/alpha/odom", kOdometry);
+  ASSERT_TRUE(is_heard(*odom));
+  EXPECT_TRUE(is_said("/alpha/odom: 2 publishers, expected one")) << said();
+  ASSERT_TRUE(odom->write(std::string("\0\1\0\0nonsense", 12)));
+  ASSERT_TRUE(odom->write(std::string("\0\1\0\0\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff", 16)));
+  ASSERT_TRUE(odom->write(odometry(kStart)));
+  EXPECT_TRUE(::tutti::test::within(kPatience_s, [&] { return !taken(*tf).empty(); })) << said();
+}
+
+TEST_F(RosRobots, WhenOdometryEndsTheRecordingHas) {
+  start({.end_after_s = 0.3});
+  const auto odom = publisher("/alpha/odom", kOdometry);
+  ASSERT_TRUE(is_heard(*odom));
+  ASSERT_TRUE(odom->write(odometry(kStart)));
+  EXPECT_TRUE(is_said("no odometry for 0.3 s: the recording has ended")) << said();
+  bool has_ended = false;
+  EXPECT_TRUE(::tutti::test::within(kPatience_s, [&] {
+    const auto input = feed_->front().take(0.01);
+    if (input) feed_->front().note_heard();
+    return has_ended = has_ended || (input && std::holds_alternative<program::FeedEnded>(*input));
+  }));
+}
+
+TEST_F(RosRobots, NamesThatAreNoneAreRefused) {
+  for (const char* name : {"a b", "7"}) {
+    const auto robot =
+        RosRobot::open({.socket = socket_, .name_space = name, .say = [](auto, auto&) {}}, test::join_loopback());
+    EXPECT_EQ(robot.error().code, ErrorCode::configuration);
+  }
+}
+
+}  // namespace ros_robot_test
+}  // namespace tutti::ros
