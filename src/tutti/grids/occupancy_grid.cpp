@@ -14,7 +14,8 @@ Status write_nav2_map(const OccupancyGrid& grid, const std::string& yaml_path, c
   namespace fs = std::filesystem;
   const fs::path image = fs::path(yaml_path).replace_extension(".pgm");
   if (image == yaml_path) return fail(ErrorCode::invalid, "{}: expected a name that ends with .yaml", yaml_path);
-  constexpr char kFree = '\xfe', kOccupied = '\0', kUnknown = '\xcd';  // 254, 0, 205
+  // 254, 0, 205: the last is 0.19608 occupied, which is unknown from free_thresh on, and below it free.
+  constexpr char kFree = '\xfe', kOccupied = '\0', kUnknown = '\xcd';
   std::string pgm = fmt::format("P5\n{} {}\n255\n", grid.width, grid.height);
   for (std::size_t y = grid.height; y-- > 0;)  // images begin at the top
     for (std::size_t x = 0; x < grid.width; ++x) {
@@ -26,7 +27,7 @@ Status write_nav2_map(const OccupancyGrid& grid, const std::string& yaml_path, c
   for (const std::string& note : notes) yaml += "# " + note + "\n";
   yaml += fmt::format(
       "image: {}\nmode: trinary\nresolution: {}\norigin: [{}, {}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
-      "free_thresh: 0.25\n",
+      "free_thresh: 0.196\n",
       image.filename().string(), grid.resolution_m, grid.origin.x(), grid.origin.y());
   return write_file(yaml_path, yaml);
 }

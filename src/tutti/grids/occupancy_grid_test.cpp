@@ -21,7 +21,7 @@ TEST(OccupancyGrid, IsWrittenAsNav2ReadsIt) {
   ASSERT_TRUE(write_nav2_map(grid, path, {"up is z"}));
   EXPECT_EQ(read_file(path).value(),
             "# up is z\nimage: grid.pgm\nmode: trinary\nresolution: 0.5\norigin: [-1, 2.5, 0]\nnegate: 0\n"
-            "occupied_thresh: 0.65\nfree_thresh: 0.25\n");
+            "occupied_thresh: 0.65\nfree_thresh: 0.196\n");
   // The image's first row is the grid's last.
   EXPECT_EQ(read_file((std::filesystem::path(::testing::TempDir()) / "grid.pgm").string()).value(),
             std::string("P5\n3 2\n255\n\xcd\xfe\0\xfe\0\xcd", 17));
