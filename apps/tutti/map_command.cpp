@@ -199,13 +199,14 @@ int show_map(const fs::path& file) {
 
 struct ExportOptions {
   std::string map, g2o, tum, ply;
+  bool live = false;
   std::shared_ptr<GridOptions> grid;
 };
 
 int export_map(const ExportOptions& options) {
   if (options.g2o.empty() && options.tum.empty() && options.ply.empty() && !wants_grid(*options.grid))
     return complain("map export", "nothing to write: expected --g2o, --tum, --ply, --grid or --voxels", 2);
-  const auto map = mapfile::open(options.map);
+  const auto map = options.live ? mapfile::open_copy(options.map) : mapfile::open(options.map);
   if (!map) return complain("map export", map.error().message);
   const auto content = mapfile::read(**map);
   if (!content) return complain("map export", content.error().message);
@@ -261,7 +262,8 @@ int salvage_map(const fs::path& in, const fs::path& out) {
 void add_map_command(CLI::App& app, int& exit_code) {
   CLI::App* map = app.add_subcommand(
       "map",
-      "Look into maps, export and join them, and say which closures are right. On files that no server has open.");
+      "Look into maps, export and join them, and say which closures are right. On files that no server has open, but "
+      "for 'export --live'.");
   map->require_subcommand(1);
 
   const auto folder = std::make_shared<std::string>(".");
@@ -278,12 +280,18 @@ void add_map_command(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App* out = map->add_subcommand("export", "Write the joint map for other programs.");
   out->add_option("map", options->map, "The map's file.")->type_name("MAP")->required();
+  out->add_flag(
+      "--live", options->live,
+      "A server may have the map open, now or meanwhile: it is copied to the folder for temporary files (TMPDIR) "
+      "first, and neither changed nor locked.");
   out->add_option("--g2o", options->g2o, "The joint pose graph; beside it which keyframe each vertex is.")
       ->type_name("FILE.g2o");
   out->add_option("--tum", options->tum, "Every session's trajectory in the joint map, as NAME.tum.")->type_name("DIR");
   out->add_option("--ply", options->ply, "What all robots saw, thinned to voxels of 0.1 m.")->type_name("FILE.ply");
   options->grid = add_grid_options(*out);
-  out->footer("Example: tutti map export state/map.tutti --grid map.yaml\n");
+  out->footer(
+      "Example: tutti map export state/map.tutti --grid map.yaml\n"
+      "Of a running server: tutti map export state/map.tutti --live --grid map.yaml\n");
   out->callback([options, &exit_code] { exit_code = export_map(*options); });
 
   const auto merging = std::make_shared<MergeOptions>();

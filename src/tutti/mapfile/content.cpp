@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/mapfile/content.hpp"
 
+#include <cerrno>
+#include <cstdlib>
 #include <set>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -9,6 +12,7 @@
 #include "tutti/node/words.hpp"
 #include "tutti/server/georeference.hpp"
 #include "tutti/server/refuted_closures.hpp"
+#include "tutti/storage/sqlite_copy.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -125,6 +129,19 @@ Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& f
   if (!std::filesystem::is_regular_file(file, failure))
     return fail(ErrorCode::io, "{}: no such file, expected a map", file.string());
   return storage::open_sqlite_store(file, storage::map_schema());
+}
+
+Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  std::error_code failure;
+  std::string folder = (fs::temp_directory_path(failure) / "tutti_map_XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr)
+    return fail(ErrorCode::io, "{}: cannot be made: {}", folder, std::generic_category().message(errno));
+  const fs::path copy = fs::path(folder) / "map.tutti";
+  const Status copied = storage::copy_sqlite_store(file, copy);
+  auto map = copied ? open(copy) : tl::unexpected(copied.error());
+  fs::remove_all(folder, failure);  // an open file stays until it is closed
+  return map;
 }
 
 Status put_word(storage::TableStore& map, const ClosureWord& word) {

@@ -53,6 +53,11 @@ server::MapEstimate estimate(const Content& content);
 /// program has it open.
 Result<std::unique_ptr<storage::TableStore>> open(const std::filesystem::path& file);
 
+/// Opens a copy of a map's file that a server may have open, now or at any time: it is neither changed nor locked. The
+/// copy is in the system's folder for temporary files, and gone when the store is destroyed. Errors: there is no such
+/// file, it is no map, or it cannot be copied.
+Result<std::unique_ptr<storage::TableStore>> open_copy(const std::filesystem::path& file);
+
 /// Stores an operator's word, which the server that opens the map next follows. On an error nothing is stored: the
 /// closure's name or submaps are unknown, there is no closure to accept, or a word that was given later holds.
 Status put_word(storage::TableStore& map, const ClosureWord& word);

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/mapfile/content.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "support/mapfile/small_map.hpp"
+#include "tutti/storage/sqlite_store.hpp"
+
+namespace tutti::mapfile {
+namespace content_test {
+
+namespace fs = std::filesystem;
+
+TEST(Content, OfAMapThatIsOpenACopyIsRead) {
+  const fs::path folder = fs::path(testing::TempDir()) / ("content_" + std::to_string(getpid()));
+  const fs::path file = folder / "map.tutti", temporary = folder / "temporary";
+  fs::create_directories(temporary);
+  const char* const before = std::getenv("TMPDIR");
+  const std::string usual = before == nullptr ? "/tmp" : before;
+  setenv("TMPDIR", temporary.c_str(), 1);
+  {
+    const auto store = storage::open_sqlite_store(file, storage::map_schema(), {.min_free_bytes = 0}).value();
+    test::Mapper mapper({RobotId{0}}, *store);
+    mapper.walk(ChainId(RobotId{0}, 5));
+    const auto refused = open(file);
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_NE(refused.error().message.find("is open in another program"), std::string::npos);
+
+    const auto copy = open_copy(file);
+    ASSERT_TRUE(copy.has_value()) << copy.error().message;
+    EXPECT_TRUE(fs::is_empty(temporary));
+    const Content content = read(**copy).value();
+    EXPECT_EQ(content.submaps.size(), mapper.server().state().submaps.size());
+    EXPECT_EQ(estimate(content).graph.poses, mapper.server().map().graph.poses);
+  }
+  EXPECT_TRUE(open(file).has_value());
+  EXPECT_FALSE(open_copy(folder / "none").has_value());
+  EXPECT_TRUE(fs::is_empty(temporary));
+  setenv("TMPDIR", usual.c_str(), 1);
+  fs::remove_all(folder);
+}
+
+}  // namespace content_test
+}  // namespace tutti::mapfile
