@@ -49,7 +49,7 @@ setup(
     zip_safe=True,
     maintainer="The Tutti authors",
     maintainer_email="tutti@example.org",
-    description="ROS 2 client of the live feed of a Tutti robot",
+    description="ROS 2 client of the live feed of a Tutti robot, and of the map of a Tutti server",
     license="BSD-3-Clause",
     entry_points={"console_scripts": ["tutti_ros = tutti_ros.node:main"]},
     cmdclass={"build_py": BuildWithMessages, "develop": DevelopWithMessages},

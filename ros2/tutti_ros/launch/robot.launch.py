@@ -8,6 +8,7 @@ from launch.actions import DeclareLaunchArgument, ExecuteProcess
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 
 def generate_launch_description():
@@ -17,6 +18,9 @@ def generate_launch_description():
         "odom": ("odom", "topic of nav_msgs/Odometry, relative to the namespace"),
         "points": ("points", "topic of sensor_msgs/PointCloud2, relative to the namespace"),
         "fix": ("fix", "topic of sensor_msgs/NavSatFix, relative to the namespace"),
+        "images": ("", "topics of one camera or two, relative to the namespace: left/image_raw,right/image_raw; empty: none"),
+        "depth": ("", "topic of depth images registered to the one camera; empty: none"),
+        "imu": ("", "topic of sensor_msgs/Imu, which goes with images; empty: none"),
         "bus": ("", "nats://HOST:PORT as the server prints it; empty: tutti robot is started by somebody else"),
         "mission": ("tutti", "name of the mission on the bus, as the server's"),
         "state": (["/tmp/tutti_", value("namespace")], "folder that the robot keeps what it knows in"),
@@ -34,6 +38,7 @@ def generate_launch_description():
     node = Node(
         package="tutti_ros", executable="tutti_ros", name="tutti_ros", namespace=value("namespace"), output="screen",
         respawn=True, respawn_delay=2.0,
-        parameters=[value("params"), {"socket": value("socket"), "use_sim_time": value("use_sim_time")}],
+        parameters=[{name: ParameterValue(value(name), value_type=str) for name in ("images", "depth", "imu")},
+                    value("params"), {"socket": value("socket"), "use_sim_time": value("use_sim_time")}],
         remappings=[("odom", value("odom")), ("points", value("points")), ("fix", value("fix"))])
     return LaunchDescription([*declared, robot, node])

@@ -15,7 +15,7 @@ NOISE = from_ros.OdometryNoise()
 class Reconnecting(unittest.TestCase):
     """The state machine alone: what it says and says again."""
 
-    def welcome(self, link, last_ns=None, takes=("hello", "odometry", "scan", "fix")):
+    def welcome(self, link, last_ns=None, takes=("hello", "odometry", "scan", "fix", "images", "imu")):
         self.assertEqual(self.parse(link.connected())[0].WhichOneof("what"), "hello")
         self.assertEqual(link.next_frame(), b"")  # not before the robot's answer
         said = frame(welcome=Feed.Welcome(takes=takes, has_odometry=last_ns is not None, last_stamp_ns=last_ns or 0,
@@ -91,10 +91,56 @@ class Reconnecting(unittest.TestCase):
         first = self.said(link)[0]
         self.assertEqual(first.stamp_ns, 1000 + 15 * 10**8)
         self.assertAlmostEqual(first.increment_covariance[0], 15 * (0.02**2 + 0.003**2 * 0.1))
-        link.most_scan_bytes = 100
+        link.most_bytes = 100
         for i in range(3):
             link.add_scan(10**12 + i, np.ones((5, 3), np.float32), None)
-        self.assertLessEqual(link.scan_bytes, 100)
+        self.assertLessEqual(link.framed_bytes, 100)
+
+    def test_too_many_images_go_before_any_odometry(self):
+        link = self.filled()
+        link.most_bytes = 1000
+        for i in range(10):
+            link.add_images(1000 + i * 10**8, [(0, True, bytes(300))], None)
+        self.assertLessEqual(link.framed_bytes, 1000)
+        self.assertEqual(link.counts["forgotten_while_away"], 7)
+        self.welcome(link)
+        said = self.said(link)
+        self.assertEqual(len([one for one in said if isinstance(one, Feed.Odometry)]), 10)
+        self.assertEqual([one.stamp_ns for one in said[10:]], [1000 + i * 10**8 for i in (7, 8, 9)])
+        for i in range(5):
+            link.add_images(10**10 + i, [(0, True, bytes(300))], None)  # before the first is said
+        self.assertEqual([one.stamp_ns for one in self.said(link)], [10**10 + i for i in (2, 3, 4)])
+        self.stored(link, 10**11)
+        self.assertEqual((len(link.kept), len(link.framed), link.framed_bytes), (0, 0, 0))
+
+    def test_images_and_imu_are_said_again_behind_what_the_robot_has(self):
+        link = self.filled(3)
+        sensors = Feed.Sensors()
+        sensors.imu.SetInParent()
+        link.set_sensors(sensors)
+        images = [(0, True, b"left"), (1, False, b"a file")]
+        for i in range(3):
+            link.add_images(1000 + i * 10**8, images, b"depth" if i == 2 else None)
+            link.add_imu([999 + i * 10**8, 1000 + i * 10**8], [1.0] * 6, [2.0] * 6)
+        hello = self.parse(link.connected())[0].hello
+        self.assertTrue(hello.sensors.scans and hello.sensors.HasField("imu"))
+        self.welcome(link, 1000 + 10**8)
+        said = self.said(link)  # what was never said is not too late yet
+        self.assertEqual([type(one).__name__ for one in said], ["Odometry"] + ["Images", "Imu"] * 3)
+        link.lost("killed")
+        self.welcome(link, 1000 + 10**8)
+        said = self.said(link)
+        self.assertEqual([type(one).__name__ for one in said], ["Odometry", "Images", "Imu"])
+        self.assertEqual([(one.camera, one.encoding, one.data) for one in said[1].image],
+                         [(0, Feed.Image.RAW, b"left"), (1, Feed.Image.FILE, b"a file")])
+        self.assertEqual((said[1].depth.encoding, said[1].depth.data), (Feed.Image.RAW, b"depth"))
+        self.assertEqual((list(said[2].stamp_ns), list(said[2].gyro)), ([999 + 2 * 10**8, 1000 + 2 * 10**8], [1.0] * 6))
+        self.assertEqual((link.counts["images"], link.counts["imu"]), (4, 8))
+        link.lost("killed")
+        self.welcome(link, 1000, takes=("hello", "odometry", "scan", "fix"))
+        self.assertEqual([type(one).__name__ for one in self.said(link)], ["Odometry", "Odometry"])
+        with self.assertRaisesRegex(ValueError, "older than images: it takes none"):
+            link.add_images(10**10, images, None)
 
     def test_an_unknown_stretch_is_stated_as_one(self):
         link = self.filled(2)

@@ -48,3 +48,34 @@ def fix(stamp_ns, latitude=46.5, variances=(1.0, 1.0, 4.0), frame_id="r1/gnss", 
 
 def pose_at(x):
     return (float(x), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def camera_info(model="plumb_bob", d=(-0.3, 0.1, 0.0, 0.0, 0.0), width=4, height=3):
+    out = ros_stub.TYPES["sensor_msgs/CameraInfo"]()
+    out.width, out.height, out.distortion_model, out.d = width, height, model, list(d)
+    out.k = [460.0, 0.0, 370.0, 0.0, 458.0, 250.0, 0.0, 0.0, 1.0]
+    return ros_stub.decode("sensor_msgs/CameraInfo", ros_stub.encode("sensor_msgs/CameraInfo", out))
+
+
+def image(encoding, width, height, step, data, stamp_ns=10**9, frame_id="r1/camera", big=0):
+    out = ros_stub.TYPES["sensor_msgs/Image"]()
+    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+    out.header.frame_id, out.encoding, out.is_bigendian = frame_id, encoding, big
+    out.width, out.height, out.step, out.data = width, height, step, bytes(data)
+    return ros_stub.decode("sensor_msgs/Image", ros_stub.encode("sensor_msgs/Image", out))
+
+
+def file_image(data, stamp_ns=10**9, frame_id="r1/camera"):
+    out = ros_stub.TYPES["sensor_msgs/CompressedImage"]()
+    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+    out.header.frame_id, out.format, out.data = frame_id, "jpeg", data
+    return ros_stub.decode("sensor_msgs/CompressedImage", ros_stub.encode("sensor_msgs/CompressedImage", out))
+
+
+def imu(stamp_ns, gyro=(1.0, 2.0, 3.0), accelerometer=(4.0, 5.0, 6.0), frame_id="r1/imu"):
+    out = ros_stub.TYPES["sensor_msgs/Imu"]()
+    out.header.stamp.sec, out.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+    out.header.frame_id = frame_id
+    w, a = out.angular_velocity, out.linear_acceleration
+    (w.x, w.y, w.z), (a.x, a.y, a.z) = gyro, accelerometer
+    return ros_stub.decode("sensor_msgs/Imu", ros_stub.encode("sensor_msgs/Imu", out))

@@ -1,64 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node on a stub of rclpy, with programs at the other end: run by tutti_ros_test.py."""
-import json
-import os
-import pathlib
 import random
-import shutil
 import signal
-import subprocess
-import tempfile
 import time
 import unittest
 
 import ros_stub
 from made_messages import cloud, fix, odometry, pose_at
-from paths import SOURCE, TUTTI
+from paths import SOURCE
+from programs import HAS_NATS, PATIENCE_S, WithPrograms
 from tutti_ros import from_ros
-from tutti_ros.node import TuttiNode
-
-PATIENCE_S = 120.0
-HAS_NATS = shutil.which("nats-server") or os.path.exists("/usr/sbin/nats-server")
 
 
-class Programs(unittest.TestCase):
-    """Nodes, and `tutti robot` at the other end."""
-
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = pathlib.Path(folder.name)
-        ros_stub.Tf.sent.clear()
-        ros_stub.Tf.known.clear()
-
-    def start(self, *arguments):
-        program = subprocess.Popen([TUTTI, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        self.addCleanup(lambda: (program.poll() is None and program.kill(), program.communicate()))
-        return program
-
-    def start_robot(self, name, bus, *more):
-        return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, "--feed",
-                          self.path / f"{name}.feed", "--stay", *more)
-
-    def node(self, name, **parameters):
-        ros_stub.Node.given = {"socket": str(self.path / f"{name}.feed"), **parameters}
-        node = TuttiNode()
-        self.addCleanup(node.destroy_node)
-        return node
-
-    def fed(self, name):
-        """What its status says of its feed."""
-        try:
-            return json.loads((self.path / name / "status.json").read_text())["feed"]
-        except (OSError, ValueError):
-            return {}
-
-    def wait_for(self, condition, what):
-        end = time.monotonic() + PATIENCE_S
-        while not condition():
-            self.assertLess(time.monotonic(), end, what)
-            time.sleep(0.01)
-
+class Programs(WithPrograms):
     def test_a_robot_alone_that_is_killed_once(self):
         bus = "nats://127.0.0.1:1"  # nobody is there: a robot needs no link
         node = self.node("r1")
@@ -131,16 +85,13 @@ class Programs(unittest.TestCase):
     @unittest.skipUnless(HAS_NATS, "nats-server is not installed")
     def test_two_robots_find_each_other(self):
         small = SOURCE / "tests/system/small_mission.yaml"
-        done = subprocess.run([TUTTI, "run", small, "--out", self.path], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.run_tutti("run", small, "--out", self.path)
         mission = [self.path / "fed.yaml", "--data", self.path]
         lines = "".join(f"  - {{name: {name}, odometry: {{file: {name}_onboard.tum}}, reference: "
                         f"{{file: {name}_reference.tum}}}}\n" for name in ("alpha", "bravo"))
         mission[0].write_text(f"mission: fed\ninput: simulated\nrobots:\n{lines}closures:\n  finder: reference\n"
                               "  reference: {min_time_gap_s: 20.0}\n")
-        server = self.start("server", "--state", self.path / "server", *mission, "--rate", "50")
-        words = server.stdout.readline().split()
-        bus = words[words.index("--bus") + 1]
+        server, bus = self.start_server(*mission, "--rate", "50")
         names = ("alpha", "bravo")
         nodes = {name: self.node(name, use_scans=False) for name in names}
         robots = [self.start_robot(name, bus, *mission, "--rate", "50", "--session", "0") for name in names]

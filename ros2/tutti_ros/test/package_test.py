@@ -43,7 +43,8 @@ class Package(unittest.TestCase):
         modules = {"ament_index_python.packages": ["get_package_share_directory"], "launch": ["LaunchDescription"],
                    "launch.actions": ["DeclareLaunchArgument", "ExecuteProcess"],
                    "launch.conditions": ["IfCondition", "UnlessCondition"],
-                   "launch.substitutions": ["LaunchConfiguration", "PythonExpression"], "launch_ros.actions": ["Node"]}
+                   "launch.substitutions": ["LaunchConfiguration", "PathJoinSubstitution", "PythonExpression"],
+                   "launch_ros.actions": ["Node"], "launch_ros.parameter_descriptions": ["ParameterValue"]}
         kinds = {name: type(name, (Any,), {}) for names in modules.values() for name in names}
         kinds["get_package_share_directory"] = lambda name: str(HERE.parent)
         for module, names in modules.items():

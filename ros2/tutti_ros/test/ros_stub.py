@@ -21,12 +21,26 @@ DEFINITIONS = {
     "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist, float64[36] covariance",
     "geometry_msgs/Transform": "geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation",
     "geometry_msgs/TransformStamped": "std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform",
+    "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
     "nav_msgs/Odometry": "std_msgs/Header header, string child_frame_id, geometry_msgs/PoseWithCovariance pose, "
                          "geometry_msgs/TwistWithCovariance twist",
+    "nav_msgs/MapMetaData": "builtin_interfaces/Time map_load_time, float32 resolution, uint32 width, uint32 height, "
+                            "geometry_msgs/Pose origin",
+    "nav_msgs/OccupancyGrid": "std_msgs/Header header, nav_msgs/MapMetaData info, int8[] data",
     "nav_msgs/Path": "std_msgs/Header header, geometry_msgs/PoseStamped[] poses",
     "sensor_msgs/PointField": "string name, uint32 offset, uint8 datatype, uint32 count",
     "sensor_msgs/PointCloud2": "std_msgs/Header header, uint32 height, uint32 width, sensor_msgs/PointField[] fields, "
                                "bool is_bigendian, uint32 point_step, uint32 row_step, uint8[] data, bool is_dense",
+    "sensor_msgs/RegionOfInterest": "uint32 x_offset, uint32 y_offset, uint32 height, uint32 width, bool do_rectify",
+    "sensor_msgs/CameraInfo": "std_msgs/Header header, uint32 height, uint32 width, string distortion_model, float64[] d, "
+                              "float64[9] k, float64[9] r, float64[12] p, uint32 binning_x, uint32 binning_y, "
+                              "sensor_msgs/RegionOfInterest roi",
+    "sensor_msgs/Image": "std_msgs/Header header, uint32 height, uint32 width, string encoding, uint8 is_bigendian, "
+                         "uint32 step, uint8[] data",
+    "sensor_msgs/CompressedImage": "std_msgs/Header header, string format, uint8[] data",
+    "sensor_msgs/Imu": "std_msgs/Header header, geometry_msgs/Quaternion orientation, float64[9] orientation_covariance, "
+                       "geometry_msgs/Vector3 angular_velocity, float64[9] angular_velocity_covariance, "
+                       "geometry_msgs/Vector3 linear_acceleration, float64[9] linear_acceleration_covariance",
     "sensor_msgs/NavSatStatus": "int8 status, uint16 service",
     "sensor_msgs/NavSatFix": "std_msgs/Header header, sensor_msgs/NavSatStatus status, float64 latitude, float64 longitude, "
                              "float64 altitude, float64[9] position_covariance, uint8 position_covariance_type",
@@ -46,7 +60,7 @@ TYPES = {}
 def default(kind):
     if kind.endswith("]"):
         base, _, length = kind[:-1].partition("[")
-        return [0.0] * int(length) if length else (array.array("B") if base == "uint8" else [])
+        return [0.0] * int(length) if length else (array.array(NUMBERS[base]) if base in ("uint8", "int8") else [])
     if kind in TYPES:
         return TYPES[kind]()
     return {"string": "", "byte": b"\0", "bool": False}.get(kind, 0.0 if kind.startswith("float") else 0)
@@ -104,9 +118,9 @@ class Reader:
         if kind.endswith("]"):
             base, _, length = kind[:-1].partition("[")
             count = int(length) if length else self.number("I")
-            if base == "uint8":
+            if base in ("uint8", "int8"):
                 self.at += count
-                return array.array("B", self.data[self.at - count:self.at])
+                return array.array(NUMBERS[base], bytes(self.data[self.at - count:self.at]))
             return [self.read(base) for _ in range(count)]
         if kind == "string":
             count = self.number("I")
@@ -132,8 +146,8 @@ class Writer:
             base, _, length = kind[:-1].partition("[")
             if not length:
                 self.number("I", len(value))
-            if base == "uint8":
-                self.out += bytes(value)
+            if base in ("uint8", "int8"):
+                self.out += array.array(NUMBERS[base], value).tobytes()
             else:
                 for x in value:
                     self.write(base, x)
@@ -253,7 +267,7 @@ def install():
     executors = module("rclpy.executors", ExternalShutdownException=type("ExternalShutdownException", (Exception,), {}))
     module("rclpy.node", Node=Node)
     module("rclpy.qos", DurabilityPolicy=types.SimpleNamespace(TRANSIENT_LOCAL="transient local"),
-           ReliabilityPolicy=types.SimpleNamespace(RELIABLE="reliable"),
+           ReliabilityPolicy=types.SimpleNamespace(RELIABLE="reliable", BEST_EFFORT="best effort"),
            QoSProfile=lambda **what: what, qos_profile_sensor_data="sensor data")
     module("rclpy", ok=lambda: True, time=time, executors=executors)
     module("tf2_ros", **{name: getattr(Tf, name) for name in

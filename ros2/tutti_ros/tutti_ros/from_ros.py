@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What ROS messages say, as the live feed wants it. Messages are anything with the fields of nav_msgs/Odometry,
-sensor_msgs/PointCloud2 and sensor_msgs/NavSatFix; what is no sample is a ValueError that says why."""
+"""What ROS messages say, as the live feed wants it. Messages are anything with the fields of nav_msgs/Odometry and of
+sensor_msgs' PointCloud2, NavSatFix, CameraInfo, Image and Imu; what is no sample is a ValueError that says why. Cameras,
+images and IMU samples are taken as by src/tutti/bags/camera.cpp."""
 import dataclasses
 import math
 
@@ -12,6 +13,12 @@ TIME_FIELDS = ("t", "time", "timestamp", "offset_time")
 UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
 SHORTEST_SWEEP_S, LONGEST_SWEEP_S = 0.001, 0.5
 LONGEST_AGE_S = 1.0
+LARGEST_IMAGE_PX = 16 * 1024 * 1024  # of one frame of the feed
+DEPTH_UNIT_M, MOST_DEPTH_M = 0.001, 65.5
+CAMERA_KINDS = ("PINHOLE", "EQUIDISTANT", "DOUBLE_SPHERE", "RATIONAL")  # by their numbers in the feed
+GREYS, BAYERS = ("mono8", "8UC1"), ("bayer_rggb8", "bayer_bggr8", "bayer_gbrg8", "bayer_grbg8")
+COLOURS = {"rgb8": (3, 0), "bgr8": (3, 2), "8UC3": (3, 2), "rgba8": (4, 0), "bgra8": (4, 2)}  # bytes, and which is red
+SAME_PLACE_M = 1e-3
 TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}  # sensor_msgs/PointField
 
 
@@ -139,3 +146,116 @@ def scan_of(message, T_body_sensor, deskewed=False):
         return stamp_ns, points, None
     newest_s = float(after.max())
     return stamp_ns + round(newest_s * 1e9), points, (newest_s - after).astype(np.float32)
+
+
+@dataclasses.dataclass(frozen=True)
+class Camera:
+    """Intrinsics, of the images as they come: K and D of a CameraInfo. `distortion` is in the order of its kind."""
+    kind: str
+    width_px: int
+    height_px: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple
+
+
+def camera_kind(model, numbers):
+    count = len(numbers)
+    if count == 0 or (model == "plumb_bob" and (count == 4 or (count == 5 and numbers[4] == 0.0))):
+        return "PINHOLE"
+    kind = {("plumb_bob", 5): "RATIONAL", ("rational_polynomial", 8): "RATIONAL", ("equidistant", 4): "EQUIDISTANT",
+            ("fisheye", 4): "EQUIDISTANT", ("double_sphere", 2): "DOUBLE_SPHERE"}.get((model, count))
+    if kind is None:
+        raise ValueError(f"distortion_model '{model[:40]}' with {count} numbers, expected plumb_bob (4 or 5), "
+                         "rational_polynomial (8), equidistant (4) or double_sphere (2)")
+    return kind
+
+
+def camera_of(message):
+    """The calibration in a CameraInfo: only one that the robot takes, as it ends the connection at any other."""
+    numbers = tuple(float(x) for x in message.d)
+    kind = camera_kind(message.distortion_model, numbers)
+    width, height = message.width, message.height
+    if not 0 < width * height <= LARGEST_IMAGE_PX:
+        raise ValueError(f"an image of {width} x {height} pixels, expected 1 to {LARGEST_IMAGE_PX} of them")
+    if message.binning_x > 1 or message.binning_y > 1:
+        raise ValueError(f"binning {message.binning_x} x {message.binning_y}, expected none")
+    fx, fy, cx, cy = (float(message.k[i]) for i in (0, 4, 2, 5))
+    if not (fx > 0.0 and fy > 0.0 and all(map(math.isfinite, (fx, fy, cx, cy, *numbers)))):
+        raise ValueError(f"focal lengths {fx} and {fy} px, centre {cx}, {cy}, distortion {numbers}: expected finite numbers "
+                         "and positive lengths; is the camera calibrated?")
+    if kind == "DOUBLE_SPHERE" and not (abs(numbers[0]) < 1.0 and 0.0 <= numbers[1] <= 1.0):
+        raise ValueError(f"double sphere with xi {numbers[0]} and alpha {numbers[1]}, expected -1 < xi < 1 and 0 <= alpha <= 1")
+    return Camera(kind, width, height, fx, fy, cx, cy, numbers[:4] if kind == "PINHOLE" else numbers)
+
+
+def rows_of(message, pixel_bytes):
+    """The pixels of an Image as an array of bytes: height x width x pixel_bytes, a view of the message's data. Rows may be
+    padded."""
+    rows, columns, step = message.height, message.width, message.step
+    data = np.frombuffer(message.data, np.uint8)
+    row = columns * pixel_bytes
+    if rows == 0 or columns == 0 or step < row or len(data) < (rows - 1) * step + row:
+        raise ValueError(f"{columns} x {rows} pixels of {pixel_bytes} bytes, rows of {step} bytes, {len(data)} bytes in all")
+    return np.ndarray((rows, columns, pixel_bytes), np.uint8, data, strides=(step, pixel_bytes, 1))
+
+
+def grey_of(message):
+    """The Image as grey values, height x width of uint8: colours by their luminance (ITU-R BT.709, as PNG files are read),
+    in a Bayer pattern each pixel the mean of a square of two by two."""
+    encoding = message.encoding
+    if encoding in GREYS:
+        return rows_of(message, 1)[:, :, 0]
+    if encoding in BAYERS:
+        square = np.pad(rows_of(message, 1)[:, :, 0], ((0, 1), (0, 1)), "edge").astype(np.uint16)
+        return ((square[:-1, :-1] + square[:-1, 1:] + square[1:, :-1] + square[1:, 1:] + 2) // 4).astype(np.uint8)
+    if encoding not in COLOURS:
+        raise ValueError(f"encoding '{encoding[:40]}', expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8")
+    size, red = COLOURS[encoding]
+    pixels = rows_of(message, size)
+    out = pixels[:, :, red].astype(np.uint32) * 13933  # of 65536
+    out += pixels[:, :, 1].astype(np.uint32) * 46871
+    out += pixels[:, :, 2 - red].astype(np.uint32) * 4732
+    return ((out + 32768) // 65536).astype(np.uint8)
+
+
+def depth_of(message):
+    """The depth image as numbers of DEPTH_UNIT_M, height x width of uint16, little endian; 0: unknown. Of 16UC1 (or mono16),
+    millimetres, and of 32FC1, metres."""
+    encoding, order = message.encoding, ">" if message.is_bigendian else "<"
+    if encoding in ("16UC1", "mono16"):
+        return np.ascontiguousarray(rows_of(message, 2)).view(order + "u2")[:, :, 0].astype("<u2")
+    if encoding != "32FC1":
+        raise ValueError(f"encoding '{encoding[:40]}', expected 16UC1 (mm) or 32FC1 (m)")
+    metres = np.ascontiguousarray(rows_of(message, 4)).view(order + "f4")[:, :, 0].astype(np.float64)
+    is_known = (metres > 0.0) & (metres <= MOST_DEPTH_M)  # of what is not a number, neither is true
+    return np.floor(np.where(is_known, metres, 0.0) / DEPTH_UNIT_M + 0.5).astype("<u2")
+
+
+def imu_of(message):
+    """(stamp_ns, gyro, accelerometer): rad/s and m/s^2 in the IMU's own axes."""
+    vectors = [(v.x, v.y, v.z) for v in (message.angular_velocity, message.linear_acceleration)]
+    if not all(map(math.isfinite, vectors[0] + vectors[1])):
+        raise ValueError(f"an IMU sample {vectors} that is none, expected finite numbers")
+    return nanoseconds(message.header.stamp), *vectors
+
+
+def check_imu_place(T_body_imu):
+    """Elsewhere than in the body's origin it measures other accelerations."""
+    away_m = math.hypot(*T_body_imu[:3])
+    if away_m > SAME_PLACE_M:
+        raise ValueError(f"is {away_m:.3f} m from the body's origin, expected 0")
+
+
+def camera_info_topic(images):
+    """Where the CameraInfo of a topic of images is: beside it."""
+    steps = 2 if is_compressed(images) else 1
+    folder = images.rsplit("/", steps)[0] if images.count("/") >= steps else ""
+    return f"{folder}/camera_info" if folder or images.startswith("/") else "camera_info"
+
+
+def is_compressed(images):
+    """As image_transport names topics of CompressedImage."""
+    return images.endswith("/compressed")

@@ -12,7 +12,9 @@ from tutti_ros.feed_messages import Feed
 PROTOCOL_VERSION = 1
 LONGEST_FRAME = 16 * 1024 * 1024
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.25, 5.0
+LATEST_NS = 500_000_000  # behind odometry, for what was not said before a connection was lost
 UNSEEN_M2, UNSEEN_RAD2 = 1.0, 0.03  # of a stretch of odometry that this program did not see
+NAMES = {"fixes": "fix", "images": "images", "imu": "imu"}  # of kinds that older robots do not take (Welcome.takes)
 
 
 def frame(**what):
@@ -56,23 +58,30 @@ def pose_from(said):
 @dataclasses.dataclass
 class Sample:
     stamp_ns: int
-    pose: tuple = ()        # T_odom_body; of a scan empty
+    pose: tuple = ()        # T_odom_body; of all else empty
     spent: tuple = (0, 0)   # variances (m^2, rad^2) of the way so far: differences are those of increments
-    frame: bytes = b""      # of a scan or a fix
+    frame: bytes = b""      # of all but odometry; empty: forgotten
     kind: str = "odometry"  # as it is counted
+    count: int = 1
+    was_said: bool = False
+
+    def is_forgotten(self):
+        return not self.frame and not self.pose
 
 
 class Link:
-    """Samples are kept until the robot has them on its disk, so that one that was killed is told again what it lost; the
-    oldest go from `most_samples` and `most_scan_bytes` on. States: away, greeting, feeding, refused (the robot closed
-    the connection, and said why; tried again like any other)."""
+    """Samples are kept until the robot has them on its disk, so that one that was killed is told again what it lost. From
+    `most_samples` on the oldest go; from `most_bytes` on the oldest scans, images and what else is no odometry. States: away,
+    greeting, feeding, refused (the robot closed the connection, and said why; tried again like any other)."""
 
-    def __init__(self, noise, client_name="tutti_ros", has_scans=True, most_samples=20_000, most_scan_bytes=64 * 1024 * 1024):
-        self.noise, self.client_name, self.has_scans = noise, client_name, has_scans
-        self.most_samples, self.most_scan_bytes = most_samples, most_scan_bytes
+    def __init__(self, noise, client_name="tutti_ros", has_scans=True, most_samples=20_000, most_bytes=64 * 1024 * 1024):
+        self.noise, self.client_name = noise, client_name
+        self.sensors = Feed.Sensors(scans=has_scans)  # that the robot is told of when it is greeted
+        self.most_samples, self.most_bytes = most_samples, most_bytes
         self.state, self.why, self.wait_s = "away", "not connected yet", FIRST_WAIT_S
         self.counts = collections.Counter()
-        self.kept, self.scan_bytes = collections.deque(), 0  # bytes of fixes too
+        self.kept = collections.deque()
+        self.framed, self.framed_bytes = collections.deque(), 0  # those of `kept` that are no odometry
         self.waiting = collections.deque()  # those of `kept` that are to be said on this connection
         self.last = None           # the newest odometry sample
         self.last_fix_ns = None
@@ -95,38 +104,77 @@ class Link:
         self._add(Sample(stamp_ns, frame=scan_frame(stamp_ns, points, ages), kind="scans"))
 
     def add_fix(self, stamp_ns, place, covariance, p_body_antenna):
-        """Of a robot that does not know of fixes (Welcome.takes) none is kept."""
         if self.last_fix_ns is not None and stamp_ns <= self.last_fix_ns:
             raise ValueError(f"a fix of {stamp_ns} ns after {self.last_fix_ns} ns, expected stamps to increase")
-        if self.welcome and "fix" not in self.welcome.takes:
-            raise ValueError("this robot's program is older than position fixes: it takes none")
+        self._check_taken("fixes")
         self.last_fix_ns = stamp_ns
         self._add(Sample(stamp_ns, kind="fixes", frame=frame(fix=Feed.Fix(
             stamp_ns=stamp_ns, latitude_deg=place[0], longitude_deg=place[1], height_m=place[2],
             covariance_m2=covariance, p_body_antenna=p_body_antenna))))
+
+    def set_sensors(self, sensors):
+        """What is said of cameras, depth and IMU the next time that the robot is greeted."""
+        sensors.scans = self.sensors.scans
+        self.sensors = sensors
+
+    def add_images(self, stamp_ns, images, depth):
+        """`images`: [(number of the camera, is it pixels and no file, bytes)]; `depth`: pixels, or None."""
+        self._check_taken("images")
+        said = Feed.Images(stamp_ns=stamp_ns)
+        for camera, is_raw, data in images:
+            said.image.add(camera=camera, encoding=Feed.Image.RAW if is_raw else Feed.Image.FILE, data=data)
+        if depth is not None:
+            said.depth.encoding, said.depth.data = Feed.Image.RAW, depth
+        self._add(Sample(stamp_ns, kind="images", frame=frame(images=said)))
+
+    def add_imu(self, stamps_ns, gyro, accelerometer):
+        """Samples, increasing; of each three numbers in the body frame."""
+        self._check_taken("imu")
+        said = Feed.Imu(stamp_ns=stamps_ns, gyro=gyro, accelerometer=accelerometer)
+        self._add(Sample(stamps_ns[-1], kind="imu", frame=frame(imu=said), count=len(stamps_ns)))
+
+    def _check_taken(self, kind):
+        """Of what a robot does not know of, nothing is kept."""
+        if self.welcome and NAMES[kind] not in self.welcome.takes:
+            raise ValueError(f"this robot's program is older than {kind}: it takes none")
 
     def end_recording(self):
         self.goodbye = True
 
     def _add(self, sample):
         self.kept.append(sample)
-        self.scan_bytes += len(sample.frame)
+        if sample.frame:
+            self.framed.append(sample)
+            self.framed_bytes += len(sample.frame)
         if self.state == "feeding":
             self.waiting.append(sample)
-        while len(self.kept) > self.most_samples or self.scan_bytes > self.most_scan_bytes:
-            oldest = self.kept.popleft()
-            self.scan_bytes -= len(oldest.frame)
+        while len(self.kept) > self.most_samples:
+            oldest = self._take_oldest()
             if self.waiting and self.waiting[0] is oldest:
                 self.waiting.popleft()
-            if self.state != "feeding":
-                self.counts["forgotten_while_away"] += 1
+            self._count_forgotten()
+        while self.framed_bytes > self.most_bytes:
+            oldest = self.framed.popleft()
+            self.framed_bytes -= len(oldest.frame)
+            oldest.frame = b""
+            self._count_forgotten()
+
+    def _count_forgotten(self):
+        if self.state != "feeding":
+            self.counts["forgotten_while_away"] += 1
+
+    def _take_oldest(self):
+        oldest = self.kept.popleft()
+        if oldest.frame:
+            self.framed_bytes -= len(self.framed.popleft().frame)
+        return oldest
 
     def connected(self):
         """What to say first."""
         self.state, self.received, self.welcome = "greeting", b"", None
         self.waiting.clear()
         hello = Feed.Hello(protocol_version=PROTOCOL_VERSION, client_name=self.client_name.encode(), wants_way=True,
-                           sensors=Feed.Sensors(scans=self.has_scans))
+                           sensors=self.sensors)
         return frame(hello=hello)
 
     def lost(self, why):
@@ -142,14 +190,16 @@ class Link:
         """What to say now; empty: nothing."""
         if self.state != "feeding":
             return b""
-        if not self.waiting:
-            if not self.goodbye:
-                return b""
-            self.goodbye = False
-            return frame(end_of_recording=Feed.EndOfRecording())
-        sample = self.waiting.popleft()
-        self.counts[sample.kind] += 1
-        return sample.frame or self._odometry(sample)
+        while self.waiting:
+            sample = self.waiting.popleft()
+            if not sample.is_forgotten():
+                self.counts[sample.kind] += sample.count
+                sample.was_said = True
+                return sample.frame or self._odometry(sample)
+        if not self.goodbye:
+            return b""
+        self.goodbye = False
+        return frame(end_of_recording=Feed.EndOfRecording())
 
     def _odometry(self, sample):
         if self.known_spent is None:
@@ -199,18 +249,23 @@ class Link:
         self.state, self.why, self.wait_s, self.welcome = "feeding", "", FIRST_WAIT_S, welcome
         self.known_spent = None if welcome.has_odometry else (0.0, 0.0)
         for sample in self.kept:
-            if sample.kind == "fixes" and "fix" not in welcome.takes:
+            if sample.is_forgotten() or NAMES.get(sample.kind, "odometry") not in (*welcome.takes, "odometry"):
                 continue
-            if not welcome.has_odometry or sample.stamp_ns > welcome.last_stamp_ns:
+            if not welcome.has_odometry or self._is_wanted(sample, welcome.last_stamp_ns):
                 self.waiting.append(sample)
-            elif sample.stamp_ns == welcome.last_stamp_ns:
-                if sample.pose:
-                    self.known_spent = sample.spent
-                else:  # it may have been lost with the robot
-                    self.waiting.append(sample)
+            elif sample.pose and sample.stamp_ns == welcome.last_stamp_ns:
+                self.known_spent = sample.spent
+
+    @staticmethod
+    def _is_wanted(sample, last_ns):
+        """By a robot whose newest odometry is of `last_ns`."""
+        if sample.stamp_ns > last_ns or sample.pose:
+            return sample.stamp_ns > last_ns
+        may_be_lost = sample.stamp_ns == last_ns and sample.kind in ("scans", "fixes")  # with a robot that was killed
+        return may_be_lost or (not sample.was_said and last_ns - sample.stamp_ns <= LATEST_NS)
 
     def _forget_before(self, stamp_ns):
         while self.kept and self.kept[0].stamp_ns < stamp_ns:
             if self.waiting and self.waiting[0] is self.kept[0]:
                 return
-            self.scan_bytes -= len(self.kept.popleft().frame)
+            self._take_oldest()

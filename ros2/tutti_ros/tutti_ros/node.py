@@ -1,29 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node: subscribes odometry, scans and position fixes, feeds the robot program, publishes what it answers (docs/ros.md)."""
+"""The node: subscribes odometry, scans, images, IMU samples and position fixes, feeds the robot program, publishes what it
+answers (docs/ros.md)."""
 import collections
 import dataclasses
 
 import rclpy
-import rclpy.executors
 import rclpy.time
 import tf2_ros
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import NavSatFix, PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from tutti_ros import poses
+from tutti_ros.camera_topics import CameraTopics
 from tutti_ros.connection import Connection
 from tutti_ros.from_ros import OdometryNoise, fix_of, odometry_of, pose_of, scan_of
 from tutti_ros.link import Link, pose_from
+from tutti_ros.ros_node import LATCHED, diagnostics, run
 from tutti_ros.situation import OnMap, diagnosis
 from tutti_ros.to_ros import set_header, set_pose, set_transform, topic_part
 
-LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = {
     "socket": "",              # of tutti robot --feed
     "map_frame": "",           # empty: odom_frame with 'odom' at its end made 'map', else 'map'
@@ -34,6 +35,10 @@ PARAMETERS = {
     "use_scans": True,
     "use_fixes": True,
     "scans_deskewed": False,   # points' times are not looked at
+    "images": "",              # topics of one camera or two: "left/image_raw,right/image_raw"; empty: none are subscribed
+    "images_offset_s": 0.0,    # added to the images' stamps gives odometry's time
+    "depth": "",               # topic of depth images registered to the one camera; empty: none
+    "imu": "",                 # topic that goes with images; empty: none
     "transform_tolerance_s": 0.1,  # by which map -> odom is dated ahead
     "publish_tf": True,
     "path_period_s": 1.0,
@@ -53,6 +58,7 @@ class TuttiNode(Node):
         self.stated_lidar = self._numbers("T_body_lidar", "x y z qx qy qz qw")
         self.stated_antenna = self._numbers("antenna_m", "x y z")
         self.sensor_poses = {}
+        self.camera_topics = CameraTopics(self)
         self.on_map, self.trouble = OnMap(), collections.deque(maxlen=5)
         self.mate_publishers, self.newest_tf_ns = {}, -1
         self.link = Link(noise, has_scans=self.use_scans)
@@ -85,7 +91,7 @@ class TuttiNode(Node):
             raise ValueError(f"parameter '{parameter}' is '{text}', expected '{expected}'")
         return numbers
 
-    def _complain(self, what):
+    def complain(self, what):
         if what not in self.trouble:
             self.trouble.append(what)
         self.get_logger().warning(what, throttle_duration_sec=5.0)
@@ -103,9 +109,10 @@ class TuttiNode(Node):
                 self.on_map.add_odometry(stamp_ns, pose)
                 is_away = self.link.state != "feeding"
         except ValueError as error:
-            self._complain(f"odometry: {error}")
+            self.complain(f"odometry: {error}")
             return
         self.connection.wake()
+        self.camera_topics.take_odometry(stamp_ns)
         if is_away and self.on_map.T_map_odom:  # the last correction, so that nobody loses the map
             self.publish_transform(stamp_ns, self.on_map.T_map_odom)
 
@@ -117,8 +124,8 @@ class TuttiNode(Node):
             stamp_ns, points, ages = scan_of(message, T_body_lidar, self.scans_deskewed)
             with self.connection.lock:
                 self.link.add_scan(stamp_ns, points, ages)
-        except (ValueError, tf2_ros.TransformException) as error:
-            self._complain(f"points: {error}")
+        except ValueError as error:
+            self.complain(f"points: {error}")
             return
         self.connection.wake()
 
@@ -133,7 +140,7 @@ class TuttiNode(Node):
             with self.connection.lock:
                 self.link.add_fix(*fix, antenna)
         except ValueError as error:
-            self._complain(f"fixes: {error}")
+            self.complain(f"fixes: {error}")
             return
         self.connection.wake()
 
@@ -141,17 +148,22 @@ class TuttiNode(Node):
         """In the body frame. Its length is all that a fix is off by where nothing says where it is."""
         try:
             return self.stated_antenna or self.sensor_pose(frame_id)[:3]
-        except tf2_ros.TransformException as error:
-            self._complain(f"fixes are taken as of an antenna at the body's origin: {error}")
+        except ValueError as error:
+            self.complain(f"fixes are taken as of an antenna at the body's origin: {error}")
             return (0.0, 0.0, 0.0)
 
     def sensor_pose(self, frame_id):
-        """T_body_sensor, asked of tf2 once: sensors are bolted on."""
+        """T_body_sensor, asked of tf2 once: sensors are bolted on. A ValueError where it is not known yet."""
+        if self.frames is None:
+            raise ValueError("no odometry has said yet which frame is the body")
         base = self.frames[2]
         if frame_id == base:
             return poses.IDENTITY
         if frame_id not in self.sensor_poses:
-            said = self.tf_buffer.lookup_transform(base, frame_id, rclpy.time.Time()).transform
+            try:
+                said = self.tf_buffer.lookup_transform(base, frame_id, rclpy.time.Time()).transform
+            except tf2_ros.TransformException as error:
+                raise ValueError(error) from error
             self.sensor_poses[frame_id] = pose_of(said.translation, said.rotation)
         return self.sensor_poses[frame_id]
 
@@ -249,29 +261,13 @@ class TuttiNode(Node):
         return out
 
     def publish_diagnostics(self):
+        for what in self.camera_topics.look():
+            self.complain(what)
         with self.connection.lock:
             level, text, values = diagnosis(self.link, self.on_map, list(self.trouble), self.connection.is_alive())
         self.trouble.clear()
-        status = DiagnosticStatus()
-        status.level, status.message = bytes([level]), text
-        status.name, status.hardware_id = f"{self.get_fully_qualified_name()}: live feed", values.get("robot", "")
-        for key, value in values.items():
-            pair = KeyValue()
-            pair.key, pair.value = key, value
-            status.values.append(pair)
-        out = DiagnosticArray()
-        out.header.stamp = self.get_clock().now().to_msg()
-        out.status.append(status)
-        self.diagnostics_publisher.publish(out)
+        self.diagnostics_publisher.publish(diagnostics(self, "live feed", level, text, values))
 
 
 def main():
-    rclpy.init()
-    node = TuttiNode()
-    try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    run(TuttiNode)

@@ -55,8 +55,8 @@ class OnMap:
 def diagnosis(link, on_map, trouble, is_alive=True):
     """(level, message, {key: value}) for /diagnostics. `trouble`: what kept messages from becoming samples, newest last."""
     values = {"connection": link.state, "reason": link.why, "waiting": len(link.waiting), "kept": len(link.kept),
-              **{key: link.counts[key] for key in ("odometry", "scans", "fixes", "corrections", "refused", "jumps",
-                                                   "odometry_left_out", "forgotten_while_away")}}
+              **{key: link.counts[key] for key in ("odometry", "scans", "fixes", "images", "imu", "corrections", "refused",
+                                                   "jumps", "odometry_left_out", "forgotten_while_away")}}
     if link.welcome:
         values["robot"] = f"{link.welcome.robot_name} ({link.welcome.robot}), session {link.welcome.session}"
     if on_map.correction:

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What tests with programs at the other end have in common."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import time
+import unittest
+
+import mcap_reader
+import ros_stub
+from paths import TUTTI
+from tutti_ros.node import TuttiNode
+
+PATIENCE_S = 120.0
+HAS_NATS = shutil.which("nats-server") or os.path.exists("/usr/sbin/nats-server")
+
+
+class WithPrograms(unittest.TestCase):
+    """Nodes, and `tutti robot` at the other end."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.path = pathlib.Path(folder.name)
+        ros_stub.Tf.sent.clear()
+        ros_stub.Tf.known.clear()
+
+    def start(self, *arguments):
+        program = subprocess.Popen([TUTTI, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.addCleanup(lambda: (program.poll() is None and program.kill(), program.communicate()))
+        return program
+
+    def start_robot(self, name, bus, *more):
+        return self.start("robot", "--name", name, "--bus", bus, "--state", self.path / name, "--feed",
+                          self.path / f"{name}.feed", "--stay", *more)
+
+    def start_server(self, *more):
+        """The program, and its bus."""
+        server = self.start("server", "--state", self.path / "server", *more)
+        words = server.stdout.readline().split()
+        return server, words[words.index("--bus") + 1]
+
+    def run_tutti(self, *arguments):
+        """What it prints, once it has ended well."""
+        done = subprocess.run([TUTTI, *map(str, arguments)], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def node(self, name, kind=TuttiNode, **parameters):
+        ros_stub.Node.given = {"socket": str(self.path / f"{name}.feed"), **parameters}
+        node = kind()
+        self.addCleanup(node.destroy_node)
+        return node
+
+    def recorded(self, name, topics):
+        """(callback, message) of a bag that `tutti simulate` wrote, in its order. `topics`: {topic below the robot's name:
+        type}."""
+        kinds = {f"/{name}/{topic}": (topic, kind) for topic, kind in topics.items()}
+        for topic, cdr in mcap_reader.messages((self.path / name / f"{name}_0.mcap").read_bytes()):
+            if topic in kinds:
+                yield kinds[topic][0], ros_stub.decode(kinds[topic][1], cdr)
+
+    def fed(self, name):
+        """What its status says of its feed."""
+        try:
+            return json.loads((self.path / name / "status.json").read_text())["feed"]
+        except (OSError, ValueError):
+            return {}
+
+    def wait_for(self, condition, what):
+        end = time.monotonic() + PATIENCE_S
+        while not condition():
+            self.assertLess(time.monotonic(), end, what)
+            time.sleep(0.01)
