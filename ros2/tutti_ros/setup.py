@@ -51,6 +51,6 @@ setup(
     maintainer_email="tutti@example.org",
     description="ROS 2 client of the live feed of a Tutti robot, and of the map of a Tutti server",
     license="BSD-3-Clause",
-    entry_points={"console_scripts": ["tutti_ros = tutti_ros.node:main"]},
+    entry_points={"console_scripts": ["tutti_ros = tutti_ros.node:main", "tutti_map = tutti_ros.map_node:main"]},
     cmdclass={"build_py": BuildWithMessages, "develop": DevelopWithMessages},
 )

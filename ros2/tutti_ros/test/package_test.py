@@ -26,7 +26,7 @@ class Package(unittest.TestCase):
                                   cwd=tree / "ros2/tutti_ros", capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stderr)
             files = pathlib.Path(f"{folder}/files").read_text()
-        for file in ("lib/tutti_ros/tutti_ros\n", "tutti_ros/feed_pb2.py\n", "share/tutti_ros/package.xml\n",
+        for file in ("lib/tutti_ros/tutti_ros\n", "lib/tutti_ros/tutti_map\n", "tutti_ros/feed_pb2.py\n", "share/tutti_ros/package.xml\n",
                      "share/ament_index/resource_index/packages/tutti_ros\n", "launch/robot.launch.py\n",
                      "rviz/robot.rviz\n", "config/robot.yaml\n"):
             self.assertIn(file, files)
