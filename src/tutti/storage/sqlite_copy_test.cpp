@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -32,22 +33,33 @@ class SqliteCopy : public ::testing::Test {
   fs::path file_ = folder_ / "some.tutti", copy_ = folder_ / "copy.tutti";
 };
 
-/// One transaction: the number, in both tables, beside bytes that make the log begin anew every few of them.
+constexpr int kFirst = -40;  // so that the file takes some time to copy
+
+/// One transaction: the number, in both tables, a row of its own, and bytes that make the log begin anew every few of
+/// them.
 std::vector<Write> numbered(int number) {
-  const std::string text = std::to_string(number), filling(300'000, static_cast<char>('a' + number % 26));
-  return {{"apples", "n", text}, {"apples", "filling/" + std::to_string(number % 7), filling}, {"pears", "n", text}};
+  const std::string text = std::to_string(number), filling(300'000, static_cast<char>('a' + std::abs(number) % 26));
+  return {{"apples", "n", text},
+          {"apples", "filling/" + std::to_string(std::abs(number) % 20), filling},
+          {"pears", "n", text},
+          {"pears", "row/" + text, std::string(3000, 'r')}};
 }
 
+/// The number, if the rows of all before it are there.
 int number_in(const TableStore& store) {
   const auto apples = store.read("apples", "n").value(), pears = store.read("pears", "n").value();
   EXPECT_EQ(apples, pears);
-  return apples ? std::stoi(*apples) : -1;
+  const int number = apples ? std::stoi(*apples) : kFirst - 1;
+  int rows = 0;
+  EXPECT_TRUE(store.scan("pears", "row/", [&](std::string_view, std::string_view) { return ++rows > 0; }));
+  EXPECT_EQ(rows, number - kFirst + 1);
+  return number;
 }
 
 TEST_F(SqliteCopy, IsWhatWasCommittedAtSomeMomentWhileOthersCommit) {
   const auto store = open(file_);
   std::atomic<int> committed = 0;
-  ASSERT_TRUE(store->commit(numbered(0)));
+  for (int i = kFirst; i <= 0; ++i) ASSERT_TRUE(store->commit(numbered(i)));
   std::jthread writer([&](const std::stop_token& stop) {
     for (int i = 1; !stop.stop_requested(); ++i) {
       ASSERT_TRUE(store->commit(numbered(i)));
@@ -55,7 +67,7 @@ TEST_F(SqliteCopy, IsWhatWasCommittedAtSomeMomentWhileOthersCommit) {
     }
   });
   int copies = 0, last = 0;
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < 30; ++i) {
     const int before = committed;
     if (const Status copied = copy_sqlite_store(file_, copy_); !copied) {
       EXPECT_NE(copied.error().message.find("changes faster"), std::string::npos) << copied.error().message;
@@ -75,11 +87,11 @@ TEST_F(SqliteCopy, IsWhatWasCommittedAtSomeMomentWhileOthersCommit) {
 }
 
 TEST_F(SqliteCopy, OfAClosedStoreIsTheStore) {
-  ASSERT_TRUE(open(file_)->commit(numbered(5)));
+  ASSERT_TRUE(open(file_)->commit(numbered(kFirst)));
   fs::copy_file(file_, copy_);
   std::ofstream(copy_.string() + "-wal") << "of another store";
   ASSERT_TRUE(copy_sqlite_store(file_, copy_));
-  EXPECT_EQ(number_in(*open(copy_)), 5);
+  EXPECT_EQ(number_in(*open(copy_)), kFirst);
 }
 
 TEST_F(SqliteCopy, WhatCannotBeCopiedIsSaid) {
