@@ -40,6 +40,11 @@ class Images(WithPrograms):
         self.run_tutti("simulate", self.path / "flown.yaml", "-o", self.path)
         return [self.path / "seen.yaml", "--data", self.path]
 
+    def start_alone(self, mission):
+        """Without a server: beside the bag of its name."""
+        return self.start("robot", "--name", "alpha", "--bus", "nats://127.0.0.1:1", "--state", self.path / "alpha_state",
+                          "--feed", self.path / "alpha.feed", "--stay", *mission)
+
     def know_places(self, name):
         """What tf2 has of /tf_static."""
         for topic, cdr in mcap_reader.messages((self.path / name / f"{name}_0.mcap").read_bytes()):
@@ -112,8 +117,7 @@ class Images(WithPrograms):
     def test_depth_and_an_imu_with_one_camera(self):
         mission = self.simulate("depth: true", 3)
         self.know_places("alpha")
-        self.start("robot", "--name", "alpha", "--bus", "nats://127.0.0.1:1", "--state", self.path / "alpha_state", "--feed",
-                   self.path / "alpha.feed", "--stay", *mission)
+        self.start_alone(mission)
         node = self.node("alpha", use_scans=False, images="camera0/image_raw", depth="depth/image_raw", imu="imu")
         self.wait_for(lambda: node.link.state == "feeding", "the robot")
         self.fly({"alpha": node}, 2.0)
@@ -124,6 +128,33 @@ class Images(WithPrograms):
         self.assertEqual([node.link.sensors.HasField("depth"), node.link.sensors.HasField("imu")], [True, True])
         self.assertEqual(node.link.counts["refused"], 0, node.link.why)
         self.assertEqual(list(node.trouble), [])
+
+    def test_a_killed_robot_is_told_its_images_again(self):
+        mission = self.simulate("cameras: 1", 3)
+        self.know_places("alpha")
+        robot = self.start_alone(mission)
+        node = self.node("alpha", use_scans=False, images="camera0/image_raw", imu="imu")
+        self.wait_for(lambda: node.link.state == "feeding", "the robot")
+        said = [(topic, message) for topic, message in self.recorded("alpha", TOPICS) if topic in node.callbacks]
+
+        def drive(messages):
+            for topic, message in messages:
+                node.callbacks[topic](message)
+                time.sleep(0.002)
+
+        drive(said[:len(said) // 2])
+        self.wait_for(lambda: node.link.state == "feeding" and not node.link.waiting, "what was fed")
+        robot.kill()
+        self.wait_for(lambda: node.link.state == "away", "the end")
+        drive(said[len(said) // 2:])
+        before = node.link.counts["images"]
+        self.start_alone(mission)
+        self.wait_for(lambda: node.link.state == "feeding" and not node.link.waiting, "all that was said again")
+        again = node.link.counts["images"] - before
+        self.assertGreater(again, self.recorded_images("alpha")[0] // 3)
+        self.wait_for(lambda: self.fed("alpha_state").get("images") == again, "images, counted by the robot")
+        self.assertEqual(self.fed("alpha_state")["images_left_out"], 0)
+        self.assertEqual(node.link.counts["refused"], 0, node.link.why)
 
     def test_what_is_not_wanted_is_not_subscribed_and_what_is_missing_is_said(self):
         topics = {"odom", "points", "fix"}
