@@ -166,6 +166,8 @@ class OfAServer(WithPrograms):
         """A robot's node feeds its scans; beside the server the other node shows the map, which is that of the file."""
         self.run_tutti("simulate", SOURCE / "missions/demo.yaml", "-o", self.path, "--set",
                        "simulation.robots.0.walk.duration_s=40", "--set", "simulation.robots.1.walk.duration_s=1")
+        self.addCleanup(setattr, server_map, "REST_PER_WORK", server_map.REST_PER_WORK)
+        server_map.REST_PER_WORK = 0.0
         map_file = self.path / "server/map.tutti"
         shown = self.node("none", MapNode, map=str(map_file), program=TUTTI, period_s=0.5)
         grids = shown.made["map"].said
@@ -204,10 +206,9 @@ class OfAServer(WithPrograms):
         server, _ = self.start_server("--rate", "20")
         server.send_signal(signal.SIGTERM)
         self.assertEqual(server.wait(PATIENCE_S), 0)
-        end = time.monotonic() + 3.0  # what was stored last
-        while time.monotonic() < end or shown.source.running:
-            looked()
-            time.sleep(0.05)
+        source = shown.source
+        self.wait_for(lambda: looked() and not source.running and source.signature == source.signature_now(),
+                      "the map of what was stored last")
         self.run_tutti("map", "export", map_file, "--grid", self.path / "out.yaml")
         expected = grid_of((self.path / "out.yaml").read_text(), (self.path / "out.pgm").read_bytes())
         last = grids[-1]

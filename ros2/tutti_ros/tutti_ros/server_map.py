@@ -100,7 +100,7 @@ class ServerMap:
             if self.running.poll() is None:
                 return None
             return self._finish(now_s)
-        signature = self._signature()
+        signature = self.signature_now()
         if signature is None:
             self.why = f"{self.file} is not there yet: no server has begun a map in this folder"
         elif signature != self.signature and now_s >= self.not_before_s:
@@ -108,8 +108,8 @@ class ServerMap:
             self._start(now_s)
         return None
 
-    def _signature(self):
-        """Another one where anything was stored."""
+    def signature_now(self):
+        """Of the files; another one where anything was stored. None: they are not there."""
         def state(path):
             try:
                 found = path.stat()
