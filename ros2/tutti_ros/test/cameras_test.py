@@ -245,6 +245,12 @@ class Waiting(unittest.TestCase):
         self.assertFalse(depth(1051, width=2))
         said, left_out = cameras.due()
         self.assertEqual((said[0][1][2], left_out), (None, ["depth/image: an image of 2 x 3 pixels, expected 4 x 3"]))
+        another = camera_info()
+        another.k[0] = 470.0
+        self.assertTrue(cameras.add_info(cameras.depth, another))
+        self.assertTrue(cameras.look())
+        self.assertIn("no depth is used: depth/image: fx, fy, cx, cy (470.0,", cameras.missing[0])
+        self.assertFalse(cameras.sensors().HasField("depth"))
         for frame, width, text in (("r1/depth", 4, "0.100 m and 0.0000 rad from 'r1/camera'"), ("r1/camera", 2, "expected")):
             cameras = self.ready(depth="depth/image")
             self.known["r1/depth"] = (0.1, 0.1, 0.2, 0.0, 0.0, 0.0, 1.0)

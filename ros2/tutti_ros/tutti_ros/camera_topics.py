@@ -19,6 +19,7 @@ class CameraTopics:
             self._subscribe(CameraInfo, stream.info, self.cameras.add_info, stream)
             self._subscribe(CompressedImage if stream.is_compressed else Image, stream.topic, self.cameras.add_image, stream)
         if node.depth:
+            self._subscribe(CameraInfo, self.cameras.depth.info, self.cameras.add_info, self.cameras.depth)
             self._subscribe(Image, node.depth, self.cameras.add_image, self.cameras.depth)
         if node.imu:
             self._subscribe(Imu, node.imu, self.cameras.add_imu, depth=IMU_DEPTH)

@@ -19,7 +19,7 @@ BATCH_NS = 50 * MS             # of IMU samples in one message, unless images wa
 MOST_IN_BATCH = 10_000
 MOST_BYTES = 48 * 1024 * 1024  # of images that wait, before the oldest go
 MOST_IMU = 20_000
-SAME_PLACE_M, SAME_TURN_RAD = 1e-3, 1e-3  # of depth and the camera it is registered to
+SAME_PLACE_M, SAME_TURN_RAD, SAME_MATRIX_PX = 1e-3, 1e-3, 1.0  # of depth and the camera it is registered to
 DEPTH = Feed.Depth(unit_m=from_ros.DEPTH_UNIT_M, sigma_per_m2=0.0014, least_m=0.3, most_m=8.0)  # DepthSensor
 
 
@@ -148,7 +148,7 @@ class Cameras:
         if self.streams and not self.placed:
             placed = [self._found("no images are used", self._place_of, stream) for stream in self.streams]
             self.placed = placed if all(placed) else []
-        if self.depth and self.placed and not self.has_depth:
+        if self.depth and self.placed:  # always, as its CameraInfo may come last
             self.has_depth = bool(self._found("no depth is used", self._check_registered))
         if self.imu and self.R_body_imu is None:
             self.R_body_imu = self._found("no IMU is used", self._turn_of_imu)
@@ -169,13 +169,18 @@ class Cameras:
         return self.place(stream.frame_id)
 
     def _check_registered(self):
-        """Its pixels are the camera's, if they are as many and its frame is at the same place."""
+        """Its pixels are the camera's, if they are as many, its frame is at the same place, and its CameraInfo, where there is
+        one, has the same matrix."""
         depth, stream = self.depth, self.streams[0]
         if depth.frame_id is None:
             raise ValueError(f"{depth.topic}: no image")
         size = stream.camera.width_px, stream.camera.height_px
         if depth.size != size:
             raise ValueError(f"{depth.topic}: {depth.size} pixels, expected {size} as of {stream.topic}")
+        matrix = lambda camera: (camera.fx, camera.fy, camera.cx, camera.cy)
+        if depth.camera and max(abs(a - b) for a, b in zip(matrix(depth.camera), matrix(stream.camera))) > SAME_MATRIX_PX:
+            raise ValueError(f"{depth.topic}: fx, fy, cx, cy {matrix(depth.camera)} px in its CameraInfo, expected "
+                             f"{matrix(stream.camera)} as of {stream.topic}: is it registered to it?")
         if depth.frame_id != stream.frame_id:
             T_body_depth, T_body_camera = self.place(depth.frame_id), self.placed[0]
             away_m, turn_rad = math.dist(T_body_depth[:3], T_body_camera[:3]), angle(T_body_depth, T_body_camera)
