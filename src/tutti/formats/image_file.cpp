@@ -5,7 +5,7 @@
 #include <turbojpeg.h>
 
 #include <algorithm>
-#include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <utility>
@@ -13,6 +13,7 @@
 
 #include "tutti/base/check.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/model/nearest_stamp.hpp"
 
 namespace tutti::formats {
 namespace {
@@ -142,45 +143,41 @@ std::string encode_png(const Image& image) {
   return encode(image.width_px, image.height_px, PNG_FORMAT_GRAY, image.grey.data());
 }
 
-namespace {
-
-/// The one that is nearest to a stamp in time, and not farther than that; null: none is.
-const ImageFile* nearest(const std::vector<ImageFile>& files, Timestamp stamp, double max_difference_s) {
-  const auto away_s = [&](const ImageFile& file) { return std::abs(file.stamp - stamp); };
-  const auto after = std::ranges::lower_bound(files, stamp, {}, &ImageFile::stamp);
-  const ImageFile* found = after == files.end() ? nullptr : &*after;
-  if (after != files.begin() && (found == nullptr || away_s(*(after - 1)) < away_s(*found))) found = &*(after - 1);
-  return found != nullptr && away_s(*found) <= max_difference_s ? found : nullptr;
-}
-
-}  // namespace
-
 ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s) {
   TUTTI_CHECK(!cameras.empty());
   ImageStream out;
   for (const CameraImages& camera : cameras) out.cameras.push_back(camera.camera);
   for (const ImageFile& file : cameras[0].images) out.stamps.push_back(file.stamp);
   out.load = [cameras = std::move(cameras), max_difference_s](std::size_t moment, std::size_t camera) -> Result<Image> {
-    const auto* file = nearest(cameras.at(camera).images, cameras[0].images.at(moment).stamp, max_difference_s);
-    return file == nullptr ? Image() : read_image(file->path);
+    const std::vector<ImageFile>& files = cameras.at(camera).images;
+    const auto file = nearest_in_time(files, cameras[0].images.at(moment).stamp, max_difference_s, &ImageFile::stamp);
+    return file == files.end() ? Image() : read_image(file->path);
   };
   return out;
 }
 
-std::size_t add_depth(ImageStream& stream, const std::vector<ImageFile>& files, const DepthSensor& sensor,
-                      double max_difference_s) {
-  std::map<std::size_t, std::string> path;  // by moment
-  for (std::size_t moment = 0; moment < stream.stamps.size(); ++moment) {
-    const auto* file = nearest(files, stream.stamps[moment], max_difference_s);
-    if (file != nullptr) path.emplace(moment, file->path);
-  }
+std::size_t add_depth(ImageStream& stream, const std::vector<Timestamp>& stamps, const LoadDepth& load,
+                      const DepthSensor& sensor, double max_difference_s) {
+  std::map<std::size_t, std::size_t> of_moment;
+  for (std::size_t moment = 0; moment < stream.stamps.size(); ++moment)
+    if (const auto at = nearest_in_time(stamps, stream.stamps[moment], max_difference_s, std::identity());
+        at != stamps.end())
+      of_moment.emplace(moment, static_cast<std::size_t>(at - stamps.begin()));
   stream.depth = sensor;
-  const std::size_t found = path.size();
-  stream.load_depth = [path = std::move(path)](std::size_t moment) -> Result<DepthImage> {
-    const auto at = path.find(moment);
-    return at == path.end() ? DepthImage() : read_depth(at->second);
+  const std::size_t found = of_moment.size();
+  stream.load_depth = [of_moment = std::move(of_moment), load](std::size_t moment) -> Result<DepthImage> {
+    const auto at = of_moment.find(moment);
+    return at == of_moment.end() ? DepthImage() : load(at->second);
   };
   return found;
+}
+
+std::size_t add_depth(ImageStream& stream, const std::vector<ImageFile>& files, const DepthSensor& sensor,
+                      double max_difference_s) {
+  std::vector<Timestamp> stamps;
+  for (const ImageFile& file : files) stamps.push_back(file.stamp);
+  const auto load = [files](std::size_t number) { return read_depth(files.at(number).path); };
+  return add_depth(stream, stamps, load, sensor, max_difference_s);
 }
 
 }  // namespace tutti::formats

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,8 +39,14 @@ std::string encode_depth(const DepthImage& image);
 /// camera. Of every other camera, the image nearest to a moment belongs to it if within `max_difference_s`; where there
 /// is none, the image is empty. At least one camera.
 ImageStream stream_images(std::vector<CameraImages> cameras, double max_difference_s = 0.005);
+using LoadDepth = std::function<Result<DepthImage>(std::size_t number)>;
+
 /// Adds to a stream the depth of what its first camera saw: for every moment the depth image nearest in time, if within
-/// `max_difference_s`. `files`: by increasing stamps. Returns the number of moments that have depth.
+/// `max_difference_s`. `stamps` are those of the depth images, and increase; `load` loads the one of that number when
+/// it is asked for. Returns the number of moments that have depth.
+std::size_t add_depth(ImageStream& stream, const std::vector<Timestamp>& stamps, const LoadDepth& load,
+                      const DepthSensor& sensor, double max_difference_s);
+/// The same of files.
 std::size_t add_depth(ImageStream& stream, const std::vector<ImageFile>& files, const DepthSensor& sensor,
                       double max_difference_s);
 
