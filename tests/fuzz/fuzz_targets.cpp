@@ -7,6 +7,8 @@
 #include "fuzz/fuzz_target.hpp"
 #include "support/wire/messages.hpp"
 #include "tutti/bags/bag_info.hpp"
+#include "tutti/bags/camera.hpp"
+#include "tutti/bags/depth.hpp"
 #include "tutti/bags/mcap_reader.hpp"
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros1_reader.hpp"
@@ -167,7 +169,7 @@ void ros1_bag(std::string_view bytes) {
 void rosbag2_metadata(std::string_view bytes) {
   static_cast<void>(bags::parse_rosbag2_metadata(std::string(bytes), "fuzz"));
 }
-/// The first byte says which type. What is a cloud is one of points, too.
+/// The first byte says which type. What is a cloud is one of points, too, and an image a picture or depth.
 void message(std::string_view bytes, bags::RosEncoding encoding) {
   if (bytes.empty()) return;
   const std::string_view rest = bytes.substr(1);
@@ -182,9 +184,13 @@ void message(std::string_view bytes, bags::RosEncoding encoding) {
     case 3:
       return static_cast<void>(bags::decode_imu(rest, encoding));
     case 4:
-      return static_cast<void>(bags::decode_image(rest, encoding));
+      if (const auto image = bags::decode_image(rest, encoding))
+        static_cast<void>(bags::to_image(*image)), static_cast<void>(bags::to_depth(*image));
+      return;
     case 5:
-      return static_cast<void>(bags::decode_compressed_image(rest, encoding));
+      if (const auto packed = bags::decode_compressed_image(rest, encoding))
+        static_cast<void>(bags::to_depth(*packed, {4, 3}));
+      return;
     case 6:
       return static_cast<void>(bags::decode_camera_info(rest, encoding));
     case 7:

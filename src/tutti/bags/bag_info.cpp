@@ -6,18 +6,21 @@
 #include <map>
 #include <utility>
 
+#include "tutti/bags/camera.hpp"
+#include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
 namespace tutti::bags {
 namespace {
 
+constexpr std::string_view kImageType = "sensor_msgs/msg/Image";
 constexpr std::size_t kMostSaid = 10;
 constexpr std::size_t kMostFrames = 4;
 
 constexpr std::array<std::pair<std::string_view, Use>, 9> kTypes{{
     {"nav_msgs/msg/Odometry", Use::odometry},
     {"sensor_msgs/msg/PointCloud2", Use::scans},
-    {"sensor_msgs/msg/Image", Use::images},
+    {kImageType, Use::images},
     {"sensor_msgs/msg/CompressedImage", Use::images},
     {"sensor_msgs/msg/CameraInfo", Use::calibration},
     {"sensor_msgs/msg/Imu", Use::imu},
@@ -43,8 +46,12 @@ Result<std::string> frames_of_tf(std::string_view bytes, RosEncoding encoding) {
   return out;
 }
 
-Result<std::string> frames_of(std::string_view type, std::string_view bytes, RosEncoding encoding) {
-  switch (use_of(type)) {
+Result<std::string> frames_of(TopicInfo& topic, std::string_view bytes, RosEncoding encoding) {
+  const auto image_frame = [&](const auto& message) {
+    if (message) topic.image = look_of(*message);
+    return frame_of(message);
+  };
+  switch (topic.use) {
     case Use::odometry: {
       const auto message = decode_odometry(bytes, encoding);
       if (!message) return tl::unexpected(message.error());
@@ -53,10 +60,13 @@ Result<std::string> frames_of(std::string_view type, std::string_view bytes, Ros
     case Use::scans:
       return frame_of(decode_point_cloud(bytes, encoding));
     case Use::images:
-      return type == "sensor_msgs/msg/Image" ? frame_of(decode_image(bytes, encoding))
-                                             : frame_of(decode_compressed_image(bytes, encoding));
-    case Use::calibration:
-      return frame_of(decode_camera_info(bytes, encoding));
+      return topic.type == kImageType ? image_frame(decode_image(bytes, encoding))
+                                      : image_frame(decode_compressed_image(bytes, encoding));
+    case Use::calibration: {
+      const auto message = decode_camera_info(bytes, encoding);
+      if (message) topic.calibration = *message;
+      return frame_of(message);
+    }
     case Use::imu:
       return frame_of(decode_imu(bytes, encoding));
     case Use::fixes:
@@ -74,21 +84,74 @@ Result<std::string> frames_of(std::string_view type, std::string_view bytes, Ros
 void look_at(TopicInfo& topic, const BagMessage& message) {
   if (topic.count++ == 0 && topic.use != Use::nothing) {
     const auto encoding = to_encoding(message.channel->message_encoding);
-    const auto frames = encoding ? frames_of(topic.type, message.data, *encoding)
-                                 : Result<std::string>(tl::unexpected(encoding.error()));
+    const auto frames =
+        encoding ? frames_of(topic, message.data, *encoding) : Result<std::string>(tl::unexpected(encoding.error()));
     (frames ? topic.frames : topic.problem) = frames ? *frames : frames.error().message;
   }
   topic.first = std::min(topic.first, message.log_time);
   topic.last = std::max(topic.last, message.log_time);
 }
 
+void add_transforms(TransformTree& tree, const BagMessage& message) {
+  const auto encoding = to_encoding(message.channel->message_encoding);
+  if (!encoding) return;
+  const auto transforms = decode_tf(message.data, *encoding);
+  if (!transforms) return;
+  for (const RosTransform& transform : *transforms) static_cast<void>(tree.add(transform, true));
+}
+
+bool shows_depth(const TopicInfo& topic) { return topic.image && is_depth(topic.topic, topic.image->encoding); }
+bool is_understood(const TopicInfo& topic, Use use) {
+  return topic.use == use && topic.count > 0 && topic.problem.empty();
+}
+
+/// Without those that show depth.
 std::string list_of(const BagInfo& info, Use use) {
   std::string out;
   for (const TopicInfo& topic : info.topics)
-    if (topic.use == use && topic.count > 0 && topic.problem.empty())
+    if (is_understood(topic, use) && !shows_depth(topic))
       out += fmt::format("{}{}{}", out.empty() ? "" : "; ", topic.topic,
                          topic.frames.empty() ? "" : " (" + topic.frames + ")");
   return out;
+}
+
+ImageTopic image_topic(const BagInfo& info, const TopicInfo& topic) {
+  ImageTopic out{topic.topic, topic.image->frame, topic.image->width_px, topic.image->height_px, {}};
+  const std::string beside = camera_info_topic(topic.topic, topic.type != kImageType);
+  const auto at = std::ranges::find_if(
+      info.topics, [&](const TopicInfo& other) { return other.topic == beside && other.calibration.has_value(); });
+  if (at != info.topics.end()) out.info = at->calibration;
+  return out;
+}
+
+/// The topics that show depth, and what a robot would do with them; empty when there are none.
+std::string depth_in_words(const BagInfo& info) {
+  std::string out;
+  std::vector<ImageTopic> cameras, depths;
+  for (const TopicInfo& topic : info.topics) {
+    if (!is_understood(topic, Use::images)) continue;
+    ImageTopic it = image_topic(info, topic);
+    const ImageLook& look = *topic.image;
+    if (shows_depth(topic)) {
+      out += fmt::format("{}{} ({}, {}, {} x {}{})", out.empty() ? "" : "; ", it.topic, it.frame, look.encoding,
+                         it.width_px, it.height_px, it.info ? "" : ", no CameraInfo");
+      if (it.info) depths.push_back(std::move(it));
+    } else if (it.info && (topic.type != kImageType || is_picture(look.encoding))) {
+      it.width_px = it.info->width;
+      it.height_px = it.info->height;
+      cameras.push_back(std::move(it));
+    }
+  }
+  if (out.empty()) return out;
+  const CameraWishes wishes{.images_flag = "tutti run --topic NAME.images=",
+                            .depth_flag = "tutti run --topic NAME.depth="};
+  const auto choice = choose_cameras(cameras, depths, wishes,
+                                     [&](const std::string& a, const std::string& b) { return info.tree.find(a, b); });
+  if (!choice) return out + "; " + choice.error().message;
+  if (choice->depth)
+    return out + fmt::format("; {} goes with {}", depths[*choice->depth].topic, cameras[choice->cameras.front()].topic);
+  if (choice->cameras.empty()) return out + "; no camera with a CameraInfo that it goes with";
+  return choice->note.empty() ? out : out + "; " + choice->note;
 }
 
 }  // namespace
@@ -125,6 +188,7 @@ BagInfo inspect(BagReader& bag) {
     TopicInfo*& topic = of_channel[(*message)->channel];
     if (!topic) topic = &topic_of(*(*message)->channel);
     look_at(*topic, **message);
+    if (topic->use == Use::transforms && topic->topic.ends_with("tf_static")) add_transforms(out.tree, **message);
     ++out.messages;
   }
   for (const BagChannel* const channel : bag.channels()) topic_of(*channel);
@@ -161,11 +225,14 @@ std::vector<std::string> uses(const BagInfo& info) {
     add("odometry", "no nav_msgs/msg/Odometry; transforms, if odometry's is among them");
   else
     add("odometry", "missing: without odometry nothing can be made of this bag");
-  for (const Row& row : kRows)
+  for (const Row& row : kRows) {
     if (const std::string list = list_of(info, row.use); !list.empty())
       add(row.name, list);
     else if (row.without)
       add(row.name, row.without);
+    if (row.use != Use::images) continue;
+    if (const std::string depth = depth_in_words(info); !depth.empty()) add("depth", depth);
+  }
   return out;
 }
 

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
+#include "tutti/bags/depth.hpp"
+#include "tutti/bags/transform_tree.hpp"
 
 namespace tutti::bags {
 
@@ -20,13 +23,16 @@ struct TopicInfo {
   Use use = Use::nothing;
   std::uint64_t count = 0;
   Timestamp first = kLastTimestamp, last = kFirstTimestamp;  ///< Log times: the earliest and the latest.
-  std::string frames;   ///< Frames of the first message ("odom -> base_link"); empty for types without a use.
-  std::string problem;  ///< Why the first message could not be decoded; empty if it could.
+  std::string frames;  ///< Frames of the first message ("odom -> base_link"); empty for types without a use.
+  std::optional<ImageLook> image;  ///< What the first message shows, of images.
+  std::optional<RosCameraInfo> calibration;
+  std::string problem;                   ///< Why the first message could not be decoded; empty if it could.
   [[nodiscard]] double rate_hz() const;  ///< Mean rate; 0 for fewer than two messages.
 };
 
 struct BagInfo {
   std::vector<TopicInfo> topics;  ///< Sorted by name, then by type.
+  TransformTree tree;             ///< Of /tf_static.
   std::uint64_t messages = 0;
   std::uint64_t errors = 0;        ///< Records and chunks that could not be read.
   std::vector<std::string> said;   ///< Messages of the first ten errors.
@@ -37,7 +43,8 @@ struct BagInfo {
 BagInfo inspect(BagReader& bag);
 
 /// What Tutti would take from the bag, for people, a line per kind of input: "odometry     /odom (odom -> base_link)".
-/// All topics of a kind are named; where a kind is missing the line says what that means.
+/// All topics of a kind are named; where a kind is missing the line says what that means. Of depth it says which camera
+/// it goes with, or why with none.
 std::vector<std::string> uses(const BagInfo& info);
 
 }  // namespace tutti::bags

@@ -9,6 +9,7 @@
 #include "support/bags/bag_writer.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/bags/mcap_reader.hpp"
+#include "tutti/bags/ros_encode.hpp"
 #include "tutti/bags/ros_messages.hpp"
 
 namespace tutti::bags {
@@ -70,6 +71,48 @@ TEST(BagInfo, StatisticsThatDisagreeAreNoted) {
   const std::string definitions = schema(1, "a/msg/B") + channel(1, 1, "/a");
   const BagInfo info = info_of(closed(kMagic + definitions + message(1, 1, ""), definitions, 9));
   EXPECT_EQ(info.notes, std::vector<std::string>{"its statistics say 9 messages, 1 could be read"});
+}
+
+/// A camera and three topics of depth: of its images, of other ones, and of none that is calibrated.
+TEST(BagInfo, DepthIsNoCameraAndItsOwnIsNamed) {
+  const std::string pixels(640 * 480 * 2, '\1');
+  std::string data = kMagic;
+  std::uint16_t id = 0;
+  const auto add = [&](const std::string& topic, const char* type, const std::string& bytes) {
+    ++id;
+    data += schema(id, type) + channel(id, id, topic) + message(id, 1, bytes);
+  };
+  const auto add_images = [&](const std::string& name, const char* encoding, std::uint32_t width, bool has_info) {
+    RosImage image{.header = {{1}, "optical"}, .height = 480, .width = width, .encoding = encoding};
+    image.step = 2 * width;
+    image.data = std::string_view(pixels).substr(0, std::size_t{2} * width * 480);
+    add(name + "/image_raw", "sensor_msgs/msg/Image", encode(image));
+    RosCameraInfo info{.header = image.header, .height = 480, .width = width};
+    info.k = {500, 0, 320, 0, 500, 240, 0, 0, 1};
+    if (has_info) add(name + "/camera_info", "sensor_msgs/msg/CameraInfo", encode(info));
+  };
+  const auto said = [&](const char* row) {
+    for (const std::string& line : uses(info_of(data)))
+      if (line.starts_with(row)) return line;
+    return std::string("nothing");
+  };
+  add_images("/color", "mono8", 640, true);
+  EXPECT_EQ(said("depth"), "nothing");
+  add_images("/raw", "32FC1", 320, true);
+  add_images("/bare", "16UC1", 640, false);
+  EXPECT_EQ(said("images"), "images       /color/image_raw (optical)");
+  EXPECT_EQ(
+      said("depth"),
+      "depth        /bare/image_raw (optical, 16UC1, 640 x 480, no CameraInfo); /raw/image_raw (optical, 32FC1, 320 "
+      "x 480); no depth is used: none is registered to /color/image_raw: /raw/image_raw: 320 x 480 "
+      "pixels, expected 640 x 480 as of /color/image_raw");
+  add_images("/aligned", "16UC1", 640, true);
+  EXPECT_TRUE(said("depth").ends_with("; /aligned/image_raw goes with /color/image_raw")) << said("depth");
+  add_images("/second", "16UC1", 640, true);
+  EXPECT_TRUE(
+      said("depth").ends_with("2 topics are registered to /color/image_raw, /aligned/image_raw and "
+                              "/second/image_raw; say which: tutti run --topic NAME.depth=/aligned/image_raw"))
+      << said("depth");
 }
 
 TEST(BagInfo, WithoutOdometryThatIsSaid) {

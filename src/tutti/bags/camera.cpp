@@ -85,16 +85,21 @@ Result<CameraModel> to_camera(const RosCameraInfo& message) {
 
 bool is_picture(std::string_view encoding) { return layout_of(encoding) != nullptr; }
 
+Status check_rows(const RosImage& message, std::uint32_t pixel_bytes) {
+  const std::uint64_t row = std::uint64_t{message.width} * pixel_bytes;
+  if (message.width == 0 || message.height == 0 || message.step < row ||
+      message.data.size() < (message.height - 1) * std::uint64_t{message.step} + row)
+    return fail(ErrorCode::invalid, "{} x {} pixels of {} bytes, rows of {} bytes, {} bytes in all", message.width,
+                message.height, pixel_bytes, message.step, message.data.size());
+  return {};
+}
+
 Result<Image> to_image(const RosImage& message) {
   const PixelLayout* const layout = layout_of(message.encoding);
   if (layout == nullptr)
     return fail(ErrorCode::unsupported, "encoding '{:.40}', expected mono8, rgb8, bgr8, rgba8, bgra8 or bayer_..8",
                 message.encoding);
-  const std::uint64_t row = std::uint64_t{message.width} * layout->bytes;
-  if (message.width == 0 || message.height == 0 || message.step < row ||
-      message.data.size() < (message.height - 1) * std::uint64_t{message.step} + row)
-    return fail(ErrorCode::invalid, "{} x {} pixels of {} bytes, rows of {} bytes, {} bytes in all", message.width,
-                message.height, layout->bytes, message.step, message.data.size());
+  if (auto ok = check_rows(message, layout->bytes); !ok) return tl::unexpected(ok.error());
   Image out(static_cast<int>(message.width), static_cast<int>(message.height));
   const auto* const data = reinterpret_cast<const std::uint8_t*>(message.data.data());
   std::uint8_t* to = out.grey.data();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -24,6 +25,9 @@ Result<CameraModel> to_camera(const RosCameraInfo& message);
 Result<Image> to_image(const RosImage& message);
 /// True for the encodings that to_image() takes.
 bool is_picture(std::string_view encoding);
+
+/// Fails unless the message has as many bytes as its size, its step and so many bytes a pixel want.
+Status check_rows(const RosImage& message, std::uint32_t pixel_bytes);
 
 /// The topic of the CameraInfo that belongs to a topic of images: "/a/image_raw" and, compressed,
 /// "/a/image_raw/compressed" have "/a/camera_info" beside them.
