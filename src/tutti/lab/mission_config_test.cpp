@@ -62,7 +62,7 @@ TEST(MissionConfig, ImagesComeFromOnePlace) {
   expect("euroc_folder: f, list: l, cameras: c", "images: several of euroc_folder, list and maplab_submaps are given");
   expect("list: l", "images.cameras: missing, but images.list is given");
   expect("cameras: c", "images.list: missing, but images.cameras is given");
-  expect("time_offset_s: 1", "images.time_offset_s: given, but there is no images.euroc_folder or images.list");
+  expect("time_offset_s: 1", "images.time_offset_s: given, but there is no images.euroc_folder, images.list or bag");
   expect("euroc_folder: f, imu: i", "images.imu: given, but images.euroc_folder has its own in imu0");
   expect("euroc_folder: f, most_cameras: 3", "images.most_cameras: ");
   EXPECT_NE(problem("euroc_folder: f", "{}").find("robots.0.odometry.file: missing"), std::string::npos);

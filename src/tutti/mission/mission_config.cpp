@@ -46,8 +46,8 @@ void check_images(const RobotConfig& robot, const std::string& path, const Probl
   if (images.list.empty() != images.cameras.empty())
     problem(fmt::format("{}.images.{}: missing, but images.{} is given", path, images.list.empty() ? "list" : "cameras",
                         images.list.empty() ? "cameras" : "list"));
-  if (images.time_offset_s != 0.0 && !images.has_files())
-    problem(path + ".images.time_offset_s: given, but there is no images.euroc_folder or images.list");
+  if (images.time_offset_s != 0.0 && !images.has_files() && robot.bag.empty())
+    problem(path + ".images.time_offset_s: given, but there is no images.euroc_folder, images.list or bag");
   if (!images.depth.list.empty() && images.list.empty())
     problem(path + ".images.depth.list: given, but there is no images.list");
   if (!images.imu.empty() && !images.euroc_folder.empty())
