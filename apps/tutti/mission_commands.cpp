@@ -206,7 +206,8 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command
       ->add_option("--topic", *topics,
                    "Of a bag where several topics would do: --topic alpha.scans=/points,\n"
-                   "--topic alpha.odometry=/odom, or two frames of /tf: --topic 'alpha.odometry=odom->base_link'")
+                   "--topic alpha.odometry=/odom, or two frames of /tf: --topic 'alpha.odometry=odom->base_link'.\n"
+                   "KIND is odometry, scans, images, depth (of the one camera; none: no depth), imu or fixes")
       ->type_name("NAME.KIND=TOPIC")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -42,28 +43,23 @@ class MapOf {
   std::optional<server::MapEstimate> map_;
 };
 
-/// Two robots in a small tunnel: what they recorded, written as bags and run from these, is the mission itself. Bags'
-/// odometry is given the covariances of recordings, so the mission's is, too.
-TEST(BagMission, FromSimulatedBagsIsTheMission) {
-  MissionConfig config;
-  config.source = "simulation";
-  config.simulation.sensors = "lidar";
-  config.simulation.lidar.azimuth_step_deg = 1.0;
-  config.simulation.world.network = {.rows = 2, .columns = 2, .block_m = 10.0, .jitter_m = 1.0};
-  config.simulation.robots.resize(2);
-  for (auto& robot : config.simulation.robots) robot.walk.duration_s = 40.0;
+/// Writes the bags of a mission and runs both; a bag's odometry is given the covariances of recordings, so the
+/// mission's is, too. `from_bags` has its settings.
+void expect_same(const MissionConfig& config, mission::MissionConfig from_bags) {
   mission::MissionParts parts{
       .input = load_input(config, {}, 1).value(), .finder = nullptr, .refiner = nullptr, .companions = {}};
-  for (mission::MissionRecording& robot : parts.input.robots)
+  for (mission::MissionRecording& robot : parts.input.robots) {
     robot.recording.increment_covariance = robot::increment_covariances(robot.recording.odometry, {});
+    robot.recording.imu_noise = {};
+  }
   parts.finder = finders::make_finder(config.closures);
+  parts.refiner = finders::make_refiner(config.closures, config.refinement);
   MapOf simulated, recorded;
   ASSERT_TRUE(mission::run_mission(config, std::move(parts), simulated.options()));
 
   const fs::path folder = fs::path(::testing::TempDir()) / ("bag_mission_" + std::to_string(getpid()));
   const auto bags = write_bags(config, 1, folder.string());
   ASSERT_TRUE(bags) << bags.error().message;
-  mission::MissionConfig from_bags;
   for (const WrittenBag& bag : *bags)
     from_bags.robots.push_back({.name = fs::path(bag.folder).filename().string(), .bag = bag.folder});
   const auto run = mission::run_mission(from_bags, recorded.options());
@@ -87,6 +83,38 @@ TEST(BagMission, FromSimulatedBagsIsTheMission) {
     EXPECT_EQ(one.closure.from, other.closure.from);
     EXPECT_EQ(one.closure.to, other.closure.to);
   }
+  fmt::print("{} nodes, {} closures; {} m or rad from the mission at most\n", actual.nodes.size(),
+             actual.closures.size(), worst);
+}
+
+/// Two robots in a small tunnel.
+TEST(BagMission, FromSimulatedBagsIsTheMission) {
+  MissionConfig config;
+  config.source = "simulation";
+  config.simulation.sensors = "lidar";
+  config.simulation.lidar.azimuth_step_deg = 1.0;
+  config.simulation.world.network = {.rows = 2, .columns = 2, .block_m = 10.0, .jitter_m = 1.0};
+  config.simulation.robots.resize(2);
+  for (auto& robot : config.simulation.robots) robot.walk.duration_s = 40.0;
+  expect_same(config, {});
+}
+
+/// Two flights with one camera each, whose depth is registered to it.
+TEST(BagMission, OfRgbdCamerasIsTheMission) {
+  MissionConfig config;
+  config.agent.submap.duration_s = 5.0;
+  config.agent.submap.representative_distance_m = 0.3;
+  config.tracking.tracker.descriptors.kind = "orb";
+  config.closures.finder = "visual";
+  config.closures.visual.max_hamming = 0.2;
+  mission::MissionConfig from_bags = config;
+  config.source = "hall";
+  config.hall.depth = true;
+  config.hall.robots = {{.name = "alpha"}, {.name = "bravo"}};
+  for (auto& robot : config.hall.robots) robot.flight.duration_s = 10.0;
+  config.hall.robots[1].flight.start_deg = 20.0;
+  config.hall.robots[1].flight.height_m = 2.0;
+  expect_same(config, std::move(from_bags));
 }
 
 }  // namespace bag_mission_test

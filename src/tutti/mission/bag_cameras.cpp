@@ -8,11 +8,15 @@
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
+#include "tutti/bags/depth.hpp"
+#include "tutti/bags/rgbd.hpp"
 #include "tutti/formats/image_file.hpp"
 #include "tutti/mission/bag_recording.hpp"
 
 namespace tutti::mission {
 namespace {
+
+constexpr const char* kNoDepth = "none";
 
 const bags::RosCameraInfo* info_of(const BagIndex& index, const std::string& topic, bool is_compressed) {
   const auto at = index.cameras.find(bags::camera_info_topic(topic, is_compressed));
@@ -21,16 +25,26 @@ const bags::RosCameraInfo* info_of(const BagIndex& index, const std::string& top
 
 Result<BagCamera> camera_of(const BagIndex& index, const std::string& topic, const ImageTrack& track,
                             const std::string& body) {
+  const std::string& encoding = track.first.encoding;
+  const bool is_picture = track.is_compressed || bags::is_picture(encoding);
+  if (track.is_depth || (!is_picture && !track.images.empty()))
+    return fail(ErrorCode::unsupported, "{}: encoding '{:.40}' is no picture{}", topic, encoding,
+                track.is_depth ? ", but depth" : "");
   if (track.images.empty()) return fail(ErrorCode::invalid, "{}: no images", topic);
-  if (!track.is_compressed && !bags::is_picture(track.encoding))
-    return fail(ErrorCode::unsupported, "{}: encoding '{:.40}' is no picture", topic, track.encoding);
   const bags::RosCameraInfo* const info = info_of(index, topic, track.is_compressed);
   if (info == nullptr) return fail(ErrorCode::invalid, "{}: no sensor_msgs/CameraInfo beside it", topic);
   const auto model = bags::to_camera(*info);
   if (!model) return in_context(topic, model.error());
-  const auto T_body_camera = index.tree.find(body, track.frame);
-  if (!T_body_camera) return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", topic, track.frame, body);
+  const auto T_body_camera = index.tree.find(body, track.first.frame);
+  if (!T_body_camera)
+    return fail(ErrorCode::invalid, "{}: no transform from '{}' to '{}'", topic, track.first.frame, body);
   return BagCamera{topic, {*model, *T_body_camera}, track.images, track.is_compressed};
+}
+
+bags::ImageTopic image_topic(const BagIndex& index, const std::string& topic, const ImageTrack& track) {
+  const bags::RosCameraInfo* const info = info_of(index, topic, track.is_compressed);
+  return {topic, track.first.frame, track.first.width_px, track.first.height_px,
+          info == nullptr ? std::nullopt : std::optional(*info)};
 }
 
 bool is_wanted(const std::string& topic, const std::string& list) {
@@ -56,45 +70,144 @@ void take_imu(const BagIndex& index, const std::string& body, const RobotConfig&
   out.notes.push_back(fmt::format("IMU of {} ({} samples, {} refused)", topic, out.imu.size(), track.refused.count));
 }
 
+std::string flag_of(const RobotConfig& robot, const char* kind) {
+  return fmt::format("--topic {}.{}=", robot.name, kind);
+}
+
+/// The topics of depth to choose from; `why_not` says why there are none although there are some.
+std::vector<bags::ImageTopic> depths_of(const BagIndex& index, const RobotConfig& robot, std::string& why_not) {
+  const std::string& wanted = robot.topics.depth;
+  std::vector<bags::ImageTopic> out;
+  std::string names;
+  if (wanted == kNoDepth) return out;
+  const auto because = [&](const std::string& why) { why_not = "no depth is used: " + why; };
+  for (const auto& [topic, track] : index.images) {
+    if (!track.is_depth) continue;
+    names += (names.empty() ? "" : ", ") + topic;
+    if (!wanted.empty() && topic != wanted) continue;
+    bags::ImageTopic depth = image_topic(index, topic, track);
+    if (track.images.empty())
+      because(note_of(topic, track.refused, track.messages));
+    else if (!depth.info && wanted.empty())
+      because(fmt::format("{}: no sensor_msgs/CameraInfo beside it; if its frame and size are the camera's: {}{}",
+                          topic, flag_of(robot, "depth"), topic));
+    else
+      out.push_back(std::move(depth));
+  }
+  if (out.empty() && why_not.empty() && !wanted.empty())
+    because(fmt::format("'{}' is no topic of 16UC1 or 32FC1 in the bag, expected one of: {}", wanted,
+                        names.empty() ? "none" : names));
+  return out;
+}
+
+void take_choice(const BagIndex& index, const bags::CameraChoice& choice, std::vector<BagCamera> cameras,
+                 const std::vector<bags::ImageTopic>& depths, BagRecording& out) {
+  std::string used;
+  std::vector<std::string> refused;
+  const auto take = [&](const std::string& topic) -> const ImageTrack& {
+    const ImageTrack& track = index.images.at(topic);
+    if (track.refused.count > 0) refused.push_back(note_of(topic, track.refused, track.messages));
+    return track;
+  };
+  for (const std::size_t i : choice.cameras) {
+    take(cameras[i].topic);
+    used += (used.empty() ? "" : ",") + cameras[i].topic;
+    out.cameras.push_back(std::move(cameras[i]));
+  }
+  if (choice.depth) {
+    const std::string& topic = depths[*choice.depth].topic;
+    const ImageTrack& track = take(topic);
+    used += fmt::format(", depth of {} ({})", topic, track.first.encoding);
+    out.depth = BagDepth{topic, track.images, track.is_compressed};
+  }
+  out.notes.push_back("images of " + used);
+  out.notes.insert(out.notes.end(), refused.begin(), refused.end());
+}
+
 /// Reads and decodes; one chunk of the bag in memory.
 class ImageReader {
  public:
   ImageReader(std::unique_ptr<bags::BagReader> reader, std::string file)
       : reader_(std::move(reader)), file_(std::move(file)) {}
 
-  Result<Image> read(const BagCamera& camera, const ScanPlace& place) {
-    const std::scoped_lock lock(mutex_);
-    const std::string name = fmt::format("{}: {}: message {}", file_, camera.topic, place.message);
-    if (auto ok = reader_->seek(place.position); !ok) return in_context(name, ok.error());
-    const auto message = reader_->next();
-    if (!message) return in_context(name, message.error());
-    if (!*message || (*message)->channel->topic != camera.topic)
-      return fail(ErrorCode::io, "{}: is not there any more: has the bag changed?", name);
-    const auto encoding = bags::to_encoding((*message)->channel->message_encoding);
-    if (!encoding) return in_context(name, encoding.error());
-    if (camera.is_compressed) {
-      const auto packed = bags::decode_compressed_image((*message)->data, *encoding);
-      if (!packed) return in_context(name, packed.error());
-      return formats::decode_image(packed->data, name);
-    }
-    const auto raw = bags::decode_image((*message)->data, *encoding);
-    if (!raw) return in_context(name, raw.error());
-    auto image = bags::to_image(*raw);
-    if (!image) return in_context(name, image.error());
-    return image;
+  Result<Image> image(const BagCamera& camera, const ScanPlace& place) {
+    return read<Image>(camera.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
+      if (!camera.is_compressed) return decode(bags::decode_image(message.data, encoding), bags::to_image);
+      return decode(bags::decode_compressed_image(message.data, encoding), [](const bags::RosCompressedImage& packed) {
+        return formats::decode_image(packed.data, "the image");
+      });
+    });
+  }
+  Result<DepthImage> depth(const BagDepth& depth, const ScanPlace& place, formats::ExpectedSize expected) {
+    return read<DepthImage>(depth.topic, place, [&](const bags::BagMessage& message, bags::RosEncoding encoding) {
+      if (!depth.is_compressed)
+        return decode(bags::decode_image(message.data, encoding),
+                      [](const bags::RosImage& raw) { return bags::to_depth(raw); });
+      return decode(bags::decode_compressed_image(message.data, encoding),
+                    [&](const bags::RosCompressedImage& packed) { return bags::to_depth(packed, expected); });
+    });
   }
 
  private:
+  template <class Message, class Convert>
+  static auto decode(const Result<Message>& message, const Convert& convert) -> decltype(convert(*message)) {
+    if (!message) return tl::unexpected(message.error());
+    return convert(*message);
+  }
+
+  /// `make` decodes a message, whose bytes live as long as this reads no other.
+  template <class Out, class Make>
+  Result<Out> read(const std::string& topic, const ScanPlace& place, const Make& make) {
+    const std::scoped_lock lock(mutex_);
+    const std::string name = fmt::format("{}: {}: message {}", file_, topic, place.message);
+    if (auto ok = reader_->seek(place.position); !ok) return in_context(name, ok.error());
+    const auto message = reader_->next();
+    if (!message) return in_context(name, message.error());
+    if (!*message || (*message)->channel->topic != topic)
+      return fail(ErrorCode::io, "{}: is not there any more: has the bag changed?", name);
+    const auto encoding = bags::to_encoding((*message)->channel->message_encoding);
+    if (!encoding) return in_context(name, encoding.error());
+    Result<Out> out = make(**message, *encoding);
+    if (!out) return in_context(name, out.error());
+    return out;
+  }
+
   std::mutex mutex_;
   std::unique_ptr<bags::BagReader> reader_;
   std::string file_;
 };
 
+/// What to say of it. Depth by another clock is not used.
+Result<std::string> add_depth(const BagDepth& depth, const std::shared_ptr<ImageReader>& images,
+                              const ImagesConfig& config, ImageStream& stream) {
+  const auto sensor = depth_sensor(config.depth, bags::kDepthUnit_m);
+  if (!sensor) return tl::unexpected(sensor.error());
+  std::vector<Timestamp> stamps;
+  for (const ScanPlace& place : depth.images) stamps.push_back(place.stamp + config.time_offset_s);
+  const CameraModel& camera = stream.cameras.front().model;
+  const formats::ExpectedSize size{camera.width_px, camera.height_px};
+  const auto load = [images, depth, size](std::size_t number) {
+    return images->depth(depth, depth.images.at(number), size);
+  };
+  const std::size_t found = formats::add_depth(stream, stamps, load, *sensor, config.depth.max_difference_s);
+  if (const auto ok = check_depth_stamps(stream.stamps, stamps, found, config.depth.max_difference_s); !ok) {
+    stream.load_depth = {};
+    return fmt::format("; no depth is used: {}: {}", depth.topic, ok.error().message);
+  }
+  constexpr double kEarly_s = 5.0;
+  std::string out = fmt::format("; {} of them have depth", found);
+  if (const double early_s = stream.stamps.back() - stamps.back(); early_s > kEarly_s)
+    out += fmt::format(", which ends {:.1f} s before them", early_s);
+  return out;
+}
+
 }  // namespace
 
 void take_cameras(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
   const std::string& wanted = robot.topics.images;
-  std::string why, found;
+  std::string why;
+  std::vector<BagCamera> cameras;
+  std::vector<bags::ImageTopic> topics;
   for (const auto& [topic, track] : index.images) {
     if (!wanted.empty() && !is_wanted(topic, wanted)) continue;
     auto camera = camera_of(index, topic, track, body);
@@ -102,21 +215,27 @@ void take_cameras(const BagIndex& index, const std::string& body, const RobotCon
       why += (why.empty() ? "" : "; ") + camera.error().message;
       continue;
     }
-    found += (found.empty() ? "" : ",") + topic;
-    out.cameras.push_back(std::move(*camera));
+    topics.push_back(image_topic(index, topic, track));
+    topics.back().width_px = static_cast<std::uint32_t>(camera->camera.model.width_px);
+    topics.back().height_px = static_cast<std::uint32_t>(camera->camera.model.height_px);
+    cameras.push_back(std::move(*camera));
   }
-  const auto most = static_cast<std::size_t>(robot.images.most_cameras);
-  if (out.cameras.size() > 2) {
-    why = fmt::format("{} cameras, expected one or two; say which: --topic {}.images={}", out.cameras.size(),
-                      robot.name, found);
-    out.cameras.clear();
-  } else if (out.cameras.size() > most) {
-    out.cameras.erase(out.cameras.begin() + static_cast<std::ptrdiff_t>(most), out.cameras.end());
-  }
-  if (out.cameras.empty())
+  std::string no_depth;
+  const std::vector<bags::ImageTopic> depths = depths_of(index, robot, no_depth);
+  const bags::CameraWishes wishes{.are_named = !wanted.empty(),
+                                  .most_cameras = robot.images.most_cameras,
+                                  .images_flag = flag_of(robot, "images"),
+                                  .depth_flag = flag_of(robot, "depth")};
+  const auto find = [&](const std::string& a, const std::string& b) { return index.tree.find(a, b); };
+  const auto choice = bags::choose_cameras(topics, depths, wishes, find);
+  if (!choice)
+    out.no_images = choice.error().message;
+  else if (choice->cameras.empty())
     out.no_images = why.empty() ? "no sensor_msgs/Image or CompressedImage in the bag" : why;
   else
-    out.notes.push_back("images of " + found);
+    take_choice(index, *choice, std::move(cameras), depths, out);
+  if (!out.cameras.empty() && !out.depth && !(choice->note + no_depth).empty())
+    out.notes.push_back(choice->note.empty() ? no_depth : choice->note);
   take_imu(index, body, robot, out);
 }
 
@@ -128,15 +247,24 @@ Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odome
   for (const BagCamera& camera : bag.cameras) stream.cameras.push_back(camera.camera);
   const double offset_s = robot.images.time_offset_s;
   for (const ScanPlace& place : bag.cameras.front().images) stream.stamps.push_back(place.stamp + offset_s);
-  stream.load = [images = std::make_shared<ImageReader>(std::move(*reader), bag.file), cameras = bag.cameras,
-                 most_s = tracking.max_stamp_difference_s](std::size_t moment, std::size_t camera) -> Result<Image> {
+  const auto images = std::make_shared<ImageReader>(std::move(*reader), bag.file);
+  stream.load = [images, cameras = bag.cameras, most_s = tracking.max_stamp_difference_s](
+                    std::size_t moment, std::size_t camera) -> Result<Image> {
     const Timestamp stamp = cameras.front().images.at(moment).stamp;
     const std::vector<ScanPlace>& places = cameras.at(camera).images;
     const auto place = std::ranges::lower_bound(places, stamp - most_s, {}, &ScanPlace::stamp);
     if (place == places.end() || place->stamp - stamp > most_s) return Image();
-    return images->read(cameras[camera], *place);
+    return images->image(cameras[camera], *place);
   };
-  return serve_images(std::move(stream), bag.imu, ImuNoise{}, robot.images, odometry, tracking);
+  std::string note;
+  if (bag.depth) {
+    auto said = add_depth(*bag.depth, images, robot.images, stream);
+    if (!said) return tl::unexpected(said.error());
+    note = std::move(*said);
+  }
+  auto out = serve_images(std::move(stream), bag.imu, ImuNoise{}, robot.images, odometry, tracking);
+  if (out) out->note += note;
+  return out;
 }
 
 }  // namespace tutti::mission

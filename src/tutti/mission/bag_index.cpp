@@ -148,26 +148,35 @@ class Indexer {
       ImageTrack& track = index.images[topic];
       track.is_compressed = message.channel->type != "sensor_msgs/msg/Image";
       if (track.is_compressed)
-        take_image(track, message, bags::decode_compressed_image(message.data, encoding),
-                   &bags::RosCompressedImage::format);
+        take_image(track, message, bags::decode_compressed_image(message.data, encoding));
       else
-        take_image(track, message, bags::decode_image(message.data, encoding), &bags::RosImage::encoding);
+        take_image(track, message, bags::decode_image(message.data, encoding));
     }
   }
 
   template <class Message>
-  static void take_image(ImageTrack& track, const BagMessage& message, const Result<Message>& image,
-                         std::string Message::*encoding) {
+  static void take_image(ImageTrack& track, const BagMessage& message, const Result<Message>& image) {
     ++track.messages;
     if (!image) return track.refused.add(track.messages, image.error().message);
     const Timestamp stamp = image->header.stamp;
     if (track.images.empty()) {
-      track.frame = bags::frame_name(image->header.frame_id);
-      track.encoding = (*image).*encoding;
+      track.first = bags::look_of(*image);
+      track.is_depth = bags::is_depth(message.channel->topic, track.first.encoding);
     } else if (auto ok = check_stamp(stamp, track.images.back().stamp); !ok) {
       return track.refused.add(track.messages, ok.error().message);
     }
+    if (track.is_depth)
+      if (auto ok = check_depth(track, *image); !ok) return track.refused.add(track.messages, ok.error().message);
     track.images.push_back({stamp, message.position, track.messages});
+  }
+
+  /// What can be told without decoding it.
+  static Status check_depth(const ImageTrack& track, const bags::RosImage& image) {
+    if (auto ok = bags::check_like_first(bags::look_of(image), track.first); !ok) return ok;
+    return bags::check_rows(image, bags::depth_bytes(image.encoding));
+  }
+  static Status check_depth(const ImageTrack& track, const bags::RosCompressedImage& image) {
+    return bags::check_like_first(bags::look_of(image), track.first);
   }
 
   static void take_imu(ImuTrack& track, const BagMessage& message) {
@@ -192,6 +201,10 @@ class Indexer {
 
 void Refusals::add(std::uint64_t message, const std::string& why) {
   if (count++ == 0) first = fmt::format("message {}: {}", message, why);
+}
+
+std::string note_of(const std::string& topic, const Refusals& refused, std::uint64_t of) {
+  return fmt::format("{}: {} of {} messages refused, the first because: {}", topic, refused.count, of, refused.first);
 }
 
 BagIndex index_bag(bags::BagReader& bag, const std::string& pair, bool with_images) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
+#include "tutti/bags/depth.hpp"
 #include "tutti/bags/transform_tree.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/position_fix.hpp"
@@ -23,6 +24,8 @@ struct Refusals {
   std::string first;  ///< Such as "message 17: stamp 5 ns, expected after 7 ns"; messages are numbered from 1.
   void add(std::uint64_t message, const std::string& why);
 };
+/// "/odom: 4 of 250 messages refused, the first because: .."
+std::string note_of(const std::string& topic, const Refusals& refused, std::uint64_t of);
 
 /// The poses of one topic, or of one pair of frames of /tf.
 struct OdometryTrack {
@@ -46,10 +49,11 @@ struct ScanTrack {
   Refusals refused;
 };
 
-/// The images of one topic, by their places in the bag. `encoding` is "jpeg" and the like for compressed ones.
+/// The images of one topic, by their places in the bag.
 struct ImageTrack {
   std::vector<ScanPlace> images;
-  std::string frame, encoding;
+  bags::ImageLook first;
+  bool is_depth = false;  ///< By the first one's encoding; then all have this one's, its frame and its size.
   bool is_compressed = false;
   std::uint64_t messages = 0;
   Refusals refused;

@@ -41,11 +41,11 @@ Result<std::string> bag_mission(const std::vector<std::string>& bags, const std:
     const auto at =
         std::ranges::find_if(robots.list, [&](const ConfigNode& node) { return node.find("name")->scalar == robot; });
     const std::string kind = dot == std::string::npos ? "" : named->first.substr(dot + 1);
-    constexpr std::array<std::string_view, 5> kKinds{"odometry", "scans", "images", "imu", "fixes"};
+    constexpr std::array<std::string_view, 6> kKinds{"odometry", "scans", "images", "depth", "imu", "fixes"};
     if (at == robots.list.end() || std::ranges::find(kKinds, kind) == kKinds.end())
       return fail(ErrorCode::configuration,
-                  "--topic {}: expected NAME.odometry=, NAME.scans=, NAME.images=, NAME.imu= or NAME.fixes= of a robot "
-                  "with --bag",
+                  "--topic {}: expected NAME.odometry=, NAME.scans=, NAME.images=, NAME.depth=, NAME.imu= or "
+                  "NAME.fixes= of a robot with --bag",
                   argument);
     at->map.back().second.map.emplace_back(kind, scalar(named->second));
   }

@@ -112,10 +112,6 @@ Result<Pose3> find_lidar(const BagIndex& index, const std::string& body, const s
               lidar, body, frames.empty() ? "none" : frames);
 }
 
-std::string note_refused(const std::string& topic, const Refusals& refused, std::uint64_t of) {
-  return fmt::format("{}: {} of {} messages refused, the first because: {}", topic, refused.count, of, refused.first);
-}
-
 /// Of several topics that have fixes none is taken unless it is said which: mostly all but one are made of that one.
 Status take_fixes(const BagIndex& index, const std::string& body, const RobotConfig& robot, BagRecording& out) {
   const std::string& wanted = robot.topics.fixes;
@@ -133,7 +129,7 @@ Status take_fixes(const BagIndex& index, const std::string& body, const RobotCon
   const FixTrack& track = index.fixes.at(topics.front());
   out.fix_topic = topics.front();
   out.fixes = track.fixes;
-  if (track.refused.count > 0) out.notes.push_back(note_refused(out.fix_topic, track.refused, track.messages));
+  if (track.refused.count > 0) out.notes.push_back(note_of(out.fix_topic, track.refused, track.messages));
   if (track.without > 0) out.fix_note += fmt::format("; {} messages without a fix", track.without);
   if (track.unsure > 0)
     out.fix_note += fmt::format("; {} do not say how sure they are, taken as {:g} m and {:g} m up", track.unsure,
@@ -182,7 +178,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   const auto& [source, track] = **odometry;
   out.odometry = track.poses;
   std::string what = fmt::format("{}: odometry of {} ({})", out.file, source, in_words(track));
-  if (track.refused.count > 0) out.notes.push_back(note_refused(source, track.refused, track.messages));
+  if (track.refused.count > 0) out.notes.push_back(note_of(source, track.refused, track.messages));
   if (auto ok = take_fixes(index, track.body, robot, out); !ok) return in_context(out.file, ok.error());
   if (with_images) take_cameras(index, track.body, robot, out);
   if (*scans == nullptr) {
@@ -194,7 +190,7 @@ Result<BagRecording> read_bag(const fs::path& data, const RobotConfig& robot, bo
   out.scan_topic = (*scans)->first;
   const ScanTrack& seen = (*scans)->second;
   out.scans = seen.scans;
-  if (seen.refused.count > 0) out.notes.push_back(note_refused(out.scan_topic, seen.refused, seen.messages));
+  if (seen.refused.count > 0) out.notes.push_back(note_of(out.scan_topic, seen.refused, seen.messages));
   std::string where;
   const auto T_body_lidar = find_lidar(index, track.body, seen.frame, robot, where);
   if (!T_body_lidar) return in_context(out.file, T_body_lidar.error());

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,13 @@ struct BagCamera {
   bool is_compressed = false;
 };
 
+/// The depth images of the one camera.
+struct BagDepth {
+  std::string topic;
+  std::vector<ScanPlace> images;
+  bool is_compressed = false;
+};
+
 /// What a mission uses of a bag.
 struct BagRecording {
   std::string file;
@@ -30,6 +38,7 @@ struct BagRecording {
   std::vector<ScanPlace> scans;  ///< Stamps increase.
   Pose3 T_body_lidar;
   std::vector<BagCamera> cameras;   ///< None, one or two.
+  std::optional<BagDepth> depth;    ///< Registered to the only camera.
   std::string no_images;            ///< Why there are no cameras.
   std::vector<ImuSample> imu;       ///< In the body frame.
   std::string fix_topic, fix_note;  ///< Empty: the bag has no fixes; and remarks on them.
@@ -42,8 +51,9 @@ struct BagRecording {
 /// or `robot.topics` names one that does not exist, the error lists them. The LiDAR's pose is `robot.T_body_lidar`,
 /// else from /tf_static (and frames of /tf that never move); having neither is an error that says what to do. Invalid
 /// messages are left out and counted in the notes. With `with_images`, cameras are the image topics that show pictures,
-/// have a CameraInfo beside them, and have a pose on the body by the bag's transforms. The IMU must be in the body's
-/// origin. Sensors that lack any of this are not used, and the notes say so.
+/// have a CameraInfo beside them, and have a pose on the body by the bag's transforms; depth is as bags::is_depth() and
+/// bags::choose_cameras() have it. The IMU must be in the body's origin. Sensors that lack any of this are not used,
+/// and the notes say so.
 Result<BagRecording> read_bag(const std::filesystem::path& data, const RobotConfig& robot, bool with_images = false);
 
 /// The bag's scans, each read when it is asked for, so that at most one chunk of the bag is in memory. They are in the

@@ -37,7 +37,7 @@ void check_images(const RobotConfig& robot, const std::string& path, const Probl
   if (!robot.bag.empty() && (!robot.odometry.file.empty() || !robot.scans.empty() || from_maplab))
     problem(path + ".bag: given, and odometry or scans of files too, expected one of them");
   const BagTopicsConfig& topics = robot.topics;
-  if (robot.bag.empty() && !(topics.odometry + topics.scans + topics.images + topics.imu).empty())
+  if (robot.bag.empty() && !(topics.odometry + topics.scans + topics.images + topics.depth + topics.imu).empty())
     problem(path + ".topics: given, but there is no bag");
   if (!robot.odometry.file.empty() && from_maplab)
     problem(path + ".odometry.file: given, but images.maplab_submaps have the odometry");

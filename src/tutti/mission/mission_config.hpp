@@ -68,7 +68,7 @@ struct DepthConfig {
             "A csv `stamp[ns],file` of grey PNG images of 16 bits, files relative to it: the depth along the optical "
             "axis at every pixel of the camera (registered); 0: not known.");
     v.field("scale", scale, greater_than(0.0),
-            "Numbers of a depth image to a metre: 5000 in TUM's recordings, 1000 of most drivers.");
+            "Numbers of a file's depth image to a metre: 5000 in TUM's recordings, 1000 of most drivers.");
     v.field("max_difference_s", max_difference_s, at_least(0.0), "An image has the nearest depth image within this.");
     v.field("sigma_m", sensor.sigma_m, at_least(0.0), "Standard deviation of a depth: this, and beside it");
     v.field("sigma_per_m2", sensor.sigma_per_m2, at_least(0.0),
@@ -109,7 +109,7 @@ struct ImagesConfig {
             "Added to the images' stamps gives the odometry's time.");
     v.field("own_stamps", own_stamps, any(),
             "Images are between the odometry's samples. Found by itself where odometry is faster than they are.");
-    v.field("depth", depth, any(), "Depth images of an RGB-D camera, with list.");
+    v.field("depth", depth, any(), "Depth images of an RGB-D camera, with list; of a bag, all but list and scale.");
     v.field("imu", imu, any(), "EuRoC's csv of raw IMU samples, with list or maplab_submaps.");
   }
   /// True if there are images in which to track points.
@@ -122,6 +122,7 @@ struct BagTopicsConfig {
   std::string odometry;
   std::string scans;
   std::string images;
+  std::string depth;
   std::string imu;
   std::string fixes;
   template <class V>
@@ -131,6 +132,8 @@ struct BagTopicsConfig {
     v.field("scans", scans, any(), "A topic of sensor_msgs/PointCloud2.");
     v.field("images", images, any(),
             "Topics of sensor_msgs/Image or CompressedImage: of one camera, or of two with a comma between them.");
+    v.field("depth", depth, any(),
+            "A topic of depth images (16UC1, 32FC1) that is registered to the one camera; none: no depth.");
     v.field("imu", imu, any(), "A topic of sensor_msgs/Imu.");
     v.field("fixes", fixes, any(), "A topic of sensor_msgs/NavSatFix.");
   }

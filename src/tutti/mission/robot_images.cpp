@@ -102,9 +102,8 @@ Result<formats::EurocFolder> read_folder(const ImagesConfig& config, const fs::p
 Status read_depth(const ImagesConfig& images, const fs::path& data, ImageStream& stream) {
   const DepthConfig& config = images.depth;
   if (config.list.empty()) return {};
-  if (!(config.sensor.least_m < config.sensor.most_m))
-    return fail(ErrorCode::configuration, "images.depth: least_m is {}, expected less than most_m, {}",
-                config.sensor.least_m, config.sensor.most_m);
+  const auto sensor = depth_sensor(config, 1.0 / config.scale);
+  if (!sensor) return tl::unexpected(sensor.error());
   const auto cameras = formats::read_cameras((data / images.cameras).string());
   if (!cameras) return in_context("images.cameras", cameras.error());
   const fs::path list = data / config.list;
@@ -112,15 +111,10 @@ Status read_depth(const ImagesConfig& images, const fs::path& data, ImageStream&
   if (!depth) return in_context("images.depth.list", depth.error());
   auto& files = depth->front().images;
   for (formats::ImageFile& file : files) file.stamp = file.stamp + images.time_offset_s;
-  DepthSensor sensor = config.sensor;
-  sensor.unit_m = 1.0 / config.scale;
-  const std::size_t found = formats::add_depth(stream, files, sensor, config.max_difference_s);
-  if (2 * found >= std::min(stream.stamps.size(), files.size())) return {};
-  return fail(ErrorCode::invalid,
-              "images.depth: of {} images and {} depth images {} are within {} s of each other, expected most "
-              "(max_difference_s); the first are of {} and {} ns",
-              stream.stamps.size(), files.size(), found, config.max_difference_s, stream.stamps.front().ns,
-              files.front().stamp.ns);
+  const std::size_t found = formats::add_depth(stream, files, *sensor, config.max_difference_s);
+  std::vector<Timestamp> stamps;
+  for (const formats::ImageFile& file : files) stamps.push_back(file.stamp);
+  return check_depth_stamps(stream.stamps, stamps, found, config.max_difference_s);
 }
 
 }  // namespace
@@ -146,6 +140,24 @@ Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const 
                      .note = fmt::format("maplab submaps with {} keyframes, {} keypoints, {} good landmarks; {} "
                                          "continued in the next submap, {} conflicts",
                                          keyframes, keypoints, landmarks, joined, conflicts)};
+}
+
+Result<DepthSensor> depth_sensor(const DepthConfig& config, double unit_m) {
+  if (!(config.sensor.least_m < config.sensor.most_m))
+    return fail(ErrorCode::configuration, "images.depth: least_m is {}, expected less than most_m, {}",
+                config.sensor.least_m, config.sensor.most_m);
+  DepthSensor out = config.sensor;
+  out.unit_m = unit_m;
+  return out;
+}
+
+Status check_depth_stamps(const std::vector<Timestamp>& images, const std::vector<Timestamp>& depths, std::size_t found,
+                          double max_difference_s) {
+  if (2 * found >= std::min(images.size(), depths.size())) return {};
+  return fail(ErrorCode::invalid,
+              "images.depth: of {} images and {} depth images {} are within {} s of each other, expected most "
+              "(max_difference_s); the first are of {} and {} ns",
+              images.size(), depths.size(), found, max_difference_s, images.front().ns, depths.front().ns);
 }
 
 Result<RobotImages> open_images(const ImagesConfig& config, const fs::path& data, const Trajectory& odometry,

@@ -31,6 +31,12 @@ Result<formats::MaplabRecording> read_maplab(const ImagesConfig& config, const s
 Result<RobotImages> listed_images(const formats::MaplabRecording& maplab, const ImagesConfig& config,
                                   const std::filesystem::path& data, const Trajectory& samples, std::size_t first);
 
+/// The sensor of `config`, whose images have this unit. Fails unless its range is one.
+Result<DepthSensor> depth_sensor(const DepthConfig& config, double unit_m);
+/// Fails unless most images have depth, or most depth images an image: `found` of them do. Neither is empty.
+Status check_depth_stamps(const std::vector<Timestamp>& images, const std::vector<Timestamp>& depths, std::size_t found,
+                          double max_difference_s);
+
 /// Opens the images of config.euroc_folder or .list, for points to be tracked in them. Images at the stamps of odometry
 /// are used; all of them are when odometry is faster than they are, and with config.own_stamps. Fails, naming the file,
 /// when files are missing or invalid, or when none of the first five images can be read. Stamps that do not fit the
