@@ -25,8 +25,8 @@ struct RosArguments {
   bool wanted = false;
   std::string odometry = "odom";
   std::vector<std::string> images;
-  std::string imu;
-  bool has_images = false;
+  std::string depth, imu;
+  bool has_images = false, has_depth = false;
   ros::RosRobotOptions robot;
   ros::RosServerOptions server;
   std::string name_space;
@@ -133,6 +133,18 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
       ->type_name("TOPIC[,TOPIC]")
       ->needs(ros);
   robot
+      .add_option_function<std::string>(
+          "--depth",
+          [out](const std::string& topic) {
+            out->has_depth = true;
+            out->depth = topic;
+          },
+          "Topic of the depth images (16UC1, 32FC1, or of compressedDepth) that are registered to the one camera, "
+          "below "
+          "the namespace; '' for none; default: found by what messages show")
+      ->type_name("TOPIC")
+      ->needs(ros);
+  robot
       .add_option("--imu", out->imu,
                   "Topic of sensor_msgs/Imu, which goes with images, below the namespace; default: the one that is "
                   "there")
@@ -184,12 +196,13 @@ std::function<void(program::Level, const std::string&)> log_of(const std::string
 Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const program::RobotOptions& options) {
   const program::DriverSettings& driver = options.settings.driver;
   const bool takes_images = arguments.has_images ? !arguments.images.empty() : driver.with_images;
-  if (!takes_images && !arguments.imu.empty())
-    return fail(
-        ErrorCode::configuration,
-        "--imu is '{}', but no images are taken that it could go with: expected --images, or a mission that finds "
-        "closures from images",
-        arguments.imu);
+  for (const auto& [option, topic] : {std::pair("--imu", arguments.imu), std::pair("--depth", arguments.depth)})
+    if (!takes_images && !topic.empty())
+      return fail(
+          ErrorCode::configuration,
+          "{} is '{}', but no images are taken that it could go with: expected --images, or a mission that finds "
+          "closures from images",
+          option, topic);
   const auto participant = join_domain();
   if (!participant) return tl::unexpected(participant.error());
   ros::RosRobotOptions ros = arguments.robot;
@@ -202,10 +215,14 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
                 .p_body_antenna = driver.p_body_antenna};
   if (takes_images)
     ros.images = {.images = arguments.images,
+                  .depth = arguments.depth,
+                  .with_depth = !arguments.has_depth || !arguments.depth.empty(),
                   .imu = arguments.imu,
                   .most_cameras = driver.most_cameras,
                   .time_offset_s = driver.images_offset_s,
-                  .most_difference_s = options.settings.tracking.max_stamp_difference_s};
+                  .most_difference_s = options.settings.tracking.max_stamp_difference_s,
+                  .depth_sensor = driver.depth,
+                  .most_depth_difference_s = driver.depth_difference_s};
   (arguments.odometry.find("->") == std::string::npos ? ros.odometry : ros.intake.odometry_frames) = arguments.odometry;
   ros.who = "tutti robot --ros " + options.version;
   ros.say = log_of(options.name + " ros", options.console);

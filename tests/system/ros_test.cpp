@@ -360,14 +360,14 @@ TEST_F(Ros, TwoRobotsAndAServerMakeTheMapOfTheirBags) {
   }
 }
 
-/// Two flights with stereo pairs and IMUs, through a small hall.
+/// Two flights through a small hall, with stereo pairs or with RGB-D cameras, and IMUs.
 constexpr const char* kFlown = R"(
 source: hall
 hall:
-  cameras: 2
+  {}
   robots:
-    - {name: alpha, flight: {start_deg: 0.0, duration_s: 10}}
-    - {name: bravo, flight: {start_deg: 20.0, height_m: 2.0, duration_s: 10}}
+    - {{name: alpha, flight: {{start_deg: 0.0, duration_s: 10}}}}
+    - {{name: bravo, flight: {{start_deg: 20.0, height_m: 2.0, duration_s: 10}}}}
 )";
 constexpr const char* kSeen = R"(
 mission: seen
@@ -381,51 +381,67 @@ closures: {finder: visual, visual: {max_hamming: 0.2}}
 
 /// Finders draw by submaps' names, hence the session. Alpha's cameras and IMU are found by type, because the mission's
 /// closures are of images; bravo is told its own. TUTTI_ROS_RATE as above.
-TEST_F(Ros, RobotsWithCamerasMakeTheClosuresOfTheirBags) {
-  TUTTI_SKIP_WITHOUT_NATS_SERVER();
-  ASSERT_TRUE(write_file((folder_ / "flown.yaml").string(), kFlown));
-  ASSERT_TRUE(write_file((folder_ / "seen.yaml").string(), kSeen));
-  ASSERT_TRUE(lab::write_bags(lab::load({.file = (folder_ / "flown.yaml").string()}).value(), 1, folder_.string()));
-  const lab::MissionSource source{.file = (folder_ / "seen.yaml").string(), .data = folder_};
-  const Closed expected = closed(map_of_bags(source));
-  ASSERT_GT(accepted(expected.estimate).size(), 10U);
+class RosImages : public Ros {
+ protected:
+  void expect_closures_of_bags(const std::string& cameras, const std::vector<std::string>& images,
+                               const std::vector<std::string>& of_bravo) {
+    ASSERT_TRUE(write_file((folder_ / "flown.yaml").string(), fmt::format(fmt::runtime(kFlown), cameras)));
+    ASSERT_TRUE(write_file((folder_ / "seen.yaml").string(), kSeen));
+    ASSERT_TRUE(lab::write_bags(lab::load({.file = (folder_ / "flown.yaml").string()}).value(), 1, folder_.string()));
+    const lab::MissionSource source{.file = (folder_ / "seen.yaml").string(), .data = folder_};
+    const Closed expected = closed(map_of_bags(source));
+    ASSERT_GT(accepted(expected.estimate).size(), 10U);
 
-  const char* const asked = std::getenv("TUTTI_ROS_RATE");
-  const std::string rate = asked == nullptr ? "5" : asked;
-  const std::vector<std::string> mission{source.file, "--data", folder_.string(), "--rate", rate};
-  start("server", {"server", "--state", (folder_ / "server").string()}, mission);
-  const std::string bus = bus_of("server");
-  std::vector<std::string> robot{"robot", "--ros", "--points", "", "--bus", bus, "--end-after", "3", "--session", "0"};
-  if (rate != "1") robot.push_back("--reliable");
-  for (const std::string name : {"alpha", "bravo"}) {
-    std::vector<std::string> words = robot;
-    words.insert(words.end(), {"--name", name, "--state", (folder_ / ("of_" + name)).string()});
-    if (name == "bravo")
-      words.insert(words.end(), {"--images", "camera0/image_raw,/bravo/camera1/image_raw", "--imu", "imu"});
-    start(name, words, mission);
+    const char* const asked = std::getenv("TUTTI_ROS_RATE");
+    const std::string rate = asked == nullptr ? "5" : asked;
+    const std::vector<std::string> mission{source.file, "--data", folder_.string(), "--rate", rate};
+    start("server", {"server", "--state", (folder_ / "server").string()}, mission);
+    const std::string bus = bus_of("server");
+    std::vector<std::string> robot{"robot", "--ros",       "--points", "",          "--bus",
+                                   bus,     "--end-after", "3",        "--session", "0"};
+    if (rate != "1") robot.push_back("--reliable");
+    for (const std::string name : {"alpha", "bravo"}) {
+      std::vector<std::string> words = robot;
+      words.insert(words.end(), {"--name", name, "--state", (folder_ / ("of_" + name)).string()});
+      if (name == "bravo") words.insert(words.end(), of_bravo.begin(), of_bravo.end());
+      start(name, words, mission);
+    }
+    std::vector<std::string> play{
+        "bag", "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(), "--rate", rate, "--wait-for"};
+    for (const std::string name : {"/alpha/", "/bravo/"}) {
+      for (const std::string topic : {"odom", "imu"}) play.push_back(name + topic);
+      for (const std::string& topic : images)
+        for (const std::string part : {"/image_raw", "/camera_info"}) play.push_back(name + topic + part);
+    }
+    start("play", play);
+    ASSERT_TRUE(within(3 * kPatience_s,
+                       [&] {
+                         std::this_thread::sleep_for(std::chrono::milliseconds(50));
+                         return have_ended({"alpha", "bravo"});
+                       }))
+        << output_of("alpha") << output_of("server") << output_of("play");
+    children_.stop_all();
+    for (const std::string name : {"alpha", "bravo"})
+      EXPECT_EQ(output_of(name).find("refuse"), std::string::npos) << output_of(name);
+
+    const auto store = mapfile::open(folder_ / "server/map.tutti").value();
+    const Closed actual = closed(mapfile::read(*store).value());
+    EXPECT_EQ(actual.sizes, expected.sizes);
+    expect_same(actual.estimate, expected.estimate);
+    fmt::print("{}{}", output_of("alpha"), output_of("play"));
   }
-  std::vector<std::string> play{
-      "bag", "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(), "--rate", rate, "--wait-for"};
-  for (const std::string name : {"/alpha/", "/bravo/"})
-    for (const std::string topic :
-         {"odom", "imu", "camera0/image_raw", "camera0/camera_info", "camera1/image_raw", "camera1/camera_info"})
-      play.push_back(name + topic);
-  start("play", play);
-  ASSERT_TRUE(within(3 * kPatience_s,
-                     [&] {
-                       std::this_thread::sleep_for(std::chrono::milliseconds(50));
-                       return have_ended({"alpha", "bravo"});
-                     }))
-      << output_of("alpha") << output_of("server") << output_of("play");
-  children_.stop_all();
-  for (const std::string name : {"alpha", "bravo"})
-    EXPECT_EQ(output_of(name).find("refuse"), std::string::npos) << output_of(name);
+};
 
-  const auto store = mapfile::open(folder_ / "server/map.tutti").value();
-  const Closed actual = closed(mapfile::read(*store).value());
-  EXPECT_EQ(actual.sizes, expected.sizes);
-  expect_same(actual.estimate, expected.estimate);
-  fmt::print("{}{}", output_of("alpha"), output_of("play"));
+TEST_F(RosImages, RobotsWithCamerasMakeTheClosuresOfTheirBags) {
+  TUTTI_SKIP_WITHOUT_NATS_SERVER();
+  expect_closures_of_bags("cameras: 2", {"camera0", "camera1"},
+                          {"--images", "camera0/image_raw,/bravo/camera1/image_raw", "--imu", "imu"});
+}
+
+TEST_F(RosImages, RobotsWithRgbdCamerasMakeTheClosuresOfTheirBags) {
+  TUTTI_SKIP_WITHOUT_NATS_SERVER();
+  expect_closures_of_bags("depth: true", {"camera0", "depth"},
+                          {"--images", "camera0/image_raw", "--depth", "depth/image_raw", "--imu", "imu"});
 }
 
 }  // namespace ros_test

@@ -116,6 +116,8 @@ Status tell_driver(const MissionConfig& config, program::RobotOptions& options) 
   driver.with_images = config.closures.finder != "lidar";
   driver.most_cameras = robot->images.most_cameras;
   driver.images_offset_s = robot->images.time_offset_s;
+  driver.depth = robot->images.depth.sensor;
+  driver.depth_difference_s = robot->images.depth.max_difference_s;
   if (!robot->antenna_m.empty()) driver.p_body_antenna = Eigen::Vector3d(robot->antenna_m.data());
   if (!mission::is_given(robot->T_body_lidar)) return {};
   const auto T_body_lidar = mission::to_pose(robot->T_body_lidar);

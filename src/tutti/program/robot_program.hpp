@@ -10,6 +10,7 @@
 
 #include "tutti/base/random.hpp"
 #include "tutti/base/result.hpp"
+#include "tutti/model/image_stream.hpp"
 #include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/perception/visual/frontend/tracking_source.hpp"
 #include "tutti/program/event_log.hpp"
@@ -33,6 +34,8 @@ struct DriverSettings {
   bool with_images = false;  ///< Closures are found from images, so images and IMU samples are wanted.
   int most_cameras = 2;
   double images_offset_s = 0.0;  ///< Added to the images' stamps gives the odometry's time.
+  DepthSensor depth;
+  double depth_difference_s = 0.02;  ///< Between the stamps of an image and its depth, at most.
 };
 
 /// What a robot is told about its mission.

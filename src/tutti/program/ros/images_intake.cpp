@@ -5,107 +5,68 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <iterator>
-#include <map>
 #include <set>
 #include <utility>
 
 #include "tutti/bags/camera.hpp"
 #include "tutti/bags/transform_tree.hpp"
+#include "tutti/model/nearest_stamp.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 
 namespace tutti::ros {
+namespace {
 
-Status resolve(ImagesConfig& config, const std::string& name_space) {
-  const auto any = resolve("any", name_space);
-  if (!any) return tl::unexpected(any.error());
-  config.within = any->substr(0, any->rfind('/') + 1);
-  std::vector<std::string*> names;
-  for (std::string& topic : config.images) names.push_back(&topic);
-  if (!config.imu.empty()) names.push_back(&config.imu);
-  for (std::string* name : names) {
-    auto whole = resolve(*name, name_space);
-    if (!whole) return tl::unexpected(whole.error());
-    *name = std::move(*whole);
+/// As the feed has raw depth: two bytes a pixel, little endian.
+std::string to_bytes(const DepthImage& depth) {
+  std::string out;
+  out.reserve(2 * depth.value.size());
+  for (const std::uint16_t value : depth.value) {
+    out.push_back(static_cast<char>(value & 0xFFU));
+    out.push_back(static_cast<char>(value >> 8U));
   }
-  return {};
-}
-
-Result<std::vector<CameraTopics>> choose_cameras(std::span<const Publication> published, const ImagesConfig& config) {
-  std::set<std::string> infos, raw;  // raw: CameraInfo topics of cameras whose images are there uncompressed
-  std::map<std::string, CameraTopics> found;
-  for (const Publication& topic : published) {
-    if (topic.type == kCameraInfoType) infos.insert(topic.topic);
-    const bool is_compressed = topic.type == kCompressedType;
-    if (!is_compressed && topic.type != kImageType) continue;
-    const bool is_named = std::ranges::find(config.images, topic.topic) != config.images.end();
-    if (config.images.empty() ? !topic.topic.starts_with(config.within) : !is_named) continue;
-    const std::string info = bags::camera_info_topic(topic.topic, is_compressed);
-    if (!is_compressed) raw.insert(info);
-    found[topic.topic] = {topic.topic, info, is_compressed};
-  }
-  if (config.images.empty())
-    std::erase_if(found, [&](const auto& entry) {
-      const CameraTopics& camera = entry.second;
-      return !infos.contains(camera.info) || (camera.is_compressed && raw.contains(camera.info));
-    });
-  if (found.size() < config.images.size()) return std::vector<CameraTopics>();
-  std::vector<CameraTopics> out;
-  std::vector<std::string> names;
-  std::set<std::string> used;
-  for (const auto& [name, camera] : found) {
-    out.push_back(camera);
-    names.push_back(name);
-    used.insert(camera.info);
-  }
-  if (out.size() > 2 || used.size() < out.size())
-    return fail(ErrorCode::invalid, "{} cameras with {} CameraInfo, expected one or two; say which: --images {}",
-                out.size(), used.size(), fmt::join(names, ","));
-  out.resize(std::min(out.size(), static_cast<std::size_t>(config.most_cameras)));
   return out;
 }
 
-Result<std::string> choose_imu(std::span<const Publication> published, const ImagesConfig& config) {
-  std::set<std::string> found;
-  for (const Publication& topic : published)
-    if (topic.type == kImuType &&
-        (config.imu.empty() ? topic.topic.starts_with(config.within) : topic.topic == config.imu))
-      found.insert(topic.topic);
-  if (found.size() > 1)
-    return fail(ErrorCode::invalid, "{} topics have one; say which: --imu {} (here are: {})", found.size(),
-                *found.begin(), fmt::join(found, ", "));
-  return found.empty() ? std::string() : *found.begin();
-}
+}  // namespace
 
-ImagesIntake::ImagesIntake(ImagesConfig config, std::vector<CameraTopics> cameras, std::string imu,
+ImagesIntake::ImagesIntake(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu,
                            const RosIntake& odometry)
     : config_(std::move(config)), imu_(std::move(imu)), odometry_(odometry) {
-  for (CameraTopics& topics : cameras) cameras_.push_back({.topics = std::move(topics)});
+  for (CameraTopics& one : topics) topics_.push_back({.topics = std::move(one)});
 }
 
-ImagesIntake::Waiting ImagesIntake::OneCamera::pop() {
+bool ImagesIntake::OneTopic::shows_picture() const {
+  return first && !is_depth() && (topics.is_compressed || bags::is_picture(first->encoding));
+}
+
+ImagesIntake::Waiting ImagesIntake::OneTopic::pop() {
   Waiting out = std::move(waiting.front());
   waiting.pop_front();
   bytes -= out.image.bytes.size();
   return out;
 }
 
-Status ImagesIntake::check_size(const OneCamera& camera, const Waiting& waiting) {
-  if (!camera.model || waiting.width == 0) return {};
-  const auto width = static_cast<std::uint32_t>(camera.model->width_px),
-             height = static_cast<std::uint32_t>(camera.model->height_px);
-  if (waiting.width == width && waiting.height == height) return {};
-  return fail(ErrorCode::invalid, "an image of {} x {} pixels, expected {} x {} as {} says", waiting.width,
-              waiting.height, width, height, camera.topics.info);
+void ImagesIntake::OneTopic::drop_before(Timestamp stamp) {
+  while (!waiting.empty() && waiting.front().stamp < stamp) pop();
 }
 
-Status ImagesIntake::add_info(std::size_t camera, std::string_view cdr) {
-  OneCamera& of = cameras_[camera];
-  const auto message = bags::decode_camera_info(cdr);
+Status ImagesIntake::check_size(const OneTopic& topic, const Waiting& waiting) {
+  if (!topic.model || waiting.width == 0 || topic.is_depth()) return {};
+  const auto width = static_cast<std::uint32_t>(topic.model->width_px),
+             height = static_cast<std::uint32_t>(topic.model->height_px);
+  if (waiting.width == width && waiting.height == height) return {};
+  return fail(ErrorCode::invalid, "an image of {} x {} pixels, expected {} x {} as {} says", waiting.width,
+              waiting.height, width, height, topic.topics.info);
+}
+
+Status ImagesIntake::add_info(std::size_t topic, std::string_view cdr) {
+  OneTopic& of = topics_[topic];
+  auto message = bags::decode_camera_info(cdr);
   if (!message) return tl::unexpected(message.error());
-  const auto model = bags::to_camera(*message);
-  if (!model) return tl::unexpected(model.error());
   if (of.model) return {};
+  const auto model = bags::to_camera(*message);
+  of.info = std::move(*message);
+  if (!model) return tl::unexpected(model.error());
   of.model = *model;
   Status first;
   std::erase_if(of.waiting, [&](const Waiting& waiting) {
@@ -118,31 +79,61 @@ Status ImagesIntake::add_info(std::size_t camera, std::string_view cdr) {
   return first;
 }
 
-Status ImagesIntake::add_image(std::size_t camera, std::string_view cdr) {
-  OneCamera& of = cameras_[camera];
+Status ImagesIntake::add_image(std::size_t topic, std::string_view cdr) {
+  OneTopic& of = topics_[topic];
   if (of.topics.is_compressed) {
     const auto message = bags::decode_compressed_image(cdr);
     if (!message) return tl::unexpected(message.error());
     if (message->data.empty()) return fail(ErrorCode::invalid, "an image of no bytes, expected a PNG or JPEG file");
+    const bags::ImageLook look = bags::look_of(*message);
+    if (bags::is_depth(of.topics.images, of.first.value_or(look).encoding)) return add_depth(of, look, *message);
+    if (!of.first) of.first = look;
     return push(of, message->header, {{}, {0, false, std::string(message->data)}});
   }
   const auto message = bags::decode_image(cdr);
   if (!message) return tl::unexpected(message.error());
+  const bags::ImageLook look = bags::look_of(*message);
+  if (bags::is_depth(of.topics.images, of.first.value_or(look).encoding)) return add_depth(of, look, *message);
   const auto image = bags::to_image(*message);
+  if (!of.first && (image || !bags::is_picture(look.encoding))) of.first = look;
   if (!image) return tl::unexpected(image.error());
   return push(of, message->header,
               {{}, {0, true, std::string(image->grey.begin(), image->grey.end())}, message->width, message->height});
 }
 
-Status ImagesIntake::push(OneCamera& camera, const bags::RosHeader& header, Waiting waiting) {
+Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosImage& message) {
+  const auto named = [&](const Error& error) {
+    return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
+  };
+  if (auto ok = bags::check_like_first(look, topic.first.value_or(look)); !ok) return named(ok.error());
+  const auto depth = bags::to_depth(message);
+  if (!depth) return named(depth.error());
+  if (!topic.first) topic.first = look;
+  return push(topic, message.header, {{}, {0, true, to_bytes(*depth)}, look.width_px, look.height_px});
+}
+
+/// The file, which depth_of() or the robot decodes, once its size is known to be a camera's.
+Status ImagesIntake::add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosCompressedImage& message) {
+  const auto named = [&](const Error& error) {
+    return in_context(fmt::format("depth at {} ns", message.header.stamp.ns), error);
+  };
+  if (auto ok = bags::check_like_first(look, topic.first.value_or(look)); !ok) return named(ok.error());
+  if (bags::png_of(message.data).empty())
+    return named({ErrorCode::unsupported,
+                  fmt::format("format '{:.60}', expected a PNG image as compressedDepth has", message.format)});
+  if (!topic.first) topic.first = look;
+  return push(topic, message.header, {{}, {0, false, std::string(message.data)}, look.width_px, look.height_px});
+}
+
+Status ImagesIntake::push(OneTopic& topic, const bags::RosHeader& header, Waiting waiting) {
   waiting.stamp = header.stamp + config_.time_offset_s;
-  if (Status ok = check_size(camera, waiting); !ok) return ok;
-  if (Status ok = odometry_.check_stamp(waiting.stamp, camera.newest); !ok) return ok;
-  if (!camera.frame) camera.frame = bags::frame_name(header.frame_id);
-  camera.newest = waiting.stamp;
-  camera.bytes += waiting.image.bytes.size();
-  camera.waiting.push_back(std::move(waiting));
-  while (camera.bytes > kMostBytes / cameras_.size()) camera.pop();
+  if (Status ok = check_size(topic, waiting); !ok) return ok;
+  if (Status ok = odometry_.check_stamp(waiting.stamp, topic.newest); !ok) return ok;
+  topic.newest = waiting.stamp;
+  topic.bytes += waiting.image.bytes.size();
+  topic.waiting.push_back(std::move(waiting));
+  const std::size_t used = is_chosen() ? cameras_.size() + (depth_ ? 1 : 0) : topics_.size();
+  while (topic.bytes > kMostBytes / used) topic.pop();
   return {};
 }
 
@@ -159,10 +150,10 @@ Status ImagesIntake::add_imu(std::string_view cdr) {
   return {};
 }
 
-Result<Camera> ImagesIntake::place(const OneCamera& camera) const {
+Result<Camera> ImagesIntake::place(const OneTopic& camera) const {
   if (!camera.model) return fail(ErrorCode::invalid, "{}: no sensor_msgs/CameraInfo", camera.topics.info);
-  if (!camera.frame) return fail(ErrorCode::invalid, "{}: no image", camera.topics.images);
-  const auto T_body_camera = odometry_.pose_on_body(*camera.frame);
+  if (!camera.first) return fail(ErrorCode::invalid, "{}: no image", camera.topics.images);
+  const auto T_body_camera = odometry_.pose_on_body(camera.first->frame);
   if (!T_body_camera) return in_context(camera.topics.images, T_body_camera.error());
   return Camera{*camera.model, *T_body_camera};
 }
@@ -175,53 +166,185 @@ Result<Pose3> ImagesIntake::imu_place() const {
   return T_body_imu;
 }
 
+bool ImagesIntake::has_any_image() const {
+  return std::ranges::any_of(topics_, [](const OneTopic& topic) { return topic.first.has_value(); });
+}
+
+bool ImagesIntake::uses(std::size_t topic) const {
+  return !is_chosen() || depth_ == topic || std::ranges::find(cameras_, topic) != cameras_.end();
+}
+
+std::string ImagesIntake::in_words() const {
+  std::string out;
+  for (const std::size_t i : cameras_) out += (out.empty() ? "" : " and ") + topics_[i].topics.images;
+  return depth_ ? fmt::format("{} with depth of {}", out, topics_[*depth_].topics.images) : out;
+}
+
+bags::ImageTopic ImagesIntake::to_topic(const OneTopic& topic) {
+  bags::ImageTopic out{topic.topics.images, topic.first->frame, topic.first->width_px, topic.first->height_px,
+                       topic.info};
+  if (topic.is_depth()) return out;
+  out.width_px = static_cast<std::uint32_t>(topic.model->width_px);
+  out.height_px = static_cast<std::uint32_t>(topic.model->height_px);
+  return out;
+}
+
+Result<std::optional<std::pair<ImagesIntake::Numbers, ImagesIntake::Numbers>>> ImagesIntake::cameras_and_depths(
+    bool is_late) const {
+  constexpr std::nullopt_t kWait = std::nullopt;
+  Numbers cameras, depths;
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    const OneTopic& topic = topics_[i];
+    const Wish wish = topic.topics.wish;
+    if (!topic.first) {
+      if (!is_late || wish == Wish::camera) return kWait;
+      continue;
+    }
+    if (wish == Wish::camera && !topic.shows_picture())
+      return fail(ErrorCode::invalid, "{}: encoding '{:.40}' is no picture{}", topic.topics.images,
+                  topic.first->encoding, topic.is_depth() ? ", but depth: --depth" : "");
+    if (topic.is_depth()) {
+      if (!config_.with_depth || (wish != Wish::depth && !config_.depth.empty())) continue;
+      const bool is_known = (topic.info || !topic.topics.has_info) && odometry_.pose_on_body(topic.first->frame);
+      if (!is_known && !is_late) return kWait;
+      depths.push_back(i);
+    } else if (topic.shows_picture() && (wish == Wish::camera || config_.images.empty())) {
+      if (!place(topic)) return kWait;
+      cameras.push_back(i);
+    }
+  }
+  if (cameras.empty()) return kWait;
+  return std::optional(std::pair(std::move(cameras), std::move(depths)));
+}
+
+Result<bool> ImagesIntake::choose(bool is_late) {
+  if (is_chosen()) return true;
+  const auto found = cameras_and_depths(is_late);
+  if (!found) return tl::unexpected(found.error());
+  if (!*found) return false;
+  const auto& [cameras, depths] = **found;
+  std::vector<bags::ImageTopic> of_cameras, of_depths;
+  std::set<std::string> infos;
+  for (const std::size_t i : cameras) {
+    of_cameras.push_back(to_topic(topics_[i]));
+    if (!infos.insert(topics_[i].topics.info).second)
+      return fail(ErrorCode::invalid,
+                  "{} shows what {} calibrates, and another does too, expected one; say which: "
+                  "--images {}",
+                  topics_[i].topics.images, topics_[i].topics.info, topics_[i].topics.images);
+  }
+  for (const std::size_t i : depths) of_depths.push_back(to_topic(topics_[i]));
+  const bags::CameraWishes wishes{.are_named = !config_.images.empty(),
+                                  .most_cameras = config_.most_cameras,
+                                  .images_flag = "--images ",
+                                  .depth_flag = "--depth "};
+  const auto choice = bags::choose_cameras(
+      of_cameras, of_depths, wishes, [this](const std::string& a, const std::string& b) -> std::optional<Pose3> {
+        const auto T_body_a = odometry_.pose_on_body(a), T_body_b = odometry_.pose_on_body(b);
+        if (!T_body_a || !T_body_b) return std::nullopt;
+        return T_body_a->inverse() * *T_body_b;
+      });
+  if (!choice) return tl::unexpected(choice.error());
+  for (const std::size_t i : choice->cameras) cameras_.push_back(cameras[i]);
+  if (choice->depth) depth_ = depths[*choice->depth];
+  note_ = choice->note;
+  if (!config_.depth.empty() && depths.empty())
+    note_ = fmt::format("no depth is used: {} shows none, expected an encoding of 16UC1 or 32FC1", config_.depth);
+  for (std::size_t i = 0; i < topics_.size(); ++i)
+    if (!uses(i)) topics_[i].drop_before(kLastTimestamp);
+  return true;
+}
+
 void ImagesIntake::describe(program::FeedSensors& sensors) const {
   std::vector<Camera> cameras;
-  for (const OneCamera& camera : cameras_) {
-    auto placed = place(camera);
+  for (const std::size_t i : cameras_) {
+    auto placed = place(topics_[i]);
     if (!placed) return;
     cameras.push_back(std::move(*placed));
   }
   sensors.cameras = std::move(cameras);
+  if (depth_) {
+    sensors.depth = config_.depth_sensor;
+    sensors.depth->unit_m = bags::kDepthUnit_m;
+  }
   if (!imu_.empty() && imu_place()) sensors.imu = ImuNoise{};  // as of a bag
 }
 
 std::string ImagesIntake::missing() const {
   std::string out;
   const auto add = [&](const std::string& what) { out += (out.empty() ? "" : "; ") + what; };
-  for (const OneCamera& camera : cameras_)
-    if (const auto placed = place(camera); !placed) add("no images are used: " + placed.error().message);
+  std::vector<std::string> names;
+  for (const OneTopic& topic : topics_) {
+    names.push_back(topic.topics.images);
+    if (is_chosen() || topic.is_depth()) continue;
+    if (const auto placed = place(topic); !placed) add("no images are used: " + placed.error().message);
+  }
+  if (!is_chosen() && out.empty() && std::ranges::none_of(topics_, &OneTopic::shows_picture))
+    add(fmt::format("no images are used: none of the topics with a CameraInfo shows pictures: {}",
+                    fmt::join(names, ", ")));
+  if (depth_)
+    if (const auto& images = topics_[cameras_.front()].newest, &depth = topics_[*depth_].newest;
+        images && depth && *images - *depth > kSilent_s)
+      add(fmt::format("{} has ended, or is by another clock: its newest is of {} ns", topics_[*depth_].topics.images,
+                      depth->ns));
   if (imu_.empty()) return out;
   if (const auto placed = imu_place(); !placed) add("no IMU is used: " + placed.error().message);
   return out;
 }
 
 bool ImagesIntake::reaches(Timestamp stamp) const {
-  return std::ranges::all_of(cameras_,
-                             [&](const OneCamera& camera) { return camera.newest && *camera.newest >= stamp; }) &&
+  const auto has = [&](std::size_t i) { return topics_[i].newest && *topics_[i].newest >= stamp; };
+  return std::ranges::all_of(cameras_, has) && (!depth_ || has(*depth_)) &&
          (imu_.empty() || (newest_imu_ && *newest_imu_ >= stamp));
 }
 
+/// Of the depth images that have arrived the nearest; it may be the next image's, too.
+Result<std::optional<program::EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
+  std::optional<program::EncodedImage> none;
+  if (!depth_) return none;
+  OneTopic& of = topics_[*depth_];
+  of.drop_before(moment - config_.most_depth_difference_s);
+  const auto at = nearest_in_time(of.waiting, moment, config_.most_depth_difference_s, &Waiting::stamp);
+  if (at == of.waiting.end()) return none;
+  if (at->image.is_raw) return std::optional(at->image);
+  if (of.first->encoding != "32FC1")
+    return std::optional(program::EncodedImage{0, false, std::string(bags::png_of(at->image.bytes))});
+  const CameraModel& camera = *topics_[cameras_.front()].model;
+  const auto depth = bags::to_depth({.header = {}, .format = of.first->encoding + ";", .data = at->image.bytes},
+                                    {camera.width_px, camera.height_px});
+  if (depth) return std::optional(program::EncodedImage{0, true, to_bytes(*depth)});
+  const Timestamp wrong = at->stamp;
+  of.bytes -= at->image.bytes.size();
+  of.waiting.erase(at);
+  return in_context(fmt::format("{}: depth at {} ns", of.topics.images, wrong.ns), depth.error());
+}
+
 Result<std::optional<program::FedImages>> ImagesIntake::next_images(Timestamp stamp) {
-  std::deque<Waiting>& first = cameras_.front().waiting;
-  while (!first.empty() && odometry_.is_before_all(first.front().stamp)) cameras_.front().pop();
-  if (first.empty() || first.front().stamp > stamp) return std::optional<program::FedImages>();
-  const Timestamp moment = first.front().stamp;
+  const std::optional<program::FedImages> none;
+  if (!is_chosen()) return none;
+  OneTopic& camera = topics_[cameras_.front()];
+  while (!camera.waiting.empty() && odometry_.is_before_all(camera.waiting.front().stamp)) camera.pop();
+  if (camera.waiting.empty() || camera.waiting.front().stamp > stamp) return none;
+  const Timestamp moment = camera.waiting.front().stamp;
   if (stamp - moment > kLatest_s) {
-    cameras_.front().pop();
+    camera.pop();
     return fail(ErrorCode::invalid, "image at {} ns comes {:.1f} s after odometry of its time, expected at most {} s",
                 moment.ns, stamp - moment, kLatest_s);
   }
+  const bool is_patient = stamp - moment < kPatience_s;
   std::optional<program::EncodedImage> other;
   if (cameras_.size() > 1) {
-    OneCamera& second = cameras_.back();
-    while (!second.waiting.empty() && second.waiting.front().stamp < moment - config_.most_difference_s) second.pop();
-    if (second.waiting.empty() && stamp - moment < kPatience_s) return std::optional<program::FedImages>();
+    OneTopic& second = topics_[cameras_.back()];
+    second.drop_before(moment - config_.most_difference_s);
+    if (second.waiting.empty() && is_patient) return none;
     if (!second.waiting.empty() && second.waiting.front().stamp - moment <= config_.most_difference_s)
       other = second.pop().image;
   }
-  program::FedImages out{.stamp = moment, .images = {}, .depth = {}};
-  out.images.push_back(cameras_.front().pop().image);
+  if (depth_ && is_patient && !(topics_[*depth_].newest && *topics_[*depth_].newest >= moment)) return none;
+  auto depth = depth_of(moment);
+  if (!depth) return tl::unexpected(depth.error());
+  program::FedImages out{.stamp = moment, .images = {}, .depth = std::move(*depth)};
+  out.images.push_back(camera.pop().image);
   if (!other) return std::optional(std::move(out));
   other->camera = 1;
   out.images.push_back(std::move(*other));

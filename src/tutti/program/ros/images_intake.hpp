@@ -5,53 +5,26 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "tutti/bags/depth.hpp"
+#include "tutti/bags/rgbd.hpp"
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/base/result.hpp"
 #include "tutti/model/visual.hpp"
 #include "tutti/program/feed/feed_sensors.hpp"
-#include "tutti/program/ros/dds.hpp"
+#include "tutti/program/ros/image_topics.hpp"
 #include "tutti/program/ros/ros_intake.hpp"
 
 namespace tutti::ros {
 
-inline constexpr const char *kImageType = "sensor_msgs/msg/Image", *kCompressedType = "sensor_msgs/msg/CompressedImage",
-                            *kCameraInfoType = "sensor_msgs/msg/CameraInfo", *kImuType = "sensor_msgs/msg/Imu";
-
-/// Which cameras and which IMU a robot on ROS's topics has.
-struct ImagesConfig {
-  std::vector<std::string> images;   ///< Topics; empty: found by type, within the namespace.
-  std::string imu;                   ///< A topic; empty: found by type, within the namespace.
-  std::string within = "/";          ///< Of the namespace's topics the beginning, "/alpha/"; set by resolve().
-  int most_cameras = 2;              ///< RobotConfig::images.most_cameras
-  double time_offset_s = 0.0;        ///< Added to the images' stamps gives the odometry's time.
-  double most_difference_s = 0.005;  ///< Of the stamps of two cameras' images of one moment.
-};
-
-/// Sets `within`, and makes all topics' names full ones. Fails when one is no valid name in ROS.
-Status resolve(ImagesConfig& config, const std::string& name_space);
-
-/// The topics of one camera.
-struct CameraTopics {
-  std::string images, info;
-  bool is_compressed = false;
-  friend bool operator==(const CameraTopics&, const CameraTopics&) = default;
-};
-
-/// Of published topics, one or two cameras, in the order of their names: those of `config`, or all that have a
-/// CameraInfo beside them (of which a compressed topic counts only where there is no other). None while they are not
-/// published; an error when there are too many, which says how to choose.
-Result<std::vector<CameraTopics>> choose_cameras(std::span<const Publication> published, const ImagesConfig& config);
-/// The topic of the IMU, by the same rules; empty while there is none.
-Result<std::string> choose_imu(std::span<const Publication> published, const ImagesConfig& config);
-
 /// Turns images and IMU samples of ROS 2 into inputs of a robot's live feed, as mission/bag_cameras.cpp does of a bag.
-/// Raw images become grey here; compressed ones stay as they are, and the robot decodes them. Bytes are untrusted: an
-/// error says what is wrong with a message, which then has no effect.
+/// Which topics are cameras and which is their depth is chosen once each has said what it shows. Raw images become grey
+/// here, raw depth millimetres; compressed ones stay as they are where the robot can decode them. Bytes are untrusted:
+/// an error says what is wrong with a message, which then has no effect.
 class ImagesIntake {
  public:
   static constexpr double kLatest_s = 0.5;               ///< Behind odometry; the robot takes none later.
@@ -60,20 +33,36 @@ class ImagesIntake {
   static constexpr std::size_t kMostBytes = 48U << 20U;  ///< Images that wait for odometry, before the oldest go.
   static constexpr std::size_t kMostSamples = 20'000;    ///< IMU samples that wait, before the oldest go.
 
+  static constexpr double kSilent_s = 5.0;  ///< Depth that is older than images by more has ended.
+
   /// `imu` is empty without an IMU. `odometry` must live as long as this.
-  ImagesIntake(ImagesConfig config, std::vector<CameraTopics> cameras, std::string imu, const RosIntake& odometry);
+  ImagesIntake(ImagesConfig config, std::vector<CameraTopics> topics, std::string imu, const RosIntake& odometry);
 
   /// The first valid calibration of a camera counts; images of another size that wait are dropped.
-  Status add_info(std::size_t camera, std::string_view cdr);
-  Status add_image(std::size_t camera, std::string_view cdr);
+  Status add_info(std::size_t topic, std::string_view cdr);
+  Status add_image(std::size_t topic, std::string_view cdr);
   Status add_imu(std::string_view cdr);
 
-  /// Fills in the cameras, once calibration and place of all are known, and the IMU once its place is.
+  /// Chooses cameras and depth by bags::choose_cameras(), once every topic has said what it shows, and calibration and
+  /// place of the cameras are known; `is_late`: topics that nobody named and that have said nothing are left out. False
+  /// while something is missing; an error when it cannot be chosen, which says how to choose.
+  Result<bool> choose(bool is_late);
+  /// Any topic has said what it shows.
+  [[nodiscard]] bool has_any_image() const;
+  [[nodiscard]] bool is_chosen() const { return !cameras_.empty(); }
+  /// Messages of this topic are of use: before the choice of all.
+  [[nodiscard]] bool uses(std::size_t topic) const;
+  /// "/left/image_raw and /right/image_raw", "/image_raw with depth of /depth/image_raw"; of a choice.
+  [[nodiscard]] std::string in_words() const;
+  /// Why no depth is used although there is some; else empty.
+  [[nodiscard]] const std::string& note() const { return note_; }
+
+  /// Fills in the cameras and their depth, once they are chosen, and the IMU once its place is known.
   void describe(program::FeedSensors& sensors) const;
-  /// What describe() waits for: "/a/camera_info: no sensor_msgs/CameraInfo"; empty when it has everything.
+  /// What is being waited for: "/a/camera_info: no sensor_msgs/CameraInfo"; empty when there is everything.
   [[nodiscard]] std::string missing() const;
-  /// The calibration of this camera is known.
-  [[nodiscard]] bool has_info(std::size_t camera) const { return cameras_[camera].model.has_value(); }
+  /// The calibration of this topic's camera is known.
+  [[nodiscard]] bool has_info(std::size_t topic) const { return topics_[topic].model.has_value(); }
   /// Everything up to `stamp` has been added.
   [[nodiscard]] bool reaches(Timestamp stamp) const;
 
@@ -90,22 +79,36 @@ class ImagesIntake {
     program::EncodedImage image;
     std::uint32_t width = 0, height = 0;  ///< 0: of a file.
   };
-  struct OneCamera {
+  struct OneTopic {
     CameraTopics topics;
+    std::optional<bags::ImageLook> first;  ///< Of the first message.
+    std::optional<bags::RosCameraInfo> info;
     std::optional<CameraModel> model;
-    std::optional<std::string> frame;
     std::optional<Timestamp> newest;
     std::deque<Waiting> waiting;
     std::size_t bytes = 0;
+    [[nodiscard]] bool is_depth() const { return first && bags::is_depth(topics.images, first->encoding); }
+    [[nodiscard]] bool shows_picture() const;
     Waiting pop();
+    void drop_before(Timestamp stamp);
   };
-  Status push(OneCamera& camera, const bags::RosHeader& header, Waiting waiting);
-  static Status check_size(const OneCamera& camera, const Waiting& waiting);
-  [[nodiscard]] Result<Camera> place(const OneCamera& camera) const;
+  using Numbers = std::vector<std::size_t>;
+  Status push(OneTopic& topic, const bags::RosHeader& header, Waiting waiting);
+  Status add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosImage& message);
+  Status add_depth(OneTopic& topic, const bags::ImageLook& look, const bags::RosCompressedImage& message);
+  static Status check_size(const OneTopic& topic, const Waiting& waiting);
+  /// Nothing while a topic must be waited for.
+  Result<std::optional<std::pair<Numbers, Numbers>>> cameras_and_depths(bool is_late) const;
+  [[nodiscard]] static bags::ImageTopic to_topic(const OneTopic& topic);
+  [[nodiscard]] Result<Camera> place(const OneTopic& camera) const;
   [[nodiscard]] Result<Pose3> imu_place() const;
+  Result<std::optional<program::EncodedImage>> depth_of(Timestamp moment);
 
   ImagesConfig config_;
-  std::vector<OneCamera> cameras_;
+  std::vector<OneTopic> topics_;
+  Numbers cameras_;  ///< Of topics_; none before the choice.
+  std::optional<std::size_t> depth_;
+  std::string note_;
   std::string imu_;
   const RosIntake& odometry_;
   std::optional<std::string> imu_frame_;

@@ -7,50 +7,13 @@
 #include <limits>
 #include <random>
 
-#include "support/program/ros/messages.hpp"
+#include "support/program/ros/camera_robot.hpp"
 
 namespace tutti::ros {
 namespace images_intake_test {
 
-using test::calibration, test::grey_image, test::imu, test::kPeriod, test::kSecond, test::kStart, test::odometry,
-    test::transform;
-
-std::string why(const Status& status) { return status ? "" : status.error().message; }
-void expect(const std::string& said, const std::string& part) { EXPECT_NE(said.find(part), std::string::npos) << said; }
-
-const CameraTopics kLeft{"/r/left/image_raw", "/r/left/camera_info", false},
-    kRight{"/r/right/image_raw", "/r/right/camera_info", false};
-const Pose3 kBodyCamera{Eigen::Quaterniond::Identity(), {0.1, 0.2, 0.3}};
-const Pose3 kBodyImu{Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())), {0, 0, 0}};
-
-/// A robot whose odometry runs at 10 Hz, and its cameras.
-struct Robot {
-  explicit Robot(std::vector<CameraTopics> cameras = {kLeft}, const std::string& imu_topic = "/r/imu",
-                 ImagesConfig config = {})
-      : images(std::move(config), std::move(cameras), imu_topic, odometry_) {}
-  void place() {
-    EXPECT_TRUE(odometry_.add_tf(transform(0, "base_link", "camera", kBodyCamera), true));
-    EXPECT_TRUE(odometry_.add_tf(transform(0, "base_link", "imu", kBodyImu), true));
-  }
-  /// Feeds odometry up to and including sample `i`.
-  Timestamp go(int i) {
-    for (; next_ <= i; ++next_) {
-      EXPECT_TRUE(odometry_.add_odometry(odometry(kStart + next_ * kPeriod)));
-      EXPECT_TRUE(odometry_.next_odometry(false));
-    }
-    return {kStart + i * kPeriod};
-  }
-  program::FeedSensors sensors() {
-    program::FeedSensors out;
-    images.describe(out);
-    return out;
-  }
-  RosIntake odometry_{{}};
-  ImagesIntake images;
-
- private:
-  int next_ = 0;
-};
+using namespace test;
+using Robot = CameraRobot;
 
 TEST(ImagesIntake, CamerasAndImuAreKnownOnceCalibrationAndPlaceAre) {
   Robot robot;
@@ -82,6 +45,7 @@ TEST(ImagesIntake, ImagesAndSamplesAreFedWhenOdometryCoversThem) {
   ASSERT_TRUE(robot.images.add_image(0, bags::encode(grey_image(kStart - kPeriod))));  // before all odometry
   ASSERT_TRUE(robot.images.add_image(0, bags::encode(grey_image(kStart))));            // at 0.05 s
   for (int i = 0; i <= 70; ++i) ASSERT_TRUE(robot.images.add_imu(imu(kStart + i * kPeriod / 10)));
+  EXPECT_EQ(robot.sensors().cameras.size(), 1U);
   EXPECT_TRUE(robot.images.reaches({kStart}));
   EXPECT_FALSE(robot.images.reaches({kStart + kPeriod}));
   EXPECT_FALSE(robot.images.next_images({kStart}).value());
@@ -109,7 +73,9 @@ TEST(ImagesIntake, TwoCamerasAreFedTogetherOrTheFirstAlone) {
   robot.go(0);
   for (std::size_t camera : {0U, 1U}) ASSERT_TRUE(robot.images.add_info(camera, bags::encode(calibration())));
   add(1, kStart - kPeriod / 2);
+  EXPECT_TRUE(robot.sensors().cameras.empty());  // the first has said nothing
   add(0, kStart);
+  EXPECT_EQ(robot.sensors().cameras.size(), 2U);
   EXPECT_FALSE(robot.images.next_images({kStart}).value());  // the second's may come
   add(1, kStart + 1'000'000);
   const auto both = robot.images.next_images({kStart}).value();
@@ -127,12 +93,13 @@ TEST(ImagesIntake, TwoCamerasAreFedTogetherOrTheFirstAlone) {
 }
 
 TEST(ImagesIntake, FilesStayAsTheyAre) {
-  Robot robot({{"/r/image_raw/compressed", "/r/camera_info", true}}, "");
+  Robot robot({{.images = "/r/image_raw/compressed", .info = "/r/camera_info", .is_compressed = true}}, "");
   robot.place();
   robot.go(0);
   ASSERT_TRUE(robot.images.add_info(0, bags::encode(calibration())));
   const bags::RosCompressedImage jpeg{.header = {{kStart}, "camera"}, .format = "jpeg", .data = "any bytes"};
   ASSERT_TRUE(robot.images.add_image(0, bags::encode(jpeg)));
+  EXPECT_EQ(robot.sensors().cameras.size(), 1U);
   const auto images = robot.images.next_images({kStart}).value();
   EXPECT_FALSE(images->images[0].is_raw);
   EXPECT_EQ(images->images[0].bytes, "any bytes");
@@ -149,12 +116,12 @@ TEST(ImagesIntake, WhatIsWrongIsSaid) {
   image.step = 4;
   image.data.remove_suffix(1);
   expect(add(image), "11 bytes in all");
-  image.encoding = "16UC1";
-  expect(add(image), "encoding '16UC1', expected mono8, ");
   expect(why(robot.images.add_image(0, odometry(kStart))), "sensor_msgs/msg/Image: ");
   expect(add(grey_image(0)), "are they by another clock?");
   EXPECT_EQ(add(grey_image(kStart)), "");
   expect(add(grey_image(kStart)), "two publishers, or a clock that began anew?");
+  image.encoding = "16UC1";  // though its first was a picture
+  expect(add(image), "encoding '16UC1', expected mono8, ");
   bags::RosCameraInfo none = calibration();
   none.k = {};
   expect(why(robot.images.add_info(0, bags::encode(none))), "is the camera calibrated?");
@@ -182,49 +149,9 @@ TEST(ImagesIntake, LateImagesAndAnImuElsewhereAreSaid) {
   EXPECT_FALSE(robot.images.next_images(robot.go(6)).value());
 }
 
-TEST(ImagesIntake, CamerasAreChosenByTypeAndSeveralAreSaid) {
-  ImagesConfig config;
-  ASSERT_TRUE(resolve(config, "r"));
-  const auto topics = [](std::vector<std::pair<const char*, const char*>> all) {
-    std::vector<Publication> out;
-    for (const auto& [topic, type] : all) out.push_back({.topic = topic, .type = type, .user_data = {}});
-    return out;
-  };
-  auto published = topics({{"/r/right/image_raw", kImageType},
-                           {"/r/right/camera_info", kCameraInfoType},
-                           {"/r/left/image_raw", kImageType},
-                           {"/r/left/image_raw/compressed", kCompressedType},
-                           {"/r/left/camera_info", kCameraInfoType},
-                           {"/r/rviz", kImageType},
-                           {"/s/image_raw", kImageType},
-                           {"/s/camera_info", kCameraInfoType},
-                           {"/s/imu", kImuType},
-                           {"/r/imu", kImuType}});
-  EXPECT_EQ(choose_cameras(published, config).value(), (std::vector{kLeft, kRight}));
-  EXPECT_EQ(choose_imu(published, config).value(), "/r/imu");
-  EXPECT_TRUE(choose_cameras(topics({}), config)->empty());
-  config.most_cameras = 1;
-  EXPECT_EQ(choose_cameras(published, config).value(), (std::vector{kLeft}));
-  for (const auto& more : topics({{"/r/up/image_raw", kImageType}, {"/r/up/camera_info", kCameraInfoType}}))
-    published.push_back(more);
-  published.push_back({.topic = "/r/imu2", .type = kImuType, .user_data = {}});
-  expect(choose_cameras(published, config).error().message,
-         "3 cameras with 3 CameraInfo, expected one or two; say which: --images "
-         "/r/left/image_raw,/r/right/image_raw,/r/up/image_raw");
-  expect(choose_imu(published, config).error().message, "2 topics have one; say which: --imu /r/imu ");
-
-  ImagesConfig named{.images = {"left/image_raw/compressed"}, .imu = "imu2"};
-  ASSERT_TRUE(resolve(named, "r"));
-  EXPECT_EQ(choose_cameras(published, named).value(),
-            (std::vector{CameraTopics{"/r/left/image_raw/compressed", "/r/left/camera_info", true}}));
-  EXPECT_EQ(choose_imu(published, named).value(), "/r/imu2");
-  named.images.push_back("/r/none");
-  EXPECT_TRUE(choose_cameras(published, named)->empty());
-  EXPECT_FALSE(resolve(named, "a b"));
-}
-
 TEST(ImagesIntake, WhatWaitsHasAnEnd) {
-  Robot robot({{"/r/image_raw/compressed", "/r/camera_info", true}});
+  Robot robot({{.images = "/r/image_raw/compressed", .info = "/r/camera_info", .is_compressed = true}});
+  ASSERT_TRUE(robot.images.add_info(0, bags::encode(calibration())));
   const std::string file(ImagesIntake::kMostBytes / 10, 'x');
   for (int i = 0; i < 30; ++i)
     ASSERT_TRUE(robot.images.add_image(
@@ -232,6 +159,7 @@ TEST(ImagesIntake, WhatWaitsHasAnEnd) {
   for (std::size_t i = 0; i < 2 * ImagesIntake::kMostSamples; ++i)
     ASSERT_TRUE(robot.images.add_imu(imu(kStart + static_cast<std::int64_t>(i), {0, 0, 0}, "base_link")));
   robot.go(0);
+  EXPECT_EQ(robot.sensors().cameras.size(), 1U);
   std::size_t images = 0, samples = 0;
   while (robot.images.next_images({kStart + kPeriod}).value()) ++images;
   for (std::size_t some = 1; some > 0; samples += some) some = robot.images.next_imu({kStart}).size();
@@ -241,22 +169,25 @@ TEST(ImagesIntake, WhatWaitsHasAnEnd) {
 
 /// Any byte of any message may be wrong, and any message cut.
 TEST(ImagesIntake, BytesOfStrangersDoNoHarm) {
-  Robot robot;
+  Robot robot({kLeft, kDepth});
   robot.place();
   robot.go(0);
   std::mt19937 rng(1);
-  const std::vector<std::string> good{bags::encode(grey_image(kStart)), bags::encode(calibration()), imu(kStart)};
+  const std::vector<std::string> good{bags::encode(grey_image(kStart)), bags::encode(depth_image(kStart)),
+                                      bags::encode(calibration()), imu(kStart)};
   std::size_t refused = 0;
   for (int i = 0; i < 20'000; ++i) {
     std::string bytes = good[rng() % good.size()];
     for (std::size_t k = 1 + rng() % 3; k > 0; --k) bytes[rng() % bytes.size()] = static_cast<char>(rng());
     if (rng() % 3 == 0) bytes.resize(rng() % bytes.size());
     const std::size_t kind = rng() % 3;
-    const Status taken = kind == 0   ? robot.images.add_image(0, bytes)
-                         : kind == 1 ? robot.images.add_info(0, bytes)
+    const std::size_t topic = rng() % 2;
+    const Status taken = kind == 0   ? robot.images.add_image(topic, bytes)
+                         : kind == 1 ? robot.images.add_info(topic, bytes)
                                      : robot.images.add_imu(bytes);
     refused += taken ? 0 : 1;
-    if (!robot.sensors().cameras.empty()) static_cast<void>(robot.images.next_images({kStart}));
+    static_cast<void>(robot.images.choose(i > 10'000));
+    static_cast<void>(robot.images.next_images({kStart}));
     static_cast<void>(robot.images.next_imu({kStart}));
   }
   EXPECT_GT(refused, 15'000U);

@@ -16,13 +16,16 @@
 
 namespace tutti::ros {
 
-/// Subscribes the cameras and the IMU of a robot once they are published, and feeds what they say. Times are wall time.
+/// Subscribes the topics that may be a robot's cameras, their depth and its IMU once they are published, gives up those
+/// that turn out to be something else, and feeds what the others say. Times are wall time.
 class RosImages {
  public:
   struct Options {
     ImagesConfig config;
-    bool lossless = false;    ///< RosRobotOptions::lossless
-    double patience_s = 5.0;  ///< After so long without cameras, or without what they need, `say` is told so.
+    bool lossless = false;  ///< RosRobotOptions::lossless
+    /// After so long without cameras, or without what they need, `say` is told so; topics that have said nothing so
+    /// long after another are left out.
+    double patience_s = 5.0;
     std::function<void(program::Level, const std::string&)> say;
   };
   /// `odometry` and `complaints` must live as long as this.
@@ -41,18 +44,21 @@ class RosImages {
 
  private:
   void look(double now_s);
-  Status subscribe(const std::vector<CameraTopics>& cameras, const std::string& imu);
+  Status subscribe(const std::vector<CameraTopics>& topics, const std::string& imu);
+  void choose(double now_s);
 
   Options options_;
   std::shared_ptr<Participant> participant_;
   const RosIntake& odometry_;
   Complaints& complaints_;
-  std::optional<ImagesIntake> intake_;  ///< Once cameras are subscribed.
-  std::vector<std::unique_ptr<Reader>> images_, infos_;
+  std::optional<ImagesIntake> intake_;                   ///< Once topics are subscribed.
+  std::vector<std::unique_ptr<Reader>> images_, infos_;  ///< By the intake's topics; null: not of use.
   std::unique_ptr<Reader> imu_;
-  std::vector<CameraTopics> seen_;  ///< The cameras that were published when it was looked last.
+  std::vector<CameraTopics> seen_;  ///< The topics that were published when it was looked last.
+  std::vector<CameraTopics> refused_;
+  Status why_refused_;  ///< Of `refused_`, of which cameras could not be chosen.
   std::string seen_imu_, said_;
-  double begin_s_, looked_s_ = 0.0;
+  double begin_s_, looked_s_ = 0.0, first_image_s_ = 0.0;
 };
 
 }  // namespace tutti::ros
