@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/bus/internal/nats_connection.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
-#include "tutti/wire/codec.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -30,8 +30,8 @@ struct EntryFree {
 
 /// A line each.
 std::string lease_text(const LeaseHolder& holder) {
-  return fmt::format("{}\n{}\n{}\n{}\n{}\n", wire::plain_text(holder.host), holder.process,
-                     wire::plain_text(holder.state), holder.since_ns, wire::plain_text(holder.seat));
+  return fmt::format("{}\n{}\n{}\n{}\n{}\n", plain_text(holder.host), holder.process, plain_text(holder.state),
+                     holder.since_ns, plain_text(holder.seat));
 }
 
 /// What somebody else has written there is a holder, too.
@@ -43,7 +43,7 @@ LeaseHolder lease_of(std::string_view text) {
       std::getline(lines, since) && std::getline(lines, holder.seat);
   holder.process = std::strtoull(process.c_str(), nullptr, 10);
   holder.since_ns = std::strtoll(since.c_str(), nullptr, 10);
-  for (std::string* word : {&holder.host, &holder.state, &holder.seat}) *word = wire::plain_text(*word);
+  for (std::string* word : {&holder.host, &holder.state, &holder.seat}) *word = plain_text(*word);
   return holder;
 }
 

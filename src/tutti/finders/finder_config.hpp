@@ -17,6 +17,7 @@ struct FinderConfig {
   double feature_cache_mb = 1000.0;  ///< For lidar about 2,400 submaps of 5,000 points.
   lidar::LidarClosureConfig lidar;
   visual::VisualClosureConfig visual;
+  [[nodiscard]] bool wants_images() const { return finder != "lidar"; }
   template <class V>
   void describe(V& v) {
     v.field("finder", finder, one_of({"lidar", "visual", "sensors"}),

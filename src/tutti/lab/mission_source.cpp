@@ -113,7 +113,7 @@ Status tell_driver(const MissionConfig& config, program::RobotOptions& options) 
   program::DriverSettings& driver = options.settings.driver;
   driver.covariance = robot->covariance;
   driver.scan_times = robot->scan_times_config();
-  driver.with_images = config.closures.finder != "lidar";
+  driver.with_images = config.closures.wants_images();
   driver.most_cameras = robot->images.most_cameras;
   driver.images_offset_s = robot->images.time_offset_s;
   driver.depth = robot->images.depth.sensor;

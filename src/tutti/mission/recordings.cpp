@@ -127,7 +127,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
   }
   std::optional<BagRecording> bag;
   if (!robot.bag.empty()) {
-    auto read = read_bag(data, robot, config.closures.finder != "lidar" && !robot.images.is_given());
+    auto read = read_bag(data, robot, config.closures.wants_images() && !robot.images.is_given());
     if (!read) return tl::unexpected(read.error());
     bag = std::move(*read);
   }

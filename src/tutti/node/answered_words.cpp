@@ -2,7 +2,7 @@
 #include "tutti/node/answered_words.hpp"
 
 #include "tutti/base/content_hash.hpp"
-#include "tutti/wire/codec.hpp"
+#include "tutti/base/plain_text.hpp"
 
 namespace tutti::node {
 namespace {
@@ -12,7 +12,7 @@ constexpr std::size_t kMostWords = 32;
 }  // namespace
 
 void AnsweredWords::note(const std::string& frame, const std::string& why) {
-  const MissionStatus::Word word{content_hash(frame), wire::plain_text(why)};
+  const MissionStatus::Word word{content_hash(frame), plain_text(why)};
   std::erase_if(words_, [&](const MissionStatus::Word& known) { return known.content == word.content; });
   words_.push_back(word);
   if (words_.size() > kMostWords) words_.erase(words_.begin());

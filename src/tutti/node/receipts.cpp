@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/base/content_hash.hpp"
+#include "tutti/base/plain_text.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/wire/codec.hpp"
 
@@ -77,7 +78,7 @@ void forget_unread(SubmapId id, Receipt& receipt) {
 
 bool note_refused(SubmapId id, const std::string& bytes, const std::string& why, Receipt& receipt) {
   if (receipt.contains(id) || !receipt.refuse(id, content_hash(bytes), kMostRefused)) return false;
-  receipt.why_refused = wire::plain_text(why);
+  receipt.why_refused = plain_text(why);
   return true;
 }
 

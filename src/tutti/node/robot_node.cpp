@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/node/robot_tables.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/node/submap_frames.hpp"
@@ -340,11 +341,11 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .jobs_done = 0,
                     .trouble = {}};
   if (updated_) status.update_age_s = now - *updated_;
-  status.trouble = wire::plain_text(odometry_trouble(now));
+  status.trouble = plain_text(odometry_trouble(now));
   for (const auto& [kind, unread] : unread_)
-    status.trouble = wire::plain_text(
-        fmt::format("cannot read what the server sends ({} so far), one of the two is to be upgraded: {}", unread.count,
-                    unread.why));
+    status.trouble =
+        plain_text(fmt::format("cannot read what the server sends ({} so far), one of the two is to be upgraded: {}",
+                               unread.count, unread.why));
   return status;
 }
 

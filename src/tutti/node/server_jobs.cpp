@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/words.hpp"
 #include "tutti/wire/codec.hpp"
@@ -66,7 +67,7 @@ void ServerNode::note_waiting(const std::vector<SubmapPair>& pairs, const std::s
   const bool was_empty = waiting_.empty();
   for (const SubmapPair& pair : pairs)
     if (server::has_both(submaps, pair) && !server_.state().answered.contains(pair)) waiting_.insert(pair);
-  why_waiting_ = wire::plain_text(why);
+  why_waiting_ = plain_text(why);
   if (was_empty && !waiting_.empty()) step.tell(now, VerificationFailed{*waiting_.begin(), why});
   if (was_empty != waiting_.empty()) ++changes_;
   if (workers_.any_can(server_.finder().id(), now)) ask_waiting(now, step);

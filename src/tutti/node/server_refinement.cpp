@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/node/map_meta.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/wire/codec.hpp"
@@ -45,7 +46,7 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
   };
   if (refinement->cannot && closed && closed->refinement) {
     refinements_.wait(*closed->refinement);
-    why_waiting_ = wire::plain_text(refinement->why);
+    why_waiting_ = plain_text(refinement->why);
     ++changes_;
     return step.tell(now, RefinementFailed{refinement->revision, refinement->why});
   }

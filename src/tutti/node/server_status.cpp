@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/wire/codec.hpp"
@@ -25,7 +26,7 @@ std::uint64_t count(const std::map<std::uint64_t, NumberSet>& sessions) {
 void ServerNode::note_refusal(bus::Endpoint::Role from, bus::MessageKind kind, const std::string& why) {
   MissionStatus::Refusals& refusals = refusals_[{from, kind}];
   if (refusals.count == 0) ++changes_;
-  refusals = {bus::name(from), wire::name(kind), refusals.count + 1, wire::plain_text(why)};
+  refusals = {bus::name(from), wire::name(kind), refusals.count + 1, plain_text(why)};
 }
 
 void ServerNode::receive_status(const bus::Envelope& envelope, Timestamp now, Step& step) {
@@ -53,7 +54,7 @@ void ServerNode::receive_status_of_worker(std::uint32_t number, const NodeStatus
 void ServerNode::refuse_robot(const bus::Envelope& envelope, const NodeStatus& status, const std::string& why,
                               Timestamp now, Step& step) {
   Receipt* const receipt = receipt_of(*envelope.from.robot(), now);
-  const Receipt::Conflict conflict{status.session, status.start, wire::plain_text(why)};
+  const Receipt::Conflict conflict{status.session, status.start, plain_text(why)};
   if (receipt == nullptr || receipt->conflict == conflict) return note_refusal(envelope.from.role, envelope.kind, why);
   refuse(envelope, why, now, step);
   receipt->conflict = conflict;
@@ -72,7 +73,7 @@ void ServerNode::receive_status_of_robot(RobotId robot, const NodeStatus& status
   if (owner) receipt.owner_session = owner->session;
   if (!heard.accepted) {
     note_refusal(bus::Endpoint::Role::robot, bus::MessageKind::status, heard.why);
-    receipt.conflict = {status.session, status.start, wire::plain_text(heard.why)};
+    receipt.conflict = {status.session, status.start, plain_text(heard.why)};
     if (receipt.conflict != old.conflict) step.tell(now, RobotRefused{robot, status.session, heard.why});
   } else {
     if (receipt.conflict && receipt.conflict->session == status.session) receipt.conflict.reset();
@@ -131,7 +132,7 @@ MissionStatus ServerNode::mission_status(Timestamp now) const {
       entry.last_update = known.last_update;
       entry.status = known.status;
       if (known.last_conflict && now - *known.last_conflict < RobotRegistry::kOwnerIsThere_s)
-        entry.conflict = wire::plain_text(known.conflict);
+        entry.conflict = plain_text(known.conflict);
     }
     if (entry.status.name.empty()) entry.status.name = default_name(bus::Endpoint::of(robot));
   }

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/wire/codec.hpp"
 
 namespace tutti::node {
@@ -12,8 +13,8 @@ using bus::Endpoint, bus::MessageKind;
 
 template <class Message>
 std::shared_ptr<const std::string> encoded(Message& message) {
-  message.version = wire::plain_text(message.version);
-  message.trouble = wire::plain_text(message.trouble);
+  message.version = plain_text(message.version);
+  message.trouble = plain_text(message.trouble);
   return std::make_shared<const std::string>(wire::encode(message));
 }
 

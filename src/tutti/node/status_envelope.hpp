@@ -6,7 +6,7 @@
 
 namespace tutti::node {
 
-/// The message with a robot's or worker's status for the server. Its texts are made plain (wire::plain_text()).
+/// The message with a robot's or worker's status for the server. Its texts are made plain (tutti::plain_text()).
 bus::Envelope to_server(bus::Endpoint from, NodeStatus status);
 /// The message with the server's status for everybody who watches.
 bus::Envelope to_viewers(MissionStatus status);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/plain_text.hpp"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/limits.hpp"
 #include "tutti/wire/refinement_codec.hpp"
@@ -36,8 +37,7 @@ Result<T> caught(Call&& call) {
   try {
     return call();
   } catch (const std::exception& error) {
-    return fail(ErrorCode::invalid, "the worker has thrown, which is a defect of it: {}",
-                wire::plain_text(error.what()));
+    return fail(ErrorCode::invalid, "the worker has thrown, which is a defect of it: {}", plain_text(error.what()));
   }
 }
 

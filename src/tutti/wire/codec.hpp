@@ -60,7 +60,7 @@ std::string encode(const ClosureVerdict& verdict);
 Result<ClosureVerdict> decode_verdict(std::string_view bytes);
 
 /// Exact. Names of jobs must have 1 to kMaxIdBytes printable ASCII letters without blanks; reasons in receipts must be
-/// as plain_text() returns them.
+/// as tutti::plain_text() returns them.
 std::string encode(const Receipt& receipt);
 Result<Receipt> decode_receipt(std::string_view bytes);
 std::string encode(const Job& job);
@@ -68,13 +68,11 @@ Result<Job> decode_job(std::string_view bytes);
 std::string encode(const Verdicts& verdicts);
 Result<Verdicts> decode_verdicts(std::string_view bytes);
 
-/// Exact; texts must be as plain_text() returns them.
+/// Exact; texts must be as tutti::plain_text() returns them.
 std::string encode(const NodeStatus& status);
 Result<NodeStatus> decode_status(std::string_view bytes);
 std::string encode(const MissionStatus& status);
 Result<MissionStatus> decode_mission_status(std::string_view bytes);
-/// The first kMaxReasonBytes bytes of a text, with '?' for every byte that is no printable ASCII: safe on any terminal.
-std::string plain_text(std::string_view text);
 
 /// Exact. The closure's name has 1 to kMaxIdBytes bytes.
 std::string encode(const ClosureWord& word);

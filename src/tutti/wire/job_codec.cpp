@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/base/check.hpp"
+#include "tutti/base/plain_text.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -119,7 +120,7 @@ Status validate(const Receipt& receipt) {
     return fail(ErrorCode::invalid, "receipt: {} refusals, at most {} are accepted", receipt.refusals.size(),
                 kMaxRefusals);
   for (const std::string& text : {receipt.why_refused, receipt.conflict ? receipt.conflict->why : std::string()})
-    if (text.size() > kMaxReasonBytes || text != plain_text(text))
+    if (text != plain_text(text))
       return fail(ErrorCode::invalid, "receipt: a reason of {} bytes, expected at most {}, all of printable ASCII",
                   text.size(), kMaxReasonBytes);
   return {};

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "tutti/base/plain_text.hpp"
+
 /// Limits of what the decoders accept, checked before memory is allocated.
 namespace tutti::wire {
 
@@ -25,7 +27,7 @@ inline constexpr std::size_t kMaxPairs = 10'000;             ///< Of submaps, pe
 inline constexpr std::size_t kMaxRefinedSubmaps = 10'000;    ///< This and the next: per refinement.
 inline constexpr std::size_t kMaxRefinedKeyframes = 40'000;  ///< What one message has room for.
 inline constexpr std::size_t kMaxIdBytes = 200;
-inline constexpr std::size_t kMaxReasonBytes = 1'000;
+inline constexpr std::size_t kMaxReasonBytes = kPlainTextBytes;
 inline constexpr std::size_t kMaxSettingsBytes = 64U << 10U;  ///< Of a finder, in a job.
 inline constexpr std::size_t kMaxMethods = 100;               ///< Of closure finding that a worker offers.
 inline constexpr std::size_t kMaxRequested = 1'000;           ///< Submaps per request.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/plain_text.hpp"
 #include "tutti/geometry/covariance.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"

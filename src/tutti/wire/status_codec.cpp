@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/v1/messages.pb.h"
 #include "tutti/wire/codec.hpp"
 #include "tutti/wire/frame.hpp"
@@ -13,14 +14,12 @@
 namespace tutti::wire {
 namespace {
 
-bool is_plain(char c) { return c >= ' ' && c <= '~'; }
-
 bool is_letter_of_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
 }
 
 Status check_text(const std::string& text, const char* what) {
-  if (text.size() <= kMaxReasonBytes && std::ranges::all_of(text, is_plain)) return {};
+  if (text == plain_text(text)) return {};
   return fail(ErrorCode::invalid, "{} of {} bytes, expected at most {}, all of printable ASCII", what, text.size(),
               kMaxReasonBytes);
 }
@@ -111,13 +110,6 @@ Result<MissionStatus::Worker> read(const v1::WorkerInMission& in) {
 }
 
 }  // namespace
-
-std::string plain_text(std::string_view text) {
-  std::string out(text.substr(0, kMaxReasonBytes));
-  std::ranges::replace_if(
-      out, [](char c) { return !is_plain(c); }, '?');
-  return out;
-}
 
 Status validate(const NodeStatus& status) {
   const auto wrong = [](const Error& error) { return in_context("status", error); };

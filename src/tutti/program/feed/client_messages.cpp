@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/program/feed/feed_frames.hpp"
 #include "tutti/v1/feed.pb.h"
 
@@ -92,7 +93,7 @@ Result<FeedSensors> read(const v1::Feed::Sensors& in) {
 
 FromClient read(v1::Feed::Hello& in) {
   FeedHello out{.version = in.protocol_version(),
-                .client = plain(in.client_name()),
+                .client = plain_text(in.client_name()),
                 .listens_only = in.listens_only(),
                 .wants_way = in.wants_way()};
   if (in.has_sensors()) out.sensors = read(in.sensors());

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/program/feed/internal/feed_messages.hpp"
 
 namespace tutti::program {
@@ -22,12 +23,6 @@ std::int64_t told(Timestamp stamp, std::int64_t offset_ns) {
 }
 
 }  // namespace
-
-std::string plain(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return c < ' ' || c > '~'; }, '?');
-  return text;
-}
 
 Result<std::optional<std::string>> FrameReader::take(std::string_view& bytes) {
   const auto fill = [&](std::string& part, std::size_t size) {
@@ -50,7 +45,7 @@ std::string welcome_frame(const FeedState& state, const Pose3& T_map_odom, std::
   v1::Feed message;
   auto& out = *message.mutable_welcome();
   out.set_protocol_version(kFeedVersion);
-  out.set_robot_name(plain(state.name));
+  out.set_robot_name(plain_text(state.name));
   out.set_robot(state.chain.robot.value);
   out.set_session(state.chain.session);
   out.set_has_odometry(state.newest.has_value());
@@ -101,14 +96,14 @@ std::string situation_frame(const FeedState& state, std::int64_t offset_ns) {
   for (const TeamMate& mate : state.team_mates) {
     auto& to = *out.add_team_mate();
     to.set_robot(mate.robot.value);
-    to.set_name(plain(mate.name));
+    to.set_name(plain_text(mate.name));
     to.set_stamp_ns(mate.stamp.ns);
     to.set_same_component(mate.T_map_body.has_value());
     if (mate.T_map_body) write(*mate.T_map_body, *to.mutable_t_map_body());
   }
   for (const FeedAlert& alert : state.alerts) {
     auto& to = *out.add_alert();
-    to.set_text(plain(alert.text));
+    to.set_text(plain_text(alert.text));
     to.set_since_stamp_ns(told(alert.since, offset_ns));
     to.set_from_stamp_ns(told(alert.from, offset_ns));
     to.set_until_stamp_ns(told(alert.until, offset_ns));
@@ -119,7 +114,7 @@ std::string situation_frame(const FeedState& state, std::int64_t offset_ns) {
 std::string refused_frame(Timestamp stamp, const std::string& why, std::int64_t offset_ns) {
   v1::Feed message;
   message.mutable_refused()->set_stamp_ns(told(stamp, offset_ns));
-  message.mutable_refused()->set_why(plain(why));
+  message.mutable_refused()->set_why(plain_text(why));
   return framed(message);
 }
 
@@ -164,7 +159,7 @@ std::string ended_frame() {
 
 std::string closed_frame(const std::string& why) {
   v1::Feed message;
-  message.mutable_closed()->set_why(plain(why));
+  message.mutable_closed()->set_why(plain_text(why));
   return framed(message);
 }
 

@@ -70,9 +70,6 @@ using FromClient = std::variant<FeedHello, node::OdometrySample, Scan, FeedEnd, 
 /// Decodes untrusted bytes; an error when they are no message of the protocol.
 Result<FromClient> decode_from_client(std::string_view payload);
 
-/// Replaces every character that is not printable ASCII by '?': protobuf requires UTF-8 of the text we send.
-std::string plain(std::string text);
-
 /// The robot's messages, each as a whole frame. `offset_ns` is FeedClock::offset_ns(): stamps are sent by the client's
 /// clock.
 std::string welcome_frame(const FeedState& state, const Pose3& T_map_odom, std::int64_t offset_ns);

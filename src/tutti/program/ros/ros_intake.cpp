@@ -9,6 +9,7 @@
 
 #include "tutti/bags/point_cloud.hpp"
 #include "tutti/bags/ros_messages.hpp"
+#include "tutti/base/plain_text.hpp"
 #include "tutti/perception/lidar/deskewed_scan.hpp"
 
 namespace tutti::ros {
@@ -23,13 +24,7 @@ Matrix6d unseen() {
 }
 
 /// Names are anybody's, and go to a terminal.
-std::string plain(std::string text) {
-  constexpr std::size_t kLongest = 80;
-  text.resize(std::min(text.size(), kLongest));
-  std::ranges::replace_if(
-      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
-  return text;
-}
+std::string plain(const std::string& name) { return plain_text(name, 80); }
 
 Status check_increases(Timestamp stamp, const std::optional<Timestamp>& before) {
   if (!before || stamp > *before) return {};
