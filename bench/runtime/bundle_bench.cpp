@@ -135,7 +135,7 @@ BENCHMARK(BM_Covariances)->Arg(0)->Arg(150)->Unit(benchmark::kMillisecond);
 
 /// Matching, merging, adjustment and covariances.
 void BM_RefineMap(benchmark::State& state) {
-  Refinement refined;
+  RefinedMap refined;
   for (auto _ : state) refined = refine_map(recording().input, config_of(state)).value();
   state.counters["ate_mm"] = ate_mm(refined.keyframes);
 }

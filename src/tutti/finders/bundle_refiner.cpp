@@ -28,7 +28,7 @@ Result<std::vector<bundle::PosedSubmap>> posed(const RefinementJob& job, const s
   return out;
 }
 
-RefinementCounts counts_of(const bundle::Refinement& refined) {
+RefinementCounts counts_of(const bundle::RefinedMap& refined) {
   const bundle::MergeSummary& merge = refined.merge;
   return {.keyframes = refined.keyframes.size(),
           .landmarks = merge.landmarks_out,
@@ -81,7 +81,7 @@ void remark_on_stereo(const std::vector<bundle::StereoScale>& scales, std::vecto
   }
 }
 
-std::vector<RefinementRemark> remarks_on(const bundle::Refinement& refined) {
+std::vector<RefinementRemark> remarks_on(const bundle::RefinedMap& refined) {
   std::vector<RefinementRemark> out;
   remark_on_imu(refined.imu, out);
   remark_on_stereo(refined.stereo, out);

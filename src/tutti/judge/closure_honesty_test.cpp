@@ -27,8 +27,8 @@ struct Case {
   double scale = 1.0;  ///< Of all lengths.
 };
 
-OdometryChain chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3>& truth) {
-  OdometryChain chain{.id = robot};
+OdometryPiece chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3>& truth) {
+  OdometryPiece chain{.id = robot};
   truth.assign(1, {});
   chain.T_odom_body.resize(1);
   for (std::uint32_t k = 1; k < kLength; ++k) {
@@ -45,7 +45,7 @@ OdometryChain chain_of(RobotId robot, const Case& c, Rng& rng, std::vector<Pose3
 ClosureHonesty found(const Case& c, std::uint64_t seed) {
   Rng rng(seed);
   std::vector<Pose3> one, two;
-  const std::vector<OdometryChain> chains{chain_of(kOne, c, rng, one), chain_of(kTwo, c, rng, two)};
+  const std::vector<OdometryPiece> pieces{chain_of(kOne, c, rng, one), chain_of(kTwo, c, rng, two)};
   std::vector<LoopClosure> closures;
   while (closures.size() < c.closures) {
     const auto a = static_cast<std::uint32_t>(rng.index(kLength));
@@ -57,7 +57,7 @@ ClosureHonesty found(const Case& c, std::uint64_t seed) {
          {kTwo, b},
          {T_a_b, test::diagonal_covariance(c.scale * kError_m * c.stated_m, kError_rad * c.stated_rad)}});
   }
-  const auto all = closure_honesty(chains, closures);
+  const auto all = closure_honesty(pieces, closures);
   const auto it = all.find({kOne, kTwo});
   return it == all.end() ? ClosureHonesty{} : it->second;
 }

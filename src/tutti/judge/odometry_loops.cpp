@@ -16,14 +16,14 @@ namespace {
 /// Odometry between any two keyframes of one chain.
 class Ways {
  public:
-  explicit Ways(std::span<const OdometryChain> chains) {
-    for (const OdometryChain& chain : chains) {
-      Piece& piece = pieces_[{chain.id, chain.first_index}];
-      piece.chain = &chain;
+  explicit Ways(std::span<const OdometryPiece> pieces) {
+    for (const OdometryPiece& odometry : pieces) {
+      Piece& piece = pieces_[{odometry.id, odometry.first_index}];
+      piece.odometry = &odometry;
       piece.covariance.push_back(Matrix6d::Zero());
-      for (std::size_t k = 0; k < chain.step_covariance.size(); ++k) {
-        const Matrix6d Ad = adjoint(T_first_body(chain, k + 1));
-        piece.covariance.push_back(piece.covariance.back() + Ad * chain.step_covariance[k] * Ad.transpose());
+      for (std::size_t k = 0; k < odometry.step_covariance.size(); ++k) {
+        const Matrix6d Ad = adjoint(T_first_body(odometry, k + 1));
+        piece.covariance.push_back(piece.covariance.back() + Ad * odometry.step_covariance[k] * Ad.transpose());
       }
     }
   }
@@ -36,20 +36,20 @@ class Ways {
     const std::size_t from = a.index - first.index, to = b.index - first.index;
     if (first.chain != a.chain || first.chain != b.chain || std::max(from, to) >= piece.covariance.size())
       return std::nullopt;
-    const Pose3 T_first_b = T_first_body(*piece.chain, to);
+    const Pose3 T_first_b = T_first_body(*piece.odometry, to);
     const Matrix6d to_b = adjoint(T_first_b.inverse());
     const double sign = from < to ? 1.0 : -1.0;
-    return RelativePose{T_first_body(*piece.chain, from).inverse() * T_first_b,
+    return RelativePose{T_first_body(*piece.odometry, from).inverse() * T_first_b,
                         sign * to_b * (piece.covariance[to] - piece.covariance[from]) * to_b.transpose()};
   }
 
  private:
   struct Piece {
-    const OdometryChain* chain = nullptr;
+    const OdometryPiece* odometry = nullptr;
     std::vector<Matrix6d> covariance;  ///< Of each pose, in the frame of the first.
   };
-  static Pose3 T_first_body(const OdometryChain& chain, std::size_t k) {
-    return chain.T_odom_body.front().inverse() * chain.T_odom_body[k];
+  static Pose3 T_first_body(const OdometryPiece& odometry, std::size_t k) {
+    return odometry.T_odom_body.front().inverse() * odometry.T_odom_body[k];
   }
 
   std::map<KeyframeId, Piece> pieces_;  // by first keyframe
@@ -110,8 +110,8 @@ OdometryLoop loop_of(const ClosurePair& pair) {
 }
 
 std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_closures(
-    std::span<const OdometryChain> chains, std::span<const LoopClosure> closures) {
-  const Ways ways(chains);
+    std::span<const OdometryPiece> pieces, std::span<const LoopClosure> closures) {
+  const Ways ways(pieces);
   std::map<std::pair<ChainId, ChainId>, std::vector<LoopClosure>> between;
   for (const LoopClosure& closure : closures) {
     const LoopClosure forth = closure.to < closure.from ? turned(closure) : closure;
@@ -132,11 +132,11 @@ std::map<std::pair<ChainId, ChainId>, std::vector<ClosurePair>> neighbouring_clo
   return out;
 }
 
-std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryChain> chains,
+std::map<ChainId, std::vector<OdometryLoop>> odometry_loops(std::span<const OdometryPiece> pieces,
                                                             std::span<const LoopClosure> closures) {
-  const Ways ways(chains);
+  const Ways ways(pieces);
   std::map<ChainId, std::vector<OdometryLoop>> loops;
-  for (const OdometryChain& chain : chains) loops[chain.id];
+  for (const OdometryPiece& piece : pieces) loops[piece.id];
   for (const auto& [from, to, measurement] : closures)
     if (const auto odometry = ways.between(from, to))
       loops.at(from.chain)

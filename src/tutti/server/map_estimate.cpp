@@ -104,8 +104,8 @@ judge::Closures collect_closures(const VerdictSet& verdicts, const WordSet& word
 }
 
 /// Closures that err by more than they say now say so.
-void raise_understated(const std::vector<judge::OdometryChain>& chains, judge::Closures& closures, MapEstimate& map) {
-  map.closure_factors = judge::closure_honesty(chains, closures.judged);
+void raise_understated(const std::vector<judge::OdometryPiece>& pieces, judge::Closures& closures, MapEstimate& map) {
+  map.closure_factors = judge::closure_honesty(pieces, closures.judged);
   for (LoopClosure& closure : closures.judged)
     if (const auto found = map.closure_factors.find(std::minmax(closure.from.chain, closure.to.chain));
         found != map.closure_factors.end())
@@ -166,17 +166,17 @@ void adopt(const judge::Optimum& optimum, MapEstimate& map) {
 
 }  // namespace
 
-std::vector<judge::OdometryChain> odometry_chains(const std::vector<MapNode>& nodes,
+std::vector<judge::OdometryPiece> odometry_pieces(const std::vector<MapNode>& nodes,
                                                   const std::vector<std::optional<Matrix6d>>& step_to) {
-  std::vector<judge::OdometryChain> chains;
+  std::vector<judge::OdometryPiece> pieces;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (step_to[i])
-      chains.back().step_covariance.push_back(*step_to[i]);
+      pieces.back().step_covariance.push_back(*step_to[i]);
     else
-      chains.push_back({.id = nodes[i].id.chain, .first_index = nodes[i].id.index});
-    chains.back().T_odom_body.push_back(nodes[i].T_odom_body);
+      pieces.push_back({.id = nodes[i].id.chain, .first_index = nodes[i].id.index});
+    pieces.back().T_odom_body.push_back(nodes[i].T_odom_body);
   }
-  return chains;
+  return pieces;
 }
 
 namespace {
@@ -194,7 +194,7 @@ std::map<ChainId, judge::OdometryHonesty> honesty_after(const MapEstimate& map, 
   std::vector<LoopClosure> fitting;
   for (const std::size_t e : optimum.fitting)
     fitting.push_back(closures[optimum.closure_of_edge[e - map.odometry_edges]]);
-  return judge::odometry_honesty(odometry_chains(map.nodes, step_to), fitting);
+  return judge::odometry_honesty(odometry_pieces(map.nodes, step_to), fitting);
 }
 
 /// True if the odometry of any chain was far worse than it said; it now says so.
@@ -218,10 +218,10 @@ MapEstimate estimate_together(const SubmapSet& submaps, const VerdictSet& verdic
   map.spare_pairs = spare.size();
   judge::Closures closures = collect_closures(verdicts, words, submaps, index, spare, refuted);
   const std::vector<LoopClosure> stated = closures.judged;
-  const std::vector<judge::OdometryChain> chains = odometry_chains(map.nodes, stated_steps(submaps, index));
-  if (config.judge_closures) raise_understated(chains, closures, map);
+  const std::vector<judge::OdometryPiece> pieces = odometry_pieces(map.nodes, stated_steps(submaps, index));
+  if (config.judge_closures) raise_understated(pieces, closures, map);
   if (config.judge_odometry) {
-    for (const auto& [chain, worth] : judge::odometry_honesty(chains, closures.judged))
+    for (const auto& [chain, worth] : judge::odometry_honesty(pieces, closures.judged))
       map.rotation_factors[chain] = worth.rotation;
     see_through(map);
   }

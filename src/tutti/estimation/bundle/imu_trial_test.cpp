@@ -18,7 +18,7 @@ RefinementConfig with_imu() {
 }
 
 /// What a room's flight of so many keyframes makes of its IMU.
-Refinement refined(int keyframes, const RefinementConfig& config, double stretch = 1.0) {
+RefinedMap refined(int keyframes, const RefinementConfig& config, double stretch = 1.0) {
   Scene scene = make_scene({.keyframes = keyframes, .points = 60, .imu = true}, 3);
   for (PosedSubmap& posed : scene.input.submaps) {
     auto submap = std::make_shared<Submap>(*posed.submap);
@@ -34,7 +34,7 @@ Refinement refined(int keyframes, const RefinementConfig& config, double stretch
 }
 
 TEST(ImuTrial, AFlightLongEnoughIsBelieved) {
-  const Refinement out = refined(15, with_imu());
+  const RefinedMap out = refined(15, with_imu());
   ASSERT_EQ(out.imu.size(), 1U);
   EXPECT_EQ(out.imu[0].factors, 14U);
   EXPECT_FALSE(out.imu[0].is_held_back);
@@ -45,13 +45,13 @@ TEST(ImuTrial, AFlightLongEnoughIsBelieved) {
 /// Poses and motion are blocks of a solver that sorts them by their addresses, and other threads' memory is what
 /// decides where a vector of them begins.
 TEST(ImuTrial, TheLastDigitsAreTheSameWhereverTheMemoryIs) {
-  const Refinement expected = refined(6, with_imu());
+  const RefinedMap expected = refined(6, with_imu());
   Rng rng(1);
   std::vector<std::vector<char>> taken;
   for (int trial = 0; trial < 5; ++trial) {
     for (int i = 0; i < 2000; ++i) taken.emplace_back(1 + rng.index(1000));
     for (int i = 0; i < 1000; ++i) std::vector<char>().swap(taken[rng.index(taken.size())]);
-    const Refinement out = refined(6, with_imu());
+    const RefinedMap out = refined(6, with_imu());
     ASSERT_EQ(out.factors.size(), expected.factors.size());
     for (std::size_t i = 0; i < out.factors.size(); ++i)
       ASSERT_EQ(out.factors[i].measurement.T_a_b, expected.factors[i].measurement.T_a_b) << trial;
@@ -60,7 +60,7 @@ TEST(ImuTrial, TheLastDigitsAreTheSameWhereverTheMemoryIs) {
 
 /// Three seconds do not tell the bias from gravity: the map is what it is without an IMU.
 TEST(ImuTrial, AShortFlightIsAsWithoutAnImu) {
-  const Refinement out = refined(3, with_imu()), without = refined(3, {});
+  const RefinedMap out = refined(3, with_imu()), without = refined(3, {});
   ASSERT_EQ(out.imu.size(), 1U);
   EXPECT_TRUE(out.imu[0].is_held_back);
   EXPECT_GT(out.imu[0].bias_sigma_mps2, 0.05);
@@ -73,7 +73,7 @@ TEST(ImuTrial, AShortFlightIsAsWithoutAnImu) {
 
 /// An accelerometer in other units, or of another body.
 TEST(ImuTrial, OneThatContradictsTheWayIsHeldBack) {
-  const Refinement out = refined(15, with_imu(), 1.4);
+  const RefinedMap out = refined(15, with_imu(), 1.4);
   ASSERT_EQ(out.imu.size(), 1U);
   EXPECT_TRUE(out.imu[0].is_held_back);
   EXPECT_GT(std::abs(out.imu[0].scale - 1.0), 3.0 * out.imu[0].scale_sigma);

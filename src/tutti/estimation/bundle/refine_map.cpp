@@ -41,12 +41,12 @@ std::vector<RelativeFactor> factors_of(const MergedMap& merged, const BundleSolu
 
 }  // namespace
 
-Result<Refinement> refine_map(const RefinementInput& input, const RefinementConfig& config) {
+Result<RefinedMap> refine_map(const RefinementInput& input, const RefinementConfig& config) {
   auto matches = guided_matches(input.submaps, input.closed, config.matching);
   matches.insert(matches.end(), input.matches.begin(), input.matches.end());
   auto merged = merge_landmarks(input.submaps, matches, config.merge);
   if (!merged) return tl::unexpected(merged.error());
-  Refinement out;
+  RefinedMap out;
   auto stereo = judge_stereo(merged->problem, merged->odometry, config.bundle, config.stereo);
   if (!stereo) return tl::unexpected(stereo.error());
   out.stereo = std::move(*stereo);

@@ -42,9 +42,8 @@ struct RelativeFactor {
   RelativePose measurement;  ///< T_from_to with the covariance of the joint posterior.
 };
 
-/// What refine_map() found. (tutti::Refinement of model/ is the message that carries the part of it that the server
-/// uses.)
-struct Refinement {
+/// What refine_map() found. A worker's tutti::Refinement carries the part of it that the server uses.
+struct RefinedMap {
   std::vector<BundleKeyframe> keyframes;  ///< Sorted by id.
   /// From every keyframe to the next one of its submap, unless both are constant; sorted by id.
   std::vector<RelativeFactor> factors;
@@ -64,6 +63,6 @@ struct Refinement {
 /// Factors between keyframes that see no landmark, and all factors when the adjustment fails, are those of the
 /// odometry. A pure function; the order of submaps and matches does not matter. Errors (ErrorCode::invalid) name input
 /// that is not finite or contradicts itself.
-Result<Refinement> refine_map(const RefinementInput& input, const RefinementConfig& config);
+Result<RefinedMap> refine_map(const RefinementInput& input, const RefinementConfig& config);
 
 }  // namespace tutti::bundle

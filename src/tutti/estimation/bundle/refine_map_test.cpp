@@ -39,7 +39,7 @@ TEST(RefineMap, ExactWithoutNoise) {
 }
 
 /// Squared error of the factors over their covariance, on average: 6 when the covariance is what it says.
-double mean_nees(const Scene& scene, const Refinement& refined) {
+double mean_nees(const Scene& scene, const RefinedMap& refined) {
   double sum = 0.0;
   for (const auto& [from, to, measurement] : refined.factors) {
     const Vector6d error = local(measurement.T_a_b, scene.truth[from.index].inverse() * scene.truth[to.index]);

@@ -12,7 +12,7 @@ namespace tutti::bundle {
 namespace stereo_scale_test {
 
 struct Outcome {
-  Refinement refined;
+  RefinedMap refined;
   double rmse_m;
 };
 
@@ -24,7 +24,7 @@ Outcome flight(const Pose3& T_second_told, std::uint64_t seed = 5, double max_si
   RefinementConfig config;
   config.stereo.max_sigmas = max_sigmas;
   config.stereo.contradicted = contradicted;
-  Refinement refined = refine_map(scene.input, config).value();
+  RefinedMap refined = refine_map(scene.input, config).value();
   const double rmse_m = position_rmse(refined.keyframes, scene.truth);
   return {std::move(refined), rmse_m};
 }

@@ -126,10 +126,10 @@ formats::Rgb significance_colour(double significance) {
   return hot < 0.5 ? mix(kThere, kMore, 2.0 * hot) : mix(kMore, kMost, 2.0 * hot - 1.0);
 }
 
-Image significance_image(const Explanation& e, const PictureClock& clock, const Range& time_s, std::size_t width,
-                         std::size_t row_height) {
+RgbaImage significance_image(const Explanation& e, const PictureClock& clock, const Range& time_s, std::size_t width,
+                             std::size_t row_height) {
   const auto scales = static_cast<std::size_t>(e.significance.cols());
-  Image image{.width = width, .height = row_height * scales, .rgba = {}};
+  RgbaImage image{.width = width, .height = row_height * scales, .rgba = {}};
   std::vector<double> value(width * scales, -1.0);  // below 0: nothing there
   for_columns(e, clock, time_s, width, [&](std::size_t n, std::size_t first, std::size_t last) {
     for (std::size_t s = 0; s < scales; ++s)

@@ -24,8 +24,8 @@ inline constexpr double kMostShown = 10.0;
 /// The disagreement map: `row_height` rows of pixels per scale (scale 0 on top), time over `width` columns. Each column
 /// has the largest significance of its nodes; a node stands for the time half-way to its neighbours. Transparent where
 /// there is no node.
-Image significance_image(const consistency::Explanation& explanation, const PictureClock& clock, const Range& time_s,
-                         std::size_t width, std::size_t row_height);
+RgbaImage significance_image(const consistency::Explanation& explanation, const PictureClock& clock,
+                             const Range& time_s, std::size_t width, std::size_t row_height);
 
 /// What explanation_svg() shows.
 struct ExplanationPicture {

@@ -21,7 +21,7 @@ Trajectory line(std::size_t poses) {
 
 double lightness(formats::Rgb c) { return 0.2126 * c.red + 0.7152 * c.green + 0.0722 * c.blue; }
 
-formats::Rgb pixel(const Image& image, std::size_t row, std::size_t column) {
+formats::Rgb pixel(const RgbaImage& image, std::size_t row, std::size_t column) {
   const std::uint8_t* at = &image.rgba[4 * (row * image.width + column)];
   return {at[0], at[1], at[2]};
 }
@@ -50,7 +50,7 @@ TEST(SignificanceImage, EveryNodeIsWhereItsTimeIs) {
   Range time_s;
   time_s.include(100.0);
   time_s.include(120.0);  // the second half is beyond the last node
-  const Image image = significance_image(e, {Timestamp{}, 100.0}, time_s, 200, 3);
+  const RgbaImage image = significance_image(e, {Timestamp{}, 100.0}, time_s, 200, 3);
   ASSERT_EQ(image.height, 3U * 6U);
   for (std::size_t row = 0; row < image.height; ++row)
     for (std::size_t column = 0; column < 200; ++column) {
@@ -69,7 +69,7 @@ TEST(SignificanceImage, WhenNodesShareAColumnTheWorstIsSeen) {
   Range time_s;
   time_s.include(0.0);
   time_s.include(999.0);
-  const Image image = significance_image(e, {}, time_s, 10, 1);
+  const RgbaImage image = significance_image(e, {}, time_s, 10, 1);
   EXPECT_TRUE(same(pixel(image, 0, 5), significance_colour(7.0)));
   EXPECT_TRUE(same(pixel(image, 0, 4), significance_colour(0.2)));
 }

@@ -45,7 +45,7 @@ constexpr Letter kLetters[] = {
 
 }  // namespace
 
-void fill(Image& image, int left, int top, int width, int height, formats::Rgb colour) {
+void fill(RgbaImage& image, int left, int top, int width, int height, formats::Rgb colour) {
   for (int y = std::max(top, 0); y < std::min(top + height, static_cast<int>(image.height)); ++y)
     for (int x = std::max(left, 0); x < std::min(left + width, static_cast<int>(image.width)); ++x) {
       std::uint8_t* pixel = &image.rgba[4 * (static_cast<std::size_t>(y) * image.width + static_cast<std::size_t>(x))];
@@ -56,7 +56,7 @@ void fill(Image& image, int left, int top, int width, int height, formats::Rgb c
     }
 }
 
-void draw_label(Image& image, int left, int top, std::string_view text, int square, formats::Rgb colour) {
+void draw_label(RgbaImage& image, int left, int top, std::string_view text, int square, formats::Rgb colour) {
   for (const char character : text) {
     const auto* letter = std::find_if(std::begin(kLetters), std::end(kLetters),
                                       [&](const Letter& l) { return l.character == character; });

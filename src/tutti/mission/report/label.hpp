@@ -9,10 +9,10 @@
 namespace tutti::mission {
 
 /// Fills a rectangle; parts outside the image are cut off.
-void fill(Image& image, int left, int top, int width, int height, formats::Rgb colour);
+void fill(RgbaImage& image, int left, int top, int width, int height, formats::Rgb colour);
 
 /// Writes lower-case words and numbers on an image, in a typeface of 5 x 7 squares that are `square` pixels wide.
 /// Unknown characters stay blank; parts outside the image are cut off.
-void draw_label(Image& image, int left, int top, std::string_view text, int square, formats::Rgb colour);
+void draw_label(RgbaImage& image, int left, int top, std::string_view text, int square, formats::Rgb colour);
 
 }  // namespace tutti::mission

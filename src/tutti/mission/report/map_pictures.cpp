@@ -55,8 +55,8 @@ Shown shown(const MissionRecord& record) {
   return out;
 }
 
-Image draw(const std::vector<CloudLayer>& layers, const PlanView& view,
-           const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
+RgbaImage draw(const std::vector<CloudLayer>& layers, const PlanView& view,
+               const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
   constexpr double kPoint_m = 0.15;  // submaps are thinned to 0.3 m, and lie over each other
   const int point_px =
       static_cast<int>(std::lround(std::clamp(kPoint_m * view.pixels_per_metre() * kPixelRatio, 1.0, 5.0)));
@@ -222,7 +222,7 @@ MapPicture map_section(const MissionRecord& record) {
   return picture(clouds, PlanView({box}, kWide_px, 0.4 * kWide_px), to_plane);
 }
 
-Image compose(const MapPicture& picture, std::size_t columns) {
+RgbaImage compose(const MapPicture& picture, std::size_t columns) {
   constexpr std::size_t kGap_px = 6;
   constexpr int kSquare_px = 4;
   constexpr int kMargin_px = 20;
@@ -232,11 +232,11 @@ Image compose(const MapPicture& picture, std::size_t columns) {
   columns = std::min(columns, picture.panels.size());
   const std::size_t width = picture.panels.front().image.width;
   const std::size_t height = picture.panels.front().image.height;
-  Image out{columns * (width + kGap_px) - kGap_px, rows * (height + kGap_px) - kGap_px, {}};
+  RgbaImage out{columns * (width + kGap_px) - kGap_px, rows * (height + kGap_px) - kGap_px, {}};
   out.rgba.resize(4 * out.width * out.height);
   for (std::size_t i = 0; i < out.rgba.size(); ++i) out.rgba[i] = kBetween[i % 4];
   for (std::size_t p = 0; p < picture.panels.size(); ++p) {
-    Image panel = picture.panels[p].image;
+    RgbaImage panel = picture.panels[p].image;
     draw_label(panel, kMargin_px, kMargin_px, picture.panels[p].name, kSquare_px, kInk);
     if (p == 0) {
       const double bar_m = picture.view.scale_bar_m();

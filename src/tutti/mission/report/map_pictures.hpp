@@ -16,7 +16,7 @@ namespace tutti::mission {
 struct MapPanel {
   std::string name;   ///< "onboard", "server", "survey" or "distance"
   std::string words;  ///< What it shows, in one short sentence.
-  Image image;        ///< With kPixelRatio times the view's resolution.
+  RgbaImage image;    ///< With kPixelRatio times the view's resolution.
 };
 
 /// A picture of several panels, and the view that they share.
@@ -34,7 +34,7 @@ MapPicture map_section(const MissionRecord& record);
 inline constexpr double kSliceThickness_m = 1.0;
 
 /// All panels as one image with names and a scale bar, for use outside the page.
-Image compose(const MapPicture& picture, std::size_t columns);
+RgbaImage compose(const MapPicture& picture, std::size_t columns);
 
 /// A vertical plane through `centre` along the horizontal direction `along`, both in the view from above.
 struct Slice {

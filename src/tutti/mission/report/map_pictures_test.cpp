@@ -15,13 +15,13 @@ namespace map_pictures_test {
 
 using Colour = std::array<int, 4>;
 
-Colour at(const Image& image, std::size_t x, std::size_t y) {
+Colour at(const RgbaImage& image, std::size_t x, std::size_t y) {
   const std::size_t i = 4 * (y * image.width + x);
   return {image.rgba[i], image.rgba[i + 1], image.rgba[i + 2], image.rgba[i + 3]};
 }
 
 TEST(Png, ReadsBack) {
-  Image image{37, 11, {}};
+  RgbaImage image{37, 11, {}};
   Rng rng(1);
   for (std::size_t i = 0; i < 4 * image.width * image.height; ++i)
     image.rgba.push_back(static_cast<std::uint8_t>(rng.uniform(0.0, 255.9)));
@@ -55,11 +55,11 @@ TEST(PointRaster, PutsPointsWhereTheProjectionSays) {
     return p.z() < 5.0 ? std::optional<Eigen::Vector2d>(p.head<2>() + Eigen::Vector2d(0.5, 0.5)) : std::nullopt;
   };
   raster.add({&cloud, {}, {255, 0, 0}}, below_five, 1);
-  const Image ink = raster.transparent();
+  const RgbaImage ink = raster.transparent();
   for (std::size_t y = 0; y < 8; ++y)
     for (std::size_t x = 0; x < 10; ++x)
       EXPECT_EQ(at(ink, x, y)[3] > 0, (x == 2 && y == 3) || (x == 5 && y == 1)) << x << " " << y;
-  const Image dark = raster.on_dark();
+  const RgbaImage dark = raster.on_dark();
   EXPECT_EQ(at(dark, 0, 0)[3], 255);
   EXPECT_GT(at(dark, 2, 3)[0], at(dark, 0, 0)[0]);
   EXPECT_LT(at(dark, 2, 3)[2], 30);
@@ -71,7 +71,7 @@ TEST(PointRaster, IsBrighterWhereMorePointsLie) {
   PointRaster raster(5, 3);
   raster.add(
       {&cloud, {}, {0, 255, 0}}, [](const Eigen::Vector3d& p) { return std::optional(p.head<2>().eval()); }, 1);
-  const Image image = raster.transparent();
+  const RgbaImage image = raster.transparent();
   int few = 0, many = 0;
   for (std::size_t y = 0; y < 3; ++y) {
     few = std::max({few, at(image, 0, y)[3], at(image, 1, y)[3]});
@@ -134,8 +134,8 @@ TEST(MapPictures, ServerAndSurveyLieOnEachOther) {
   record.robots[0].onboard_cloud = *record.survey;
   for (const MapPicture& picture : {map_from_above(record), map_section(record)}) {
     ASSERT_GE(picture.panels.size(), 3U);
-    const Image& server = picture.panels[1].image;
-    const Image& survey = picture.panels[2].image;
+    const RgbaImage& server = picture.panels[1].image;
+    const RgbaImage& survey = picture.panels[2].image;
     std::size_t lit = 0, differ = 0;
     for (std::size_t i = 0; i < server.rgba.size(); i += 4) {
       const bool there = server.rgba[i + 1] > 30, real = survey.rgba[i + 1] > 30;
@@ -149,8 +149,8 @@ TEST(MapPictures, ServerAndSurveyLieOnEachOther) {
 
 TEST(MapPictures, ComposeKeepsEveryPanel) {
   const MapPicture picture = map_from_above(test::example_record({.survey = true}));
-  const Image image = compose(picture, 2);
-  const Image& panel = picture.panels[0].image;
+  const RgbaImage image = compose(picture, 2);
+  const RgbaImage& panel = picture.panels[0].image;
   EXPECT_EQ(image.width, 2 * panel.width + 6);
   EXPECT_EQ(image.height, 2 * panel.height + 6);
   EXPECT_EQ(image.rgba.size(), 4 * image.width * image.height);
@@ -160,7 +160,7 @@ TEST(MapPictures, ComposeKeepsEveryPanel) {
 
 TEST(Label, LettersDiffer) {
   const auto drawn = [](std::string_view text) {
-    Image image{60, 10, std::vector<std::uint8_t>(2400, 0)};
+    RgbaImage image{60, 10, std::vector<std::uint8_t>(2400, 0)};
     draw_label(image, 1, 1, text, 1, {255, 255, 255});
     return image.rgba;
   };

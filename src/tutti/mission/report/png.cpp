@@ -7,7 +7,7 @@
 
 namespace tutti::mission {
 
-std::string encode_png(const Image& image) {
+std::string encode_png(const RgbaImage& image) {
   TUTTI_CHECK(image.width > 0 && image.height > 0 && image.rgba.size() == 4 * image.width * image.height);
   png_image png{};
   png.version = PNG_IMAGE_VERSION;

@@ -10,14 +10,14 @@
 namespace tutti::mission {
 
 /// An image with opacity: rows from the top, four bytes per pixel: red, green, blue, opacity.
-struct Image {
+struct RgbaImage {
   std::size_t width = 0;
   std::size_t height = 0;
   std::vector<std::uint8_t> rgba;
 };
 
 /// The bytes of a PNG file; the image must have at least one pixel.
-std::string encode_png(const Image& image);
+std::string encode_png(const RgbaImage& image);
 
 /// The text "data:image/png;base64,...", for pages that contain their pictures.
 std::string data_uri(std::string_view png);

@@ -41,10 +41,10 @@ void PointRaster::add(const CloudLayer& layer, const Projection& project, int po
   }
 }
 
-Image PointRaster::on_dark() const { return shaded(true); }
-Image PointRaster::transparent() const { return shaded(false); }
+RgbaImage PointRaster::on_dark() const { return shaded(true); }
+RgbaImage PointRaster::transparent() const { return shaded(false); }
 
-Image PointRaster::shaded(bool opaque) const {
+RgbaImage PointRaster::shaded(bool opaque) const {
   std::vector<float> counts;
   for (const Pixel& pixel : pixels_)
     if (pixel.count > 0.0F) counts.push_back(pixel.count);
@@ -58,7 +58,7 @@ Image PointRaster::shaded(bool opaque) const {
     std::nth_element(counts.begin(), nth, counts.end());
     dense = std::max(dense, *nth);
   }
-  Image image{width_, height_, {}};
+  RgbaImage image{width_, height_, {}};
   image.rgba.reserve(4 * pixels_.size());
   for (const Pixel& pixel : pixels_) {
     const float share_of_dense = std::min(1.0F, std::log(std::max(pixel.count, 1.0F)) / std::log(dense));

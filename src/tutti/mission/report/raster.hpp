@@ -33,15 +33,15 @@ class PointRaster {
   /// Draws every point as a square of `point_px` pixels.
   void add(const CloudLayer& layer, const Projection& project, int point_px);
   /// The image on a dark ground, for pictures that stand alone.
-  [[nodiscard]] Image on_dark() const;
+  [[nodiscard]] RgbaImage on_dark() const;
   /// The points only, more opaque where there are many, to lie under other shapes.
-  [[nodiscard]] Image transparent() const;
+  [[nodiscard]] RgbaImage transparent() const;
 
  private:
   struct Pixel {
     float red = 0.0F, green = 0.0F, blue = 0.0F, count = 0.0F;
   };
-  [[nodiscard]] Image shaded(bool opaque) const;
+  [[nodiscard]] RgbaImage shaded(bool opaque) const;
   std::size_t width_;
   std::size_t height_;
   std::vector<Pixel> pixels_;
