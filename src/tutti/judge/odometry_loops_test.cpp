@@ -102,6 +102,29 @@ TEST(OdometryLoops, NotOverAGap) {
   EXPECT_NEAR(loops.at(kOne).front().odometry(5, 5), 15 * 0.002 * 0.002, 1e-9);
 }
 
+/// A covariance between two keyframes is the difference of two that have grown along the whole way: 0.08 % are lost
+/// here.
+TEST(OdometryLoops, AreAsCertainAfterADayByCarAsAtItsBegin) {
+  constexpr std::uint32_t kSteps = 40'000;
+  constexpr double kStep_m = 20.0;
+  const Pose3 step{so3_exp(Eigen::Vector3d(0, 0, 1e-5)), Eigen::Vector3d(kStep_m, 0, 0)};
+  OdometryPiece day{.id = kOne};
+  day.T_odom_body.emplace_back();
+  for (std::uint32_t k = 0; k < kSteps; ++k) {
+    day.T_odom_body.push_back(day.T_odom_body.back() * step);
+    day.step_covariance.push_back(test::diagonal_covariance(0.01, 1e-3));
+  }
+  ASSERT_GT(day.T_odom_body.back().translation.norm(), 500e3);
+  std::vector<LoopClosure> closures;
+  for (const std::uint32_t from : {0U, kSteps - 5})
+    closures.push_back({{kOne, from}, {kOne, from + 5}, {Pose3{}, test::diagonal_covariance(0.1, 0.1)}});
+  const auto loops = odometry_loops(std::span(&day, 1), closures).at(kOne);
+  ASSERT_EQ(loops.size(), 2U);
+  const Eigen::LLT<Matrix6d> begin(loops[0].odometry);
+  const Matrix6d ratio = begin.matrixL().solve(begin.matrixL().solve(loops[1].odometry).transpose());
+  EXPECT_LT((ratio - Matrix6d::Identity()).norm(), 0.01) << ratio;
+}
+
 TEST(NeighbouringClosures, AreTheNearestOfAll) {
   Rng rng(4);
   const Walk walk(0.01, 0.002, rng);
