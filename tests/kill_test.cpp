@@ -4,6 +4,7 @@
 // acknowledged comes again. The map is the undisturbed one, bit for bit, and so are the robots' corrected trajectories.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>

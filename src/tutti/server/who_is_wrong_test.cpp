@@ -48,7 +48,7 @@ TEST(WhoIsWrong, ThirtyPercentWrongClosuresCostLittle) {
 
 TEST(WhoIsWrong, FailedOdometryIsRepairedAmongWrongClosures) {
   for (const double wrong_share : {0.0, 0.1, 0.3})
-    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    for (std::uint64_t seed = 1; seed <= tutti::seeds(2U); ++seed) {
       CorridorRunConfig config;
       config.closures.wrong_share = wrong_share;
       config.failures = {failure(0, 170, 190, 1.5, 1.5, 20)};
@@ -79,7 +79,7 @@ TEST(WhoIsWrong, FailedOdometryWithoutClosuresAroundIsRepaired) {
 }
 
 TEST(WhoIsWrong, SeveralFailuresAreRepaired) {
-  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+  for (std::uint64_t seed = 1; seed <= tutti::seeds(2U); ++seed) {
     CorridorRunConfig config;
     config.closures.wrong_share = 0.1;
     config.failures = {failure(0, 130, 150, 2, 0, -20), failure(1, 250, 270, 0, 2, 25)};
@@ -160,7 +160,7 @@ TEST(WhoIsWrong, AFailureLittleByLittleIsFoundWhereItHappened) {
 
 TEST(WhoIsWrong, AFailureWhereNoClosureWasIsFoundWhereItMustHaveBeen) {
   std::vector<double> off_s;
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+  for (std::uint64_t seed = 1; seed <= tutti::seeds(5U); ++seed) {
     CorridorRunConfig config;
     config.closures.wrong_share = 0.1;
     config.failures = {failure(0, 200, 230, 0, 0, 10)};
