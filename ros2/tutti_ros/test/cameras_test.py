@@ -237,11 +237,11 @@ class Waiting(unittest.TestCase):
         self.assertTrue(depth(1030))
         self.assertTrue(cameras.look())
         self.assertAlmostEqual(cameras.sensors().depth.unit_m, 0.001)
-        self.see(cameras, 1032 * MS)
+        self.see(cameras, 1045 * MS)
         self.see(cameras, 1050 * MS)
         cameras.add_odometry(1060 * MS)
         (_, (stamp_ns, _, data)), = cameras.due()[0]
-        self.assertEqual((stamp_ns, data), (1032 * MS, b"\1\2" * 12))
+        self.assertEqual((stamp_ns, data), (1045 * MS, b"\1\2" * 12))
         self.assertFalse(depth(1051, width=2))
         said, left_out = cameras.due()
         self.assertEqual((said[0][1][2], left_out), (None, ["depth/image: an image of 2 x 3 pixels, expected 4 x 3"]))

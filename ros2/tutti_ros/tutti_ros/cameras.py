@@ -13,7 +13,8 @@ from tutti_ros.poses import angle, rotation
 MS = 10**6  # ns
 LATEST_NS = 500 * MS           # behind odometry; the robot takes none later
 PATIENCE_NS = 300 * MS         # by odometry, for what belongs to the first camera's image
-MOST_DIFFERENCE_NS = 5 * MS    # of the stamps of one moment
+MOST_DIFFERENCE_NS = 5 * MS    # of the stamps of two cameras' images of one moment
+MOST_OF_DEPTH_NS = 20 * MS     # of depth's and the camera's, as DepthConfig::max_difference_s
 ANOTHER_CLOCK_NS = 10_000 * MS
 BATCH_NS = 50 * MS             # of IMU samples in one message, unless images want them sooner
 MOST_IN_BATCH = 10_000
@@ -33,8 +34,9 @@ class Image:
 class Stream:
     """One topic of images. `camera`: its calibration, once it is known."""
 
-    def __init__(self, topic, most_bytes):
+    def __init__(self, topic, most_bytes, most_difference_ns=MOST_DIFFERENCE_NS):
         self.topic, self.info = topic, from_ros.camera_info_topic(topic)
+        self.most_difference_ns = most_difference_ns  # of its stamps and the first camera's at one moment
         self.is_compressed, self.most_bytes = from_ros.is_compressed(topic), most_bytes
         self.camera, self.frame_id, self.newest_ns = None, None, None
         self.waiting, self.bytes, self.size = collections.deque(), 0, ()
@@ -58,14 +60,14 @@ class Stream:
             self.pop()
 
     def drop_before_nearest(self, moment_ns):
-        self.drop_before(moment_ns - MOST_DIFFERENCE_NS)
+        self.drop_before(moment_ns - self.most_difference_ns)
         away_ns = lambda i: abs(self.waiting[i].stamp_ns - moment_ns)
         while len(self.waiting) > 1 and away_ns(1) <= away_ns(0):
             self.pop()
 
     def take(self, moment_ns, size):
         """Its next image, if that is of this moment and of this size: (image or None, why it is none)."""
-        if not self.waiting or self.waiting[0].stamp_ns > moment_ns + MOST_DIFFERENCE_NS:
+        if not self.waiting or self.waiting[0].stamp_ns > moment_ns + self.most_difference_ns:
             return None, ""
         image = self.pop()
         if image.size and image.size != size:
@@ -88,7 +90,7 @@ class Cameras:
             raise ValueError(f"parameter 'imu' is '{imu}' without 'images', with which it would go")
         share = MOST_BYTES // max(1, len(images) + bool(depth))
         self.streams = [Stream(topic, share) for topic in images]
-        self.depth = Stream(depth, share) if depth else None
+        self.depth = Stream(depth, share, MOST_OF_DEPTH_NS) if depth else None
         self.imu, self.imu_frame_id, self.newest_imu_ns = imu, None, None
         self.samples = collections.deque()  # (stamp_ns, gyro, accelerometer) in the IMU's axes
         self.offset_ns, self.place = round(offset_s * 1e9), place
