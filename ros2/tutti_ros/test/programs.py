@@ -63,12 +63,21 @@ class WithPrograms(unittest.TestCase):
             if topic in kinds:
                 yield kinds[topic][0], ros_stub.decode(kinds[topic][1], cdr)
 
-    def fed(self, name):
-        """What its status says of its feed."""
+    def status(self, name):
         try:
-            return json.loads((self.path / name / "status.json").read_text())["feed"]
+            return json.loads((self.path / name / "status.json").read_text())
         except (OSError, ValueError):
             return {}
+
+    def fed(self, name):
+        """What its status says of its feed."""
+        return self.status(name).get("feed", {})
+
+    def wait_for_map(self):
+        """Until the server has an answer for every pair and a map with it, by a status that is written after this is asked."""
+        asked, file = time.time(), self.path / "server/status.json"
+        self.wait_for(lambda: file.stat().st_mtime > asked + 0.1 and self.status("server").get("pending_jobs") == 0 and
+                      self.status("server").get("has_news") is False, "the server's map")
 
     def wait_for(self, condition, what):
         end = time.monotonic() + PATIENCE_S

@@ -60,7 +60,7 @@ TEST(StereoScale, ABaselineTenPerCentTooLongIsRefused) {
 /// By as much as odometry says, which has errors of its own; in one scale all along, as two cameras see it.
 TEST(StereoScale, ABaselineIsCorrectedWhereThatIsAskedFor) {
   double corrected_m = 0.0, one_camera_m = 0.0;
-  for (std::uint64_t seed = 0; seed < seeds(4U); ++seed) {
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
     const Outcome out = flight(longer_m(0.02), seed, 3.0, "correct");
     const StereoScale& scale = out.refined.stereo.front();
     EXPECT_TRUE(scale.is_corrected && !scale.is_refused);
