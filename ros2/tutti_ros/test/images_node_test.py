@@ -105,7 +105,9 @@ class Images(WithPrograms):
             self.wait_for(lambda: robot.poll() is not None, f"{name}'s end")
             self.assertEqual(robot.returncode, 0)
             fed = self.fed(f"of_{name}")
-            self.assertEqual((fed["images"], fed["imu_samples"]), self.recorded_images(name))
+            images, samples = self.recorded_images(name)
+            self.assertEqual(fed["images"], images)
+            self.assertTrue(samples - 10 <= fed["imu_samples"] <= samples, fed)  # 50 ms may wait for a batch at the end
             self.assertEqual(nodes[name].link.counts["refused"], 0, nodes[name].link.why)
             self.assertEqual(list(nodes[name].trouble), [])
         self.wait_for_map()
