@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <string>
 #include <thread>
@@ -33,6 +34,7 @@
 #include "tutti/mapfile/content.hpp"
 #include "tutti/mission/runner.hpp"
 #include "tutti/program/ros/ros_intake.hpp"
+#include "tutti/program/server_program.hpp"
 
 namespace tutti {
 namespace ros_test {
@@ -82,6 +84,20 @@ class Ros : public ::testing::Test {
     };
     EXPECT_TRUE(within(kPatience_s, [&] { return !bus().empty(); })) << output_of(server);
     return bus();
+  }
+
+  /// A server whose state is in folder_/server has an answer for every pair, and a map with it, by a status that is
+  /// written after this is asked. Robots end before that: what they sent is stored, and not yet looked at.
+  [[nodiscard]] bool server_has_map() {
+    const fs::path file = folder_ / "server" / program::kStatusFile;
+    const auto asked = fs::file_time_type::clock::now();
+    return within(kPatience_s, [&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      std::error_code failed;
+      if (fs::last_write_time(file, failed) < asked + std::chrono::milliseconds(100) || failed) return false;
+      const auto status = nlohmann::json::parse(read_file(file.string()).value_or(""), nullptr, false);
+      return status.is_object() && status.at("pending_jobs") == 0 && status.at("has_news") == false;
+    });
   }
 
   std::vector<std::string> ended_;
@@ -342,6 +358,7 @@ TEST_F(Ros, TwoRobotsAndAServerMakeTheMapOfTheirBags) {
                        return have_ended({"alpha", "bravo"}) && !grids.empty() && !clouds.empty();
                      }))
       << output_of("alpha") << output_of("server");
+  ASSERT_TRUE(server_has_map()) << output_of("server");
   children_.stop_all();
 
   const auto store = mapfile::open(folder_ / "server/map.tutti").value();
@@ -420,6 +437,7 @@ class RosImages : public Ros {
                          return have_ended({"alpha", "bravo"});
                        }))
         << output_of("alpha") << output_of("server") << output_of("play");
+    ASSERT_TRUE(server_has_map()) << output_of("server");
     children_.stop_all();
     for (const std::string name : {"alpha", "bravo"})
       EXPECT_EQ(output_of(name).find("refuse"), std::string::npos) << output_of(name);
