@@ -2,7 +2,6 @@
 // Cameras and the IMU of a bag.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "tutti/bags/rgbd.hpp"
 #include "tutti/formats/image_file.hpp"
 #include "tutti/mission/bag_recording.hpp"
+#include "tutti/model/nearest_stamp.hpp"
 
 namespace tutti::mission {
 namespace {
@@ -252,8 +252,8 @@ Result<RobotImages> open_images(const BagRecording& bag, const Trajectory& odome
                     std::size_t moment, std::size_t camera) -> Result<Image> {
     const Timestamp stamp = cameras.front().images.at(moment).stamp;
     const std::vector<ScanPlace>& places = cameras.at(camera).images;
-    const auto place = std::ranges::lower_bound(places, stamp - most_s, {}, &ScanPlace::stamp);
-    if (place == places.end() || place->stamp - stamp > most_s) return Image();
+    const auto place = nearest_in_time(places, stamp, most_s, &ScanPlace::stamp);
+    if (place == places.end()) return Image();
     return images->image(cameras[camera], *place);
   };
   std::string note;

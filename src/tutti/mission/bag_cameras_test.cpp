@@ -47,7 +47,9 @@ std::string pixels(const Depth& depth, int i) {
   for (std::uint32_t k = 0; k < depth.width * depth.height; ++k) {
     const double depth_m = k == 0 ? NAN : 1.0 + 0.001 * i;
     std::string bytes;
-    if (depth.encoding == "32FC1")
+    if (depth.encoding == "mono8")
+      bytes = std::string(1, static_cast<char>(i % 200));
+    else if (depth.encoding == "32FC1")
       bytes = little(static_cast<float>(depth_m));
     else
       bytes = little(static_cast<std::uint16_t>(k == 0 ? 0 : 1000 + i));
@@ -75,7 +77,7 @@ class BagCameras : public testing::Test {
     return with_camera(std::move(out), odometry, kBodyCamera, "mono8");
   }
   static void add(std::vector<Sample>& samples, const Depth& depth) {
-    const std::uint32_t bytes = depth.encoding == "32FC1" ? 4 : 2;
+    const std::uint32_t bytes = depth.encoding == "mono8" ? 1 : depth.encoding == "32FC1" ? 4 : 2;
     for (int i = 0; i < depth.count; ++i) {
       const Timestamp stamp = kStart + (depth.offset_s + depth.period_s * i);
       const std::string data = pixels(depth, i);
@@ -166,6 +168,26 @@ TEST_F(BagCameras, CompressedDepthIsTakenAlike) {
   const Recording recording = load_samples(samples);
   ASSERT_TRUE(recording.images && recording.images->load_depth) << notes_;
   EXPECT_EQ(first_two(recording, 3), (FirstTwo{903, 903}));
+}
+
+/// A camera of 333 Hz has three images within 5 ms of a moment of the other's.
+TEST_F(BagCameras, OfASecondCameraTheNearestImageIsTaken) {
+  constexpr double kPeriod_s = 0.003, kOffset_s = 0.0005;
+  const Recording recording = load({Depth{.name = "/second",
+                                          .encoding = "mono8",
+                                          .period_s = kPeriod_s,
+                                          .offset_s = kOffset_s,
+                                          .count = static_cast<int>(kImages * kImages_s / kPeriod_s)}},
+                                   {"alpha.images=/camera/image_raw,/second/image_raw"});
+  ASSERT_NE(recording.images, nullptr) << notes_;
+  ASSERT_EQ(recording.images->cameras.size(), 2U);
+  for (std::size_t moment = 0; moment + 1 < kImages; ++moment) {
+    const auto image = recording.images->load(moment, 1);
+    ASSERT_TRUE(image) << image.error().message;
+    ASSERT_FALSE(image->empty()) << moment;
+    const long nearest = std::lround((kImages_s * static_cast<double>(moment) - kOffset_s) / kPeriod_s);
+    EXPECT_EQ(image->grey.front(), nearest % 200) << moment;
+  }
 }
 
 /// Of whatever kind, depth is no second camera; what does not fit is said with what was expected.
