@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <iterator>
+#include <limits>
 
+#include "tutti/model/nearest_stamp.hpp"
 #include "tutti/model/pose_at.hpp"
 #include "tutti/robot/submap_builder.hpp"
 
@@ -34,8 +35,7 @@ std::vector<SubmapFix> SubmapBuilder::take_fixes() {
   const std::vector<Keyframe>& keyframes = state_.keyframes;
   const auto later = std::ranges::upper_bound(state_.fixes, keyframes.back().stamp, {}, &PlacedFix::stamp);
   for (auto fix = state_.fixes.begin(); fix != later; ++fix) {
-    auto at = std::ranges::lower_bound(keyframes, fix->stamp, {}, &Keyframe::stamp);
-    if (at != keyframes.begin() && fix->stamp - std::prev(at)->stamp < at->stamp - fix->stamp) --at;
+    const auto at = nearest_in_time(keyframes, fix->stamp, std::numeric_limits<double>::infinity(), &Keyframe::stamp);
     const Eigen::Vector3d p = at->T_odom_body.inverse() * fix->p_odom_antenna;
     if (p.norm() <= kFarthestAntenna_m) out.push_back({at->index, p, fix->antenna, fix->covariance});
   }

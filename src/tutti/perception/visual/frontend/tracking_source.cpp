@@ -4,23 +4,23 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "tutti/base/check.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/model/nearest_stamp.hpp"
 #include "tutti/perception/visual/stereo_check.hpp"
 
 namespace tutti::visual {
 namespace {
 
-/// The stamp nearest to `stamp`, of at least one.
+/// The index of the stamp nearest to `stamp`, of at least one.
 std::size_t nearest(const std::vector<Timestamp>& stamps, Timestamp stamp) {
-  const auto after = std::ranges::lower_bound(stamps, stamp) - stamps.begin();
-  const auto i = static_cast<std::size_t>(after);
-  if (i == stamps.size()) return i - 1;
-  return i > 0 && stamp - stamps[i - 1] <= stamps[i] - stamp ? i - 1 : i;
+  constexpr double kAnyDifference_s = std::numeric_limits<double>::infinity();
+  return static_cast<std::size_t>(nearest_in_time(stamps, stamp, kAnyDifference_s, std::identity()) - stamps.begin());
 }
 
 /// Are most samples within the stream images' stamps, or most images within the odometry samples'?
