@@ -203,6 +203,10 @@ class Waiting(unittest.TestCase):
         self.assertEqual(self.stamps(cameras), [])
         cameras.add_odometry(1362 * MS)
         self.assertEqual(self.stamps(cameras), [1062 * MS])  # without the other's
+        self.see(cameras, 1365 * MS, 0)
+        cameras.add_odometry(1370 * MS)
+        self.assertEqual(self.stamps(cameras), [])
+        self.assertEqual(len(cameras.due(is_last=True)[0]), 1)
         for bad in (["a/i", "b/i", "c/i"], ["a/left", "a/right"]):
             with self.assertRaisesRegex(ValueError, "expected the topics of one or two cameras"):
                 Cameras(bad)
@@ -278,6 +282,10 @@ class Waiting(unittest.TestCase):
         cameras.add_odometry(1060 * MS)
         self.assertEqual([(add, what[0]) for add, what in cameras.due()[0]],
                          [("add_imu", [1055 * MS, 1060 * MS]), ("add_images", 1060 * MS)])
+        cameras.add_odometry(1070 * MS)
+        self.assertEqual(cameras.due()[0], [])
+        self.assertEqual([(add, what[0]) for add, what in cameras.due(is_last=True)[0]],
+                         [("add_imu", [1065 * MS, 1070 * MS])])
         with self.assertRaisesRegex(ValueError, "two publishers"):
             cameras.add_imu(imu(1000 * MS))
         with self.assertRaisesRegex(ValueError, "without 'images'"):

@@ -107,7 +107,7 @@ class Images(WithPrograms):
             fed = self.fed(f"of_{name}")
             images, samples = self.recorded_images(name)
             self.assertEqual(fed["images"], images)
-            self.assertTrue(samples - 10 <= fed["imu_samples"] <= samples, fed)  # 50 ms may wait for a batch at the end
+            self.assertEqual(fed["imu_samples"], samples)
             self.assertEqual(nodes[name].link.counts["refused"], 0, nodes[name].link.why)
             self.assertEqual(list(nodes[name].trouble), [])
         self.wait_for_map()

@@ -41,9 +41,9 @@ class CameraTopics:
         self.cameras.add_odometry(stamp_ns)
         self.say()
 
-    def say(self):
+    def say(self, is_last=False):
         """What odometry has reached."""
-        said, left_out = self.cameras.due()
+        said, left_out = self.cameras.due(is_last)
         connection = self.node.connection
         try:
             with connection.lock:

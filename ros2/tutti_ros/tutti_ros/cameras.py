@@ -212,22 +212,22 @@ class Cameras:
         return out
 
     # What is due.
-    def due(self):
+    def due(self, is_last=False):
         """What odometry has reached, in the order to be said: [("add_images" or "add_imu" of a Link, arguments)]; and what
-        is left out, in words."""
+        is left out, in words. `is_last`: nothing more comes that would be worth waiting for."""
         if self.now_ns is None or not self.placed:
             for stream in self.streams:
                 stream.drop_before((self.now_ns or 0) - LATEST_NS)
             return [], []
         left_out, images = [], []
-        while self._is_due(left_out):
+        while self._is_due(left_out, is_last):
             images += self._moment(left_out)
-        return self._imu_batches(at_once=bool(images)) + images, left_out
+        return self._imu_batches(at_once=is_last or bool(images)) + images, left_out
 
     def _beside(self):
         return self.streams[1:] + ([self.depth] if self.has_depth else [])
 
-    def _is_due(self, left_out):
+    def _is_due(self, left_out, is_last):
         first = self.streams[0]
         first.drop_before(self.first_ns)
         while first.waiting and self.now_ns - first.waiting[0].stamp_ns > LATEST_NS:
@@ -240,7 +240,7 @@ class Cameras:
         for stream in self._beside():
             stream.drop_before_nearest(moment_ns)
         is_whole = all(stream.waiting for stream in self._beside())
-        return is_whole or self.now_ns - moment_ns >= PATIENCE_NS
+        return is_last or is_whole or self.now_ns - moment_ns >= PATIENCE_NS
 
     def _moment(self, left_out):
         """Of all cameras at one moment; none without the first camera's."""

@@ -168,6 +168,7 @@ class TuttiNode(Node):
         return self.sensor_poses[frame_id]
 
     def end_recording(self, request, response):
+        self.camera_topics.say(is_last=True)
         with self.connection.lock:
             self.link.end_recording()
         self.connection.wake()
