@@ -242,13 +242,13 @@ class Waiting(unittest.TestCase):
         self.assertTrue(cameras.look())
         self.assertAlmostEqual(cameras.sensors().depth.unit_m, 0.001)
         self.see(cameras, 1045 * MS)
-        self.see(cameras, 1050 * MS)
-        cameras.add_odometry(1060 * MS)
-        (_, (stamp_ns, _, data)), = cameras.due()[0]
-        self.assertEqual((stamp_ns, data), (1045 * MS, b"\1\2" * 12))
-        self.assertFalse(depth(1051, width=2))
-        said, left_out = cameras.due()
-        self.assertEqual((said[0][1][2], left_out), (None, ["depth/image: an image of 2 x 3 pixels, expected 4 x 3"]))
+        self.see(cameras, 1065 * MS)
+        cameras.add_odometry(1070 * MS)
+        self.assertEqual(cameras.due()[0], [])  # nearer depth may come
+        self.assertFalse(depth(1066, width=2))
+        ((_, (stamp_ns, _, data)), (_, (_, _, no_data))), left_out = cameras.due()
+        self.assertEqual((stamp_ns, data, no_data), (1045 * MS, b"\1\2" * 12, None))
+        self.assertEqual(left_out, ["depth/image: an image of 2 x 3 pixels, expected 4 x 3"])
         another = camera_info()
         another.k[0] = 470.0
         self.assertTrue(cameras.add_info(cameras.depth, another))

@@ -239,7 +239,7 @@ class Cameras:
         moment_ns = first.waiting[0].stamp_ns
         for stream in self._beside():
             stream.drop_before_nearest(moment_ns)
-        is_whole = all(stream.waiting for stream in self._beside())
+        is_whole = all((stream.newest_ns or 0) >= moment_ns for stream in self._beside())
         return is_last or is_whole or self.now_ns - moment_ns >= PATIENCE_NS
 
     def _moment(self, left_out):

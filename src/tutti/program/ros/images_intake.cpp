@@ -298,6 +298,17 @@ bool ImagesIntake::reaches(Timestamp stamp) const {
          (imu_.empty() || (newest_imu_ && *newest_imu_ >= stamp));
 }
 
+/// Of the second camera's images that have arrived the nearest.
+std::optional<program::EncodedImage> ImagesIntake::second_of(Timestamp moment) {
+  if (cameras_.size() < 2) return std::nullopt;
+  OneTopic& of = topics_[cameras_.back()];
+  of.drop_before(moment - config_.most_difference_s);
+  const auto at = nearest_in_time(of.waiting, moment, config_.most_difference_s, &Waiting::stamp);
+  if (at == of.waiting.end()) return std::nullopt;
+  of.drop_before(at->stamp);
+  return of.pop().image;
+}
+
 /// Of the depth images that have arrived the nearest; it may be the next image's, too.
 Result<std::optional<program::EncodedImage>> ImagesIntake::depth_of(Timestamp moment) {
   std::optional<program::EncodedImage> none;
@@ -332,15 +343,10 @@ Result<std::optional<program::FedImages>> ImagesIntake::next_images(Timestamp st
                 moment.ns, stamp - moment, kLatest_s);
   }
   const bool is_patient = stamp - moment < kPatience_s;
-  std::optional<program::EncodedImage> other;
-  if (cameras_.size() > 1) {
-    OneTopic& second = topics_[cameras_.back()];
-    second.drop_before(moment - config_.most_difference_s);
-    if (second.waiting.empty() && is_patient) return none;
-    if (!second.waiting.empty() && second.waiting.front().stamp - moment <= config_.most_difference_s)
-      other = second.pop().image;
-  }
-  if (depth_ && is_patient && !(topics_[*depth_].newest && *topics_[*depth_].newest >= moment)) return none;
+  const auto may_come = [&](const OneTopic& topic) { return is_patient && !(topic.newest && *topic.newest >= moment); };
+  if ((cameras_.size() > 1 && may_come(topics_[cameras_.back()])) || (depth_ && may_come(topics_[*depth_])))
+    return none;
+  std::optional<program::EncodedImage> other = second_of(moment);
   auto depth = depth_of(moment);
   if (!depth) return tl::unexpected(depth.error());
   program::FedImages out{.stamp = moment, .images = {}, .depth = std::move(*depth)};

@@ -102,6 +102,7 @@ class ImagesIntake {
   [[nodiscard]] static bags::ImageTopic to_topic(const OneTopic& topic);
   [[nodiscard]] Result<Camera> place(const OneTopic& camera) const;
   [[nodiscard]] Result<Pose3> imu_place() const;
+  std::optional<program::EncodedImage> second_of(Timestamp moment);
   Result<std::optional<program::EncodedImage>> depth_of(Timestamp moment);
 
   ImagesConfig config_;

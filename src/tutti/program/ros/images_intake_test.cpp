@@ -90,6 +90,18 @@ TEST(ImagesIntake, TwoCamerasAreFedTogetherOrTheFirstAlone) {
   add(0, kStart + 3 * kPeriod);
   EXPECT_FALSE(robot.images.next_images(robot.go(5)).value());
   EXPECT_EQ(robot.images.next_images(robot.go(6)).value()->images.size(), 1U);  // the second has ended
+
+  const std::int64_t moment = kStart + 7 * kPeriod;
+  add(0, moment);
+  add(1, moment - 3'000'000);
+  EXPECT_FALSE(robot.images.next_images(robot.go(7)).value());  // a nearer one may come
+  bags::RosImage image = grey_image(moment + 1'000'000);
+  image.data = "ABCDEFGHIJKL";
+  ASSERT_TRUE(robot.images.add_image(1, bags::encode(image)));
+  add(1, moment + 4'000'000);
+  const auto nearest = robot.images.next_images(robot.go(7)).value();
+  ASSERT_TRUE(nearest && nearest->images.size() == 2U);
+  EXPECT_EQ(nearest->images[1].bytes, "ABCDEFGHIJKL");
 }
 
 TEST(ImagesIntake, FilesStayAsTheyAre) {
