@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <type_traits>
 #include <vector>
@@ -81,12 +82,16 @@ void pass(A& a, double& x) {
   a.number(x);
 }
 template <class A>
+void pass(A& a, float& x) {
+  a.coordinate(x);
+}
+template <class A>
 void pass(A& a, Timestamp& t) {
   pass(a, t.ns);
 }
 template <class A>
 void pass(A& a, Eigen::Vector3f& point) {
-  for (float& x : point) a.coordinate(x);
+  for (float& x : point) pass(a, x);
 }
 template <class A>
 void pass(A& a, Pose3& T) {
@@ -137,19 +142,36 @@ void pass(A& a, std::vector<T>& list) {
   a.length(list);
   for (T& element : list) pass(a, element);
 }
-/// Of no cloud and of an empty one, the points are none: nobody tells them apart.
+/// Whether there is a value, and then one in any case.
+template <class A, class T>
+void pass(A& a, std::optional<T>& optional) {
+  bool is_there = optional.has_value();
+  T value = optional.value_or(T{});
+  pass(a, is_there);
+  pass(a, value);
+  optional = is_there ? std::optional(std::move(value)) : std::nullopt;
+}
+/// Of nothing and of an empty value, the same is written: nobody tells them apart.
+template <class A, class T>
+void pass(A& a, std::shared_ptr<const T>& shared) {
+  T value;
+  if (shared != nullptr) value = *shared;
+  pass(a, value);
+  shared = std::make_shared<const T>(std::move(value));
+}
+template <class A>
+void pass(A& a, PointCloud& cloud) {
+  pass(a, cloud.points);
+}
 template <class A>
 void pass(A& a, lidar::PosedCloud& scan) {
   pass(a, scan.T_submap_body);
-  PointCloud cloud;
-  if (scan.cloud != nullptr) cloud = *scan.cloud;
-  pass(a, cloud.points);
-  scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+  pass(a, scan.cloud);
 }
 template <class A>
 void pass(A& a, TrackedKeypoint& keypoint) {
-  for (float& x : keypoint.pixel) a.coordinate(x);
-  a.coordinate(keypoint.sigma_px);
+  for (float& x : keypoint.pixel) pass(a, x);
+  pass(a, keypoint.sigma_px);
   pass(a, keypoint.track);
 }
 template <class A>
@@ -179,10 +201,7 @@ void pass(A& a, ImuSample& sample) {
 template <class A>
 void pass(A& a, TrackedImages& images) {
   pass(a, images.stamp);
-  std::vector<Camera> cameras;
-  if (images.cameras != nullptr) cameras = *images.cameras;
-  pass(a, cameras);
-  images.cameras = std::make_shared<const std::vector<Camera>>(std::move(cameras));
+  pass(a, images.cameras);
   pass(a, images.images);
   pass(a, images.imu);
   ImuNoise& noise = images.imu_noise;
@@ -215,28 +234,12 @@ void pass(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.representative_distance_m);
 }
 template <class A>
-void pass(A& a, std::optional<Timestamp>& stamp) {
-  bool is_known = stamp.has_value();
-  Timestamp value = stamp.value_or(Timestamp{});
-  pass(a, is_known);
-  pass(a, value);
-  stamp = is_known ? std::optional(value) : std::nullopt;
-}
-template <class A>
 void pass(A& a, Scan& scan) {
   pass(a, scan.stamp);
-  PointCloud cloud;
-  if (scan.cloud != nullptr) cloud = *scan.cloud;
-  pass(a, cloud.points);
-  scan.cloud = std::make_shared<const PointCloud>(std::move(cloud));
+  pass(a, scan.cloud);
   bool has_ages = scan.age_s != nullptr;
   pass(a, has_ages);
-  if (!has_ages) return;
-  std::vector<float> ages;
-  if (scan.age_s != nullptr) ages = *scan.age_s;
-  a.length(ages);
-  for (float& age_s : ages) a.coordinate(age_s);
-  scan.age_s = std::make_shared<const std::vector<float>>(std::move(ages));
+  if (has_ages) pass(a, scan.age_s);
 }
 template <class A>
 void pass(A& a, robot::OdometryStep& step) {
@@ -273,30 +276,19 @@ void pass_waiting(A& a, robot::SubmapBuilderState& builder) {
   pass(a, builder.keyframes_without_images);
 }
 template <class A>
-void pass(A& a, std::optional<double>& number) {
-  bool is_known = number.has_value();
-  double value = number.value_or(0.0);
-  pass(a, is_known);
-  pass(a, value);
-  number = is_known ? std::optional(value) : std::nullopt;
+void pass(A& a, robot::OdometryWatch::State::Anchor& anchor) {
+  pass(a, anchor.T_odom_body);
+  pass(a, anchor.T_fed_body);
 }
 /// What odometry was before it was made one that does not jump: after pass_waiting(), and as that not in older states.
 template <class A>
 void pass_watch(A& a, AgentState& state) {
   if (!a.has_more()) return;
   robot::OdometryWatch::State& watch = state.watch;
-  bool has_newest = watch.newest.has_value(), has_anchor = watch.anchor.has_value();
-  StampedPose newest = watch.newest.value_or(StampedPose{});
-  auto anchor = watch.anchor.value_or(robot::OdometryWatch::State::Anchor{});
-  pass(a, has_newest);
-  pass(a, newest);
+  pass(a, watch.newest);
   pass(a, watch.speed_mps);
   pass(a, watch.turn_rate_radps);
-  pass(a, has_anchor);
-  pass(a, anchor.T_odom_body);
-  pass(a, anchor.T_fed_body);
-  watch.newest = has_newest ? std::optional(newest) : std::nullopt;
-  watch.anchor = has_anchor ? std::optional(anchor) : std::nullopt;
+  pass(a, watch.anchor);
   for (robot::OdometryStep& step : state.submaps.waiting.odometry) pass(a, step.is_jump);
 }
 template <class A>
@@ -364,11 +356,7 @@ void pass(A& a, AgentState& state) {
   pass(a, state.T_map_odom);
   for (double& x : state.covariance.reshaped()) a.number(x);
   pass(a, state.whereabouts);
-  bool has_component = state.component.has_value();
-  std::uint32_t component = state.component.value_or(0);
-  pass(a, has_component);
-  pass(a, component);
-  state.component = has_component ? std::optional(component) : std::nullopt;
+  pass(a, state.component);
   pass_waiting(a, state.submaps);
   pass_watch(a, state);
   pass_fixes(a, state.submaps);
