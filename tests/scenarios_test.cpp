@@ -302,6 +302,13 @@ TEST(Scenarios, LateJoinsLoseContactAndReturn) {
 }
 
 // Other worlds, ways and errors than those of missions/ (docs/simulation.md).
+/// While alpha's odometry fails, far from everything it knows, four look-alikes that agree are its only closures: two
+/// failures of 70 m that cancel each other would explain them.
+TEST(Scenarios, LookAlikesInTheMidstOfAFailureDoNotMoveTheMap) {
+  const std::vector<std::string> trajectories{"closures.finder=reference", "simulation.sensors=none"};
+  expect_repaired(run(scenario("terrace", trajectories), 5), "terrace, seed 5");
+}
+
 TEST(Scenarios, OtherParametersAreRepairedAsWell) {
   const std::string robot = "simulation.robots.0.", world = "simulation.world.";
   const auto expect = [](const std::string& name, const std::vector<std::string>& assignments, double least_onboard_m,

@@ -162,15 +162,17 @@ Solution HypothesisSolver::judge(Hypothesis hypothesis, estimation::GncResult op
   return out;
 }
 
-/// What a stretch pays for how far it failed, in truncations. An error is as likely to be of any size, to a factor,
-/// along each of its six axes, up to what a body can do: the logarithm of that density over that of odometry's own
-/// errors.
+/// What a stretch pays for how far it failed, in truncations: the logarithm of the density of its error over that of
+/// odometry's own errors. Along each of its six axes the density falls with the power 1.25 of the error's size, up to
+/// what a body can do, so that large failures are rarer than small ones. With the power 1, errors of any size are as
+/// likely, to a factor, and two failures that cancel each other explain a group of look-alikes too cheaply.
 double HypothesisSolver::votes_for(const FailedStretch& failed) const {
   const double duration_s = odometry_.seconds(failed.to) - odometry_.seconds(failed.from);
   if (failed.missed.head<3>().norm() > kReach * odometry_.usual_speed() * duration_s) return kInfinite;
   const Matrix6d covariance = odometry_.between(failed.from, failed.to).covariance;
   const double squared_distance = failed.missed.dot(covariance.llt().solve(failed.missed));
-  return std::max(0.0, 6.0 / limit_ * std::log(squared_distance / limit_));
+  constexpr double kPower = 1.25, kAxes = 6.0;
+  return std::max(0.0, kPower * kAxes / limit_ * std::log(squared_distance / limit_));
 }
 
 void HypothesisSolver::find_failed(const std::vector<Pose3>& poses, Solution& out) const {
