@@ -301,7 +301,6 @@ TEST(Scenarios, LateJoinsLoseContactAndReturn) {
   expect_work(record, {41, 5460, 129, 51, 430, 1'670'000});  // 41, 5460, 103, 41, 342, 1,337,472
 }
 
-// Other worlds, ways and errors than those of missions/ (docs/simulation.md).
 /// While alpha's odometry fails, far from everything it knows, four look-alikes that agree are its only closures: two
 /// failures of 70 m that cancel each other would explain them.
 TEST(Scenarios, LookAlikesInTheMidstOfAFailureDoNotMoveTheMap) {
@@ -309,6 +308,7 @@ TEST(Scenarios, LookAlikesInTheMidstOfAFailureDoNotMoveTheMap) {
   expect_repaired(run(scenario("terrace", trajectories), 5), "terrace, seed 5");
 }
 
+// Other worlds, ways and errors than those of missions/ (docs/simulation.md).
 TEST(Scenarios, OtherParametersAreRepairedAsWell) {
   const std::string robot = "simulation.robots.0.", world = "simulation.world.";
   const auto expect = [](const std::string& name, const std::vector<std::string>& assignments, double least_onboard_m,
