@@ -35,16 +35,22 @@ struct RosArguments {
 
 namespace {
 
-Result<std::shared_ptr<ros::Participant>> join_domain() {
+constexpr const char* kInsecureHelp =
+    "Join ROS 2's domain on the networks that CYCLONEDDS_URI names, else on all, although anybody there may publish; "
+    "default: this machine only";
+
+Result<std::shared_ptr<ros::Participant>> join_domain(bool insecure) {
   const char* const domain = std::getenv("ROS_DOMAIN_ID");
   const auto number = ros::domain_of(domain == nullptr ? "" : domain);
   if (!number) return tl::unexpected(number.error());
-  return ros::Participant::open(*number);
+  if (!insecure && std::getenv("CYCLONEDDS_URI") != nullptr)
+    fmt::print(stderr, "tutti: CYCLONEDDS_URI is not used: without --insecure only this machine is heard by DDS\n");
+  return ros::Participant::open(*number, insecure ? ros::Reach::network : ros::Reach::this_machine);
 }
 
-int play_bags(const ros::BagPlayOptions& options) {
+int play_bags(const ros::BagPlayOptions& options, bool insecure) {
   program::stop_on_signals();
-  const auto participant = join_domain();
+  const auto participant = join_domain(insecure);
   const auto played = participant ? ros::play(options, *participant, program::stop_asked())
                                   : Result<ros::BagPlayed>(tl::unexpected(participant.error()));
   if (!played)
@@ -58,12 +64,16 @@ int play_bags(const ros::BagPlayOptions& options) {
 
 void add_bag_play(CLI::App& bag, int& exit_code) {
   const auto options = std::make_shared<ros::BagPlayOptions>();
+  const auto insecure = std::make_shared<bool>(false);
   options->say = [](const std::string& text) { fmt::print(stderr, "tutti bag play: {}\n", text); };
   auto* command = bag.add_subcommand(
       "play", "Publish what bags hold as ROS 2's topics, over DDS and without ROS, as fast as it was recorded.");
   command->footer(
-      "Of the domain ROS_DOMAIN_ID; CYCLONEDDS_URI says which network. Publishers are reliable: subscribers may be or\n"
-      "not, and of those that are not, what the network loses is lost. docs/ros.md has the rest.\n"
+      "Of the domain ROS_DOMAIN_ID, on this machine; with --insecure CYCLONEDDS_URI says which network. Publishers "
+      "are\n"
+      "reliable: subscribers may be or not, and of those that are not, what the network loses is lost. docs/ros.md "
+      "has\n"
+      "the rest.\n"
       "Example: tutti bag play recordings/alpha recordings/bravo --wait-for /alpha/odom --rate 2\n");
   command
       ->add_option("bags", options->bags,
@@ -86,7 +96,8 @@ void add_bag_play(CLI::App& bag, int& exit_code) {
              "Before the first message; subscribers find out where it plays, which takes a moment.", "S",
              within(0.0, 1e6));
   command->add_flag("--clock", options->clock, "Publish /clock too, 40 times a second, for use_sim_time.");
-  command->callback([options, &exit_code] { exit_code = play_bags(*options); });
+  command->add_flag("--insecure", *insecure, kInsecureHelp);
+  command->callback([options, insecure, &exit_code] { exit_code = play_bags(*options, *insecure); });
 }
 
 std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
@@ -94,7 +105,8 @@ std::shared_ptr<RosArguments> add_ros_robot_options(CLI::App& robot) {
   auto* const ros = robot.add_flag("--ros", out->wanted,
                                    "Take odometry, scans, images, IMU samples and position fixes from ROS 2's topics, "
                                    "and publish map -> odom, the corrected way and "
-                                   "team-mates, over DDS and without ROS (docs/ros.md)");
+                                   "team-mates, over DDS and without ROS, on this machine; with --insecure on the "
+                                   "networks that CYCLONEDDS_URI names, else on all (docs/ros.md)");
   robot
       .add_option_function<std::string>(
           "--namespace",
@@ -170,7 +182,8 @@ std::shared_ptr<RosArguments> add_ros_server_options(CLI::App& server) {
   auto out = std::make_shared<RosArguments>();
   auto* const ros = server.add_flag("--ros", out->wanted,
                                     "Publish the map as ROS 2's topics map (nav_msgs/OccupancyGrid) and map_points "
-                                    "(sensor_msgs/PointCloud2), over DDS and without ROS (docs/ros.md)");
+                                    "(sensor_msgs/PointCloud2), over DDS and without ROS, on this machine; with "
+                                    "--insecure on the networks that CYCLONEDDS_URI names, else on all (docs/ros.md)");
   server.add_option("--namespace", out->name_space, "Of these topics; default: none")->type_name("NAME")->needs(ros);
   server.add_option("--map-frame", out->server.frame, "Frame that they are in")
       ->type_name("FRAME")
@@ -203,7 +216,7 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
           "{} is '{}', but no images are taken that it could go with: expected --images, or a mission that finds "
           "closures from images",
           option, topic);
-  const auto participant = join_domain();
+  const auto participant = join_domain(options.insecure);
   if (!participant) return tl::unexpected(participant.error());
   ros::RosRobotOptions ros = arguments.robot;
   ros.socket = options.feed;
@@ -232,7 +245,7 @@ Result<std::shared_ptr<void>> start_ros(const RosArguments& arguments, const pro
 }
 
 Status show_on_ros(const RosArguments& arguments, program::ServerOptions& options) {
-  const auto participant = join_domain();
+  const auto participant = join_domain(options.insecure);
   if (!participant) return tl::unexpected(participant.error());
   ros::RosServerOptions ros = arguments.server;
   ros.name_space = arguments.name_space;

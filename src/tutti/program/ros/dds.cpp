@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "tutti/program/ros/internal/raw_type.hpp"
+#include "tutti/program/ros/internal/this_machine.hpp"
 
 namespace tutti::ros {
 namespace {
@@ -20,6 +21,12 @@ constexpr std::string_view kTopicPrefix = "rt/";
 constexpr std::string_view kTypeMiddle = "::msg::dds_::";
 constexpr std::uint32_t kDiscovered = 256;  // publications that are read at a time
 constexpr std::uint32_t kTaken = 64;        // messages
+/// Loopback may not have multicast, so programs look for each other at the ports of the first hundred.
+constexpr const char* kLoopback =
+    "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast>"
+    "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>99</"
+    "MaxAutoParticipantIndex>"
+    "<Peers><Peer address='127.0.0.1'/></Peers></Discovery>";
 
 /// "nav_msgs/msg/Odometry" is nav_msgs::msg::dds_::Odometry_; empty where it is no such name.
 std::string dds_type(std::string_view ros) {
@@ -88,6 +95,18 @@ bool is_name(std::string_view part) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
   };
   return !part.empty() && !(part.front() >= '0' && part.front() <= '9') && std::ranges::all_of(part, is_allowed);
+}
+
+/// Makes the domain, which stays until the process ends, unless the process is in it already.
+Status open_on_loopback(std::uint32_t domain) {
+  const dds_entity_t made = dds_create_domain(domain, kLoopback);
+  if (made == DDS_RETCODE_PRECONDITION_NOT_MET) return {};
+  if (made < 0) return failure(made, fmt::format("domain {} on loopback", domain));
+  // Cyclone sends from 127.0.0.1 then, but receives at every address of the machine.
+  Status held = internal::hold_to_loopback(internal::sockets_of(domain));
+  if (held) return {};
+  dds_delete(made);
+  return in_context(fmt::format("DDS: domain {} on loopback", domain), held.error());
 }
 
 dds_duration_t duration(double wall_s) { return static_cast<dds_duration_t>(std::llround(wall_s * 1e9)); }
@@ -177,12 +196,16 @@ std::string Reader::incompatible() const {
   return fmt::format("{} publishers of {} offer another {} than is asked for", status.total_count, topic_, what);
 }
 
-Result<std::shared_ptr<Participant>> Participant::open(std::uint32_t domain) {
+Result<std::shared_ptr<Participant>> Participant::open(std::uint32_t domain, Reach reach) {
+  if (reach == Reach::this_machine)
+    if (Status ok = open_on_loopback(domain); !ok) return tl::unexpected(ok.error());
   const QosPointer qos(dds_create_qos());
   constexpr std::string_view kEnclave = "enclave=/;";  // as ROS's own participants say
   dds_qset_userdata(qos.get(), kEnclave.data(), kEnclave.size());
   const dds_entity_t entity = dds_create_participant(domain, qos.get(), nullptr);
-  if (entity < 0) return failure(entity, fmt::format("domain {} (CYCLONEDDS_URI and network interfaces)", domain));
+  if (entity < 0)
+    return failure(entity, fmt::format("domain {} ({})", domain,
+                                       reach == Reach::network ? "CYCLONEDDS_URI and network interfaces" : "loopback"));
   std::shared_ptr<Participant> out(new Participant(entity));
   out->wait_set_ = dds_create_waitset(entity);
   if (out->wait_set_ < 0) return failure(out->wait_set_, "a wait set");

@@ -94,12 +94,18 @@ struct Publication {
   std::string user_data;  ///< "typehash=RIHS01_..;"
 };
 
+/// Whom a participant hears, and who hears it. DDS has neither passwords nor encryption here.
+enum class Reach {
+  this_machine,  ///< Programs on this machine, over loopback; CYCLONEDDS_URI is not used.
+  network,       ///< Whoever is on the networks that CYCLONEDDS_URI names; without it, on all.
+};
+
 /// One program in a DDS domain. All calls, also of its readers and writers, may be made from several threads.
 class Participant : public std::enable_shared_from_this<Participant> {
  public:
-  /// Joins a domain; the environment variable CYCLONEDDS_URI configures the network. Fails when no network interface is
-  /// usable, or the configuration is invalid.
-  static Result<std::shared_ptr<Participant>> open(std::uint32_t domain);
+  /// Joins a domain. Fails when no network interface is usable, or the configuration is invalid. The first participant
+  /// in a domain decides on the reach of all others that this process has in it.
+  static Result<std::shared_ptr<Participant>> open(std::uint32_t domain, Reach reach);
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;

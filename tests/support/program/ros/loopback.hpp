@@ -27,20 +27,16 @@ inline std::uint32_t free_domain() {
   return kLast;
 }
 
-/// For this process and those that it starts: DDS on this machine only, without multicast, which loopback may not
-/// have; free_domain().
+/// free_domain(), for this process and those that it starts.
 inline std::uint32_t loopback_domain() {
   static const std::uint32_t domain = free_domain();
-  setenv("CYCLONEDDS_URI",
-         "<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false"
-         "</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>20"
-         "</MaxAutoParticipantIndex><Peers><Peer address='127.0.0.1'/></Peers></Discovery>",
-         1);
   setenv("ROS_DOMAIN_ID", std::to_string(domain).c_str(), 1);
   return domain;
 }
 
-inline std::shared_ptr<Participant> join_loopback() { return Participant::open(loopback_domain()).value(); }
+inline std::shared_ptr<Participant> join_loopback() {
+  return Participant::open(loopback_domain(), Reach::this_machine).value();
+}
 
 /// A reader that loses nothing.
 inline constexpr Qos kKeepAll{.reliable = true, .latched = false, .depth = 0};
