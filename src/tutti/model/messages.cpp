@@ -12,15 +12,15 @@ bool Receipt::has_refusal_of(std::uint64_t session, std::uint32_t index) const {
 
 bool Receipt::refuses(SubmapId id, std::uint64_t content) const {
   const Refusal refusal{id.chain.session, id.index, content};
-  return refuses(id) &&
-         (std::ranges::find(refusals, refusal) != refusals.end() || !has_refusal_of(id.chain.session, id.index));
+  return std::ranges::find(refusals, refusal) != refusals.end() ||
+         (refuses(id) && !has_refusal_of(id.chain.session, id.index));
 }
 
 bool Receipt::refuse(SubmapId id, std::uint64_t content, std::size_t most) {
   const Refusal refusal{id.chain.session, id.index, content};
   if (std::ranges::find(refusals, refusal) != refusals.end()) return false;
   refusals.push_back(refusal);
-  refused[id.chain.session].insert(id.index);
+  if (!contains(id)) refused[id.chain.session].insert(id.index);
   while (refusals.size() > most) {
     const Refusal oldest = refusals.front();
     refusals.erase(refusals.begin());

@@ -77,7 +77,7 @@ void forget_unread(SubmapId id, Receipt& receipt) {
 }
 
 bool note_refused(SubmapId id, const std::string& bytes, const std::string& why, Receipt& receipt) {
-  if (receipt.contains(id) || !receipt.refuse(id, content_hash(bytes), kMostRefused)) return false;
+  if (!receipt.refuse(id, content_hash(bytes), kMostRefused)) return false;
   receipt.why_refused = plain_text(why);
   return true;
 }

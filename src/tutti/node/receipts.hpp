@@ -55,8 +55,8 @@ void note_unread(SubmapId id, Receipt& receipt);
 /// The submap has come in a version that can be read.
 void forget_unread(SubmapId id, Receipt& receipt);
 /// Notes that this content was refused. Only the latest refusals are kept, so that garbage sent by anybody neither
-/// fills the receipt nor blocks the submap that the robot will send under this id. False when it was noted before, or a
-/// submap of this id is stored.
+/// fills the receipt nor blocks the submap that the robot will send under this id. Where another submap is stored under
+/// the id, whose content this is can see that it is not its own. False when it was noted before.
 bool note_refused(SubmapId id, const std::string& bytes, const std::string& why, Receipt& receipt);
 /// The row of table `meta` that stores a robot's refusals, which do not follow from the map.
 storage::Write refusals_row(const Receipt& receipt);

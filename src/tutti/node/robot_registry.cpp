@@ -19,6 +19,12 @@ void remember(std::set<std::uint64_t>& sessions, std::uint64_t session) {
   if (sessions.size() > RobotRow::kMostSessions) sessions.erase(sessions.begin());
 }
 
+/// It has begun a new session, for example because its clock was set back. Only a start with a random part tells.
+bool is_one_program(const NodeStatus& before, const NodeStatus& now) {
+  constexpr std::uint64_t kCounts = std::uint64_t{1} << 32U;
+  return now.start >= kCounts && now.start == before.start && now.session > before.session;
+}
+
 }  // namespace
 
 std::optional<ChainId> RobotRegistry::owner(RobotId robot) const {
@@ -70,13 +76,20 @@ std::string RobotRegistry::objection(RobotId id, const NodeStatus& status, Times
                          other.value, robot.status.session, id.value);
   const auto found = robots_.find(id);
   if (found == robots_.end() || !found->second.is_claimed) return {};
-  const auto& [is_claimed, owner, former, rivals, seen, updated, conflicted, conflict] = found->second;
+  const NodeStatus& owner = found->second.status;
   if (has_submaps && !is_mapped(id, owner.session)) return {};
   if (!is_mapped(id) && owner.name != status.name && !is_there(found->second, status.session, now)) return {};
   if (owner.name != status.name)
     return fmt::format("number {} belongs to robot '{}' in this map, not to '{}'", id.value, owner.name, status.name);
-  if (owner.session == status.session) return {};
-  if (former.contains(status.session))
+  if (owner.session == status.session) {
+    if (!found->second.copies.contains(status.start) || !is_there(found->second, status.session, now)) return {};
+    return fmt::format(
+        "another program lives that goes on with session {} of robot '{}': the state folder of this one "
+        "was copied",
+        owner.session, owner.name);
+  }
+  if (is_one_program(owner, status)) return {};
+  if (found->second.former.contains(status.session))
     return fmt::format("session {} of robot '{}' has been replaced by session {}", status.session, owner.name,
                        owner.session);
   if (is_there(found->second, status.session, now))
@@ -93,6 +106,21 @@ void RobotRegistry::take_over(RobotId id, Robot& robot, const NodeStatus& status
   robot.former.erase(status.session);
   robot.rivals.erase(status.session);
   robot.is_claimed = true;
+}
+
+bool RobotRegistry::note_start(Robot& robot, const NodeStatus& status, Timestamp now) {
+  const std::uint64_t known = robot.status.start;
+  if (status.start == known || known == 0 || status.start == 0) return true;
+  if (status.start != robot.start_before) {  // it has started again, as far as can be told
+    robot.start_before = known;
+    robot.heard_again.reset();
+    return true;
+  }
+  if (!robot.heard_again) robot.heard_again = now;
+  if (now - *robot.heard_again < kHeardAgain_s) return false;
+  remember(robot.copies, known);
+  robot.start_before = 0;
+  return true;
 }
 
 RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, Timestamp now) {
@@ -114,8 +142,13 @@ RobotRegistry::Heard RobotRegistry::hear(RobotId id, const NodeStatus& status, T
     return heard;
   }
   heard.accepted = true;
-  if (!robot.is_claimed || robot.status.session != status.session) {
+  const bool is_owner = robot.is_claimed && robot.status.session == status.session;
+  if (is_owner && !note_start(robot, status, now)) return heard;
+  robot.copies.erase(status.start);
+  if (!is_owner) {
     take_over(id, robot, status);
+    robot.start_before = 0;
+    robot.copies.clear();
     heard.must_be_stored = is_mapped(id);
   }
   robot.status = status;

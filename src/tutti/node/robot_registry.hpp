@@ -15,12 +15,17 @@ namespace tutti::node {
 /// Decides which session owns a robot's name and number, by the statuses that programs send. A session that has lost
 /// them to another never gets them back, whatever its number; robots' messages go to the newest owner.
 ///
+/// A program that starts on a copied state folder has the session of another one that lives. Their starts differ
+/// (NodeStatus::start), but so does the start of a robot that was killed and goes on. So a new start is believed until
+/// the one before it has been heard again for kHeardAgain_s: then both live, and the newer one is refused.
+///
 /// Anybody can send a status. So the claim of a robot without submaps in the map counts only while the robot is heard;
 /// it is not stored, yields to a session with submaps, and is dropped when there are too many.
 class RobotRegistry {
  public:
   /// An owner counts as present when it was heard less than this ago.
   static constexpr double kOwnerIsThere_s = 30.0;
+  static constexpr double kHeardAgain_s = 5.0;         ///< At once it may be a message that was late.
   static constexpr std::size_t kMostStrangers = 1000;  ///< Limit on robots that have sent a status and have no submaps.
 
   struct Robot {
@@ -31,7 +36,10 @@ class RobotRegistry {
     std::optional<Timestamp> last_seen;
     std::optional<Timestamp> last_update;
     std::optional<Timestamp> last_conflict;
-    std::string conflict;  ///< Why a session was refused last.
+    std::string conflict;                  ///< Why a session was refused last.
+    std::uint64_t start_before = 0;        ///< The owner's session was of this start before; 0: of no other.
+    std::optional<Timestamp> heard_again;  ///< When that was first heard since.
+    std::set<std::uint64_t> copies;        ///< Starts of the owner's session that are not the first of those that live.
   };
   struct Heard {
     bool accepted = false;
@@ -69,6 +77,8 @@ class RobotRegistry {
   void make_room();
   /// Why the status is refused; empty when it is not.
   [[nodiscard]] std::string objection(RobotId id, const NodeStatus& status, Timestamp now) const;
+  /// Takes the start of a status of the owner's session; false when the status is an old one's, and says nothing new.
+  static bool note_start(Robot& robot, const NodeStatus& status, Timestamp now);
   void take_over(RobotId id, Robot& robot, const NodeStatus& status) const;
 
   std::map<RobotId, Robot> robots_;

@@ -54,6 +54,48 @@ TEST_F(Registry, ANameAndANumberBelongToOneSessionWhileItIsThere) {
   EXPECT_EQ(registry_.robots().at(kOne).last_seen, at(2));
 }
 
+/// A status of the session and start, and whether it is accepted.
+bool hears(RobotRegistry& registry, std::uint64_t session, std::uint64_t start, double s) {
+  NodeStatus said = status("alpha", session);
+  said.start = start;
+  return registry.hear(kOne, said, at(s)).accepted;
+}
+
+TEST_F(Registry, OfTwoLivingProgramsOfASessionTheSecondIsRefusedUntilTheFirstIsGone) {
+  constexpr std::uint64_t kFirst = (5ULL << 32U) + 4, kSecond = (9ULL << 32U) + 4;
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(hears(registry_, 10, kFirst, 2.0 * i));
+  int refused = 0;
+  for (int i = 5; i < 20; ++i) {
+    const bool is_refused = !hears(registry_, 10, kSecond, 2.0 * i);
+    EXPECT_TRUE(hears(registry_, 10, kFirst, 2.0 * i + 1.0));
+    EXPECT_TRUE(is_refused || i < 10) << i;
+    refused += is_refused ? 1 : 0;
+  }
+  EXPECT_GE(refused, 10);
+  EXPECT_EQ(registry_.robots().at(kOne).status.start, kFirst);
+  EXPECT_NE(registry_.robots().at(kOne).conflict.find("was copied"), std::string::npos);
+  EXPECT_TRUE(hears(registry_, 10, kSecond, 2.0 * 20 + 31.0));
+}
+
+TEST_F(Registry, AProgramThatStartsAgainAndAgainIsNoSecondOne) {
+  for (std::uint64_t start = 1; start < 50; ++start) {
+    const double s = 3.0 * static_cast<double>(start);
+    EXPECT_TRUE(hears(registry_, 10, (start * 77 << 32U) + start, s));
+    if (start > 1) {
+      EXPECT_TRUE(hears(registry_, 10, ((start - 1) * 77 << 32U) + start - 1, s + 1.0));  // it was late
+    }
+    EXPECT_TRUE(hears(registry_, 10, (start * 77 << 32U) + start, s + 2.0));
+  }
+}
+
+TEST_F(Registry, AProgramMayBeginAnotherSession) {
+  constexpr std::uint64_t kStart = (5ULL << 32U) + 1;
+  EXPECT_TRUE(hears(registry_, 10, kStart, 0.0));
+  EXPECT_TRUE(hears(registry_, 11, kStart, 2.0));
+  EXPECT_EQ(owner(kOne), 11U);
+  EXPECT_FALSE(hears(registry_, 12, (6ULL << 32U) + 1, 4.0));  // another program
+}
+
 TEST_F(Registry, AfterThirtySecondsANewSessionTakesItsPlaceForGood) {
   hear(kOne, "alpha", 10, 0);
   EXPECT_FALSE(hear(kOne, "alpha", 11, 29.9));

@@ -262,10 +262,13 @@ TEST_F(ServerStatus, OfOneIdTheFirstContentStays) {
   SubmapMessage other = first;
   other.submap.cloud = std::make_shared<const PointCloud>(PointCloud{{{9.0F, 9.0F, 1.0F}}});
   receive(test::envelope(first));
-  const auto tables = store_->tables();
+  const auto submaps = store_->tables().at("submaps");
   const Step step = receive(test::envelope(other));
   EXPECT_EQ(told<MessageRefused>(step), 1U);
-  EXPECT_EQ(store_->tables(), tables);
+  EXPECT_EQ(store_->tables().at("submaps"), submaps);
+  restart();
+  EXPECT_TRUE(receipt(kAlpha).refuses({chain, 0}, content_hash(*test::envelope(other).bytes)));  // so its robot knows
+  EXPECT_FALSE(receipt(kAlpha).refuses({chain, 0}, content_hash(*test::envelope(first).bytes)));
   EXPECT_TRUE(receipt(kAlpha).contains({chain, 0}));  // it need not come once more
   EXPECT_FALSE(receipt(kAlpha).refuses({chain, 0}));
   EXPECT_EQ(told<MessageRefused>(receive(test::envelope(first))), 0U);
