@@ -50,6 +50,7 @@ class Troubles {
   static constexpr std::pair<const char*, const char*> kKinds[] = {
       {"sample_refused", "odometry samples refused"},
       {"odometry_jumped", "steps of odometry that no body makes"},
+      {"session_begun", "times another session had to begin"},
       {"scan_refused", "wanted scans that are not there or no good"},
       {"images_refused", "times images refused"},
       {"fix_refused", "fixes refused"},

@@ -88,6 +88,12 @@ struct StateLost {
   std::uint64_t session = 0;  ///< The new session.
   std::string why;
 };
+/// Told by the robot: it has begun a new session, a chain of its own; its unsent submaps are kept.
+struct SessionBegun {
+  RobotId robot;
+  std::uint64_t session = 0;  ///< The new session.
+  std::string why;
+};
 /// Told by the robot: the server's map is another one than before and lacks these submaps, which are sent again.
 struct SubmapsForgotten {
   RobotId robot;
@@ -133,7 +139,8 @@ struct Event {
   Timestamp time;
   std::variant<SubmapStored, VerdictsTaken, WordTaken, VerificationFailed, RefinementTaken, RefinementFailed,
                MapUpdated, ChangeOfMind, RobotUpdated, MessageRefused, RobotJoined, RobotRefused, StateLost,
-               SubmapsForgotten, SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing, FixRefused>
+               SessionBegun, SubmapsForgotten, SampleRefused, OdometryJumped, ScanRefused, ImagesRefused, SensorMissing,
+               FixRefused>
       what;
 };
 

@@ -83,7 +83,8 @@ struct Robot {
   void live(int samples) {
     for (int i = 0; i < samples; ++i) {
       now = now + 0.2;
-      stamp = stamp + one_of(rng, {1e-9, 0.01, 0.5, 2.0, 1e5, 1e9});
+      const bool is_far = rng.bernoulli(0.05);  // not more often: what is taken next has to confirm it
+      stamp = stamp + (is_far ? one_of(rng, {1e5, 1e9}) : one_of(rng, {1e-9, 0.01, 0.5, 2.0}));
       done(node->add_odometry({stamp, any_extreme_pose(rng), any_extreme_covariance(rng)}, now));
       if (node->agent().newest_sample() == stamp) ++taken;
       if (node->agent().wants_scan())

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a robot's node makes of what the server sends: graphs, and receipts of which submaps it has.
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "tutti/base/content_hash.hpp"
@@ -98,8 +99,13 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
     return step.tell(now, MessageRefused{envelope.from, envelope.kind, "a receipt for another robot"});
   if (receipt->incarnation != receipt_incarnation_) note_start(*receipt, now, step);
   std::vector<SubmapId> known;
+  std::set<std::uint64_t> foreign;  // sessions
   for (const auto& [id, bytes] : uplink_.submaps()) {
-    const bool is_refused = !receipt->contains(id) && is_refused_as_it_is(id, *receipt);
+    const bool is_refused = is_refused_as_it_is(id, *receipt);
+    if (is_refused && receipt->contains(id)) {
+      foreign.insert(id.chain.session);
+      continue;
+    }
     if (is_refused)
       step.tell(now, MessageRefused{bus::Endpoint::of(agent_.robot()), bus::MessageKind::submap,
                                     fmt::format("submap {} is refused by the server, which last said: {}",
@@ -110,6 +116,7 @@ void RobotNode::receive_receipt(const bus::Envelope& envelope, Timestamp now, St
       uplink_.park(id);
   }
   for (const SubmapId id : known) archive(id, step);
+  note_foreign(foreign, now, step);
   note_conflict(*receipt, now, step);
   send_submaps(now, {}, step);
 }
@@ -118,6 +125,7 @@ void RobotNode::note_start(const Receipt& receipt, Timestamp now, Step& step) {
   receipt_incarnation_ = receipt.incarnation;
   remember_incarnations(step);
   uplink_.release();
+  hold_foreign();
   std::vector<SubmapId> forgotten;
   for (const auto& [id, bytes] : archive_)
     if (!receipt.contains(id) && !is_refused_as_it_is(id, receipt)) forgotten.push_back(id);
@@ -149,18 +157,12 @@ void RobotNode::archive(SubmapId id, Step& step) {
 
 /// And not something else that came under its id.
 bool RobotNode::is_refused_as_it_is(SubmapId id, const Receipt& receipt) const {
-  if (!receipt.refuses(id)) return false;
+  const auto is_of_id = [&](const Receipt::Refusal& of) {
+    return of.session == id.chain.session && of.index == id.index;
+  };
+  if (!receipt.refuses(id) && std::ranges::none_of(receipt.refusals, is_of_id)) return false;
   const auto row = store_.read(kOutbox, key_of(id));
   return row && *row && receipt.refuses(id, content_hash(**row));
-}
-
-void RobotNode::note_conflict(const Receipt& receipt, Timestamp now, Step& step) {
-  owner_session_ = receipt.owner_session;
-  const std::optional<std::string> before = std::exchange(conflict_, std::nullopt);
-  const auto& conflict = receipt.conflict;
-  if (!conflict || conflict->session != agent_.chain().session || conflict->start != start_) return;
-  conflict_ = conflict->why;
-  if (conflict_ != before) step.tell(now, RobotRefused{agent_.robot(), conflict->session, conflict->why});
 }
 
 }  // namespace tutti::node

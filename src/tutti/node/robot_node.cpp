@@ -63,9 +63,11 @@ Result<std::unique_ptr<RobotNode>> RobotNode::open(RobotId robot, std::uint64_t 
     for (const auto& [key, bytes] : rows) node->obsolete_.push_back(key);
     node->why_lost_ = readable.error().message;
   }
+  for (const auto& [key, bytes] : rows) node->rows_.insert(key);
+  node->gate_ = OdometryGate(robot, node->agent_.newest_sample());
   node->journal_ = entries;
   node->is_new_ = rows.empty() || !readable;
-  if (const auto before = storage::numbers_of(starts->value_or(""), 1)) node->start_ = before->front() + 1;
+  if (const auto before = storage::numbers_of(starts->value_or(""), 1)) node->starts_ = before->front() + 1;
   if (Status ok = node->read_outbox(); !ok)
     return in_context(fmt::format("robot {}: what is stored", robot.value), ok.error());
   return node;
@@ -106,6 +108,13 @@ Status RobotNode::read_outbox() {
   if (auto read = store_.sizes(kOutbox, keep); !read || !ok) return read ? ok : read;
   if (auto read = store_.sizes(kArchive, mark); !read || !ok) return read ? ok : read;
   for (const auto& [id, size] : kept) uplink_.add(id, size);
+  const auto hold = [&](std::string_view key, std::size_t) {
+    if (const auto session = storage::numbers_of(key.substr(std::min(key.size(), kForeign.size())), 1);
+        session && key.starts_with(kForeign))
+      foreign_sessions_.insert(session->front());
+  };
+  if (auto read = store_.sizes(kMeta, hold); !read) return read;
+  hold_foreign();
   const auto heard = store_.read(kMeta, kIncarnations);
   if (!heard) return tl::unexpected(heard.error());
   if (const auto numbers = storage::numbers_of(heard->value_or(""), 2)) {
@@ -140,7 +149,7 @@ Step RobotNode::resume(Timestamp now) {
     save_checkpoint(step);
   }
   if (config_.keeps_state) {
-    step.writes.push_back({kMeta, kStarts, storage::key_of({start_})});
+    step.writes.push_back({kMeta, kStarts, storage::key_of({starts_})});
     step.writes.push_back({kMeta, kSession, storage::key_of({agent_.chain().session})});
   }
   if (why_lost_) step.tell(now, StateLost{agent_.robot(), agent_.chain().session, *std::exchange(why_lost_, {})});
@@ -150,17 +159,29 @@ Step RobotNode::resume(Timestamp now) {
 
 Step RobotNode::add_odometry(const OdometrySample& sample, Timestamp now) {
   Step step;
-  if (auto ok = agent_.add_odometry(sample.stamp, sample.T_odom_body, sample.increment_covariance); !ok) {
-    step.tell(now, SampleRefused{agent_.robot(), ok.error().message});
-    ++refused_samples_;
-    why_refused_ = ok.error().message;
+  const auto passed = gate_.take(sample);
+  if (!passed) {
+    step.tell(now, SampleRefused{agent_.robot(), passed.error().message});
     return step;
   }
-  refused_samples_ = 0;
+  if (!passed->why_anew.empty()) step = begin_session(passed->why_anew, now);
+  if (passed->waited) hear(*passed->waited, now, step);
+  hear(sample, now, step);
+  return step;
+}
+
+void RobotNode::hear(const OdometrySample& sample, Timestamp now, Step& step) {
+  if (auto ok = agent_.add_odometry(sample.stamp, sample.T_odom_body, sample.increment_covariance); !ok)
+    return step.tell(now, SampleRefused{agent_.robot(), ok.error().message});
   finished_ = false;
   remember(sample, now, step);
   settle(now, step);
-  return step;
+}
+
+void RobotNode::expect_sensors(bool scans, bool images) {
+  config_.agent.submap.has_scans = scans;
+  config_.agent.submap.has_images = images;
+  agent_.expect_sensors(scans, images);
 }
 
 Step RobotNode::add_scan(const Scan& scan, Timestamp now) {
@@ -260,11 +281,16 @@ Step RobotNode::on_timer(Timestamp now) {
 
 void RobotNode::save_checkpoint(Step& step) {
   if (!config_.keeps_state) return;
-  for (std::string& key : std::exchange(obsolete_, {}))
-    step.writes.push_back({kCheckpoint, std::move(key), std::nullopt});
   wire::StateChange change = wire::changed_rows(agent_, stored_);
-  for (std::string& key : change.removed) step.writes.push_back({kCheckpoint, std::move(key), std::nullopt});
-  for (auto& [key, bytes] : change.put) step.writes.push_back({kCheckpoint, key, std::move(bytes)});
+  for (auto* keys : {&obsolete_, &change.removed})
+    for (std::string& key : std::exchange(*keys, {})) {
+      rows_.erase(key);
+      step.writes.push_back({kCheckpoint, std::move(key), std::nullopt});
+    }
+  for (auto& [key, bytes] : change.put) {
+    rows_.insert(key);
+    step.writes.push_back({kCheckpoint, key, std::move(bytes)});
+  }
   unwritten_.clear();
   for (; journal_ > 0; --journal_) step.writes.push_back({kJournal, storage::key_of({journal_ - 1}), std::nullopt});
 }
@@ -316,9 +342,9 @@ bus::Envelope RobotNode::submap_envelope(SubmapId id, std::shared_ptr<const std:
 }
 
 std::string RobotNode::odometry_trouble(Timestamp now) const {
-  if (refused_samples_ >= config_.most_refused_samples)
-    return fmt::format("the last {} odometry samples were refused, the newest because: {}", refused_samples_,
-                       why_refused_);
+  if (std::string refused = gate_.trouble(); !refused.empty()) return refused;
+  if (session_begun_ && now - session_begun_->first < config_.jump_told_s)
+    return fmt::format("session {} has begun: {}", agent_.chain().session, session_begun_->second);
   if (newest_jump_ && now - newest_jump_->first < config_.jump_told_s)
     return fmt::format("{} ({} so far)", to_string(newest_jump_->second), jumps_);
   return {};
@@ -327,7 +353,7 @@ std::string RobotNode::odometry_trouble(Timestamp now) const {
 NodeStatus RobotNode::status(Timestamp now) const {
   NodeStatus status{.name = config_.name.empty() ? default_name(bus::Endpoint::of(agent_.robot())) : config_.name,
                     .session = agent_.chain().session,
-                    .start = start_,
+                    .start = start(),
                     .version = {},
                     .backlog_submaps = uplink_.submaps().size(),
                     .backlog_bytes = uplink_.bytes(),
@@ -341,7 +367,7 @@ NodeStatus RobotNode::status(Timestamp now) const {
                     .jobs_done = 0,
                     .trouble = {}};
   if (updated_) status.update_age_s = now - *updated_;
-  status.trouble = plain_text(odometry_trouble(now));
+  status.trouble = plain_text(dispute().empty() ? odometry_trouble(now) : dispute());
   for (const auto& [kind, unread] : unread_)
     status.trouble =
         plain_text(fmt::format("cannot read what the server sends ({} so far), one of the two is to be upgraded: {}",

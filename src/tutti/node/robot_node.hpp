@@ -5,11 +5,13 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "tutti/model/status.hpp"
 #include "tutti/node/journal.hpp"
+#include "tutti/node/odometry_gate.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/uplink.hpp"
 #include "tutti/robot/agent.hpp"
@@ -22,7 +24,8 @@ struct RobotNodeConfig {
   robot::AgentConfig agent;
   /// Store everything that the robot needs after a restart. Without this a robot that starts again is a new one.
   bool keeps_state = true;
-  std::string name;  ///< Empty: default_name(), such as "robot_7".
+  std::string name;               ///< Empty: default_name(), such as "robot_7".
+  std::uint32_t incarnation = 0;  ///< A random number of every start of the program; 0: none.
   UplinkConfig uplink;
   /// Size of the archive: the newest submaps that the server has named as stored or refused, kept in case its map loses
   /// them. 0: none are kept.
@@ -32,8 +35,7 @@ struct RobotNodeConfig {
   double journal_period_s = 0.5;
   /// Keyframes without a scan (or images) after which SensorMissing is told.
   std::uint64_t most_keyframes_without = 20;
-  std::uint64_t most_refused_samples = 20;  ///< Refused samples in a row after which status() says so.
-  double jump_told_s = 600.0;               ///< How long status() says that odometry has jumped.
+  double jump_told_s = 600.0;  ///< How long status() says that odometry has jumped, or its clock.
 };
 
 /// A robot as a node: RobotAgent with its store and messages. It takes odometry, sensor data and proxy graphs, and
@@ -56,18 +58,22 @@ class RobotNode {
   /// The first step after every start.
   Step resume(Timestamp now);
   /// RobotAgent::expect_sensors(); not stored, so call it after every start.
-  void expect_sensors(bool scans, bool images) { agent_.expect_sensors(scans, images); }
+  void expect_sensors(bool scans, bool images);
   /// As the functions of RobotAgent with these names; what the agent refuses is told as an event. Data that come again,
-  /// as after a restart, are refused or change nothing.
+  /// as after a restart, are refused or change nothing. Odometry passes an OdometryGate: where its clock begins anew,
+  /// so does the robot (begin_session()).
   Step add_odometry(const OdometrySample& sample, Timestamp now);
   Step add_scan(const Scan& scan, Timestamp now);
   Step add_images(const TrackedImages& images, Timestamp now);
   Step add_fix(const PositionFix& fix, Timestamp now);
   Step finish(Timestamp now);
+  /// Ends the last submap, and begins a session after all earlier ones, in a chain of its own. The outbox is kept.
+  /// `why` is for people.
+  Step begin_session(const std::string& why, Timestamp now);
   /// Writes everything that waits to be written, for a planned end.
   Step store_all();
   /// True when everything that the robot heard is in the store, once the steps so far are carried out.
-  [[nodiscard]] bool is_stored() const { return unwritten_.empty(); }
+  [[nodiscard]] bool is_stored() const { return unwritten_.empty() && !gate_.holds_one(); }
   /// Takes a message that was sent to the robot.
   Step receive(const bus::Envelope& envelope, Timestamp now);
   /// The newest graph that the robot would know after this message. Nothing when the message has no graph, or gives
@@ -85,6 +91,8 @@ class RobotNode {
   /// Why the server says that another program owns this robot's name or number; nothing when it does not say so about
   /// this session and start.
   [[nodiscard]] const std::optional<std::string>& conflict() const { return conflict_; }
+  /// The same, or that the map has somebody else's submaps in the place of this robot's; empty when neither.
+  [[nodiscard]] std::string dispute() const { return conflict_ ? *conflict_ : foreign_; }
   /// The session that owns them, by the last receipt.
   [[nodiscard]] std::optional<std::uint64_t> owner_session() const { return owner_session_; }
 
@@ -100,11 +108,12 @@ class RobotNode {
 
  private:
   RobotNode(RobotId robot, const RobotNodeConfig& config, robot::AgentState state, const storage::TableStore& store)
-      : config_(config), store_(store), agent_(robot, config.agent, std::move(state)) {}
+      : config_(config), store_(store), agent_(robot, config.agent, std::move(state)), gate_(robot) {}
 
   static Result<std::uint64_t> newest_session(const storage::TableStore& store);
   Status hear_again(const JournalEntry& entry);
   Status read_outbox();
+  void hear(const OdometrySample& sample, Timestamp now, Step& step);
   void remember(const JournalEntry& entry, Timestamp now, Step& step);
   void write_journal(Step& step);
   /// Takes the submaps that have ended, after which the journal can be dropped.
@@ -119,6 +128,14 @@ class RobotNode {
   [[nodiscard]] bool is_refused_as_it_is(SubmapId id, const Receipt& receipt) const;
   [[nodiscard]] std::string odometry_trouble(Timestamp now) const;
   void note_conflict(const Receipt& receipt, Timestamp now, Step& step);
+  /// Under these sessions the map has submaps of somebody else, in the place of this robot's.
+  void note_foreign(const std::set<std::uint64_t>& sessions, Timestamp now, Step& step);
+  /// The session is of another body, too: nothing more is sent of it, and if it is the present one, another begins.
+  void leave(std::uint64_t session, const std::string& why, Timestamp now, Step& step);
+  void hold_foreign();
+  void change_session(const std::string& why, Timestamp now, Step& step);
+  /// NodeStatus::start: the number of starts, and in the upper half the program's random number.
+  [[nodiscard]] std::uint64_t start() const { return std::uint64_t{config_.incarnation} << 32U | starts_; }
   void note(const robot::UpdateSummary& summary);
   void receive_receipt(const bus::Envelope& envelope, Timestamp now, Step& step);
   /// Sends submaps again that a server which has started anew does not name.
@@ -132,6 +149,7 @@ class RobotNode {
   RobotNodeConfig config_;
   const storage::TableStore& store_;
   robot::RobotAgent agent_;
+  OdometryGate gate_;  // for what agent_ takes
   robot::StageObserver observer_;
   Uplink uplink_{config_.uplink};            // of the submaps in the outbox
   std::map<SubmapId, std::size_t> archive_;  // with their sizes
@@ -145,25 +163,27 @@ class RobotNode {
   std::map<bus::MessageKind, Unread> unread_;  // since the last one of the kind that could be read
   std::optional<ProxyGraph> base_;             // the last graph that came in full
   std::shared_ptr<const std::string> delta_;   // the last message that gave differences from base_
-  std::uint64_t refused_samples_ = 0;          // since the last that was taken
-  std::string why_refused_;
-  std::uint64_t jumps_ = 0;                                               // since the start
+  std::uint64_t jumps_ = 0;                    // since the start
   std::optional<std::pair<Timestamp, robot::OdometryJump>> newest_jump_;  // when it was told
   bool tells_no_scan_ = false, tells_no_images_ = false;
   std::uint64_t journal_ = 0;           // number of entries since the checkpoint that are written
   std::vector<std::string> unwritten_;  // and the entries that are not
   Timestamp unwritten_since_;
   wire::StoredState stored_;           // of the agent, in the checkpoint
+  std::set<std::string> rows_;         // keys of the checkpoint
   std::vector<std::string> obsolete_;  // rows of the checkpoint, until the next one
   std::optional<std::string> why_lost_;
-  bool is_new_ = false;      // there is no checkpoint yet
-  std::uint64_t start_ = 1;  // number of starts on this store
+  std::optional<std::pair<Timestamp, std::string>> session_begun_;  // when, and why
+  bool is_new_ = false;                                             // there is no checkpoint yet
+  std::uint64_t starts_ = 1;                                        // number of starts on this store
   bool finished_ = false;
   std::optional<Timestamp> updated_;
   std::pair<std::uint64_t, std::uint64_t> mapped_age_;  // ProxyGraph::age() of the newest graph since the start,
   Timestamp mapped_until_ = kFirstTimestamp;            // and the stamp of the last own node in it
   std::uint64_t alerts_ = 0;                            // of the last update
   std::optional<std::string> conflict_;
+  std::set<std::uint64_t> foreign_sessions_;  // that are of another body, too
+  std::string foreign_;                       // that submaps of these wait for ever; else empty
   std::optional<std::uint64_t> owner_session_;
 };
 

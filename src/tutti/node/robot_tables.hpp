@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string_view>
+
 /// Names of the tables of a robot's store (storage::robot_schema()), and of their rows.
 namespace tutti::node::robot_tables {
 
@@ -15,5 +17,6 @@ inline constexpr const char* kStarts = "starts";    // number of starts on this 
 inline constexpr const char* kSession = "session";  // newest session on this store
 // the server's incarnations in the last graph and in the last receipt
 inline constexpr const char* kIncarnations = "incarnations";
+inline constexpr std::string_view kForeign = "foreign/";  // followed by a session that another body has, too
 
 }  // namespace tutti::node::robot_tables

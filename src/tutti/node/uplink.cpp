@@ -21,8 +21,13 @@ bool Uplink::remove(SubmapId submap) {
 }
 
 void Uplink::park(SubmapId submap) {
-  if (sent_.erase(submap) == 0) return;
-  under_way_bytes_ -= bytes_.at(submap);
+  if (sent_.contains(submap)) hold(submap);
+}
+
+void Uplink::hold(SubmapId submap) {
+  const auto known = bytes_.find(submap);
+  if (known == bytes_.end()) return;
+  if (sent_.erase(submap) > 0) under_way_bytes_ -= known->second;
   parked_.insert(submap);
 }
 

@@ -44,6 +44,8 @@ class Uplink {
   /// Takes a submap that was sent out of those under way; it is not sent again until release(). Does nothing for one
   /// that was not sent.
   void park(SubmapId submap);
+  /// The same, whether or not it was sent.
+  void hold(SubmapId submap);
   void release() { parked_.clear(); }
   /// The submaps to be sent now, in this order; they count as under way from here on.
   std::vector<SubmapId> take(Timestamp now);

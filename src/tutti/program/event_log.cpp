@@ -160,6 +160,12 @@ Told tell(const node::StateLost& lost) {
                   lost.session, lost.why),
       Level::warning};
 }
+Told tell(const node::SessionBegun& begun) {
+  return {{{"event", "session_begun"}, {"robot", begun.robot.value}, {"session", begun.session}, {"why", begun.why}},
+          fmt::format("robot {} begins session {}, submaps that wait are kept: {}", begun.robot.value, begun.session,
+                      begun.why),
+          Level::warning};
+}
 Told tell(const node::SubmapsForgotten& forgotten) {
   return {{{"event", "submaps_forgotten"}, {"robot", forgotten.robot.value}, {"submaps", forgotten.submaps}},
           fmt::format("the server's map is another than before and lacks {} submaps that it had: they are sent again",
@@ -228,6 +234,7 @@ std::string throttled_kind(const node::Event& event) {
   if (std::holds_alternative<node::RobotJoined>(event.what)) return "robot joined";
   if (std::holds_alternative<node::SampleRefused>(event.what)) return "sample";
   if (std::holds_alternative<node::OdometryJumped>(event.what)) return "jump";
+  if (std::holds_alternative<node::SessionBegun>(event.what)) return "session";
   if (std::holds_alternative<node::ScanRefused>(event.what)) return "scan";
   if (std::holds_alternative<node::ImagesRefused>(event.what)) return "images";
   if (std::holds_alternative<node::FixRefused>(event.what)) return "fix";

@@ -81,6 +81,8 @@ class FedRobotTest : public testing::Test {
   std::unique_ptr<Host> host_;
 };
 
+class FedRobotClock : public FedRobotTest, public testing::WithParamInterface<bool> {};
+
 TEST_F(FedRobotTest, TakesWhatIsFedAndSaysHowFarItIsStored) {
   ASSERT_TRUE(host_->open());
   feed(0, 100);
@@ -124,6 +126,42 @@ TEST_F(FedRobotTest, AFullDiskCostsTheMapAndNeverThePose) {
   EXPECT_EQ(front_->state().stored, kOdometry.back().stamp);
   expect_the_robot_of_all_that_was_fed();
 }
+
+// Odometry's clock goes back while the disk is full: what is fed waits, in both sessions.
+TEST_P(FedRobotClock, ThatGoesBackIsANewSessionWhateverTheDiskDoes) {
+  const auto feed_back = [&](std::size_t from, std::size_t until) {
+    std::size_t taken = 0;
+    for (std::size_t i = from; i < until; ++i) {
+      node::OdometrySample back = sample(i);
+      back.stamp = back.stamp - 3600.0;
+      taken += front_->add_odometry(back) ? 1 : 0;
+    }
+    return taken;
+  };
+  ASSERT_TRUE(host_->open());
+  feed(0, 50);
+  turns(10);
+  disk_.full = GetParam();
+  feed(50, 100);
+  EXPECT_LT(feed_back(100, 200), 100U);
+  turns(10);
+  EXPECT_EQ(front_->state().newest->stamp, kOdometry[199].stamp - 3600.0);
+  disk_.full = false;
+  wall_s_ += Host::kReopen_s;
+  turns(100);
+  EXPECT_EQ(feed_back(200, 250), 50U);
+  turns(100);
+  EXPECT_EQ(agent().chain().session, 8U);
+  EXPECT_EQ(agent().newest_sample(), kOdometry[249].stamp - 3600.0);
+  EXPECT_EQ(front_->state().stored, kOdometry[249].stamp - 3600.0);
+  EXPECT_EQ(front_->state().chain, agent().chain());
+  const auto again = open_robot();  // after a kill
+  EXPECT_EQ(again->node().agent().chain(), agent().chain());
+  EXPECT_EQ(again->node().agent().newest_sample(), agent().newest_sample());
+  EXPECT_TRUE(again->node().backlog().contains({ChainId(kRobot, 7), 0}));
+}
+
+INSTANTIATE_TEST_SUITE_P(OfADisk, FedRobotClock, testing::Bool());
 
 TEST_F(FedRobotTest, AStartOnAFullDiskWaitsForRoom) {
   disk_.full = true;

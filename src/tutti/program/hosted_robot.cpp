@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "tutti/base/plain_text.hpp"
 #include "tutti/model/proxy_graph.hpp"
 #include "tutti/node/status_envelope.hpp"
 
@@ -75,9 +76,17 @@ Answer HostedRobot::work(Timestamp now) {
   return said();
 }
 
-Answer HostedRobot::report(Timestamp now) {
+/// What the feed refuses, the node never hears of.
+NodeStatus HostedRobot::node_status(Timestamp now) const {
   NodeStatus status = driver_->node().status(now);
   status.version = options_.version;
+  if (const std::string refused = feed_ ? feed_->front().odometry_trouble() : ""; !refused.empty())
+    status.trouble = plain_text(refused);
+  return status;
+}
+
+Answer HostedRobot::report(Timestamp now) {
+  NodeStatus status = node_status(now);
   return {{.messages = {node::to_server(bus::Endpoint::of(driver_->node().agent().robot()), std::move(status))}}, {}};
 }
 
@@ -126,7 +135,7 @@ Json HostedRobot::feed_status() const {
 }
 
 Json HostedRobot::status(Timestamp now) const {
-  const NodeStatus status = driver_->node().status(now);
+  const NodeStatus status = node_status(now);
   const bus::NatsState link = port_.state();
   const double time_s = now - Timestamp{};
   Json out{{"program", "robot"},
@@ -143,6 +152,7 @@ Json HostedRobot::status(Timestamp now) const {
             fmt::format("{}, {} keyframes, {} submaps not stored yet, heard map revision {}{}{}", progress(time_s),
                         status.keyframes, status.backlog_submaps, status.heard_revision,
                         link.connected ? "" : ", no link: " + link.last_error, alone_.empty() ? "" : ", " + alone_)}};
+  if (!status.trouble.empty()) out["trouble"] = status.trouble;
   if (feed_) out["feed"] = feed_status();
   return out;
 }

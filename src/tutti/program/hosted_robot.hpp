@@ -59,6 +59,7 @@ class HostedRobot final : public Hosted {
   [[nodiscard]] const std::optional<std::string>& refused() const { return refused_; }
 
  private:
+  [[nodiscard]] NodeStatus node_status(Timestamp now) const;
   Answer said(std::vector<std::uint64_t> done = {}) {
     Answer out{driver_->take_step(), std::move(done)};
     if (fed_) fed_->note(out.step);

@@ -13,6 +13,7 @@
 #include "tutti/program/feed/live_feed.hpp"
 #include "tutti/program/host.hpp"
 #include "tutti/program/hosted_robot.hpp"
+#include "tutti/program/incarnation.hpp"
 #include "tutti/program/server_program.hpp"
 #include "tutti/program/state_folder.hpp"
 #include "tutti/program/stop.hpp"
@@ -72,6 +73,7 @@ class RobotProgram {
   void tell_feed();
 
   const RobotOptions& options_;
+  const std::uint32_t incarnation_ = any_incarnation();
   RobotId robot_;
   std::optional<StateFolder> folder_;
   std::unique_ptr<EventLog> log_;
@@ -81,6 +83,7 @@ class RobotProgram {
   std::optional<Clock> clock_;
   std::unique_ptr<LiveFeed> feed_;  // null: it replays
   FeedFront::Load load_;            // as it was told last
+  bool odometry_refused_ = false;   // as it was told last
   std::optional<Host> host_;
 };
 
@@ -95,6 +98,7 @@ void RobotProgram::tell_alone() {
 Result<std::unique_ptr<RobotDriver>> RobotProgram::open_driver() {
   node::RobotNodeConfig config{.agent = options_.settings.agent,
                                .name = options_.name,
+                               .incarnation = incarnation_,
                                .uplink = {.bytes_per_s = options_.uplink_bytes_per_s},
                                .max_archive_bytes = options_.max_archive_bytes};
   if (feed_) {
@@ -141,6 +145,11 @@ void RobotProgram::tell_feed() {
   feed_->front().say_trouble(trouble.empty() ? "" : "the map waits, localisation goes on by odometry: " + trouble);
   if (const std::string thrown = feed_->take_thrown(); !thrown.empty())
     log_->say(Level::error, "the feed has thrown, which is a defect of it; clients have to connect again: " + thrown);
+  const std::string refused = feed_->front().odometry_trouble();
+  if (const bool is_refused = !refused.empty(); is_refused != odometry_refused_) {
+    odometry_refused_ = is_refused;
+    log_->say(is_refused ? Level::warning : Level::info, is_refused ? refused : "odometry is taken again");
+  }
   const FeedFront::Load load = feed_->front().load(), before = std::exchange(load_, load);
   const std::size_t now = load.scans_left_out + load.samples_joined + load.images_left_out,
                     was = before.scans_left_out + before.samples_joined + before.images_left_out;

@@ -6,10 +6,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -17,7 +15,6 @@
 #include <utility>
 
 #include "tutti/base/file.hpp"
-#include "tutti/base/random.hpp"
 #include "tutti/bus/mission_lease.hpp"
 #include "tutti/bus/nats_child.hpp"
 #include "tutti/bus/nats_port.hpp"
@@ -25,6 +22,7 @@
 #include "tutti/node/server_node.hpp"
 #include "tutti/node/status_envelope.hpp"
 #include "tutti/program/host.hpp"
+#include "tutti/program/incarnation.hpp"
 #include "tutti/program/state_folder.hpp"
 #include "tutti/program/stop.hpp"
 #include "tutti/program/worker_program.hpp"
@@ -192,13 +190,6 @@ bus::LeaseHolder holder_of(const StateFolder& folder) {
           .state = path.string(),
           .since_ns = static_cast<std::int64_t>(wall_clock_ns()),
           .seat = fmt::format("{} {} {}", machine, folder.made_ns(), path.string())};
-}
-
-/// Of this start and, but for one in 4e9 times, no other: not of the clock alone, which a base station may not have.
-std::uint32_t any_incarnation() {
-  const auto since_boot = static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
-  const Rng rng = Rng(wall_clock_ns()).fork(static_cast<std::uint64_t>(getpid())).fork(since_boot);
-  return static_cast<std::uint32_t>(1 + Rng(rng).index(std::numeric_limits<std::uint32_t>::max() - 1));
 }
 
 /// All that a running server holds, in the order in which it is made.

@@ -69,6 +69,8 @@ class OdometryWatch {
   /// Maps the frame of what is fed now to `odom`; the identity before the first jump.
   [[nodiscard]] Pose3 T_odom_fed() const;
   [[nodiscard]] const State& state() const { return state_; }
+  /// One with the same settings that has seen no sample.
+  [[nodiscard]] OdometryWatch anew() const { return {config_, {}}; }
 
  private:
   [[nodiscard]] Pose3 in_odom(const Pose3& T_fed_body) const;

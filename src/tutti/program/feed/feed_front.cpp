@@ -47,7 +47,10 @@ Timestamp stamp_of(const FeedInput& input) {
 }
 
 FeedFront::FeedFront(FeedState robot, const Limits& limits)
-    : limits_(limits), robot_(std::move(robot)), localiser_(robot_.chain.robot) {
+    : limits_(limits),
+      robot_(std::move(robot)),
+      gate_(robot_.chain.robot, robot_.newest ? std::optional(robot_.newest->stamp) : std::nullopt),
+      localiser_(robot_.chain.robot) {
   if (robot_.newest) stored_ = robot_.newest->stamp;
   localiser_.correct(robot_.watch, robot_.covariance);
 }
@@ -55,18 +58,47 @@ FeedFront::FeedFront(FeedState robot, const Limits& limits)
 Status FeedFront::add_odometry(const node::OdometrySample& sample) {
   const std::scoped_lock lock(mutex_);
   if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  const auto has_jumped = localiser_.add(sample);
-  if (!has_jumped) return tl::unexpected(has_jumped.error());
-  if (*has_jumped) jumps_.insert(sample.stamp);
-  ended_ = false;
-  push(sample);
-  release_images();
+  auto passed = gate_.take(sample);
+  if (!passed) return tl::unexpected(passed.error());
+  if (!passed->why_anew.empty()) begin_anew(std::move(passed->why_anew));
+  if (passed->waited)
+    if (Status ok = take(*passed->waited); !ok) return ok;
+  if (Status ok = take(sample); !ok) return ok;
   fed_.notify_one();
   if (waiting() > limits_.inputs) {
     note_behind(sample.stamp);
     thin();
   }
   return {};
+}
+
+Status FeedFront::take(const node::OdometrySample& sample) {
+  const auto has_jumped = localiser_.add(sample);
+  if (!has_jumped) return tl::unexpected(has_jumped.error());
+  if (*has_jumped) jumps_.insert(sample.stamp);
+  ended_ = false;
+  push(sample);
+  release_images();
+  return {};
+}
+
+/// Until the robot has begun its new session, nothing that it says is about what is fed now.
+void FeedFront::begin_anew(std::string why) {
+  release_images(true);
+  push(FeedAnew{std::move(why)});
+  ++anew_;
+  newest_images_.reset();
+  newest_fix_.reset();
+  imu_.clear();
+  FeedState anew;
+  anew.chain = robot_.chain;
+  anew.name = robot_.name;
+  anew.next_keyframe = robot_.next_keyframe;
+  anew.next_keyframe.last.reset();
+  anew.watch = robot_.watch.anew();
+  robot_ = std::move(anew);
+  localiser_ = Localiser(robot_.chain.robot);
+  localiser_.correct(robot_.watch, robot_.covariance);
 }
 
 Status FeedFront::add_scan(const Scan& scan) {
@@ -121,8 +153,14 @@ void FeedFront::push(FeedInput input) {
 /// The way evenly, as fine as it can be, until there is room for a while. Scans are half of what waits at most, and
 /// behind the last of them all is odometry.
 void FeedFront::thin() {
-  const auto first = std::find_if(inputs_.begin() + static_cast<std::ptrdiff_t>(taken_), inputs_.end(), is_odometry);
-  const double span_s = localiser_.newest()->stamp - stamp_of(*first);
+  double span_s = 0.0;
+  std::optional<Timestamp> first;  // of one session
+  for (std::size_t i = taken_; i < inputs_.size(); ++i) {
+    if (std::holds_alternative<FeedAnew>(inputs_[i])) first.reset();
+    if (!is_odometry(inputs_[i])) continue;
+    if (!first) first = stamp_of(inputs_[i]);
+    span_s = std::max(span_s, stamp_of(inputs_[i]) - *first);
+  }
   finest_s_ = std::max(2.0 * finest_s_, 2.0 * span_s / static_cast<double>(limits_.inputs));
   while (waiting() > limits_.inputs / 4 * 3 && finest_s_ < 4.0 * span_s) {
     std::deque<FeedInput> all = std::exchange(inputs_, {});
@@ -148,6 +186,10 @@ FeedState FeedFront::state() const {
     out.wants_scan =
         robot_.wants_scan || robot_.next_keyframe.is_due({out.newest->stamp, localiser_.watch().T_odom_body()});
   if (!trouble_.empty()) out.alerts.push_back({trouble_, trouble_since_, trouble_since_, trouble_since_});
+  if (const std::string refused = gate_.trouble(); !refused.empty()) {
+    const Timestamp since = localiser_.newest() ? localiser_.newest()->stamp : Timestamp{};
+    out.alerts.push_back({refused, since, since, since});
+  }
   if (scans_left_out_ + samples_joined_ + images_left_out_ > 0) {
     const std::string text = fmt::format("the map is behind what is fed, localisation goes on: {}are left out{}",
                                          images_left_out_ == 0  ? "scans "
@@ -221,6 +263,10 @@ void FeedFront::note_stored() {
     if (!std::holds_alternative<std::shared_ptr<const FeedSensors>>(inputs_.front()))
       ended_ = std::holds_alternative<FeedEnded>(inputs_.front());
     if (const auto* sample = std::get_if<node::OdometrySample>(&inputs_.front())) stored_ = sample->stamp;
+    if (std::holds_alternative<FeedAnew>(inputs_.front())) {
+      stored_.reset();
+      --anew_;
+    }
     scan_bytes_ -= scan_bytes_of(inputs_.front());
     image_bytes_ -= image_bytes_of(inputs_.front());
     inputs_.pop_front();
@@ -236,8 +282,11 @@ void FeedFront::begin_again(const std::optional<Timestamp>& stored) {
   if (std::exchange(in_hand_, false)) leave_out_what_fails();
   taken_ = 0;
   stored_ = stored;
-  std::erase_if(inputs_,
-                [&](const FeedInput& input) { return is_odometry(input) && stored && stamp_of(input) <= *stored; });
+  bool is_of_robot = true;  // and not of the session that it begins next
+  std::erase_if(inputs_, [&](const FeedInput& input) {
+    is_of_robot = is_of_robot && !std::holds_alternative<FeedAnew>(input);
+    return is_of_robot && is_odometry(input) && stored && stamp_of(input) <= *stored;
+  });
 }
 
 /// The last one taken made the robot go.
@@ -261,6 +310,7 @@ void FeedFront::refuse(Timestamp stamp, std::string why) {
 
 void FeedFront::publish(FeedState robot) {
   const std::scoped_lock lock(mutex_);
+  if (anew_ > 0) return;
   const bool is_same = robot.chain == robot_.chain;
   // One that was made again says nothing until it has caught up.
   if (is_same && robot_.newest && (!robot.newest || robot.newest->stamp < robot_.newest->stamp)) return;
@@ -272,6 +322,11 @@ void FeedFront::say_trouble(std::string trouble) {
   const std::scoped_lock lock(mutex_);
   if (trouble_.empty() && localiser_.newest()) trouble_since_ = localiser_.newest()->stamp;
   trouble_ = std::move(trouble);
+}
+
+std::string FeedFront::odometry_trouble() const {
+  const std::scoped_lock lock(mutex_);
+  return gate_.trouble();
 }
 
 void FeedFront::close() {

@@ -13,15 +13,20 @@
 #include <variant>
 #include <vector>
 
+#include "tutti/node/odometry_gate.hpp"
 #include "tutti/program/feed/feed_target.hpp"
 #include "tutti/program/feed/localiser.hpp"
 
 namespace tutti::program {
 
 struct FeedEnded {};
+/// The clock of odometry began anew: later inputs are of a new session.
+struct FeedAnew {
+  std::string why;
+};
 /// An input for the robot. Sensors mean that later inputs are of these sensors.
-using FeedInput =
-    std::variant<node::OdometrySample, Scan, FeedEnded, FedImages, std::shared_ptr<const FeedSensors>, PositionFix>;
+using FeedInput = std::variant<node::OdometrySample, Scan, FeedEnded, FedImages, std::shared_ptr<const FeedSensors>,
+                               PositionFix, FeedAnew>;
 
 /// The input's stamp; zero for kinds that have none.
 Timestamp stamp_of(const FeedInput& input);
@@ -88,6 +93,8 @@ class FeedFront final : public FeedTarget {
   static constexpr std::size_t kWays = 4;
   /// Shows `trouble` to clients as an alert until it is called with an empty text.
   void say_trouble(std::string trouble);
+  /// What is wrong with the odometry that comes, for people; empty when nothing is.
+  [[nodiscard]] std::string odometry_trouble() const;
   /// From now on everything from clients is refused, because the program ends.
   void close();
   /// The client has ended the recording, its end is stored, and nothing was fed since.
@@ -111,6 +118,8 @@ class FeedFront final : public FeedTarget {
 
  private:
   [[nodiscard]] std::size_t waiting() const { return inputs_.size() - taken_; }
+  Status take(const node::OdometrySample& sample);
+  void begin_anew(std::string why);
   void push(FeedInput input);
   void note_behind(Timestamp stamp);
   [[nodiscard]] bool is_ahead(Timestamp stamp) const;
@@ -130,10 +139,12 @@ class FeedFront final : public FeedTarget {
   const Limits limits_;
   mutable std::mutex mutex_;
   std::condition_variable fed_;
-  FeedState robot_;  // as it was published
+  FeedState robot_;          // as it was published
+  node::OdometryGate gate_;  // before localiser_
   Localiser localiser_;
   std::deque<FeedInput> inputs_;
   std::size_t taken_ = 0;       // of them, from the front
+  std::size_t anew_ = 0;        // of them, how many FeedAnew
   std::size_t scan_bytes_ = 0;  // in them
   std::shared_ptr<const FeedSensors> sensors_ = std::make_shared<const FeedSensors>();
   std::deque<FedImages> images_;  // that wait for odometry or the IMU

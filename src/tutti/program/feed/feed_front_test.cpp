@@ -26,7 +26,8 @@ Scan scan(std::size_t i, std::size_t points = 10) {
   return {kOdometry[i].stamp, std::make_shared<const PointCloud>(std::move(cloud)), {}};
 }
 
-Status give(FeedTarget& robot, const FeedInput& input) {
+Status give(test::NodeTarget& robot, const FeedInput& input) {
+  if (const auto* anew = std::get_if<FeedAnew>(&input)) return robot.begin_session(anew->why);
   if (const auto* odometry = std::get_if<node::OdometrySample>(&input)) return robot.add_odometry(*odometry);
   if (const auto* of = std::get_if<Scan>(&input)) return robot.add_scan(*of);
   return robot.finish();

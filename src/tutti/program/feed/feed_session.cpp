@@ -142,7 +142,10 @@ void FeedSession::greet(Client client, const FeedHello& hello) {
 void FeedSession::take_odometry(Client client, const node::OdometrySample& sample) {
   Connection& connection = clients_.at(client);
   if (connection.ended) return refuse(client, sample.stamp, "the recording has ended");
-  if (const Status ok = target_.add_odometry(sample); !ok) return refuse(client, sample.stamp, ok.error().message);
+  if (const Status ok = target_.add_odometry(sample); !ok) {
+    refuse(client, sample.stamp, ok.error().message);
+    return refresh();  // many in a row are an alert
+  }
   const FeedState state = target_.state();
   if (!(state.T_odom_fed == T_odom_fed_)) {
     const Pose3 before = std::exchange(T_odom_fed_, state.T_odom_fed);

@@ -60,7 +60,8 @@ class Client {
   std::string bytes_;
 };
 
-Status give(FeedTarget& robot, const FeedInput& input) {
+Status give(test::NodeTarget& robot, const FeedInput& input) {
+  if (const auto* anew = std::get_if<FeedAnew>(&input)) return robot.begin_session(anew->why);
   if (const auto* odometry = std::get_if<node::OdometrySample>(&input)) return robot.add_odometry(*odometry);
   if (const auto* of = std::get_if<Scan>(&input)) return robot.add_scan(*of);
   return robot.finish();
@@ -108,6 +109,62 @@ TEST(LiveFeed, AnswersWhileTheRobotIsStuck) {
   EXPECT_EQ((*feed)->take_thrown(), "");
   feed->reset();
   EXPECT_NE(access(path.c_str(), F_OK), 0);
+}
+
+/// Through the socket: one stamp in the future costs that one sample, and a clock that goes back a second or two.
+TEST(LiveFeed, OutlivesStampsInTheFutureAndAClockThatGoesBack) {
+  for (const double rate : {1.0, 200.0}) {
+    const Trajectory way = robot::test::drifting_odometry(1700);
+    const std::string path = testing::TempDir() + "live_feed_clock_" + std::to_string(getpid());
+    test::NodeTarget robot;
+    auto feed = LiveFeed::open(path, {}, robot.state());
+    ASSERT_TRUE(feed.has_value()) << feed.error().message;
+    std::jthread behind([&](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        const auto input = (*feed)->front().take(0.01);
+        if (!input) continue;
+        EXPECT_TRUE(give(robot, *input));
+        (*feed)->front().note_heard();
+        (*feed)->front().note_stored();
+        (*feed)->front().publish(robot.state());
+      }
+    });
+    Client client(path);
+    client.say(test::hello());
+    EXPECT_TRUE(client.hear().has_welcome());
+    std::string alerts;
+    std::size_t next = 0;
+    const auto is_taken = [&](Timestamp stamp) {
+      client.say(test::odometry({stamp, way[next++].pose}, robot::test::kStepCovariance));
+      while (true) {
+        const v1::Feed said = client.hear();
+        for (const auto& alert : said.situation().alert()) alerts += alert.text() + "\n";
+        if (said.has_correction() || said.has_refused()) return said.has_correction();
+      }
+    };
+    const Timestamp start = way[0].stamp;
+    const auto seconds = [&](double from_s, double for_s) {
+      int taken = 0;
+      for (int i = 0; i < for_s * rate; ++i) taken += is_taken(start + (from_s + i / rate)) ? 1 : 0;
+      return taken / rate;
+    };
+    EXPECT_EQ(seconds(0.0, 2.0), 2.0);
+    EXPECT_FALSE(is_taken(start + 86'400.0));
+    EXPECT_EQ(seconds(2.0, 1.0), 1.0);
+    EXPECT_EQ(alerts, "");
+    EXPECT_NEAR(seconds(-86'400.0, 5.0), 3.0, 1.0 + 1 / rate);
+    EXPECT_NE(alerts.find("odometry samples are refused"), std::string::npos) << alerts;
+    client.say(test::end_of_recording());
+    while (!client.hear().has_ended()) continue;
+    behind.request_stop();
+    behind.join();
+    EXPECT_EQ(robot.node().agent().chain().session, 8U);
+    EXPECT_EQ((*feed)->front().state().chain.session, 8U);
+    EXPECT_EQ(robot.node().agent().newest_sample(), (*feed)->front().state().newest->stamp);
+    EXPECT_EQ((*feed)->front().odometry_trouble(), "");
+    EXPECT_EQ((*feed)->front().state().alerts.size(), 1U);
+    EXPECT_NE((*feed)->front().state().alerts.at(0).text.find("session 8 has begun"), std::string::npos);
+  }
 }
 
 /// The way that a robot corrects comes to who asked for it, to the bit.

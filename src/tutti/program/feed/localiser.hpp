@@ -15,8 +15,8 @@
 namespace tutti::program {
 
 /// Where a robot is while its agent is samples behind: the pose and its uncertainty at the agent's newest sample,
-/// carried on by the odometry since. Accepts and refuses samples, and detects jumps of odometry, exactly as
-/// RobotAgent::add_odometry() does.
+/// carried on by the odometry since. Takes samples that passed an OdometryGate, and detects jumps of odometry, exactly
+/// as RobotAgent::add_odometry() does.
 class Localiser {
  public:
   /// When the agent is further behind, the oldest steps are compounded to one.

@@ -23,6 +23,12 @@ void RobotView::note(const node::Event& event, const node::RobotNode& node) {
                                                missing->keyframes, missing->sensor == "scan" ? "a scan" : "images"),
                                    *newest, *newest, *newest};
   }
+  if (std::holds_alternative<node::RobotRefused>(event.what)) disputed_ = newest.value_or(Timestamp{});
+  if (const auto* begun = std::get_if<node::SessionBegun>(&event.what)) {
+    *this = RobotView(std::move(name_), std::move(names_));
+    begun_ = fmt::format("session {} has begun, a map of its own until places are seen again: {}", begun->session,
+                         begun->why);
+  }
   if (const auto* jumped = std::get_if<node::OdometryJumped>(&event.what))
     jump_ = {to_string(jumped->jump) + ": no body moves so, and only the map tells where the robot is", jumped->jump.to,
              jumped->jump.from, jumped->jump.to};
@@ -61,8 +67,13 @@ FeedState RobotView::state(const node::RobotNode& node) const {
                 .next_keyframe = agent.next_keyframe(),
                 .watch = agent.watch()};
   for (const auto& [sensor, alert] : missing_) out.alerts.push_back(alert);
+  if (const std::string dispute = node.dispute(); !dispute.empty())
+    out.alerts.push_back({dispute, disputed_, disputed_, disputed_});
   out.newest = agent.newest_fed();
-  if (jump_ && out.newest->stamp - jump_->until < kJumpAlert_s) out.alerts.push_back(*jump_);
+  if (!begun_.empty() && !agent.keyframes().empty())
+    if (const Timestamp since = agent.keyframes().front().stamp; out.newest->stamp - since < kJumpAlert_s)
+      out.alerts.push_back({begun_, since, since, since});
+  if (jump_ && out.newest && out.newest->stamp - jump_->until < kJumpAlert_s) out.alerts.push_back(*jump_);
   for (const robot::Whereabouts& other : agent.whereabouts()) {
     const auto name = names_.find(other.robot);
     out.team_mates.push_back({other.robot,

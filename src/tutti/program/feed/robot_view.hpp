@@ -31,6 +31,8 @@ class RobotView {
   std::vector<FeedAlert> alerts_;
   std::map<std::string, FeedAlert> missing_;  ///< By sensor.
   std::optional<FeedAlert> jump_;             ///< The latest jump of odometry.
+  Timestamp disputed_;                        ///< The newest sample when RobotNode::dispute() began.
+  std::string begun_;                         ///< Why the session has begun; empty: it is the first.
 };
 
 /// An error when the node refused the sample or scan that this step was about.

@@ -9,7 +9,7 @@
 namespace tutti::program {
 
 SmoothMap::Answer SmoothMap::step(const StampedPose& sample, const Pose3& target, const Matrix6d& covariance) {
-  const double dt_s = last_ ? sample.stamp - *last_ : 0.0;
+  const double dt_s = last_ ? std::max(0.0, sample.stamp - *last_) : 0.0;  // odometry's clock may begin anew
   last_ = sample.stamp;
   Answer out;
   const Pose3 body = T_map_odom_ * sample.pose, wanted = target * sample.pose;

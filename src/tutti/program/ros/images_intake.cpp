@@ -129,6 +129,10 @@ Status ImagesIntake::push(OneTopic& topic, const bags::RosHeader& header, Waitin
   waiting.stamp = header.stamp + config_.time_offset_s;
   if (Status ok = check_size(topic, waiting); !ok) return ok;
   if (Status ok = odometry_.check_stamp(waiting.stamp, topic.newest); !ok) return ok;
+  while (!topic.waiting.empty() && topic.waiting.back().stamp >= waiting.stamp) {
+    topic.bytes -= topic.waiting.back().image.bytes.size();
+    topic.waiting.pop_back();
+  }
   topic.newest = waiting.stamp;
   topic.bytes += waiting.image.bytes.size();
   topic.waiting.push_back(std::move(waiting));
@@ -144,6 +148,7 @@ Status ImagesIntake::add_imu(std::string_view cdr) {
   if (!sample) return tl::unexpected(sample.error());
   if (Status ok = odometry_.check_stamp(sample->stamp, newest_imu_); !ok) return ok;
   if (!imu_frame_) imu_frame_ = bags::frame_name(message->header.frame_id);
+  drop_from(sample->stamp, samples_, [](const ImuSample& waiting) { return waiting.stamp; });
   newest_imu_ = sample->stamp;
   samples_.push_back(*sample);
   if (samples_.size() > kMostSamples) samples_.pop_front();

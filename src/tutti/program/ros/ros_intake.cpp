@@ -26,6 +26,8 @@ Matrix6d unseen() {
 /// Names are anybody's, and go to a terminal.
 std::string plain(const std::string& name) { return plain_text(name, 80); }
 
+using Verdict = robot::StampWatch::Verdict;
+
 Status check_increases(Timestamp stamp, const std::optional<Timestamp>& before) {
   if (!before || stamp > *before) return {};
   return fail(ErrorCode::invalid, "stamp {} ns, expected after {} ns: two publishers, or a clock that began anew?",
@@ -36,6 +38,7 @@ Status check_increases(Timestamp stamp, const std::optional<Timestamp>& before) 
 
 void RosIntake::begin_behind(const std::optional<Timestamp>& newest) {
   known_ = newest;
+  if (!stamps_.newest()) stamps_ = robot::StampWatch(newest);
   unseen_ = newest && (!last_ || last_->stamp != *newest);
   if (newest) std::erase_if(samples_, [&](const StampedPose& sample) { return sample.stamp <= *newest; });
 }
@@ -65,14 +68,47 @@ Status RosIntake::add_sample(Timestamp stamp, const Pose3& T_odom_body, const st
     return fail(ErrorCode::invalid,
                 "frames '{}' -> '{}', expected '{}' -> '{}' as of the first message: two publishers?", plain(said.odom),
                 plain(said.body), plain(frames_->odom), plain(frames_->body));
-  if (known_ && stamp <= *known_) return {};
-  const bool is_said_again = !config_.odometry_frames.empty() && newest_ && stamp == *newest_;  // as many do on /tf
+  const std::optional<Timestamp> newest = stamps_.newest();
+  const bool is_said_again = !config_.odometry_frames.empty() && newest && stamp == *newest;  // as many do on /tf
   if (is_said_again) return {};
-  if (Status ok = check_increases(stamp, newest_); !ok) return ok;
-  newest_ = stamp;
-  samples_.push_back({stamp, T_odom_body});
-  ++counts_.odometry;
+  const StampedPose sample{stamp, T_odom_body};
+  switch (stamps_.take(stamp)) {
+    case Verdict::waits:
+    case Verdict::is_before:
+      refused_.push_back(sample);
+      if (refused_.size() > kMostRefused) refused_.pop_front();
+      if (known_ && newest == known_ && stamp <= *known_) return {};  // the robot has it
+      if (stamp > *newest)
+        return fail(ErrorCode::invalid, "stamp {} ns is {:.0f} s ahead of {} ns: it counts if the next one confirms it",
+                    stamp.ns, stamp - *newest, newest->ns);
+      return check_increases(stamp, newest);
+    case Verdict::confirms:
+      queue(refused_.back());
+      break;
+    case Verdict::begins_anew:
+      begin_anew();
+      break;
+    case Verdict::follows:
+      break;
+  }
+  refused_.clear();
+  queue(sample);
   return {};
+}
+
+void RosIntake::queue(const StampedPose& sample) {
+  samples_.push_back(sample);
+  ++counts_.odometry;
+}
+
+/// The robot judges as stamps_ does, and must see the same row of samples.
+void RosIntake::begin_anew() {
+  auto first = std::prev(refused_.end());
+  while (first != refused_.begin() && std::prev(first)->stamp < first->stamp) --first;
+  std::for_each(first, refused_.end(), [&](const StampedPose& sample) { queue(sample); });
+  known_.reset();
+  scans_.clear();
+  fixes_.clear();
 }
 
 Status RosIntake::add_tf(std::string_view cdr, bool is_static) {
@@ -102,11 +138,12 @@ Status RosIntake::take_transform(const bags::RosTransform& transform, bool is_st
 }
 
 Status RosIntake::check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const {
-  if (Status ok = check_increases(stamp, before); !ok) return ok;
-  if (newest_ && std::abs(stamp - *newest_) > kAnotherClock_s)
+  const std::optional<Timestamp>& newest = stamps_.newest();
+  if (newest && std::abs(stamp - *newest) > kAnotherClock_s)
     return fail(ErrorCode::invalid, "stamp {} ns is {:.1f} s from odometry's newest, {} ns: are they by another clock?",
-                stamp.ns, stamp - *newest_, newest_->ns);
-  return {};
+                stamp.ns, stamp - *newest, newest->ns);
+  const bool was_wrong = before && newest && *before - *newest > kAhead_s;
+  return was_wrong ? Status() : check_increases(stamp, before);
 }
 
 Status RosIntake::take_fix(std::string_view cdr) {
@@ -118,6 +155,7 @@ Status RosIntake::take_fix(std::string_view cdr) {
   if (!received) return tl::unexpected(received.error());
   if (!*received) return {};
   if (Status ok = check_stamp(stamp, newest_fix_); !ok) return ok;
+  drop_from(stamp, fixes_, [](const bags::ReceivedFix& waiting) { return waiting.fix.stamp; });
   if (fixes_.size() >= kMostFixes) fixes_.pop_front();  // odometry has ended
   newest_fix_ = stamp;
   fixes_.push_back(std::move(**received));
@@ -142,6 +180,7 @@ Status RosIntake::take_points(std::string_view cdr) {
     if (!ages) return tl::unexpected(ages.error());
     after_s = std::max(0.0, -double{std::ranges::min(*ages)});
   }
+  drop_from(stamp, scans_, [](const Waiting& waiting) { return waiting.stamp; });
   if (scans_.size() >= kMostScans) scans_.pop_front();  // odometry has ended
   newest_scan_ = stamp;
   scans_.push_back({stamp, stamp + after_s, message->header.frame_id, std::move(*cloud), std::move(*times)});
@@ -154,6 +193,11 @@ std::optional<node::OdometrySample> RosIntake::next_odometry(bool wait_for_scans
   const StampedPose sample = samples_.front();
   if (wait_for_scans && !(newest_scan_ && *newest_scan_ >= sample.stamp)) return std::nullopt;
   samples_.pop_front();
+  if (last_ && sample.stamp <= last_->stamp) {  // of a clock that began anew
+    last_.reset();
+    history_.clear();
+    has_whole_history_ = true;
+  }
   node::OdometrySample out{sample.stamp, sample.pose, Matrix6d::Zero()};
   if (last_) out.increment_covariance = robot::increment_covariances({*last_, sample}, config_.covariance).front();
   if (std::exchange(unseen_, false)) out.increment_covariance = unseen();

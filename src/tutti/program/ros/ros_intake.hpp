@@ -21,6 +21,7 @@
 #include "tutti/node/journal.hpp"
 #include "tutti/perception/lidar/scan_times.hpp"
 #include "tutti/robot/odometry_covariance.hpp"
+#include "tutti/robot/stamp_watch.hpp"
 
 namespace tutti::ros {
 
@@ -33,6 +34,11 @@ struct IntakeConfig {
                                                   ///< T_body_lidar, or else the body's origin.
 };
 
+/// Removes what waits and is not before `stamp` (RosIntake::check_stamp()).
+void drop_from(Timestamp stamp, auto& waiting, const auto& stamp_of) {
+  while (!waiting.empty() && stamp_of(waiting.back()) >= stamp) waiting.pop_back();
+}
+
 /// Frames of odometry, from its first message.
 struct OdometryFrames {
   std::string odom, body;
@@ -44,17 +50,20 @@ struct OdometryFrames {
 /// untrusted: an error says what is wrong with a message, which then has no effect.
 class RosIntake {
  public:
-  static constexpr double kHistory_s = 2.0;         ///< How long fed odometry is kept, to undistort sweeps.
-  static constexpr double kAnotherClock_s = 10.0;   ///< Scans and fixes farther than this from odometry are refused.
-  static constexpr std::size_t kMostScans = 40;     ///< Scans that wait for odometry; beyond it the oldest is dropped.
-  static constexpr std::size_t kMostFixes = 200;    ///< Fixes that wait for odometry; beyond it the oldest is dropped.
-  static constexpr std::size_t kMostFrames = 1000;  ///< Limit on the frames of /tf.
+  static constexpr double kHistory_s = 2.0;          ///< How long fed odometry is kept, to undistort sweeps.
+  static constexpr double kAnotherClock_s = 10.0;    ///< Scans and fixes farther than this from odometry are refused.
+  static constexpr std::size_t kMostScans = 40;      ///< Scans that wait for odometry; beyond it the oldest is dropped.
+  static constexpr std::size_t kMostFixes = 200;     ///< Fixes that wait for odometry; beyond it the oldest is dropped.
+  static constexpr std::size_t kMostRefused = 8000;  ///< Samples that are kept until it is known whether they count.
+  static constexpr std::size_t kMostFrames = 1000;   ///< Limit on the frames of /tf.
   explicit RosIntake(IntakeConfig config) : config_(std::move(config)) {}
 
-  /// The robot already has everything up to `newest` (FeedWelcome::newest): older samples are skipped, and the first
-  /// step after it gets a large covariance when nobody has observed the way there.
+  /// The robot already has everything up to `newest` (FeedWelcome::newest): samples that wait and are older are
+  /// dropped, and the first step after it gets a large covariance when nobody has observed the way there.
   void begin_behind(const std::optional<Timestamp>& newest);
 
+  /// Stamps are judged as by the robot (StampWatch): what it would refuse is refused here. Where the clock began anew,
+  /// what was refused of the new time is fed after all, so that the robot sees it, too.
   Status add_odometry(std::string_view cdr);
   Status add_points(std::string_view cdr);
   /// Adds a fix; ignores messages in which the receiver reports that it has none.
@@ -78,8 +87,10 @@ class RosIntake {
   /// T_body_frame by transforms that do not move; an error names those that are known.
   [[nodiscard]] Result<Pose3> pose_on_body(const std::string& frame) const;
   /// Fails for a stamp of a sensor's message that is not after `before`, the stamp of the message before, or that is by
-  /// another clock than odometry's.
+  /// another clock than odometry's. A `before` that is far ahead of odometry does not count: it was wrong itself, and
+  /// what waits and is not before `stamp` is to be dropped.
   [[nodiscard]] Status check_stamp(Timestamp stamp, const std::optional<Timestamp>& before) const;
+  static constexpr double kAhead_s = 1.0;  ///< What is farther ahead of odometry is "far ahead" for check_stamp().
   /// True for stamps from before the first odometry.
   [[nodiscard]] bool is_before_all(Timestamp stamp) const {
     return has_whole_history_ && !history_.empty() && stamp < history_.front().stamp;
@@ -98,6 +109,8 @@ class RosIntake {
 
  private:
   Status add_sample(Timestamp stamp, const Pose3& T_odom_body, const std::string& odom, const std::string& body);
+  void queue(const StampedPose& sample);
+  void begin_anew();
   Status take_odometry(std::string_view cdr);
   Status take_points(std::string_view cdr);
   Status take_fix(std::string_view cdr);
@@ -118,12 +131,14 @@ class RosIntake {
   std::optional<OdometryFrames> frames_;
   bags::TransformTree tree_;
   std::set<std::string> known_frames_;
+  robot::StampWatch stamps_;         ///< Of odometry.
   std::deque<StampedPose> samples_;  ///< Samples that are not fed yet.
+  std::deque<StampedPose> refused_;  ///< The last ones in a row that were refused for their stamps.
   Trajectory history_;               ///< Samples that were fed, over the last kHistory_s.
   bool has_whole_history_ = true;    ///< history_ begins with the very first sample.
   std::deque<Waiting> scans_;
   std::deque<bags::ReceivedFix> fixes_;
-  std::optional<Timestamp> newest_, newest_scan_, newest_fix_, known_;
+  std::optional<Timestamp> newest_scan_, newest_fix_, known_;
   std::optional<StampedPose> last_;  ///< The sample fed last.
   bool unseen_ = false;              ///< Nobody has observed the way to the next sample.
   bool is_unsure_ = false;           ///< A fix did not say how sure it is.

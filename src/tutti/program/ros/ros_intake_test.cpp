@@ -6,6 +6,7 @@
 #include <random>
 
 #include "support/program/ros/messages.hpp"
+#include "tutti/node/odometry_gate.hpp"
 
 namespace tutti::ros {
 namespace ros_intake_test {
@@ -190,6 +191,59 @@ TEST(RosIntake, WhatTheRobotHasIsPassedOverAndTheWaySinceIsUnseen) {
   intake.begin_behind(Timestamp{kStart + 3 * kPeriod});  // the same connection's end and another one's begin
   ASSERT_TRUE(intake.add_odometry(odometry(kStart + 4 * kPeriod)));
   EXPECT_LT(feed(intake).samples.at(0).increment_covariance(0, 0), 0.01);
+}
+
+TEST(RosIntake, OneStampInTheFutureShutsOutNothing) {
+  constexpr std::int64_t kHour = 3'600'000'000'000;
+  RosIntake intake({});
+  ASSERT_TRUE(intake.add_points(points(kStart + kHour, kAtOnce)));  // nobody can know that it is wrong
+  ASSERT_TRUE(intake.add_fix(fix(kStart + kHour)));
+  ASSERT_TRUE(intake.add_odometry(odometry(kStart)));
+  EXPECT_NE(why(intake.add_odometry(odometry(kStart + kHour))).find("3600 s ahead"), std::string::npos);
+  std::size_t scans = 0, fixes = 0, samples = 0;
+  for (int i = 1; i < 20; ++i) {
+    ASSERT_TRUE(intake.add_points(points(kStart + i * kPeriod, kAtOnce)));
+    if (i == 5) {
+      ASSERT_TRUE(intake.add_points(points(kStart + i * kPeriod + 5'000'000'000, kAtOnce)));
+    }
+    ASSERT_TRUE(intake.add_fix(fix(kStart + i * kPeriod)));
+    ASSERT_TRUE(intake.add_odometry(odometry(kStart + i * kPeriod)));
+    const Fed fed = feed(intake);
+    samples += fed.samples.size();
+    scans += fed.scans.size();
+    while (intake.next_fix()) ++fixes;
+  }
+  EXPECT_EQ(samples, 20U);
+  EXPECT_EQ(scans, 19U);
+  EXPECT_EQ(fixes, 19U);
+}
+
+// Also after the robot was started again: it knows of stamps from before.
+TEST(RosIntake, AClockThatGoesBackIsFedAsTheRobotIsToSeeIt) {
+  for (const bool is_new : {false, true}) {
+    RosIntake intake({});
+    if (is_new) intake.begin_behind(Timestamp{kStart});
+    EXPECT_TRUE(intake.add_odometry(odometry(kStart)));
+    feed(intake);
+    node::OdometryGate robot(RobotId{1}, Timestamp{kStart});
+    std::size_t fed = 0, taken = 0, scans = 0, anew = 0;
+    for (int i = 0; i < 60; ++i) {
+      static_cast<void>(intake.add_odometry(odometry(i * kPeriod, 0.1 * i)));
+      static_cast<void>(intake.add_points(points(i * kPeriod, kAtOnce)));
+      const Fed now = feed(intake);
+      for (const node::OdometrySample& sample : now.samples) {
+        const auto passed = robot.take(sample);
+        taken += passed ? 1 : 0;
+        anew += passed && !passed->why_anew.empty() ? 1 : 0;
+      }
+      fed += now.samples.size();
+      scans += now.scans.size();
+    }
+    EXPECT_EQ(fed, 60U);
+    EXPECT_EQ(anew, 1U);
+    EXPECT_GT(taken, 35U);
+    EXPECT_GT(scans, 35U);
+  }
 }
 
 TEST(RosIntake, WhatIsWrongIsSaid) {

@@ -14,6 +14,8 @@ namespace tutti::ros {
 class Unstored {
  public:
   void add(Timestamp stamp, std::size_t bytes) {
+    constexpr double kAnotherClock_s = 10.0;  // scans and images come that late at most
+    if (!inputs_.empty() && inputs_.back().first - stamp > kAnotherClock_s) *this = {};  // the clock began anew
     inputs_.emplace_back(stamp, bytes);
     bytes_ += bytes;
   }

@@ -27,6 +27,7 @@ class NodeTarget final : public FeedTarget {
   }
   Status add_scan(const Scan& scan) override { return carry_out(node_->add_scan(scan, {})); }
   Status add_fix(const PositionFix& fix) override { return carry_out(node_->add_fix(fix, {})); }
+  Status begin_session(const std::string& why) { return carry_out(node_->begin_session(why, {})); }
   Status finish() override {
     ended_ = true;
     return carry_out(node_->finish({}));
