@@ -10,7 +10,7 @@ import sys
 
 # (what an #include looks like, which files may have it, in words)
 CONFINED = [
-    (r"yaml-cpp/", r"base/config_io\.cpp$", "base/config_io.cpp"),
+    (r"yaml-cpp/", r"base/config_yaml\.cpp$", "base/config_yaml.cpp"),
     (r"google/protobuf|.*\.pb\.h$", r"(tests/support/)?(wire|bus|program/feed)/", "wire/, bus/ and program/feed/"),
     (r"ceres/", r"(estimation/bundle/.*\.cpp|.*_test\.cpp)$", "estimation/bundle/*.cpp and tests"),
     (r"Spectra/", r"spectral/.*\.cpp$", "spectral/*.cpp"),

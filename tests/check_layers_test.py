@@ -24,7 +24,7 @@ class CheckLayers(unittest.TestCase):
     def test_clean_files_pass(self):
         code, out = check({
             "base/a.cpp": '#include <cstdio>\n#include "tutti/base/a.hpp"\nsnprintf(b, 3, "");\ndoor.exit();\n',
-            "base/config_io.cpp": "#include <yaml-cpp/yaml.h>\n",
+            "base/config_yaml.cpp": "#include <yaml-cpp/yaml.h>\n",
             "base/b.cpp": '// std::cout\nauto s = "std::cout";\n/* abort()\n exit(1); */\n',
             "base/a_test.cpp": "#include <ceres/ceres.h>\nstd::cout << 1;\n",
             "perception/lidar/a.cpp": '#include "tutti/geometry/a.hpp"\n#include <nanoflann.hpp>\n',

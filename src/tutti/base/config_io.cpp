@@ -1,117 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tutti/base/config_io.hpp"
-
-#include <yaml-cpp/eventhandler.h>
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numeric>
-#include <set>
-#include <sstream>
 
-#include "tutti/base/file.hpp"
+#include "tutti/base/config_io.hpp"
 
 namespace tutti {
 namespace {
-
-// Aliases can make a small file unfold without end ("&a [*a]", "billion laughs"); no honest settings come near these.
-constexpr int kMaxDepth = 32;
-constexpr int kMaxNodes = 200'000;
-
-/// What is wrong with a document's content, with the line that says it.
-struct ContentError {
-  int line;
-  std::string text;
-};
-
-/// Hears of a document's content and keeps nothing.
-class Deaf final : public YAML::EventHandler {
- public:
-  void OnDocumentStart(const YAML::Mark&) override {}
-  void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
-  void OnMapEnd() override {}
-};
-
-/// YAML::LoadAll() finds documents without end, and memory for them, where a token between documents belongs to none
-/// (a ',' at the beginning): it is not asked. Two stand for more.
-int count_documents(const std::string& text) {
-  std::istringstream stream(text);
-  YAML::Parser parser(stream);
-  Deaf nobody;
-  if (!parser.HandleNextDocument(nobody)) return 0;
-  return parser.HandleNextDocument(nobody) ? 2 : 1;
-}
-
-class YamlReader {
- public:
-  ConfigNode read(const YAML::Node& yaml, int line, int depth = 0) {
-    if (depth > kMaxDepth) throw ContentError{line, fmt::format("nested more than {} deep", kMaxDepth)};
-    if (++nodes_ > kMaxNodes) throw ContentError{line, fmt::format("more than {} values", kMaxNodes)};
-    ConfigNode out{.line = line};
-    if (yaml.IsScalar()) {
-      out.kind = ConfigNode::Kind::scalar;
-      out.scalar = yaml.Scalar();
-    } else if (yaml.IsSequence()) {
-      out.kind = ConfigNode::Kind::list;
-      for (const auto& element : yaml) out.list.push_back(read(element, line_of(element, line), depth + 1));
-    } else if (yaml.IsMap()) {
-      read_map(yaml, depth, out);
-    }
-    return out;
-  }
-  static int line_of(const YAML::Node& yaml, int fallback) {
-    return yaml.Mark().is_null() ? fallback : yaml.Mark().line + 1;
-  }
-
- private:
-  void read_map(const YAML::Node& yaml, int depth, ConfigNode& out) {
-    out.kind = ConfigNode::Kind::map;
-    std::set<std::string> seen;
-    for (const auto& entry : yaml) {
-      const int line = line_of(entry.first, out.line);
-      if (!entry.first.IsScalar()) throw ContentError{line, "a key must be plain text"};
-      const std::string& key = entry.first.Scalar();
-      if (!seen.insert(key).second) throw ContentError{line, fmt::format("key '{}' appears twice", key)};
-      out.map.emplace_back(key, read(entry.second, line, depth + 1));
-    }
-  }
-  int nodes_ = 0;
-};
-
-void emit(YAML::Emitter& out, const ConfigNode& node) {
-  switch (node.kind) {
-    case ConfigNode::Kind::null:
-      out << YAML::Null;
-      break;
-    case ConfigNode::Kind::scalar:
-      out << node.scalar;
-      break;
-    case ConfigNode::Kind::list: {
-      const bool flat =
-          std::ranges::all_of(node.list, [](const auto& e) { return e.kind == ConfigNode::Kind::scalar; });
-      out << (flat ? YAML::Flow : YAML::Block) << YAML::BeginSeq;
-      for (const auto& element : node.list) emit(out, element);
-      out << YAML::EndSeq;
-      break;
-    }
-    case ConfigNode::Kind::map:
-      out << (node.map.empty() ? YAML::Flow : YAML::Block) << YAML::BeginMap;
-      for (const auto& [key, value] : node.map) {
-        out << YAML::Key << key << YAML::Value;
-        emit(out, value);
-      }
-      out << YAML::EndMap;
-      break;
-  }
-}
 
 void forget_lines(ConfigNode& node) {
   node.line = 0;
@@ -207,30 +103,6 @@ std::string print_number(Number value) {
 const ConfigNode* ConfigNode::find(std::string_view key) const {
   const auto found = std::ranges::find(map, key, &std::pair<std::string, ConfigNode>::first);
   return found == map.end() ? nullptr : &found->second;
-}
-
-Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name) {
-  try {
-    const int documents = count_documents(text);
-    if (documents > 1) return fail(ErrorCode::parse, "{}: several YAML documents, expected one", name);
-    if (documents == 0) return ConfigNode{};
-    const YAML::Node document = YAML::Load(text);
-    return YamlReader{}.read(document, YamlReader::line_of(document, 1));
-  } catch (const ContentError& error) {
-    return fail(ErrorCode::parse, "{}:{}: {}", name, error.line, error.text);
-  } catch (const YAML::Exception& error) {
-    return fail(ErrorCode::parse, "{}:{}: {}", name, error.mark.line + 1, error.msg);
-  }
-}
-
-Result<ConfigNode> load_yaml(const std::string& path) {
-  return read_file(path).and_then([&](const std::string& text) { return parse_yaml(text, path); });
-}
-
-std::string to_yaml(const ConfigNode& node) {
-  YAML::Emitter out;
-  emit(out, node);
-  return std::string(out.c_str()) + "\n";
 }
 
 Status apply_override(ConfigNode& root, const std::string& assignment) {
