@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "tutti/base/config_io.hpp"
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numeric>
 
-#include "tutti/base/config_io.hpp"
-
 namespace tutti {
 namespace {
+
+constexpr std::size_t kMostShown = 200;  // letters of a value
+constexpr std::size_t kMostProblems = 50;
 
 void forget_lines(ConfigNode& node) {
   node.line = 0;
@@ -167,7 +170,8 @@ std::string type_name(const std::string&) { return "text"; }
 std::string show(const ConfigNode& node) {
   switch (node.kind) {
     case ConfigNode::Kind::scalar:
-      return fmt::format("'{}'", node.scalar);
+      return node.scalar.size() > kMostShown ? fmt::format("'{:.{}}..'", node.scalar, kMostShown)
+                                             : fmt::format("'{}'", node.scalar);
     case ConfigNode::Kind::list:
       return "a list";
     case ConfigNode::Kind::map:
@@ -209,6 +213,10 @@ void complain_of_unknown(Findings& findings, const std::string& path, const Find
     complain(findings, *node, path, "expected a map of settings");
   for (const auto& [key, value] : node->map) {
     if (std::ranges::find(known, key) != known.end()) continue;
+    if (findings.problems.size() >= kMostProblems || key.size() > kMostShown) {
+      complain(findings, value, path, fmt::format("unknown key '{:.80}'", key));
+      continue;
+    }
     const auto nearest = std::ranges::min_element(known, {}, [&key](const auto& k) { return edit_distance(key, k); });
     const bool close =
         nearest != known.end() && edit_distance(key, *nearest) <= std::max<std::size_t>(2, key.size() / 2);
@@ -230,7 +238,10 @@ void complain(Findings& findings, const ConfigNode& node, const std::string& pat
 Status to_status(const std::string& name, const std::vector<std::string>& problems) {
   if (problems.empty()) return {};
   std::string message;
-  for (const auto& problem : problems) message += (message.empty() ? "" : "\n") + name + problem;
+  for (std::size_t i = 0; i < std::min(problems.size(), kMostProblems); ++i)
+    message += (message.empty() ? "" : "\n") + name + problems[i];
+  if (problems.size() > kMostProblems)
+    message += fmt::format("\n{}: {} more problems", name, problems.size() - kMostProblems);
   return fail(ErrorCode::configuration, "{}", message);
 }
 

@@ -23,18 +23,28 @@ struct ContentError {
   std::string text;
 };
 
-/// Hears of a document's content and keeps nothing.
-class Deaf final : public YAML::EventHandler {
+/// Hears of a document's content, counts it and keeps nothing. Keys count, too.
+class Counter final : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnNull(const YAML::Mark& at, YAML::anchor_t) override { count(at); }
+  void OnAlias(const YAML::Mark& at, YAML::anchor_t) override { count(at); }
+  void OnScalar(const YAML::Mark& at, const std::string&, YAML::anchor_t, const std::string&) override { count(at); }
+  void OnSequenceStart(const YAML::Mark& at, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    count(at);
+  }
   void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapStart(const YAML::Mark& at, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    count(at);
+  }
   void OnMapEnd() override {}
+
+ private:
+  void count(const YAML::Mark& at) {
+    if (++nodes_ > 2 * kMaxNodes) throw ContentError{at.line + 1, fmt::format("more than {} values", kMaxNodes)};
+  }
+  int nodes_ = 0;
 };
 
 /// YAML::LoadAll() finds documents without end, and memory for them, where a token between documents belongs to none
@@ -42,9 +52,9 @@ class Deaf final : public YAML::EventHandler {
 int count_documents(const std::string& text) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
-  Deaf nobody;
-  if (!parser.HandleNextDocument(nobody)) return 0;
-  return parser.HandleNextDocument(nobody) ? 2 : 1;
+  Counter counter;
+  if (!parser.HandleNextDocument(counter)) return 0;
+  return parser.HandleNextDocument(counter) ? 2 : 1;
 }
 
 class YamlReader {
@@ -55,7 +65,7 @@ class YamlReader {
     ConfigNode out{.line = line};
     if (yaml.IsScalar()) {
       out.kind = ConfigNode::Kind::scalar;
-      out.scalar = yaml.Scalar();
+      out.scalar = counted(yaml.Scalar(), line);
     } else if (yaml.IsSequence()) {
       out.kind = ConfigNode::Kind::list;
       for (const auto& element : yaml) out.list.push_back(read(element, line_of(element, line), depth + 1));
@@ -75,12 +85,18 @@ class YamlReader {
     for (const auto& entry : yaml) {
       const int line = line_of(entry.first, out.line);
       if (!entry.first.IsScalar()) throw ContentError{line, "a key must be plain text"};
-      const std::string& key = entry.first.Scalar();
-      if (!seen.insert(key).second) throw ContentError{line, fmt::format("key '{}' appears twice", key)};
+      const std::string& key = counted(entry.first.Scalar(), line);
+      if (!seen.insert(key).second) throw ContentError{line, fmt::format("key '{:.80}' appears twice", key)};
       out.map.emplace_back(key, read(entry.second, line, depth + 1));
     }
   }
+  const std::string& counted(const std::string& text, int line) {
+    if ((bytes_ += text.size()) > kMaxYamlBytes)
+      throw ContentError{line, fmt::format("more than {} bytes of values", kMaxYamlBytes)};
+    return text;
+  }
   int nodes_ = 0;
+  std::size_t bytes_ = 0;  // aliases repeat them
 };
 
 void emit(YAML::Emitter& out, const ConfigNode& node) {
@@ -113,6 +129,8 @@ void emit(YAML::Emitter& out, const ConfigNode& node) {
 }  // namespace
 
 Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name) {
+  if (text.size() > kMaxYamlBytes)
+    return fail(ErrorCode::parse, "{}: {} bytes, expected at most {}", name, text.size(), kMaxYamlBytes);
   try {
     const int documents = count_documents(text);
     if (documents > 1) return fail(ErrorCode::parse, "{}: several YAML documents, expected one", name);
@@ -127,7 +145,7 @@ Result<ConfigNode> parse_yaml(const std::string& text, const std::string& name) 
 }
 
 Result<ConfigNode> load_yaml(const std::string& path) {
-  return read_file(path).and_then([&](const std::string& text) { return parse_yaml(text, path); });
+  return read_file(path, kMaxYamlBytes).and_then([&](const std::string& text) { return parse_yaml(text, path); });
 }
 
 std::string to_yaml(const ConfigNode& node) {
