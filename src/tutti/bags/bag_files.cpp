@@ -14,6 +14,7 @@
 #include "tutti/bags/mcap_reader.hpp"
 #include "tutti/bags/ros1_reader.hpp"
 #include "tutti/bags/rosbag2_metadata.hpp"
+#include "tutti/base/config_io.hpp"
 #include "tutti/base/file.hpp"
 
 namespace tutti::bags {
@@ -24,11 +25,12 @@ namespace fs = std::filesystem;
 constexpr std::string_view kSqliteMagic = "SQLite format 3";
 constexpr std::string_view kRos1Magic = "#ROSBAG V";
 
-std::string first_bytes(const std::string& path) {
+Result<std::string> first_bytes(const std::string& path) {
+  auto file = open_file(path);
+  if (!file) return tl::unexpected(file.error());
   std::array<char, 16> bytes{};
-  std::ifstream file(path, std::ios::binary);
-  file.read(bytes.data(), bytes.size());
-  return {bytes.data(), static_cast<std::size_t>(file.gcount())};
+  file->read(bytes.data(), bytes.size());
+  return std::string(bytes.data(), static_cast<std::size_t>(file->gcount()));
 }
 
 template <class Reader>
@@ -37,6 +39,7 @@ Result<std::unique_ptr<BagReader>> boxed(Result<Reader> reader) {
   return std::make_unique<Reader>(std::move(*reader));
 }
 
+/// The file's first bytes are `magic`.
 Result<std::unique_ptr<BagReader>> open_plain(const std::string& path, const std::string& magic) {
   if (magic.starts_with(kSqliteMagic)) return boxed(Db3Reader::open(path));
   if (magic.starts_with(kRos1Magic)) return boxed(Ros1Reader::open(path));
@@ -77,7 +80,7 @@ Result<std::unique_ptr<BagReader>> open_folder(const fs::path& folder) {
   std::optional<std::uint64_t> messages;
   const fs::path metadata_file = folder / "metadata.yaml";
   if (fs::exists(metadata_file, failure)) {
-    const auto text = read_file(metadata_file.string());
+    const auto text = read_file(metadata_file.string(), kMaxYamlBytes);
     const auto metadata = text ? parse_rosbag2_metadata(*text, metadata_file.string())
                                : Result<Rosbag2Metadata>(tl::unexpected(text.error()));
     if (metadata) {
@@ -134,17 +137,19 @@ Status BagFiles::enter(std::size_t file) {
   leave();
   file_ = file;
   const std::string& path = files_[file];
-  const std::string magic = first_bytes(path);
-  if (magic.starts_with(internal::kZstdMagic)) {
+  const auto magic = first_bytes(path);
+  if (!magic) return tl::unexpected(magic.error());
+  if (magic->starts_with(internal::kZstdMagic)) {
     const auto plain = internal::PackedFile::unpack(path);
     if (!plain) return tl::unexpected(plain.error());
     packed_.insert(file);
-    auto reader = open_plain(plain->path(), first_bytes(plain->path()));  // its name goes, the open file stays
+    auto reader = open_plain(plain->path(), first_bytes(plain->path()).value_or(""));  // its name goes, the open file
+                                                                                       // stays
     if (!reader) return in_context(path, reader.error());
     reader_ = std::move(*reader);
     return {};
   }
-  auto reader = open_plain(path, magic);
+  auto reader = open_plain(path, *magic);
   if (!reader) return tl::unexpected(reader.error());
   reader_ = std::move(*reader);
   return {};

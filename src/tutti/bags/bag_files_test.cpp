@@ -2,6 +2,7 @@
 #include "tutti/bags/bag_files.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include "support/bags/rosbag2_writer.hpp"
 #include "support/shared_data.hpp"
 #include "tutti/bags/bag_info.hpp"
+#include "tutti/bags/internal/packed_file.hpp"
 #include "tutti/bags/rosbag2_metadata.hpp"
 
 namespace tutti::bags {
@@ -180,6 +182,36 @@ TEST_F(BagFolders, OtherDatabasesAreRefused) {
   const auto bag = open_bag((folder_ / "other.db3").string());
   ASSERT_FALSE(bag);
   EXPECT_NE(bag.error().message.find("expected rosbag2's tables"), std::string::npos) << bag.error().message;
+}
+
+/// One that nobody writes to was waited for without end.
+TEST_F(BagFolders, PipesAreNotRead) {
+  const fs::path pipe = folder_ / "pipe.mcap";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(open_bag(pipe.string()).error().message, pipe.string() + ": is a pipe, expected a file");
+  write_bytes(folder_ / "bag.mcap", mcap_of(samples()));
+  write_bytes(folder_ / "metadata.yaml", metadata_of({"pipe.mcap", "bag.mcap"}, 23));
+  auto bag = open_bag(folder_.string());
+  ASSERT_TRUE(bag) << bag.error().message;
+  Read read = read_all(**bag);
+  EXPECT_EQ(read.messages.size(), 23U);
+  EXPECT_EQ(read.errors, (std::vector<std::string>{pipe.string() + ": is a pipe, expected a file"}));
+  fs::remove(folder_ / "metadata.yaml");
+  fs::rename(pipe, folder_ / "metadata.yaml");
+  bag = open_bag(folder_.string());
+  ASSERT_TRUE(bag) << bag.error().message;
+  read = read_all(**bag);
+  EXPECT_EQ(read.messages.size(), 23U);
+  EXPECT_TRUE(read.notes.at(0).starts_with((folder_ / "metadata.yaml").string() + ": is a pipe, expected a file"));
+}
+
+TEST_F(BagFolders, AFileDoesNotUnpackToAThousandTimesItsSize) {
+  const std::string path = (folder_ / "zeros.mcap.zstd").string();
+  write_bytes(path, packed(kMagic + std::string(10'000'000, '\0'), "zstd"));
+  const auto refused = internal::PackedFile::unpack(path, 1'000'000);
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().message.ends_with(" bytes unpack to more than 1000000")) << refused.error().message;
+  EXPECT_TRUE(internal::PackedFile::unpack(path));
 }
 
 TEST(Rosbag2Metadata, FilesStayInTheirFolder) {

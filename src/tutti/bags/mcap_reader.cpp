@@ -22,13 +22,8 @@ std::string name_of(std::uint8_t opcode) {
   return opcode < kNames.size() ? kNames[opcode] : fmt::format("of unknown kind {}", opcode);
 }
 
-/// Stamps up to the year 2262; MCAP's own would go on to 2554.
-Timestamp stamp(Cursor& cursor, std::string_view what) {
-  const auto ns = cursor.number<std::uint64_t>(what);
-  if (ns > static_cast<std::uint64_t>(kLastTimestamp.ns))
-    cursor.complain(fmt::format("{} is {} ns, expected at most {}", what, ns, kLastTimestamp.ns));
-  return Timestamp{static_cast<std::int64_t>(ns & static_cast<std::uint64_t>(kLastTimestamp.ns))};
-}
+/// MCAP's own would go on to the year 2554.
+constexpr auto kLastStamp = static_cast<std::uint64_t>(kLastTimestamp.ns);
 
 }  // namespace
 
@@ -154,7 +149,7 @@ Status McapReader::define_schema(const Record& record, std::string_view content)
   if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
   if (id == 0) return fail_at(record, ErrorCode::parse, "id 0, expected 1 or more");
   const auto [at, is_new] = schemas_.try_emplace(id, name);
-  if (!is_new && at->second != name)
+  if (!is_new && at->second != name && is_first_wrong(record, id))
     return fail_at(record, ErrorCode::invalid, "schema {} is '{:.80}', expected '{:.80}' as before", id, name,
                    at->second);
   return {};
@@ -171,42 +166,48 @@ Status McapReader::define_channel(const Record& record, std::string_view content
   if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
   if (schema != 0) {
     const auto type = schemas_.find(schema);
-    if (type == schemas_.end())
+    if (type == schemas_.end()) {
+      if (!is_first_wrong(record, id)) return {};
       return fail_at(record, ErrorCode::invalid,
                      "channel {} ('{:.80}') has schema {}, expected one that is defined before", id, channel.topic,
                      schema);
+    }
     channel.type = type->second;
   }
   const auto [at, is_new] = channels_.try_emplace(id, channel);
-  if (!is_new && (at->second.topic != channel.topic || at->second.type != channel.type))
+  if (!is_new && (at->second.topic != channel.topic || at->second.type != channel.type) && is_first_wrong(record, id))
     return fail_at(record, ErrorCode::invalid, "channel {} is '{:.80}', expected '{:.80}' as before", id, channel.topic,
                    at->second.topic);
   return {};
 }
 
-Result<BagMessage> McapReader::to_message(const Record& record, std::string_view content) const {
+Result<std::optional<BagMessage>> McapReader::to_message(const Record& record, std::string_view content) {
   Cursor cursor(content);
   BagMessage message{.position = {.at = record.offset, .inside = record.inside}};
   const auto id = cursor.number<std::uint16_t>("channel_id");
   cursor.number<std::uint32_t>("sequence");
-  message.log_time = stamp(cursor, "log_time");
-  message.publish_time = stamp(cursor, "publish_time");
+  const auto logged = cursor.number<std::uint64_t>("log_time"),
+             published = cursor.number<std::uint64_t>("publish_time");
   if (!cursor.ok()) return fail_at(record, ErrorCode::parse, "{}", *cursor.error());
+  message.log_time = {static_cast<std::int64_t>(logged)};
+  message.publish_time = {static_cast<std::int64_t>(published)};
   message.data = cursor.take(cursor.left(), "data");
   const auto channel = channels_.find(id);
-  if (channel == channels_.end())
-    return fail_at(record, ErrorCode::invalid, "channel {}, expected one that is defined before", id);
+  if (channel == channels_.end() || std::max(logged, published) > kLastStamp) {
+    if (!is_first_wrong(record, id)) return std::nullopt;
+    if (channel == channels_.end())
+      return fail_at(record, ErrorCode::invalid, "channel {}, expected one that is defined before", id);
+    return fail_at(record, ErrorCode::invalid, "log_time {} ns, publish_time {} ns, expected at most {}", logged,
+                   published, kLastStamp);
+  }
   message.channel = &channel->second;
   return message;
 }
 
 Result<std::optional<BagMessage>> McapReader::take(const Record& record, std::string_view content) {
   Status ok;
-  if (record.opcode == kMessage) {
-    const auto message = to_message(record, content);
-    if (message) return *message;
-    ok = tl::unexpected(message.error());
-  } else if (record.opcode == kSchema) {
+  if (record.opcode == kMessage) return to_message(record, content);
+  if (record.opcode == kSchema) {
     ok = define_schema(record, content);
   } else if (record.opcode == kChannel) {
     ok = define_channel(record, content);
@@ -235,6 +236,7 @@ Status McapReader::enter_chunk(const Record& record, bool cut) {
   chunk_at_ = 0;
   chunk_offset_ = record.offset;
   chunk_cut_ = cut;
+  complained_of_.clear();
   ++chunks_read_;
   return {};
 }
@@ -315,7 +317,12 @@ Result<std::optional<BagMessage>> McapReader::next_of_chunk() {
     return out;
   }
   chunk_at_ += kRecordHeadBytes + record.size;
-  return take(record, cursor.take(record.size, "content"));
+  auto out = take(record, cursor.take(record.size, "content"));
+  if (!out && out.error().code == ErrorCode::parse) {
+    out.error().message += fmt::format("; {} bytes behind it are not read", chunk_.size() - chunk_at_);
+    chunk_.clear();
+  }
+  return out;
 }
 
 Result<std::optional<BagMessage>> McapReader::next_of_file() {
@@ -343,9 +350,10 @@ Result<std::optional<BagMessage>> McapReader::next_of_file() {
   const bool wanted = record->opcode == kChunk || (!cut && (record->opcode == kSchema || record->opcode == kChannel ||
                                                             record->opcode == kMessage || record->opcode == 0));
   if (!wanted) return std::nullopt;
-  if (record->size > internal::kMaxChunkBytes)
-    return fail_at(*record, ErrorCode::unsupported, "length {}, expected at most {}", record->size,
-                   internal::kMaxChunkBytes);
+  if (const auto most = record->opcode == kChunk ? internal::kMaxChunkBytes : internal::kMaxMessageBytes;
+      record->size > most)
+    return fail_at(*record, ErrorCode::unsupported, "length {}, expected at most {}", record->size, most);
+  if (record->opcode == 0) end("");  // zeros, as a file has them at its end after a power cut
   if (auto ok = file_.read(begin, record->size, record_); !ok) {
     end("");
     return tl::unexpected(ok.error());

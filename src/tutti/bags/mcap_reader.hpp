@@ -7,8 +7,10 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
@@ -29,7 +31,9 @@ struct McapSummary {
 
 /// Reads files with or without chunks and with or without a summary. A chunk whose CRC does not match is an error. A
 /// file that is cut off is read up to the last whole message, also within its last chunk, and a note says so. Errors
-/// name byte and record.
+/// name byte and record. A record that cannot be costs what follows in its chunk, as nothing says where the next one
+/// begins. Of records that are well formed and wrong, as messages of an unknown channel are, only the first of each
+/// channel or schema and chunk is an error, and the others are passed over.
 class McapReader final : public BagReader {
  public:
   static Result<McapReader> open(const std::string& path);
@@ -70,8 +74,11 @@ class McapReader final : public BagReader {
   Status define_schema(const Record& record, std::string_view content);
   Status define_channel(const Record& record, std::string_view content);
   Status take_statistics(const Record& record, std::string_view content);
-  Result<BagMessage> to_message(const Record& record, std::string_view content) const;
+  Result<std::optional<BagMessage>> to_message(const Record& record, std::string_view content);
   void end(std::string note);
+  bool is_first_wrong(const Record& record, std::uint16_t id) {
+    return complained_of_.emplace(record.opcode, id).second;
+  }
   template <class... Args>
   [[nodiscard]] tl::unexpected<Error> fail_at(const Record& record, ErrorCode code, fmt::format_string<Args...> format,
                                               Args&&... args) const;
@@ -84,6 +91,8 @@ class McapReader final : public BagReader {
   std::size_t chunk_at_ = 0;        ///< How far it has been read.
   std::uint64_t chunk_offset_ = 0;  ///< Its byte in the file.
   bool chunk_cut_ = false;          ///< Whether the file ends in it.
+  /// Kinds and ids of records of this chunk that were wrong.
+  std::set<std::pair<std::uint8_t, std::uint16_t>> complained_of_;
   std::uint64_t chunks_read_ = 0;
   bool all_defined_ = false;                      ///< True: the summary has all channels.
   std::uint64_t defined_until_ = 0;               ///< Otherwise channels that are defined before this byte are known.

@@ -182,7 +182,7 @@ TEST(Mcap, WhatIsWrongIsNamed) {
   EXPECT_EQ(error_of(channel(1, 1, "/b")), at + "Channel: channel 1 is '/b', expected '/a' as before");
   EXPECT_EQ(error_of(schema(1, "other")), at + "Schema: schema 1 is 'other', expected 'pkg/msg/Type' as before");
   EXPECT_EQ(error_of(chunk("", "brotli")), at + "Chunk: compression 'brotli', expected none, zstd, lz4 or bz2");
-  EXPECT_EQ(error_of(message(1, ~std::uint64_t{0}, "")).substr(0, at.size() + 20), at + "Message: byte 14: lo");
+  EXPECT_EQ(error_of(message(1, ~std::uint64_t{0}, "")).substr(0, at.size() + 20), at + "Message: log_time 18");
 }
 
 TEST(Mcap, RecordsOfOtherKindsArePassedOver) {
@@ -205,6 +205,61 @@ TEST(Mcap, ABrokenSummaryIsOnlyNoted) {
 TEST(Mcap, OtherFilesAreNamed) {
   EXPECT_NE(reader_of("").error().message.find("no MCAP file"), std::string::npos);
   EXPECT_EQ(McapReader::open("/no/such/file").error().code, ErrorCode::io);
+}
+
+TEST(Mcap, AChunkIsGivenUpAtItsFirstImpossibleRecord) {
+  const std::string first = kMagic + header() + kDefinitions;
+  for (const std::string& impossible :
+       {std::string(1'000, '\0'), record(5, "abc"), record(5, "").substr(0, 8) + "\1"}) {
+    const std::string bad = chunk(messages(0, 2) + impossible + messages(2, 3), "zstd");
+    const Read read = read_all(closed(first + bad + chunk(messages(3, 6), "zstd"), kDefinitions, 6, 2));
+    EXPECT_EQ(read.messages.size(), 5U);
+    ASSERT_EQ(read.errors.size(), 1U);
+    EXPECT_NE(read.errors[0].find("in this chunk: "), std::string::npos) << read.errors[0];
+  }
+}
+
+/// It was 11 million errors.
+TEST(Mcap, ChunksOfZerosAreOneErrorEach) {
+  const auto error_of = [](std::size_t zeros, const char* compression) {
+    const std::string bomb = chunk(std::string(zeros, '\0'), compression, zeros, 0);
+    EXPECT_LT(bomb.size(), zeros / 200);
+    const Read read = read_all(closed(kMagic + header() + bomb + kDefinitions + messages(0, 1), kDefinitions, 1, 1));
+    EXPECT_EQ(read.messages.size(), 1U);
+    EXPECT_EQ(read.errors.size(), 1U);
+    return read.errors.at(0);
+  };
+  EXPECT_NE(error_of(100'000'000, "zstd").find("unpack to 100000000, expected at most 67108864"), std::string::npos);
+  for (const char* compression : {"zstd", "bz2", "lz4"})
+    EXPECT_NE(error_of(5'000'000, compression).find("opcode 0, which no record has; 4999991 bytes behind it are not"),
+              std::string::npos);
+}
+
+TEST(Mcap, OfACutChunkNoMoreIsUnpackedThanOfAWholeOne) {
+  const std::string begin = kDefinitions + messages(0, 1), zeros(70'000'000, '\0');
+  const std::string bytes = kMagic + header() + chunk(begin + zeros, "zstd", begin.size() + zeros.size(), 0);
+  const Read read = read_all(bytes.substr(0, bytes.size() - 1));
+  EXPECT_EQ(read.messages.size(), 1U);
+  ASSERT_EQ(read.errors.size(), 1U);
+  EXPECT_NE(read.errors[0].find(fmt::format("; {} bytes", 67108864 - begin.size() - 9)), std::string::npos)
+      << read.errors[0];
+}
+
+TEST(Mcap, ZerosBehindTheLastRecordAreOneError) {
+  const Read read = read_all(kMagic + header() + kDefinitions + messages(0, 3) + std::string(1'000'000, '\0'));
+  EXPECT_EQ(read.messages.size(), 3U);
+  EXPECT_EQ(read.errors.size(), 1U);
+}
+
+TEST(Mcap, OfWrongRecordsTheFirstOfEachChannelAndChunkIsAnError) {
+  std::string records;
+  for (std::uint64_t i = 0; i < 100; ++i)
+    records += message(8, i, "") + message(9, i, "") + message(1, ~std::uint64_t{0}, "") + channel(1, 1, "/b") +
+               channel(2, 9, "/c") + schema(1, "other") + messages(i, i + 1);
+  const Read read = read_all(
+      closed(kMagic + header() + kDefinitions + chunk(records, "") + chunk(records, ""), kDefinitions, 200, 2));
+  EXPECT_EQ(read.messages.size(), 200U);
+  EXPECT_EQ(read.errors.size(), 12U);
 }
 
 }  // namespace mcap_reader_test

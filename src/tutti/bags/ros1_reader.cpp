@@ -132,6 +132,7 @@ Result<Ros1Reader::Record> Ros1Reader::parse_header(std::string_view header, con
     if (time != 0) record.time.ns = static_cast<std::int64_t>((time & 0xffff'ffffU) * 1'000'000'000U + (time >> 32U));
   });
   if (unread) wrong = unread;
+  if (!wrong && record.op == Op{}) wrong = "no op, which every record has";
   if (wrong) return fail_at(position, ErrorCode::parse, "header of a record: {}", *wrong);
   return record;
 }
@@ -168,9 +169,9 @@ Result<std::optional<Ros1Reader::Record>> Ros1Reader::next_record() {
     cut_off("header of a record", header_size, file_.size() - offset_);
     return std::nullopt;
   }
-  if (header_size > kMaxHeaderBytes) {
+  if (header_size == 0 || header_size > kMaxHeaderBytes) {  // zeros are what a power cut leaves at the end of a file
     end("");
-    return fail_at(position, ErrorCode::parse, "header of {} bytes, expected at most {}", header_size, kMaxHeaderBytes);
+    return fail_at(position, ErrorCode::parse, "header of {} bytes, expected 1 to {}", header_size, kMaxHeaderBytes);
   }
   if (auto ok = file_.read(offset_, header_size, header); !ok) return tl::unexpected(ok.error());
   offset_ += header_size;
@@ -188,9 +189,9 @@ Result<std::optional<Ros1Reader::Record>> Ros1Reader::next_record() {
   record->data_size = size;
   data_.clear();
   if (record->op == Op::bag_header || record->op == Op::index) return *record;
-  if (size > internal::kMaxChunkBytes)
+  if (const auto most = record->op == Op::chunk ? internal::kMaxChunkBytes : internal::kMaxMessageBytes; size > most)
     return fail_at(position, ErrorCode::unsupported, "record {} of {} bytes, expected at most {}", name_of(record->op),
-                   size, internal::kMaxChunkBytes);
+                   size, most);
   if (auto ok = file_.read(begin, size, data_); !ok) return tl::unexpected(ok.error());
   return *record;
 }
@@ -202,7 +203,7 @@ Status Ros1Reader::define(const Record& record, std::string_view data) {
   });
   if (wrong) return fail_at(record.position, ErrorCode::parse, "connection {}: {}", record.connection, *wrong);
   const auto [at, is_new] = channels_.try_emplace(record.connection, channel);
-  if (!is_new && at->second != channel)
+  if (!is_new && at->second != channel && complained_of_.emplace(record.op, record.connection).second)
     return fail_at(record.position, ErrorCode::invalid,
                    "connection {} is '{:.80}' ({:.80}), expected '{:.80}' ({:.80}) as before", record.connection,
                    channel.topic, channel.type, at->second.topic, at->second.type);
@@ -216,6 +217,7 @@ Result<std::optional<BagMessage>> Ros1Reader::take(const Record& record, std::st
   }
   if (record.op != Op::message) return std::nullopt;
   const auto channel = channels_.find(record.connection);
+  if (channel == channels_.end() && !complained_of_.emplace(record.op, record.connection).second) return std::nullopt;
   if (channel == channels_.end())
     return fail_at(record.position, ErrorCode::invalid, "message of connection {}, expected one that is defined before",
                    record.connection);
@@ -235,6 +237,7 @@ Status Ros1Reader::enter_chunk(const Record& record) {
   chunk_at_ = 0;
   chunk_offset_ = record.position.at;
   chunk_cut_ = cut_;
+  complained_of_.clear();
   ++chunks_read_;
   return {};
 }
@@ -269,8 +272,12 @@ Result<std::optional<BagMessage>> Ros1Reader::next_of_chunk() {
   }
   chunk_at_ += cursor.at();
   const auto record = parse_header(header, position);
-  if (!record) return tl::unexpected(record.error());
-  return take(*record, data);
+  auto out = record ? take(*record, data) : tl::unexpected(record.error());
+  if (!out && out.error().code == ErrorCode::parse) {
+    out.error().message += fmt::format("; {} bytes behind it are not read", chunk_.size() - chunk_at_);
+    chunk_.clear();
+  }
+  return out;
 }
 
 Result<std::optional<BagMessage>> Ros1Reader::next() {

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -19,7 +20,9 @@ namespace tutti::bags {
 
 /// Reads ROS 1 bags, format 2.0 (http://wiki.ros.org/Bags/Format/2.0), with chunks compressed by bz2, lz4 or not at
 /// all. Types get ROS 2's names. A bag that was never closed, or is cut off, is read up to the last whole message, also
-/// within its last chunk, and a note says so. Errors name the byte.
+/// within its last chunk, and a note says so. Errors name the byte. A record that cannot be costs what follows in its
+/// chunk. Of records that are well formed and wrong, as messages of an unknown connection are, only the first of each
+/// connection and chunk is an error, and the others are passed over.
 class Ros1Reader final : public BagReader {
  public:
   static Result<Ros1Reader> open(const std::string& path);
@@ -75,6 +78,7 @@ class Ros1Reader final : public BagReader {
   std::size_t chunk_at_ = 0;
   std::uint64_t chunk_offset_ = 0;
   bool chunk_cut_ = false;
+  std::set<std::pair<Op, std::uint32_t>> complained_of_;  ///< Kinds and connections of wrong records of this chunk.
   std::uint64_t chunks_read_ = 0;
   bool all_defined_ = false;
   std::map<std::uint32_t, BagChannel> channels_;

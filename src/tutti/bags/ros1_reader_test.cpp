@@ -182,5 +182,26 @@ TEST(Ros1, ARealBagIsRead) {
   EXPECT_GT(poses, 1000U);
 }
 
+TEST(Ros1, AChunkIsGivenUpAtItsFirstImpossibleRecord) {
+  const std::string first = "#ROSBAG V2.0\n" + ros1_bag_header(0) + ros1_connection(1, "/a", "pkg/A");
+  const std::string good = ros1_message(1, 5, "good");
+  for (const std::string& impossible : {std::string(1'000'000, '\0'), counted(counted("nonsense")) + counted("")}) {
+    const Read read = read_all(first + ros1_chunk(good + impossible + good, "bz2") + good);
+    EXPECT_EQ(read.messages.size(), 2U);
+    EXPECT_EQ(read.errors.size(), 1U);
+  }
+  std::string records;
+  for (int i = 0; i < 100; ++i) records += ros1_message(9, 1, "") + ros1_connection(1, "/b", "pkg/A") + good;
+  const Read read = read_all(first + ros1_chunk(records, "bz2") + ros1_chunk(records, "none"));
+  EXPECT_EQ(read.messages.size(), 200U);
+  EXPECT_EQ(read.errors.size(), 4U);  // the first of its kind in each
+}
+
+TEST(Ros1, ZerosBehindTheLastRecordAreOneError) {
+  const Read read = read_all(ros1_bag(samples(), "none", 4, false) + std::string(1'000'000, '\0'));
+  EXPECT_EQ(read.messages, expected());
+  EXPECT_EQ(read.errors.size(), 1U);
+}
+
 }  // namespace ros1_reader_test
 }  // namespace tutti::bags

@@ -25,25 +25,30 @@ struct Progress {
   const char* error = nullptr;  ///< As the library says it.
 };
 
-/// `step(in, out, room)` unpacks some of `in`.
+/// `step(in, out, room)` unpacks some of `in`. Of a chunk that is cut off as much as may come of what is there.
 template <class Step>
 Result<std::string> unpack(std::string_view packed, std::uint64_t size, bool cut, const char* name, const Step& step) {
+  const std::uint64_t most = most_unpacked(packed.size());
+  if (size > most && !cut)
+    return fail(ErrorCode::unsupported, "{}: {} bytes unpack to {}, expected at most {}", name, packed.size(), size,
+                most);
+  const std::uint64_t wanted = std::min(size, most);
   std::string out;
   std::size_t filled = 0;
   bool ended = false;
   while (true) {
     // One byte more than expected, so that a frame that holds more is seen.
-    if (filled == out.size()) out.resize(std::min<std::uint64_t>(size + 1, std::max(kFirstBytes, 2 * out.size())));
+    if (filled == out.size()) out.resize(std::min<std::uint64_t>(wanted + 1, std::max(kFirstBytes, 2 * out.size())));
     const Progress now = step(packed, out.data() + filled, out.size() - filled);
     if (now.error && !cut) return fail(ErrorCode::parse, "{}: {}, after {} of {} bytes", name, now.error, filled, size);
     packed.remove_prefix(std::min(now.taken, packed.size()));
     filled += now.written;
     ended = now.ended;
     const bool stuck = now.taken == 0 && now.written == 0;
-    if (now.error || filled > size || stuck || (ended && packed.empty())) break;
+    if (now.error || filled > wanted || stuck || (ended && packed.empty())) break;
   }
-  out.resize(filled);
   if (filled > size) return fail(ErrorCode::parse, "{}: unpacks to more than the {} bytes it says", name, size);
+  out.resize(std::min<std::uint64_t>(filled, wanted));
   if (!cut && (filled != size || (!ended && size > 0)))
     return fail(ErrorCode::parse, "{}: unpacks to {} bytes, expected {}", name, filled, size);
   return out;

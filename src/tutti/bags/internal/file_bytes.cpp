@@ -5,12 +5,14 @@
 #include <limits>
 #include <utility>
 
+#include "tutti/base/file.hpp"
+
 namespace tutti::bags::internal {
 
 Result<FileBytes> FileBytes::open(const std::string& path) {
-  auto file = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (!*file) return fail(ErrorCode::io, "{}: cannot be opened", path);
-  return open(std::move(file), path);
+  auto file = open_file(path);
+  if (!file) return tl::unexpected(file.error());
+  return open(std::make_unique<std::ifstream>(std::move(*file)), path);
 }
 
 Result<FileBytes> FileBytes::open(std::unique_ptr<std::istream> stream, std::string name) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,8 +15,9 @@ inline constexpr std::string_view kZstdMagic = "\x28\xb5\x2f\xfd";
 /// What a file that is packed by zstd holds, in a file among the system's temporary ones, which is gone with this.
 class PackedFile {
  public:
-  /// Piece by piece. What comes out of a file that is cut off before the cut is kept.
-  static Result<PackedFile> unpack(const std::string& path);
+  /// Piece by piece. What comes out of a file that is cut off before the cut is kept. More than
+  /// most_unpacked(its size, `little`) is an error.
+  static Result<PackedFile> unpack(const std::string& path, std::uint64_t little = std::uint64_t{1} << 30);
   ~PackedFile();
   PackedFile(PackedFile&& other) noexcept : path_(std::exchange(other.path_, {})) {}
   PackedFile& operator=(PackedFile&&) = delete;
