@@ -6,8 +6,11 @@
 #include <cctype>
 #include <cstddef>
 #include <filesystem>
+#include <fstream>
 #include <string_view>
 #include <system_error>
+
+#include "tutti/base/file.hpp"
 
 namespace tutti::bags {
 namespace {
@@ -38,9 +41,9 @@ tl::unexpected<Error> Db3Reader::fail_sqlite() const {
   return fail(ErrorCode::parse, "{}: SQLite: {}", name_, sqlite3_errmsg(database_.get()));
 }
 
-Result<Db3Reader> Db3Reader::open(const std::string& path) {
+Result<Db3Reader> Db3Reader::open(const std::string& path, std::int64_t most_bytes) {
+  if (const auto file = open_file(path); !file) return tl::unexpected(file.error());
   std::error_code failure;
-  if (!std::filesystem::exists(path, failure)) return fail(ErrorCode::io, "{}: cannot be opened", path);
   // What a recorder has left in a log beside the file belongs to it, and SQLite reads that only where it may write
   // beside it too. A file without one is read without a trace.
   const auto has = [&](const char* end) {
@@ -48,7 +51,7 @@ Result<Db3Reader> Db3Reader::open(const std::string& path) {
     return !failure && size > 0;
   };
   const char* const log = has("-wal") ? "-wal" : has("-journal") ? "-journal" : nullptr;
-  Db3Reader reader(path);
+  Db3Reader reader(path, most_bytes);
   const Status ok = reader.start(uri_of(path, log == nullptr ? "?immutable=1" : "?mode=ro"));
   if (ok) return reader;
   if (log == nullptr) return tl::unexpected(ok.error());
@@ -66,10 +69,16 @@ Status Db3Reader::start(const std::string& uri) {
   sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_db_config(opened, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_limit(opened, SQLITE_LIMIT_LENGTH,
+                static_cast<int>(internal::kMaxMessageBytes));  // what columns compute, too
   if (auto ok = read_topics(); !ok) return ok;
-  auto messages = prepare("SELECT id, topic_id, timestamp, data FROM messages WHERE id >= ? ORDER BY id");
+  // Of a blob that is too long, SQLite reads the length alone.
+  auto messages = prepare(
+      "SELECT id, topic_id, timestamp, length(data), CASE WHEN length(data) <= ?2 THEN data END FROM messages "
+      "WHERE id >= ?1 ORDER BY id");
   if (!messages) return tl::unexpected(messages.error());
   messages_ = std::move(*messages);
+  if (sqlite3_bind_int64(messages_.get(), 2, most_bytes_) != SQLITE_OK) return fail_sqlite();
   return seek({.at = 0});
 }
 
@@ -112,10 +121,12 @@ Result<std::optional<BagMessage>> Db3Reader::next() {
   const auto channel = channels_.find(topic);
   if (channel == channels_.end())
     return fail(ErrorCode::invalid, "{}: message {}: topic {}, expected one of the table of topics", name_, id, topic);
+  if (const std::int64_t size = sqlite3_column_int64(row, 3); size > most_bytes_)
+    return fail(ErrorCode::unsupported, "{}: message {}: {} bytes, expected at most {}", name_, id, size, most_bytes_);
   BagMessage message{.channel = &channel->second, .position = {.at = static_cast<std::uint64_t>(id)}};
   message.log_time = message.publish_time = Timestamp{sqlite3_column_int64(row, 2)};
-  const auto* const data = static_cast<const char*>(sqlite3_column_blob(row, 3));
-  if (data != nullptr) message.data = {data, static_cast<std::size_t>(sqlite3_column_bytes(row, 3))};
+  const auto* const data = static_cast<const char*>(sqlite3_column_blob(row, 4));
+  if (data != nullptr) message.data = {data, static_cast<std::size_t>(sqlite3_column_bytes(row, 4))};
   return message;
 }
 

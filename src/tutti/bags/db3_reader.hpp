@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tutti/bags/bag_reader.hpp"
+#include "tutti/bags/internal/chunk.hpp"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -17,10 +18,10 @@ namespace tutti::bags {
 
 /// Reads rosbag2's SQLite files (.db3): one row a message, CDR as in MCAP. Neither the file nor its folder is written,
 /// but for FILE-shm where a recorder has left its write-ahead log, FILE-wal. An error of SQLite (a damaged page) ends
-/// the reading, after the rows before it.
+/// the reading, after the rows before it. A message of more than `most_bytes` is an error, of which nothing is read.
 class Db3Reader final : public BagReader {
  public:
-  static Result<Db3Reader> open(const std::string& path);
+  static Result<Db3Reader> open(const std::string& path, std::int64_t most_bytes = internal::kMaxMessageBytes);
 
   Result<std::optional<BagMessage>> next() override;
   Status seek(const BagPosition& position) override;
@@ -34,13 +35,14 @@ class Db3Reader final : public BagReader {
   };
   using Statement = std::unique_ptr<sqlite3_stmt, Close>;
 
-  explicit Db3Reader(std::string name) : name_(std::move(name)) {}
+  Db3Reader(std::string name, std::int64_t most_bytes) : name_(std::move(name)), most_bytes_(most_bytes) {}
   Status start(const std::string& uri);
   Status read_topics();
   [[nodiscard]] Result<Statement> prepare(const char* sql) const;
   [[nodiscard]] tl::unexpected<Error> fail_sqlite() const;
 
   std::string name_;
+  std::int64_t most_bytes_;
   std::unique_ptr<sqlite3, Close> database_;
   Statement messages_;
   bool ended_ = false;
