@@ -95,10 +95,12 @@ Result<formats::TimedCloud> to_timed_cloud(const RosPointCloud& message) {
   const bool swapped = message.is_bigendian == (std::endian::native == std::endian::little);
   formats::TimedCloud out;
   if (time) out.time_field = time->name;
-  const std::size_t count = std::size_t{message.width} * message.height;
+  // Of rows without points there may be four thousand millions in no bytes.
+  const std::uint32_t rows = message.width == 0 ? 0 : message.height;
+  const std::size_t count = std::size_t{message.width} * rows;
   out.cloud.points.reserve(count);
   if (time) out.times.reserve(count);
-  for (std::uint32_t row = 0; row < message.height; ++row)
+  for (std::uint32_t row = 0; row < rows; ++row)
     for (std::uint32_t column = 0; column < message.width; ++column) {
       const char* const at = message.data.data() + row * *step + std::size_t{column} * message.point_step;
       Eigen::Vector3f point;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <ctime>
 #include <limits>
 
 #include "support/bags/robot_bag.hpp"
@@ -72,6 +73,19 @@ TEST(PointCloud, WhatIsWrongIsNamed) {
     bad.height = 1;
     EXPECT_FALSE(to_timed_cloud(bad));
   }
+}
+
+/// Four thousand million rows took 4 s.
+TEST(PointCloud, RowsWithoutPointsCostNothing) {
+  RosPointCloud none = decode_point_cloud(cloud_of(Timestamp{5}, "lidar", kPoints)).value();
+  none.width = none.row_step = 0;
+  none.height = 0xffff'ffffU;
+  none.data = {};
+  const std::clock_t begin = std::clock();
+  const auto cloud = to_timed_cloud(none);
+  ASSERT_TRUE(cloud) << cloud.error().message;
+  EXPECT_TRUE(cloud->cloud.points.empty());
+  EXPECT_LT(std::clock() - begin, CLOCKS_PER_SEC / 4);
 }
 
 TEST(PointCloud, WhatIsMadeOfPointsIsReadAsTheyAre) {
