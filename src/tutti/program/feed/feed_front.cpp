@@ -154,12 +154,12 @@ void FeedFront::push(FeedInput input) {
 /// behind the last of them all is odometry.
 void FeedFront::thin() {
   double span_s = 0.0;
-  std::optional<Timestamp> first;  // of one session
+  std::size_t first = inputs_.size();  // where the odometry of a session begins
   for (std::size_t i = taken_; i < inputs_.size(); ++i) {
-    if (std::holds_alternative<FeedAnew>(inputs_[i])) first.reset();
+    if (std::holds_alternative<FeedAnew>(inputs_[i])) first = inputs_.size();
     if (!is_odometry(inputs_[i])) continue;
-    if (!first) first = stamp_of(inputs_[i]);
-    span_s = std::max(span_s, stamp_of(inputs_[i]) - *first);
+    first = std::min(first, i);
+    span_s = std::max(span_s, stamp_of(inputs_[i]) - stamp_of(inputs_[first]));
   }
   finest_s_ = std::max(2.0 * finest_s_, 2.0 * span_s / static_cast<double>(limits_.inputs));
   while (waiting() > limits_.inputs / 4 * 3 && finest_s_ < 4.0 * span_s) {
