@@ -16,7 +16,7 @@ std::optional<ClosureFit::Misfit> misfit(const server::MapEstimate& map, const L
   const MapNode *from = find_node(map, closure.from), *to = find_node(map, closure.to);
   if (from == nullptr || to == nullptr || from->component != to->component) return std::nullopt;
   const Vector6d error = local(closure.measurement.T_a_b, from->T_world_body.inverse() * to->T_world_body);
-  const Matrix6d covariance = bounded_covariance(closure.measurement.covariance);
+  const Matrix6d covariance = invertible_covariance(bounded_covariance(closure.measurement.covariance));
   return ClosureFit::Misfit{error.head<3>().norm(), error.tail<3>().norm(), error.dot(covariance.llt().solve(error))};
 }
 

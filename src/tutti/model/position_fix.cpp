@@ -3,6 +3,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "tutti/geometry/covariance.hpp"
+
 namespace tutti {
 namespace {
 
@@ -37,6 +39,19 @@ Status check_fix(const Geodetic& antenna, const Eigen::Matrix3d& covariance, con
     return fail(ErrorCode::invalid, "antenna {} m from the body, expected at most {} m", p_antenna.norm(),
                 kFarthestAntenna_m);
   return {};
+}
+
+Eigen::Matrix3d invertible_fix_covariance(const Eigen::Matrix3d& covariance) {
+  Eigen::Matrix3d raised = covariance;
+  raised.diagonal() = raised.diagonal().cwiseMax(kLeastTranslation_m * kLeastTranslation_m);
+  const Eigen::Vector3d sigma = raised.diagonal().cwiseSqrt();
+  const Eigen::Matrix3d correlation = sigma.cwiseInverse().asDiagonal() * raised * sigma.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(correlation);
+  if (solver.eigenvalues()(0) >= kRounding) return raised;
+  const Eigen::Matrix3d regular =
+      solver.eigenvectors() * solver.eigenvalues().cwiseMax(kRounding).asDiagonal() * solver.eigenvectors().transpose();
+  const Eigen::Matrix3d scaled = sigma.asDiagonal() * regular * sigma.asDiagonal();
+  return 0.5 * (scaled + scaled.transpose());
 }
 
 }  // namespace tutti

@@ -46,4 +46,9 @@ inline constexpr double kLeastFixSigma_m = 1e-5;
 [[nodiscard]] Status check_fix(const Geodetic& antenna, const Eigen::Matrix3d& covariance,
                                const Eigen::Vector3d& p_antenna);
 
+/// A covariance that can be inverted, of one that check_fix() accepts: unchanged when no standard deviation is below
+/// kLeastTranslation_m, as for odometry, and the correlation matrix is regular beyond the rounding that check_fix()
+/// allows; otherwise raised as far as that.
+[[nodiscard]] Eigen::Matrix3d invertible_fix_covariance(const Eigen::Matrix3d& covariance);
+
 }  // namespace tutti

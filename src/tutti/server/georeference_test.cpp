@@ -301,6 +301,32 @@ TEST(Georeference, FixesRefuteClosuresThatJoinRobotsWrongly) {
   }
 }
 
+/// Drivers state correlations of 1, which rounding makes a little more, and errors along one line only.
+TEST(Georeference, FixesOfSingularCovariancesCountAsFarAsTheyCan) {
+  Eigen::Matrix3d correlated = Eigen::Vector3d(0.25, 0.25, 1.0).asDiagonal();
+  correlated(0, 1) = correlated(1, 0) = 0.25;
+  Eigen::Matrix3d rounded = correlated;
+  rounded(0, 1) = rounded(1, 0) = 0.25 * (1.0 + 1e-6);
+  const Eigen::Matrix3d line = Eigen::Vector3d(0.3, 0.4, 0.5) * Eigen::RowVector3d(0.3, 0.4, 0.5);
+  for (const Eigen::Matrix3d& covariance : {correlated, rounded, line}) {
+    ASSERT_TRUE(check_fix({}, covariance, Eigen::Vector3d::Zero())) << covariance;
+    World world;
+    world.add({});
+    for (auto& [id, submap] : world.submaps) {
+      auto stated = std::make_shared<Submap>(*submap);
+      for (SubmapFix& fix : stated->fixes) fix.covariance = covariance;
+      submap = stated;
+    }
+    const double without = world.rmse(estimate_map(world.submaps, {}, {}));
+    const MapEstimate map = world.map();
+    ASSERT_TRUE(map.fixes.georeference) << covariance;
+    EXPECT_GT(map.fixes.edges.size(), 0U) << covariance;
+    for (const PoseGraphEdge& edge : map.fixes.edges) ASSERT_TRUE(edge.information.allFinite()) << covariance;
+    for (const MapNode& node : map.nodes) ASSERT_TRUE(node.T_world_body.translation.allFinite()) << covariance;
+    EXPECT_LT(world.rmse(map), without) << covariance;
+  }
+}
+
 TEST(Georeference, IsAFunctionOfTheSet) {
   World world;
   world.add({.id = 0});

@@ -92,7 +92,8 @@ std::optional<PlacedFixes> place_fixes(const MapEstimate& map, const SubmapSet& 
       const Matrix3d R = (T_enu_ecef.rotation * enu_in_ecef(fix.antenna).rotation).toRotationMatrix();
       of.component = node->component;
       of.fixes.push_back({static_cast<std::size_t>(node - map.nodes.data()), fix.p_keyframe_antenna,
-                          T_enu_ecef * ecef_of(fix.antenna), R * fix.covariance * R.transpose()});
+                          T_enu_ecef * ecef_of(fix.antenna),
+                          R * invertible_fix_covariance(fix.covariance) * R.transpose()});
     }
     if (!of.fixes.empty()) out.submaps.push_back(std::move(of));
   }

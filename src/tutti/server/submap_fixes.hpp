@@ -19,7 +19,7 @@ struct SubmapFixes {
     std::size_t node = 0;  ///< Index of the map's node.
     Eigen::Vector3d p_node_antenna;
     Eigen::Vector3d p_enu;
-    Eigen::Matrix3d covariance;  ///< In enu, m^2.
+    Eigen::Matrix3d covariance;  ///< In enu, m^2; can be inverted.
   };
   std::vector<Fix> fixes;
   double correlation = 1.0;  ///< Factor on their common variance, because neighbouring submaps share errors.
