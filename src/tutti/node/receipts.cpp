@@ -7,6 +7,7 @@
 
 #include "tutti/base/content_hash.hpp"
 #include "tutti/base/plain_text.hpp"
+#include "tutti/node/map_meta.hpp"
 #include "tutti/node/meta_keys.hpp"
 #include "tutti/wire/codec.hpp"
 
