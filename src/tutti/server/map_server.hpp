@@ -117,10 +117,10 @@ class MapServer {
   /// another session (ProxyGraph::kMostChains); or the store cannot keep the payload, and the submap may be sent again.
   Status receive(const SubmapMessage& message);
   /// Takes the answer to a job; answers may come in any order and any number of times. Of two verdicts on one pair a
-  /// refusal wins, then the closures with the smaller numbers, so that the order does not matter. A verdict that comes
-  /// before its submaps waits for them. On an error nothing changes: the verdict is of another finder than the
-  /// server's; a closure joins anything else than a keyframe of pair.first to one of pair.second; the finder would not
-  /// verify the pair; or kMostWaiting verdicts wait already, and the pair is verified again.
+  /// refusal wins, then more closures, then those with the smaller numbers, so that the order does not matter. A
+  /// verdict that comes before its submaps waits for them. On an error nothing changes: the verdict is of another
+  /// finder than the server's; a closure joins anything else than a keyframe of pair.first to one of pair.second; the
+  /// finder would not verify the pair; or kMostWaiting verdicts wait already, and the pair is verified again.
   Status receive(const ClosureVerdict& verdict);
   static constexpr std::size_t kMostWaiting = 1000;
   /// Takes an operator's word on the closures of a pair, any number of times; the next optimise() follows it. Of two

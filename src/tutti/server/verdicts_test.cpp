@@ -126,9 +126,12 @@ TEST_F(Verdicts, ThatDoNotBelongToTheirPairAreErrorsAndChangeNothing) {
 TEST_F(Verdicts, OfOneFinderTheSameHoldsWhateverComesFirst) {
   ClosureVerdict other = good_;
   other.closures[0].measurement.T_a_b.translation.z() += 0.01;
+  ClosureVerdict more = other;  // of a finder that knows closures one after the other
+  more.closures.push_back(good_.closures[0]);
   const ClosureVerdict no{good_.pair, {}, Refusal{RefusalReason::misfit, 1.5, 1.2}, finder_->id()};
-  // The last one holds, however they are shuffled: the one with smaller numbers, and in doubt none.
-  for (const std::vector<ClosureVerdict>& all : {std::vector{other, good_}, {good_, other, no}, {good_, no}}) {
+  // The last one holds, however they are shuffled: more, then the one with smaller numbers, and in doubt none.
+  for (const std::vector<ClosureVerdict>& all :
+       {std::vector{other, good_}, {other, good_, more}, {good_, other, more, no}, {good_, no}}) {
     for (std::uint64_t seed = 0; seed < 12; ++seed) {
       Rng rng(seed);
       std::vector<ClosureVerdict> order = all;
