@@ -92,6 +92,9 @@ class NamedFinder final : public server::ClosureFinder {
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
     return finder_->is_candidate(first, second);
   }
+  [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap& second) const override {
+    return finder_->known_at(first, second);
+  }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override {
     auto verdict = finder_->verify(first, second, payloads);

@@ -36,6 +36,9 @@ class SpoiledClosureFinder final : public server::ClosureFinder {
     return inner_->can_compare(first, second);
   }
   [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override;
+  [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap& second) const override {
+    return inner_->known_at(first, second);
+  }
   [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                               const server::PayloadStore& payloads) const override;
 

@@ -99,7 +99,7 @@ class MissionRun {
           robot.actor->finish(now());
           carry_out(*robot.port, robot.actor->take_step());
         }
-      const double delivery_s = next_delivery(), timer_s = next_timer();
+      const double delivery_s = next_delivery(), timer_s = std::min(next_timer(), next_worker());
       if (sample_s == kNever && delivery_s > duration_s_ + kPatience_s && timer_s == kNever) {
         if (!deliver()) break;  // or a worker was asked last
         continue;
@@ -109,6 +109,7 @@ class MissionRun {
       deliver();
       if (sample_s <= time_s_) replay();
       if (next_timer() <= time_s_) update_map();
+      if (next_worker() <= time_s_) carry_out(*worker_port_, worker_.on_timer(now()));
       if (time_s_ < next_progress_s) continue;
       tell_progress();
       while (next_progress_s <= time_s_) next_progress_s += config_.server.update_period_s;
@@ -166,9 +167,10 @@ class MissionRun {
     const auto next = network_.next_delivery();
     return next ? *next - kMissionStart : kNever;
   }
-  [[nodiscard]] double next_timer() const {
-    const auto next = server_->next_timer();
-    return next ? static_cast<double>((*next).ns - kMissionStart.ns) / 1e9 : kNever;
+  [[nodiscard]] double next_timer() const { return seconds_to(server_->next_timer()); }
+  [[nodiscard]] double next_worker() const { return seconds_to(worker_.next_timer()); }
+  static double seconds_to(std::optional<Timestamp> next) {
+    return next ? static_cast<double>(next->ns - kMissionStart.ns) / 1e9 : kNever;
   }
 
   /// Nobody kills the nodes of a mission: what they would write matters to the server's workers only.

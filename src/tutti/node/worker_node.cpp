@@ -160,7 +160,7 @@ void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step&
   if (cache_)
     for (const SubmapId& id : submaps_of(*job))
       if (!cache_->contains(id)) missing.insert(id);
-  if (missing.empty()) return answer(*job, step);
+  if (missing.empty()) return answer(*job, now, step);
   held_ = Held{.job = std::move(*job), .missing = std::move(missing), .asked = {}, .last_came = now};
   ask(now, step);
 }
@@ -186,7 +186,7 @@ void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step
   held_->last_came = now;
   if (!held_->missing.empty()) return ask(now, step);
   const Held held = *std::exchange(held_, std::nullopt);
-  answer(held.job, step);
+  answer(held.job, now, step);
   cache_->trim({});
 }
 
@@ -208,8 +208,9 @@ void WorkerNode::ask(Timestamp now, Step& step) {
 }
 
 std::optional<Timestamp> WorkerNode::next_timer() const {
-  if (!held_) return rests_until_;
-  Timestamp next = held_->last_came + kPatience_s;
+  const auto due = later_.next_due();
+  if (!held_) return due && rests_until_ ? std::min(due, rests_until_) : due ? due : rests_until_;
+  Timestamp next = std::min(held_->last_came + kPatience_s, due.value_or(kLastTimestamp));
   for (const auto& [id, asked] : held_->asked) next = std::min(next, asked + kAskAgain_s);
   return next;
 }
@@ -217,13 +218,14 @@ std::optional<Timestamp> WorkerNode::next_timer() const {
 Step WorkerNode::on_timer(Timestamp now) {
   Step step;
   if (rests_until_ && *rests_until_ <= now) rests_until_.reset();
+  tell_later(now, step);
   if (!held_) return step;
   if (now - held_->last_came < kPatience_s) {
     ask(now, step);
     return step;
   }
   const Held held = *std::exchange(held_, std::nullopt);
-  answer(held.job, step);  // without them: those pairs have failed
+  answer(held.job, now, step);  // without them: those pairs have failed
   return step;
 }
 
@@ -245,7 +247,7 @@ Result<Refinement> WorkerNode::refine_or_throw(const RefinementJob& job) const {
   return refinement;
 }
 
-void WorkerNode::answer(const RefinementJob& job, Step& step) const {
+void WorkerNode::answer(const RefinementJob& job, Timestamp /*now*/, Step& step) {
   Result<Refinement> result = answer_to(job);
   for_each_(1, [&](std::size_t) { result = refine(job); });
   Refinement answer = result ? std::move(*result) : answer_to(job);
@@ -253,24 +255,45 @@ void WorkerNode::answer(const RefinementJob& job, Step& step) const {
   send(bus::MessageKind::refinement, job.id, wire::encode(answer), step);
 }
 
-void WorkerNode::answer(const AnyJob& job, Step& step) const {
-  std::visit([&](const auto& one) { answer(one, step); }, job);
+void WorkerNode::answer(const AnyJob& job, Timestamp now, Step& step) {
+  std::visit([&](const auto& one) { answer(one, now, step); }, job);
 }
 
-void WorkerNode::answer(const Job& job, Step& step) const {
+/// Empty when all closures of the verdict are known.
+std::vector<Timestamp> WorkerNode::known_at(const ClosureVerdict& verdict, Timestamp now) {
+  const auto first = submaps_->submap(verdict.pair.first), second = submaps_->submap(verdict.pair.second);
+  if (verdict.closures.empty() || !first || !second) return {};
+  auto known_at = asked_finder_->known_at(**first, **second);
+  if (!known_at.empty())
+    later_.note_newest(std::max((*first)->keyframes.back().stamp, (*second)->keyframes.back().stamp), now);
+  return known_at;
+}
+
+void WorkerNode::tell_later(Timestamp now, Step& step) {
+  for (const Verdicts& answer : later_.take_due(now))
+    send(bus::MessageKind::verdicts, answer.job, wire::encode(answer), step);
+}
+
+void WorkerNode::answer(const Job& job, Timestamp now, Step& step) {
   std::vector<Result<ClosureVerdict>> results(job.pairs.size());
   for_each_(job.pairs.size(), [&](std::size_t i) { results[i] = verify(job.pairs[i]); });
   Verdicts answer{.job = job.id, .verdicts = {}, .failed = {}, .why = {}};
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i]) {
       if (clock_ && !results[i]->closures.empty()) results[i]->verified_ns = clock_();
-      answer.verdicts.push_back(std::move(*results[i]));
+      if (auto later = known_at(*results[i], now); !later.empty())
+        later_.add(job.id, std::move(*results[i]), std::move(later));
+      else
+        answer.verdicts.push_back(std::move(*results[i]));
       continue;
     }
     if (answer.failed.empty()) answer.why = results[i].error().message.substr(0, wire::kMaxReasonBytes);
     answer.failed.push_back(job.pairs[i]);
   }
-  send(bus::MessageKind::verdicts, job.id, wire::encode(answer), step);
+  if (later_.has(job.id)) answer.job = later_.part_of(job.id);
+  if (!later_.has(job.id) || !answer.verdicts.empty() || !answer.failed.empty())
+    send(bus::MessageKind::verdicts, answer.job, wire::encode(answer), step);
+  tell_later(now, step);
 }
 
 }  // namespace tutti::node

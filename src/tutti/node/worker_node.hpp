@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tutti/node/frame_cache.hpp"
+#include "tutti/node/later_answers.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/node/submap_frames.hpp"
 #include "tutti/server/closure_finder.hpp"
@@ -21,8 +22,9 @@ namespace tutti::node {
 
 /// Verifies loop closures and refines maps for the server, with the finder or refiner that the job names: the worker's
 /// own, or one made from the job's settings. A job that it cannot do goes back to the server, and the worker then
-/// pauses so that other workers get the job. It keeps nothing between jobs that it could not get again. A worker that
-/// lacks submaps of a job asks the server for them, and holds the job until they are there.
+/// pauses so that other workers get the job. It keeps nothing between jobs that it could not get again, except closures
+/// that become known later (LaterAnswers): a worker that ends forgets those of pairs that it has begun to answer. A
+/// worker that lacks submaps of a job asks the server for them, and holds the job until they are there.
 class WorkerNode {
  public:
   /// Calls its argument with 0 ... count - 1, in any order and possibly on several threads, and returns after the last
@@ -61,7 +63,7 @@ class WorkerNode {
   /// it) is of a version that this program cannot read. In the last case the job is never answered and must be left to
   /// another worker.
   [[nodiscard]] bool holds_job() const { return held_.has_value() || leaves_job_ || rests_until_.has_value(); }
-  /// When on_timer() is to be called next; nothing while no job is held.
+  /// When on_timer() is to be called next; nothing while no job is held and no closure is to become known.
   [[nodiscard]] std::optional<Timestamp> next_timer() const;
   Step on_timer(Timestamp now);
 
@@ -83,9 +85,11 @@ class WorkerNode {
   Status prepare(const RefinementJob& job);
   void decline(const Job& job, const std::string& why, Step& step) const;
   void decline(const RefinementJob& job, const std::string& why, Step& step) const;
-  void answer(const Job& job, Step& step) const;
-  void answer(const RefinementJob& job, Step& step) const;
-  void answer(const AnyJob& job, Step& step) const;
+  void answer(const Job& job, Timestamp now, Step& step);
+  [[nodiscard]] std::vector<Timestamp> known_at(const ClosureVerdict& verdict, Timestamp now);
+  void tell_later(Timestamp now, Step& step);
+  void answer(const RefinementJob& job, Timestamp now, Step& step);
+  void answer(const AnyJob& job, Timestamp now, Step& step);
   [[nodiscard]] Result<ClosureVerdict> verify(const SubmapPair& pair) const;
   [[nodiscard]] Result<ClosureVerdict> verify_or_throw(const SubmapPair& pair) const;
   [[nodiscard]] Result<Refinement> refine(const RefinementJob& job) const;
@@ -106,6 +110,7 @@ class WorkerNode {
   double rest_s_ = kRest_s;
   std::optional<Timestamp> rests_until_;
   bool leaves_job_ = false;
+  LaterAnswers later_;
 };
 
 }  // namespace tutti::node

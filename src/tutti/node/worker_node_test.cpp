@@ -87,6 +87,59 @@ TEST_F(WorkerNodeTest, AFinderThatThrowsCostsThePairAndNothingElse) {
   EXPECT_NE(verdicts.why.find("_M_range_check"), std::string::npos) << verdicts.why;
 }
 
+/// Knows the closure of submap n 100 n seconds after the robots' clock began, and one more 1000 s later.
+class LaterFinder final : public server::ClosureFinder {
+ public:
+  [[nodiscard]] MethodId id() const override { return there_.id(); }
+  [[nodiscard]] bool is_candidate(const Submap& first, const Submap& second) const override {
+    return there_.is_candidate(first, second);
+  }
+  [[nodiscard]] bool can_compare(const PayloadSize& first, const PayloadSize& second) const override {
+    return there_.can_compare(first, second);
+  }
+  [[nodiscard]] Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
+                                              const server::PayloadStore& payloads) const override {
+    auto verdict = there_.verify(first, second, payloads);
+    if (verdict && !verdict->closures.empty()) verdict->closures.push_back(verdict->closures.front());
+    return verdict;
+  }
+  [[nodiscard]] std::vector<Timestamp> known_at(const Submap& first, const Submap&) const override {
+    return {Timestamp{} + 100.0 * first.id.index, Timestamp{} + (100.0 * first.id.index + 1000.0)};
+  }
+
+ private:
+  test::EvenFinder there_;
+};
+
+TEST_F(WorkerNodeTest, AnswersWithEachClosureWhenItIsKnownAndTheJobWithTheLast) {
+  WorkerNode worker(kWorker, std::make_shared<LaterFinder>(), frames());
+  Job job{.id = "1/0", .pairs = {}};
+  for (std::uint32_t i = 0; i < 3; ++i) job.pairs.push_back({{kAlpha, i}, {kBravo, 2}});
+  const Timestamp newest = test::submap(kBravo, 2).submap.keyframes.back().stamp;
+  const Timestamp now = newest + 5000.0;  // the clock here is 5000 s ahead
+  const Step step = worker.receive(envelope(job), now);
+  EXPECT_FALSE(worker.holds_job());
+  ASSERT_EQ(step.messages.size(), 2U);  // the refusal, and what is known of submap 0
+  std::vector<Verdicts> told;
+  for (const bus::Envelope& message : step.messages) told.push_back(wire::decode_verdicts(*message.bytes).value());
+  EXPECT_NE(told[0].job, "1/0");
+  EXPECT_NE(told[1].job, "1/0");
+  EXPECT_NE(step.messages[0].id, step.messages[1].id);
+  ASSERT_EQ(told[0].verdicts.size(), 1U);
+  EXPECT_TRUE(told[0].verdicts[0].refusal.has_value());
+  ASSERT_EQ(told[1].verdicts.size(), 1U);
+  EXPECT_EQ(told[1].verdicts[0].pair, job.pairs[0]);
+  EXPECT_EQ(told[1].verdicts[0].closures.size(), 1U);
+  ASSERT_EQ(worker.next_timer(), Timestamp{} + 5200.0);
+  EXPECT_EQ(answer(worker.on_timer(*worker.next_timer())).verdicts.at(0).pair, job.pairs[2]);
+  EXPECT_EQ(answer(worker.on_timer(Timestamp{} + 6000.0)).verdicts.at(0).closures.size(), 2U);
+  ASSERT_EQ(worker.next_timer(), Timestamp{} + 6200.0);
+  const Verdicts last = answer(worker.on_timer(*worker.next_timer()));
+  EXPECT_EQ(last.job, "1/0");
+  EXPECT_EQ(last.verdicts.at(0).closures.size(), 2U);
+  EXPECT_FALSE(worker.next_timer().has_value());
+}
+
 /// What a worker asks the server for, and the server's answers.
 class DistantWorkerTest : public WorkerNodeTest {
  protected:

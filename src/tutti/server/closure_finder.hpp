@@ -35,6 +35,12 @@ class ClosureFinder {
   /// error means that one could not be read: there is no verdict, and the pair may be verified another time.
   [[nodiscard]] virtual Result<ClosureVerdict> verify(const Submap& first, const Submap& second,
                                                       const PayloadStore& payloads) const = 0;
+  /// For closures that others find while robots drive: when each closure of verify()'s verdict becomes known, by the
+  /// robots' clock, in their order and not decreasing. A worker answers with each when it is known. Empty: verify()
+  /// found them.
+  [[nodiscard]] virtual std::vector<Timestamp> known_at(const Submap& /*first*/, const Submap& /*second*/) const {
+    return {};
+  }
 };
 
 class MapRefiner;
