@@ -246,14 +246,18 @@ int merge_maps(const MergeOptions& options) {
 }
 
 int salvage_map(const fs::path& in, const fs::path& out) {
-  const auto salvaged = mapfile::salvage(in, out);
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const auto salvaged = mapfile::salvage(
+      in, out, static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()));
   if (!salvaged) return complain("map salvage", salvaged.error().message);
   for (const std::string& lost : salvaged->lost) fmt::print("lost  {}\n", lost);
   std::string rows;
   for (const auto& [table, count] : salvaged->rows)
     rows += fmt::format("{}{} {}", rows.empty() ? "" : ", ", count, table);
   fmt::print("{}: {}; {}\n", out.string(), rows.empty() ? "no rows" : rows,
-             salvaged->lost.empty() ? "nothing is lost" : "robots send again what they have of the rest");
+             salvaged->kind == "robot" ? "the robot that opens it sends these submaps and begins a session"
+             : salvaged->lost.empty()  ? "nothing is lost"
+                                       : "robots send again what they have of the rest");
   return 0;
 }
 

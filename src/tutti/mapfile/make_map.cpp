@@ -45,14 +45,15 @@ void remove_store(const fs::path& file) {
   for (const char* end : {"", "-wal", "-shm", "-journal"}) fs::remove(file.string() + end, failure);
 }
 
-Status make_map(const fs::path& out, const std::function<Status(storage::TableStore&)>& fill) {
+Status make_store(const fs::path& out, const storage::Schema& schema,
+                  const std::function<Status(storage::TableStore&)>& fill) {
   std::error_code failure;
   if (fs::exists(out, failure)) return fail(ErrorCode::io, "{}: is there already", out.string());
   const fs::path part = part_of(out);
   remove_store(part);
   Status done;
   {
-    auto made = storage::open_sqlite_store(part, storage::map_schema());
+    auto made = storage::open_sqlite_store(part, schema);
     done = made ? fill(**made) : tl::unexpected(made.error());
   }  // closed: one file
   if (done && !take_name(part, out))
@@ -65,6 +66,10 @@ Status make_map(const fs::path& out, const std::function<Status(storage::TableSt
     ::close(fd);
   }
   return {};
+}
+
+Status make_map(const fs::path& out, const std::function<Status(storage::TableStore&)>& fill) {
+  return make_store(out, storage::map_schema(), fill);
 }
 
 Status copy_map(const storage::TableStore& from, const fs::path& out) {

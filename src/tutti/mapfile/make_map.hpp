@@ -10,12 +10,15 @@
 
 namespace tutti::mapfile {
 
-/// Makes a new map's file that `fill` writes. `out` must not exist; it appears whole or, on an error, not at all.
+/// Makes a new store's file that `fill` writes. `out` must not exist; it appears whole or, on an error, not at all.
+Status make_store(const std::filesystem::path& out, const storage::Schema& schema,
+                  const std::function<Status(storage::TableStore&)>& fill);
+/// Makes a new map's file in the same manner.
 Status make_map(const std::filesystem::path& out, const std::function<Status(storage::TableStore&)>& fill);
 /// Makes a new map's file with all rows of another store; `out` as in make_map().
 Status copy_map(const storage::TableStore& from, const std::filesystem::path& out);
-/// The name that make_map() uses beside `out` until the file is whole, for programs that remove what an interrupted one
-/// left.
+/// The name that make_store() uses beside `out` until the file is whole, for programs that remove what an interrupted
+/// one left.
 std::filesystem::path part_of(const std::filesystem::path& out);
 /// Removes a store's file and what SQLite leaves beside it; a missing file is no error.
 void remove_store(const std::filesystem::path& file);

@@ -17,6 +17,7 @@ namespace salvage_test {
 namespace fs = std::filesystem;
 using test::Mapper;
 constexpr RobotId kAlpha{0};
+constexpr std::uint64_t kNow_ns = 1'700'000'000'000'000'000;
 const ChainId kWalk{kAlpha, 5};
 
 /// A map in a file.
@@ -48,7 +49,7 @@ TEST_F(SalvagedMap, LacksTheDamagedRowWhichIsNamedAndTakesItWhenItComesAgain) {
   damage("submaps", node::key_of(SubmapId{kWalk, 2}));
   EXPECT_FALSE(read(*open(map_).value()).has_value());
   const std::string before = read_file(map_.string()).value();
-  const auto salvaged = salvage(map_, out_);
+  const auto salvaged = salvage(map_, out_, kNow_ns);
   ASSERT_TRUE(salvaged.has_value()) << salvaged.error().message;
   EXPECT_EQ(salvaged->rows.at("submaps"), submaps_ - 1);
   ASSERT_EQ(salvaged->lost.size(), 1U);
@@ -70,17 +71,44 @@ TEST_F(SalvagedMap, LacksTheDamagedRowWhichIsNamedAndTakesItWhenItComesAgain) {
 TEST_F(SalvagedMap, WithoutItsOwnRowGoesOn) {
   damage("meta", "map");
   EXPECT_FALSE(read(*open(map_).value()).has_value());
-  ASSERT_TRUE(salvage(map_, out_).has_value());
+  ASSERT_TRUE(salvage(map_, out_, kNow_ns).has_value());
   const auto store = open(out_).value();
   Mapper mapper({kAlpha}, *store);
   EXPECT_EQ(mapper.server().state().submaps.size(), submaps_);
 }
 
+/// The first page is the same in every map; a map that was cut short lacks what was behind the cut.
+TEST_F(SalvagedMap, WithoutItsFirstPageIsWholeAndACutOneHasWhatIsBefore) {
+  const std::string whole = read_file(map_.string()).value();
+  std::string damaged = whole;
+  damaged.replace(0, 4096, 4096, '\x55');
+  ASSERT_TRUE(write_file(map_.string(), damaged));
+  EXPECT_NE(open(map_).error().message.find("tutti map salvage"), std::string::npos) << open(map_).error().message;
+  const auto salvaged = salvage(map_, out_, kNow_ns);
+  ASSERT_TRUE(salvaged.has_value()) << salvaged.error().message;
+  EXPECT_EQ(salvaged->kind, "map");
+  EXPECT_EQ(read(*open(out_).value())->submaps.size(), submaps_);
+
+  fs::remove(out_);
+  ASSERT_TRUE(write_file(map_.string(), whole.substr(0, whole.size() - 4096)));
+  EXPECT_NE(open(map_).error().message.find("tutti map salvage"), std::string::npos) << open(map_).error().message;
+  const auto cut = salvage(map_, out_, kNow_ns);
+  ASSERT_TRUE(cut.has_value()) << cut.error().message;
+  EXPECT_FALSE(cut->lost.empty());
+  EXPECT_GE(read(*open(out_).value())->submaps.size() + 2, submaps_);
+}
+
+TEST_F(SalvagedMap, OfNoBytesIsRefused) {
+  ASSERT_TRUE(write_file(map_.string(), ""));
+  EXPECT_NE(open(map_).error().message.find("0 bytes"), std::string::npos) << open(map_).error().message;
+  EXPECT_FALSE(salvage(map_, out_, kNow_ns).has_value());
+}
+
 TEST_F(SalvagedMap, IsNotThereWhenItFails) {
-  EXPECT_FALSE(salvage(folder_ / "missing", out_).has_value());
-  EXPECT_FALSE(salvage(map_, map_).has_value());
+  EXPECT_FALSE(salvage(folder_ / "missing", out_, kNow_ns).has_value());
+  EXPECT_FALSE(salvage(map_, map_, kNow_ns).has_value());
   ASSERT_TRUE(write_file((folder_ / "garbage").string(), std::string(9000, 'x')));
-  EXPECT_FALSE(salvage(folder_ / "garbage", out_).has_value());
+  EXPECT_FALSE(salvage(folder_ / "garbage", out_, kNow_ns).has_value());
   EXPECT_FALSE(fs::exists(out_));
 }
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/storage/sqlite_store.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
 #include <sys/statvfs.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <map>
@@ -17,7 +19,7 @@
 namespace tutti::storage {
 
 using internal::kApplicationId, internal::Database, internal::Statement, internal::Use, internal::hash_of,
-    internal::hex;
+    internal::hex, internal::sql_of_kind, internal::sql_of_store, internal::sql_of_table;
 namespace {
 
 constexpr std::size_t kLongestRow = std::size_t{256} << 20U;  // key and bytes; SQLite's own limit is 1e9
@@ -30,11 +32,8 @@ struct TableStatements {
   Statement sizes;
 };
 
-std::string sql_of_table(const std::string& table) {
-  return "CREATE TABLE " + table + " (key BLOB PRIMARY KEY NOT NULL, hash INTEGER NOT NULL, bytes BLOB NOT NULL)";
-}
-
-std::string sql_of_kind() { return "CREATE TABLE store (kind TEXT NOT NULL)"; }
+/// Ends the message of whoever refuses a damaged file.
+constexpr std::string_view kSalvage = "; 'tutti map salvage FILE -o NEW' copies the rows that are whole";
 
 class SqliteStore final : public TableStore {
  public:
@@ -53,6 +52,7 @@ class SqliteStore final : public TableStore {
   [[nodiscard]] Result<Statement> prepare(const std::string& sql) const;
   [[nodiscard]] Result<std::string> value_of(const std::string& sql) const;
   [[nodiscard]] Result<std::int64_t> number_of(const std::string& sql) const;
+  Status open_file(int flags);
   Status configure();
   Status create(const Schema& schema);
   Status check_kind(const Schema& schema) const;
@@ -78,11 +78,12 @@ tl::unexpected<Error> SqliteStore::failure(int code, std::string_view doing) con
     case SQLITE_BUSY:
       return fail(ErrorCode::io, "{}: is open in another program", file);
     case SQLITE_NOTADB:
-      return fail(ErrorCode::parse, "{}: not an SQLite file", file);
+      return fail(ErrorCode::parse, "{}: not an SQLite file, or its first page is damaged{}", file, kSalvage);
     case SQLITE_FULL:
       return fail(ErrorCode::io, "{}: {}: the disk, or the size that the file may have, is full", file, doing);
     case SQLITE_CORRUPT:
-      return fail(ErrorCode::parse, "{}: {}: the file is damaged: {}", file, doing, sqlite3_errmsg(database_.get()));
+      return fail(ErrorCode::parse, "{}: {}: the file is damaged: {}{}", file, doing, sqlite3_errmsg(database_.get()),
+                  kSalvage);
     default:
       return fail(ErrorCode::io, "{}: {}: {}", file, doing, sqlite3_errmsg(database_.get()));
   }
@@ -126,12 +127,9 @@ Result<std::int64_t> SqliteStore::number_of(const std::string& sql) const {
 
 /// Alone with the file from here on: in exclusive mode what is locked once is kept.
 Status SqliteStore::configure() {
-  sqlite3* database = nullptr;
-  const int code = sqlite3_open_v2(file_.c_str(), &database,
-                                   SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
-  database_.reset(database);
-  if (code != SQLITE_OK) return failure(code, "opening it");
-  if (sqlite3_db_readonly(database, "main") != 0) return fail(ErrorCode::io, "{}: cannot be written", file_.string());
+  if (const Status opened = open_file(SQLITE_OPEN_READWRITE); !opened) return opened;
+  if (sqlite3_db_readonly(database_.get(), "main") != 0)
+    return fail(ErrorCode::io, "{}: cannot be written", file_.string());
   // A map comes from anywhere: nothing in it is run.
   for (const char* sql : {"PRAGMA locking_mode = EXCLUSIVE", "PRAGMA trusted_schema = OFF",
                           "PRAGMA secure_delete = OFF", "PRAGMA synchronous = FULL", "BEGIN EXCLUSIVE", "COMMIT"})
@@ -139,11 +137,33 @@ Status SqliteStore::configure() {
   return {};
 }
 
+/// Beside its place, and whole when it gets its name: whoever is killed here leaves no store that is none.
 Status SqliteStore::create(const Schema& schema) {
-  std::string sql = "BEGIN;" + sql_of_kind() + ";INSERT INTO store VALUES('" + schema.kind + "');";
-  for (const std::string& table : schema.tables) sql += sql_of_table(table) + ";";
-  sql += fmt::format("PRAGMA application_id={};PRAGMA user_version={};COMMIT", kApplicationId, schema.version);
-  return run(sql);
+  const std::filesystem::path named = file_;
+  file_ += ".new";
+  std::error_code ignored;
+  for (const char* end : {"", "-journal"}) std::filesystem::remove(file_.string() + end, ignored);
+  Status made = open_file(SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  if (made) made = run(sql_of_store(schema));
+  database_.reset();
+  const std::filesystem::path part = std::exchange(file_, named);
+  if (!made) return made;
+  std::error_code failure;
+  std::filesystem::rename(part, named, failure);
+  if (failure) return fail(ErrorCode::io, "{}: cannot be made: {}", named.string(), failure.message());
+  if (const int folder = ::open(named.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); folder >= 0) {
+    ::fsync(folder);  // the name, too, is on the disk
+    ::close(folder);
+  }
+  return {};
+}
+
+Status SqliteStore::open_file(int flags) {
+  sqlite3* database = nullptr;
+  const int code = sqlite3_open_v2(file_.c_str(), &database, flags | SQLITE_OPEN_NOMUTEX, nullptr);
+  database_.reset(database);
+  if (code != SQLITE_OK) return failure(code, "opening it");
+  return {};
 }
 
 Status SqliteStore::check_kind(const Schema& schema) const {
@@ -192,16 +212,20 @@ Status SqliteStore::check(const Schema& schema) const {
                 schema.version, *found);
   const Result<std::string> damage = value_of("PRAGMA integrity_check(1)");
   if (!damage) return tl::unexpected(damage.error());
-  if (*damage != "ok") return fail(ErrorCode::parse, "{}: the file is damaged: {}", file, *damage);
+  if (*damage != "ok") return fail(ErrorCode::parse, "{}: the file is damaged: {}{}", file, *damage, kSalvage);
   return {};
 }
 
 Status SqliteStore::open(const Schema& schema) {
-  if (const Status done = configure(); !done) return done;
-  const Result<std::int64_t> tables = number_of("SELECT count(*) FROM sqlite_schema");
-  if (!tables) return tl::unexpected(tables.error());
-  if (*tables == 0)
+  std::error_code failed;
+  if (!std::filesystem::exists(file_, failed)) {
     if (const Status done = create(schema); !done) return done;
+  } else if (std::filesystem::is_regular_file(file_, failed) && std::filesystem::file_size(file_, failed) == 0) {
+    // SQLite would take it for a new one, and its log for nobody's.
+    return fail(ErrorCode::parse, "{}: 0 bytes, expected a {}, or no file for a new one{}", file_.string(), schema.kind,
+                kSalvage);
+  }
+  if (const Status done = configure(); !done) return done;
   if (const Status done = check_kind(schema); !done) return done;
   if (const Status done = add_tables(schema); !done) return done;
   if (const Status done = check(schema); !done) return done;
@@ -288,8 +312,8 @@ Status SqliteStore::commit(std::span<const Write> writes) {
 Status SqliteStore::check_row(std::string_view table, std::string_view key, std::int64_t hash,
                               std::string_view bytes) const {
   if (hash == hash_of(key, bytes)) return {};
-  return fail(ErrorCode::parse, "{}: {}, key x'{}': the row is damaged: its {} bytes do not have its hash",
-              file_.string(), table, hex(key), bytes.size());
+  return fail(ErrorCode::parse, "{}: {}, key x'{}': the row is damaged: its {} bytes do not have its hash{}",
+              file_.string(), table, hex(key), bytes.size(), kSalvage);
 }
 
 Result<std::optional<std::string>> SqliteStore::read(std::string_view table, std::string_view key) const {

@@ -91,8 +91,12 @@ TEST_F(SqliteStoreTest, WhatIsCommittedIsOnTheDisk) {
 TEST_F(SqliteStoreTest, WhatIsNoStoreIsRefusedAndLeftAlone) {
   const std::string text(5000, 'x');
   ASSERT_TRUE(write_file(file(), text));
-  expect_says(refusal(), {"some.tutti", "not an SQLite file"});
+  expect_says(refusal(), {"some.tutti", "not an SQLite file", "tutti map salvage"});
   EXPECT_EQ(read_file(file()).value(), text);
+
+  ASSERT_TRUE(write_file(file(), ""));  // SQLite would begin a new one there
+  expect_says(refusal(), {"some.tutti: 0 bytes", "tutti map salvage"});
+  EXPECT_EQ(fs::file_size(file()), 0U);
 
   fs::remove(file());
   run_sql("CREATE TABLE a (b); INSERT INTO a VALUES (1)");
@@ -153,7 +157,7 @@ TEST_F(SqliteStoreTest, ADamagedRowIsNamedAndTheOthersAreRead) {
   EXPECT_EQ(store->read("apples", "a").value(), "1");
   const auto damaged = store->read("apples", "\x01k");
   ASSERT_FALSE(damaged.has_value());
-  expect_says(damaged.error().message, {"some.tutti", "apples", "x'016b'", "damaged"});
+  expect_says(damaged.error().message, {"some.tutti", "apples", "x'016b'", "damaged", "tutti map salvage"});
   const Status scanned = store->scan("apples", "", [](auto, auto) { return true; });
   ASSERT_FALSE(scanned.has_value());
   expect_says(scanned.error().message, {"x'016b'"});

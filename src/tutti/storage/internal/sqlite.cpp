@@ -7,6 +7,18 @@
 
 namespace tutti::storage::internal {
 
+std::string sql_of_kind() { return "CREATE TABLE store (kind TEXT NOT NULL)"; }
+
+std::string sql_of_table(const std::string& table) {
+  return "CREATE TABLE " + table + " (key BLOB PRIMARY KEY NOT NULL, hash INTEGER NOT NULL, bytes BLOB NOT NULL)";
+}
+
+std::string sql_of_store(const Schema& schema) {
+  std::string sql = "BEGIN;" + sql_of_kind() + ";INSERT INTO store VALUES('" + schema.kind + "');";
+  for (const std::string& table : schema.tables) sql += sql_of_table(table) + ";";
+  return sql + fmt::format("PRAGMA application_id={};PRAGMA user_version={};COMMIT", kApplicationId, schema.version);
+}
+
 std::int64_t hash_of(std::string_view key, std::string_view bytes) {
   return static_cast<std::int64_t>(content_hash(bytes, content_hash(key)));
 }

@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "tutti/storage/table_store.hpp"
+
 /// SQLite's handles, and what stores have in every row.
 namespace tutti::storage::internal {
 
@@ -47,6 +49,12 @@ class Use {
  private:
   sqlite3_stmt* statement_;
 };
+
+/// The statements that make a store's tables: they are in its schema, letter by letter.
+std::string sql_of_kind();
+std::string sql_of_table(const std::string& table);
+/// Makes all of an empty store, in one transaction.
+std::string sql_of_store(const Schema& schema);
 
 /// FNV-1a over the key, then over the bytes. Any change within eight neighbouring bits changes it.
 std::int64_t hash_of(std::string_view key, std::string_view bytes);
