@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <numeric>
+
+#include "tutti/base/nearest_word.hpp"
 
 namespace tutti {
 namespace {
@@ -67,22 +68,6 @@ Result<ConfigNode*> step_into(ConfigNode& node, const PathStep& step, const std:
   for (auto& [key, value] : node.map)
     if (key == name) return &value;
   return &node.map.emplace_back(name, ConfigNode{}).second;
-}
-
-/// Levenshtein's distance: how many letters to insert, delete or replace.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row.back();
 }
 
 template <class Number>
@@ -217,11 +202,9 @@ void complain_of_unknown(Findings& findings, const std::string& path, const Find
       complain(findings, value, path, fmt::format("unknown key '{:.80}'", key));
       continue;
     }
-    const auto nearest = std::ranges::min_element(known, {}, [&key](const auto& k) { return edit_distance(key, k); });
-    const bool close =
-        nearest != known.end() && edit_distance(key, *nearest) <= std::max<std::size_t>(2, key.size() / 2);
+    const auto close = nearest_word(key, known);
     complain(findings, value, path.empty() ? key : path + "." + key,
-             close ? fmt::format("unknown key, did you mean '{}'?", *nearest)
+             close ? fmt::format("unknown key, did you mean '{}'?", *close)
                    : fmt::format("unknown key, known here: {}", fmt::join(known, ", ")));
   }
 }
