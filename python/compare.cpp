@@ -6,6 +6,7 @@
 
 #include "evaluation.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/geometry/so3.hpp"
 
 namespace tutti::python {
@@ -44,9 +45,7 @@ CompareReport compare(const Trajectory& a, const Trajectory& b, double tolerance
 
 void write(const CompareReport& report, const PathLike& folder) {
   const std::filesystem::path path(path_of(folder));
-  std::error_code failure;
-  std::filesystem::create_directories(path, failure);
-  if (failure) throw FileProblem(fmt::format("{}: cannot make the folder: {}", path.string(), failure.message()));
+  check(make_folder(path));
   check(write_file((path / "compare.html").string(), mission::compare_html(report)));
   check(write_file((path / "compare.json").string(), mission::compare_json(report)));
 }

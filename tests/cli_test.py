@@ -273,6 +273,7 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("export", self.path / "map", "-o", self.path / "map.mcap"), 0, "messages of")
         self.expect(tutti("run", "x", "--map", self.path / "map"), 2)
         self.expect(tutti("map", "export", self.path / "map", "--grid", self.path / "g.yaml"), 1, "no points below any robot")
+        self.expect(tutti("map", "merge", one, other, "-o", self.path / "new/folder/both"), 0, "0 submaps")
         self.expect(tutti("map", "export", self.path / "map", "--grid", "g.yaml", "--low", 2, "--high", 1), 2, "--low")
         self.expect(tutti("export", self.path / "out", "-o", self.path / "out.mcap"), 0, "messages of", "topics")
         self.expect(tutti("bag", "info", self.path / "out.mcap"), 0, "/alpha/corrected", "nav_msgs/msg/Path", "/tf_static")
@@ -294,6 +295,11 @@ class CommandLine(unittest.TestCase):
         header = (self.path / "walls.ply").read_bytes()[:400]
         self.assertIn(b"element face", header)
         self.expect(tutti("world", mission, "--points", 1, "-o", self.path / "points.ply"), 0)
+        new = self.path / "new"
+        self.expect(tutti("export", self.path / "map", "-o", new / "one/map.mcap"), 0, "messages of")
+        self.expect(tutti("map", "export", self.path / "map", "--g2o", new / "two/graph.g2o", "--tum", new / "three"), 0, "vertices")
+        self.expect(tutti("optimise", new / "two/graph.g2o", "-o", new / "four/graph.g2o"), 0, "chi2")
+        self.expect(tutti("export", self.path / "map", "-o", self.path / "map/x.mcap"), 1, "cannot make the folder")
         self.assertNotIn(b"element face", (self.path / "points.ply").read_bytes()[:400])
         replayed = self.mission("robots: [{name: a, odometry: {file: a}, scans: s}]\n")
         self.expect(tutti("world", replayed, "-o", self.path / "x.ply"), 2, "recordings", "simulation")

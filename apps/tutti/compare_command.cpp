@@ -12,6 +12,7 @@
 #include "compare_input.hpp"
 #include "options.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/mission/report/compare.hpp"
 
@@ -57,9 +58,7 @@ Result<mission::CompareReport> compare(const CompareOptions& options) {
 }
 
 Status write_files(const mission::CompareReport& report, const std::filesystem::path& folder) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) return fail(ErrorCode::io, "--out {}: cannot make the folder: {}", folder.string(), failure.message());
+  if (auto made = make_folder(folder); !made) return in_context("--out", made.error());
   if (auto ok = write_file((folder / "compare.html").string(), mission::compare_html(report)); !ok) return ok;
   return write_file((folder / "compare.json").string(), mission::compare_json(report));
 }

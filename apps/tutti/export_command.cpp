@@ -9,6 +9,7 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/exports/map_scene.hpp"
 #include "tutti/exports/run_scene.hpp"
 
@@ -32,6 +33,7 @@ Result<exports::Scene> scene_of(const std::string& input) {
 int export_scene(const SceneOptions& options) {
   const auto scene = scene_of(options.input);
   if (!scene) return complain("export", scene.error().message);
+  if (auto made = make_folder_of(options.output); !made) return complain("export", made.error().message);
   const auto written = exports::write_scene(*scene, options.output);
   if (!written) return complain("export", written.error().message);
   fmt::print("{}: {} messages of {} topics\n", options.output, written->messages, written->topics);

@@ -20,6 +20,7 @@
 #include "commands.hpp"
 #include "map_grid_options.hpp"
 #include "options.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/mapfile/closures.hpp"
 #include "tutti/mapfile/export.hpp"
 #include "tutti/mapfile/merge.hpp"
@@ -211,6 +212,8 @@ int export_map(const ExportOptions& options) {
   const auto content = mapfile::read(**map);
   if (!content) return complain("map export", content.error().message);
   const server::MapEstimate estimate = mapfile::estimate(*content);
+  for (const std::string& file : {options.g2o, options.ply})
+    if (auto made = make_folder_of(file); !made) return complain("map export", made.error().message);
   if (estimate.components > 1)
     fmt::print("note: {} components, of which each has a frame of its own\n", estimate.components);
   if (!options.g2o.empty()) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "options.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/grids/map_grid.hpp"
@@ -93,6 +94,8 @@ int export_grids(const storage::TableStore& map, const mapfile::Content& content
     if (options.config.grid.low_m >= options.config.grid.high_m)
       return complain("map export", "--low is not below --high", 2);
     if (auto ok = write_grid(map, content, estimate, options); !ok) return complain("map export", ok.error().message);
+  for (const std::string& file : {options.grid, options.voxels})
+    if (auto made = make_folder_of(file); !made) return complain("map export", made.error().message);
   }
   if (options.voxels.empty()) return 0;
   const auto voxels = grids::voxels_of_map(map, content, estimate, options.voxel_m, options.config.grid.mate_m);

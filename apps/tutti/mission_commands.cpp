@@ -13,6 +13,7 @@
 
 #include "commands.hpp"
 #include "options.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mapfile/make_map.hpp"
@@ -103,9 +104,9 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
     return 0;
   }
   const std::string out = arguments.out.string();
-  std::error_code failure;  // before the mission, not after it
-  fs::create_directories(out, failure);
-  if (failure) return failed(fmt::format("--out {}: cannot make the folder: {}", out, failure.message()));
+    if (auto made = make_folder_of(arguments.map); !made) return failed("--map " + made.error().message);
+    std::error_code failure;
+  if (auto made = make_folder(out); !made) return failed("--out " + made.error().message);  // before the mission
   if (!arguments.map.empty()) {
     if (fs::exists(arguments.map, failure))
       return failed(fmt::format("--map {}: is there already", arguments.map.string()), 2);
@@ -144,11 +145,12 @@ int write_world(const WorldOptions& options) {
     return complain("world", fmt::format("{}: source is '{}', expected 'simulation'", options.mission, config->source),
                     2);
   const auto mesh = simulation::world_mesh(config->simulation, options.seed);
-  const Status written =
-      options.points_m > 0.0
-          ? formats::write_ply(options.output,
-                               simulation::sample_surface(mesh, options.points_m, Rng(options.seed)).points)
-          : formats::write_ply(options.output, mesh.vertices, {}, mesh.triangles);
+  Status written = make_folder_of(options.output);
+  if (written)
+    written = options.points_m > 0.0
+                  ? formats::write_ply(options.output,
+                                       simulation::sample_surface(mesh, options.points_m, Rng(options.seed)).points)
+                  : formats::write_ply(options.output, mesh.vertices, {}, mesh.triangles);
   if (!written) return complain("world", written.error().message);
   fmt::print("{}: {} triangles, world of {} with seed {}\n", options.output, mesh.triangles.size(), config->mission,
              options.seed);

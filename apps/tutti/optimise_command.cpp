@@ -12,6 +12,7 @@
 #include "commands.hpp"
 #include "optimise_robust.hpp"
 #include "options.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/estimation/fixed_nodes.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
@@ -123,7 +124,8 @@ int run(OptimiseOptions options) {
                                                 ? "the edges do not determine every pose (singular)"
                                                 : "a pose or an edge is not a number"));
   file->graph.poses = outcome.solution.poses;
-  auto written = formats::write_g2o(options.output, *file);
+  auto written = make_folder_of(options.output);
+  if (written) written = formats::write_g2o(options.output, *file);
   if (written) written = copy_stamps(options);
   return written ? 0 : complain("optimise", written.error().message);
 }

@@ -12,6 +12,7 @@
 
 #include "options.hpp"
 #include "tutti/base/file.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/evaluation/ate.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
@@ -126,9 +127,7 @@ Status write_stamps(const std::string& path, const NamedGraph& graph, const serv
 }
 
 Status write_trajectories(const std::string& folder, const NamedGraph& graph, const server::MapEstimate& map) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) return fail(ErrorCode::io, "{}: cannot make the folder: {}", folder, failure.message());
+  if (auto made = make_folder(folder); !made) return made;
   std::vector<Trajectory> ways(graph.robot_names.size());
   for (const auto& node : map.nodes) ways[robot_of(node)].push_back({node.stamp, node.T_world_body});
   for (std::size_t r = 0; r < ways.size(); ++r)
@@ -226,6 +225,7 @@ void print(const NamedGraph& graph, const server::JudgedGraph& judged, const Sco
 
 Status write_all(const RobustOptions& options, const NamedGraph& graph, const server::JudgedGraph& judged,
                  const GraphTruth& truth) {
+  if (auto ok = make_folder_of(options.output); !ok) return ok;
   if (auto ok = write_graph(options.output, graph, judged.map); !ok) return ok;
   if (auto ok = write_stamps(options.output, graph, judged.map); !ok) return ok;
   if (auto ok = write_file(closures_beside(options.output), closures_csv(graph, judged, truth)); !ok) return ok;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tutti/base/file.hpp"
+#include "tutti/base/folder.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/ply.hpp"
@@ -34,9 +35,7 @@ Status export_g2o(const server::MapEstimate& map, const std::filesystem::path& f
 
 Result<std::vector<std::string>> export_tum(const Content& content, const server::MapEstimate& map,
                                             const std::filesystem::path& folder) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure) return fail(ErrorCode::io, "{}: cannot make the folder: {}", folder.string(), failure.message());
+  if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
   std::map<ChainId, Trajectory> trajectories;
   for (const MapNode& node : map.nodes) trajectories[node.id.chain].push_back({node.stamp, node.T_world_body});
   const server::ClosureNames names = content.closure_names();

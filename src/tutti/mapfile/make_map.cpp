@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "tutti/base/folder.hpp"
 #include "tutti/storage/sqlite_store.hpp"
 
 namespace tutti::mapfile {
@@ -49,6 +50,7 @@ Status make_store(const fs::path& out, const storage::Schema& schema,
                   const std::function<Status(storage::TableStore&)>& fill) {
   std::error_code failure;
   if (fs::exists(out, failure)) return fail(ErrorCode::io, "{}: is there already", out.string());
+  if (auto folder = make_folder_of(out); !folder) return folder;
   const fs::path part = part_of(out);
   remove_store(part);
   Status done;
