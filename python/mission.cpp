@@ -75,8 +75,7 @@ Outcome run_mission(const PathLike& mission, const PathLike& data, const std::op
                     const std::optional<PathLike>& map, const py::dict& settings, std::uint64_t seed, int threads,
                     const py::object& progress) {
   const std::string file = path_of(mission);
-  const auto assignments = to_assignments(settings);
-  return run(file == "demo" ? lab::demo_mission(assignments) : lab::load_mission(file, assignments),
+  return run(lab::load_mission(file, to_assignments(settings)),
              {path_of(data), optional_path(out), optional_path(map), seed, threads}, progress);
 }
 

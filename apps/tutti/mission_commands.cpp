@@ -194,7 +194,8 @@ void add_run_command(CLI::App& app, int& exit_code) {
       "correct the robots, and write a report (report.html, report.json, trajectories, graph, map).\n"
       "The same mission, data and seed give the same report.json.");
   const auto bags = std::make_shared<std::vector<std::string>>(), topics = std::make_shared<std::vector<std::string>>();
-  auto* mission = command->add_option("mission", arguments->mission, "Mission file")->type_name("MISSION.yaml");
+  auto* mission =
+      command->add_option("mission", arguments->mission, "Mission file, or 'demo'")->type_name("MISSION.yaml");
   auto* bag =
       command
           ->add_option(
@@ -238,7 +239,7 @@ void add_world_command(CLI::App& app, int& exit_code) {
   command->footer(
       "The very walls that the simulated LiDAR sees with the same seed, in the frame of the reference trajectories.\n"
       "Example: tutti world missions/tunnel.yaml -o tunnel.ply\n");
-  command->add_option("mission", options->mission, "Mission file with source: simulation.")
+  command->add_option("mission", options->mission, "Mission file with source: simulation, or 'demo'.")
       ->required()
       ->type_name("MISSION.yaml");
   command->add_option("-o,--output", options->output, "Where to write it.")->required()->type_name("OUT.ply");

@@ -43,7 +43,7 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
       "covariances, LiDAR scans with the times of their points, IMU, images, /tf, /tf_static, and the true poses\n"
       "(/ROBOT/truth, in one frame `world` for all). Stamps count from 1 January 2026, as robots' clocks agree.\n"
       "Example: tutti simulate missions/demo.yaml -o bags && tutti bag info bags/alpha\n");
-  command->add_option("mission", options->mission, "Mission file with source: simulation or hall.")
+  command->add_option("mission", options->mission, "Mission file with source: simulation or hall, or 'demo'.")
       ->required()
       ->type_name("MISSION.yaml");
   command->add_option("-o,--output", options->folder, "Where the bags are made; theirs must not be there.")

@@ -79,7 +79,7 @@ struct MissionConfig : mission::MissionConfig {
 /// Reads a mission from a document; `name` is the document's. Checks single fields only.
 Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& name);
 /// Loads a mission file, applies --set assignments, and checks what concerns several fields (unique names, files
-/// given).
+/// given). "demo" is the built-in mission, unless a file is called so.
 Result<MissionConfig> load_mission(const std::filesystem::path& file, const std::vector<std::string>& assignments);
 /// The same for a mission's text; `name` is used in errors.
 Result<MissionConfig> parse_mission(const std::string& text, const std::string& name,

@@ -33,6 +33,10 @@ TEST(MissionConfig, TheDemosAreMissions) {
   EXPECT_EQ(named(DemoSensors::lidar), "demo simulation lidar");
   EXPECT_EQ(named(DemoSensors::visual), "hall hall visual");
   EXPECT_EQ(named(DemoSensors::both), "hall_mixed hall sensors");
+  const auto by_name = load_mission("demo", {"agent.submap.duration_s=7"});
+  ASSERT_TRUE(by_name.has_value()) << by_name.error().message;
+  EXPECT_EQ(by_name->mission, "demo");
+  EXPECT_EQ(by_name->agent.submap.duration_s, 7.0);
 }
 
 TEST(MissionConfig, WhatAMissionNeedsIsAskedForByName) {

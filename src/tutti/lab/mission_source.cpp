@@ -15,8 +15,6 @@
 namespace tutti::lab {
 
 Result<MissionConfig> load(const MissionSource& source) {
-  std::error_code ignored;
-  if (source.file == "demo" && !std::filesystem::exists("demo", ignored)) return demo_mission(source.assignments);
   if (!source.file.empty()) return load_mission(source.file, source.assignments);
   auto root = parse_yaml("{}", "settings");
   if (!root) return tl::unexpected(root.error());

@@ -19,7 +19,7 @@ namespace tutti::lab {
 
 /// The mission that a program was started with.
 struct MissionSource {
-  std::string file;  ///< MISSION.yaml; "demo": the built-in mission; empty: none, and every setting has its default.
+  std::string file;  ///< As load_mission() takes it; empty: none, and every setting has its default.
   std::filesystem::path data;
   std::vector<std::string> assignments;  ///< KEY=VALUE
   std::uint64_t seed = 1;
