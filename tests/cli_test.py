@@ -57,6 +57,31 @@ class CommandLine(unittest.TestCase):
 
         self.expect(tutti("bag", "info", "--help"), 0, "BAG")
 
+    def test_what_people_type_before_they_know_the_commands(self):
+        self.assertEqual(tutti("version").stdout, tutti("--version").stdout)
+        self.assertEqual(tutti("help").stdout, tutti("--help").stdout)
+        self.assertEqual(tutti("help", "map", "export").stdout, tutti("map", "export", "--help").stdout)
+        self.expect(tutti("expotr", "out"), 2, "'expotr' is no command of tutti; did you mean 'tutti export'?")
+        self.expect(tutti("map", "closure", "lits", "x"), 2, "'lits' is no command of tutti map closure; did you mean 'tutti map closure list'?")
+        self.expect(tutti("dance"), 2, "'dance' is no command of tutti, expected one of demo, run, ", " map, ")
+        self.expect(tutti("dance", "--help"), 2, "'dance' is no command of tutti")
+        self.expect(tutti("help", "map", "exprot"), 2, "did you mean 'tutti map export'?")
+
+    def test_an_option_takes_one_value_and_leaves_the_arguments_alone(self):
+        mission = self.mission("source: simulation\nclosures: {finder: reference}\nsimulation: {robots: [{name: alpha, walk: {duration_s: 5}}]}\n")
+        some = ("--set", "agent.submap.duration_s=7", "--set", "simulation.sensors=none")
+        self.expect(tutti("run", "--print-config", *some, mission), 0, "duration_s: 7", "sensors: none")
+        self.expect(tutti("world", *some, mission, "-o", self.path / "walls.ply"), 0, "triangles")
+        self.expect(tutti("simulate", *some, mission, "-o", self.path / "bags"), 0, "messages")
+        self.expect(tutti("mission", "up", "--out", self.path / "up", "--set", "closures.finder=magic", mission), 2, "magic", "lidar")
+
+    def test_the_demo_is_a_mission_of_every_command(self):
+        self.expect(tutti("run", "demo", "--print-config", cwd=self.path), 0, "mission: demo\n")
+        self.assertEqual(tutti("run", "demo", "--print-config").stdout, tutti("demo", "--print-config").stdout)
+        self.expect(tutti("world", "demo", "-o", self.path / "walls.ply"), 0, "world of demo")
+        (self.path / "demo").write_text("mission: mine\n")
+        self.expect(tutti("run", "demo", cwd=self.path), 2, "demo", "robots: none")  # the file of this name
+
     def test_bag_info_says_what_is_there_and_what_is_missing(self):
         def counted(data, size=4):
             return len(data).to_bytes(size, "little") + data

@@ -26,6 +26,8 @@ class Manual(unittest.TestCase):
             self.assertIn(f"'{' '.join(['tutti', *path])}')", bash)
             flags = re.findall(r"^  ((?:-\w,)?--[\w-]+)", text, re.M)
             self.assertIn("-h,--help", flags)
+            # An option that took all words up to the next one would take the command's arguments, too.
+            self.assertEqual(re.findall(r"^  (?:-\w,)?--[\w-]+[^,\n]* \.\.\.", text, re.M), [])  # lists with commas are one word
             for flag in flags:
                 self.assertIn("\\fB" + flag.replace("-", "\\-") + "\\fR", page)
                 self.assertIn(flag.split(",")[-1], bash)
@@ -61,6 +63,7 @@ class Manual(unittest.TestCase):
         self.assertEqual(completed("demo", "--out", ""), ["folder"])
         self.assertEqual(completed("bag", "info", ""), ["completion", "folder"])
         self.assertEqual(completed("run", "--print-config", "co"), ["completion"])
+        self.assertEqual(completed("help", "optim"), ["optimise"])
 
 
 if __name__ == "__main__":

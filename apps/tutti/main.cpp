@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // One program, one thin file per subcommand.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
 #include <iostream>
+#include <string>
+#include <vector>
 
+#include "command_words.hpp"
 #include "commands.hpp"
 
 int main(int argc, char** argv) {
@@ -37,6 +41,13 @@ int main(int argc, char** argv) {
   tutti::app::add_worker_command(app, exit_code);
   tutti::app::add_mission_command(app, exit_code);
   tutti::app::add_manual_command(app, exit_code);
+  tutti::app::add_help_and_version_commands(app, exit_code);
+  tutti::app::take_one_value_each(app);
+  const std::vector<std::string> words(argv + 1, argv + std::max(argc, 1));
+  if (const auto named = tutti::app::named_command(app, words); !named.no_command.empty()) {
+    std::cerr << "tutti: " << tutti::app::no_such_command(named) << '\n';
+    return 2;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

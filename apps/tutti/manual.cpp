@@ -12,28 +12,23 @@
 #include <string_view>
 #include <vector>
 
+#include "command_words.hpp"
+
 namespace tutti::app {
 namespace {
 
 using Visit = void(const CLI::App&, const std::string& path);
 
-bool is_shown(const CLI::App* app) { return !app->get_name().empty() && !app->get_group().empty(); }
-bool is_shown(const CLI::Option* option) { return !option->get_group().empty(); }
-
-std::vector<const CLI::App*> subcommands(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App* other) { return is_shown(other); });
-}
-
 std::vector<const CLI::Option*> options(const CLI::App& app, bool positional) {
   return app.get_options([positional](const CLI::Option* option) {
-    return is_shown(option) && (positional ? option->get_positional() : option->nonpositional());
+    return !option->get_group().empty() && (positional ? option->get_positional() : option->nonpositional());
   });
 }
 
 /// Calls `visit` for `app` and what is below it, in the order of --help.
 void walk(const CLI::App& app, const std::string& path, const std::function<Visit>& visit) {
   visit(app, path);
-  for (const CLI::App* other : subcommands(app)) walk(*other, path + " " + other->get_name(), visit);
+  for (const CLI::App* other : shown_commands(app)) walk(*other, path + " " + other->get_name(), visit);
 }
 
 /// As groff reads it: nothing of it is a request or an escape, and '-' is the sign that is typed.
@@ -120,9 +115,12 @@ std::string completed_command(const CLI::App& app, const std::string& path) {
     flags.push_back(names_of(*option, " "));
     if (option->get_items_expected_max() > 0) values[completed_value(*option)].push_back(names_of(*option, "|"));
   }
-  for (const CLI::App* other : subcommands(app)) words.push_back(other->get_name());
   std::string positional = "_tutti_files";
-  if (const auto places = options(app, true); !places.empty()) positional = completed_value(*places.front());
+  const auto places = options(app, true);
+  if (!places.empty()) positional = completed_value(*places.front());
+  const bool takes_commands = !places.empty() && places.front()->get_type_name() == "COMMAND";  // help
+  for (const CLI::App* other : shown_commands(takes_commands ? *app.get_parent() : app))
+    words.push_back(other->get_name());
   if (!words.empty()) positional = fmt::format("_tutti_words '{}'", fmt::join(words, " "));
   std::string out = fmt::format("    '{}')\n      case \"$previous\" in\n", path);
   for (const auto& [how, names] : values) out += fmt::format("        {}) {} ;;\n", fmt::join(names, "|"), how);

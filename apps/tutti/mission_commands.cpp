@@ -86,9 +86,7 @@ void add_mission_options(CLI::App& command, MissionArguments& arguments) {
       .add_option("--set", arguments.assignments,
                   "Change a setting, e.g. --set agent.policy.name=spectral or --set agent.submap.duration_s=5;\n"
                   "may be given several times")
-      ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+      ->type_name("KEY=VALUE");
   command.add_flag("--print-config", arguments.print_config, "Print every setting with its value, and stop");
 }
 
@@ -104,10 +102,10 @@ int run_and_report(const Result<lab::MissionConfig>& config, MissionArguments& a
     return 0;
   }
   const std::string out = arguments.out.string();
-    if (auto made = make_folder_of(arguments.map); !made) return failed("--map " + made.error().message);
-    std::error_code failure;
   if (auto made = make_folder(out); !made) return failed("--out " + made.error().message);  // before the mission
   if (!arguments.map.empty()) {
+    if (auto made = make_folder_of(arguments.map); !made) return failed("--map " + made.error().message);
+    std::error_code failure;
     if (fs::exists(arguments.map, failure))
       return failed(fmt::format("--map {}: is there already", arguments.map.string()), 2);
     arguments.run.keep_map = [&arguments](const storage::TableStore& map) {
@@ -203,8 +201,6 @@ void add_run_command(CLI::App& app, int& exit_code) {
               "Instead of a mission file: a robot and what it recorded, a folder of rosbag2's, .mcap, .db3 or .bag;\n"
               "several times, e.g. --bag alpha=recordings/a --bag bravo=recordings/b. Topics are found by type")
           ->type_name("NAME=BAG")
-          ->expected(1)
-          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
           ->excludes(mission);
   command
       ->add_option("--topic", *topics,
@@ -212,8 +208,6 @@ void add_run_command(CLI::App& app, int& exit_code) {
                    "--topic alpha.odometry=/odom, or two frames of /tf: --topic 'alpha.odometry=odom->base_link'.\n"
                    "KIND is odometry, scans, images, depth (of the one camera; none: no depth), imu or fixes")
       ->type_name("NAME.KIND=TOPIC")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->needs(bag);
   command->add_option("--data", arguments->run.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");

@@ -38,9 +38,7 @@ inline CLI::Option* add_mission_argument(CLI::App& command, ProgramArguments& ar
       ->capture_default_str();
   command
       .add_option("--set", arguments.mission.assignments, "Change a setting of the mission; may be given several times")
-      ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+      ->type_name("KEY=VALUE");
   return command.add_option("mission_file", arguments.mission.file, what)->type_name("MISSION.yaml");
 }
 

@@ -86,11 +86,15 @@ void add_bag_play(CLI::App& bag, int& exit_code) {
                    "In front of every topic but /tf, /tf_static and /clock; frames stay as they are.")
       ->type_name("NAME");
   add_number(*command, "--rate", options->rate, "Times real time.", "R", within(1e-3, 1e6));
-  command->add_option("--topics", options->topics, "Only these, as the bag has them; default: all.")
+  command
+      ->add_option("--topics", options->topics,
+                   "Only this one, as the bag has it; may be given several times; default: all.")
       ->type_name("TOPIC");
   command
-      ->add_option("--wait-for", options->wait_for,
-                   "Topics as they are published: each has a subscriber before the first message is sent.")
+      ->add_option(
+          "--wait-for", options->wait_for,
+          "A topic as it is published: it has a subscriber before the first message is sent; may be given several "
+          "times.")
       ->type_name("TOPIC");
   add_number(*command, "--delay", options->delay_s,
              "Before the first message; subscribers find out where it plays, which takes a moment.", "S",

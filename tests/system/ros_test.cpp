@@ -117,7 +117,8 @@ TEST_F(Ros, ARealBagArrivesInAnotherProcessToTheByte) {
   const auto participant = join_loopback();
   const auto odom = participant->reader("/r1/odom", "nav_msgs/msg/Odometry", kKeepAll, "").value();
   const auto tf = participant->reader("/tf", "tf2_msgs/msg/TFMessage", kKeepAll, "").value();
-  start("play", {"bag", "play", bag, "--namespace", "r1", "--rate", "1000", "--wait-for", "/r1/odom", "/tf"});
+  start("play",
+        {"bag", "play", bag, "--namespace", "r1", "--rate", "1000", "--wait-for", "/r1/odom", "--wait-for", "/tf"});
   const auto late = participant->reader("/tf_static", "tf2_msgs/msg/TFMessage", ros::kStaticTfQos, "").value();
   const auto hear = [&](ros::Reader& from, const std::string& topic) {
     for (std::string& message : taken(from)) heard[topic].push_back(std::move(message));
@@ -341,8 +342,9 @@ TEST_F(Ros, TwoRobotsAndAServerMakeTheMapOfTheirBags) {
     words.insert(words.end(), {"--name", name, "--state", (folder_ / ("of_" + name)).string()});
     start(name, words, mission);
   }
-  start("play", {"bag", "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(), "--rate", rate,
-                 "--wait-for", "/alpha/points", "/bravo/points", "/alpha/fix", "/bravo/fix"});
+  start("play",
+        {"bag", "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(), "--rate", rate, "--wait-for",
+         "/alpha/points", "--wait-for", "/bravo/points", "--wait-for", "/alpha/fix", "--wait-for", "/bravo/fix"});
   std::map<std::string, Heard> heard;
   std::map<Timestamp, Timestamp> sampled;
   std::vector<std::string> grids, clouds;
@@ -423,12 +425,13 @@ class RosImages : public Ros {
       if (name == "bravo") words.insert(words.end(), of_bravo.begin(), of_bravo.end());
       start(name, words, mission);
     }
-    std::vector<std::string> play{
-        "bag", "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(), "--rate", rate, "--wait-for"};
+    std::vector<std::string> play{"bag",    "play", (folder_ / "alpha").string(), (folder_ / "bravo").string(),
+                                  "--rate", rate};
+    const auto wait_for = [&play](const std::string& topic) { play.insert(play.end(), {"--wait-for", topic}); };
     for (const std::string name : {"/alpha/", "/bravo/"}) {
-      for (const std::string topic : {"odom", "imu"}) play.push_back(name + topic);
+      for (const std::string topic : {"odom", "imu"}) wait_for(name + topic);
       for (const std::string& topic : images)
-        for (const std::string part : {"/image_raw", "/camera_info"}) play.push_back(name + topic + part);
+        for (const std::string part : {"/image_raw", "/camera_info"}) wait_for(name + topic + part);
     }
     start("play", play);
     ASSERT_TRUE(within(3 * kPatience_s,
