@@ -10,6 +10,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+import time
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -46,10 +47,38 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     return wheel
 
 
+def terminal():
+    """Where a person looks, if it is not what is printed to: pip keeps that to itself (without -v), for minutes."""
+    try:
+        return None if sys.stdout.isatty() else open("/dev/tty", "w")
+    except OSError:
+        return None
+
+
+def build(command, screen):
+    """Runs ninja, and says on the screen, where there is one, how far it is: in one line, which pip's next one replaces."""
+    began, shown = time.monotonic(), 0.0
+    minutes = lambda: f"{(time.monotonic() - began) / 60:.1f} min"
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace") as ninja:
+        for line in ninja.stdout:
+            print(line, end="", flush=True)
+            done = re.match(r"\[(\d+)/(\d+)\]", line)
+            if done and screen and time.monotonic() >= shown + 1:
+                shown = time.monotonic()
+                screen.write(f"\r\033[K  Building tutti: {done[1]} of {done[2]} steps, {minutes()}\r")
+                screen.flush()
+    if screen:
+        screen.write(f"\r\033[K  Building tutti: {minutes()}, ")
+        screen.flush()
+    if ninja.returncode:
+        raise subprocess.CalledProcessError(ninja.returncode, command)
+
+
 def install(prefix):
     folder = pathlib.Path(os.environ.get("TUTTI_PYTHON_BUILD_DIR", ROOT / "build/python"))
     if "TUTTI_PYTHON_BUILD_DIR" not in os.environ or not (folder / "CMakeCache.txt").exists():
         subprocess.run(["cmake", "-S", ROOT, "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DTUTTI_UNITY=ON",
-                        f"-DTUTTI_UNITY_DIR={ROOT / 'build/unity'}", "-DTUTTI_BUILD_TESTS=OFF", "-DTUTTI_BUILD_PYTHON=ON", f"-DPython3_EXECUTABLE={sys.executable}"], check=True)
-        subprocess.run(["cmake", "--build", folder, "--target", "tutti_python"], check=True)
+                        f"-DTUTTI_UNITY_DIR={ROOT / 'build/unity'}", "-DTUTTI_BUILD_TESTS=OFF", "-DTUTTI_BUILD_ROS=OFF", "-DTUTTI_BUILD_PYTHON=ON",
+                        f"-DPython3_EXECUTABLE={sys.executable}"], check=True)
+        build(["cmake", "--build", folder, "--target", "tutti_python"], terminal())
     subprocess.run(["cmake", "--install", folder, "--component", "python", "--prefix", prefix], check=True)

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The package as a whole: what it has, how it says so, and that it installs."""
 import ast
+import contextlib
+import importlib.util
 import inspect
+import io
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
 import time
@@ -91,6 +96,31 @@ class Wheel(InFolder):
     def test_pip_installs_it(self):
         """As `pip install .` does in a virtual environment, but for building it once more."""
         environment = {**os.environ, "TUTTI_PYTHON_BUILD_DIR": str(BUILD), "PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+    @staticmethod
+    def backend():
+        spec = importlib.util.spec_from_file_location("backend", SOURCE / "python/backend.py")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    def test_who_waits_for_the_build_sees_how_far_it_is(self):
+        screen, said = io.StringIO(), io.StringIO()
+        ninja = [sys.executable, "-c", "print('[1/3] one\\n[3/3] three'); import sys; sys.exit(len(sys.argv) - 1)"]
+        with contextlib.redirect_stdout(said):
+            self.backend().build(ninja, screen)
+            self.assertRaises(subprocess.CalledProcessError, self.backend().build, [*ninja, "fails"], None)
+        self.assertIn("Building tutti: 1 of 3 steps, 0.0 min", screen.getvalue())
+        self.assertEqual(said.getvalue(), 2 * "[1/3] one\n[3/3] three\n")
+
+    def test_only_what_it_needs_is_built(self):
+        ninja = shutil.which("ninja")
+        if not ninja or not (BUILD / "build.ninja").exists():
+            self.skipTest("not built with ninja")
+        commands = subprocess.run([ninja, "-C", BUILD, "-t", "commands", "tutti_python"], capture_output=True, text=True, check=True).stdout
+        built = set(re.findall(r"CMakeFiles/(\w+)\.dir/", commands))
+        self.assertIn("tutti_lab", built)
+        self.assertEqual(built & {"tutti_program", "tutti_feed", "tutti_lab_programs", "tutti_ros", "tutti_exports", "tutti_commands"}, set())
+
         environment.pop("PYTHONPATH", None)
         subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", self.path / "venv"], check=True)
         python = self.path / "venv/bin/python"
