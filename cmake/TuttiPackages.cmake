@@ -50,12 +50,20 @@ function(tutti_install_debian component package)
 endfunction()
 
 # tutti_install_program(<target> <component> <package> [EXCLUDE_FROM_ALL]): with manual, completion, units and documents.
-# Units are written when they are installed, since they say where the program is.
+# Manual and completion are written when they are installed, from the program's own tables: whoever has built the program
+# can make its package. So are units, since they say where the program is.
 function(tutti_install_program target component package)
   set(docs "${CMAKE_INSTALL_DATADIR}/doc/${package}")
   install(TARGETS ${target} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT ${component} ${ARGN})
-  install(FILES "${PROJECT_BINARY_DIR}/manual/tutti.1.gz" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT ${component} ${ARGN})
-  install(FILES "${PROJECT_BINARY_DIR}/manual/tutti" DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions" COMPONENT ${component} ${ARGN})
+  set(manual "${PROJECT_BINARY_DIR}/manual/${package}")
+  install(CODE "
+    file(MAKE_DIRECTORY \"${manual}\")
+    execute_process(COMMAND \"$<TARGET_FILE:${target}>\" manual man OUTPUT_FILE \"${manual}/tutti.1\" COMMAND_ERROR_IS_FATAL ANY)
+    execute_process(COMMAND gzip -9nf \"${manual}/tutti.1\" COMMAND_ERROR_IS_FATAL ANY)
+    execute_process(COMMAND \"$<TARGET_FILE:${target}>\" manual bash OUTPUT_FILE \"${manual}/tutti\" COMMAND_ERROR_IS_FATAL ANY)"
+    COMPONENT ${component} ${ARGN})
+  install(FILES "${manual}/tutti.1.gz" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT ${component} ${ARGN})
+  install(FILES "${manual}/tutti" DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions" COMPONENT ${component} ${ARGN})
   install(FILES "${PROJECT_SOURCE_DIR}/deploy/tutti.sysusers" RENAME tutti.conf DESTINATION lib/sysusers.d COMPONENT ${component} ${ARGN})
   foreach(unit IN ITEMS tutti-server tutti-robot@ tutti-worker@)
     install(CODE "
@@ -64,25 +72,13 @@ function(tutti_install_program target component package)
       file(INSTALL \"${PROJECT_BINARY_DIR}/deploy/${unit}.service\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/lib/systemd/system\")"
       COMPONENT ${component} ${ARGN})
   endforeach()
-  install(FILES "${PROJECT_SOURCE_DIR}/README.md" "${PROJECT_SOURCE_DIR}/CHANGELOG.md" DESTINATION "${docs}" COMPONENT ${component} ${ARGN})
+  install(FILES "${PROJECT_SOURCE_DIR}/deploy/debian/README.md" "${PROJECT_SOURCE_DIR}/CHANGELOG.md" DESTINATION "${docs}" COMPONENT ${component} ${ARGN})
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/docs" DESTINATION "${docs}" COMPONENT ${component} ${ARGN}
           FILES_MATCHING PATTERN "*.md" PATTERN results EXCLUDE PATTERN decisions EXCLUDE PATTERN images EXCLUDE)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/missions" DESTINATION "${CMAKE_INSTALL_DATADIR}/tutti" COMPONENT ${component} ${ARGN})
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/proto" DESTINATION "${docs}/examples" COMPONENT ${component} ${ARGN})
   install(FILES "${PROJECT_SOURCE_DIR}/examples/feed_client.py" DESTINATION "${docs}/examples" COMPONENT ${component} ${ARGN})
   tutti_install_debian(${component} ${package} ${ARGN})
-endfunction()
-
-# The manual and the completion, from the program's own tables.
-function(tutti_make_manual target)
-  set(folder "${PROJECT_BINARY_DIR}/manual")
-  file(MAKE_DIRECTORY "${folder}")
-  add_custom_command(OUTPUT "${folder}/tutti.1.gz" "${folder}/tutti"
-    COMMAND ${target} manual man > "${folder}/tutti.1"
-    COMMAND gzip -9nf "${folder}/tutti.1"
-    COMMAND ${target} manual bash > "${folder}/tutti"
-    DEPENDS ${target} COMMENT "manual" VERBATIM)
-  add_custom_target(tutti_manual ALL DEPENDS "${folder}/tutti.1.gz")
 endfunction()
 
 if(NOT TUTTI_INSTALL OR TUTTI_SANITIZE)
@@ -120,7 +116,6 @@ set(method "Several robots map the same place, each with its own odometry. A ser
 joins their maps and sends back, in kilobytes, what each robot needs to agree
 with the joint map.")
 if(TARGET tutti)
-  tutti_make_manual(tutti)
   tutti_install_program(tutti program tutti)
   set(scripts "${PROJECT_SOURCE_DIR}/deploy/debian/postinst;${PROJECT_SOURCE_DIR}/deploy/debian/prerm;${PROJECT_SOURCE_DIR}/deploy/debian/postrm")
   # libblas.so.3 may be a reference BLAS, which makes updates of a map many times slower.

@@ -29,6 +29,7 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
         cls.path = pathlib.Path(cls.folder.name)
+        shutil.rmtree(BUILD / "manual", ignore_errors=True)  # what `ninja tutti` alone has built is enough
         done = run("cpack", "-G", "DEB", "--config", BUILD / "CPackConfig.cmake", "-B", cls.path / "made", "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=none",
                    cwd=cls.path)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -116,6 +117,18 @@ class Packages(unittest.TestCase):
             completed = lambda *words: run("bash", "-c", script, "bash", self.path / name / "usr/share/bash-completion/completions/tutti", "tutti", *words)
             self.assertEqual(completed("map", "clos").stdout, "closure\n")
             self.assertEqual(completed("server", "--lis").stdout, "--listen\n")
+
+    def test_the_readme_names_only_what_is_in_the_package(self):
+        for name in PROGRAMS:
+            text = (self.path / name / f"usr/share/doc/{name}/README.md").read_text()
+            named = set(re.findall(r"`((?:/usr/|docs/|examples/|[A-Z]+\.md)[^`]*)`", text)) | set(re.findall(r"docs/[a-z-]+\.md", text))
+            self.assertGreater(len(named), 15)
+            for file in named:
+                self.assertTrue((self.path / name / f"usr/share/doc/{name}" / file if file[0] != "/" else self.path / name / file[1:]).exists(), file)
+            for mission in re.findall(r"`([a-z_]+\.yaml)`", text):
+                self.assertTrue((self.path / name / "usr/share/tutti/missions" / mission).exists(), mission)
+            for elsewhere in ("docs/results", "docs/images", "scripts/", "CONTRIBUTING", "LICENSE"):
+                self.assertNotIn(elsewhere, text)
 
     def test_systemd_has_nothing_to_say_of_the_units(self):
         if not shutil.which("systemd-analyze"):
