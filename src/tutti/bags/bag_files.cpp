@@ -41,6 +41,7 @@ Result<std::unique_ptr<BagReader>> boxed(Result<Reader> reader) {
 
 /// The file's first bytes are `magic`.
 Result<std::unique_ptr<BagReader>> open_plain(const std::string& path, const std::string& magic) {
+  if (magic.empty()) return fail(ErrorCode::parse, "{}: is empty (0 bytes), expected a recording", path);
   if (magic.starts_with(kSqliteMagic)) return boxed(Db3Reader::open(path));
   if (magic.starts_with(kRos1Magic)) return boxed(Ros1Reader::open(path));
   return boxed(McapReader::open(path));

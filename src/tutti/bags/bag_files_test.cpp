@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <tuple>
 
 #include "support/bags/rosbag2_writer.hpp"
@@ -159,6 +160,42 @@ TEST_F(BagFolders, ASqliteFileIsReadWithItsLogAndWithoutATrace) {
   EXPECT_EQ(count(closed), samples().size() + 5);
   EXPECT_EQ(count(killed), samples().size() + 5);
   for (const char* end : {"-wal", "-shm"}) EXPECT_FALSE(fs::exists(closed.string() + end)) << end;
+}
+
+/// A recorder that keeps a rollback journal was killed in the middle of a transaction whose pages had left its cache.
+TEST_F(BagFolders, OfASqliteFileWithAHotJournalItIsSaidHowToReadIt) {
+  const fs::path file = folder_ / "recorded.db3", killed = folder_ / "killed.db3";
+  write_db3(file, samples());
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
+  sqlite3_exec(
+      db,
+      "PRAGMA journal_mode=DELETE; PRAGMA cache_size=1; BEGIN; UPDATE messages SET data = zeroblob(9000); "
+      "INSERT INTO messages(topic_id, timestamp, data) SELECT topic_id, timestamp, zeroblob(9000) FROM messages",
+      nullptr, nullptr, nullptr);
+  fs::copy_file(file, killed);
+  fs::copy_file(file.string() + "-journal", killed.string() + "-journal");
+  sqlite3_close(db);
+  const auto refused = open_bag(killed.string());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("copy both, open the copy once with `sqlite3 COPY .tables`"),
+            std::string::npos)
+      << refused.error().message;
+  EXPECT_TRUE(fs::exists(killed.string() + "-journal"));
+  // What the advice does.
+  ASSERT_EQ(sqlite3_open(killed.c_str(), &db), SQLITE_OK);
+  sqlite3_exec(db, "SELECT name FROM sqlite_schema", nullptr, nullptr, nullptr);
+  sqlite3_close(db);
+  const Read read = read_all(**open_bag(killed.string()));
+  EXPECT_EQ(read.messages, read_all(**open_bag(file.string())).messages);
+  EXPECT_EQ(read.messages.size(), samples().size());
+}
+
+TEST_F(BagFolders, AnEmptySqliteFileIsCalledEmpty) {
+  std::ofstream(folder_ / "empty.db3").close();
+  const auto bag = open_bag((folder_ / "empty.db3").string());
+  ASSERT_FALSE(bag);
+  EXPECT_NE(bag.error().message.find("empty.db3: is empty (0 bytes)"), std::string::npos) << bag.error().message;
 }
 
 TEST_F(BagFolders, PackedMessagesThatAreBrokenAreLostAlone) {

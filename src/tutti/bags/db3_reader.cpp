@@ -44,19 +44,26 @@ tl::unexpected<Error> Db3Reader::fail_sqlite() const {
 Result<Db3Reader> Db3Reader::open(const std::string& path, std::int64_t most_bytes) {
   if (const auto file = open_file(path); !file) return tl::unexpected(file.error());
   std::error_code failure;
-  // What a recorder has left in a log beside the file belongs to it, and SQLite reads that only where it may write
-  // beside it too. A file without one is read without a trace.
+  // What a recorder has left in a log beside the file belongs to it. SQLite reads a write-ahead log only where it may
+  // write beside it, and takes back what a journal holds only where it may write the file itself, which nobody here
+  // does. A file without either is read without a trace.
   const auto has = [&](const char* end) {
     const auto size = std::filesystem::file_size(path + end, failure);
     return !failure && size > 0;
   };
-  const char* const log = has("-wal") ? "-wal" : has("-journal") ? "-journal" : nullptr;
+  const bool has_log = has("-wal"), has_journal = !has_log && has("-journal");
   Db3Reader reader(path, most_bytes);
-  const Status ok = reader.start(uri_of(path, log == nullptr ? "?immutable=1" : "?mode=ro"));
+  const Status ok = reader.start(uri_of(path, has_log || has_journal ? "?mode=ro" : "?immutable=1"));
   if (ok) return reader;
-  if (log == nullptr) return tl::unexpected(ok.error());
-  return fail(ok.error().code, "{}; {}{} beside it holds messages too: copy both to where files can be written",
-              ok.error().message, path, log);
+  if (has_log)
+    return fail(ok.error().code, "{}; {}-wal beside it holds messages too: copy both to where files can be written",
+                ok.error().message, path);
+  if (has_journal)
+    return fail(ok.error().code,
+                "{}; {}-journal beside it is needed to take back what was not stored whole, for which the file must be "
+                "written: copy both, open the copy once with `sqlite3 COPY .tables`, and read that",
+                ok.error().message, path);
+  return tl::unexpected(ok.error());
 }
 
 Status Db3Reader::start(const std::string& uri) {
