@@ -59,10 +59,12 @@ Card robot_card(const MissionRecord& record, const RobotRecord& robot) {
     card.value = from_to(headline_rmse(robot.onboard), headline_rmse(policy->accuracy)) +
                  fmt::format(" <small>server {}</small>", format_metres(headline_rmse(robot.server)));
   else
-    card.value =
-        format_metres(policy != nullptr ? for_headline(policy->agreement_rmse_m, robot.mapped_share) : std::nullopt) +
-        " <small>from the server</small>";
-  card.detail =
+    card.value = robot.onboard.rmse_m ? "-" : "not measured <small>no reference</small>";
+  const auto agreement = policy != nullptr ? for_headline(policy->agreement_rmse_m, robot.mapped_share) : std::nullopt;
+  if (!robot.onboard.rmse_m && agreement)
+    card.detail =
+        fmt::format("corrected and server agree within {} RMSE, however true both are<br>", format_metres(agreement));
+  card.detail +=
       fmt::format("<b>{}</b> constraints beside {} odometry factors ({}); <b>{}</b> received ({}), {} sent ({})",
                   constraints, robot.odometry_factors, format_share(constraints, robot.odometry_factors),
                   format_bytes(static_cast<double>(robot.bytes_down)), format_rate(robot.bytes_down, robot.duration_s),
@@ -84,8 +86,8 @@ std::string robots_html(const MissionRecord& record) {
   if (cards.empty()) return "";
   return fmt::format("<p class=\"lead\">{}</p>\n", referenced
                                                        ? "Error of every robot, RMSE: by its own odometry → corrected"
-                                                       : "Difference between corrected robots and server, RMSE; no "
-                                                         "reference, so errors could not be measured") +
+                                                       : "Error of every robot: not measured, because there is no "
+                                                         "reference") +
          cards_html(cards, "robots");
 }
 

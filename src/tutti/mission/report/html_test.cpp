@@ -229,6 +229,11 @@ TEST(ReportHtml, WorksWithoutReferenceCloudOrUpdates) {
   expect_good_page(html);
   EXPECT_EQ(html.find("Where and when"), std::string::npos);
   EXPECT_NE(html.find("no reference"), std::string::npos);
+  // How far corrected and server agree is no accuracy, and stands nowhere as large as one.
+  const std::string robots = html.substr(0, html.find("<div class=\"cards\">"));
+  EXPECT_EQ(all_between(robots, "<p class=\"value\">", "</p>"),
+            std::vector<std::string>(record.robots.size(), "not measured <small>no reference</small>"));
+  EXPECT_EQ(all_between(robots, "corrected and server agree within ", "<").size(), record.robots.size());
 }
 
 TEST(ReportHtml, EmptyMission) { expect_good_page(report_html(MissionRecord{})); }
@@ -318,7 +323,7 @@ TEST(ReportHtml, APartialFigureIsMarkedAndNoHeadline) {
   }
   EXPECT_NE(html.find("server (0.017 m, partial: on 6 %)"), std::string::npos) << "over the curves";
   EXPECT_NE(html.find("<td class=\"left\">server</td><td>(0.017 m)</td>"), std::string::npos) << "in the table";
-  record.robots[0].onboard = record.robots[0].server = {};  // no reference: the distance to the server is the headline
+  record.robots[0].onboard = record.robots[0].server = {};  // no reference
   for (PolicyRecord& policy : record.robots[0].policies) policy.accuracy = {};
   EXPECT_NE(headline(report_html(record)).find("to the server (0.020 m)"), std::string::npos);
 }
