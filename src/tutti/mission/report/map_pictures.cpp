@@ -58,8 +58,9 @@ Shown shown(const MissionRecord& record) {
 RgbaImage draw(const std::vector<CloudLayer>& layers, const PlanView& view,
                const std::function<std::optional<Eigen::Vector2d>(const Eigen::Vector3d&)>& to_plane) {
   constexpr double kPoint_m = 0.15;  // submaps are thinned to 0.3 m, and lie over each other
+  constexpr double kMost_px = 24.0;  // of a place of 10 m: at 5, points were dots on a black ground
   const int point_px =
-      static_cast<int>(std::lround(std::clamp(kPoint_m * view.pixels_per_metre() * kPixelRatio, 1.0, 5.0)));
+      static_cast<int>(std::lround(std::clamp(kPoint_m * view.pixels_per_metre() * kPixelRatio, 1.0, kMost_px)));
   PointRaster raster(static_cast<std::size_t>(std::ceil(kPixelRatio * view.width())),
                      static_cast<std::size_t>(std::ceil(kPixelRatio * view.height())));
   const Projection project = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector2d> {

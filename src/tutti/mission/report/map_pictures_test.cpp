@@ -147,6 +147,34 @@ TEST(MapPictures, ServerAndSurveyLieOnEachOther) {
   }
 }
 
+/// A room whose floor and ceiling three submaps have seen, each thinned to 0.3 m; a section of 10 m is shown.
+TEST(MapPictures, OfASmallPlaceAFloorIsALineAndNoDots) {
+  MissionRecord record = test::example_record({.robots = 1, .keyframes = 5, .cloud = true});
+  auto& points = record.server.clouds[0].cloud.points;
+  points.clear();
+  const std::uint32_t component = record.server.largest_component;
+  const Pose3 T_world_display = display_from_world(record, component).inverse();
+  const Eigen::Vector3d start = displayed_routes(record, component).front().front();
+  Rng rng(1);
+  for (int i = 0; i < 3 * 2 * 80 * 80; ++i) {
+    const Eigen::Vector3d corner(0.3 * (i % 80) - 12.0, 0.3 * (i / 80 % 80) - 12.0, i / 6400 % 2 == 0 ? 0.0 : 2.5);
+    const Eigen::Vector3d within(rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.3), 0.0);
+    points.push_back((T_world_display * (start + corner + within)).cast<float>());
+  }
+  record.robots[0].onboard_cloud.points.clear();
+  const MapPicture picture = map_section(record);
+  ASSERT_EQ(picture.panels.size(), 1U);
+  const RgbaImage& image = picture.panels[0].image;
+  std::size_t lit = 0;
+  for (std::size_t x = 0; x < image.width; ++x) {
+    bool any = false;
+    for (std::size_t y = image.height / 2; y < image.height; ++y)
+      any = any || at(image, x, y)[0] + at(image, x, y)[1] > 120;
+    lit += any ? 1 : 0;
+  }
+  EXPECT_GT(static_cast<double>(lit), 0.8 * static_cast<double>(image.width));
+}
+
 TEST(MapPictures, ComposeKeepsEveryPanel) {
   const MapPicture picture = map_from_above(test::example_record({.survey = true}));
   const RgbaImage image = compose(picture, 2);
