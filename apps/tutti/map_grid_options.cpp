@@ -13,6 +13,8 @@
 #include "tutti/formats/ply.hpp"
 #include "tutti/geometry/so3.hpp"
 #include "tutti/grids/map_grid.hpp"
+#include "tutti/mapfile/export.hpp"
+#include "tutti/mapfile/placement.hpp"
 
 namespace tutti::app {
 
@@ -62,6 +64,8 @@ Status write_grid(const storage::TableStore& map, const mapfile::Content& conten
   std::vector<std::string> notes;
   for (const auto& [chain, height] : made->body_height_m)
     notes.push_back(fmt::format("{}: {:.2f} m above the ground", content.closure_names().of(chain), height));
+  notes.push_back(mapfile::in_words(made->T_level_world) +
+                  " takes the world of the map, which .ply files of it are in, to this grid");
   notes.push_back(fmt::format("tilted from the map's world by {:.2f} deg, about its origin",
                               rotation_angle(made->T_level_world) / kRadPerDeg));
   if (const auto& earth = estimate.fixes.georeference) {
@@ -90,17 +94,18 @@ Status write_grid(const storage::TableStore& map, const mapfile::Content& conten
 
 int export_grids(const storage::TableStore& map, const mapfile::Content& content, const server::MapEstimate& estimate,
                  const GridOptions& options) {
+  for (const std::string& file : {options.grid, options.voxels})
+    if (auto made = make_folder_of(file); !made) return complain("map export", made.error().message);
   if (!options.grid.empty()) {
     if (options.config.grid.low_m >= options.config.grid.high_m)
       return complain("map export", "--low is not below --high", 2);
     if (auto ok = write_grid(map, content, estimate, options); !ok) return complain("map export", ok.error().message);
-  for (const std::string& file : {options.grid, options.voxels})
-    if (auto made = make_folder_of(file); !made) return complain("map export", made.error().message);
   }
   if (options.voxels.empty()) return 0;
   const auto voxels = grids::voxels_of_map(map, content, estimate, options.voxel_m, options.config.grid.mate_m);
   if (!voxels) return complain("map export", voxels.error().message);
-  if (auto ok = formats::write_ply(options.voxels, voxels->points); !ok)
+  const Pose3 T_level_world = mapfile::level_frame(estimate, mapfile::component_to_show(content, estimate));
+  if (auto ok = formats::write_ply(options.voxels, voxels->points, {}, {}, mapfile::world_comments(T_level_world)); !ok)
     return complain("map export", ok.error().message);
   fmt::print("{}: {} voxels of {} m\n", options.voxels, voxels->points.size(), options.voxel_m);
   return 0;

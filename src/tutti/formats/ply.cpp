@@ -140,12 +140,12 @@ Result<PointCloud> read_ply(const std::string& path) {
 }
 
 std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours,
-                   std::span<const Triangle> triangles) {
+                   std::span<const Triangle> triangles, std::span<const std::string> comments) {
   TUTTI_CHECK(colours.empty() || colours.size() == points.size(), "{} colours for {} points", colours.size(),
               points.size());
-  std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
-      points.size());
+  std::string out = "ply\nformat binary_little_endian 1.0\n";
+  for (const std::string& comment : comments) out += "comment " + comment + "\n";
+  out += fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", points.size());
   if (!colours.empty()) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (!triangles.empty())
     out += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", triangles.size());
@@ -167,8 +167,8 @@ std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb>
 }
 
 Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours,
-                 std::span<const Triangle> triangles) {
-  return write_file(path, to_ply(points, colours, triangles));
+                 std::span<const Triangle> triangles, std::span<const std::string> comments) {
+  return write_file(path, to_ply(points, colours, triangles, comments));
 }
 
 }  // namespace tutti::formats

@@ -23,11 +23,11 @@ using Triangle = std::array<std::uint32_t, 3>;  ///< Indices of the corners amon
 
 /// A PLY 1.0 file, binary little endian: vertices x y z (float) and, with colours, red green blue (uchar); with
 /// triangles an element `face` with the list vertex_indices (uchar, int). `colours` is empty or has one entry per
-/// point.
+/// point; `comments` are lines of the header, without line ends.
 std::string to_ply(std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {},
-                   std::span<const Triangle> triangles = {});
+                   std::span<const Triangle> triangles = {}, std::span<const std::string> comments = {});
 Status write_ply(const std::string& path, std::span<const Eigen::Vector3f> points, std::span<const Rgb> colours = {},
-                 std::span<const Triangle> triangles = {});
+                 std::span<const Triangle> triangles = {}, std::span<const std::string> comments = {});
 
 /// The vertices of an ascii or binary little-endian PLY file. x, y, z are float or double at any position; other scalar
 /// properties and elements after `vertex` (faces) are skipped, and points with a non-finite coordinate dropped. List

@@ -34,6 +34,10 @@ TEST(Ply, ColoursFollowTheirPoint) {
   EXPECT_EQ(bytes.substr(bytes.size() - 3), "\xfd\xfe\xff");
   EXPECT_EQ(bytes.substr(bytes.size() - 18, 3), "\x01\x02\x03");
   EXPECT_THROW((void)to_ply(points, std::vector<Rgb>(1)), std::logic_error);
+  const std::vector<std::string> comments{"frame: world", "end_header is no end here"};
+  const std::string commented = to_ply(points, colours, {}, comments);
+  EXPECT_NE(commented.find("comment frame: world\ncomment end_header is"), std::string::npos);
+  EXPECT_EQ(parse_ply(commented, "p")->points, points);
 }
 
 TEST(Ply, FacesFollowTheVertices) {

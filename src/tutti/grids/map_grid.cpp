@@ -21,14 +21,10 @@ class MapPart {
       : content_(content),
         map_(map),
         clouds_(node::SubmapFrames::of(store)),
-        component_(mapfile::component_to_show(content, map)) {
-    Eigen::Vector3d up = Eigen::Vector3d::Zero();
+        component_(mapfile::component_to_show(content, map)),
+        T_level_world_(mapfile::level_frame(map, component_)) {
     for (const auto& node : map.nodes)
-      if (node.component == component_) {
-        ways_[node.id.chain].push_back({node.stamp, node.T_world_body});
-        up += node.T_world_body.rotation * Eigen::Vector3d::UnitZ();
-      }
-    T_level_world_.rotation = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
+      if (node.component == component_) ways_[node.id.chain].push_back({node.stamp, node.T_world_body});
   }
 
   [[nodiscard]] const Pose3& T_level_world() const { return T_level_world_; }

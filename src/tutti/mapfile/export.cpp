@@ -74,6 +74,10 @@ Result<JointCloud> joint_cloud(const storage::TableStore& store, const Content& 
   return out;
 }
 
+std::vector<std::string> world_comments(const Pose3& T_level_world) {
+  return {"frame: the map's world", in_words(T_level_world) + " takes it to the frame of the map's grids"};
+}
+
 Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content& content,
                                  const server::MapEstimate& map, const std::filesystem::path& file) {
   const auto joint = joint_cloud(store, content, map);
@@ -82,7 +86,9 @@ Result<ExportedCloud> export_ply(const storage::TableStore& store, const Content
   const ExportedCloud out{points.size(), joint->submaps, joint->left_out,
                           joint->component == server::choose_components(map).largest};
   if (points.empty()) return out;
-  if (auto status = formats::write_ply(file.string(), points); !status) return tl::unexpected(status.error());
+  const auto frame = world_comments(level_frame(map, joint->component));
+  if (auto status = formats::write_ply(file.string(), points, {}, {}, frame); !status)
+    return tl::unexpected(status.error());
   return out;
 }
 

@@ -5,10 +5,12 @@
 
 #include "support/mapfile/small_map.hpp"
 #include "support/node/submaps.hpp"
+#include "tutti/base/file.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/formats/trajectory_file.hpp"
+#include "tutti/mapfile/placement.hpp"
 
 namespace tutti::mapfile {
 namespace export_test {
@@ -75,6 +77,25 @@ TEST_F(Export, GraphTrajectoriesAndCloudAreThoseOfTheServersMap) {
   for (const Eigen::Vector3f& point : points->points)
     nearest = std::min(nearest, (point.cast<double>() - expected).norm());
   EXPECT_LT(nearest, 0.15);  // a voxel, and the wire's rounding
+  // It says how it lies to grids of the map.
+  const std::string text = read_file((folder_ / "map.ply").string()).value();
+  const Pose3 T_level_world = level_frame(map, node->component);
+  EXPECT_NE(text.find("\ncomment frame: the map's world\ncomment " + in_words(T_level_world)), std::string::npos);
+}
+
+TEST(LevelFrame, HasTheMeanOfTheBodiesZAxesUp) {
+  server::MapEstimate map;
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.1, Eigen::Vector3d(1.0, 2.0, 0.0).normalized()));
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    const Eigen::AngleAxisd yaw(1.5 * i, Eigen::Vector3d::UnitZ());
+    map.nodes.push_back(
+        {.id = {{RobotId{0}, 5}, i}, .T_world_body = {tilt * yaw, {1.0 * i, 2.0, 3.0}}, .component = 1});
+  }
+  map.nodes.push_back({.id = {{RobotId{1}, 5}, 0}, .component = 0});
+  const Pose3 T_level_world = level_frame(map, 1);
+  EXPECT_LT((T_level_world.rotation * tilt * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+  EXPECT_EQ(T_level_world.translation, Eigen::Vector3d::Zero());
+  EXPECT_EQ(in_words(level_frame(map, 0)), "T_level_world 0 0 0 0 0 0 1 (x y z, quaternion x y z w)");
 }
 
 /// Of a small part with a camera on foot, and a large one without: there is something to see.
