@@ -22,9 +22,10 @@ constexpr double kArm_m = 5.0;  // as tutti compare: a rotation counts by how fa
 const TrajectoryComparison& only(const CompareReport& report) { return report.robots.front(); }
 const consistency::Explanation& explanation(const CompareReport& report) { return only(report).explanation; }
 
-CompareReport compare(const Trajectory& a, const Trajectory& b, double tolerance_m, std::optional<double> tolerance_deg,
-                      double odometry_sigma_m, double odometry_sigma_deg, double spacing_m, double false_alarm_rate,
-                      double max_gap_s, std::optional<double> max_difference_s) {
+CompareReport compare(const Trajectory& estimate, const Trajectory& reference, double tolerance_m,
+                      std::optional<double> tolerance_deg, double odometry_sigma_m, double odometry_sigma_deg,
+                      double spacing_m, double false_alarm_rate, double max_gap_s,
+                      std::optional<double> max_difference_s) {
   check_range(tolerance_m, 1e-9, 1e9, "tolerance_m");
   check_range(tolerance_deg.value_or(1.0), 1e-9, 180.0, "tolerance_deg");
   check_range(odometry_sigma_m, 1e-9, 1e9, "odometry_sigma_m");
@@ -39,7 +40,8 @@ CompareReport compare(const Trajectory& a, const Trajectory& b, double tolerance
                    .odometry_m = odometry_sigma_m,
                    .odometry_deg = odometry_sigma_deg,
                    .false_alarm_rate = false_alarm_rate};
-  report.robots.push_back(value_of(mission::compare_trajectories({"", a, {}}, {"", b, {}}, report.config)));
+  report.robots.push_back(
+      value_of(mission::compare_trajectories({"", reference, {}}, {"", estimate, {}}, report.config)));
   return report;
 }
 
@@ -88,8 +90,9 @@ void bind_parts(py::module_& m) {
 }
 
 void bind_comparison(py::module_& m) {
-  py::class_<CompareReport>(m, "Comparison",
-                            R"(Where, at which scale and since when b disagrees with a; what compare() returns.
+  py::class_<CompareReport>(
+      m, "Comparison",
+      R"(Where, at which scale and since when b, the estimate, disagrees with a, the reference; what compare() returns.
 
 Rows are n nodes along a in time order, columns the s scales, of which 0 is the largest. str() is what `tutti compare`
 prints; docs/compare.md defines every figure.)")
@@ -146,15 +149,16 @@ prints; docs/compare.md defines every figure.)")
 void bind_compare(py::module_& m) {
   bind_parts(m);
   bind_comparison(m);
-  m.def("compare", &compare, "a"_a, "b"_a, "tolerance_m"_a = 0.05, "tolerance_deg"_a = py::none(),
+  m.def("compare", &compare, "estimate"_a, "reference"_a, "tolerance_m"_a = 0.05, "tolerance_deg"_a = py::none(),
         "odometry_sigma_m"_a = 0.03, "odometry_sigma_deg"_a = 0.3, "spacing_m"_a = 0.0, "false_alarm_rate"_a = 0.01,
         "max_gap_s"_a = 0.2, "max_difference_s"_a = py::none(), py::call_guard<py::gil_scoped_release>(),
-        R"(Where, at which scale and since when trajectory b disagrees with a, which judges: `tutti compare`.
+        R"(Where, at which scale and since when an estimate disagrees with the reference, which judges: `tutti compare`.
 
-tolerance_m, tolerance_deg: standard deviation of a; the default angle moves a point 5 m away by tolerance_m.
-odometry_sigma_m, odometry_sigma_deg: of b's motion over 1 m, growing with the square root of the way. spacing_m: way
-between two nodes; 0: a 500th of the way. false_alarm_rate: chance of calling it disagreement when b differs within the
-tolerance only. Poses pair up as associate() says; b need not be aligned. ValueError: fewer than two common times.)");
+In what it returns the reference is a, the estimate b. tolerance_m, tolerance_deg: standard deviation of a; the default
+angle moves a point 5 m away by tolerance_m. odometry_sigma_m, odometry_sigma_deg: of b's motion over 1 m, growing with the
+square root of the way. spacing_m: way between two nodes; 0: a 500th of the way. false_alarm_rate: chance of calling it
+disagreement when b differs within the tolerance only. Poses pair up as associate() says; b need not be aligned.
+ValueError: fewer than two common times.)");
 }
 
 }  // namespace tutti::python

@@ -129,7 +129,7 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("compare", "one"), 2)
         for wrong in (("--tolerance", "nan"), ("--tolerance", "0"), ("--false-alarms", "1"), ("--false-alarms", "nan"), ("--a-estimate", "best"),
                       ("--spacing", "-1"), ("--odometry-sigma", "inf")):
-            self.expect(tutti("compare", "one", "two", *wrong), 2, wrong[0])
+            self.expect(tutti("compare", "two", "one", *wrong), 2, wrong[0])
 
     def test_configuration_errors_exit_2_and_name_the_place(self):
         self.expect(tutti("run", self.path / "none.yaml"), 2, "none.yaml")
@@ -273,6 +273,7 @@ class CommandLine(unittest.TestCase):
         self.assertNotIn("notes", listed.stdout)
         self.expect(tutti("map", "info", one), 0, "submaps      0", "0 accepted")
         self.expect(tutti("map", "merge", one, other, "-o", self.path / "both"), 0, "0 submaps")
+        self.expect(tutti("map", "merge", one, other, "-o", self.path / "new/folder/both"), 0, "0 submaps")
         self.expect(tutti("map", "info", self.path / "both"), 0, "with news since")
         self.expect(tutti("map", "merge", one, other, "-o", self.path / "both"), 1, "both", "there already")
         self.expect(tutti("map", "closure", "list", one), 0, "closure")
@@ -294,11 +295,15 @@ class CommandLine(unittest.TestCase):
 
     def test_export_writes_a_file_for_viewers(self):
         self.expect(tutti("demo", *BRIEF, "--out", self.path / "out", "--map", self.path / "map"), 0)
+        new = self.path / "new"
+        self.expect(tutti("export", self.path / "map", "-o", new / "one/map.mcap"), 0, "messages of")
+        self.expect(tutti("map", "export", self.path / "map", "--g2o", new / "two/graph.g2o", "--tum", new / "three"), 0, "vertices")
+        self.expect(tutti("optimise", new / "two/graph.g2o", "-o", new / "four/graph.g2o"), 0, "chi2")
+        self.expect(tutti("export", self.path / "map", "-o", self.path / "map/x.mcap"), 1, "cannot make the folder")
         self.expect(tutti("map", "info", self.path / "map"), 0, "joint map")
         self.expect(tutti("export", self.path / "map", "-o", self.path / "map.mcap"), 0, "messages of")
         self.expect(tutti("run", "x", "--map", self.path / "map"), 2)
         self.expect(tutti("map", "export", self.path / "map", "--grid", self.path / "g.yaml"), 1, "no points below any robot")
-        self.expect(tutti("map", "merge", one, other, "-o", self.path / "new/folder/both"), 0, "0 submaps")
         self.expect(tutti("map", "export", self.path / "map", "--grid", "g.yaml", "--low", 2, "--high", 1), 2, "--low")
         self.expect(tutti("export", self.path / "out", "-o", self.path / "out.mcap"), 0, "messages of", "topics")
         self.expect(tutti("bag", "info", self.path / "out.mcap"), 0, "/alpha/corrected", "nav_msgs/msg/Path", "/tf_static")
@@ -320,11 +325,6 @@ class CommandLine(unittest.TestCase):
         header = (self.path / "walls.ply").read_bytes()[:400]
         self.assertIn(b"element face", header)
         self.expect(tutti("world", mission, "--points", 1, "-o", self.path / "points.ply"), 0)
-        new = self.path / "new"
-        self.expect(tutti("export", self.path / "map", "-o", new / "one/map.mcap"), 0, "messages of")
-        self.expect(tutti("map", "export", self.path / "map", "--g2o", new / "two/graph.g2o", "--tum", new / "three"), 0, "vertices")
-        self.expect(tutti("optimise", new / "two/graph.g2o", "-o", new / "four/graph.g2o"), 0, "chi2")
-        self.expect(tutti("export", self.path / "map", "-o", self.path / "map/x.mcap"), 1, "cannot make the folder")
         self.assertNotIn(b"element face", (self.path / "points.ply").read_bytes()[:400])
         replayed = self.mission("robots: [{name: a, odometry: {file: a}, scans: s}]\n")
         self.expect(tutti("world", replayed, "-o", self.path / "x.ply"), 2, "recordings", "simulation")
@@ -352,9 +352,10 @@ class CommandLine(unittest.TestCase):
     def test_compare_finds_where_a_trajectory_went_wrong(self):
         truth, bent = self.write_way("truth.tum"), self.write_way("bent.tum", bend_at=60)
         out = self.path / "compared"
-        self.expect(tutti("compare", truth, bent, "--out", out), 0, "They disagree", "failure?",
+        self.expect(tutti("compare", bent, truth), 0, "judges:    " + str(truth), "EST is judged by REF")  # as tutti eval has them
+        self.expect(tutti("compare", bent, truth, "--out", out), 0, "They disagree", "failure?",
                     "would fix B", "compare.html")
-        report = json.loads(tutti("compare", truth, bent, "--json").stdout)
+        report = json.loads(tutti("compare", bent, truth, "--json").stdout)
         self.assertEqual(report, json.loads((out / "compare.json").read_text()))
         self.assertTrue(report["disagree"])
         robot = report["robots"][0]
@@ -374,7 +375,7 @@ class CommandLine(unittest.TestCase):
         truth = self.write_way("truth.tum")
         self.expect(tutti("compare", truth, truth), 0, "They agree")
         bent = self.write_way("bent.tum", bend_at=60)
-        loose = json.loads(tutti("compare", truth, bent, "--tolerance", 100, "--json").stdout)
+        loose = json.loads(tutti("compare", bent, truth, "--tolerance", 100, "--json").stdout)
         self.assertFalse(loose["disagree"])
         self.assertEqual(loose["robots"][0]["constraints"], [])
 
@@ -394,7 +395,7 @@ class CommandLine(unittest.TestCase):
 
     def test_compare_reads_graphs_with_and_without_stamps(self):
         a, b = self.write_graph("a.g2o", 0.0), self.write_graph("b.g2o", 0.5)
-        report = json.loads(tutti("compare", a, b, "--json").stdout)
+        report = json.loads(tutti("compare", b, a, "--json").stdout)
         self.assertTrue(report["disagree"])
         self.assertEqual([note.split(":")[0] for note in report["notes"]], [str(a), str(b)])  # invented times
         self.assertIn("n seconds", report["notes"][0])
@@ -411,14 +412,14 @@ class CommandLine(unittest.TestCase):
         graph, copy = self.write_graph("graph.g2o", 0.5), self.write_graph("copy.g2o", 0.5)
         self.write_stamps("graph_stamps.csv")
         for a, b in ((graph, copy), (copy, graph)):  # the same vertices
-            report = json.loads(tutti("compare", a, b, "--json").stdout)
+            report = json.loads(tutti("compare", b, a, "--json").stdout)
             self.assertFalse(report["disagree"])
             self.assertEqual(report["robots"][0]["duration_s"], 395)
             self.assertIn("copy.g2o: no times of its own", report["notes"][0])
         fewer, way = self.write_graph("fewer.g2o", 0.5, steps=60), self.write_way("way.tum")
-        self.expect(tutti("compare", graph, fewer), 1, "fewer.g2o: 60 vertices, expected the 80 of")
+        self.expect(tutti("compare", fewer, graph), 1, "fewer.g2o: 60 vertices, expected the 80 of")
         for a, b in ((way, copy), (copy, way)):
-            self.expect(tutti("compare", a, b), 1, "copy.g2o", "no times", "copy_stamps.csv")
+            self.expect(tutti("compare", b, a), 1, "copy.g2o", "no times", "copy_stamps.csv")
 
     def test_optimise_takes_the_stamps_along(self):
         graph = self.write_graph("graph.g2o", 0.5)
@@ -426,7 +427,7 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("optimise", graph, "-o", self.path / "better.g2o"), 0)
         self.assertEqual((self.path / "better_stamps.csv").read_text(), (self.path / "graph_stamps.csv").read_text())
         self.expect(tutti("optimise", graph, "-o", graph), 0)
-        report = json.loads(tutti("compare", graph, self.path / "better.g2o", "--json").stdout)
+        report = json.loads(tutti("compare", self.path / "better.g2o", graph, "--json").stdout)
         self.assertFalse(report["disagree"])
         self.assertEqual(report["notes"], [])
         (self.path / "better_stamps.csv").unlink()
@@ -538,19 +539,19 @@ class CommandLine(unittest.TestCase):
 
     def test_compare_says_what_is_wrong(self):
         truth = self.write_way("truth.tum")
-        self.expect(tutti("compare", truth, self.path / "none.tum"), 1, "none.tum")
+        self.expect(tutti("compare", self.path / "none.tum", truth), 1, "none.tum")
         (self.path / "empty.tum").write_text("# nothing\n")
-        self.expect(tutti("compare", truth, self.path / "empty.tum"), 1, "empty.tum", "no pose")
+        self.expect(tutti("compare", self.path / "empty.tum", truth), 1, "empty.tum", "no pose")
         (self.path / "nan.tum").write_text("1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n")
-        self.expect(tutti("compare", truth, self.path / "nan.tum"), 1, "nan.tum:2")
+        self.expect(tutti("compare", self.path / "nan.tum", truth), 1, "nan.tum:2")
         (self.path / "one.tum").write_text("11 0 0 0 0 0 0 1\n")
-        self.expect(tutti("compare", truth, self.path / "one.tum"), 1, "one.tum", "at least 2")
+        self.expect(tutti("compare", self.path / "one.tum", truth), 1, "one.tum", "at least 2")
         later = self.write_way("later.tum", start=1000.0)
-        self.expect(tutti("compare", truth, later), 1, "later.tum", "1000.000", "110.000")
-        self.expect(tutti("compare", self.path, truth), 1, "_server.tum")
+        self.expect(tutti("compare", later, truth), 1, "later.tum", "1000.000", "110.000")
+        self.expect(tutti("compare", truth, self.path), 1, "_server.tum")
         for endless in ("x" * 5000, "x" * 5000 + ".g2o"):
-            self.expect(tutti("compare", endless, truth), 1, "tutti compare: xxx", "too long")
             self.expect(tutti("compare", truth, endless), 1, "tutti compare: xxx", "too long")
+            self.expect(tutti("compare", endless, truth), 1, "tutti compare: xxx", "too long")
             self.expect(tutti("optimise", endless, "-o", self.path / "x.g2o"), 1, "too long")
             self.expect(tutti("eval", truth, endless), 1, "too long")
             self.expect(tutti("eval", "--map", truth, endless), 1, "truth.tum")

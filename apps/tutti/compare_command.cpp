@@ -64,6 +64,8 @@ Status write_files(const mission::CompareReport& report, const std::filesystem::
 }
 
 int run(const CompareOptions& options) {
+  if (options.a != options.b)  // until 0.3
+    fmt::print(stderr, "tutti compare: EST is judged by REF, in the order of tutti eval; before 0.2 REF came first\n");
   const auto report = compare(options);
   const Status written = !report               ? tl::unexpected(report.error())
                          : options.out.empty() ? Status()
@@ -97,7 +99,8 @@ void add_compare_command(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand("compare", "Where, at which scale and since when two trajectories disagree");
   command->footer(
-      "A judges, B is judged, as a robot judges its odometry by the server's map. Both are cut into nodes along A;\n"
+      "REF, called A, judges; EST, called B, is judged, as a robot judges its odometry by the server's map. Both are "
+      "cut into nodes along A;\n"
       "wavelets along the way separate scales, and what stands out of A's tolerance at a node and scale is a\n"
       "disagreement. Told are the stretches where it was born, and the fewest relative poses of A that would bring B\n"
       "into agreement. B need not be aligned.\n\n"
@@ -109,8 +112,8 @@ void add_compare_command(CLI::App& app, int& exit_code) {
       "Exit code 0, whether they agree or not (--json says \"disagree\"); 1 when a file is bad or no times are "
       "common;\n"
       "2 on wrong usage. docs/compare.md has a worked example.");
-  command->add_option("A", options->a, "What is true, or the best there is")->required()->type_name("FILE|FOLDER");
-  command->add_option("B", options->b, "What is judged")->required()->type_name("FILE|FOLDER");
+  command->add_option("EST", options->b, "What is judged: B")->required()->type_name("FILE|FOLDER");
+  command->add_option("REF", options->a, "What is true, or the best there is: A")->required()->type_name("FILE|FOLDER");
   command
       ->add_option("--out", options->out,
                    "Write pictures (compare.html) and figures (compare.json) here, made if missing")

@@ -32,7 +32,7 @@ class Examples(InFolder):
     def test_compare_trajectories(self):
         tutti.write_trajectory(self.path / "a.tum", walk(600))
         tutti.write_trajectory(self.path / "b.tum", walk(600, error_rad=2e-3))
-        said = self.example("compare_trajectories.py", self.path / "a.tum", self.path / "b.tum")
+        said = self.example("compare_trajectories.py", self.path / "b.tum", self.path / "a.tum")
         self.assertIn("SuspectedOrigin", said)
         lines = (SOURCE / "examples/python/compare_trajectories.py").read_text().split("import tutti\n")[1].strip().splitlines()
         self.assertLessEqual(len(lines), 10)

@@ -51,7 +51,7 @@ class Stub(InFolder):
 
     def test_arguments_are_those_of_the_docstrings(self):
         compare = self.nodes["compare"]
-        self.assertEqual([argument.arg for argument in compare.args.args][:3], ["a", "b", "tolerance_m"])
+        self.assertEqual([argument.arg for argument in compare.args.args][:3], ["estimate", "reference", "tolerance_m"])
         self.assertIn("tolerance_m", inspect.getdoc(tutti.compare))
 
     def test_docs_name_everything(self):
@@ -93,9 +93,6 @@ class Library(InFolder):
 
 
 class Wheel(InFolder):
-    def test_pip_installs_it(self):
-        """As `pip install .` does in a virtual environment, but for building it once more."""
-        environment = {**os.environ, "TUTTI_PYTHON_BUILD_DIR": str(BUILD), "PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
     @staticmethod
     def backend():
         spec = importlib.util.spec_from_file_location("backend", SOURCE / "python/backend.py")
@@ -121,6 +118,9 @@ class Wheel(InFolder):
         self.assertIn("tutti_lab", built)
         self.assertEqual(built & {"tutti_program", "tutti_feed", "tutti_lab_programs", "tutti_ros", "tutti_exports", "tutti_commands"}, set())
 
+    def test_pip_installs_it(self):
+        """As `pip install .` does in a virtual environment, but for building it once more."""
+        environment = {**os.environ, "TUTTI_PYTHON_BUILD_DIR": str(BUILD), "PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
         environment.pop("PYTHONPATH", None)
         subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", self.path / "venv"], check=True)
         python = self.path / "venv/bin/python"

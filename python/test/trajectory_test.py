@@ -108,7 +108,7 @@ class Comparisons(InFolder):
         truth = walk(600)
         slipped = truth.matrices
         slipped[300:] = slipped[300] @ turn([0, 0, 1], 0.3) @ np.linalg.inv(slipped[300]) @ slipped[300:]
-        found = tutti.compare(truth, tutti.Trajectory.from_matrices(truth.stamps, slipped))
+        found = tutti.compare(estimate=tutti.Trajectory.from_matrices(truth.stamps, slipped), reference=truth)
         self.assertTrue(found.disagrees)
         self.assertEqual(found.significance.shape, (len(found.stamps), len(found.scale_length_m)))
         origin = max(found.origins, key=lambda one: one.rotation_rad)
@@ -120,16 +120,26 @@ class Comparisons(InFolder):
         truth, way = walk(), walk(error_rad=2e-3)
         tutti.write_trajectory(self.path / "a", truth)
         tutti.write_trajectory(self.path / "b", way)
-        said = json.loads(program("compare", self.path / "a", self.path / "b", "--json"))
-        own = json.loads(tutti.compare(truth, way).json())
+        said = json.loads(program("compare", self.path / "b", self.path / "a", "--json"))
+        own = json.loads(tutti.compare(estimate=way, reference=truth).json())
         self.assertEqual(said["robots"], own["robots"])
-        tutti.compare(truth, way).write(self.path / "out")
+        tutti.compare(estimate=way, reference=truth).write(self.path / "out")
         self.assertTrue((self.path / "out/compare.html").stat().st_size > 1000)
 
+    def test_estimate_and_reference_have_the_order_that_ate_has(self):
+        truth, way = walk(), walk(200, error_rad=2e-3)
+        named = tutti.compare(estimate=way, reference=truth).json()
+        self.assertNotEqual(named, tutti.compare(estimate=truth, reference=way).json())
+        with self.assertWarnsRegex(FutureWarning, "order of tutti.ate"):
+            self.assertEqual(tutti.compare(way, truth).json(), named)
+        with self.assertWarnsRegex(DeprecationWarning, "reference and estimate"):
+            self.assertEqual(tutti.compare(a=truth, b=way).json(), named)  # as it was
+        self.assertAlmostEqual(tutti.ate(way, truth).rmse_m, tutti.compare(estimate=way, reference=truth).before.rmse_m, 3)
+
     def test_wrong_numbers_are_refused(self):
-        self.refuses("tolerance_m|expected", tutti.compare, walk(), walk(), tolerance_m=-1.0)
-        self.refuses("tolerance_m|nan", tutti.compare, walk(), walk(), tolerance_m=float("nan"))
-        self.refuses("0 of B's poses|expected at least 2", tutti.compare, walk(), walk(start_s=0.0))
+        self.refuses("tolerance_m|expected", tutti.compare, estimate=walk(), reference=walk(), tolerance_m=-1.0)
+        self.refuses("tolerance_m|nan", tutti.compare, estimate=walk(), reference=walk(), tolerance_m=float("nan"))
+        self.refuses("0 of B's poses|expected at least 2", tutti.compare, estimate=walk(start_s=0.0), reference=walk())
 
 
 if __name__ == "__main__":
