@@ -8,6 +8,8 @@ Needs python3-protobuf. All on one machine, from the folder above this one; BUS 
   PYTHONPATH=/tmp examples/feed_client.py /tmp/alpha.feed < ODOMETRY.txt > CORRECTED.txt"""
 import socket, struct, sys
 from decimal import Decimal
+if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+    sys.exit(__doc__)
 from tutti.v1.feed_pb2 import Feed
 
 robot = socket.socket(socket.AF_UNIX)

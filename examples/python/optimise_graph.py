@@ -4,6 +4,8 @@ import sys
 
 import tutti
 
+if len(sys.argv) != 3:
+    sys.exit(__doc__)
 result = tutti.optimise_robust(tutti.read_graph(sys.argv[1]))
 print(result)
 for (a, b), reason in zip(result.graph.ids[tutti.read_graph(sys.argv[1]).edges], result.reasons):

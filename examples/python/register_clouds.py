@@ -5,7 +5,9 @@ import sys
 import numpy as np
 import tutti
 
-bag, topic, out = sys.argv[1:4]
+if len(sys.argv) != 4:
+    sys.exit(__doc__)
+bag, topic, out = sys.argv[1:]
 T_first_scan, before, everything = np.eye(4), None, []
 for message in tutti.read_bag(bag, [topic]):
     scan = tutti.OrientedCloud(message.decode()["points"], voxel_m=0.3)

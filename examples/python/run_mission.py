@@ -5,6 +5,8 @@ import sys
 import numpy as np
 import tutti
 
+if len(sys.argv) not in (3, 4):
+    sys.exit(__doc__)
 mission, file, *data = sys.argv[1:]
 result = tutti.run_mission(mission, *data, map=file, settings={"agent.submap.duration_s": 8})
 for robot in result.robots:
