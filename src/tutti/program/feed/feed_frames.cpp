@@ -24,7 +24,7 @@ std::int64_t told(Timestamp stamp, std::int64_t offset_ns) {
 
 }  // namespace
 
-Result<std::optional<std::string>> FrameReader::take(std::string_view& bytes) {
+Result<std::optional<std::string>> FrameReader::take(std::string_view& bytes, std::size_t most) {
   const auto fill = [&](std::string& part, std::size_t size) {
     const std::size_t count = std::min(size - part.size(), bytes.size());
     part.append(bytes.substr(0, count));
@@ -34,8 +34,7 @@ Result<std::optional<std::string>> FrameReader::take(std::string_view& bytes) {
   if (!fill(header_, kHeaderBytes)) return std::nullopt;
   std::size_t size = 0;
   for (std::size_t i = 0; i < kHeaderBytes; ++i) size |= std::size_t{static_cast<unsigned char>(header_[i])} << (8 * i);
-  if (size == 0 || size > kMaxFeedBytes)
-    return fail(ErrorCode::parse, "a frame of {} bytes, expected 1 to {}", size, kMaxFeedBytes);
+  if (size == 0 || size > most) return fail(ErrorCode::parse, "a frame of {} bytes, expected 1 to {}", size, most);
   if (!fill(payload_, size)) return std::nullopt;
   header_.clear();
   return std::exchange(payload_, {});

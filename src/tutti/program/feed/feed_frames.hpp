@@ -22,6 +22,8 @@ namespace tutti::program {
 inline constexpr std::uint32_t kFeedVersion = 1;
 /// Size limit of one message, which fits a scan of a million points.
 inline constexpr std::size_t kMaxFeedBytes = 16U << 20U;
+/// Size limit of a client's message while it does not feed: then only Hello is expected.
+inline constexpr std::size_t kMaxHelloBytes = 64U << 10U;
 inline constexpr std::size_t kMaxImuSamples = 10'000;  ///< Limit per message: ten seconds at 1 kHz.
 /// Names of the messages a client may send; the index is the message's number in the protocol minus one.
 inline constexpr const char* kFromClient[] = {"hello",  "odometry", "scan", "end_of_recording",
@@ -32,8 +34,10 @@ class FrameReader {
  public:
   /// Removes from the front of `bytes` what the next frame needs, and returns the frame's message once it is complete
   /// (else nothing; all bytes are then used up). An error means that the stream is no feed, and no later frame can be
-  /// found in it.
-  Result<std::optional<std::string>> take(std::string_view& bytes);
+  /// found in it, or that the frame has more than `most` bytes.
+  Result<std::optional<std::string>> take(std::string_view& bytes, std::size_t most = kMaxFeedBytes);
+  /// A frame has begun and is not complete.
+  [[nodiscard]] bool is_within_frame() const { return !header_.empty(); }
 
  private:
   std::string header_, payload_;

@@ -27,6 +27,8 @@ Timestamp wall_clock() {
   return {std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count()};
 }
 
+double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
 bool would_wait() { return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR; }
 
 /// A file left there by a program that was killed goes; an error when it is in use or no socket.
@@ -101,7 +103,7 @@ void FeedServer::serve(int timeout_ms) {
     wanted.push_back({.fd = file, .events = static_cast<short>(events), .revents = 0});
     clients.push_back(client);
   }
-  if (poll(wanted.data(), wanted.size(), timeout_ms) <= 0) return;
+  if (poll(wanted.data(), wanted.size(), timeout_ms) < 0) return;
   for (std::size_t i = 0; i < clients.size(); ++i) {
     const short ready = wanted[i + 1].revents;
     const int file = wanted[i + 1].fd;
@@ -114,6 +116,7 @@ void FeedServer::serve(int timeout_ms) {
     drop(clients[i]);
   }
   if ((wanted[0].revents & POLLIN) != 0) accept_one();
+  session_.close_stalled(steady_s());
   for (const auto& [client, file] : std::map(files_))
     if (!write_to(client, file) || (silent_.contains(client) && !session_.waits_for_end(client))) drop(client);
 }

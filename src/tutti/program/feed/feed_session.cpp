@@ -46,10 +46,12 @@ void FeedSession::disconnect(Client client) {
 
 void FeedSession::receive(Client client, std::string_view bytes) {
   Connection& connection = clients_.at(client);
+  connection.moved = true;
   if (feeder_ == client) last_.bytes += bytes.size();
   while (!connection.over) {
-    const auto payload = connection.reader.take(bytes);
-    if (!payload) return close(client, payload.error().message);
+    const bool feeds = feeder_ == client;
+    const auto payload = connection.reader.take(bytes, feeds ? kMaxFeedBytes : kMaxHelloBytes);
+    if (!payload) return close(client, payload.error().message + (feeds ? "" : " of a client that does not feed"));
     if (!*payload) return;
     auto message = decode_from_client(**payload);
     if (!message) return close(client, message.error().message);
@@ -186,7 +188,21 @@ void FeedSession::close(Client client, const std::string& why) {
   Connection& connection = clients_.at(client);
   put(connection, closed_frame(why));
   connection.over = true;
+  connection.reader = {};
   if (feeder_ == client) feeder_.reset();
+}
+
+void FeedSession::close_stalled(double wall_s) {
+  for (auto& [number, connection] : clients_) {
+    const bool waits = connection.over ? !connection.queue.empty() : connection.reader.is_within_frame();
+    if (std::exchange(connection.moved, false) || !waits) connection.moved_s = wall_s;
+    if (wall_s - connection.moved_s <= kMostPause_s) continue;
+    connection.moved_s = wall_s;
+    if (connection.over)
+      drop_queue(connection);
+    else
+      close(number, fmt::format("a frame has begun, and nothing came of it for {} s", kMostPause_s));
+  }
 }
 
 void FeedSession::broadcast(const std::function<std::string(std::int64_t offset_ns)>& frame) {
@@ -215,9 +231,14 @@ void FeedSession::make_room(Connection& connection) {
     ++connection.dropped;
   }
   if (connection.queued <= most) return;
+  drop_queue(connection);
+  connection.over = true;
+  connection.reader = {};
+}
+
+void FeedSession::drop_queue(Connection& connection) {
   connection.queue.clear();
   connection.queued = connection.sent = 0;
-  connection.over = true;
 }
 
 std::string_view FeedSession::output(Client client) const {
@@ -229,6 +250,7 @@ std::string_view FeedSession::output(Client client) const {
 void FeedSession::sent(Client client, std::size_t bytes) {
   Connection& connection = clients_.at(client);
   connection.sent += bytes;
+  connection.moved = true;
   if (connection.queue.empty() || connection.sent < connection.queue.front().bytes.size()) return;
   connection.queued -= connection.queue.front().bytes.size();
   connection.queue.pop_front();

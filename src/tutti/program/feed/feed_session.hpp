@@ -20,7 +20,8 @@ namespace tutti::program {
 /// The live feed of one robot, without sockets: takes bytes from clients and gives bytes for them. One client feeds,
 /// the others listen. A client that does not read holds up nobody: beyond FeedSettings::max_queue_kb it loses its
 /// oldest corrections (and is told how many); when the messages that must not be dropped alone exceed that, it is
-/// disconnected.
+/// disconnected. Of frames that are not complete at most kMaxFeedBytes are held for the client that feeds, and
+/// kMaxHelloBytes for each other one.
 class FeedSession {
  public:
   using Client = std::uint64_t;
@@ -35,6 +36,10 @@ class FeedSession {
   void disconnect(Client client);
   /// Handles every message that `bytes` complete.
   void receive(Client client, std::string_view bytes);
+  /// Ends connections in which a frame has begun, or the last words wait, and nothing goes on for kMostPause_s. To be
+  /// called now and then; `wall_s` is of a clock that never goes back.
+  void close_stalled(double wall_s);
+  static constexpr double kMostPause_s = 60.0;
   /// To be called when the robot may have heard or done something: tells clients what has changed for them.
   void refresh();
 
@@ -68,6 +73,8 @@ class FeedSession {
     std::size_t queued = 0;     ///< Bytes in the queue, including those of the first frame that were already sent.
     std::size_t sent = 0;       ///< Bytes of the first frame that were sent.
     std::uint64_t dropped = 0;  ///< Corrections that were dropped.
+    bool moved = false;         ///< Bytes came or left since close_stalled() was called last.
+    double moved_s = 0.0;       ///< When it saw that last.
     bool greeted = false;
     bool over = false;
     bool ended = false;          ///< It has ended the recording,
@@ -79,6 +86,7 @@ class FeedSession {
   void close(Client client, const std::string& why);
   void put(Connection& connection, std::string frame, bool is_correction = false);
   void make_room(Connection& connection);
+  static void drop_queue(Connection& connection);
   /// Sends a frame to every greeted client, with stamps by the clock of each (FeedClock::offset_ns()).
   void broadcast(const std::function<std::string(std::int64_t offset_ns)>& frame);
   [[nodiscard]] std::int64_t offset_ns(Client client) const { return feeder_ == client ? last_.clock.offset_ns() : 0; }

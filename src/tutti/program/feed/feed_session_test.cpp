@@ -231,5 +231,55 @@ TEST_F(FeedSessionTest, AClientThatLosesWhatItMustHaveIsDropped) {
   EXPECT_TRUE(session_.output(1).empty());
 }
 
+/// {length, the first of its bytes} of a frame.
+std::string beginning_of_frame(std::size_t size, std::size_t there) {
+  std::string out(4, '\0');
+  for (std::size_t i = 0; i < 4; ++i) out[i] = static_cast<char>(size >> (8 * i) & 0xffU);
+  return out + std::string(there, '\0');
+}
+
+TEST_F(FeedSessionTest, OnlyWhoFeedsMayHoldALargeFrame) {
+  join(0);
+  join(1, true);
+  session_.connect(2);  // says no Hello
+  const std::string begin = beginning_of_frame(kMaxFeedBytes, 1'000), small = beginning_of_frame(kMaxHelloBytes, 1'000);
+  EXPECT_TRUE(say(0, begin).empty());
+  for (const FeedSession::Client client : {1, 2}) {
+    EXPECT_FALSE(session_.is_over(client));
+    const auto heard = say(client, begin);
+    ASSERT_EQ(heard.size(), 1U);
+    EXPECT_EQ(heard[0].closed().why(), "a frame of 16777216 bytes, expected 1 to 65536 of a client that does not feed");
+  }
+  session_.connect(3);
+  EXPECT_TRUE(say(3, small).empty());
+  EXPECT_FALSE(session_.is_over(0));
+}
+
+TEST_F(FeedSessionTest, AFrameThatDoesNotGoOnIsClosed) {
+  constexpr double kPause_s = FeedSession::kMostPause_s;
+  join(0);
+  join(1, true);
+  session_.close_stalled(0.0);
+  session_.close_stalled(10.0 * kPause_s);  // between frames any pause is right
+  double now_s = 10.0 * kPause_s;
+  session_.receive(0, beginning_of_frame(kMaxFeedBytes, 1));
+  for (int i = 0; i < 5; ++i) {
+    session_.close_stalled(now_s);
+    session_.close_stalled(now_s += kPause_s);
+    ASSERT_FALSE(session_.is_over(0)) << i;  // it goes on, slowly
+    session_.receive(0, "x");
+  }
+  session_.close_stalled(now_s);
+  EXPECT_TRUE(session_.has_feeder());
+  session_.close_stalled(now_s += kPause_s + 1.0);
+  EXPECT_TRUE(session_.is_over(0));
+  EXPECT_FALSE(session_.is_over(1));
+  EXPECT_FALSE(session_.has_feeder());
+  EXPECT_FALSE(session_.output(0).empty());  // why
+  session_.close_stalled(now_s += kPause_s + 1.0);
+  EXPECT_TRUE(session_.output(0).empty());  // it does not read either
+  join(2);
+}
+
 }  // namespace feed_session_test
 }  // namespace tutti::program
