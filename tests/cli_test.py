@@ -527,6 +527,9 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("optimise", "--robust", ranges, "-o", out), 0, "2 (0 1), by gaps", "55 accepted, 3 refused")
         self.expect(tutti("optimise", "--robust", out, "-o", self.path / "again.g2o", "--truth", out), 0,
                     "2 (0 1), by %s" % (self.path / "out_stamps.csv"), "55 accepted, 0 refused", "ATE          0.000 m")
+        right = self.path / "right.g2o"  # the right closures alone, without vertices
+        right.write_text("".join(line + "\n" for line in ranges.read_text().splitlines()[2 * 119:][:55]))
+        self.expect(tutti("optimise", "--robust", ranges, "-o", out, "--right", right), 0, "precision    100.0 % (55 of 55")
         graph = self.write_pyfg("fleet.pyfg")
         for arguments, code, words in (((ranges, "--robots", "120,0"), 2, ["--robots", "increase"]),
                                        ((ranges, "--robots", "5,120"), 2, ["vertex 0", "first robot's 5"]),

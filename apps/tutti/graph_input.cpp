@@ -205,18 +205,19 @@ std::string beside(const std::string& path, const char* ending) {
   return out.string();
 }
 
-/// A file's vertices and edges alone.
+enum class Wanted { poses, edges };
+/// A file's vertices and edges alone; without poses where only edges are asked for.
 struct Plain {
   PoseGraph graph;
   std::vector<std::string> names;
 };
 
-Result<Plain> read_plain(const std::string& path) {
+Result<Plain> read_plain(const std::string& path, Wanted wanted) {
   const auto pyfg = is_pyfg(path);
   if (!pyfg) return tl::unexpected(pyfg.error());
   Plain out;
   if (!*pyfg) {
-    auto file = formats::read_g2o(path);
+    auto file = wanted == Wanted::poses ? formats::read_g2o(path) : formats::read_g2o_edges(path);
     if (!file) return tl::unexpected(file.error());
     for (const std::int64_t id : file->vertex_ids) out.names.push_back(name_of(id));
     out.graph = std::move(file->graph);
@@ -336,7 +337,7 @@ Result<GraphTruth> read_truth(const GraphSource& source, const NamedGraph& graph
   if (source.truth.empty() && graph.is_pyfg) {
     out.poses.assign(graph.robots.graph.poses.begin(), graph.robots.graph.poses.end());
   } else if (!source.truth.empty() && source.truth != "none") {
-    const auto truth = read_plain(source.truth);
+    const auto truth = read_plain(source.truth, Wanted::poses);
     if (!truth) return tl::unexpected(truth.error());
     std::map<std::string, Pose3> poses;
     for (std::size_t v = 0; v < truth->names.size(); ++v) poses[truth->names[v]] = truth->graph.poses[v];
@@ -350,7 +351,7 @@ Result<GraphTruth> read_truth(const GraphSource& source, const NamedGraph& graph
   const std::string clean = beside(source.path, "_no_outliers");
   const std::string path = !source.right.empty() ? source.right : is_a_file(clean) ? clean : std::string();
   if (path.empty()) return out;
-  const auto right = read_plain(path);
+  const auto right = read_plain(path, Wanted::edges);
   if (!right) return tl::unexpected(right.error());
   std::map<EdgeKey, int> left;
   for (const PoseGraphEdge& edge : right->graph.edges) ++left[key_of(right->names, edge)];

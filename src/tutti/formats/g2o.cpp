@@ -191,6 +191,15 @@ class Positions {
   const std::vector<std::int64_t>& ids_;
 };
 
+Result<Lines> read_lines(std::string_view text, const std::string& name) {
+  LineReader line(text, name);
+  Lines lines;
+  while (line.next())
+    if (auto ok = read_line(line, lines); !ok) return tl::unexpected(ok.error());
+  return lines;
+}
+
+/// Without vertices, poses are the identity.
 Result<G2oFile> assemble(const Lines& lines, const std::string& name) {
   auto ids = collect_ids(lines, name);
   if (!ids) return tl::unexpected(ids.error());
@@ -222,17 +231,19 @@ Result<G2oFile> assemble(const Lines& lines, const std::string& name) {
 
   file.graph.poses.resize(file.vertex_ids.size());
   for (const Vertex& vertex : lines.vertices) file.graph.poses[*positions.of(vertex.id, name)] = vertex.pose;
-  if (!file.has_vertices) {
-    const std::size_t components = internal::chain_poses(file.graph, file.vertex_ids);
-    if (components != 1)
-      return fail(ErrorCode::invalid, "{}: no VERTEX lines and {} connected components, expected 1 to chain poses in",
-                  name, components);
-    for (std::size_t i = 0; i < file.graph.poses.size(); ++i)
-      if (!file.graph.poses[i].translation.allFinite())
-        return fail(ErrorCode::invalid, "{}: position of vertex {}, chained from the edges, is not finite", name,
-                    file.vertex_ids[i]);
-  }
   return file;
+}
+
+Status place_along_edges(G2oFile& file, const std::string& name) {
+  const std::size_t components = internal::chain_poses(file.graph, file.vertex_ids);
+  if (components != 1)
+    return fail(ErrorCode::invalid, "{}: no VERTEX lines and {} connected components, expected 1 to chain poses in",
+                name, components);
+  for (std::size_t i = 0; i < file.graph.poses.size(); ++i)
+    if (!file.graph.poses[i].translation.allFinite())
+      return fail(ErrorCode::invalid, "{}: position of vertex {}, chained from the edges, is not finite", name,
+                  file.vertex_ids[i]);
+  return {};
 }
 
 void write_pose(std::string& out, const Pose3& pose, bool is_2d) {
@@ -254,12 +265,19 @@ void write_information(std::string& out, const Matrix6d& information, bool is_2d
 
 }  // namespace
 
+Result<G2oFile> parse_g2o_edges(std::string_view text, const std::string& name) {
+  return read_lines(text, name).and_then([&](const Lines& lines) { return assemble(lines, name); });
+}
+
 Result<G2oFile> parse_g2o(std::string_view text, const std::string& name) {
-  LineReader line(text, name);
-  Lines lines;
-  while (line.next())
-    if (auto ok = read_line(line, lines); !ok) return tl::unexpected(ok.error());
-  return assemble(lines, name);
+  auto file = parse_g2o_edges(text, name);
+  if (!file || file->has_vertices) return file;
+  if (auto ok = place_along_edges(*file, name); !ok) return tl::unexpected(ok.error());
+  return file;
+}
+
+Result<G2oFile> read_g2o_edges(const std::string& path) {
+  return read_file(path).and_then([&](const std::string& text) { return parse_g2o_edges(text, path); });
 }
 
 Result<G2oFile> read_g2o(const std::string& path) {

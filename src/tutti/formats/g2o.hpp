@@ -44,6 +44,10 @@ struct G2oFile {
 /// every edge must name known vertices, and several components are allowed.
 Result<G2oFile> parse_g2o(std::string_view text, const std::string& name);
 Result<G2oFile> read_g2o(const std::string& path);
+/// The same for who needs the edges alone: without VERTEX lines every pose is the identity, and the graph need not be
+/// connected.
+Result<G2oFile> parse_g2o_edges(std::string_view text, const std::string& name);
+Result<G2oFile> read_g2o_edges(const std::string& path);
 
 /// Text with VERTEX lines, whatever has_vertices says, and one FIX line per fixed vertex. SE(3) reads back bit for bit.
 /// With is_2d only the planar part is written, as SE(2), exact but for the rounding of the angle.

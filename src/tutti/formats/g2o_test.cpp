@@ -357,5 +357,17 @@ TEST(G2o, ClosuresAloneAreNotOneGraph) {
   EXPECT_NE(file.error().message.find("connected components, expected 1"), std::string::npos) << file.error().message;
 }
 
+TEST(G2o, EdgesAreReadOfGraphsThatAreNotConnected) {
+  const std::string apart = "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 7 6 2 0 0 1 0 0 1 0 1";
+  EXPECT_FALSE(parse_g2o(apart, "g.g2o"));
+  const auto file = parse_g2o_edges(apart, "g.g2o");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->vertex_ids, (std::vector<std::int64_t>{0, 1, 6, 7}));
+  EXPECT_FALSE(file->has_vertices);
+  EXPECT_EQ(file->graph.edges[1].from, 3U);
+  EXPECT_EQ(file->graph.edges[1].T_from_to.translation.x(), 2.0);
+  EXPECT_EQ(file->graph.poses, std::vector<Pose3>(4));
+}
+
 }  // namespace g2o_test
 }  // namespace tutti::formats
