@@ -326,8 +326,10 @@ Result<std::optional<program::EncodedImage>> ImagesIntake::depth_of(Timestamp mo
   if (of.first->encoding != "32FC1")
     return std::optional(program::EncodedImage{0, false, std::string(bags::png_of(at->image.bytes))});
   const CameraModel& camera = *topics_[cameras_.front()].model;
-  const auto depth = bags::to_depth({.header = {}, .format = of.first->encoding + ";", .data = at->image.bytes},
-                                    {camera.width_px, camera.height_px});
+  bags::RosCompressedImage image;  // a temporary is uninitialised for GCC 12
+  image.format = of.first->encoding + ";";
+  image.data = at->image.bytes;
+  const auto depth = bags::to_depth(image, {camera.width_px, camera.height_px});
   if (depth) return std::optional(program::EncodedImage{0, true, to_bytes(*depth)});
   const Timestamp wrong = at->stamp;
   of.bytes -= at->image.bytes.size();
