@@ -57,14 +57,15 @@ void FedRobot::hear(const Scan& scan, Timestamp now) {
 }
 
 /// Every image is tracked, those of keyframes are kept.
-void FedRobot::hear(const FedImages& images, Timestamp now) {
+void FedRobot::hear(const std::shared_ptr<const FedImages>& images, Timestamp now) {
   const robot::RobotAgent& agent = robot_.node().agent();
-  const bool is_keyframe = agent.wants_images(images.stamp);
-  TrackedImages seen = camera_.see(images, is_keyframe);
-  tell_image_errors(images.stamp, now);
+  const Timestamp stamp = images->stamp;
+  const bool is_keyframe = agent.wants_images(stamp);
+  TrackedImages seen = camera_.see(*images, is_keyframe);
+  tell_image_errors(stamp, now);
   if (!is_keyframe || seen.images.empty()) return;
-  if (images.sensors->imu)
-    if (const auto before = agent.keyframe_before(images.stamp)) seen.imu = front_.imu(*before, images.stamp);
+  if (images->sensors->imu)
+    if (const auto before = agent.keyframe_before(stamp)) seen.imu = front_.imu(*before, stamp);
   robot_.add_images(seen, now);
 }
 

@@ -41,7 +41,7 @@ class FedRobot {
   bool take(const FeedInput& input);
   void hear(const node::OdometrySample& sample, Timestamp now) { robot_.add_odometry(sample, now); }
   void hear(const Scan& scan, Timestamp now);
-  void hear(const FedImages& images, Timestamp now);
+  void hear(const std::shared_ptr<const FedImages>& images, Timestamp now);
   void hear(const PositionFix& fix, Timestamp now) { robot_.add_fix(fix, now); }
   void hear(const std::shared_ptr<const FeedSensors>& sensors, Timestamp /*now*/) { expect(*sensors); }
   void hear(FeedEnded, Timestamp now) { robot_.finish(now); }

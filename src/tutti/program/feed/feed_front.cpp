@@ -22,8 +22,8 @@ std::size_t scan_bytes_of(const FeedInput& input) {
 }
 
 std::size_t image_bytes_of(const FeedInput& input) {
-  const auto* images = std::get_if<FedImages>(&input);
-  return images == nullptr ? 0 : bytes_of(*images);
+  const auto* images = std::get_if<std::shared_ptr<const FedImages>>(&input);
+  return images == nullptr ? 0 : bytes_of(**images);
 }
 
 bool is_odometry(const FeedInput& input) { return std::holds_alternative<node::OdometrySample>(input); }
@@ -40,7 +40,7 @@ node::OdometrySample joined(const node::OdometrySample& first, const node::Odome
 
 Timestamp stamp_of(const FeedInput& input) {
   if (const auto* sample = std::get_if<node::OdometrySample>(&input)) return sample->stamp;
-  if (const auto* images = std::get_if<FedImages>(&input)) return images->stamp;
+  if (const auto* images = std::get_if<std::shared_ptr<const FedImages>>(&input)) return (*images)->stamp;
   if (const auto* fix = std::get_if<PositionFix>(&input)) return fix->stamp;
   const auto* scan = std::get_if<Scan>(&input);
   return scan != nullptr ? scan->stamp : Timestamp{};
@@ -258,6 +258,7 @@ bool FeedFront::is_drained() const {
 }
 
 void FeedFront::note_stored() {
+  std::vector<FeedInput> stored;  // which are freed while nobody waits
   const std::scoped_lock lock(mutex_);
   for (; taken_ > 0; --taken_) {
     if (!std::holds_alternative<std::shared_ptr<const FeedSensors>>(inputs_.front()))
@@ -269,6 +270,7 @@ void FeedFront::note_stored() {
     }
     scan_bytes_ -= scan_bytes_of(inputs_.front());
     image_bytes_ -= image_bytes_of(inputs_.front());
+    stored.push_back(std::move(inputs_.front()));
     inputs_.pop_front();
   }
   if (!inputs_.empty()) return;

@@ -24,9 +24,9 @@ struct FeedEnded {};
 struct FeedAnew {
   std::string why;
 };
-/// An input for the robot. Sensors mean that later inputs are of these sensors.
-using FeedInput = std::variant<node::OdometrySample, Scan, FeedEnded, FedImages, std::shared_ptr<const FeedSensors>,
-                               PositionFix, FeedAnew>;
+/// An input for the robot, cheap to copy. Sensors mean that later inputs are of these sensors.
+using FeedInput = std::variant<node::OdometrySample, Scan, FeedEnded, std::shared_ptr<const FedImages>,
+                               std::shared_ptr<const FeedSensors>, PositionFix, FeedAnew>;
 
 /// The input's stamp; zero for kinds that have none.
 Timestamp stamp_of(const FeedInput& input);
@@ -147,8 +147,8 @@ class FeedFront final : public FeedTarget {
   std::size_t anew_ = 0;        // of them, how many FeedAnew
   std::size_t scan_bytes_ = 0;  // in them
   std::shared_ptr<const FeedSensors> sensors_ = std::make_shared<const FeedSensors>();
-  std::deque<FedImages> images_;  // that wait for odometry or the IMU
-  std::size_t image_bytes_ = 0;   // in them and in inputs_
+  std::deque<std::shared_ptr<const FedImages>> images_;  // that wait for odometry or the IMU
+  std::size_t image_bytes_ = 0;                          // in them and in inputs_
   std::optional<Timestamp> newest_images_, newest_fix_;
   std::deque<ImuSample> imu_;
   std::uint64_t images_taken_ = 0, images_refused_ = 0, imu_taken_ = 0, imu_refused_ = 0, fixes_taken_ = 0,

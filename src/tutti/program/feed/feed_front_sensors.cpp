@@ -36,22 +36,23 @@ Status FeedFront::may_wait(const FedImages& images) const {
   return {};
 }
 
-Status FeedFront::add_images(FedImages images) {
+Status FeedFront::add_images(FedImages fed) {
+  const auto images = std::make_shared<FedImages>(std::move(fed));
   const std::scoped_lock lock(mutex_);
   if (closed_) return fail(ErrorCode::io, "the robot's program ends");
-  if (Status ok = may_wait(images); !ok) {
+  if (Status ok = may_wait(*images); !ok) {
     ++images_refused_;
     if (ok.error().code == ErrorCode::io) {
-      note_behind(images.stamp);
+      note_behind(images->stamp);
       ++images_left_out_;
     }
     return ok;
   }
   ++images_taken_;
-  newest_images_ = images.stamp;
-  image_bytes_ += bytes_of(images);
-  images.sensors = sensors_;
-  images_.push_back(std::move(images));
+  newest_images_ = images->stamp;
+  image_bytes_ += bytes_of(*images);
+  images->sensors = sensors_;
+  images_.push_back(images);
   release_images();
   fed_.notify_one();
   return {};
@@ -65,7 +66,7 @@ void FeedFront::release_images(bool all) {
     return !sensors_->imu || (!imu_.empty() && imu_.back().stamp >= stamp) ||
            localiser_.newest()->stamp - stamp >= kImuPatience_s;
   };
-  for (; !images_.empty() && is_due(images_.front().stamp); images_.pop_front()) push(std::move(images_.front()));
+  for (; !images_.empty() && is_due(images_.front()->stamp); images_.pop_front()) push(std::move(images_.front()));
 }
 
 Status FeedFront::add_imu(const std::vector<ImuSample>& samples) {

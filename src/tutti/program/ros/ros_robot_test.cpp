@@ -135,11 +135,12 @@ TEST_F(RosRobots, ImagesAndImuAreFedOnceTheirPlaceIsKnown) {
   const auto look = [&] {
     while (const auto input = feed_->front().take(0.0)) {
       samples += std::holds_alternative<node::OdometrySample>(*input) ? 1 : 0;
-      if (const auto* seen = std::get_if<program::FedImages>(&*input)) {
+      if (const auto* taken = std::get_if<std::shared_ptr<const program::FedImages>>(&*input)) {
+        const program::FedImages& seen = **taken;
         ++images;
-        EXPECT_EQ(seen->images.at(0).bytes, "abcdefghijkl");
-        EXPECT_EQ(seen->sensors->cameras.size(), 1U);
-        sensors += seen->sensors->imu ? 1 : 0;
+        EXPECT_EQ(seen.images.at(0).bytes, "abcdefghijkl");
+        EXPECT_EQ(seen.sensors->cameras.size(), 1U);
+        sensors += seen.sensors->imu ? 1 : 0;
       }
       feed_->front().note_heard();
     }
