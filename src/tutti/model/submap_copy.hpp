@@ -18,6 +18,7 @@ struct SubmapRequest {
 struct SubmapCopy {
   SubmapId id;
   std::string frame;  ///< The bytes as the robot sent them; decoding them shows whether they are this submap.
+                      ///< Empty: the map does not have it.
   friend bool operator==(const SubmapCopy&, const SubmapCopy&) = default;
 };
 

@@ -22,16 +22,27 @@ double try_again_after_s(double timeout_s, unsigned failures) {
 
 std::string JobBook::next_name() const { return fmt::format("{}{}", prefix_, given_); }
 
-std::optional<JobBook::OpenJob> JobBook::close(std::string_view name, Timestamp now) {
+std::optional<std::uint64_t> JobBook::number_of(std::string_view name) const {
   std::uint64_t number = 0;
   if (!name.starts_with(prefix_)) return std::nullopt;
   const char* const end = name.data() + name.size();
-  if (const auto read = std::from_chars(name.data() + prefix_.size(), end, number);
-      read.ec != std::errc() || read.ptr != end || number >= given_)
-    return std::nullopt;
-  auto job = open_.extract(number);
-  for (auto later = open_.upper_bound(number); later != open_.end(); ++later) later->second.since = now;
+  const auto read = std::from_chars(name.data() + prefix_.size(), end, number);
+  const bool is_given = read.ec == std::errc() && read.ptr == end && number < given_;
+  return is_given ? std::optional(number) : std::nullopt;
+}
+
+std::optional<JobBook::OpenJob> JobBook::close(std::string_view name, Timestamp now) {
+  const auto number = number_of(name);
+  if (!number) return std::nullopt;
+  auto job = open_.extract(*number);
+  for (auto later = open_.upper_bound(*number); later != open_.end(); ++later) later->second.since = now;
   return job ? std::optional(std::move(job.mapped())) : std::nullopt;
+}
+
+std::optional<JobBook::OpenJob> JobBook::find(std::string_view name) const {
+  const auto number = number_of(name);
+  const auto found = number ? open_.find(*number) : open_.end();
+  return found == open_.end() ? std::nullopt : std::optional(found->second);
 }
 
 Timestamp JobBook::due(const OpenJob& job) const {
@@ -41,10 +52,10 @@ Timestamp JobBook::due(const OpenJob& job) const {
 std::vector<JobBook::OpenJob> JobBook::take_late(Timestamp now) {
   std::vector<OpenJob> late;
   if (timeout_s_ <= 0.0) return late;
-  for (auto job = open_.begin(); job != open_.end();) {
-    const auto next = std::next(job);
-    if (due(job->second) <= now) late.push_back(std::move(open_.extract(job).mapped()));
-    job = next;
+  for (auto& [number, job] : open_) {
+    if (job.is_replaced || due(job) > now) continue;
+    late.push_back(job);
+    job.is_replaced = true;
   }
   return late;
 }
@@ -52,7 +63,8 @@ std::vector<JobBook::OpenJob> JobBook::take_late(Timestamp now) {
 std::optional<Timestamp> JobBook::next_due() const {
   std::optional<Timestamp> next;
   if (timeout_s_ <= 0.0) return next;
-  for (const auto& [number, job] : open_) next = std::min(next.value_or(due(job)), due(job));
+  for (const auto& [number, job] : open_)
+    if (!job.is_replaced) next = std::min(next.value_or(due(job)), due(job));
   return next;
 }
 

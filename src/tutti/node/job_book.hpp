@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -21,10 +22,13 @@ namespace tutti::node {
 class JobBook {
  public:
   struct OpenJob {
-    std::vector<SubmapPair> pairs;
+    std::vector<SubmapPair> pairs;                    ///< In order.
     std::shared_ptr<const RefinementJob> refinement;  ///< A refinement instead of pairs.
     Timestamp since;     ///< When it was sent, or when the last job before it was answered.
     unsigned asked = 0;  ///< How often it was asked before.
+    /// Its pairs were asked again under another name; an answer is still welcome.
+    bool is_replaced = false;
+    [[nodiscard]] bool has(const SubmapPair& pair) const { return std::ranges::binary_search(pairs, pair); }
   };
 
   /// `prefix` begins the names of all jobs. It must be unique to this start of this map, because a bus accepts a name
@@ -34,17 +38,30 @@ class JobBook {
   /// The name that the next open() gives.
   [[nodiscard]] std::string next_name() const;
   /// Adds a job that is being sent under next_name().
-  void open(OpenJob job) { open_.emplace(given_++, std::move(job)); }
+  void open(OpenJob job) {
+    std::ranges::sort(job.pairs);
+    open_.emplace(given_++, std::move(job));
+  }
   /// Removes the job of this name, which is answered, and returns it. Nothing when it is not open, or of an earlier
   /// start.
   std::optional<OpenJob> close(std::string_view name, Timestamp now);
-  /// Removes and returns the jobs that are to be asked again now.
+  /// Returns the jobs that are to be asked again now, under other names. Answers to these stay welcome.
   std::vector<OpenJob> take_late(Timestamp now);
   /// When take_late() has something to return; nothing when never.
   [[nodiscard]] std::optional<Timestamp> next_due() const;
-  [[nodiscard]] std::size_t size() const { return open_.size(); }
+  /// How many jobs wait for an answer; those that were asked again count once.
+  [[nodiscard]] std::size_t size() const {
+    return static_cast<std::size_t>(
+        std::ranges::count(open_, false, [](const auto& job) { return job.second.is_replaced; }));
+  }
+
+  /// The job of this name, which stays open; nothing likewise.
+  [[nodiscard]] std::optional<OpenJob> find(std::string_view name) const;
+  /// True if this book has given the name, whether or not the job is open.
+  [[nodiscard]] bool has_given(std::string_view name) const { return number_of(name).has_value(); }
 
  private:
+  [[nodiscard]] std::optional<std::uint64_t> number_of(std::string_view name) const;
   [[nodiscard]] Timestamp due(const OpenJob& job) const;
 
   std::string prefix_;

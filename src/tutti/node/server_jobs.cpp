@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <set>
 #include <utility>
 
 #include "tutti/base/plain_text.hpp"
@@ -13,40 +14,61 @@
 
 namespace tutti::node {
 
+/// A bus may bring an answer twice, which is nothing to tell.
+void ServerNode::refuse_unasked(const bus::Envelope& envelope, const std::string& job, Timestamp now, Step& step) {
+  if (!jobs_.has_given(job))
+    refuse(envelope, fmt::format("job '{}' is none of this server's since it started", plain_text(job)), now, step);
+}
+
+/// An answer counts for what was asked, and is the answer to all of it.
 void ServerNode::receive_verdicts(const bus::Envelope& envelope, Timestamp now, Step& step) {
   auto answer = wire::decode_verdicts(*envelope.bytes);
   if (!answer) return refuse(envelope, answer.error().message, now, step);
-  const bool was_open = jobs_.close(answer->job, now).has_value();
+  const std::size_t part = answer->job.find('+');  // LaterAnswers::part_of(): there is more to come
+  const bool is_all = part == std::string::npos;
+  const std::string name = answer->job.substr(0, part);
+  const auto job = is_all ? jobs_.close(name, now) : jobs_.find(name);
+  if (!job) return refuse_unasked(envelope, name, now, step);
+  std::erase_if(answer->failed, [&](const SubmapPair& pair) { return job->is_replaced || !job->has(pair); });
+  std::erase_if(answer->verdicts, [&](const ClosureVerdict& verdict) { return !job->has(verdict.pair); });
   if (answer->cannot) {
-    if (was_open) note_waiting(answer->failed, answer->why, now, step);
+    if (!job->is_replaced) note_waiting(answer->failed, answer->why, now, step);
     return;
   }
+  std::set<SubmapPair> unanswered(job->pairs.begin(), job->pairs.end());
+  for (const ClosureVerdict& verdict : answer->verdicts) unanswered.erase(verdict.pair);
+  for (const SubmapPair& pair : answer->failed) unanswered.erase(pair);
   std::vector<ClosureVerdict> strange;
   const auto is_strange = [&](const ClosureVerdict& verdict) { return verdict.finder != server_.state().finder; };
   std::ranges::copy_if(answer->verdicts, std::back_inserter(strange), is_strange);
   std::erase_if(answer->verdicts, is_strange);
-  if (!strange.empty()) set_aside(envelope, strange, was_open, now, step);
+  if (!strange.empty()) set_aside(envelope, strange, now, step);
   Verdicts refused{.job = answer->job, .verdicts = {}, .failed = {}, .why = {}};
   for (ClosureVerdict& verdict : answer->verdicts) {
     const bool is_workers = envelope.from.role == bus::Endpoint::Role::worker && !verdict.closures.empty();
     failed_.forget(verdict.pair);
     waiting_.erase(verdict.pair);
     verdict.worker = is_workers ? std::optional(envelope.from.number) : std::nullopt;
-    if (const Status taken = take(verdict, refused, step); !taken) refuse(envelope, taken.error().message, now, step);
+    if (const Status taken = take(verdict, refused, step); !taken) {
+      refuse(envelope, taken.error().message, now, step);
+      unanswered.insert(verdict.pair);
+    }
   }
   for (const SubmapPair& pair : answer->failed) note_failed(pair, answer->why, now, refused, step);
+  for (const SubmapPair& pair : unanswered)
+    if (is_all && !job->is_replaced && !server_.state().answered.contains(pair))
+      note_failed(pair, "the answer has nothing valid on it", now, refused, step);
   keep(refused, step);
   step.tell(now, VerdictsTaken{answer->job, answer->verdicts.size()});
 }
 
 /// Of another finder than the server's, as of a program of another version: believed when the server's is that one.
 /// Closures are kept until then, one answer for each pair.
-void ServerNode::set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, bool was_open,
-                           Timestamp now, Step& step) {
+void ServerNode::set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, Timestamp now,
+                           Step& step) {
   const std::string why = fmt::format("answers of finder {}, expected {}: not believed",
                                       to_string(verdicts.front().finder), to_string(server_.state().finder));
   refuse(envelope, why, now, step);
-  if (!was_open) return;
   std::vector<SubmapPair> pairs;
   for (const ClosureVerdict& verdict : verdicts) {
     const SubmapPair& pair = verdict.pair;
@@ -87,7 +109,7 @@ void ServerNode::keep(const Verdicts& refused, Step& step) {
 void ServerNode::receive_returned_job(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto job = wire::decode_job(*envelope.bytes);
   if (!job) return refuse(envelope, job.error().message, now, step);
-  if (!jobs_.close(job->id, now)) return;
+  if (const auto closed = jobs_.close(job->id, now); !closed || closed->is_replaced) return;
   Verdicts refused{.job = job->id, .verdicts = {}, .failed = {}, .why = {}};
   if (job->pairs.size() == 1) {
     give_up(job->pairs.front(), "every worker that had it has ended", now, refused, step);
@@ -179,7 +201,7 @@ std::optional<Timestamp> ServerNode::next_timer() const {
   return next;
 }
 
-/// The bus gives up a job that has ended five workers, and may lose one. An answer that comes after all does no harm.
+/// The bus gives up a job that has ended five workers, and may lose one. An answer that comes after all is taken.
 void ServerNode::ask_again(Timestamp now, Step& step) {
   bool is_due = false;
   for (const SubmapPair& pair : failed_.take_due(now)) is_due = give_back(pair) || is_due;

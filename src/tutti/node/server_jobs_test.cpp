@@ -147,5 +147,80 @@ TEST_F(ServerJobs, AJobOfAnEarlierStartComesBackForNothing) {
   expect_refused("every worker that had it has ended");
 }
 
+/// What anybody can send: a verdict with other closures than the worker found.
+class StrangeAnswers : public ServerJobs {
+ protected:
+  Job ask() {
+    receive(test::submap(kAlpha, 0));
+    return jobs_of(receive(test::submap(kBravo, 0))).at(0);
+  }
+  Step say(const Verdicts& said) {
+    return receive({Endpoint::worker(9), Endpoint::server(), MessageKind::verdicts, said.job,
+                    std::make_shared<const std::string>(wire::encode(said))});
+  }
+  /// Of the pair of job, refused.
+  [[nodiscard]] Verdicts refusal_of(const std::string& job, const SubmapPair& pair = kBad) const {
+    return {.job = job,
+            .verdicts = {{.pair = pair,
+                          .closures = {},
+                          .refusal = Refusal{RefusalReason::unverified},
+                          .finder = finder_->id()}},
+            .failed = {},
+            .why = {}};
+  }
+  [[nodiscard]] bool has_closure() const { return node_->map_server().state().verdicts.contains(kBad); }
+};
+
+TEST_F(StrangeAnswers, ToAJobThatIsAnsweredAreDropped) {
+  const Job job = ask();
+  answer(job);
+  ASSERT_TRUE(has_closure());
+  const auto before = store_->tables();
+  EXPECT_TRUE(say(refusal_of(job.id)).writes.empty());
+  EXPECT_TRUE(has_closure());
+  EXPECT_EQ(store_->tables(), before);
+}
+
+TEST_F(StrangeAnswers, ToAJobOfAnotherStartOrOfNoneAreDropped) {
+  const Job job = ask();
+  restart();
+  for (const std::string& name : {job.id, std::string("7/7/7")}) {
+    EXPECT_TRUE(say(refusal_of(name)).writes.empty()) << name;
+    EXPECT_FALSE(node_->map_server().state().answered.contains(kBad)) << name;
+  }
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);  // which is asked anew
+}
+
+TEST_F(StrangeAnswers, CountOnlyForWhatWasAsked) {
+  answer(ask());
+  ASSERT_TRUE(has_closure());
+  const std::vector<Job> next = jobs_of(receive(test::submap(kAlpha, 1)));
+  ASSERT_FALSE(next.empty());
+  EXPECT_TRUE(say(refusal_of(next[0].id, kBad)).writes.empty());
+  EXPECT_TRUE(has_closure());
+  // It said nothing of what it was asked: that has failed, and is asked again.
+  EXPECT_FALSE(wait(60.0).empty());
+}
+
+TEST_F(StrangeAnswers, TheOldAnswerToWhatWasAskedAgainIsWelcome) {
+  const Job job = ask();
+  const std::vector<Job> again = wait(600.0);
+  ASSERT_EQ(again.size(), 1U);
+  ASSERT_NE(again[0].id, job.id);
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
+  answer(job);
+  EXPECT_TRUE(has_closure());
+  answer(again[0]);
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, 0U);
+}
+
+TEST_F(StrangeAnswers, OfAPartLeavesTheJobOpen) {
+  const Job job = ask();
+  EXPECT_FALSE(say(refusal_of(job.id + "+1")).writes.empty());  // as LaterAnswers names it
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, 1U);
+  say(refusal_of(job.id));
+  EXPECT_EQ(node_->mission_status(now_).pending_jobs, 0U);
+}
+
 }  // namespace server_jobs_test
 }  // namespace tutti::node

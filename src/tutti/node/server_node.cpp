@@ -253,20 +253,21 @@ void ServerNode::note_refused(SubmapId id, const bus::Envelope& envelope, const 
   send_receipt(*receipt, step);
 }
 
-/// What a worker asked for; what it does not get it asks for again.
+/// What a worker asked for; what it does not get it asks for again. A copy without a frame says that the map does not
+/// have it.
 void ServerNode::send_copies(const bus::Envelope& envelope, Timestamp now, Step& step) {
   if (envelope.from.role != bus::Endpoint::Role::worker) return refuse(envelope, "only workers get copies", now, step);
   const auto request = wire::decode_submap_request(*envelope.bytes);
   if (!request) return refuse(envelope, request.error().message, now, step);
   for (std::size_t i = 0; i < std::min(request->submaps.size(), WorkerNode::kMostAsked); ++i) {
-    auto frame = frames_->frame(request->submaps[i]);
+    auto frame = frames_->find(request->submaps[i]);
     if (!frame) return refuse(envelope, frame.error().message, now, step);
-    step.messages.push_back(
-        {bus::Endpoint::server(),
-         envelope.from,
-         bus::MessageKind::submap_copy,
-         {},
-         std::make_shared<const std::string>(wire::encode(SubmapCopy{request->submaps[i], std::move(*frame)}))});
+    step.messages.push_back({bus::Endpoint::server(),
+                             envelope.from,
+                             bus::MessageKind::submap_copy,
+                             {},
+                             std::make_shared<const std::string>(
+                                 wire::encode(SubmapCopy{request->submaps[i], std::move(*frame).value_or("")}))});
   }
 }
 

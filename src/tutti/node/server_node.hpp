@@ -142,8 +142,9 @@ class ServerNode {
   /// After an update: sets when the whole map is to be refined if nothing more comes.
   void note_settling(Timestamp now);
   void settle(Timestamp now, Step& step);
-  void set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, bool was_open,
-                 Timestamp now, Step& step);
+  void set_aside(const bus::Envelope& envelope, const std::vector<ClosureVerdict>& verdicts, Timestamp now, Step& step);
+  /// An answer to a job that is not open.
+  void refuse_unasked(const bus::Envelope& envelope, const std::string& job, Timestamp now, Step& step);
   /// A worker did not have the finder for these pairs: they are asked again when a worker has it.
   void note_waiting(const std::vector<SubmapPair>& pairs, const std::string& why, Timestamp now, Step& step);
   void ask_waiting(Timestamp now, Step& step);

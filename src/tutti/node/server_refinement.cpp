@@ -41,11 +41,19 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
   const auto refinement = wire::decode_refinement(*envelope.bytes);
   if (!refinement) return refuse(envelope, refinement.error().message, now, step);
   const auto closed = jobs_.close(refinement->job, now);
+  if (!closed || !closed->refinement) return refuse_unasked(envelope, refinement->job, now, step);
+  const RefinementJob& asked = *closed->refinement;
   const auto failed = [&](const std::string& why) {
-    if (closed && closed->refinement) note_failed_refinement(*closed->refinement, why, now, step);
+    if (!closed->is_replaced) note_failed_refinement(asked, why, now, step);
   };
-  if (refinement->cannot && closed && closed->refinement) {
-    refinements_.wait(*closed->refinement);
+  if (refinement->revision != asked.revision || refinement->whole != asked.whole) {
+    const std::string why = "an answer to another refinement than was asked for";
+    refuse(envelope, why, now, step);
+    return failed(why);
+  }
+  if (refinement->cannot) {
+    if (closed->is_replaced) return;
+    refinements_.wait(asked);
     why_waiting_ = plain_text(refinement->why);
     ++changes_;
     return step.tell(now, RefinementFailed{refinement->revision, refinement->why});
@@ -70,7 +78,8 @@ void ServerNode::receive_refinement(const bus::Envelope& envelope, Timestamp now
 void ServerNode::receive_returned_refinement(const bus::Envelope& envelope, Timestamp now, Step& step) {
   const auto job = wire::decode_refinement_job(*envelope.bytes);
   if (!job) return refuse(envelope, job.error().message, now, step);
-  if (jobs_.close(job->id, now)) give_up_refinement(job->revision, "every worker that had it has ended", now, step);
+  if (const auto closed = jobs_.close(job->id, now); closed && !closed->is_replaced)
+    give_up_refinement(job->revision, "every worker that had it has ended", now, step);
 }
 
 void ServerNode::note_failed_refinement(const RefinementJob& job, const std::string& why, Timestamp now, Step& step) {

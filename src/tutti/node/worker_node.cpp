@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/node/worker_node.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <exception>
 #include <utility>
@@ -129,16 +131,19 @@ void WorkerNode::send(bus::MessageKind kind, const std::string& job, std::string
       {self_, bus::Endpoint::server(), kind, job, std::make_shared<const std::string>(std::move(bytes))});
 }
 
-void WorkerNode::decline(const Job& job, const std::string& why, Step& step) const {
-  const Verdicts answer{
-      .job = job.id, .verdicts = {}, .failed = job.pairs, .why = why.substr(0, wire::kMaxReasonBytes), .cannot = true};
+void WorkerNode::decline(const Job& job, const std::string& why, bool cannot, Step& step) const {
+  const Verdicts answer{.job = job.id,
+                        .verdicts = {},
+                        .failed = job.pairs,
+                        .why = why.substr(0, wire::kMaxReasonBytes),
+                        .cannot = cannot};
   send(bus::MessageKind::verdicts, job.id, wire::encode(answer), step);
 }
 
-void WorkerNode::decline(const RefinementJob& job, const std::string& why, Step& step) const {
+void WorkerNode::decline(const RefinementJob& job, const std::string& why, bool cannot, Step& step) const {
   Refinement answer = answer_to(job);
   answer.why = why.substr(0, wire::kMaxReasonBytes);
-  answer.cannot = true;
+  answer.cannot = cannot;
   send(bus::MessageKind::refinement, job.id, wire::encode(answer), step);
 }
 
@@ -152,7 +157,7 @@ void WorkerNode::receive_job(const bus::Envelope& envelope, Timestamp now, Step&
   }
   const Status ready = std::visit([&](const auto& one) { return prepare(one); }, *job);
   if (!ready) {
-    std::visit([&](const auto& one) { decline(one, ready.error().message, step); }, *job);
+    std::visit([&](const auto& one) { decline(one, ready.error().message, true, step); }, *job);
     if (rest_s_ > 0.0) rests_until_ = now + rest_s_;
     return;
   }
@@ -173,6 +178,12 @@ void WorkerNode::receive_copy(const bus::Envelope& envelope, Timestamp now, Step
   auto copy = wire::decode_submap_copy(*envelope.bytes);
   if (!copy) return refuse(copy.error().message);
   if (!held_ || !held_->missing.contains(copy->id)) return;  // it came twice
+  if (copy->frame.empty()) {  // nobody's job: answered as failed, which makes room for the next
+    const Held held = *std::exchange(held_, std::nullopt);
+    const std::string why = fmt::format("submap {} is not in the map", to_string(copy->id));
+    std::visit([&](const auto& job) { decline(job, why, false, step); }, held.job);
+    return;
+  }
   const auto message = wire::decode_submap(copy->frame);
   if (!message && message.error().code == ErrorCode::unsupported) {
     leaves_job_ = true;

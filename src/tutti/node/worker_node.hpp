@@ -83,8 +83,9 @@ class WorkerNode {
   /// Sets the finder (refiner) that the job asks for.
   Status prepare(const Job& job);
   Status prepare(const RefinementJob& job);
-  void decline(const Job& job, const std::string& why, Step& step) const;
-  void decline(const RefinementJob& job, const std::string& why, Step& step) const;
+  /// Answers that nothing of the job was done; `cannot`: because this worker lacks what the job asks for.
+  void decline(const Job& job, const std::string& why, bool cannot, Step& step) const;
+  void decline(const RefinementJob& job, const std::string& why, bool cannot, Step& step) const;
   void answer(const Job& job, Timestamp now, Step& step);
   [[nodiscard]] std::vector<Timestamp> known_at(const ClosureVerdict& verdict, Timestamp now);
   void tell_later(Timestamp now, Step& step);

@@ -185,6 +185,19 @@ TEST_F(DistantWorkerTest, AsksForWhatItLacksAndHoldsTheJobUntilItHasAll) {
   EXPECT_EQ(answer(worker_.receive(envelope(job), Timestamp{})), answer(last));  // it has them now
 }
 
+TEST_F(DistantWorkerTest, AJobOfSubmapsThatTheMapDoesNotHaveIsAnsweredAtOnce) {
+  const Job job = job_of(2);
+  const std::vector<SubmapId> open = asked(worker_.receive(envelope(job), Timestamp{}));
+  bus::Envelope none = copy(open[0], open[0]);
+  none.bytes = std::make_shared<const std::string>(wire::encode(SubmapCopy{open[0], ""}));
+  const Verdicts failed = answer(worker_.receive(none, Timestamp{}));
+  EXPECT_FALSE(worker_.holds_job());
+  EXPECT_EQ(failed.failed, job.pairs);
+  EXPECT_FALSE(failed.cannot);
+  EXPECT_NE(failed.why.find("is not in the map"), std::string::npos) << failed.why;
+  EXPECT_TRUE(worker_.receive(none, Timestamp{}).messages.empty());  // of no job
+}
+
 TEST_F(DistantWorkerTest, AsksAgainForWhatDoesNotComeAndAtLastAnswersWithout) {
   const Job job = job_of(2);
   const std::vector<SubmapId> open = asked(worker_.receive(envelope(job), Timestamp{}));

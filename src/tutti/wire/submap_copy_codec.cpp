@@ -23,8 +23,8 @@ Status validate(const SubmapRequest& request) {
 }
 
 Status validate(const SubmapCopy& copy) {
-  if (!copy.frame.empty() && copy.frame.size() <= kMaxMessageBytes - kRoomForId) return {};
-  return fail(ErrorCode::invalid, "submap copy: a frame of {} bytes, expected 1 to {}", copy.frame.size(),
+  if (copy.frame.size() <= kMaxMessageBytes - kRoomForId) return {};
+  return fail(ErrorCode::invalid, "submap copy: a frame of {} bytes, expected at most {}", copy.frame.size(),
               kMaxMessageBytes - kRoomForId);
 }
 
