@@ -132,6 +132,14 @@ consistency::Explanation explain_again(const mission::RobotActor& actor, const M
   return again.receive(sent ? *sent : own).explanation;
 }
 
+/// For the report, of a log that has outgrown its files.
+std::string cut_short(const std::string& whose, std::uint64_t files) {
+  return fmt::format(
+      "{}: the first {} files of its events are gone, because a log keeps two: what this report counts and draws of it "
+      "begins after them",
+      whose, files);
+}
+
 Result<Robot> read_robot(const MissionConfig& config, const mission::MissionRecording& recording,
                          const fs::path& folder, const fs::path& scores) {
   const std::string& name = recording.recording.name;
@@ -145,21 +153,23 @@ Result<Robot> read_robot(const MissionConfig& config, const mission::MissionReco
   robot.actor = std::move(*actor);
   robot.timing = {.robot = name, .policy = config.agent.policy.name};
   Status taken;
-  const Status read = program::read_events(folder, [&](const Json& event) {
+  const auto read = program::read_events(folder, [&](const Json& event) {
     if (taken) taken = take(event, name, robot);
   });
-  if (!read || !taken) return in_context(folder.string(), (read ? taken : read).error());
+  if (!read || !taken) return in_context(folder.string(), read ? taken.error() : read.error());
   robot.finished.troubles = robot.troubles.lines(name);
-  const Status scored = program::read_events(scores, [&](const Json& event) {
+  const auto scored = program::read_events(scores, [&](const Json& event) {
     if (taken) taken = take_score(event, robot);
   });
-  if (!scored || !taken) return in_context(scores.string(), (scored ? taken : scored).error());
+  if (!scored || !taken) return in_context(scores.string(), scored ? taken.error() : scored.error());
+  for (const auto& [whose, gone] : {std::pair(name, *read), std::pair(name + "'s player", *scored)})
+    if (gone > 0) robot.finished.troubles.push_back(cut_short(whose, gone));
   robot.finished.outcome = robot.actor->outcome();
   return robot;
 }
 
-/// The server's course: what it told.
-Result<mission::MissionEvents> read_course(const fs::path& folder) {
+/// The server's course: what it told. `gone`: files of it that are not there any more.
+Result<mission::MissionEvents> read_course(const fs::path& folder, std::uint64_t& gone) {
   mission::MissionEvents course;
   std::set<std::string> failed;  // pairs that could not be verified are tried again and again
   const auto take = [&](const Json& event) {
@@ -185,7 +195,9 @@ Result<mission::MissionEvents> read_course(const fs::path& folder) {
     if (what == "message_refused" || is_new_failure)
       course.take({time, node::MessageRefused{{}, bus::MessageKind::verdicts, event.value("why", "")}});
   };
-  if (const Status read = program::read_events(folder, take); !read) return tl::unexpected(read.error());
+  const auto read = program::read_events(folder, take);
+  if (!read) return tl::unexpected(read.error());
+  gone = *read;
   return course;
 }
 
@@ -213,7 +225,8 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
   if (!server) return in_context(map.string(), server.error());
   static_cast<void>((*server)->resume(Timestamp{}));
   if (const auto due = (*server)->next_timer()) static_cast<void>((*server)->on_timer(*due));  // computes the map
-  const auto course = read_course(state / "server");
+  std::uint64_t gone = 0;
+  const auto course = read_course(state / "server", gone);
   if (!course) return tl::unexpected(course.error());
   mission::FinishedMission finished{.config = config,
                                     .seed = source.seed,
@@ -231,6 +244,7 @@ Result<mission::MissionRecord> collect_mission(const MissionConfig& config, cons
     finished.robots.push_back(std::move(robot.finished));
   }
   mission::MissionRecord record = mission::make_record(finished);
+  if (gone > 0) record.notes.push_back(cut_short("the server", gone));
   for (Robot& robot : robots) record.timing.policies.push_back(std::move(robot.timing));
   return record;
 }

@@ -3,12 +3,13 @@
 
 #include <fmt/format.h>
 #include <spdlog/logger.h>
-#include <spdlog/sinks/rotating_file_sink.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <unistd.h>
 
 #include <array>
 #include <chrono>
+#include <fstream>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -21,11 +22,42 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kEvents = "events.jsonl";
-constexpr const char* kOlderEvents = "events.1.jsonl";
+constexpr const char* kContinues = "log_continues";  // the first event of a file that is not the first one
 constexpr std::array<std::pair<const char*, spdlog::level::level_enum>, 4> kLevels{{{"debug", spdlog::level::debug},
                                                                                     {"info", spdlog::level::info},
                                                                                     {"warning", spdlog::level::warn},
                                                                                     {"error", spdlog::level::err}}};
+
+/// Lines for people, in a file of the program's own.
+class LogFile final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit LogFile(RotatedFile file) : file_(std::move(file)) {}
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    file_.append({line.data(), line.size()});
+  }
+  void flush_() override {}
+  RotatedFile file_;
+};
+
+/// How many files of events were before the one with this first line.
+std::uint64_t files_before(const Json& first) {
+  const bool continues = first.is_object() && first.contains("event") && first["event"] == kContinues &&
+                         first.contains("before") && first["before"].is_number_unsigned();
+  return continues ? first["before"].get<std::uint64_t>() : 0;
+}
+
+/// The same of a file, or nothing if there is none.
+std::optional<std::uint64_t> files_before(const fs::path& file) {
+  std::ifstream in(file);
+  if (!in) return std::nullopt;
+  std::string line;
+  std::getline(in, line);
+  return files_before(Json::parse(line, nullptr, false));
+}
 
 spdlog::level::level_enum of_spdlog(Level level) { return kLevels.at(static_cast<std::size_t>(level)).second; }
 
@@ -276,42 +308,34 @@ std::unique_ptr<EventLog> EventLog::on_console(const std::string& name, Level co
   return log;
 }
 
-Result<std::unique_ptr<EventLog>> EventLog::open(const fs::path& folder, const std::string& name, Level console) {
+Result<std::unique_ptr<EventLog>> EventLog::open(const fs::path& folder, const std::string& name, Level console,
+                                                 std::uintmax_t max_event_bytes) {
   auto log = on_console(name, console);
-  try {
-    const auto file =
-        std::make_shared<spdlog::sinks::rotating_file_sink_mt>((folder / "log.txt").string(), kMaxLogBytes, 1);
-    file->set_level(spdlog::level::info);
-    file->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
-    log->people_->sinks().push_back(file);
-  } catch (const spdlog::spdlog_ex& error) {
-    return fail(ErrorCode::io, "{}: {}", (folder / "log.txt").string(), error.what());
-  }
-  log->people_->set_error_handler([](const std::string& /*a full disk*/) {});
-  log->people_->flush_on(spdlog::level::info);
-  log->file_ = folder / kEvents;
-  std::error_code error;
-  log->bytes_ = fs::exists(log->file_, error) ? fs::file_size(log->file_, error) : 0;
-  log->events_.open(log->file_, std::ios::app);
-  if (!log->events_) return fail(ErrorCode::io, "{}: cannot be opened", log->file_.string());
-  if (log->bytes_ > 0) log->append("");  // ends a line that a kill has torn
+  auto text = RotatedFile::open(folder / "log.txt", kMaxLogBytes);
+  if (!text) return tl::unexpected(text.error());
+  const auto sink = std::make_shared<LogFile>(std::move(*text));
+  sink->set_level(spdlog::level::info);
+  sink->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %v");
+  log->people_->sinks().push_back(sink);
+  log->people_->set_error_handler([](const std::string& /*of stderr*/) {});
+  const fs::path file = folder / kEvents;
+  const auto before = files_before(file), older = files_before(RotatedFile::older_of(file));
+  log->files_before_ = before ? *before : older ? *older + 1 : 0;
+  const auto heading = [log = log.get()] {
+    return Json{{"event", kContinues}, {"before", ++log->files_before_}}.dump() + "\n";
+  };
+  auto events = RotatedFile::open(file, max_event_bytes, heading);
+  if (!events) return tl::unexpected(events.error());
+  log->events_.emplace(std::move(*events));
+  // Killed between the renaming of a full file and the first line of the next.
+  if (!before && older) log->append(Json{{"event", kContinues}, {"before", log->files_before_}}.dump());
   return log;
 }
 
 EventLog::~EventLog() { show(""); }
 
 void EventLog::append(const std::string& line) {
-  if (file_.empty()) return;
-  if (bytes_ > kMaxEventBytes) {
-    events_.close();
-    std::error_code ignored;
-    fs::rename(file_, file_.parent_path() / kOlderEvents, ignored);
-    events_.open(file_, std::ios::trunc);
-    bytes_ = 0;
-  }
-  events_.clear();
-  events_ << line << '\n' << std::flush;
-  bytes_ += line.size() + 1;
+  if (events_) events_->append(line + '\n');
 }
 
 void EventLog::write(const node::Event& event) {
@@ -357,17 +381,19 @@ void EventLog::show(const std::string& line) {
   static_cast<void>(!::write(STDERR_FILENO, all.data(), all.size()));
 }
 
-Status read_events(const fs::path& folder, const std::function<void(const Json&)>& take) {
-  for (const char* name : {kOlderEvents, kEvents}) {
-    std::ifstream in(folder / name);
-    if (!in && name == std::string_view(kEvents))
-      return fail(ErrorCode::io, "{}: cannot be read", (folder / name).string());
+Result<std::uint64_t> read_events(const fs::path& folder, const std::function<void(const Json&)>& take) {
+  const fs::path file = folder / kEvents;
+  std::optional<std::uint64_t> gone;
+  for (const fs::path& one : {RotatedFile::older_of(file), file}) {
+    std::ifstream in(one);
+    if (!in && one == file) return fail(ErrorCode::io, "{}: cannot be read", one.string());
     for (std::string line; std::getline(in, line);) {
       const Json json = Json::parse(line, nullptr, false);
+      if (!gone && json.is_object()) gone = files_before(json);
       if (json.is_object()) take(json);
     }
   }
-  return {};
+  return gone.value_or(0);
 }
 
 }  // namespace tutti::program

@@ -3,15 +3,16 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "tutti/base/result.hpp"
 #include "tutti/node/event.hpp"
+#include "tutti/program/rotated_file.hpp"
 #include "tutti/program/throttle.hpp"
 
 namespace spdlog {
@@ -33,7 +34,8 @@ Json to_json(const node::Event& event);
 
 /// Writes what a program tells: events for other programs in FOLDER/events.jsonl, one JSON object per line; sentences
 /// for people in FOLDER/log.txt and, from `console` on, on stderr. Both files are begun anew when they are full, and
-/// one older file of each is kept. May be called from any thread.
+/// one older file of each is kept; a later file of events says in its first line how many were before it. May be called
+/// from any thread.
 ///
 /// What cannot be written, for example because the disk is full, is lost, and the program goes on. Events that others
 /// can cause at will (refusals, statuses) are throttled, and a sentence is repeated only after kSame_s.
@@ -45,7 +47,7 @@ class EventLog {
 
   /// Continues the files of `folder`; `name` precedes sentences for people. Fails when the files cannot be opened.
   static Result<std::unique_ptr<EventLog>> open(const std::filesystem::path& folder, const std::string& name,
-                                                Level console);
+                                                Level console, std::uintmax_t max_event_bytes = kMaxEventBytes);
   /// Only writes sentences to stderr, for a program without a folder.
   static std::unique_ptr<EventLog> on_console(const std::string& name, Level console);
   ~EventLog();
@@ -62,9 +64,8 @@ class EventLog {
   void people(Level level, const std::string& sentence);
 
   std::mutex mutex_;
-  std::filesystem::path file_;
-  std::ofstream events_;
-  std::uintmax_t bytes_ = 0;
+  std::optional<RotatedFile> events_;
+  std::uint64_t files_before_ = 0;  // of events
   std::shared_ptr<spdlog::logger> people_;
   Throttle throttle_;
   std::string last_said_;
@@ -73,8 +74,8 @@ class EventLog {
   Level console_ = Level::warning;
 };
 
-/// Reads the lines of events.jsonl, after those of the older file. A line that a kill has torn is skipped. Fails when a
-/// file cannot be read.
-Status read_events(const std::filesystem::path& folder, const std::function<void(const Json&)>& take);
+/// Reads the lines of events.jsonl, after those of the older file. A line that a kill has torn is skipped. Returns how
+/// many files there were before these, which are gone. Fails when a file cannot be read.
+Result<std::uint64_t> read_events(const std::filesystem::path& folder, const std::function<void(const Json&)>& take);
 
 }  // namespace tutti::program

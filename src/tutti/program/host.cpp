@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/own_file.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/nats_port.hpp"
 #include "tutti/program/state_folder.hpp"

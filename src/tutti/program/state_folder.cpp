@@ -7,42 +7,20 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <set>
 
 #include "tutti/base/file.hpp"
+#include "tutti/base/own_file.hpp"
 #include "tutti/program/clock.hpp"
 
 namespace tutti::program {
 
 namespace fs = std::filesystem;
-namespace {
-
-fs::path beside_of(const fs::path& file) { return file.string() + ".new"; }
-
-}  // namespace
 
 double StateFolder::age_s() const {
   const std::uint64_t now_ns = wall_clock_ns();
   return now_ns > made_ns_ ? static_cast<double>(now_ns - made_ns_) * 1e-9 : 0.0;  // clocks are set back at times
-}
-
-Status replace_file(const fs::path& file, const std::string& text, bool durable) {
-  const fs::path beside = beside_of(file);
-  if (Status written = write_file(beside.string(), text); !written) return written;
-  if (durable) {
-    const int written = ::open(beside.c_str(), O_RDONLY | O_CLOEXEC);
-    const bool is_on_disk = written >= 0 && fsync(written) == 0;
-    const int why = errno;
-    if (written >= 0) close(written);
-    if (!is_on_disk) return fail(ErrorCode::io, "{}: cannot be written: {}", beside.string(), std::strerror(why));
-  }
-  std::error_code error;
-  fs::rename(beside, file, error);
-  if (error) return fail(ErrorCode::io, "{}: cannot be written: {}", file.string(), error.message());
-  return {};
 }
 
 Result<StateFolder> StateFolder::open(const fs::path& folder, const std::string& owner, const std::string& brought) {
@@ -62,8 +40,9 @@ StateFolder::~StateFolder() {
 
 Status StateFolder::lock() {
   const fs::path file = path_ / "lock";
-  lock_ = ::open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
-  if (lock_ < 0) return fail(ErrorCode::io, "{}: cannot be made: {}", file.string(), std::strerror(errno));
+  const auto opened = open_own_file(file, O_CREAT | O_RDWR, 0600);
+  if (!opened) return tl::unexpected(opened.error());
+  lock_ = *opened;
   if (flock(lock_, LOCK_EX | LOCK_NB) == 0) return {};
   return fail(ErrorCode::io, "state folder {}: another program that is running has it; two would spoil it",
               path_.string());

@@ -46,8 +46,4 @@ class StateFolder {
   int lock_ = -1;
 };
 
-/// Writes a file beside `file` and renames it, so that readers see either all of the old text or all of the new.
-/// `durable` syncs the new file to the disk before it is renamed.
-Status replace_file(const std::filesystem::path& file, const std::string& text, bool durable);
-
 }  // namespace tutti::program

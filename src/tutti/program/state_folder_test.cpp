@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tutti/base/file.hpp"
+#include "tutti/base/own_file.hpp"
 #include "tutti/program/event_log.hpp"
 
 namespace tutti::program {
@@ -92,6 +94,21 @@ TEST_F(StateFolderTest, AMapThatWasBroughtIsTaken) {
   const auto folder = StateFolder::open(folder_, "server", "map.tutti");
   ASSERT_TRUE(folder.has_value()) << folder.error().message;
   EXPECT_TRUE(folder->is_new());
+}
+
+TEST_F(StateFolderTest, OfSomebodyElsesFolderNoLinkIsFollowed) {
+  fs::create_directories(folder_ / "state");
+  const fs::path foreign = folder_ / "foreign";
+  std::ofstream(foreign) << "of somebody else";
+  fs::create_symlink(foreign, folder_ / "state" / "owner.new");
+  {
+    const auto folder = StateFolder::open(folder_ / "state", "server");
+    ASSERT_TRUE(folder.has_value()) << folder.error().message;
+  }
+  fs::remove(folder_ / "state" / "lock");
+  fs::create_symlink(foreign, folder_ / "state" / "lock");
+  EXPECT_FALSE(StateFolder::open(folder_ / "state", "server").has_value());
+  EXPECT_EQ(read_file(foreign.string()).value(), "of somebody else");
 }
 
 TEST_F(StateFolderTest, EventsComeBackInTheirOrderAndWithoutWhatAKillHasTorn) {
