@@ -106,6 +106,14 @@ class CommandLine(unittest.TestCase):
         self.expect(tutti("status"), 2, "--bus")
         self.expect(tutti("status", "--bus", "nats://192.0.2.1:4222"), 2, "another machine", "TLS")
         self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--wait", "0.3"), 1, "no bus at nats://127.0.0.1:1")
+        self.expect(tutti("status", "--bus", "nats://127.0.0.1.example.invalid:1"), 2, "another machine", "TLS")
+        self.expect(tutti("status", "--bus", "nats://127.0.0.1:one"), 2, "expected nats://HOST:PORT")
+        self.expect(tutti("status", "--bus", "nats://127.0.0.1:1", "--credentials", self.path / "none"), 2, "none")
+
+    def test_passwords_are_not_printed(self):
+        done = tutti("status", "--bus", "nats://alpha:hidden@127.0.0.1:1", "--wait", "0.3")
+        self.expect(done, 1, "no bus at nats://127.0.0.1:1")
+        self.assertNotIn("hidden", done.stdout + done.stderr)
 
     def test_usage_errors_exit_2(self):
         self.expect(tutti(), 2)

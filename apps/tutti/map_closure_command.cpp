@@ -14,6 +14,7 @@
 #include <string>
 #include <thread>
 
+#include "bus_options.hpp"
 #include "commands.hpp"
 #include "map_command.hpp"
 #include "options.hpp"
@@ -31,6 +32,7 @@ constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 struct ClosureOptions {
   std::string map, closure, by, bus, mission;
+  bus::BusCredentials credentials;
   bool insecure = false, rejected = false;
   double wait_s = 60.0;
 };
@@ -121,9 +123,11 @@ std::optional<std::string> heard_answer(bus::Port& port, const node::WordSender&
 /// To the server that has the map open, until it has answered.
 Status send(const ClosureOptions& options, const ClosureWord& word) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
-  bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
-  auto mission = options.mission.empty() ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s))
-                                         : options.mission;
+  bus::NatsPortOptions where{
+      .url = options.bus, .allow_insecure = options.insecure, .credentials = options.credentials};
+  auto mission = options.mission.empty()
+                     ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s))
+                     : options.mission;
   if (!mission) return tl::unexpected(mission.error());
   where.mission = std::move(*mission);
   auto port = bus::open_nats_port(self, where);
@@ -183,6 +187,7 @@ void add_word(CLI::App& command, Wish wish, const std::string& help, int& exit_c
   word->add_option("--mission", options->mission, "Of several on that bus; default: the one that has a server.")
       ->type_name("NAME");
   word->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet.");
+  add_credentials_option(*word, options->bus, options->credentials);
   add_number(*word, "--wait", options->wait_s, "How long to say it again until the server has answered", "S");
   word->add_option("--by", options->by, "Who says so, for the record.")->type_name("NAME")->capture_default_str();
   word->callback([options, wish, &exit_code] { exit_code = say(*options, wish); });

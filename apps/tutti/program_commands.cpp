@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "bus_options.hpp"
 #include "commands.hpp"
 #include "options.hpp"
 #include "program_options.hpp"
@@ -21,9 +22,13 @@ namespace {
 
 constexpr const char* kFilesName = "as the mission file says (mission: NAME), else 'tutti'";
 
-void add_bus_option(CLI::App& command, std::string& bus, bool& insecure) {
-  command.add_option("--bus", bus, "The bus, as the server prints it")->type_name("nats://HOST:PORT")->required();
-  command.add_flag("--insecure", insecure, "Use a bus on another machine although there is no TLS yet");
+template <class Options>
+void add_bus_option(CLI::App& command, Options& options) {
+  command.add_option("--bus", options.bus, "The bus, as the server prints it")
+      ->type_name("nats://HOST:PORT")
+      ->required();
+  command.add_flag("--insecure", options.insecure, "Use a bus on another machine although there is no TLS yet");
+  add_credentials_option(command, options.bus, options.credentials);
 }
 
 void add_state_option(CLI::App& command, std::filesystem::path& state, const std::string& what) {
@@ -48,6 +53,7 @@ void add_server_command(CLI::App& app, int& exit_code) {
       "Folder of this server: map, log, events, bus; made if missing. In a new one a map.tutti from elsewhere goes "
       "on");
   command->add_option("--bus", options->bus, "A NATS bus that runs already")->type_name("nats://HOST:PORT");
+  add_credentials_option(*command, options->bus, options->credentials);
   command
       ->add_option("--listen", options->listen,
                    "Where the server's own bus is to be reached; default: from this machine only, the port of the last "
@@ -98,7 +104,7 @@ void add_robot_command(CLI::App& app, int& exit_code) {
   command->add_option("--name", options->name, "Its name in the mission; with --feed any, another for each robot")
       ->type_name("NAME")
       ->required();
-  add_bus_option(*command, options->bus, options->insecure);
+  add_bus_option(*command, *options);
   add_state_option(*command, options->state,
                    "Folder of this robot: what it knows, and what is not sent yet; made if missing");
   add_mission_argument(*command, *common,
@@ -168,7 +174,7 @@ void add_worker_command(CLI::App& app, int& exit_code) {
       "Keeps nothing: killed in the middle of a job it costs time only, the job goes to another. SIGTERM or Ctrl-C "
       "stop "
       "it.");
-  add_bus_option(*command, options->bus, options->insecure);
+  add_bus_option(*command, *options);
   add_mission_argument(*command, *common,
                        "Needed only where closures come from its reference: all else the server says with each job");
   add_mission_name(*command, common->mission.name, "the one that has a server on this bus");

@@ -12,6 +12,7 @@
 #include <string>
 #include <thread>
 
+#include "bus_options.hpp"
 #include "commands.hpp"
 #include "options.hpp"
 #include "tutti/bus/mission_lease.hpp"
@@ -29,6 +30,7 @@ constexpr double kFresh_s = 6.0;  // three of the server's periods: it is there
 
 struct StatusOptions {
   std::string bus;
+  bus::BusCredentials credentials;
   std::string mission;
   bool insecure = false;
   bool json = false;
@@ -183,7 +185,8 @@ int watch(bus::NatsPort& port, View& view, const StatusOptions& options) {
 }
 
 int run(const StatusOptions& options) {
-  bus::NatsPortOptions where{.url = options.bus, .allow_insecure = options.insecure};
+  bus::NatsPortOptions where{
+      .url = options.bus, .allow_insecure = options.insecure, .credentials = options.credentials};
   const auto mission = options.mission.empty()
                            ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s))
                            : options.mission;
@@ -208,6 +211,7 @@ void add_status_command(CLI::App& app, int& exit_code) {
       ->type_name("nats://HOST:PORT")
       ->required();
   command->add_flag("--insecure", options->insecure, "Use a bus on another machine although there is no TLS yet");
+  add_credentials_option(*command, options->bus, options->credentials);
   command->add_flag("--json", options->json, "One JSON object on a line instead of a table");
   command->add_flag("--watch", options->watch, "Go on, and show it again whenever something is new");
   command->add_option("--mission", options->mission, "Of several missions on one bus; default: the one with a server")

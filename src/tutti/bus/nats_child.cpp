@@ -22,6 +22,8 @@
 #include <vector>
 
 #include "tutti/base/file.hpp"
+#include "tutti/base/own_file.hpp"
+#include "tutti/bus/bus_address.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -45,16 +47,17 @@ struct ToBeClosed {
 /// Messages of up to 8 MB pass, which copies of submaps need. The default write_deadline of 10 s cuts off a receiver of
 /// 2 MB over 1 Mbit/s.
 std::string configuration(const fs::path& folder, const NatsChildOptions& options, int port) {
+  const std::string host = to_string(HostPort{parse_host_port(options.host).value_or(HostPort{options.host}).host});
+  const std::string listen_at = fmt::format("{}:{}", host, port == 0 ? -1 : port);
   return fmt::format(R"(server_name: tutti
-listen: "{}:{}"
+listen: "{}"
 ports_file_dir: "{}"
 max_payload: 8388608
 max_pending: 67108864
 write_deadline: "60s"
 jetstream {{ store_dir: "{}", max_mem: 64MB, max_file: {} }}
 )",
-                     options.host, port == 0 ? -1 : port, folder.string(), (folder / "js").string(),
-                     options.max_store_bytes);
+                     listen_at, folder.string(), (folder / "js").string(), options.max_store_bytes);
 }
 
 /// The last lines that say that something is wrong, or the last ones.
@@ -97,15 +100,10 @@ bool is_ready(const std::string& url) {
 
 }  // namespace
 
-bool is_loopback(std::string_view host) {
-  return host == "localhost" || host == "::1" || host == "[::1]" || host.starts_with("127.");
-}
-
 /// The process and the thread that forked it, which waits for its end: the kernel ends the child with that thread.
 class NatsChild::Process {
  public:
-  Process(const std::string& program, const fs::path& configuration, const fs::path& log, int lock)
-      : log_(open(log.c_str(), O_CREAT | O_WRONLY | O_TRUNC | O_CLOEXEC, 0600)) {
+  Process(const std::string& program, const fs::path& configuration, int log, int lock) : log_{log} {
     std::vector<std::string> words{program, "-c", configuration.string()};
     thread_ = std::thread([this, words = std::move(words), lock]() mutable { run(words, lock); });
     std::unique_lock guard(mutex_);
@@ -205,8 +203,9 @@ bool NatsChild::running() const { return process_ && !process_->ended(); }
 
 Status NatsChild::lock_folder() {
   const fs::path file = folder_ / "lock";
-  lock_ = open(file.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
-  if (lock_ < 0) return fail(ErrorCode::io, "{}: cannot be made: {}", file.string(), std::strerror(errno));
+  const auto opened = open_own_file(file, O_CREAT | O_RDWR, 0600);
+  if (!opened) return tl::unexpected(opened.error());
+  lock_ = *opened;
   const auto end = Clock::now() + kOthersMayEnd;
   while (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) return fail(ErrorCode::io, "{}: {}", file.string(), std::strerror(errno));
@@ -236,7 +235,7 @@ Status NatsChild::wait_until_ready() {
   while (true) {
     if (const std::string url = url_in(ports); !url.empty() && is_ready(url)) {
       url_ = url;
-      return write_file((folder_ / "port").string(), std::to_string(port_of(url)));
+      return replace_file(folder_ / "port", std::to_string(port_of(url)), false);
     }
     const std::string log = (folder_ / "log").string();
     if (process_->ended()) return fail(ErrorCode::io, "nats-server: {} ({})", complaint_of(log), log);
@@ -252,10 +251,12 @@ Status NatsChild::launch(int port) {
   for (const auto& entry : fs::directory_iterator(folder_, ignored))
     if (entry.path().extension() == ".ports") fs::remove(entry.path(), ignored);  // of killed ones
   const fs::path file = folder_ / "configuration";
-  if (const Status written = write_file(file.string(), configuration(folder_, options_, port)); !written)
+  if (Status written = replace_file(file, configuration(folder_, options_, port), false, 0600); !written)
     return written;
   process_.reset();
-  process_ = std::make_unique<Process>(options_.program, file, folder_ / "log", lock_);
+  const auto log = open_own_file(folder_ / "log", O_CREAT | O_WRONLY | O_TRUNC, 0600);
+  if (!log) return tl::unexpected(log.error());
+  process_ = std::make_unique<Process>(options_.program, file, *log, lock_);
   pid_ = process_->pid();
   if (const int error = process_->failure(); error == ENOENT)
     return fail(ErrorCode::io, "{}: not installed (Debian: apt install nats-server)", options_.program);
@@ -267,7 +268,9 @@ Status NatsChild::launch(int port) {
 }
 
 Result<std::unique_ptr<NatsChild>> NatsChild::start(const fs::path& folder, const NatsChildOptions& options) {
-  if (!options.allow_insecure && !is_loopback(options.host))
+  const auto at = parse_host_port(options.host);
+  if (!at) return tl::unexpected(at.error());
+  if (!options.allow_insecure && !is_loopback(at->host))
     return fail(ErrorCode::configuration,
                 "host {}: others than this machine could write to it: needs TLS, or "
                 "allow_insecure",

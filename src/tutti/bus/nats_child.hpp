@@ -32,9 +32,6 @@ struct NatsChildOptions {
   }
 };
 
-/// True for addresses that only this machine can reach: 127.0.0.0/8, ::1, localhost.
-bool is_loopback(std::string_view host);
-
 /// A nats-server with JetStream as a child process. The child ends with this process, however this one ends. Its folder
 /// holds its configuration, messages and log, and is locked, so that one nats-server has it at a time.
 class NatsChild {

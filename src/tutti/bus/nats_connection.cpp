@@ -9,8 +9,9 @@
 #include <atomic>
 #include <utility>
 
+#include "tutti/base/plain_text.hpp"
+#include "tutti/bus/bus_address.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
-#include "tutti/bus/nats_child.hpp"
 
 namespace tutti::bus {
 namespace {
@@ -28,25 +29,25 @@ constexpr std::int64_t kAcknowledge_ns = 30'000'000'000;  // then a message come
 constexpr std::uint64_t kMostRemoved = 1000;              // sequences looked at in one go
 constexpr std::int64_t kDeliveries = 5;                   // of a job: what ends five workers is not given to a sixth
 
-/// Errors are in NatsConnection::last_error(); without a handler libnats prints them.
+/// Errors are in what calls return, and in NatsConnection::denied(); without a handler libnats prints them.
 void say_nothing(natsConnection* /*connection*/, natsSubscription* /*subscription*/, natsStatus /*status*/,
                  void* /*closure*/) {}
 
-std::string host_of(std::string_view url) {
-  const std::size_t scheme = url.find("://");
-  if (scheme != std::string_view::npos) url.remove_prefix(scheme + 3);
-  if (const std::size_t user = url.rfind('@'); user != std::string_view::npos) url.remove_prefix(user + 1);
-  const std::size_t port = url.rfind(':');
-  return std::string(port == std::string_view::npos || url.ends_with(']') ? url : url.substr(0, port));
-}
-
-NatsOwned<natsOptions> make_options(const std::string& url, const std::string& name) {
+NatsOwned<natsOptions> make_options(const NatsPortOptions& where, const std::string& name) {
   natsOptions* made = nullptr;
   if (natsOptions_Create(&made) != NATS_OK) return nullptr;
   NatsOwned<natsOptions> options(made);
   const std::string inbox = "_INBOX_" + name;
+  const auto url = parse_bus_url(where.url);
+  if (!url) return nullptr;
+  const BusCredentials& credentials = where.credentials.secret.empty() ? url->credentials : where.credentials;
+  const char* const secret = credentials.secret.c_str();
+  if (!credentials.secret.empty() &&
+      (credentials.user.empty() ? natsOptions_SetToken(made, secret)
+                                : natsOptions_SetUserInfo(made, credentials.user.c_str(), secret)) != NATS_OK)
+    return nullptr;
   const bool all =
-      natsOptions_SetURL(made, url.c_str()) == NATS_OK && natsOptions_SetName(made, name.c_str()) == NATS_OK &&
+      natsOptions_SetURL(made, url->plain.c_str()) == NATS_OK && natsOptions_SetName(made, name.c_str()) == NATS_OK &&
       natsOptions_SetCustomInboxPrefix(made, inbox.c_str()) == NATS_OK &&
       natsOptions_SetMaxReconnect(made, -1) == NATS_OK &&
       natsOptions_SetReconnectWait(made, kReconnect_ms) == NATS_OK &&
@@ -72,24 +73,28 @@ std::string retained_bucket(const std::string& mission) { return "GRAPH_" + miss
 std::string retained_stream(const std::string& mission) { return "KV_" + retained_bucket(mission); }
 
 tl::unexpected<Error> NatsConnection::failure(natsStatus status, std::string_view doing, int code) const {
-  return fail(ErrorCode::io, "{}: {}: {}{}", url_, doing, natsStatus_GetText(status),
-              code == 0 ? "" : fmt::format(" (JetStream error {})", code));
+  const std::string refused = denied();
+  return fail(ErrorCode::io, "{}: {}: {}{}{}", url_, doing, natsStatus_GetText(status),
+              code == 0 ? "" : fmt::format(" (JetStream error {})", code),
+              refused.empty() ? "" : " (the bus does not allow it: " + refused + ")");
 }
 
 Status check(const NatsPortOptions& options) {
   if (!is_mission_name(options.mission))
     return fail(ErrorCode::configuration, "mission '{}': 1 to 32 letters, digits, '-' and '_' were expected",
                 options.mission);
-  if (!options.allow_insecure && !is_loopback(host_of(options.url)))
+  const auto url = parse_bus_url(options.url);
+  if (!url) return tl::unexpected(url.error());
+  if (!options.allow_insecure && !is_loopback(url->at.host))
     return fail(ErrorCode::configuration, "{}: another machine, and no TLS yet: allow_insecure (--insecure) forces it",
-                options.url);
+                url->plain);
   return {};
 }
 
 Result<std::shared_ptr<NatsConnection>> NatsConnection::open(const NatsPortOptions& options, const std::string& name) {
-  std::shared_ptr<NatsConnection> made(new NatsConnection(options.url, name));
-  const auto settings = make_options(options.url, name);
-  if (!settings) return fail(ErrorCode::configuration, "{}: not an address that NATS understands", options.url);
+  std::shared_ptr<NatsConnection> made(new NatsConnection(without_credentials(options.url), name));
+  const auto settings = make_options(options, name);
+  if (!settings) return fail(ErrorCode::configuration, "{}: not an address that NATS understands", made->url_);
   natsStatus status = natsConnection_Connect(&made->connection_, settings.get());
   if (status != NATS_OK) return made->failure(status, "connecting");
   jsOptions streams;
@@ -117,10 +122,12 @@ std::uint64_t NatsConnection::reconnects() const {
   return reconnects;
 }
 
-std::string NatsConnection::last_error() const {
+/// nats-server does not answer what it refuses; it says so on the connection, which libnats remembers as its last
+/// error.
+std::string NatsConnection::denied() const {
   const char* text = nullptr;
-  natsConnection_GetLastError(connection_, &text);
-  return text == nullptr ? "" : text;
+  if (connection_ == nullptr || natsConnection_GetLastError(connection_, &text) != NATS_NOT_PERMITTED) return {};
+  return text == nullptr ? "" : plain_text(text);
 }
 
 /// To add what is there already would reserve its room once more (error 10047).
@@ -311,6 +318,7 @@ Result<std::optional<NatsConnection::Look>> NatsConnection::look_at(const std::s
               .pending = info->NumPending,
               .given = given,
               .deliveries = info->Delivered.Consumer,
+              .gone = a.LastSeq - std::min(a.LastSeq, a.Msgs),
               .done_up_to = given == 0 ? info->Delivered.Stream : info->AckFloor.Stream,
               .asked = info->NumWaiting > 0};
 }
@@ -329,6 +337,35 @@ Status NatsConnection::remove_done(const std::string& stream, const Look& look,
     if (status == NATS_TIMEOUT || status == NATS_CONNECTION_CLOSED) return failure(status, "emptying " + stream, code);
   }
   return {};
+}
+
+Result<std::uint64_t> NatsConnection::remove_strange(const std::string& stream, std::uint64_t after,
+                                                     const std::function<bool(std::string_view)>& ours,
+                                                     std::uint64_t& removed) const {
+  jsErrCode code{};
+  jsStreamInfo* info = nullptr;
+  natsStatus status = js_GetStreamInfo(&info, streams_, stream.c_str(), nullptr, &code);
+  const NatsOwned<jsStreamInfo> owned(status == NATS_OK ? info : nullptr);
+  if (status != NATS_OK) return failure(status, "stream " + stream, code);
+  const jsStreamState& there = info->State;
+  if (there.LastSeq < after) after = 0;  // it was made anew
+  if (there.Msgs == 0) return there.LastSeq;
+  after = std::max(after + 1, there.FirstSeq) - 1;
+  const std::uint64_t end = std::min(there.LastSeq, after + kMostRemoved);
+  for (; after < end; ++after) {
+    natsMsg* found = nullptr;
+    status = js_GetMsg(&found, streams_, stream.c_str(), after + 1, nullptr, &code);
+    if (status == NATS_NOT_FOUND) continue;  // it is done
+    if (status != NATS_OK) return failure(status, "looking into " + stream, code);
+    const NatsOwned<natsMsg> message(found);
+    const char* id = nullptr;
+    natsMsgHeader_Get(found, "Nats-Msg-Id", &id);
+    if (ours(id == nullptr ? "" : id)) continue;
+    status = js_DeleteMsg(streams_, stream.c_str(), after + 1, nullptr, &code);
+    if (status != NATS_OK && status != NATS_NOT_FOUND) return failure(status, "removing from " + stream, code);
+    ++removed;
+  }
+  return end;
 }
 
 Status NatsConnection::remove_stream(const std::string& stream) const {

@@ -145,7 +145,17 @@ TEST_F(NatsDamage, AJobThatEndsEveryWorkerComesBackAndTheOthersStay) {
     });
     return id;
   };
-  for (std::uint32_t i = 0; i < 5; ++i) EXPECT_EQ(got(*network.open(Endpoint::worker(i)), 5.0), "0");
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const auto ending = network.open(Endpoint::worker(i));
+    EXPECT_EQ(got(*ending, 5.0), "0");
+    if (i == 0) {
+      within(0.5, [] { return false; });
+      EXPECT_EQ(hub->state().given_in_vain, 0U);
+    }
+    if (i == 2) {
+      EXPECT_TRUE(within(5.0, [&] { return hub->state().given_in_vain == 3; })) << hub->state().given_in_vain;
+    }
+  }
   const auto worker = network.open(Endpoint::worker(9));
   EXPECT_EQ(got(*worker, 0.5), "");
   send(*hub, Endpoint::any_worker(), MessageKind::job, 1);
@@ -155,6 +165,7 @@ TEST_F(NatsDamage, AJobThatEndsEveryWorkerComesBackAndTheOthersStay) {
   EXPECT_EQ(hub->state().streams_made_anew, 0U) << hub->state().last_error;
   worker->acknowledge(ticket);
   EXPECT_EQ(got(*worker, 5.0), "2");
+  EXPECT_TRUE(within(5.0, [&] { return hub->state().given_in_vain == 0; }));
   EXPECT_TRUE(within(5.0, [&] { return hub->state().jobs_removed == 1; })) << hub->state().last_error;
   const auto returned = hub->receive();
   ASSERT_EQ(returned.size(), 1U);

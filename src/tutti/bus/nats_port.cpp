@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/content_hash.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/jetstream_port.hpp"
 
@@ -39,6 +40,7 @@ JetStreamPort::JetStreamPort(Endpoint self, NatsPortOptions options)
       threads_.emplace_back([this, all = "mission." + mission + ".*.*.status"] { hear_best_effort(all); });
       threads_.emplace_back([this, all = "mission." + mission + ".worker.*.submap_request"] { hear_best_effort(all); });
       threads_.emplace_back([this] { watch(); });
+      threads_.emplace_back([this] { keep_jobs_ours(); });
       break;
     case Endpoint::Role::robot:
     case Endpoint::Role::viewer:
@@ -66,9 +68,11 @@ JetStreamPort::~JetStreamPort() {
 Status JetStreamPort::send(Envelope envelope) {
   TUTTI_CHECK(envelope.from == self_ && envelope.bytes != nullptr, "not from {}", name_of(self_));
   const std::scoped_lock guard(mutex_);
+  const Delivery delivery = delivery_of(envelope.kind);
+  if (delivery == Delivery::work_queue)  // before it can be in the stream
+    jobs_sent_.insert(content_hash(to_string(whole_part(envelope))));
   Status added = outbox_.add(envelope);
-  if (added && delivery_of(envelope.kind) == Delivery::retained)
-    retained_sent_.insert_or_assign({envelope.to, envelope.kind}, envelope);
+  if (added && delivery == Delivery::retained) retained_sent_.insert_or_assign({envelope.to, envelope.kind}, envelope);
   changed_.notify_all();
   return added;
 }
@@ -93,7 +97,7 @@ void JetStreamPort::still_busy(std::uint64_t ticket) {
 NatsState JetStreamPort::state() const {
   const std::scoped_lock guard(mutex_);
   const bool listening = listening_ + 1 == threads_.size();  // all but the sender's thread
-  NatsState state{.url = options_.url,
+  NatsState state{.url = without_credentials(options_.url),
                   .connected = listening && session_ && session_->connection->connected(),
                   .reconnects = cuts_ == 0 ? 0 : cuts_ - 1,
                   .waiting_messages = outbox_.messages(),
@@ -102,7 +106,10 @@ NatsState JetStreamPort::state() const {
                   .refused = refused_ + inbox_.given_up(),
                   .streams_made_anew = streams_made_anew_,
                   .jobs_removed = jobs_removed_,
+                  .strange_jobs = strange_jobs_,
                   .unconfirmed_s = 0.0,
+                  .denied = session_ ? session_->connection->denied() : "",
+                  .given_in_vain = given_in_vain_,
                   .last_error = last_error_};
   if (const auto since = outbox_.unconfirmed_since(); since && state.connected)
     state.unconfirmed_s = std::chrono::duration<double>(Clock::now() - *since).count();

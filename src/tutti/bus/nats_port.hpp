@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tutti/base/config.hpp"
+#include "tutti/bus/bus_address.hpp"
 #include "tutti/bus/port.hpp"
 
 namespace tutti::bus {
@@ -16,6 +17,7 @@ struct NatsPortOptions {
   std::string url;
   std::string mission = "tutti";
   bool allow_insecure = false;
+  BusCredentials credentials = {};  ///< The one place where they enter; those in a URL count when there are none.
   std::uint64_t max_waiting_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_held_bytes = std::uint64_t{64} << 20U;
   std::uint64_t max_stream_bytes = std::uint64_t{512} << 20U;
@@ -52,9 +54,16 @@ struct NatsState {
   std::uint64_t refused = 0;            ///< Messages that arrived and could not be understood, or never became whole.
   std::uint64_t streams_made_anew = 0;  ///< Server's port only: streams that the bus had lost, or gave nothing of.
   std::uint64_t jobs_removed = 0;       ///< Server's port only: jobs that no worker gets any more.
+  std::uint64_t strange_jobs = 0;       ///< Server's port only: jobs that it has not sent, and has removed.
   /// For how long a connected bus has confirmed nothing of what was sent.
   double unconfirmed_s = 0.0;
-  std::string last_error;
+  /// What the bus does not let this program do, in the bus's words, since it connected; empty: nothing was refused.
+  std::string denied = {};
+  /// Server's port only: how often jobs were given to workers since one was last answered, once every job that is out
+  /// was given kGivenInVain times on average. 0: jobs are answered.
+  std::uint64_t given_in_vain = 0;
+  static constexpr std::uint64_t kGivenInVain = 3;
+  std::string last_error = {};
 };
 
 /// A port over NATS JetStream (docs/bus.md). The server's port makes the streams that the mission needs on the bus and

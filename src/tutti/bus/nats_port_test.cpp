@@ -342,7 +342,9 @@ TEST(NatsPortOptionsTest, OtherMachinesNeedTlsAndMissionsAName) {
     return port ? "" : port.error().message;
   };
   EXPECT_NE(refusal({.url = "nats://10.0.0.1:4222"}).find("10.0.0.1"), std::string::npos);
-  EXPECT_NE(refusal({.url = "nats://user:word@base:4222"}).find("TLS"), std::string::npos);
+  EXPECT_NE(refusal({.url = "nats://user:word@10.0.0.1:4222"}).find("TLS"), std::string::npos);
+  EXPECT_EQ(refusal({.url = "nats://user:word@10.0.0.1:4222"}).find("word"), std::string::npos);
+  EXPECT_NE(refusal({.url = "nats://127.0.0.1.example.invalid:4222"}).find("TLS"), std::string::npos);
   EXPECT_NE(refusal({.url = "nats://127.0.0.1:4222", .mission = "a.b"}).find("'a.b'"), std::string::npos);
   EXPECT_EQ(refusal({.url = "nats://127.0.0.1:1"}), "");  // waits for one
   EXPECT_EQ(refusal({.url = "nats://10.0.0.1:4222", .allow_insecure = true}), "");

@@ -2,6 +2,7 @@
 // The threads of a JetStreamPort that receive.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/base/content_hash.hpp"
 #include "tutti/bus/delivery.hpp"
 #include "tutti/bus/internal/jetstream_port.hpp"
 #include "tutti/bus/internal/nats_names.hpp"
@@ -21,6 +23,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kListen_ms = 200;
 constexpr int kBatch = 32;
+constexpr auto kLookForStrange = std::chrono::milliseconds(500);
 
 void drop_all(natsSubscription* subscription) {
   natsMsg* heard = nullptr;
@@ -113,6 +116,7 @@ void JetStreamPort::watch() {
     std::optional<Clock::time_point> since;  // they have been in this state
     std::uint64_t deliveries = 0;
     bool removed = false;
+    std::uint64_t gone = 0, deliveries_then = 0;  // when a message was last acknowledged, or removed
   };
   const std::string jobs = job_stream(options_.mission);
   std::map<std::string, Watched> all;
@@ -120,6 +124,10 @@ void JetStreamPort::watch() {
     const std::scoped_lock guard(mutex_);
     if (stranded_.empty()) stranded_ = stream;
     changed_.notify_all();
+  };
+  const auto note_given = [&](std::uint64_t given, std::uint64_t deliveries) {
+    const std::scoped_lock guard(mutex_);
+    given_in_vain_ = given > 0 && deliveries >= NatsState::kGivenInVain * given ? deliveries : 0;
   };
   const auto is_there = [&](const std::string& stream, const NatsConnection& connection) {
     const auto there = connection.has_stream(stream);
@@ -137,8 +145,16 @@ void JetStreamPort::watch() {
     const bool is_held_back = (*look)->pending > 0 && (*look)->asked && (*look)->deliveries == watched.deliveries &&
                               (*look)->given < kMostUnacknowledged && !(stream != jobs && is_full());
     watched.deliveries = (*look)->deliveries;
-    if (!is_left && !is_held_back) watched = {.since = {}, .deliveries = watched.deliveries, .removed = false};
-    if (!is_left && !is_held_back) return;
+    if ((*look)->gone != watched.gone || (*look)->given == 0 || watched.deliveries < watched.deliveries_then) {
+      watched.gone = (*look)->gone;
+      watched.deliveries_then = watched.deliveries - std::min(watched.deliveries, (*look)->given);
+    }
+    if (stream == jobs) note_given((*look)->given, watched.deliveries - watched.deliveries_then);
+    if (!is_left && !is_held_back) {
+      watched.since.reset();
+      watched.removed = false;
+      return;
+    }
     if (!watched.since) watched.since = Clock::now();
     if (Clock::now() - *watched.since < std::chrono::duration<double>(options_.stranded_s)) return;
     if (stream == jobs && is_left && !watched.removed) {
@@ -165,6 +181,30 @@ void JetStreamPort::watch() {
            is_there(retained_stream(options_.mission), *present.connection);
          }
          return pause(std::chrono::duration<double>(options_.stranded_s / 4));
+       });
+}
+
+/// What is there when a server starts is of an earlier start, whose answers nobody waits for.
+void JetStreamPort::keep_jobs_ours() {
+  const std::string jobs = job_stream(options_.mission);
+  std::uint64_t looked = 0;
+  const auto ours = [&](std::string_view id) {
+    const std::scoped_lock guard(mutex_);
+    return jobs_sent_.contains(content_hash(id));
+  };
+  keep([](Session& /*present*/) { return Result<bool>(true); },
+       [&](bool /*made*/, Session& present) {
+         if (!present.connection->connected() || is_stranded(jobs)) return pause(kLookForStrange);
+         std::uint64_t removed = 0;
+         const auto end = present.connection->remove_strange(jobs, looked, ours, removed);
+         const bool is_more = end && removed > 0;
+         if (end) looked = *end;
+         if (!end) note(end.error().message);
+         {
+           const std::scoped_lock guard(mutex_);
+           strange_jobs_ += removed;
+         }
+         return is_more ? !stopping_ : pause(kLookForStrange);
        });
 }
 

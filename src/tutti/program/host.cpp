@@ -160,6 +160,7 @@ double Host::turn() {
     second_s_ = wall_s + 1.0;
     look_at_link();
     if (parts_.each_second) parts_.each_second();
+    if (std::exchange(starts_anew_, false)) close();
   }
   if (!node_) {
     if (wall_s >= reopen_s_) reopen();
@@ -284,9 +285,20 @@ void Host::count(bool sent, const bus::Envelope& message) {
 }
 
 void Host::look_at_link() {
+  const auto state = link();
+  if (!state) return;
+  for (const auto& [level, sentence] : link_.look(*state, clock_.wall_s())) log_.say(level, sentence);
+}
+
+std::optional<bus::NatsState> Host::link() const {
   const auto* port = dynamic_cast<const bus::NatsPort*>(port_.get());
-  if (port == nullptr) return;
-  for (const auto& [level, sentence] : link_.look(port->state(), clock_.wall_s())) log_.say(level, sentence);
+  return port == nullptr ? std::nullopt : std::optional(port->state());
+}
+
+std::string Host::all_trouble() const {
+  if (parts_.trouble)
+    if (std::string said = parts_.trouble(); !said.empty()) return said;
+  return trouble_.empty() ? link_.trouble() : trouble_;
 }
 
 void Host::tell_status() {
@@ -297,7 +309,7 @@ void Host::tell_status() {
   if (node_)
     if (const auto thrown = thrown_by([&] { status = node_->status(clock_.now()); }))
       status["line"] = "how it stands cannot be told: " + *thrown;
-  const std::string& trouble = trouble_.empty() ? link_.trouble() : trouble_;
+  const std::string trouble = all_trouble();
   if (!trouble.empty()) status["trouble"] = trouble;
   if (thrown_ > 0) status["thrown"] = {{"times", thrown_}, {"last", last_thrown_}, {"put_aside", aside_.count()}};
   if (status.contains("line")) log_.show(status.value("line", ""));

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "tutti/bus/nats_port.hpp"
 #include "tutti/bus/port.hpp"
 #include "tutti/node/step.hpp"
 #include "tutti/program/clock.hpp"
@@ -90,6 +91,8 @@ class Host {
     std::string table_aside = {};
     /// Version of the program; another version tries messages again that this one has put aside.
     std::string version = {};
+    /// Says what the program knows to be wrong, which goes before what the host sees of it; may be empty.
+    std::function<std::string()> trouble = {};
   };
   Host(Parts parts, const Clock& clock, EventLog& log)
       : parts_(std::move(parts)), clock_(clock), log_(log), aside_(parts_.version) {}
@@ -116,8 +119,12 @@ class Host {
   /// Traffic by direction (true: sent) and kind.
   using TrafficTable = std::map<std::pair<bool, bus::MessageKind>, Traffic>;
   [[nodiscard]] const TrafficTable& traffic() const { return traffic_; }
-  /// What is wrong with the link to the bus; empty when nothing is.
-  [[nodiscard]] const std::string& link_trouble() const { return link_.trouble(); }
+  /// The state of a port to NATS; nothing when there is no port, or another kind of port.
+  [[nodiscard]] std::optional<bus::NatsState> link() const;
+  /// Everything that is wrong comes to this: what the program says, else trouble(), else the link. Empty: nothing is.
+  [[nodiscard]] std::string all_trouble() const;
+  /// The port and the node are made anew at the next turn.
+  void start_anew() { starts_anew_ = true; }
   /// Why the node cannot do all of its work; empty when it can.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
@@ -150,6 +157,7 @@ class Host {
   double reopen_s_ = 0.0;
   double report_s_ = 0.0, status_s_ = 0.0, second_s_ = 0.0;
   std::string trouble_;
+  bool starts_anew_ = false;
   bool lost_ = false;  // a step from within Hosted::wait() could not be stored
   PutAside aside_;
   std::uint64_t thrown_ = 0;  // how often the node has thrown

@@ -29,7 +29,17 @@ std::vector<LinkWatch::Said> LinkWatch::look(const bus::NatsState& state, double
   was_there_ = true;
   if (state.streams_made_anew > made_anew_) say(Level::warning, state.last_error);
   made_anew_ = state.streams_made_anew;
-  if (state.unconfirmed_s > kStores_s) {
+  const bool is_in_vain = state.given_in_vain > 0;
+  if (is_in_vain)
+    trouble_ = fmt::format("jobs were given to workers {} times since one was last answered, each of them at least {}",
+                           state.given_in_vain, bus::NatsState::kGivenInVain);
+  if (is_in_vain && !said_in_vain_) say(Level::error, trouble_);
+  if (!is_in_vain && said_in_vain_) say(Level::info, "jobs are answered again");
+  said_in_vain_ = is_in_vain;
+  if (!state.denied.empty()) {
+    trouble_ = fmt::format("the bus {} does not allow this program something: {}", state.url, state.denied);
+    if (std::exchange(said_denied_, state.denied) != state.denied) say(Level::error, trouble_);
+  } else if (state.unconfirmed_s > kStores_s) {
     trouble_ = fmt::format("the bus {} is there and has stored nothing for {:.0f} s: its disk may be full{}", state.url,
                            state.unconfirmed_s, state.last_error.empty() ? "" : " (last error" + why + ")");
     if (!std::exchange(said_full_, true)) say(Level::error, trouble_);

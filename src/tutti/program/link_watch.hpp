@@ -12,7 +12,7 @@
 namespace tutti::program {
 
 /// Reports changes of a program's link to the bus: there is no link, or none any more; the bus stores nothing, as when
-/// its disk is full; the bus had lost its streams.
+/// its disk is full; it does not allow something; it had lost its streams; it gives jobs to workers in vain.
 class LinkWatch {
  public:
   static constexpr double kPatience_s = 5.0;  ///< A missing link is reported after this time.
@@ -32,6 +32,8 @@ class LinkWatch {
   bool was_there_ = false;
   bool said_gone_ = false;
   bool said_full_ = false;
+  bool said_in_vain_ = false;
+  std::string said_denied_;
   std::uint64_t made_anew_ = 0;
   std::string trouble_;
 };

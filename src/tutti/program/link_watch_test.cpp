@@ -64,5 +64,25 @@ TEST(LinkWatch, ABusThatStoresNothingIsSaidToBeFull) {
   EXPECT_TRUE(watch.look(state, 23).empty());
 }
 
+TEST(LinkWatch, JobsGivenInVainAndWhatTheBusDoesNotAllowAreAlerts) {
+  LinkWatch watch;
+  bus::NatsState state{.url = "nats://base:4222", .connected = true, .given_in_vain = 60};
+  auto said = watch.look(state, 0);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0].level, Level::error);
+  EXPECT_TRUE(has(watch.trouble(), "given to workers 60 times")) << watch.trouble();
+  EXPECT_TRUE(watch.look(state, 1).empty());
+  state.given_in_vain = 0;
+  EXPECT_EQ(watch.look(state, 2).size(), 1U);
+  EXPECT_EQ(watch.trouble(), "");
+  state.denied = "Permissions Violation for Publish to \"mission.m.robot.3.submap\"";
+  state.unconfirmed_s = 60.0;  // and its disk is not full
+  said = watch.look(state, 3);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0].level, Level::error);
+  EXPECT_TRUE(has(watch.trouble(), "mission.m.robot.3.submap")) << watch.trouble();
+  EXPECT_TRUE(watch.look(state, 4).empty());
+}
+
 }  // namespace link_watch_test
 }  // namespace tutti::program

@@ -187,8 +187,10 @@ Status RobotProgram::start() {
   const auto driver = open_driver();  // where the recording stood
   if (!driver) return in_context((folder_->path() / kRobotFile).string(), driver.error());
   clock_.emplace(options_.rate, begin_s(**driver));
-  const bus::NatsPortOptions where{
-      .url = options_.bus, .mission = options_.settings.mission, .allow_insecure = options_.insecure};
+  const bus::NatsPortOptions where{.url = options_.bus,
+                                   .mission = options_.settings.mission,
+                                   .allow_insecure = options_.insecure,
+                                   .credentials = options_.credentials};
   auto lease = bus::MissionLease::open(where, std::nullopt);
   if (!lease) return tl::unexpected(lease.error());
   lease_ = std::move(*lease);
@@ -210,7 +212,8 @@ Status RobotProgram::start() {
   // On a full disk there is no map, but clients are told where they are.
   if (Status opened = host_->open(); !opened && !(feed_ && host_->tries_again())) return opened;
   log_->say(Level::info, fmt::format("robot {} runs in {}, bus {}, {}, {}", robot_.value, folder_->path().string(),
-                                     options_.bus, options_.feed.empty() ? "replays" : "is fed at " + options_.feed,
+                                     bus::without_credentials(options_.bus),
+                                     options_.feed.empty() ? "replays" : "is fed at " + options_.feed,
                                      folder_->is_new() ? "a new session" : "goes on"));
   return {};
 }

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -118,9 +117,11 @@ class OwnWorker {
                };
                return std::make_unique<HostedWorker>(kSelf, version, make, threads, port, stop_);
              },
-             .each_second = {},
+             .each_second = [this] { look_whether_in_vain(); },
              .status_file = {}},
-            clock, log) {}
+            clock, log),
+        clock_(clock),
+        log_(log) {}
   ~OwnWorker() {
     stop_ = true;
     if (thread_.joinable()) thread_.join();
@@ -132,38 +133,44 @@ class OwnWorker {
     thread_ = std::thread([this] { host_.run(stop_); });
     return {};
   }
+  /// Whether the bus gives jobs to workers and gets no answers. Called once a second.
+  void note_given_in_vain(bool is_in_vain) { is_in_vain_ = is_in_vain; }
 
  private:
+  /// This thread is not at a job when this is called. Jobs that are given and do not come here are given to an old
+  /// request, or over a connection that the bus takes for a good one.
+  void look_whether_in_vain() {
+    const auto* worker = dynamic_cast<const HostedWorker*>(host_.hosted());
+    if (!is_in_vain_ || worker == nullptr || worker->holds_job() || clock_.wall_s() < again_s_) return;
+    again_s_ = clock_.wall_s() + kAnewAgain_s;
+    log_.say(Level::error, "jobs are given to workers in vain, and its own one has none: connects that one anew");
+    host_.start_anew();
+  }
+
   static constexpr bus::Endpoint kSelf{bus::Endpoint::Role::worker, 0};
+  static constexpr double kAnewAgain_s = 60.0;
   std::atomic<bool> stop_ = false;
+  std::atomic<bool> is_in_vain_ = false;
+  double again_s_ = 0.0;
   Host host_;
+  const Clock& clock_;
+  EventLog& log_;
   std::thread thread_;
 };
 
-struct Address {
-  std::string host;
-  int port = 0;
-};
-/// "HOST", "HOST:PORT", "[::1]:PORT".
-Result<Address> address_of(const std::string& listen) {
-  Address address{.host = listen.empty() ? "127.0.0.1" : listen};
-  const std::size_t colon = address.host.rfind(':');
-  if (colon == std::string::npos || address.host.ends_with(']')) return address;
-  const char* end = address.host.data() + address.host.size();
-  const auto [last, error] = std::from_chars(address.host.data() + colon + 1, end, address.port);
-  if (error != std::errc() || last != end || address.port < 1 || address.port > 65535 || colon == 0)
-    return fail(ErrorCode::configuration, "--listen {}: expected HOST or HOST:PORT", listen);
-  address.host.resize(colon);
+Result<bus::HostPort> address_of(const std::string& listen) {
+  auto address = bus::parse_host_port(listen.empty() ? "127.0.0.1" : listen);
+  if (!address) return in_context("--listen", address.error());
   return address;
 }
 
-Result<std::unique_ptr<bus::NatsChild>> start_bus(const ServerOptions& options, const Address& address,
+Result<std::unique_ptr<bus::NatsChild>> start_bus(const ServerOptions& options, const bus::HostPort& address,
                                                   const std::filesystem::path& folder) {
   return bus::NatsChild::start(folder,
                                {.host = address.host, .port = address.port, .allow_insecure = options.insecure});
 }
 
-Status check_addresses(const ServerOptions& options, const Address& address) {
+Status check_addresses(const ServerOptions& options, const bus::HostPort& address) {
   if (!options.bus.empty() && !options.listen.empty())
     return fail(ErrorCode::configuration, "--bus and --listen: either a bus that runs, or one of its own");
   if (options.insecure || bus::is_loopback(address.host)) return {};
@@ -206,7 +213,6 @@ class ServerProgram {
   Status check_lease(const bus::MissionLease::State& seen) const;
   void tend();
   void tend_bus();
-  [[nodiscard]] std::string trouble() const;
   [[nodiscard]] std::string robot_command() const;
 
   const ServerOptions& options_;
@@ -236,12 +242,7 @@ Result<std::unique_ptr<Hosted>> ServerProgram::open_node() {
   auto node = node::ServerNode::open(std::move(robots), finder_, config, folder_->made_ns(), *store_);
   if (!node) return in_context((folder_->path() / kMapFile).string(), node.error());
   return std::make_unique<HostedServer>(
-      std::move(*node), options_.version, [this] { return trouble(); }, is_over_);
-}
-
-std::string ServerProgram::trouble() const {
-  if (!trouble_.empty()) return trouble_;
-  return host_->trouble().empty() ? host_->link_trouble() : host_->trouble();
+      std::move(*node), options_.version, [this] { return host_->all_trouble(); }, is_over_);
 }
 
 Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {
@@ -250,7 +251,7 @@ Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {
   return fail(ErrorCode::io,
               "mission '{}' on bus {} has a server: {}. Stop that one (a killed one's place is free after {:g} s), or "
               "give this one another --mission NAME",
-              bus_.mission, bus_.url, to_string(*other), bus::MissionLease::kLease_s);
+              bus_.mission, bus::without_credentials(bus_.url), to_string(*other), bus::MissionLease::kLease_s);
 }
 
 /// Before it the port does not connect.
@@ -266,6 +267,7 @@ Status ServerProgram::take_lease() {
 void ServerProgram::tend() {
   tend_bus();
   is_over_ = !check_lease(lease_->state());
+  if (const auto link = host_->link(); worker_) worker_->note_given_in_vain(link && link->given_in_vain > 0);
   if (const auto* server = dynamic_cast<const HostedServer*>(host_->hosted()); server != nullptr && viewer_)
     server->show(*viewer_);
 }
@@ -280,15 +282,18 @@ void ServerProgram::tend_bus() {
 }
 
 std::string ServerProgram::robot_command() const {
-  return fmt::format("tutti robot --name NAME --bus {} --mission {} --state DIR {}", bus_.url, bus_.mission,
-                     settings_.robot_arguments);
+  return fmt::format("tutti robot --name NAME --bus {} --mission {} --state DIR {}", bus::without_credentials(bus_.url),
+                     bus_.mission, settings_.robot_arguments);
 }
 
 Status ServerProgram::start() {
   const auto address = address_of(options_.listen);
   if (!address) return tl::unexpected(address.error());
   if (Status ok = check_addresses(options_, *address); !ok) return ok;
-  bus_ = {.url = options_.bus, .mission = settings_.mission, .allow_insecure = options_.insecure};
+  bus_ = {.url = options_.bus,
+          .mission = settings_.mission,
+          .allow_insecure = options_.insecure,
+          .credentials = options_.credentials};
   auto folder = StateFolder::open(options_.state, "server", kMapFile);
   if (!folder) return tl::unexpected(folder.error());
   folder_.emplace(std::move(*folder));
@@ -315,7 +320,8 @@ Status ServerProgram::start() {
                             .each_second = [this] { tend(); },
                             .status_file = folder_->path() / kStatusFile,
                             .table_aside = node::kMetaTable,
-                            .version = options_.version},
+                            .version = options_.version,
+                            .trouble = [this] { return trouble_; }},
                 *clock_, *log_);
   if (Status opened = host_->open(); !opened) return opened;
   if (options_.view) {
@@ -330,8 +336,9 @@ Status ServerProgram::start() {
 }
 
 Status ServerProgram::run(const std::atomic<bool>& stop) {
-  log_->say(Level::info, fmt::format("runs in {}, mission {}, bus {}, {} threads of its own verify closures",
-                                     folder_->path().string(), bus_.mission, bus_.url, options_.threads));
+  log_->say(Level::info,
+            fmt::format("runs in {}, mission {}, bus {}, {} threads of its own verify closures",
+                        folder_->path().string(), bus_.mission, bus::without_credentials(bus_.url), options_.threads));
   if (options_.announce) options_.announce(robot_command());
   tell_service_manager("READY=1");
   host_->run(stop);

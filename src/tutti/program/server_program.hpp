@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tutti/base/result.hpp"
+#include "tutti/bus/bus_address.hpp"
 #include "tutti/mapfile/content.hpp"
 #include "tutti/program/event_log.hpp"
 #include "tutti/program/finder_settings.hpp"
@@ -67,6 +68,7 @@ struct ServerOptions {
   std::string bus;     ///< "nats://HOST:PORT"; empty: the program starts its own nats-server,
   std::string listen;  ///< at this "HOST" or "HOST:PORT"; empty: on this machine only, at any free port.
   bool insecure = false;
+  bus::BusCredentials credentials;  ///< For `bus`.
   ServerSettings settings;
   int threads = 1;    ///< Threads that verify closures in this program; 0: workers do it.
   double rate = 1.0;  ///< Mission time per wall time.

@@ -37,7 +37,9 @@ std::uint32_t any_number() {
 /// Who was told no mission works for the one that is there.
 Result<std::string> mission_of(const WorkerOptions& options) {
   if (!options.settings.mission.empty()) return options.settings.mission;
-  return bus::served_mission({.url = options.bus, .allow_insecure = options.insecure}, bus::kLookForServer_s);
+  return bus::served_mission(
+      {.url = options.bus, .allow_insecure = options.insecure, .credentials = options.credentials},
+      bus::kLookForServer_s);
 }
 
 }  // namespace
@@ -106,7 +108,8 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
   const bus::Endpoint self = bus::Endpoint::worker(any_number());
   const auto mission = mission_of(options);
   if (!mission) return tl::unexpected(mission.error());
-  const bus::NatsPortOptions where{.url = options.bus, .mission = *mission, .allow_insecure = options.insecure};
+  const bus::NatsPortOptions where{
+      .url = options.bus, .mission = *mission, .allow_insecure = options.insecure, .credentials = options.credentials};
   const auto lease = bus::MissionLease::open(where, std::nullopt);
   if (!lease) return tl::unexpected(lease.error());
   std::string alone;
@@ -134,8 +137,8 @@ Status run_worker(const WorkerOptions& options, const std::atomic<bool>& stop) {
              .status_file = {}},
             clock, *log);
   if (Status opened = host.open(); !opened) return opened;
-  log->say(Level::info,
-           fmt::format("worker {} runs, mission {}, bus {}, {} threads", self.number, *mission, options.bus, threads));
+  log->say(Level::info, fmt::format("worker {} runs, mission {}, bus {}, {} threads", self.number, *mission,
+                                    bus::without_credentials(options.bus), threads));
   tell_service_manager("READY=1");
   host.run(stop);
   tell_service_manager("STOPPING=1");

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "tutti/bus/bus_address.hpp"
 #include "tutti/node/worker_node.hpp"
 #include "tutti/program/finder_settings.hpp"
 #include "tutti/program/host.hpp"
@@ -28,6 +29,7 @@ struct WorkerSettings {
 struct WorkerOptions {
   std::string bus;  ///< "nats://HOST:PORT"
   bool insecure = false;
+  bus::BusCredentials credentials;
   WorkerSettings settings;
   int threads = 1;  ///< 0: as many as the machine has.
   Level console = Level::warning;
@@ -51,6 +53,7 @@ class HostedWorker final : public Hosted {
   Answer work(Timestamp now) override;
   Answer report(Timestamp now) override;
   [[nodiscard]] Json status(Timestamp now) const override;
+  [[nodiscard]] bool holds_job() const { return job_.has_value(); }
 
  private:
   void for_each(std::size_t count, const std::function<void(std::size_t)>& call);

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -64,6 +65,8 @@ class JetStreamPort final : public NatsPort {
   void hear_retained();
   /// Over the streams, whether they give what they have.
   void watch();
+  /// Over the jobs: what this server has not sent goes, before it keeps workers from what it has.
+  void keep_jobs_ours();
   [[nodiscard]] bool is_stranded(const std::string& stream) const {
     const std::scoped_lock guard(mutex_);
     return stranded_ == stream;
@@ -107,6 +110,9 @@ class JetStreamPort final : public NatsPort {
   std::string stranded_;  ///< The stream to be made anew; "": none.
   std::uint64_t streams_made_anew_ = 0;
   std::uint64_t jobs_removed_ = 0;
+  std::unordered_set<std::uint64_t> jobs_sent_;  ///< Hashes of their ids; the server's.
+  std::uint64_t strange_jobs_ = 0;
+  std::uint64_t given_in_vain_ = 0;
   std::uint64_t refused_ = 0;
   std::string last_error_;
 

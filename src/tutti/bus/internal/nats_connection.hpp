@@ -51,7 +51,10 @@ class NatsConnection {
   [[nodiscard]] bool connected() const { return natsConnection_Status(connection_) == NATS_CONN_STATUS_CONNECTED; }
   [[nodiscard]] bool closed() const { return natsConnection_IsClosed(connection_); }
   [[nodiscard]] std::uint64_t reconnects() const;
-  [[nodiscard]] std::string last_error() const;
+  /// What the bus does not let this connection do, in its words; empty: it has refused nothing.
+  [[nodiscard]] std::string denied() const;
+  /// An error of libnats as one of ours: where, while doing what, why.
+  [[nodiscard]] tl::unexpected<Error> failure(natsStatus status, std::string_view doing, int code = 0) const;
 
   /// Streams and the bucket of retained values.
   [[nodiscard]] Status prepare(const NatsPortOptions& options) const;
@@ -64,6 +67,7 @@ class NatsConnection {
     std::uint64_t pending = 0;     ///< Of these: to be given for the first time;
     std::uint64_t given = 0;       ///< given and not acknowledged.
     std::uint64_t deliveries = 0;  ///< So far.
+    std::uint64_t gone = 0;        ///< Messages that were once in the stream, and are not any more.
     std::uint64_t done_up_to = 0;  ///< What is in the stream up to this sequence is given to nobody any more.
     bool asked = false;            ///< Somebody waits for messages.
   };
@@ -75,6 +79,11 @@ class NatsConnection {
   [[nodiscard]] Status remove_done(const std::string& stream, const Look& look,
                                    const std::function<void(natsMsg*)>& take) const;
   [[nodiscard]] Status remove_stream(const std::string& stream) const;
+  /// Looks at what is in a stream behind sequence `after`, so many messages at a time, and removes those whose id
+  /// (Nats-Msg-Id) is not `ours`. Returns up to which sequence it has looked; `removed` grows.
+  [[nodiscard]] Result<std::uint64_t> remove_strange(const std::string& stream, std::uint64_t after,
+                                                     const std::function<bool(std::string_view)>& ours,
+                                                     std::uint64_t& removed) const;
   // What these return is the connection's, which frees it when it is closed: libnats (issue 637) may be at a message
   // for a subscription that is being destroyed.
   /// The consumer of a stream, if it is missing.
@@ -99,7 +108,6 @@ class NatsConnection {
  private:
   NatsConnection(std::string url, std::string name) : url_(std::move(url)), name_(std::move(name)) {}
   [[nodiscard]] Status add_stream(jsStreamConfig& stream) const;
-  [[nodiscard]] tl::unexpected<Error> failure(natsStatus status, std::string_view doing, int code = 0) const;
 
   std::string url_;
   std::string name_;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tutti/base/check.hpp"
+#include "tutti/base/content_hash.hpp"
 #include "tutti/bus/delivery.hpp"
 
 namespace tutti::bus {
@@ -126,6 +127,8 @@ std::optional<Part> part_of(std::string_view text) {
   if (content) id = id.substr(0, before);
   return Part{*kind, std::string(id), *index, *count, content};
 }
+
+Part whole_part(const Envelope& envelope) { return {envelope.kind, envelope.id, 0, 1, content_hash(*envelope.bytes)}; }
 
 bool Assembly::add(const Part& part, std::string_view bytes, std::string reply) {
   if (count_ == 0) count_ = part.count;

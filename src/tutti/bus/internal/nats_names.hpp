@@ -47,6 +47,8 @@ struct Part {
 };
 std::string to_string(const Part& part);
 std::optional<Part> part_of(std::string_view text);
+/// The only part of a message that is not cut.
+Part whole_part(const Envelope& envelope);
 
 /// The parts of one message on their way in: in any order, any of them again.
 class Assembly {
