@@ -115,6 +115,10 @@ class CommandLine(unittest.TestCase):
         self.expect(done, 1, "no bus at nats://127.0.0.1:1")
         self.assertNotIn("hidden", done.stdout + done.stderr)
 
+    def test_a_word_says_what_it_waits_for(self):
+        self.expect(tutti("map", "closure", "reject", "a/1-b/2", "--bus", "nats://127.0.0.1:1", "--mission", "alps",
+                          "--wait", "2"), 1, "waits for a link to the bus nats://127.0.0.1:1", "at most 2 s")
+
     def test_usage_errors_exit_2(self):
         self.expect(tutti(), 2)
         self.expect(tutti("dance"), 2)

@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "bus_options.hpp"
 #include "commands.hpp"
@@ -28,6 +29,7 @@ namespace tutti::app {
 namespace {
 
 constexpr const char* kCommand = "map closure";
+constexpr double kSaySoon_s = 1.5;
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 struct ClosureOptions {
@@ -120,13 +122,24 @@ std::optional<std::string> heard_answer(bus::Port& port, const node::WordSender&
   return std::nullopt;
 }
 
+void say_waiting(const std::string& what) { fmt::print(stderr, "tutti {}: {}\n", kCommand, what); }
+
+std::string waits_for(const bus::NatsState& state) {
+  const std::string why = state.denied.empty() ? state.last_error : state.denied;
+  if (!state.connected)
+    return fmt::format("waits for a link to the bus {}{}{}", state.url, why.empty() ? "" : ": ", why);
+  if (state.waiting_messages > 0)
+    return fmt::format("waits for the bus {} to store the word{}{}", state.url, why.empty() ? "" : ": ", why);
+  return fmt::format("the bus {} has the word: waits for the server to say that it is stored", state.url);
+}
+
 /// To the server that has the map open, until it has answered.
 Status send(const ClosureOptions& options, const ClosureWord& word) {
   const auto self = bus::Endpoint::viewer(static_cast<std::uint32_t>(getpid()));
   bus::NatsPortOptions where{
       .url = options.bus, .allow_insecure = options.insecure, .credentials = options.credentials};
   auto mission = options.mission.empty()
-                     ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s))
+                     ? bus::served_mission(where, std::min(bus::kLookForServer_s, options.wait_s), say_waiting)
                      : options.mission;
   if (!mission) return tl::unexpected(mission.error());
   where.mission = std::move(*mission);
@@ -134,6 +147,7 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
   if (!port) return tl::unexpected(port.error());
   node::WordSender sender(self, word);
   const auto begin = std::chrono::steady_clock::now();
+  std::string said;
   for (;; std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
     const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     if (const auto answer = heard_answer(**port, sender))
@@ -147,6 +161,8 @@ Status send(const ClosureOptions& options, const ClosureWord& word) {
                   "{}: the bus has the word, but the server has not said within {} s that it has it; say it again if "
                   "`tutti map closure show` does not know it later",
                   options.bus, options.wait_s);
+    if (now_s > kSaySoon_s && std::exchange(said, waits_for(state)) != waits_for(state))
+      say_waiting(fmt::format("{}, at most {:g} s", said, options.wait_s));
     if (state.waiting_messages > 0) continue;  // it has not left yet
     if (const auto envelope = sender.due(now_s))
       if (auto sent = (*port)->send(*envelope); !sent) return sent;

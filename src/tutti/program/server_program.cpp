@@ -181,13 +181,15 @@ Status check_addresses(const ServerOptions& options, const bus::HostPort& addres
 }
 
 constexpr double kLeaseAnswer_s = 5.0;  // of a bus that is there
+constexpr bus::LeaseTimes kLease;
 
 std::string first_line(const char* file) {
   const std::string text = read_file(file).value_or("");
   return text.substr(0, text.find('\n'));
 }
 
-/// The lease of this state folder: a restart on this machine has the same seat, a copy elsewhere another one.
+/// The lease of this state folder: a restart on this machine has the same seat, a copy elsewhere another one; a copy
+/// under the same path in another container of this machine has the seat, but never the mark.
 bus::LeaseHolder holder_of(const StateFolder& folder) {
   std::error_code ignored;
   const auto path = std::filesystem::weakly_canonical(folder.path(), ignored);
@@ -196,7 +198,8 @@ bus::LeaseHolder holder_of(const StateFolder& folder) {
           .process = static_cast<std::uint64_t>(getpid()),
           .state = path.string(),
           .since_ns = static_cast<std::int64_t>(wall_clock_ns()),
-          .seat = fmt::format("{} {} {}", machine, folder.made_ns(), path.string())};
+          .seat = fmt::format("{} {} {}", machine, folder.made_ns(), path.string()),
+          .mark = bus::process_mark(any_incarnation())};
 }
 
 /// All that a running server holds, in the order in which it is made.
@@ -251,7 +254,7 @@ Status ServerProgram::check_lease(const bus::MissionLease::State& seen) const {
   return fail(ErrorCode::io,
               "mission '{}' on bus {} has a server: {}. Stop that one (a killed one's place is free after {:g} s), or "
               "give this one another --mission NAME",
-              bus_.mission, bus::without_credentials(bus_.url), to_string(*other), bus::MissionLease::kLease_s);
+              bus_.mission, bus::without_credentials(bus_.url), to_string(*other), kLease.lease_s);
 }
 
 /// Before it the port does not connect.
@@ -260,7 +263,12 @@ Status ServerProgram::take_lease() {
   if (!lease) return tl::unexpected(lease.error());
   lease_ = std::move(*lease);
   bus_.may_connect = [lease = lease_] { return lease->state().held; };
-  return check_lease(lease_->wait(kLeaseAnswer_s));
+  bus::MissionLease::State seen = lease_->wait(kLeaseAnswer_s);
+  if (!seen.waits.empty()) {
+    log_->say(Level::warning, seen.waits);
+    seen = lease_->wait(kLease.unrenewed_s + kLease.renew_s);
+  }
+  return check_lease(seen);
 }
 
 /// Once a second.
