@@ -7,6 +7,7 @@
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
 #include "support/wire/visual.hpp"
+#include "tutti/bus/lease_holder.hpp"
 #include "tutti/formats/image_file.hpp"
 #include "tutti/formats/ply.hpp"
 #include "tutti/node/journal.hpp"
@@ -133,6 +134,12 @@ std::map<std::string, std::vector<std::string>> seeds() {
   out["receipt"] = both(MessageKind::receipt, wire::encode(any_receipt(rng)));
   out["status"] = both(MessageKind::status, wire::encode(any_status(rng)));
   out["mission_status"] = both(MessageKind::mission_status, wire::encode(any_mission_status(rng)));
+  out["bus_names"] = {"mission.m.robot.3.submap", "$KV.GRAPH_m.viewer.0.mission_status",
+                      "submap/3/1700000000/4/h00c0ffee00c0ffee/0.2", "job/5/1/0000002a/7/0.1"};
+  out["bus_url"] = {"nats://127.0.0.1:4222", "tls://alpha:secret@[::1]:4222/", "token@base"};
+  out["lease"] = {bus::lease_text({"base", 17, "/var/lib/a", 1'700'000'000'000'000'000, "boot 5 /var/lib/a",
+                                   "pid:[4026531836] 123 00c0ffee"}),
+                  "base\n17\n/a\n5\nseat\n"};
   out["job"] = both(MessageKind::job, wire::encode(Job{"1/7", any_pairs(rng, 5)}));
   out["cloud"] = both(MessageKind::cloud, wire::encode(*any_submap(rng, 1, 40).submap.cloud));
   out["word"] = both(MessageKind::word, wire::encode(any_word(rng)));

@@ -15,6 +15,10 @@
 #include "tutti/bags/ros_messages.hpp"
 #include "tutti/bags/rosbag2_metadata.hpp"
 #include "tutti/base/check.hpp"
+#include "tutti/bus/bus_address.hpp"
+#include "tutti/bus/delivery.hpp"
+#include "tutti/bus/internal/nats_names.hpp"
+#include "tutti/bus/lease_holder.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/formats/image_file.hpp"
@@ -218,6 +222,36 @@ void maplab(std::string_view bytes) {
   static_cast<void>(formats::internal::parse_maplab_folder(texts, "fuzz"));
 }
 
+/// A subject and an id, of a stranger's message on the bus.
+void bus_names(std::string_view bytes) {
+  if (const auto address = bus::address_of(bytes)) {
+    const bus::Envelope envelope{address->end, address->end, address->kind, {}, {}};
+    const auto again = bus::address_of(bus::subject_of("fuzz", envelope));
+    TUTTI_CHECK(bus::delivery_of(address->kind) == bus::Delivery::work_queue ||
+                    (again && again->end == address->end && again->kind == address->kind),
+                "a subject that was read is not read again");
+  }
+  if (const auto part = bus::part_of(bytes))
+    TUTTI_CHECK(bus::part_of(bus::to_string(*part)) == part, "an id that was read is not read again");
+}
+
+void lease(std::string_view bytes) {
+  const auto holder = bus::lease_of(bytes);
+  if (!holder) return;
+  TUTTI_CHECK(bus::lease_of(bus::lease_text(*holder)) == holder, "a lease that was read is not read again");
+  static_cast<void>(bus::to_string(*holder));
+}
+
+void bus_url(std::string_view bytes) {
+  static_cast<void>(bus::without_credentials(bytes));
+  const auto url = bus::parse_bus_url(bytes);
+  if (!url) return;
+  const auto again = bus::parse_bus_url(url->plain);
+  TUTTI_CHECK(
+      again && again->at == url->at && again->credentials == bus::BusCredentials{} && again->plain == url->plain,
+      "a URL that was read is not read again");
+}
+
 }  // namespace
 
 const ProxyGraph& delta_base() {
@@ -231,6 +265,8 @@ const ProxyGraph& delta_base() {
 const std::map<std::string, Target>& targets() {
   static const std::map<std::string, Target> all{
       {"agent_state", agent_state},
+      {"bus_names", bus_names},
+      {"bus_url", bus_url},
       {"cameras", cameras},
       {"cdr", cdr},
       {"cloud", cloud},
@@ -246,6 +282,7 @@ const std::map<std::string, Target>& targets() {
       {"journal", journal},
       {"kitti_poses", kitti_poses},
       {"kitti_scan", file<formats::parse_kitti_scan>},
+      {"lease", lease},
       {"maplab", maplab},
       {"mcap", mcap},
       {"mission_status", mission_status},

@@ -78,6 +78,7 @@ Result<HostPort> parse_host_port(std::string_view text) {
     if (end == std::string_view::npos) return refuse();
     host = text.substr(1, end - 1);
     rest = text.substr(end + 1);
+    if (host.find(':') == std::string_view::npos) return refuse();  // they are for addresses of IPv6
   } else if (std::ranges::count(text, ':') == 1) {
     host = text.substr(0, text.find(':'));
     rest = text.substr(host.size());

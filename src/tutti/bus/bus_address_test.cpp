@@ -24,7 +24,7 @@ TEST(BusAddressTest, HostsAndPortsAreRead) {
   EXPECT_EQ(read("[::1]:4222"), (HostPort{"::1", 4222}));
   EXPECT_EQ(to_string(HostPort{"::1", 4222}), "[::1]:4222");
   for (const char* text : {"", ":4222", "base:", "base:0", "base:65536", "base:4222x", "[::1", "[::1]4222", "a b",
-                           "a\"b", "a/b:1", "a,b:1", "[]:1", "a\nb"})
+                           "a\"b", "a/b:1", "a,b:1", "[]:1", "[base]:1", "a\nb"})
     EXPECT_FALSE(parse_host_port(text).has_value()) << text;
 }
 
