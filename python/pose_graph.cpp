@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "tutti/base/file.hpp"
+#include "tutti/formats/jrl.hpp"
 #include "tutti/formats/pyfg.hpp"
 #include "tutti/geometry/covariance.hpp"
 
@@ -96,7 +97,8 @@ Graph read_graph(const PathLike& file) {
   const std::string path = path_of(file);
   const py::gil_scoped_release release;
   const std::string text = value_of(read_file(path));
-  if (std::filesystem::path(path).extension() != ".g2o" && formats::looks_like_pyfg(text)) return from_pyfg(path);
+  const bool has_names = formats::looks_like_pyfg(text) || formats::looks_like_jrl(text);
+  if (std::filesystem::path(path).extension() != ".g2o" && has_names) return from_pyfg(path);
   Graph out{.file = value_of(formats::parse_g2o(text, path)), .path = path};
   std::error_code unreadable;
   const std::string beside = formats::stamps_beside(path);

@@ -12,6 +12,7 @@
 #include "tutti/base/file.hpp"
 #include "tutti/formats/g2o.hpp"
 #include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/jrl.hpp"
 #include "tutti/formats/pyfg.hpp"
 #include "tutti/geometry/covariance.hpp"
 
@@ -19,8 +20,6 @@ namespace tutti::app {
 namespace {
 
 constexpr int kSymbolShift = 56;
-/// Times closer than this are no times of keyframes.
-constexpr double kLeastGap_s = 1e-3;
 
 /// A vertex before it has its place: by robot, then by `order`.
 struct Loose {
@@ -34,12 +33,12 @@ bool is_a_file(const std::string& path) {
   return std::filesystem::exists(path, unreadable);
 }
 
-/// PyFG's lines have a stamp and a name where g2o's have a number.
+/// Or JRL: a file whose vertices have names.
 Result<bool> is_pyfg(const std::string& path) {
   if (const auto ending = std::filesystem::path(path).extension(); ending == ".g2o") return false;
   const auto text = read_file(path);
   if (!text) return tl::unexpected(text.error());
-  return formats::looks_like_pyfg(*text);
+  return formats::looks_like_pyfg(*text) || formats::looks_like_jrl(*text);
 }
 
 /// Puts vertices and edges of `graph` in their order; robots are numbered in the order of `loose`.
@@ -60,17 +59,11 @@ void place(const PoseGraph& graph, std::vector<Loose> loose, NamedGraph& out) {
   }
 }
 
-/// Per vertex; true if they increase along every robot, in steps that keyframes may have.
-bool are_times(const std::vector<KeyframeId>& vertices, const std::vector<Timestamp>& stamps) {
-  std::vector<double> gaps;
-  for (std::size_t v = 1; v < vertices.size(); ++v) {
-    if (vertices[v].chain != vertices[v - 1].chain) continue;
-    if (stamps[v] <= stamps[v - 1]) return false;
-    gaps.push_back(stamps[v] - stamps[v - 1]);
-  }
-  if (gaps.empty()) return true;
-  std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
-  return gaps[gaps.size() / 2] >= kLeastGap_s;
+/// Of vertices that are in their places.
+bool are_times(const NamedGraph& graph) {
+  std::vector<std::uint32_t> robots;
+  for (const KeyframeId& id : graph.robots.vertices) robots.push_back(id.chain.robot.value);
+  return formats::are_times(robots, graph.robots.stamps);
 }
 
 void count_seconds(NamedGraph& graph) {
@@ -79,33 +72,10 @@ void count_seconds(NamedGraph& graph) {
   graph.stamps_from = "none in the file: the n-th pose of a robot counts as at n seconds";
 }
 
-/// Of PyFG: the vertices' own stamps; or those of the odometry that ends at them, which benchmarks give instead.
-void find_times(const formats::PyfgFile& file, NamedGraph& graph) {
-  const auto& vertices = graph.robots.vertices;
-  for (const auto& vertex : file.vertices) graph.robots.stamps.push_back(vertex.stamp);
-  graph.stamps_from = "of the vertices";
-  if (are_times(vertices, graph.robots.stamps)) return;
-  std::vector<std::optional<Timestamp>> ends(vertices.size());
-  for (const auto& edge : file.edges) {
-    const auto [a, b] = std::minmax(edge.from, edge.to);
-    if (b == a + 1 && vertices[a].chain == vertices[b].chain && !ends[b]) ends[b] = edge.stamp;
-  }
-  std::vector<Timestamp> known;
-  for (const auto& end : ends)
-    if (end) known.push_back(*end);
-  const double gap_s = typical_gap_s(known);
-  for (std::size_t v = 0; v < vertices.size(); ++v)
-    if (vertices[v].index == 0 && v + 1 < vertices.size() && ends[v + 1]) ends[v] = *ends[v + 1] - gap_s;
-  graph.stamps_from = "of the odometry edges, as of their later poses";
-  const bool all_known = std::ranges::all_of(ends, [](const auto& end) { return end.has_value(); });
-  for (std::size_t v = 0; all_known && v < vertices.size(); ++v) graph.robots.stamps[v] = *ends[v];
-  if (!all_known || !are_times(vertices, graph.robots.stamps)) count_seconds(graph);
-}
-
 Result<NamedGraph> from_pyfg(const GraphSource& source) {
   if (!source.robots.empty())
     return fail(ErrorCode::configuration, "--robots: {} names its robots by letters", source.path);
-  const auto file = formats::read_pyfg(source.path);
+  const auto file = formats::read_pyfg_or_jrl(source.path);
   if (!file) return tl::unexpected(file.error());
   NamedGraph out{.is_pyfg = true, .replaced = file->indefinite, .robots_from = "letters of the names"};
   PoseGraph graph;
@@ -115,7 +85,8 @@ Result<NamedGraph> from_pyfg(const GraphSource& source) {
       out.robot_names.emplace_back(1, vertex.name.robot);
     loose.push_back({static_cast<std::uint32_t>(out.robot_names.size() - 1),
                      static_cast<std::int64_t>(vertex.name.number), loose.size()});
-    graph.poses.push_back(vertex.pose);
+    graph.poses.push_back(vertex.pose.value_or(Pose3{}));
+    out.has_poses = out.has_poses && vertex.pose.has_value();
     out.names.push_back(to_string(vertex.name));
     out.ids.push_back((std::int64_t{vertex.name.robot} << kSymbolShift) |
                       static_cast<std::int64_t>(vertex.name.number));
@@ -125,7 +96,12 @@ Result<NamedGraph> from_pyfg(const GraphSource& source) {
     graph.edges.push_back(
         {edge.from, edge.to, edge.measurement.T_a_b, invertible_covariance(edge.measurement.covariance).inverse()});
   place(graph, std::move(loose), out);
-  find_times(*file, out);
+  if (auto times = formats::times_of(*file)) {
+    out.robots.stamps = std::move(times->stamps);
+    out.stamps_from = std::move(times->from);
+  } else {
+    count_seconds(out);
+  }
   return out;
 }
 
@@ -208,8 +184,9 @@ std::string beside(const std::string& path, const char* ending) {
 enum class Wanted { poses, edges };
 /// A file's vertices and edges alone; without poses where only edges are asked for.
 struct Plain {
-  PoseGraph graph;
   std::vector<std::string> names;
+  std::vector<std::optional<Pose3>> poses;
+  std::vector<PoseGraphEdge> edges;
 };
 
 Result<Plain> read_plain(const std::string& path, Wanted wanted) {
@@ -220,16 +197,17 @@ Result<Plain> read_plain(const std::string& path, Wanted wanted) {
     auto file = wanted == Wanted::poses ? formats::read_g2o(path) : formats::read_g2o_edges(path);
     if (!file) return tl::unexpected(file.error());
     for (const std::int64_t id : file->vertex_ids) out.names.push_back(name_of(id));
-    out.graph = std::move(file->graph);
+    out.poses.assign(file->graph.poses.begin(), file->graph.poses.end());
+    out.edges = std::move(file->graph.edges);
     return out;
   }
-  const auto file = formats::read_pyfg(path);
+  const auto file = formats::read_pyfg_or_jrl(path);
   if (!file) return tl::unexpected(file.error());
   for (const auto& vertex : file->vertices) {
     out.names.push_back(to_string(vertex.name));
-    out.graph.poses.push_back(vertex.pose);
+    out.poses.push_back(vertex.pose);
   }
-  for (const auto& edge : file->edges) out.graph.edges.push_back({edge.from, edge.to, edge.measurement.T_a_b});
+  for (const auto& edge : file->edges) out.edges.push_back({edge.from, edge.to, edge.measurement.T_a_b});
   return out;
 }
 
@@ -312,7 +290,7 @@ Result<NamedGraph> name_graph(const GraphSource& source, const formats::G2oFile&
   }
   place(file.graph, std::move(loose), out);
   out.stamps_from = formats::stamps_beside(source.path);
-  if (stamps.empty() || !are_times(out.robots.vertices, out.robots.stamps)) count_seconds(out);
+  if (stamps.empty() || !are_times(out)) count_seconds(out);
   return out;
 }
 
@@ -334,17 +312,14 @@ Result<NamedGraph> read_graph(const GraphSource& source) {
 
 Result<GraphTruth> read_truth(const GraphSource& source, const NamedGraph& graph) {
   GraphTruth out;
-  if (source.truth.empty() && graph.is_pyfg) {
+  if (source.truth.empty() && graph.is_pyfg && graph.has_poses) {
     out.poses.assign(graph.robots.graph.poses.begin(), graph.robots.graph.poses.end());
   } else if (!source.truth.empty() && source.truth != "none") {
     const auto truth = read_plain(source.truth, Wanted::poses);
     if (!truth) return tl::unexpected(truth.error());
-    std::map<std::string, Pose3> poses;
-    for (std::size_t v = 0; v < truth->names.size(); ++v) poses[truth->names[v]] = truth->graph.poses[v];
-    for (const std::string& name : graph.names) {
-      const auto found = poses.find(name);
-      out.poses.push_back(found == poses.end() ? std::nullopt : std::optional(found->second));
-    }
+    std::map<std::string, std::optional<Pose3>> poses;
+    for (std::size_t v = 0; v < truth->names.size(); ++v) poses[truth->names[v]] = truth->poses[v];
+    for (const std::string& name : graph.names) out.poses.push_back(poses[name]);
     if (std::ranges::none_of(out.poses, [](const auto& pose) { return pose.has_value(); }))
       return fail(ErrorCode::invalid, "{}: has none of the vertices of {}", source.truth, source.path);
   }
@@ -354,7 +329,7 @@ Result<GraphTruth> read_truth(const GraphSource& source, const NamedGraph& graph
   const auto right = read_plain(path, Wanted::edges);
   if (!right) return tl::unexpected(right.error());
   std::map<EdgeKey, int> left;
-  for (const PoseGraphEdge& edge : right->graph.edges) ++left[key_of(right->names, edge)];
+  for (const PoseGraphEdge& edge : right->edges) ++left[key_of(right->names, edge)];
   for (const PoseGraphEdge& edge : graph.robots.graph.edges) {
     const auto found = left.find(key_of(graph.names, edge));
     out.right.push_back(found != left.end() && found->second > 0);

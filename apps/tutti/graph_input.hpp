@@ -12,7 +12,7 @@
 #include "tutti/formats/graph_stamps.hpp"
 #include "tutti/server/graph_judge.hpp"
 
-/// Reads pose graphs of several robots from g2o and PyFG files, with what is known about them; for `tutti optimise
+/// Reads pose graphs of several robots from g2o, PyFG and JRL files, with what is known about them; for `tutti optimise
 /// --robust` and for Python.
 namespace tutti::app {
 
@@ -31,7 +31,8 @@ struct NamedGraph {
   std::vector<std::int64_t> ids;           ///< Per vertex, its id in a g2o file; for "A12", GTSAM's symbol key.
   std::vector<std::string> robot_names;    ///< By RobotId::value.
   std::vector<std::optional<Pose3>> held;  ///< Per vertex: the pose that a FIX line or a prior states.
-  bool is_pyfg = false;
+  bool is_pyfg = false;                    ///< Or JRL.
+  bool has_poses = true;                   ///< False: the file lacks poses of vertices, which are the identity here.
   bool is_2d = false;
   std::size_t replaced = 0;  ///< Number of information or covariance matrices that were not positive semidefinite.
   std::string robots_from;   ///< For people: how robots were told apart,

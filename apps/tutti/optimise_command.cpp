@@ -161,9 +161,9 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "other in the file count as odometry and are trusted; gnc decides for each other edge whether it is wrong.\n"
       "IN_stamps.csv, if it is there, is copied beside the output.\n\n"
       "--robust decides as the mapping server does which closures, and which stretches of odometry, are wrong: of g2o\n"
-      "files, and of PyFG as COSMO-Bench writes it (names are a letter per robot and a number). Edges between "
-      "vertices\n"
-      "that follow each other in one robot are odometry. OUT holds odometry and the accepted closures, each with the\n"
+      "files, and of PyFG and JRL as COSMO-Bench has them (names are a letter per robot and a number). Edges between\n"
+      "vertices that follow each other in one robot are odometry. OUT holds odometry and the accepted closures, each "
+      "with the\n"
       "information that it was found to be worth; OUT_closures.csv all closures and why they were refused;\n"
       "OUT_stamps.csv the times. Robots of a g2o file are told by --robots, by IN_stamps.csv, by GTSAM's symbol keys\n"
       "(letter << 56 | number), or begin where no edge joins a vertex to the one before. The search for failed "
@@ -175,7 +175,7 @@ void add_optimise_command(CLI::App& app, int& exit_code) {
       "          tutti optimise --robust fleet.g2o --robots 0,1000,2000 --truth truth.g2o -o out.g2o\n");
   command
       ->add_option("input", options->input,
-                   "Graph to read: g2o (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional); PyFG with --robust.")
+                   "Graph to read: g2o (EDGE_SE3:QUAT or EDGE_SE2, VERTEX lines optional); PyFG, JRL with --robust.")
       ->required()
       ->type_name("IN");
   command->add_option("-o,--output", options->output, "Where to write the optimised graph.")

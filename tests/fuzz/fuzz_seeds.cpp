@@ -4,6 +4,7 @@
 
 #include "fuzz/fuzz_target.hpp"
 #include "support/bags/ros1_writer.hpp"
+#include "support/formats/jrl.hpp"
 #include "support/robot/drifting_robot.hpp"
 #include "support/wire/messages.hpp"
 #include "support/wire/visual.hpp"
@@ -195,6 +196,11 @@ std::map<std::string, std::vector<std::string>> seeds() {
       "VERTEX_SE3:QUAT 0.5 A0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1.5 B12 1 0 0 0 0 0 1\n"
       "VERTEX_SE3:QUAT:PRIOR 0.5 A0 0 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"
       "EDGE_SE3:QUAT 1.5 A0 B12 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"};
+  out["jrl"] = {formats::test::to_jrl(*formats::parse_pyfg(
+      "VERTEX_SE3:QUAT 1 A0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 2 A1 1 0 0 0 0 0 1\nVERTEX_SE3:QUAT 2 B12 1 0 0 0 0 0 1\n"
+      "EDGE_SE3:QUAT 2 A0 A1 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"
+      "EDGE_SE3:QUAT 9 A0 B12 1 0 0 0 0 0 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n",
+      "seed"))};
   out["graph_stamps"] = {"id,robot,keyframe,stamp_ns\n0,1,0,1700000000000000000\n1,1:77,1,1700000000500000000\n"};
   out["pcd"] = {joined({kPcd, "ascii\n1 2 3 0.5\n4 5 6 0.25\n"}),
                 joined({kPcd, "binary\n", little({1.0F, 2.0F, 3.0F, 0.5F, 4.0F, 5.0F, 6.0F, 0.25F})}),

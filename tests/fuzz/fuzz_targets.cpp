@@ -25,6 +25,7 @@
 #include "tutti/formats/image_folder.hpp"
 #include "tutti/formats/imu_file.hpp"
 #include "tutti/formats/internal/maplab_folder.hpp"
+#include "tutti/formats/jrl.hpp"
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/pcd.hpp"
 #include "tutti/formats/ply.hpp"
@@ -147,7 +148,16 @@ void g2o(std::string_view bytes) {
 }
 void pyfg(std::string_view bytes) {
   const auto graph = formats::parse_pyfg(bytes, "fuzz");
-  if (graph)
+  if (!graph) return;
+  static_cast<void>(formats::times_of(*graph));
+  if (graph->vertices.front().pose)
+    TUTTI_CHECK(formats::parse_pyfg(formats::to_pyfg(*graph), "again").has_value(), "what was read is refused");
+}
+void jrl(std::string_view bytes) {
+  const auto graph = formats::parse_jrl(bytes, "fuzz");
+  if (!graph) return;
+  static_cast<void>(formats::times_of(*graph));
+  if (std::ranges::all_of(graph->vertices, [](const auto& vertex) { return vertex.pose.has_value(); }))
     TUTTI_CHECK(formats::parse_pyfg(formats::to_pyfg(*graph), "again").has_value(), "what was read is refused");
 }
 void kitti_poses(std::string_view bytes) {
@@ -280,6 +290,7 @@ const std::map<std::string, Target>& targets() {
       {"imu_csv", file<formats::parse_imu_csv>},
       {"job", job},
       {"journal", journal},
+      {"jrl", jrl},
       {"kitti_poses", kitti_poses},
       {"kitti_scan", file<formats::parse_kitti_scan>},
       {"lease", lease},

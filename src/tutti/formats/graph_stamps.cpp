@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <limits>
@@ -24,6 +25,19 @@ Result<std::uint32_t> small_number(const internal::LineReader& line, std::size_t
 }
 
 }  // namespace
+
+bool are_times(std::span<const std::uint32_t> robots, std::span<const Timestamp> stamps) {
+  constexpr double kLeastGap_s = 1e-3;
+  std::vector<double> gaps;
+  for (std::size_t v = 1; v < robots.size(); ++v) {
+    if (robots[v] != robots[v - 1]) continue;
+    if (stamps[v] <= stamps[v - 1]) return false;
+    gaps.push_back(stamps[v] - stamps[v - 1]);
+  }
+  if (gaps.empty()) return true;
+  std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
+  return gaps[gaps.size() / 2] >= kLeastGap_s;
+}
 
 std::string stamps_beside(const std::string& graph_path) {
   std::filesystem::path path(graph_path);

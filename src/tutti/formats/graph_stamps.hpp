@@ -26,6 +26,10 @@ struct VertexStamp {
 /// The path at which the stamps of a graph's file are expected: "x_stamps.csv" beside "x.g2o".
 std::string stamps_beside(const std::string& graph_path);
 
+/// True if the stamps of vertices, of these robots, can be times of keyframes: they increase along every robot, and
+/// most steps take at least a millisecond. The vertices of a robot are neighbours.
+bool are_times(std::span<const std::uint32_t> robots, std::span<const Timestamp> stamps);
+
 /// The rows in file order. Errors name file and line.
 Result<std::vector<VertexStamp>> parse_graph_stamps(std::string_view text, const std::string& name);
 Result<std::vector<VertexStamp>> read_graph_stamps(const std::string& path);

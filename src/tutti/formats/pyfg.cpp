@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tutti/formats/pyfg.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <set>
 
 #include "tutti/base/file.hpp"
+#include "tutti/formats/graph_stamps.hpp"
+#include "tutti/formats/internal/semidefinite.hpp"
 #include "tutti/formats/internal/text.hpp"
 
 namespace tutti::formats {
@@ -16,8 +18,6 @@ using internal::LineReader;
 using internal::shown;
 
 constexpr std::string_view kVertex = "VERTEX_SE3:QUAT", kPrior = "VERTEX_SE3:QUAT:PRIOR", kEdge = "EDGE_SE3:QUAT";
-/// An eigenvalue this far below zero, as a share of the largest, is zero.
-constexpr double kNoEigenvalue = 1e-12;
 constexpr double kPriorVariance = 1e-6;
 
 /// An edge or a prior (no `to`) between names; vertices may come after them.
@@ -69,15 +69,10 @@ Result<Matrix6d> read_covariance(const LineReader& line, std::size_t first, std:
   std::size_t next = 0;
   for (int row = 0; row < 6; ++row)
     for (int column = row; column < 6; ++column) out(row, column) = out(column, row) = upper[next++];
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(out);
-  const double least = eigen.eigenvalues()(0), most = eigen.eigenvalues()(5);
-  if (least >= -kNoEigenvalue * most) return out;
-  if (!(most > 0.0) || !eigen.eigenvalues().allFinite())
-    return line.fail(ErrorCode::invalid, "eigenvalues of the covariance are {:.3g} to {:.3g}, expected a positive one",
-                     least, most);
-  ++indefinite;
-  out = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
-  return Matrix6d(0.5 * (out + out.transpose()));
+  auto nearest = internal::nearest_semidefinite(out);
+  if (!nearest) return line.fail(nearest.error().code, "{}", nearest.error().message);
+  if (nearest->is_replaced) ++indefinite;
+  return nearest->covariance;
 }
 
 Status read_pyfg_line(const LineReader& line, PyfgLines& lines) {
@@ -112,9 +107,22 @@ Status read_pyfg_line(const LineReader& line, PyfgLines& lines) {
   return {};
 }
 
+/// Of a file without vertices: those that odometry joins.
+std::vector<PyfgVertex> vertices_of_odometry(const std::vector<PyfgLine>& lines) {
+  std::set<PyfgName> names;
+  for (const PyfgLine& line : lines)
+    if (line.to && is_odometry(line.from, *line.to)) names.insert({line.from, *line.to});
+  std::vector<PyfgVertex> out;
+  for (const PyfgName& name : names) out.push_back({.name = name, .stamp = {}, .pose = {}, .prior = {}});
+  return out;
+}
+
 Result<PyfgFile> assemble_pyfg(PyfgLines lines, const std::string& name) {
-  if (lines.vertices.empty()) return fail(ErrorCode::parse, "{}: no {} line, expected a pose graph", name, kVertex);
   PyfgFile file{.vertices = std::move(lines.vertices), .edges = {}, .indefinite = lines.indefinite};
+  if (file.vertices.empty()) file.vertices = vertices_of_odometry(lines.others);
+  if (file.vertices.empty())
+    return fail(ErrorCode::parse, "{}: no {} line, and no {} from a vertex to the next: expected a pose graph", name,
+                kVertex, kEdge);
   std::ranges::sort(file.vertices, {}, &PyfgVertex::name);
   const auto twice = std::ranges::adjacent_find(file.vertices, {}, &PyfgVertex::name);
   if (twice != file.vertices.end())
@@ -152,6 +160,10 @@ void write_covariance(std::string& out, const Matrix6d& covariance) {
 
 }  // namespace
 
+bool is_odometry(const PyfgName& a, const PyfgName& b) {
+  return a.robot == b.robot && (a.number + 1 == b.number || b.number + 1 == a.number);
+}
+
 std::string to_string(const PyfgName& name) { return fmt::format("{}{}", name.robot, name.number); }
 
 Result<PyfgFile> parse_pyfg(std::string_view text, const std::string& name) {
@@ -177,8 +189,9 @@ std::string to_pyfg(const PyfgFile& file) {
     fmt::format_to(std::back_inserter(out), "{} {} {}", tag, internal::to_seconds(stamp), to_string(name));
   };
   for (const PyfgVertex& vertex : file.vertices) {
+    if (!vertex.pose) continue;
     begin(kVertex, vertex.stamp, vertex.name);
-    write_pose(out, vertex.pose);
+    write_pose(out, *vertex.pose);
     out += '\n';
   }
   for (const PyfgVertex& vertex : file.vertices) {
@@ -194,6 +207,32 @@ std::string to_pyfg(const PyfgFile& file) {
     write_covariance(out, edge.measurement.covariance);
   }
   return out;
+}
+
+std::optional<PyfgTimes> times_of(const PyfgFile& file) {
+  const auto& vertices = file.vertices;
+  PyfgTimes out{.stamps = {}, .from = "of the vertices"};
+  std::vector<std::uint32_t> robots;
+  for (const PyfgVertex& vertex : vertices) {
+    robots.push_back(static_cast<std::uint32_t>(vertex.name.robot));
+    out.stamps.push_back(vertex.stamp);
+  }
+  if (are_times(robots, out.stamps)) return out;
+  std::vector<std::optional<Timestamp>> ends(vertices.size());
+  for (const PyfgEdge& edge : file.edges) {
+    const auto [a, b] = std::minmax(edge.from, edge.to);
+    if (b == a + 1 && robots[a] == robots[b] && !ends[b]) ends[b] = edge.stamp;
+  }
+  std::vector<Timestamp> known;
+  for (const auto& end : ends)
+    if (end) known.push_back(*end);
+  const double gap_s = typical_gap_s(known);
+  for (std::size_t v = 0; v + 1 < vertices.size(); ++v)
+    if ((v == 0 || robots[v] != robots[v - 1]) && ends[v + 1]) ends[v] = *ends[v + 1] - gap_s;
+  out.from = "of the odometry edges, as of their later poses";
+  if (!std::ranges::all_of(ends, [](const auto& end) { return end.has_value(); })) return std::nullopt;
+  for (std::size_t v = 0; v < vertices.size(); ++v) out.stamps[v] = *ends[v];
+  return are_times(robots, out.stamps) ? std::optional(std::move(out)) : std::nullopt;
 }
 
 Status write_pyfg(const std::string& path, const PyfgFile& file) { return write_file(path, to_pyfg(file)); }

@@ -20,9 +20,10 @@
 /// A name is the letter of the robot and a number: A12. A covariance is the upper triangle, row by row, in the tangent
 /// [translation; rotation vector] of RelativePose. Writers give it a fixed number of decimals, so small variances may
 /// be 0 and a matrix may become indefinite; the nearest positive semidefinite one is then taken (negative eigenvalues
-/// become 0) and counted. A matrix without a positive eigenvalue is refused unless it is 0. Files with landmarks or
-/// ranges (VERTEX_XYZ, EDGE_SE3_XYZ, EDGE_RANGE) and planar graphs (SE2) are refused, because the rest of them would be
-/// another graph.
+/// become 0) and counted. A matrix without a positive eigenvalue is refused unless it is 0. A file without any vertex
+/// line has the vertices that edges between consecutive numbers of one robot name; their poses are unknown. Files with
+/// landmarks or ranges (VERTEX_XYZ, EDGE_SE3_XYZ, EDGE_RANGE) and planar graphs (SE2) are refused, because the rest of
+/// them would be another graph.
 namespace tutti::formats {
 
 struct PyfgName {
@@ -31,11 +32,13 @@ struct PyfgName {
   friend auto operator<=>(const PyfgName&, const PyfgName&) = default;
 };
 std::string to_string(const PyfgName& name);
+/// True of an edge between consecutive numbers of one robot.
+bool is_odometry(const PyfgName& a, const PyfgName& b);
 
 struct PyfgVertex {
   PyfgName name;
   Timestamp stamp;
-  Pose3 pose;                  ///< T_world_body; in benchmarks the ground truth.
+  std::optional<Pose3> pose;   ///< T_world_body; in benchmarks the ground truth. Nothing: not in the file.
   std::optional<Pose3> prior;  ///< T_world_body of its PRIOR line, whose covariance is checked and not kept.
   friend bool operator==(const PyfgVertex&, const PyfgVertex&) = default;
 };
@@ -61,7 +64,17 @@ Result<PyfgFile> read_pyfg(const std::string& path);
 /// True if the first line that is no comment has a name where g2o has a number.
 bool looks_like_pyfg(std::string_view text);
 
-/// Text that reads back bit for bit. Priors are written with a covariance of 1e-6 (m^2, rad^2).
+/// When each vertex was, and how that is known, for people.
+struct PyfgTimes {
+  std::vector<Timestamp> stamps;
+  std::string from;
+};
+/// The stamps of the vertices, or of the odometry that ends at them, which benchmarks give instead. Nothing when
+/// neither are times (are_times() in graph_stamps.hpp).
+std::optional<PyfgTimes> times_of(const PyfgFile& file);
+
+/// Text that reads back bit for bit, if all vertices have a pose. Priors are written with a covariance of 1e-6 (m^2,
+/// rad^2).
 std::string to_pyfg(const PyfgFile& file);
 Status write_pyfg(const std::string& path, const PyfgFile& file);
 

@@ -94,6 +94,32 @@ TEST(Pyfg, SaysWhatIsWrong) {
   says(vertex + fmt::format("VERTEX_SE3:QUAT:PRIOR 0 A0 {} {}\n", kUnit, negative), "eigenvalues of the covariance");
 }
 
+TEST(Pyfg, WithoutVerticesHasThoseOfItsOdometry) {
+  const auto edge = [](const char* stamp, const char* from, const char* to) {
+    return fmt::format("EDGE_SE3:QUAT {} {} {} {} {}\n", stamp, from, to, kUnit, kCovariance);
+  };
+  const std::string odometry = edge("1670403893.500000001", "a0", "a1") + edge("1670403895.1", "a1", "a2");
+  const auto file = parse_pyfg(odometry + edge("1670403999.0", "a2", "a0"), "g.pyfg");
+  ASSERT_TRUE(file) << file.error().message;
+  ASSERT_EQ(file->vertices.size(), 3U);
+  EXPECT_FALSE(file->vertices[0].pose);
+  const auto times = times_of(*file);
+  ASSERT_TRUE(times);
+  EXPECT_EQ(times->stamps[1], Timestamp{1'670'403'893'500'000'001});
+  EXPECT_EQ(times->stamps[2], Timestamp{1'670'403'895'100'000'000});
+  EXPECT_LT(times->stamps[0], times->stamps[1]);
+  EXPECT_NE(message_of(odometry + edge("0", "a0", "b0")).find("g.pyfg:3: names vertex b0"), std::string::npos);
+}
+
+TEST(Pyfg, StampsThatDoNotIncreaseAreNoTimes) {
+  PyfgFile file{.vertices = {{{'a', 0}, {2'000'000'000}, {}, {}}, {{'a', 1}, {1'000'000'000}, {}, {}}}, .edges = {}};
+  EXPECT_FALSE(times_of(file));
+  file.vertices[1].stamp = {2'000'000'001};  // nor those that count
+  EXPECT_FALSE(times_of(file));
+  file.vertices[1].stamp = {3'300'000'000};
+  EXPECT_EQ(times_of(file)->from, "of the vertices");
+}
+
 TEST(Pyfg, TakesTheNearestCovarianceOfOneThatRoundingMadeIndefinite) {
   // No variance along x, yet a covariance with y.
   const auto file = parse_pyfg(fmt::format("VERTEX_SE3:QUAT 0 A0 {0}\nVERTEX_SE3:QUAT 1 A1 {0}\n"
