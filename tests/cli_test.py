@@ -122,7 +122,7 @@ class CommandLine(unittest.TestCase):
     def test_usage_errors_exit_2(self):
         self.expect(tutti(), 2)
         self.expect(tutti("dance"), 2)
-        self.expect(tutti("run"), 2, "MISSION.yaml or --bag NAME=BAG")
+        self.expect(tutti("run"), 2, "MISSION.yaml, --bag NAME=BAG or --graph FLEET.pyfg")
         self.expect(tutti("run", "mine.yaml", "--bag", "alpha=bag"), 2, "excludes")
         self.expect(tutti("run", "--bag", "alpha"), 2, "'alpha': expected --bag NAME=BAG")
         self.expect(tutti("run", "--bag", "alpha=none", "--topic", "alpha.scan=/a"), 2, "alpha.scan=/a", "NAME.scans=")
@@ -633,6 +633,22 @@ class CommandLine(unittest.TestCase):
             self.expect(tutti("eval", "--map", survey, survey, "--report", report), 1, "report.json", word)
         self.expect(tutti("eval", "--map", survey, survey, "--report", self.path), 1, "tutti eval: %s: " % self.path)
         self.expect(tutti("eval", "--map", survey, survey, "--report", self.path / "none"), 1, "none")
+
+    def test_a_graph_is_run_as_a_mission(self):
+        covariance = " ".join("1e-4" if i in (0, 6, 11, 15, 18, 20) else "0" for i in range(21))
+        pose, one = "0 0 0 0 0 0 1", self.path / "one.pyfg"
+        edges = [f"EDGE_SE3:QUAT {1.67e9 + k:.1f} a{k - 1} a{k} 1 0 0 0 0 0 1 {covariance}" for k in range(1, 40)]
+        one.write_text("\n".join(edges) + "\n")
+        self.expect(tutti("run", "--graph", one, "--out", self.path / "one"), 0, "report.html")
+        robot = json.loads((self.path / "one/report.json").read_text())["robots"][0]
+        self.assertEqual((robot["name"], robot["keyframes"], robot["onboard_rmse_m"]), ("a", 40, None))
+        self.expect(tutti("run", "--graph", one, "--print-config"), 0, "finder: recorded", "mission: one")
+        self.expect(tutti("run", "--graph", self.path / "none.pyfg"), 2, "none.pyfg")
+        self.expect(tutti("run", "--graph", one, "--bag", "a=b"), 2, "--bag")
+        one.write_text("\n".join(edges[:9] + edges[10:]) + "\n")
+        self.expect(tutti("run", "--graph", one, "--out", self.path / "gap"), 1, "no odometry from a9 to a10")
+        one.write_text("\n".join(edges) + f"\nEDGE_SE3:QUAT 1.67e9 a3 b7 {pose} {covariance}\n")
+        self.expect(tutti("run", "--graph", one), 2, "one.pyfg:40: names vertex b7")
 
     def test_missions_of_the_repository_are_valid(self):
         for mission in sorted((SOURCE / "missions").glob("*.yaml")):

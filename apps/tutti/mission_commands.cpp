@@ -18,6 +18,7 @@
 #include "tutti/lab/run_mission.hpp"
 #include "tutti/mapfile/make_map.hpp"
 #include "tutti/mission/bag_mission.hpp"
+#include "tutti/mission/graph_recording.hpp"
 #include "tutti/mission/report/report.hpp"
 #include "tutti/simulation/surface.hpp"
 
@@ -202,6 +203,15 @@ void add_run_command(CLI::App& app, int& exit_code) {
               "several times, e.g. --bag alpha=recordings/a --bag bravo=recordings/b. Topics are found by type")
           ->type_name("NAME=BAG")
           ->excludes(mission);
+  const auto graph = std::make_shared<std::string>();
+  command
+      ->add_option("--graph", *graph,
+                   "Instead of a mission file: a pose graph of several robots with times, PyFG or JRL. Robots are "
+                   "called by their\n"
+                   "letters; closures come when they arrived then, and vertices are the reference")
+      ->type_name("FLEET.pyfg")
+      ->excludes(mission)
+      ->excludes(bag);
   command
       ->add_option("--topic", *topics,
                    "Of a bag where several topics would do: --topic alpha.scans=/points,\n"
@@ -212,15 +222,16 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command->add_option("--data", arguments->run.data, "Folder that the mission's file names are relative to")
       ->type_name("DIR");
   add_mission_options(*command, *arguments);
-  command->callback([arguments, bags, topics, &exit_code] {
-    if (!bags->empty()) {
-      if (arguments->out.empty()) arguments->out = fs::path("out") / "bags";
-      const auto text = mission::bag_mission(*bags, *topics);
+  command->callback([arguments, bags, topics, graph, &exit_code] {
+    const auto run_text = [&](const fs::path& name, const char* option, const Result<std::string>& text) {
+      if (arguments->out.empty()) arguments->out = fs::path("out") / name;
       exit_code = run_and_report(
-          text ? lab::parse_mission(*text, "--bag", arguments->assignments) : tl::unexpected(text.error()), *arguments);
-      return;
-    }
-    if (arguments->mission.empty()) throw CLI::RequiredError("MISSION.yaml or --bag NAME=BAG");
+          text ? lab::parse_mission(*text, option, arguments->assignments) : tl::unexpected(text.error()), *arguments);
+    };
+    if (!bags->empty()) return run_text("bags", "--bag", mission::bag_mission(*bags, *topics));
+    if (!graph->empty())
+      return run_text(fs::path(*graph).stem(), "--graph", mission::graph_mission(*graph, arguments->run.data));
+    if (arguments->mission.empty()) throw CLI::RequiredError("MISSION.yaml, --bag NAME=BAG or --graph FLEET.pyfg");
     if (arguments->out.empty()) arguments->out = fs::path("out") / arguments->mission.stem();
     exit_code = run_and_report(lab::load_mission(arguments->mission, arguments->assignments), *arguments);
   });

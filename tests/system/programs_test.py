@@ -5,6 +5,7 @@
 usage: programs_test.py TUTTI_PROGRAM SOURCE_DIR [Programs.TEST...]
 """
 import json
+import math
 import os
 import pathlib
 import random
@@ -65,6 +66,25 @@ def vertices(folder):
 def edges(folder):
     words = [line.split() for line in (folder / "graph.g2o").read_text().splitlines()]
     return sorted((int(w[1]), int(w[2])) for w in words if w and w[0].startswith("EDGE"))
+
+
+def fleet():
+    """A pose graph: two robots on one circle, a second a pose; every other closure between them arrives 40 s late."""
+    turn, radius, covariance = 2 * math.pi / 40, 8.0, " ".join("1e-4" if i in (0, 6, 11, 15, 18, 20) else "0" for i in range(21))
+    pose = lambda x, y, yaw: f"{x:.9f} {y:.9f} 0 0 0 {math.sin(yaw / 2):.12f} {math.cos(yaw / 2):.12f}"
+    stamp = lambda k, late_s=0: f"{1670403892 + k + late_s}.357527971"
+    lines = []
+    for robot in "ab":
+        for k in range(120):
+            angle = turn * k
+            lines.append(f"VERTEX_SE3:QUAT {stamp(k)} {robot}{k} {pose(radius * math.cos(angle), radius * math.sin(angle), angle)}")
+    step = pose(*(radius * value for value in (math.cos(turn) - 1, math.sin(turn))), turn)
+    for robot in "ab":
+        lines += [f"EDGE_SE3:QUAT {stamp(k)} {robot}{k - 1} {robot}{k} {step} {covariance}" for k in range(1, 120)]
+    for k in range(40, 120, 5):
+        lines.append(f"EDGE_SE3:QUAT {stamp(k)} a{k - 40} a{k} {pose(0, 0, 0)} {covariance}")
+        lines.append(f"EDGE_SE3:QUAT {stamp(k, 40 * (k % 2))} a{k} b{k - 40} {pose(0, 0, 0)} {covariance}")
+    return "\n".join(lines) + "\n"
 
 
 class Program:
@@ -200,6 +220,26 @@ class Programs(ProgramsTest):
         told = json.loads((out / "state/robots/alpha/status.json").read_text())["feed"]
         self.assertGreater(told["fixes"], 200)
         self.assertEqual(told["fixes_left_out"], 0)
+
+    def test_a_fleet_hears_of_closures_when_they_arrived(self):
+        (self.path / "fleet.pyfg").write_text(fleet())
+        (self.path / "fleet.yaml").write_text(
+            "robots: [{name: a, graph: {file: fleet.pyfg}}, {name: bravo, graph: {file: fleet.pyfg, robot: b}}]\n"
+            "closures: {finder: recorded}\n")
+        expected, out = self.path / "run", self.path / "up"
+        for words in (("run",), ("mission", "up", "--rate", "20")):
+            done = run(*words, self.path / "fleet.yaml", "--data", self.path, "--out", out if len(words) > 1 else expected)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.expect_same_map(out, expected)
+        for key in ("closures_accepted", "components"):
+            self.assertEqual(report(out)["server"][key], report(expected)["server"][key])
+        self.assertEqual(report(expected)["server"]["closures_accepted"], 32)
+        arrivals = sorted([k for k in range(40, 120, 5)] + [k + 40 * (k % 2) for k in range(40, 120, 5)])
+        for folder in (out, expected):  # the server's clock is the older one
+            course = report(folder)["server"]["course"]
+            for update in course:
+                self.assertLessEqual(update["closures_accepted"], sum(at <= update["time_s"] for at in arrivals))
+            self.assertGreater(course[-1]["time_s"], 155.0)  # of a115 and b75, and the robots had ended at 119
 
     def test_workers_elsewhere_find_the_same(self):
         out = self.mission_up("--workers", "2")

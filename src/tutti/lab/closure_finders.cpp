@@ -13,6 +13,7 @@
 #include "tutti/finders/sensor_finder_maker.hpp"
 #include "tutti/finders/sensor_finders.hpp"
 #include "tutti/geometry/so3.hpp"
+#include "tutti/lab/recorded_closures.hpp"
 
 namespace tutti::lab {
 
@@ -90,10 +91,11 @@ std::shared_ptr<const server::ClosureFinder> make_reference_finder(
 /// Of the recordings that the finder's answers depend on, in short.
 std::string extent_of(const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings) {
   std::string out;
-  if (!config.closure_changes.are_made_up()) return out;
+  if (!config.closure_changes.come_with_mission()) return out;
   for (const mission::MissionRecording& robot : recordings) {
     const Trajectory& reference = robot.recording.reference;
     out += fmt::format("{} {}\n", robot.recording.robot.value, reference.size());
+    if (!robot.graph.empty()) out += fmt::format("{} {}\n", robot.graph, robot.closures.size());
     if (!reference.empty()) out += fmt::format("{} {}\n", reference.front().stamp.ns, reference.back().stamp.ns);
   }
   return out;
@@ -117,9 +119,14 @@ struct DrawnSettings {
 std::shared_ptr<const server::ClosureFinder> make_closure_finder(
     const MissionConfig& config, const std::vector<mission::MissionRecording>& recordings, std::uint64_t seed) {
   const ClosureChanges& changes = config.closure_changes;
-  if (!changes.are_made_up() && changes.wrong_share == 0.0) return finders::make_finder(config.closures);
-  auto finder = changes.are_made_up() ? make_reference_finder(config, recordings, seed)
-                                      : finders::make_unnamed_finder(config.closures);
+  if (!changes.come_with_mission() && changes.wrong_share == 0.0) return finders::make_finder(config.closures);
+  std::shared_ptr<const server::ClosureFinder> finder;
+  if (changes.finder == "recorded")
+    finder = std::make_shared<RecordedClosureFinder>(recordings);
+  else if (changes.finder == "reference")
+    finder = make_reference_finder(config, recordings, seed);
+  else
+    finder = finders::make_unnamed_finder(config.closures);
   MethodId id = finder->id();
   if (changes.wrong_share > 0.0)
     finder = std::make_shared<SpoiledClosureFinder>(std::move(finder), changes.wrong_share, changes.wrong, seed);

@@ -15,6 +15,9 @@
 namespace tutti::lab {
 namespace {
 
+/// No two poses of a graph are that close: every one is a keyframe, which closures name.
+constexpr double kEveryPose_s = 1e-6;
+
 mission::MissionConfig& of_recordings(MissionConfig& config) { return config; }
 
 /// Of each of some simulated robots; without a name they are named by place.
@@ -27,15 +30,21 @@ void check_names(const Robots& robots, const char* path, std::vector<std::string
 
 void check_closures(const MissionConfig& config, std::vector<std::string>& problems) {
   const ClosureChanges& closures = config.closure_changes;
-  if (!closures.are_made_up()) {
+  if (!closures.come_with_mission()) {
     std::ranges::move(mission::problems_of_finder(config), std::back_inserter(problems));
-    if (!closures.planted.empty())
-      problems.push_back(
-          fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'", closures.finder));
   }
-  for (std::size_t i = 0; i < config.robots.size(); ++i)
-    if (closures.are_made_up() && config.robots[i].reference.file.empty())
+  if (!closures.planted.empty() && closures.finder != "reference")
+    problems.push_back(
+        fmt::format("closures.planted: given, but closures.finder is '{}', expected 'reference'", closures.finder));
+  for (std::size_t i = 0; i < config.robots.size(); ++i) {
+    const mission::RobotConfig& robot = config.robots[i];
+    if (closures.finder == "reference" && robot.reference.file.empty() && robot.graph.file.empty())
       problems.push_back(fmt::format("robots.{}.reference.file: missing, but closures.finder is 'reference'", i));
+    if (closures.finder == "recorded" && robot.graph.file.empty())
+      problems.push_back(fmt::format("robots.{}.graph.file: missing, but closures.finder is 'recorded'", i));
+  }
+  if (closures.finder == "recorded" && config.source != "recordings")
+    problems.push_back(fmt::format("closures.finder: is 'recorded', but source is '{}'", config.source));
   if (config.source == "simulation" && closures.finder == "lidar" && config.simulation.sensors != "lidar")
     problems.push_back(
         fmt::format("closures.finder: is 'lidar', but simulation.sensors is '{}'; expected finder 'reference'",
@@ -77,7 +86,7 @@ Result<MissionConfig> finish(ConfigNode root, const std::string& name, const std
   return config;
 }
 
-/// Who finds closures is of the laboratory's settings where they are made up.
+/// Who finds closures is of the laboratory's settings where they come with the mission.
 ConfigNode without_finder(ConfigNode root) {
   for (auto& [key, value] : root.map)
     if (key == "closures") std::erase_if(value.map, [](const auto& entry) { return entry.first == "finder"; });
@@ -90,9 +99,10 @@ Result<MissionConfig> read_mission(const ConfigNode& root, const std::string& na
   MissionConfig config;
   ConfigLoader loader;
   loader.load(root, config);
-  const ConfigNode rest = config.closure_changes.are_made_up() ? without_finder(root) : root;
+  const ConfigNode rest = config.closure_changes.come_with_mission() ? without_finder(root) : root;
   loader.load(rest, of_recordings(config));
   if (const auto ok = loader.finish(name); !ok) return tl::unexpected(ok.error());
+  if (mission::has_graphs(config)) config.agent.submap.keyframe_time_s = kEveryPose_s;
   return config;
 }
 
@@ -126,7 +136,7 @@ Result<MissionConfig> demo_mission(const std::vector<std::string>& assignments, 
 std::string to_yaml(const MissionConfig& config) {
   ConfigNode all = dump_config<mission::MissionConfig>(config);
   MissionConfig rest = config;
-  if (!rest.closure_changes.are_made_up()) rest.closure_changes.finder = config.closures.finder;
+  if (!rest.closure_changes.come_with_mission()) rest.closure_changes.finder = config.closures.finder;
   merge_config(all, dump_config(rest));
   return tutti::to_yaml(all);
 }

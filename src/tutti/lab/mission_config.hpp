@@ -28,7 +28,7 @@ struct RobotChanges {
   }
 };
 
-/// Closures that are made up from the reference, and ways to make found closures wrong.
+/// Closures that come with the mission, and ways to make found closures wrong.
 struct ClosureChanges {
   std::string finder = mission::MissionConfig().closures.finder;
   simulation::ReferenceClosureConfig reference;
@@ -37,16 +37,19 @@ struct ClosureChanges {
   std::vector<PlantedClosureConfig> planted;
   template <class V>
   void describe(V& v) {
-    v.field("finder", finder, one_of({"lidar", "visual", "sensors", "reference"}),
-            "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry; "
-            "reference: true relative poses plus noise and a share of wrong ones.");
+    v.field(
+        "finder", finder, one_of({"lidar", "visual", "sensors", "reference", "recorded"}),
+        "lidar: from the submap clouds; visual: from images; sensors: from whatever two submaps both carry; "
+        "reference: true relative poses plus noise and a share of wrong ones; recorded: those of robots[].graph, when "
+        "they arrived.");
     v.field("reference", reference);
     v.field("wrong_share", wrong_share, between(0.0, 0.9),
             "Share of the closures found that are made wrong on purpose.");
     v.field("wrong", wrong, any(), "How wrong these are.");
     v.field("planted", planted, any(), "reference: wrong closures at given places and times.");
   }
-  [[nodiscard]] bool are_made_up() const { return finder == "reference"; }
+  /// Closures are made of the mission's recordings, not of what sensors saw.
+  [[nodiscard]] bool come_with_mission() const { return finder == "reference" || finder == "recorded"; }
 };
 
 /// A mission file: robots with recordings, or a simulation, and what the laboratory does to either.

@@ -21,8 +21,9 @@ Result<MissionConfig> load(const MissionSource& source) {
   for (const std::string& assignment : source.assignments)
     if (const auto ok = apply_override(*root, assignment); !ok) return tl::unexpected(ok.error());
   auto config = read_mission(*root, "--set");
-  if (config && config->closure_changes.are_made_up())
-    return fail(ErrorCode::configuration, "closures.finder is 'reference': without a mission there is none");
+  if (config && config->closure_changes.come_with_mission())
+    return fail(ErrorCode::configuration, "closures.finder is '{}': without a mission there is none",
+                config->closure_changes.finder);
   return config;
 }
 
@@ -52,7 +53,7 @@ std::vector<std::string> robot_names(const MissionConfig& config) {
 
 Result<std::shared_ptr<const server::ClosureFinder>> make_finder(const MissionConfig& config,
                                                                  const MissionSource& source) {
-  if (!config.closure_changes.are_made_up()) return make_closure_finder(config, {}, source.seed);
+  if (!config.closure_changes.come_with_mission()) return make_closure_finder(config, {}, source.seed);
   const auto input = load_input(config, source.data, source.seed);
   if (!input) return tl::unexpected(input.error());
   return make_closure_finder(config, input->robots, source.seed);
@@ -80,7 +81,7 @@ Result<program::ServerSettings> server_settings(const MissionSource& source) {
   if (!finders) return tl::unexpected(finders.error());
   program::ServerSettings out{.mission = std::move(*name),
                               .robots = {},
-                              .accepts_others = !config->closure_changes.are_made_up(),
+                              .accepts_others = !config->closure_changes.come_with_mission(),
                               .server = config->server,
                               .finders = std::move(*finders)};
   if (source.file.empty()) return out;

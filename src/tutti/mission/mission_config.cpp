@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <set>
@@ -33,7 +34,8 @@ void check_links(const MissionConfig& config, const Problem& problem) {
 void check_images(const RobotConfig& robot, const std::string& path, const Problem& problem) {
   const ImagesConfig& images = robot.images;
   const bool from_maplab = !images.maplab_submaps.empty();
-  if (robot.odometry.file.empty() && robot.bag.empty() && !from_maplab) problem(path + ".odometry.file: missing");
+  if (robot.odometry.file.empty() && robot.bag.empty() && robot.graph.file.empty() && !from_maplab)
+    problem(path + ".odometry.file: missing");
   if (!robot.bag.empty() && (!robot.odometry.file.empty() || !robot.scans.empty() || from_maplab))
     problem(path + ".bag: given, and odometry or scans of files too, expected one of them");
   const BagTopicsConfig& topics = robot.topics;
@@ -52,6 +54,18 @@ void check_images(const RobotConfig& robot, const std::string& path, const Probl
     problem(path + ".images.depth.list: given, but there is no images.list");
   if (!images.imu.empty() && !images.euroc_folder.empty())
     problem(path + ".images.imu: given, but images.euroc_folder has its own in imu0");
+}
+
+void check_graphs(const MissionConfig& config, const Problem& problem) {
+  if (!has_graphs(config)) return;
+  for (std::size_t i = 0; i < config.robots.size(); ++i) {
+    const RobotConfig& robot = config.robots[i];
+    if (robot.graph.file.empty())
+      problem(fmt::format("robots.{}.graph.file: missing, but other robots are from a graph", i));
+    else if (!robot.odometry.file.empty() || !robot.bag.empty() || !robot.scans.empty() || robot.images.is_given())
+      problem(fmt::format("robots.{}.graph: given, and odometry, a bag, scans or images too, expected one of them", i));
+  }
+  if (config.odometry_hz > 0.0) problem("odometry_hz: given, but the poses of a graph are its keyframes");
 }
 
 void check_imu(const MissionConfig& config, const Problem& problem) {
@@ -93,6 +107,10 @@ Status check_numbers(const std::vector<double>& numbers, std::size_t count, cons
 
 }  // namespace
 
+bool has_graphs(const MissionConfig& config) {
+  return std::ranges::any_of(config.robots, [](const RobotConfig& robot) { return !robot.graph.file.empty(); });
+}
+
 std::string problem_of_name(const std::string& name) {
   constexpr const char* kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
   if (name.size() <= kLongestName && name.find_first_not_of(kLetters) == std::string::npos) return {};
@@ -103,6 +121,7 @@ std::vector<std::string> problems_of(const MissionConfig& config) {
   std::vector<std::string> problems;
   const auto problem = [&](std::string text) { problems.push_back(std::move(text)); };
   check_robots(config, problem);
+  check_graphs(config, problem);
   check_imu(config, problem);
   check_links(config, problem);
   if (config.server.update_period_s < kShortestUpdate_s)  // every one is a step of the mission

@@ -139,11 +139,26 @@ struct BagTopicsConfig {
   }
 };
 
+/// A robot in a pose graph of several, whose keyframes are the graph's poses.
+struct GraphConfig {
+  std::string file;   ///< Empty: none.
+  std::string robot;  ///< Empty: the robot's name.
+  template <class V>
+  void describe(V& v) {
+    v.field("file", file, any(),
+            "Instead of odometry and reference: a pose graph of several robots with times, PyFG or JRL. Edges along a "
+            "robot's poses are its odometry, vertices the reference, all other edges closures (closures.finder: "
+            "recorded).");
+    v.field("robot", robot, any(), "The robot's letter in the graph; by default its name.");
+  }
+};
+
 /// One robot with a recording that is replayed.
 struct RobotConfig {
   std::string name;
   std::string bag;  ///< Instead of odometry and scans (bags::open_bag()); empty: none.
   BagTopicsConfig topics;
+  GraphConfig graph;
   TrajectoryFile odometry;
   TrajectoryFile reference;
   std::string reference_transform;  ///< File with this robot's T_common_reference, 4x4; empty: identity.
@@ -172,6 +187,7 @@ struct RobotConfig {
     v.field("bag", bag, any(),
             "Instead of odometry and scans: what rosbag2 recorded (a folder, .mcap or .db3), or ROS 1's .bag.");
     v.field("topics", topics, any(), "Of the bag, where their types do not tell which.");
+    v.field("graph", graph);
     v.field("odometry", odometry);
     v.field("reference", reference);
     v.field("reference_transform", reference_transform, any(), "File with 4x4 T_common_reference.");
@@ -274,6 +290,8 @@ std::vector<std::string> problems_of(const MissionConfig& config);
 /// Problems of robots' data with config.closures, in the same form; for missions whose closures the configured finder
 /// finds.
 std::vector<std::string> problems_of_finder(const MissionConfig& config);
+/// True if robots are from pose graphs. Every pose is a keyframe then, whatever agent.submap says.
+bool has_graphs(const MissionConfig& config);
 /// Why files cannot be named after a robot of this name; empty when they can.
 std::string problem_of_name(const std::string& name);
 

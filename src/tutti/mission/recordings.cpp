@@ -15,6 +15,7 @@
 #include "tutti/formats/kitti.hpp"
 #include "tutti/formats/trajectory_file.hpp"
 #include "tutti/mission/bag_recording.hpp"
+#include "tutti/mission/graph_recording.hpp"
 #include "tutti/mission/resample.hpp"
 #include "tutti/mission/robot_fixes.hpp"
 #include "tutti/mission/robot_images.hpp"
@@ -101,6 +102,28 @@ Status take_bag(const BagRecording& bag, const Trajectory& odometry, const Robot
   return {};
 }
 
+std::string letter_of(const RobotConfig& robot) { return robot.graph.robot.empty() ? robot.name : robot.graph.robot; }
+
+/// What the graph has beside odometry and its covariance. A reference of its own counts before the graph's.
+void take_graph(const GraphRecording& graph, const RobotConfig& robot, MissionRecording& out) {
+  if (robot.reference.file.empty()) out.recording.reference = graph.reference;
+  out.graph = robot.graph.file;
+  out.graph_robot = letter_of(robot);
+  out.closures = graph.closures;
+  for (const std::string& note : graph.notes) out.notes.push_back(fmt::format("{}: {}", robot.name, note));
+}
+
+/// The robots of a graph share a clock: each begins when it did.
+void align_starts(std::vector<MissionRecording>& robots) {
+  std::map<std::string, Timestamp> first;
+  for (const MissionRecording& robot : robots) {
+    const Timestamp begin = robot.recording.odometry.front().stamp;
+    if (const auto known = first.try_emplace(robot.graph, begin).first; begin < known->second) known->second = begin;
+  }
+  for (MissionRecording& robot : robots)
+    if (!robot.graph.empty()) robot.start_s += robot.recording.odometry.front().stamp - first.at(robot.graph);
+}
+
 /// A bag without what closures are found from would silently have none.
 Status check_bag(const RobotConfig& robot, const std::string& finder, const MissionRecording& loaded) {
   const bool has = finder == "lidar"    ? loaded.recording.scans != nullptr
@@ -116,27 +139,56 @@ Status check_bag(const RobotConfig& robot, const std::string& finder, const Miss
       robot.name, said, finder);
 }
 
+/// What a robot's odometry is from, where that has more than odometry.
+struct Sources {
+  std::optional<formats::MaplabRecording> maplab;
+  std::optional<BagRecording> bag;
+  std::optional<GraphRecording> graph;
+};
+
+/// Puts what was read into `out`.
+template <class T>
+Status put(Result<T> read, std::optional<T>& out) {
+  if (!read) return tl::unexpected(read.error());
+  out = std::move(*read);
+  return {};
+}
+
+Status read_sources(const RobotConfig& robot, const fs::path& data, const MissionConfig& config, Sources& out) {
+  if (!robot.images.maplab_submaps.empty()) return put(read_maplab(robot.images, data), out.maplab);
+  if (!robot.bag.empty())
+    return put(read_bag(data, robot, config.closures.wants_images() && !robot.images.is_given()), out.bag);
+  if (!robot.graph.file.empty())
+    return put(read_graph_recording((data / robot.graph.file).string(), letter_of(robot)), out.graph);
+  return {};
+}
+
+Result<Trajectory> recorded_odometry(const Sources& sources, const RobotConfig& robot, const fs::path& data,
+                                     std::vector<Error>& left_out) {
+  if (sources.maplab) return sources.maplab->odometry;
+  if (sources.bag) return sources.bag->odometry;
+  if (sources.graph) return sources.graph->odometry;
+  // Scans that are numbered as the poses need all of these.
+  const bool is_numbered = !robot.scans.empty() && robot.scan_times.empty();
+  return read_trajectory(robot.odometry, data, is_numbered ? nullptr : &left_out);
+}
+
+/// Of the samples of `odometry`, the first of which is number `from`.
+std::vector<Matrix6d> covariances_of(const Sources& sources, const RobotConfig& robot, const Trajectory& odometry,
+                                     std::size_t from) {
+  if (!sources.graph) return robot::increment_covariances(odometry, robot.covariance);
+  const auto begin = sources.graph->increment_covariance.begin() + static_cast<std::ptrdiff_t>(from);
+  return {begin, begin + static_cast<std::ptrdiff_t>(odometry.size()) - 1};
+}
+
 Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, const MissionConfig& config,
                                 const ChangeOdometry& change) {
   const visual::TrackingConfig& tracking = config.tracking;
-  std::optional<formats::MaplabRecording> maplab;
-  if (!robot.images.maplab_submaps.empty()) {
-    auto read = read_maplab(robot.images, data);
-    if (!read) return tl::unexpected(read.error());
-    maplab = std::move(*read);
-  }
-  std::optional<BagRecording> bag;
-  if (!robot.bag.empty()) {
-    auto read = read_bag(data, robot, config.closures.wants_images() && !robot.images.is_given());
-    if (!read) return tl::unexpected(read.error());
-    bag = std::move(*read);
-  }
-  // Scans that are numbered as the poses need all of these.
-  const bool is_numbered = !robot.scans.empty() && robot.scan_times.empty();
+  Sources sources;
+  if (auto ok = read_sources(robot, data, config, sources); !ok) return tl::unexpected(ok.error());
+  const auto& [maplab, bag, graph] = sources;
   std::vector<Error> left_out;
-  auto odometry = maplab ? Result<Trajectory>(maplab->odometry)
-                  : bag  ? Result<Trajectory>(std::move(bag->odometry))
-                         : read_trajectory(robot.odometry, data, is_numbered ? nullptr : &left_out);
+  const auto odometry = recorded_odometry(sources, robot, data, left_out);
   if (!odometry) return tl::unexpected(odometry.error());
   MissionRecording out;
   if (!left_out.empty())
@@ -148,6 +200,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     out.recording.reference = std::move(reference->first);
     if (robot.reference.file == robot.odometry.file) out.T_common_odom = reference->second;
   }
+  if (graph) take_graph(*graph, robot, out);
   const auto [from, until] = part_of(odometry->size(), robot);
   Trajectory raw(odometry->begin() + static_cast<std::ptrdiff_t>(from),
                  odometry->begin() + static_cast<std::ptrdiff_t>(until));
@@ -178,7 +231,7 @@ Result<MissionRecording> replay(const RobotConfig& robot, const fs::path& data, 
     out.notes.push_back(fmt::format("{}: {}", robot.name, images->note));
     take_images(std::move(*images), out.recording);
   }
-  out.recording.increment_covariance = robot::increment_covariances(raw, robot.covariance);
+  out.recording.increment_covariance = covariances_of(sources, robot, raw, from);
   out.recording.odometry = std::move(raw);
   return out;
 }
@@ -197,6 +250,7 @@ Result<std::vector<MissionRecording>> replay_all(const MissionConfig& config, co
     loaded->score_against_reference = robot.score_against_reference && !loaded->recording.reference.empty();
     out.push_back(std::move(*loaded));
   }
+  align_starts(out);
   return out;
 }
 

@@ -14,8 +14,18 @@
 #include "tutti/mission/mission_config.hpp"
 #include "tutti/model/point_cloud.hpp"
 #include "tutti/model/recording.hpp"
+#include "tutti/model/relative_pose.hpp"
 
 namespace tutti::mission {
+
+/// A closure that came with a recording, and when its server got it.
+struct RecordedClosure {
+  std::string from;  ///< The other robot, by its letter in the graph.
+  Timestamp from_stamp;
+  Timestamp to_stamp;  ///< Of the robot that has the closure.
+  RelativePose measurement;
+  Timestamp arrived;
+};
 
 /// A robot's recording, with what is known about it besides (and never shown to robots or server).
 struct MissionRecording {
@@ -26,7 +36,9 @@ struct MissionRecording {
   /// T_common_odom, when the reference is the recorded odometry itself (so it is exact up to the reference's own
   /// error).
   std::optional<Pose3> T_common_odom;
-  std::vector<std::string> notes;  ///< Assumptions made about the recording, for the report.
+  std::string graph, graph_robot;         ///< File and letter of the graph that it is from; empty: from none.
+  std::vector<RecordedClosure> closures;  ///< Those of the graph that end at this robot.
+  std::vector<std::string> notes;         ///< Assumptions made about the recording, for the report.
 };
 
 /// The recordings of a mission.
