@@ -4,7 +4,7 @@
 #
 # Usage: bench/accuracy/all.sh SHARED [TABLE...]
 #
-# SHARED holds data/ (docs/data.md) and cases/. TABLEs are map, judge, missions, hku, paper and selection; all without any.
+# SHARED holds data/ (docs/data.md) and cases/. TABLEs are fleets, map, judge, missions, hku, paper and selection; all without any.
 # Builds the preset `bench` first. Runs are kept in out/all/PROGRAM, PROGRAM being a sum over what was built: stopped at
 # any moment and called again it goes on, and another program begins anew. JOBS=1 leaves a core free (default 2).
 set -eu
@@ -12,7 +12,7 @@ cd "$(dirname "$0")/../.."
 [ $# -ge 1 ] || { sed -n '3,10s/^# \{0,1\}//p' "$0"; exit 2; }
 shared=$(cd "$1" && pwd)
 shift
-[ $# -gt 0 ] || set -- map judge missions hku paper selection
+[ $# -gt 0 ] || set -- fleets map judge missions hku paper selection
 jobs=${JOBS:-2}
 tutti=$PWD/build/bench/apps/tutti/tutti
 calibration=$PWD/build/bench/bench/accuracy/tutti_calibration
@@ -26,13 +26,14 @@ mkdir -p "$keep"
 
 run_table() {
   case $1 in
+    fleets) python3 bench/accuracy/fleets.py "$tutti" --data "$shared/data" --jobs "$jobs" --out "$keep/fleets" ;;
     map) python3 bench/accuracy/map.py "$tutti" --shared "$shared" --jobs "$jobs" --out "$keep/map" ;;
     judge) python3 bench/accuracy/judge.py "$judge" --out "$keep/judge" ;;
     missions) python3 bench/accuracy/missions.py "$tutti" --data "$shared/data" --keep "$keep/missions" ;;
     hku) python3 bench/accuracy/hku.py "$tutti" --data "$shared/data" --keep "$keep/hku" ;;
     paper) python3 bench/accuracy/paper.py "$tutti" --keep "$keep/paper" ;;
     selection) python3 bench/accuracy/selection.py "$tutti" "$calibration" --data "$shared/data" --keep "$keep/selection" --jobs "$jobs" ;;
-    *) echo "no table is called '$1': map, judge, missions, hku, paper, selection" >&2; return 2 ;;
+    *) echo "no table is called '$1': fleets, map, judge, missions, hku, paper, selection" >&2; return 2 ;;
   esac
 }
 
@@ -47,7 +48,7 @@ failed=
 alone=
 for table in "$@"; do  # those that make one run after the other, side by side; the others use all cores themselves
   case $table in
-    map | selection) ;;
+    fleets | map | selection) ;;
     *) alone="$alone $table" ;;
   esac
 done
@@ -70,7 +71,7 @@ else
 fi
 for table in "$@"; do
   case $table in
-    map | selection) make_table "$table" || failed="$failed $table" ;;
+    fleets | map | selection) make_table "$table" || failed="$failed $table" ;;
   esac
 done
 

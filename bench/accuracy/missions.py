@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs the missions once (and the demo) with all policies side by side and writes docs/results/missions.md; tunnel and
-terrace are in paper.py.
+terrace are in paper.py, cosmo_tuhh in fleets.py.
 
 Usage: bench/accuracy/missions.py TUTTI_PROGRAM --data FOLDER [--seed 1] [--keep FOLDER]
 docs/data.md says what FOLDER holds.
@@ -58,7 +58,7 @@ def main():
     options = ["--seed", arguments.seed, "--set", compare(*COMPETITORS)]
     text += section(report_of(arguments.tutti, "demo", *options, keep=arguments.keep))
     for name in sorted(file.stem for file in (SOURCE / "missions").glob("*.yaml")
-                       if file.stem not in ("demo", "tunnel", "terrace")):
+                       if file.stem not in ("demo", "tunnel", "terrace", "cosmo_tuhh")):
         try:
             text += section(report_of(arguments.tutti, "run", mission_file(name), "--data", arguments.data, *options,
                                       keep=arguments.keep))
